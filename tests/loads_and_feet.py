@@ -18,9 +18,9 @@ def context_of(recording, feet=None, **more):
     return RecordingContext(recording, MarkerSet("feet", {}, segments, {}), **more)
 
 
-def place_findings(recording, feet=None, **more):
+def place_findings(recording, feet=None, context=None, **more):
     """What all questions of places find, with causes over their consequences."""
-    return explained(asked(PLACE_QUESTIONS, context_of(recording, feet, **more)))
+    return explained(asked(PLACE_QUESTIONS, context or context_of(recording, feet, **more)))
 
 
 def doubted(recording, feet=None, **more):

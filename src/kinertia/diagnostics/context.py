@@ -9,11 +9,14 @@ from typing import Any
 
 from kinertia.diagnostics.axes import Axes, AxisNames
 from kinertia.diagnostics.evidence.caused_velocity import CausedVelocity, caused_velocities
+from kinertia.diagnostics.evidence.copied_frames import without_copied_frames
 from kinertia.diagnostics.evidence.foot_trajectories import FootTrajectory, foot_trajectories
 from kinertia.diagnostics.evidence.force_mass import ForceMass, force_mass
 from kinertia.diagnostics.evidence.loaded_plates import adult_share
+from kinertia.diagnostics.evidence.marker_precision import MarkerPrecision
 from kinertia.diagnostics.evidence.plate_contacts import PlateContact, contacts_of
 from kinertia.diagnostics.evidence.plate_edges import Overhang, overhangs, without
+from kinertia.diagnostics.evidence.trajectory_faults import TrajectoryFaults
 from kinertia.errors import KinertiaError
 from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.findings.finding import Finding, Severity
@@ -71,6 +74,23 @@ class RecordingContext:
             return self.recording.markers
         present = set(self.recording.markers.labels)
         return self.recording.markers.select([label for label in self.marker_set.labels if label in present])
+
+    @cached_property
+    def measured_markers(self) -> Markers:
+        """`markers` without copies of lost frames."""
+        return self.markers if self.is_static else without_copied_frames(self.markers)
+
+    @cached_property
+    def marker_precision(self) -> MarkerPrecision:
+        """Rounding and noise of the coordinates."""
+        return MarkerPrecision.of(self.measured_markers)
+
+    @cached_property
+    def trajectory_faults(self) -> TrajectoryFaults:
+        """Spikes, jumps and filled intervals of single markers; of who stands still, repeated spikes only."""
+        segments = {} if self.marker_set is None else self.marker_set.segments
+        coarse = self.is_static or self.marker_precision.rounded or self.marker_precision.noisy
+        return TrajectoryFaults.of(self.measured_markers, segments, coarse)
 
     @cached_property
     def travel(self) -> Travel:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from kinertia.errors import PriorError, problem_of
-from kinertia.findings.finding import finding
+from kinertia.findings.finding import with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.settings import Attached
@@ -54,8 +54,8 @@ class CarriedMass:
         if body < min(_LIGHTEST_KG, scale_kg):
             names = ", ".join(one.name for one in attached if one.on_scale)
             problem = f"weighed with the person (on_scale = true), it leaves {body:.4g} kg of {scale_kg:.4g} kg"
-            stated = {"name": Quantity(names), "problem": Quantity(problem)}
-            found = finding("S406", Where(part=names), left_kg=Quantity(body, "kg"), **stated)
+            left = {"left_kg": Quantity(body, "kg"), "name": Quantity(names), "problem": Quantity(problem)}
+            found = with_evidence("S406", Where(part=names), left)
             raise PriorError(problem_of(found)).with_finding(found)
         beside = [mass for mass, weighed in masses if not weighed]
         return cls(body, scale_kg + sum(mass for mass, _ in beside), sum(sd * sd for _, sd in beside) ** 0.5)

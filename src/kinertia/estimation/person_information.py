@@ -17,7 +17,7 @@ from kinertia.errors import PriorError, problem_of
 from kinertia.estimation.population import population_prior
 from kinertia.estimation.prior import BspPrior, literature_prior
 from kinertia.estimation.result import Fit
-from kinertia.findings.finding import finding
+from kinertia.findings.finding import with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.model.bsp import BodySegmentParameters, block_diagonal, dynamic_by_table
@@ -92,7 +92,9 @@ def _relative(literature: BspPrior, body: BodySegmentParameters) -> tuple[np.nda
 
 def unusable(person: str, reason: str, **evidence: Quantity) -> PriorError:
     """S409: a person, or a group, from whom no prior can be learnt."""
-    found = finding("S409", Where(part=person), person=Quantity(person), reason=Quantity(reason), **evidence)
+    found = with_evidence(
+        "S409", Where(part=person), {**evidence, "person": Quantity(person), "reason": Quantity(reason)}
+    )
     return PriorError(problem_of(found)).with_finding(found)
 
 

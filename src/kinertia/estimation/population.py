@@ -23,8 +23,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kinertia.estimation.prior import BspPrior
-from kinertia.findings.finding import Finding, Severity, finding
+from kinertia.findings.finding import Finding, Severity, with_evidence
 from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.settings import Subject
 
@@ -59,7 +60,7 @@ class Population:
             evidence["bmi"] = Quantity(subject.mass_kg / subject.height_m**2, "kg/m2", limit=OBESE_KG_M2)
         if subject.age_years is not None:
             evidence["age"] = Quantity(subject.age_years, "a")
-        return finding("S401", severity=Severity.INFO if self.stated else Severity.WARNING, **evidence)
+        return with_evidence("S401", Where(), evidence, Severity.INFO if self.stated else Severity.WARNING)
 
 
 @dataclass(frozen=True, eq=False)

@@ -40,6 +40,10 @@ class Prepared:
         overrule, overrule_of: what the user overrules, everywhere and in single trials.
         left_out: names of the trials that could not be used.
         rules: how many rules were asked so far.
+        elbow_rotations_rad: side ("r", "l") -> by how much the trials turned an elbow axis of the static trial
+            (`arm_branch.elbow_rotations`).
+        torso_rotation_rad: by how much calibration would have turned the torso under its markers, which were kept from
+            it; None where it would not.
 
     Examples:
         >>> ready = kinertia.prepare_subject("lab/subject.toml")
@@ -63,6 +67,8 @@ class Prepared:
     overrule_of: Mapping[str, Overrule] = field(default_factory=dict)
     left_out: tuple[str, ...] = ()
     rules: int = 0
+    elbow_rotations_rad: Mapping[str, float] = field(default_factory=dict)
+    torso_rotation_rad: float | None = None
 
     @property
     def carried(self) -> CarriedMass:

@@ -16,9 +16,9 @@ from kinertia.estimation.identifiability import evidence
 from kinertia.estimation.input_checks import known
 from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
 from kinertia.estimation.simultaneous.fit import Posterior
-from kinertia.model.anthropometry import SEGMENTS
 from kinertia.findings.finding import Finding, Severity
 from kinertia.findings.overview import Overview
+from kinertia.model.anthropometry import SEGMENTS
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.imported import OsimModel
 from kinertia.model.skeleton import Skeleton
@@ -205,6 +205,7 @@ class Fit:
         file: the OpenSim model that the skeleton is from, if it is.
         left_out: names of the trials that could not be used.
         rules: how many rules were asked.
+        evaluations: of the two-level estimate; 0 of the other one.
 
     Examples:
         >>> mass = fit.bsp[fit.bsp.parameter == "mass"]  # fit = kinertia.fit_subject("subject.toml")
@@ -227,6 +228,7 @@ class Fit:
     file: OsimModel | None = None
     left_out: tuple[str, ...] = ()
     rules: int = 0
+    evaluations: int = 0
 
     @property
     def overview(self) -> Overview:

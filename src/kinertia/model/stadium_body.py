@@ -29,8 +29,9 @@ from typing import Any
 import numpy as np
 
 from kinertia.errors import PriorError, problem_of
-from kinertia.findings.finding import Severity, finding
+from kinertia.findings.finding import Severity, with_evidence
 from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
 from kinertia.model.bsp import BodySegmentParameters, FloatArray, combine
 from kinertia.model.measures import measures
 
@@ -152,7 +153,7 @@ def _cut_at(trunk: Sequence[tuple[Any, float]], height_m: float) -> tuple[list[A
 def _impossible(measure: str, value: Quantity, expected: str) -> PriorError:
     """S403 of measures that no body has."""
     stated = {"measure": Quantity(measure), "value_m": value, "expected_m": Quantity(expected)}
-    found = finding("S403", severity=Severity.ERROR, **stated)
+    found = with_evidence("S403", Where(part=measure), stated, Severity.ERROR)
     return PriorError(problem_of(found)).with_finding(found)
 
 

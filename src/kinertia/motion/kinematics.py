@@ -25,7 +25,6 @@ from kinertia.motion.common_cutoff import Cutoff, common_cutoff
 from kinertia.motion.dynamics import Motion
 from kinertia.motion.inverse_kinematics import InverseKinematics, solve_ik
 from kinertia.motion.one_thread import one_blas_thread
-from kinertia.motion.range_ends import range_notes
 from kinertia.motion.smoothing import SmoothedSpline, SmoothingError, smooth
 from kinertia.trial.data import Markers, Trial
 from kinertia.trial.sampled_time import TIME_TOLERANCE_S, runs, span_s, within
@@ -186,7 +185,6 @@ def solve_kinematics(
     if stuck:
         findings.append(finding("R105", Where(trial=trial.name), frames=Quantity(stuck, "1")))
     remarks = [f"{trial.name}: {cutoff.sentence}"] if cutoff.sentence else []
-    remarks += [f"{trial.name}: {sentence}" for sentence in range_notes(skeleton, ik)]
     return Kinematics(
         trial, turned_deg, ik, spline, cutoff.hz, windows, (*trial.notes, *remarks), (*trial.findings, *findings)
     )
@@ -218,8 +216,8 @@ def _long_enough(
     if not used:
         first, last = max(windows, key=lambda run: run[1] - run[0])
         longest = Where(span_s=(float(time[first]), float(time[last])))
-        frames = Quantity(last - first + 1, "1", limit=FEWEST_FRAMES)
-        raise TrialError.found(trial.name, "P279", at=longest, frames=frames)
+        few = Quantity(last - first + 1, "1", limit=FEWEST_FRAMES)
+        raise TrialError.found(trial.name, "P279", at=longest, frames=few)
     frames = sum(last - first + 1 for first, last in used)
     left_out = sum(last - first + 1 for first, last in windows) - frames
     found = []

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
+from kinertia.diagnostics.result.masses import mass_from_force_kg
 from kinertia.diagnostics.result.suitability import suitability
-from kinertia.diagnostics.result.warnings import mass_from_force_kg
 from kinertia.estimation.cycles import Stage, cycle_columns, spatiotemporal_columns
 from kinertia.estimation.forces_used import forces_before, forces_used
 from kinertia.estimation.identifiability import BaseParameters

@@ -14,7 +14,7 @@ import numpy as np
 from kinertia.estimation.forces_used import forces_used, full_bandwidth
 from kinertia.estimation.identifiability import evidence
 from kinertia.estimation.result import Fit, TrialFit
-from kinertia.estimation.simultaneous.instrument_warnings import SHOWN_UNIT
+from kinertia.estimation.simultaneous.instrument_errors import SHOWN_UNIT
 from kinertia.io.provenance import Provenance, versions
 from kinertia.model.bsp import PARAMETERS
 from kinertia.report.body_figure import body_figure

@@ -355,7 +355,7 @@ class Trial:
         loads: the loads of the two feet, in their own (usually faster) time base.
         measured: (n,) True where every foot on the ground stood on a loaded plate.
         notes: one sentence for each assumption made on the way here.
-        virtual_sd_m, belt: as the recording's.
+        virtual_sd_m, belt, vertical: as the recording's.
         findings: how its loads were sorted by foot.
 
     Examples:
@@ -375,6 +375,7 @@ class Trial:
     virtual_sd_m: Mapping[str, float] = field(default_factory=dict)
     belt: Belt | None = None
     findings: tuple[Finding, ...] = ()
+    vertical: str = "+Y"
 
     def __post_init__(self) -> None:
         _expect_shape("measured", self.measured, (len(self.markers.time),))

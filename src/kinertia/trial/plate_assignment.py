@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from kinertia.errors import TrialError, problem_of
-from kinertia.findings.finding import Finding, finding
+from kinertia.findings.finding import Finding, finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.trial.data import FEET, BoolArray, FloatArray, FootLoads, Markers, Recording, Trial
@@ -82,6 +82,7 @@ def build_trial(recording: Recording, feet: FootMarkers, window_s: tuple[float, 
         recording.virtual_sd_m,
         recording.belt,
         findings,
+        recording.vertical,
     )
 
 
@@ -251,19 +252,20 @@ def _spans(time: FloatArray, mask: BoolArray) -> str:
 def _nothing_measured(
     recording: Recording, loads: FootLoads, contact: GroundContact, window_s: tuple[float, float] | None
 ) -> Finding:
-    """P278, with when forces were there, or when feet were on the ground and on plates, and how long both shared one."""
+    """P278, with when forces were there, or feet on the ground and on plates, and how long both shared a plate."""
     time, where = recording.markers.time, Where(trial=recording.name, span_s=window_s)
-    evidence = {"left_out": Quantity("; ".join(recording.left_out))} if recording.left_out else {}
+    left_out = {"left_out": Quantity("; ".join(recording.left_out))} if recording.left_out else {}
     if window_s is not None:
-        causes = ("a window in which there are no forces",)
-        return finding("P278", where, causes=causes, forces=Quantity(_spans(time, contact.inside)), **evidence)
+        forces = {"forces": Quantity(_spans(time, contact.inside)), **left_out}
+        return with_evidence("P278", where, forces, causes=("a window in which there are no forces",))
     both = contact.ground.all(axis=1) & (contact.loaded.sum(axis=1) == 1)
     shared = float(both.mean()) if loads.together is not None else 0.0
+    evidence = {"shared": Quantity(shared, "1", limit=_MOSTLY_SHARED)}
     for foot, name in enumerate(FOOT_NAMES):
         evidence[f"{name}_ground"] = Quantity(_spans(time, contact.ground[:, foot]))
         evidence[f"{name}_plate"] = Quantity(_spans(time, contact.loaded[:, foot]))
-    causes = ("both feet on one plate, which measures their sum only",) if shared > _MOSTLY_SHARED else ()
-    return finding("P278", where, causes=causes, shared=Quantity(shared, "1", limit=_MOSTLY_SHARED), **evidence)
+    one_plate = ["both feet on one plate, which measures their sum only"] if shared > _MOSTLY_SHARED else []
+    return with_evidence("P278", where, evidence | left_out, causes=tuple(one_plate))
 
 
 def _error(found: Finding) -> TrialError:

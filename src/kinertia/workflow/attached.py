@@ -30,8 +30,6 @@ _UNKNOWN_SIZE_SD = 0.5
 """Relative deviation of the second moments of something whose size is not given."""
 _WATER_KG_M3 = 1000.0
 _GROUND = "ground"
-_TOLD_SD = 2.0
-"""Deviations of its mass by which something is told from nothing."""
 
 
 def with_attached(ready: Prepared, by_itself: Collection[str] = ()) -> Prepared:
@@ -153,21 +151,6 @@ def _less_body(prior: BspPrior, by_itself: Collection[str]) -> np.ndarray:
     change[:, 1:4] = 0.0
     change[[name in by_itself for name in prior.mean.segments]] = 0.0
     return change.ravel()
-
-
-def not_found_warnings(attached: Sequence[Attached], estimate: BodySegmentParameters, sd: np.ndarray) -> list[str]:
-    """One sentence for each thing of unknown mass of which nothing is found; `sd` (s, 10) of the estimate's table."""
-    warnings = []
-    for one in attached:
-        row = estimate.segments.index(one.name)
-        mass_kg, sd_kg = float(estimate.mass_kg[row]), float(sd[row, 0])
-        if one.mass_kg is None and mass_kg < _TOLD_SD * sd_kg:
-            weighed = "" if one.on_scale else ", is mass_kg under [subject] without it, and are the plates' gains right"
-            warnings.append(
-                f"[[attached]] {one.name}: {mass_kg:.2f} kg are found, with a deviation of {sd_kg:.2f} kg, which is "
-                f"not to be told from nothing; was it there{weighed}? A known mass would help (mass_kg)"
-            )
-    return warnings
 
 
 def _assumed(attached: Attached, scale_kg: float) -> Finding:

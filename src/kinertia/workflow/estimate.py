@@ -8,11 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kinertia.diagnostics.result.mirrored_free_moments import mirrored_free_moments_warning
-from kinertia.diagnostics.result.unseen_turn import unseen_turn_note
-from kinertia.diagnostics.result.warnings import fit_warnings, force_warnings, turning_warnings, two_level_warnings
-from kinertia.diagnostics.subject.telling_movements import TellingMovements, missing_movements
-from kinertia.estimation.forces_used import forces_used
+from kinertia.diagnostics.result.warnings import two_level_warnings
 from kinertia.estimation.free_moment_sign import free_moment_sign_warnings, with_likelier_sign
 from kinertia.estimation.prepared import Prepared, Progress
 from kinertia.estimation.prior import BspPrior
@@ -22,7 +18,6 @@ from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
 from kinertia.estimation.simultaneous.fit import Posterior, SimultaneousFit, fit_simultaneous
 from kinertia.estimation.simultaneous.model_uncertainty import ModelUncertainty
 from kinertia.estimation.two_level import Window, correct_pelvis, estimate_two_level, stretches
-from kinertia.model.anatomy import segment_of
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.gait27 import VIRTUAL_TRUNK
 from kinertia.model.imported import OsimModel
@@ -36,7 +31,7 @@ from kinertia.motion.smoothing import interpolate
 from kinertia.settings import Attached, Overrule, Settings, Subject
 from kinertia.trial.data import Recording
 from kinertia.trial.trial_input import TrialInput
-from kinertia.workflow.attached import not_found_warnings, with_attached
+from kinertia.workflow.attached import with_attached
 from kinertia.workflow.prepare import prepare
 
 

@@ -25,7 +25,7 @@ from kinertia.estimation.input_checks import complete_subject
 from kinertia.findings.finding import Finding
 from kinertia.findings.rule import matching
 from kinertia.model.marker_set import MarkerSet
-from kinertia.settings import Overrule, Subject
+from kinertia.settings import Subject
 from kinertia.trial.data import Recording
 from kinertia.workflow.joint_widths import with_widths
 from kinertia.workflow.person import Person
@@ -116,9 +116,8 @@ def screen(person: Person) -> Screened:
     for trial in context.trials:
         found += _of_recording(trial, MOTION_QUESTIONS)
     found += _of_person(context, found)
-    return Screened(
-        person, context, more_statics, tuple(_overruled(explained(found), person.overrule, person.overrule_of))
-    )
+    findings = overruled(explained(found), person.overrule, person.overrule_of)
+    return Screened(person, context, tuple(findings))
 
 
 def person_context(person: Person) -> PersonContext:

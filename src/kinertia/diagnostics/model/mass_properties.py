@@ -81,13 +81,10 @@ def degenerate_inertia(context: PersonContext) -> Iterator[Finding]:
     if context.model is None:
         return
     bsp = context.model.bsp
-    impossible, pointlike = (
-        impossible_segments(bsp),
-        {name for name, _, radius_m in _radii(bsp) if not radius_m > _NO_EXTENT_M},
-    )
+    others = {*impossible_segments(bsp), *(name for name, _, radius_m in _radii(bsp) if not radius_m > _NO_EXTENT_M)}
     for k in np.flatnonzero(~bsp.physically_consistent() & (bsp.mass_kg > 0)):
         name = bsp.segments[k]
-        if name not in impossible and name not in pointlike:
+        if name not in others:
             moments = Quantity(tuple(np.linalg.eigvalsh(bsp.inertia_kgm2[k]).tolist()), "kg m2")
             yield finding("O205", Where(part=name), advice(context), moments_kgm2=moments)
 

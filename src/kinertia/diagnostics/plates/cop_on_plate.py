@@ -14,7 +14,7 @@ from kinertia.findings.quantity import Quantity
 from kinertia.trial.data import PlateLoads
 
 OFF_PLATE_SHARE = 0.05
-"""More of the reliable load than this with its centre of pressure off the plate is worth a look; half of it is wrong."""
+"""More of the load than this with its centre of pressure off the plate is worth a look; half of it is wrong."""
 _MOST_SHARE = 0.5
 
 

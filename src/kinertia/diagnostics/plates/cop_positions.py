@@ -21,7 +21,7 @@ from kinertia.diagnostics.plates.interchanged_plates import interchanged_plates
 from kinertia.diagnostics.plates.rotated_plates import rotated_plates
 from kinertia.diagnostics.timing.contact_delays import contact_delays, stance_durations
 from kinertia.diagnostics.timing.rate_and_delay import fitted_rate_or_delay
-from kinertia.findings.finding import Finding, Severity, finding
+from kinertia.findings.finding import Finding, Severity, finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.rule import rule
 
@@ -176,11 +176,5 @@ def _excess_of_both(begin_m: float, end_m: float) -> float:
 
 
 def _origin(context: RecordingContext, offset: Quantity, contacts: int, method: str, **measured: Quantity) -> Finding:
-    return finding(
-        "P243",
-        context.at(),
-        offset_m=offset,
-        **measured,
-        contacts=Quantity(contacts, "1"),
-        method=Quantity(method),
-    )
+    how = {"contacts": Quantity(contacts, "1"), "method": Quantity(method)}
+    return with_evidence("P243", context.at(), {"offset_m": offset, **measured, **how})

@@ -21,7 +21,7 @@ from kinertia.diagnostics.evidence.velocity_residual import (
     VelocityResidual,
     rotated_residual,
 )
-from kinertia.findings.finding import Finding, finding
+from kinertia.findings.finding import Finding, finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.rule import rule
 from kinertia.trial.data import PlateLoads, Trial
@@ -63,7 +63,7 @@ def force_directions(context: RecordingContext) -> Iterator[Finding]:
         others += own[1:]
         both.append(own[0].residual_m_s if own else residuals[axis].as_read)
     rotated = _rotated(context, parts, residuals, correlations, against)
-    if rotated is not None and rotated.residual_m_s <= float(np.hypot(*both)):
+    if rotated is not None and (not best or rotated.residual_m_s <= float(np.linalg.norm(both))):
         best, others = [rotated], [*best, *others]
     elif rotated is not None:
         others.append(rotated)
@@ -86,7 +86,7 @@ def _rotated(
     enough = -_OPPOSED if against else _CLEAR
     fitting = any(one > enough for one in correlations.values())
     if len(against) == len(HORIZONTAL):
-        angle, residual = np.pi, float(np.hypot(*(one.all_reversed for one in residuals.values())))
+        angle, residual = np.pi, float(np.linalg.norm([one.all_reversed for one in residuals.values()]))
     elif strength > _CLEAR_ROTATION and abs(angle_deg) > _ROTATED_DEG and not fitting:
         angle = float(np.radians(90 * round(angle_deg / 90)))
         residual = rotated_residual(parts, angle)
@@ -144,7 +144,7 @@ def _reversed_plate(
     else:  # a foot that pushes to one side all the time looks the same with another zero
         evidence |= {"zero_n": Quantity(float(residual.zero_n[zero]), "N"), "zero_of": Quantity(plates.names[zero])}
     where = context.at(plate=plates.names[best], **context.along(axis))
-    yield _Hypothesis(finding("P233", where, causes=causes, **evidence), left)
+    yield _Hypothesis(with_evidence("P233", where, evidence, causes=causes), left)
 
 
 def _best_explained(plates: PlateLoads, parts: Sequence[CausedVelocity], axis: int) -> VelocityResidual:

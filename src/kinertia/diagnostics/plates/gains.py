@@ -16,7 +16,7 @@ from kinertia.diagnostics.evidence.caused_velocity import CausedVelocity
 from kinertia.diagnostics.evidence.markers_centre import markers_centre
 from kinertia.diagnostics.evidence.ups_and_downs import ups_and_downs_of
 from kinertia.diagnostics.evidence.velocity_residual import HORIZONTAL, Scaled, VelocityResidual
-from kinertia.findings.finding import Finding, finding
+from kinertia.findings.finding import Finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.model.skeleton import GRAVITY_M_S2
 from kinertia.motion.smoothing import SmoothingError, smooth
@@ -105,7 +105,7 @@ def _disagreeing(
     """P221 of the plate that reads more and of the one that reads less; which of them is wrong nobody knows."""
     plates = {"plate": Quantity(names[0]), "other": Quantity(names[1])}
     masses = {"mass_kg": Quantity(mass_kg[0], "kg"), "other_kg": Quantity(mass_kg[1], "kg")}
-    return finding("P221", context.at(**context.along(1)), **masses, **plates, **evidence)
+    return with_evidence("P221", context.at(**context.along(1)), {**masses, **plates, **evidence})
 
 
 def _masses(context: RecordingContext, plates: PlateLoads, trial: Trial) -> dict[str, float]:
@@ -149,14 +149,14 @@ def _scaled_axis(
         return None
     alike = [one for one in residual.scaled if _CLEARLY_BEST * one.residual < best.residual and _is_gain(one)]
     names = ["all plates" if one.plate is None else plates.names[one.plate] for one in alike]
+    evidence = {
+        "factor": Quantity(best.factor, "1"),
+        "velocity_residual_m_s": residual.once(best.residual, limit),
+    }
     single = len(alike) == 1 and best.plate is not None
-    return finding(
-        "P222",
-        context.at(plate=names[0] if single else None, **context.along(axis)),
-        factor=Quantity(best.factor, "1"),
-        velocity_residual_m_s=residual.once(best.residual, limit),
-        **({} if single else {"plate": Quantity(" or ".join(names))}),
-    )
+    if not single:
+        evidence["plate"] = Quantity(" or ".join(names))
+    return with_evidence("P222", context.at(plate=names[0] if single else None, **context.along(axis)), evidence)
 
 
 def _is_gain(one: Scaled) -> bool:

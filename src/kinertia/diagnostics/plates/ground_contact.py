@@ -1,4 +1,4 @@
-"""Is ground contact complete? Loads sorted by foot, frames with complete contact, feet beside or together on a plate."""
+"""Is ground contact complete? Loads sorted by foot, frames with complete contact, feet beside or together on plates."""
 
 from __future__ import annotations
 
@@ -75,7 +75,8 @@ def _under_both(contact: PlateContact) -> BoolArray:
     # on a treadmill's single belt the feet come in turn, and each sample is sorted (`plate_assignment`)
     if span_s(contact.time) <= ONE_STEP_S:
         away |= own > _OUTSIDE_M
-    return away & (own > _OTHERS_SHARE * (own + other))
+    away &= own > _OTHERS_SHARE * (own + other)
+    return away
 
 
 def plate_edges(context: RecordingContext) -> Iterator[Finding]:
@@ -93,5 +94,5 @@ def plate_edges(context: RecordingContext) -> Iterator[Finding]:
 
 
 def partly_unmeasured(context: RecordingContext) -> list[tuple[float, float]]:
-    """First and last time (s) of what a preparation leaves out: more than a toe of a loaded foot is beside its plate."""
+    """First and last time (s) of what a preparation leaves out: more than a toe of a loaded foot is off its plate."""
     return [one.span_s for one in context.overhangs if not one.only_toe]

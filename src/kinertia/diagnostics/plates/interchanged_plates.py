@@ -74,7 +74,8 @@ def _middles(plates: PlateLoads, used: Sequence[int]) -> dict[int, FloatArray]:
 def _opposite(context: RecordingContext) -> Iterator[Hypothesis]:
     """Loads of two plates, or belts, that are off by as much in opposite directions, each by the same all the time."""
     plates, feet = context.plates, context.foot_trajectories
-    assert plates is not None and feet is not None
+    assert plates is not None
+    assert feet is not None
     steps = [one for one in context.contacts if one.is_step]
     used = sorted({one.plate for one in steps})
     if len(used) != 2:

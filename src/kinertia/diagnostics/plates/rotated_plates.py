@@ -56,18 +56,18 @@ def rotated_plates(context: RecordingContext) -> Iterator[Hypothesis]:
     clearly = only or _rms(left_m[best]) < _CLEARLY_BEST * _rms(left_m[second])
     if not best or left_m[best].max() > _RIGHT_M or not clearly:
         return
-    which = list(best[1:])
+    wrong = list(best[1:])
     by = np.zeros_like(point)
-    by[:, which] = (middle + (point - middle) @ np.array(_OPERATIONS[best[0]][1]).T - point)[:, which]
+    by[:, wrong] = (middle + (point - middle) @ np.array(_OPERATIONS[best[0]][1]).T - point)[:, wrong]
     operation, _, cause = _OPERATIONS[best[0]]
     found = finding(
         "P242",
-        context.at(plate=plates.names[which[0]] if len(which) == 1 else None),
+        context.at(plate=plates.names[wrong[0]] if len(wrong) == 1 else None),
         causes=(cause,),
         before_m=Quantity(float(read_m.max()), "m", limit=_WRONG_M, usual=(0.016, 0.075)),
         after_m=Quantity(float(left_m[best].max()), "m", limit=_RIGHT_M),
         operation=Quantity(operation),
-        plates=Quantity(" and ".join(plates.names[p] for p in which)),
+        plates=Quantity(" and ".join(plates.names[p] for p in wrong)),
     )
     yield Hypothesis(found, displaced(plates, by))
 

@@ -48,6 +48,16 @@ class MeanVerticalMoment:
     allowed_nm: float
     span_s: tuple[float, float]
 
+    @property
+    def contradicts(self) -> bool:
+        """Whether nobody can walk like that."""
+        return abs(self.moment_nm) > self.allowed_nm
+
+    @property
+    def by_free_moments(self) -> bool:
+        """Whether free moments that have the same sign, or do not cancel, are most of it."""
+        return sum(self.free_nm) / self.moment_nm >= _FREE_SHARE
+
 
 def vertical_moment(context: RecordingContext) -> Iterator[Finding]:
     """P266: about the middle of the pelvis markers, in the longest measured window."""
@@ -61,10 +71,10 @@ def vertical_moment(context: RecordingContext) -> Iterator[Finding]:
     if not pelvis or not seen.any():
         return
     mean = mean_vertical_moment(trial.loads, markers.time[seen], positions[seen].mean(axis=1))
-    if mean is None or abs(mean.moment_nm) <= mean.allowed_nm:
+    if mean is None or not mean.contradicts:
         return
     causes = rule("P266").causes
-    if sum(mean.free_nm) / mean.moment_nm < _FREE_SHARE:  # then it is not them
+    if not mean.by_free_moments:
         causes = (*causes[1:], causes[0])
     yield finding(
         "P266",

@@ -13,6 +13,8 @@ from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, IdleReading
 
 _ZERO_N, _FAR_FROM_ZERO_N, _DRIFT_N = 15.0, 40.0, 15.0
 """Zeroed plates read a few newtons; 40 N are 5 % of an adult's weight on every plate."""
+_LEAST_N = 6.0
+"""Twice what zeroed plates read: no limit is lower, however light the person."""
 _STEP_N, _MOST_UNLOADED_N, _STEADY_N = 350.0, 150.0, 15.0
 _UNLOADED_PERCENT = (2.0, 15.0)
 """A plate that somebody walks over is unloaded for at least so many percent of the record."""
@@ -29,20 +31,23 @@ def zeros(context: RecordingContext) -> Iterator[Finding]:
     if plates is None:
         return
     for p, (name, idle) in enumerate(zip(plates.names, plates.idle or (_UNKNOWN,) * len(plates.names), strict=True)):
-        drifts = abs(idle.drift_n) > _DRIFT_N * share
+        drifts = abs(idle.drift_n) > _limit_n(_DRIFT_N, share)
         if drifts:
-            drift = Quantity(idle.drift_n, "N", limit=_DRIFT_N * share)
+            drift = Quantity(idle.drift_n, "N", limit=_limit_n(_DRIFT_N, share))
             yield finding("P211", context.at(plate=name, **context.along(1)), drift_n=drift)
-        levels = [
-            abs(level) > _ZERO_N * share and not (drifts and axis == 1) for axis, level in enumerate(idle.level_n)
-        ]
-        for axis in np.flatnonzero(levels):
-            level, blocks = idle.level_n[axis], "unloaded blocks"
-            far = axis == 1 and abs(level) > _FAR_FROM_ZERO_N * share
-            yield _zero(context, name, int(axis), level, blocks, Severity.ERROR if far else None)
-        least = None if drifts or levels[1] else _steady_minimum(plates.force[:, p, 1], share)
-        if least is not None:
-            yield _zero(context, name, 1, least, "minimum", Severity.ERROR)
+        vertical = False
+        for axis, level_n in enumerate(idle.level_n):
+            if abs(level_n) > _limit_n(_ZERO_N, share) and not (drifts and axis == 1):
+                far = axis == 1 and abs(level_n) > _FAR_FROM_ZERO_N * share
+                vertical |= axis == 1
+                yield _zero(context, name, axis, level_n, "unloaded blocks", Severity.ERROR if far else None)
+        least_n = None if drifts or vertical else _steady_minimum(plates.force[:, p, 1], share)
+        if least_n is not None:
+            yield _zero(context, name, 1, least_n, "minimum", Severity.ERROR)
+
+
+def _limit_n(adult_n: float, share: float) -> float:
+    return max(_LEAST_N, adult_n * share)
 
 
 def _zero(
@@ -52,7 +57,7 @@ def _zero(
         "P213",
         context.at(plate=name, **context.along(axis)),
         severity,
-        level_n=Quantity(level_n, "N", limit=_ZERO_N * context.adult_share, usual=(-3.0, 3.0)),
+        level_n=Quantity(level_n, "N", limit=_limit_n(_ZERO_N, context.adult_share), usual=(-3.0, 3.0)),
         method=Quantity(method),
     )
 

@@ -99,12 +99,10 @@ def trial_scales(context: PersonContext) -> Iterator[Finding]:
         scale = between(first, other)
         if scale is None or not scale.differs:
             continue
-        standing = [
-            [size(between(one, trial, AGAINST_STANDING)) for trial in (first, other)] for one in context.standing
-        ]
-        further = [one for one in context.trials if one not in (first, other)]
-        moving = [[size(between(one, trial)) for trial in (first, other)] for one in further]
-        for odd in odd_ones(first, other, [(one, two) for one, two in (*standing, *moving)]):
+        further = [(one, AGAINST_STANDING) for one in context.standing]
+        further += [(one, 0.0) for one in context.trials if one not in (first, other)]
+        witnesses = [(size(between(one, first, usual)), size(between(one, other, usual))) for one, usual in further]
+        for odd in odd_ones(first, other, witnesses):
             peer, sign = (first, 1.0) if odd is other else (other, -1.0)
             yield scale.finding(odd.name, f"trial {peer.name}", sign)
 

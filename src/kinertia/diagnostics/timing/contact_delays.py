@@ -20,7 +20,7 @@ from kinertia.diagnostics.evidence.plate_contacts import (
     PlateContact,
     contacts_of,
 )
-from kinertia.findings.finding import finding
+from kinertia.findings.finding import finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.trial.data import FloatArray, PlateLoads
 from kinertia.trial.ground_contact import bridged
@@ -118,13 +118,13 @@ def contact_delays(context: RecordingContext) -> Iterator[Hypothesis]:
     }
     if far_m > FAR_M / 2 or abs(delay) > _LONGEST_DELAY_S:
         distance = Quantity(far_m, "m", limit=FAR_M / 2)
-        yield Hypothesis(finding("T212", context.at(), **measured, distance_m=distance), corrected)
+        yield Hypothesis(with_evidence("T212", context.at(), measured | {"distance_m": distance}), corrected)
         return
-    causes = ("the trigger or start of one file", "a filter that delays")
+    causes = ["the trigger or start of one file", "a filter that delays"]
     if (rate := delays.by_rate(float(plates.time[0]))) is not None:
         measured["rate_alternative"] = Quantity(rate, "1")
-        causes += ("a wrong sampling rate, which so few contacts do not exclude (T201)",)
-    yield Hypothesis(finding("T211", context.at(), causes=causes, **measured), corrected)
+        causes.append("a wrong sampling rate, which so few contacts do not exclude (T201)")
+    yield Hypothesis(with_evidence("T211", context.at(), measured, causes=tuple(causes)), corrected)
 
 
 def _growing(context: RecordingContext, plates: PlateLoads, delays: ContactDelays) -> Hypothesis:

@@ -43,7 +43,8 @@ def interchanged_forces(person: PersonContext) -> Iterator[Finding]:
 
 
 def _with_forces_of(one: RecordingContext, other: RecordingContext) -> float:
-    assert one.trial is not None and other.trial is not None
+    assert one.trial is not None
+    assert other.trial is not None
     return _residual(caused_velocities(replace(one.trial, loads=other.trial.loads), one.segment_of_label))
 
 
