@@ -9,7 +9,7 @@ from kinertia.findings.finding import finding
 from kinertia.findings.overview import Overview
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
-from kinertia.report.finding_view import FindingView, digest, evidence_text, lines, place_text
+from kinertia.report.finding_view import FindingView, digest, evidence_text, lines, linked, place_text
 
 
 def view(*findings):
@@ -87,6 +87,11 @@ def test_every_code_on_the_page_is_explained_there():
 )
 def test_evidence_is_read_with_limit_and_usual_range(quantity, text):
     assert evidence_text(finding("P213", level_n=quantity), "level_n") == text
+
+
+def test_codes_in_sentences_lead_to_their_explanation_and_nothing_else_does():
+    html = linked("<b>; see P213, Z999")
+    assert html == '&lt;b&gt;; see <a class="code" href="#explain-P213">P213</a>, Z999'
 
 
 def test_places_are_named_as_far_as_they_are_known():

@@ -11,18 +11,20 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+from markupsafe import Markup, escape
+
 from kinertia.findings.display import axis_text, first_few, outlined, shown
 from kinertia.findings.finding import Finding, Severity
 from kinertia.findings.overview import DO_NOT_USE, USE, WITH_CARE, Group, Overview, grouped, in_order
 from kinertia.findings.quantity import Quantity
-from kinertia.findings.rule import Rule, questions, rule
+from kinertia.findings.rule import Rule, matching, questions, rule
 from kinertia.findings.where import Where
 
 LOOKS = {USE: "info", WITH_CARE: "warning", DO_NOT_USE: "error"}
 """Class of the style sheet for each word of a verdict; that of a finding is its severity."""
 MOST_STEPS = 3
 _TITLES = {Severity.ERROR: "Errors", Severity.WARNING: "Warnings"}
-_NOTHING = "Nothing needs to be done."
+_CODE = re.compile(r"\b([A-Z]\d{3})\b")
 
 
 @dataclass(frozen=True)
@@ -176,6 +178,15 @@ def evidence_text(one: Finding, name: str, signed: bool = False) -> str:
 def _style(template: str, name: str) -> str:
     field = re.search(rf"\{{{name}:([+%#]*)\}}", template)
     return "" if field is None else field.group(1)
+
+
+def linked(sentence: str) -> Markup:
+    """A sentence whose codes lead to their explanation on the same page."""
+    link = Markup('<a class="code" href="#explain-{0}">{0}</a>')
+    parts = _CODE.split(sentence)
+    return Markup("").join(
+        link.format(part) if k % 2 and matching(part) else escape(part) for k, part in enumerate(parts)
+    )
 
 
 def asks(one: Rule) -> str:
