@@ -190,7 +190,7 @@ def summary(fit: Fit) -> dict[str, Any]:
         "rules_run": fit.rules,
         "trials_left_out": list(fit.left_out),
         "findings": [one.to_dict() for one in fit.findings],
-        "suitability": [asdict(one) for one in suitability(fit)],
+        "suitability": [asdict(one) for one in suitability(fit, fit.findings, fit.left_out)],
         "warnings": list(fit.warnings),
         "corrections": list(fit.corrections),
         "notes": list(fit.notes),

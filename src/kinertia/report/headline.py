@@ -71,7 +71,7 @@ class Words:
 
 def words(fit: Fit) -> Words:
     """A fit in sentences."""
-    outputs = tuple(suitability(fit))
+    outputs = suitability(fit, fit.findings, fit.left_out)
     motion = tuple(sentence for trial in fit.trials for sentence in _motion(fit, trial))
     return Words(purposes(outputs, impossible(fit)), outputs, motion, _knowledge(fit), _departures(fit))
 
