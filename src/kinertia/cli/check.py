@@ -108,7 +108,7 @@ def check(
     overrule = overrule_of(waive)
     osim = [read_osim(path) for path in files if path.suffix.lower() == ".osim"]
     measured = [path for path in files if path.suffix.lower() != ".osim"]
-    who = Subject(name="person", mass_kg=mass, height_m=height, sex=sex)
+    who = Subject.model_validate({"name": "person", "mass_kg": mass, "height_m": height, "sex": sex})
     with shown_progress() as progress:
         if subjects:
             wanted = read_subject(subjects[0])

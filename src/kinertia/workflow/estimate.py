@@ -8,8 +8,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kinertia.diagnostics.result.warnings import two_level_warnings
-from kinertia.estimation.free_moment_sign import free_moment_sign_warnings, with_likelier_sign
+from kinertia.diagnostics.result.context import ResultContext
+from kinertia.diagnostics.result.questions import ESTIMATE_QUESTIONS, RESULT_QUESTIONS, judged
+from kinertia.diagnostics.runner import explained, overruled
+from kinertia.estimation.free_moment_sign import with_likelier_sign
 from kinertia.estimation.prepared import Prepared, Progress
 from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.result import Fit, TrialFit
@@ -18,6 +20,7 @@ from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
 from kinertia.estimation.simultaneous.fit import Posterior, SimultaneousFit, fit_simultaneous
 from kinertia.estimation.simultaneous.model_uncertainty import ModelUncertainty
 from kinertia.estimation.two_level import Window, correct_pelvis, estimate_two_level, stretches
+from kinertia.findings.rule import matching
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.gait27 import VIRTUAL_TRUNK
 from kinertia.model.imported import OsimModel
@@ -33,6 +36,9 @@ from kinertia.trial.data import Recording
 from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow.attached import with_attached
 from kinertia.workflow.prepare import prepare
+
+_RULES = len({code for one in (*ESTIMATE_QUESTIONS, *RESULT_QUESTIONS) for code in matching(one.code)})
+"""How many rules are asked of an estimate."""
 
 
 @one_blas_thread
@@ -126,7 +132,8 @@ def estimate(ready: Prepared, progress: Progress = lambda stage, share: None) ->
         notes=ready.notes,
         file=ready.file,
         left_out=ready.left_out,
-        rules=ready.rules + RULES,
+        rules=ready.rules + _RULES,
+        evaluations=outcome.evaluations,
     )
     found = explained([*ready.findings, *judged(ResultContext(fit, ready))])
     return replace(fit, findings=tuple(overruled(found, ready.overrule, ready.overrule_of)))
@@ -141,9 +148,7 @@ class _Outcome:
     trials: tuple[TrialFit, ...]
     converged: bool
     posterior: Posterior | None
-    warnings: tuple[str, ...]
-    corrections: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
+    evaluations: int = 0
 
 
 def _two_level(ready: Prepared, settings: Settings, started: float, progress: Progress) -> _Outcome:
@@ -162,8 +167,7 @@ def _two_level(ready: Prepared, settings: Settings, started: float, progress: Pr
         motion = joined([next(motions) for _ in parts])
         estimates.append(_Estimated(ready.skeleton, motion, None, k.cutoff_hz, k.foot_loads, smoothed, smoothed, None))
     trials = _trial_fits(ready, result.bsp, estimates, started)
-    warnings = (*free_moment_sign_warnings(trials), *two_level_warnings(result))
-    return _Outcome(ready.skeleton, result.bsp, trials, result.converged, None, warnings)
+    return _Outcome(ready.skeleton, result.bsp, trials, result.converged, None, result.evaluations)
 
 
 def named_by_source(ready: Prepared) -> ModelUncertainty:
@@ -189,7 +193,7 @@ def _simultaneous(ready: Prepared, settings: Settings, started: float, progress:
         )
 
     signed = with_likelier_sign(ready, fit)
-    fitted, ready, sign = signed.fitted, signed.ready, signed.sign
+    fitted, ready = signed.fitted, signed.ready
     result = fitted.result
     parts = (
         fitted.skeletons,
@@ -205,10 +209,7 @@ def _simultaneous(ready: Prepared, settings: Settings, started: float, progress:
         for skeleton, motion, course, bandwidth, loads, reactions, sd, k in zip(*parts, ready.kinematics, strict=True)
     ]
     trials = _trial_fits(ready, fitted.bsp, estimates, started)
-    said = ([], []) if sign is None else (list(filter(None, [sign.correction])), list(filter(None, [sign.note])))
-    corrections, notes = (*said[0], *fitted.corrections), tuple(said[1])
-    outcome = fitted.skeleton, fitted.bsp, trials, result.converged, fitted.posterior
-    return _Outcome(*outcome, fitted.warnings, corrections, notes)
+    return _Outcome(fitted.skeleton, fitted.bsp, trials, result.converged, fitted.posterior)
 
 
 @dataclass(frozen=True, eq=False)

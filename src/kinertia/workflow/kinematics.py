@@ -35,8 +35,8 @@ def seen_markers(context: RecordingContext) -> Trial:
     """The trial of a recording that can be used, without markers that no frame shows."""
     trial = context.trial
     assert trial is not None
-    shown = trial.markers.seen.any(axis=0)
-    labels = [label for label, is_shown in zip(trial.markers.labels, shown, strict=True) if is_shown]
+    seen = trial.markers.seen
+    labels = [label for column, label in enumerate(trial.markers.labels) if seen[:, column].any()]
     return replace(trial, markers=trial.markers.select(labels))
 
 

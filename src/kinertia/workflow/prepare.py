@@ -5,16 +5,16 @@ smoothed kinematics.
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.labels.swapped_markers import labels_against_model
-from kinertia.diagnostics.runner import Overrule, blocking
+from kinertia.diagnostics.labels.swapped_markers import labels_by_model
+from kinertia.diagnostics.runner import blocking
 from kinertia.diagnostics.subject.unobserved_segments import unobserved_segments
 from kinertia.errors import BlockedError, MarkerSetError, SettingsError, TrialError
-from kinertia.estimation.arm_branch import with_elbows_that_bend_forwards
-from kinertia.estimation.calibration import adapt, first_poses, hold_uninformed, sampled, turn_about
+from kinertia.estimation.arm_branch import elbow_rotations, with_elbows_that_bend_forwards
+from kinertia.estimation.calibration import adapt, first_poses, hold_uninformed, turn_about
 from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.estimation.input_checks import check_trials, complete_subject, known
 from kinertia.estimation.population import population_prior
@@ -36,7 +36,7 @@ from kinertia.model.skeleton import Skeleton
 from kinertia.motion.kinematics import facing
 from kinertia.motion.one_thread import one_blas_thread
 from kinertia.motion.upright_trunk import with_upright_trunk
-from kinertia.settings import Attached, Settings, Subject
+from kinertia.settings import Attached, Overrule, Settings, Subject
 from kinertia.trial.data import Recording, Trial
 from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow.kinematics import Turned, seen_markers, solved_trials
@@ -51,28 +51,47 @@ _TURNED_RAD = 0.25
 """The skin turns the markers about the torso by 2 to 6 degrees; shoulders without a third axis, in a run, by 38."""
 
 
+@dataclass(frozen=True, eq=False)
+class Calibrated:
+    """The adapted skeleton, and what adapting it showed.
+
+    Attributes:
+        skeleton: adapted to the trials.
+        findings: labels that contradict the static trial's model.
+        elbow_rotations_rad: side -> by how much an elbow axis was turned, where it was.
+        torso_rotation_rad: by how much the torso would have turned under its markers, which were kept from it.
+    """
+
+    skeleton: Skeleton
+    findings: list[Finding]
+    elbow_rotations_rad: Mapping[str, float]
+    torso_rotation_rad: float | None
+
+
 @one_blas_thread
-def calibrate(model: Gait27, trials: Sequence[Trial]) -> tuple[Skeleton, list[Finding]]:
-    """The skeleton of the 27-DOF model as the static trial gives it, adapted to the trials; and labels that contradict
-    it.
+def calibrate(model: Gait27, trials: Sequence[Trial]) -> Calibrated:
+    """The skeleton of the 27-DOF model as the static trial gives it, adapted to the trials.
 
     Markers of pelvis, legs and feet are held to the static trial by a deviation of 10 mm, those of torso and arms and
     the shoulder centres by 40 mm. Where arms have turned the torso under its markers, since the model's shoulders lack
     an axis, its markers and the pelvis' may not turn as a whole.
     """
     skeleton, poses = with_elbows_that_bend_forwards(model.skeleton, trials, first_poses(model.skeleton, trials))
+    elbows = elbow_rotations(model.skeleton, skeleton)
     skeleton, _ = hold_uninformed(skeleton, trials, poses, dict.fromkeys(ARM_COORDINATES, 0.0))
-    free = skeleton.free(ARM_ROTATIONS)
-    found = [one for trial in trials for one in labels_against_model(free, trial.name, sampled(trial.markers))]
+    found = [one for trial in trials for one in labels_by_model(skeleton, trial)]
     upper = {"torso", *(f"{name}_{side}" for side in "rl" for name in ("upper_arm", "forearm"))}
     marker_sd = {s: UPPER_BODY_SD_M if s in upper else LOWER_BODY_SD_M for s in model.skeleton.segments}
     coordinate_sd = dict.fromkeys(SHOULDER_OFFSETS, UPPER_BODY_SD_M) | dict.fromkeys(
         ARM_ROTATIONS, _ARM_ROTATION_SD_RAD
     )
     adapted = adapt(skeleton, trials, poses, marker_sd, coordinate_sd)
-    if turn_about("torso", skeleton.markers, adapted.skeleton.markers) > _TURNED_RAD:
+    torso_rad: float | None = turn_about("torso", skeleton.markers, adapted.skeleton.markers)
+    if torso_rad is not None and torso_rad > _TURNED_RAD:
         adapted = adapt(skeleton, trials, poses, marker_sd, coordinate_sd, unturned=("pelvis", "torso"))
-    return adapted.skeleton, found
+    else:
+        torso_rad = None
+    return Calibrated(adapted.skeleton, found, elbows, torso_rad)
 
 
 @one_blas_thread
@@ -92,7 +111,7 @@ def prepare(
         BlockedError: findings leave no trial, with all of them.
         KinertiaError: the subject or a marker set cannot be used.
     """
-    person = Person(subject, inputs, static, marker_set, attached=attached, overrule=overrule or Overrule())
+    person = Person(subject, inputs, static, marker_set=marker_set, attached=attached, overrule=overrule or Overrule())
     return prepared(screen(person), settings or Settings(), progress)
 
 
@@ -121,19 +140,15 @@ def prepared(screened: Screened, settings: Settings, progress: Progress = lambda
     model = build_gait27(static.recording, marker_set, height_m, sex, settings.hip_centre)
     if VIRTUAL_TRUNK[0] in model.skeleton.markers:
         turned = [replace(one, trial=with_upright_trunk(model.skeleton, one.trial)) for one in turned]
-    skeleton, found = calibrate(model, [one.trial for one in turned])
-    overruled_ = screened.overruled([*screened.findings, *found])
-    if blocking(overruled_):
-        stopped = {one.where.trial for one in blocking(overruled_)}
-        turned = [one for one in turned if one.trial.name not in stopped]
-        if not turned:
-            raise BlockedError(overruled_, blocking(overruled_))
+    calibrated = calibrate(model, [one.trial for one in turned])
+    skeleton, found = calibrated.skeleton, [*screened.findings, *calibrated.findings]
+    turned = _unblocked(turned, screened.overruled(found))
     total = CarriedMass.of(known(subject.mass_kg), person.attached)
     literature = literature_bsp(total.body_kg, height_m, sex, model.geometry, settings.bsp)
     expected = population_prior(literature_prior(literature), subject, total.body_kg)
     calibration_s = (time.perf_counter() - started) / len(turned)
     solved = solved_trials(skeleton, turned, settings.cutoff_hz, calibration_s, progress)
-    findings = screened.overruled([*screened.findings, *found, *unobserved_segments(skeleton), *solved.findings])
+    findings = screened.overruled([*found, *unobserved_segments(skeleton), *solved.findings])
     return Prepared(
         subject=subject,
         settings=settings,
@@ -151,7 +166,23 @@ def prepared(screened: Screened, settings: Settings, progress: Progress = lambda
         overrule_of=person.overrule_of,
         left_out=screened.left_out_by(findings),
         rules=screened.rules,
+        elbow_rotations_rad=calibrated.elbow_rotations_rad,
+        torso_rotation_rad=calibrated.torso_rotation_rad,
     )
+
+
+def _unblocked(trials: Sequence[Turned], findings: Sequence[Finding]) -> list[Turned]:
+    """Those that can go on.
+
+    Raises:
+        BlockedError: none can.
+    """
+    errors = blocking(findings)
+    stopped = {one.where.trial for one in errors}
+    left = [one for one in trials if one.trial.name not in stopped]
+    if not left:
+        raise BlockedError(findings, errors)
+    return left
 
 
 def _turned(context: RecordingContext, read_seconds: float) -> Turned:

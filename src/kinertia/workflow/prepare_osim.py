@@ -153,8 +153,9 @@ def _assumed(
     file = Where(file=model.path.name)
     assumed = []
     if abs(factor - 1.0) >= _MASS_TOLERANCE:
-        kg = {"model_kg": Quantity(model.bsp.total_mass_kg, "kg"), "stated_kg": Quantity(own.total_mass_kg, "kg")}
-        assumed.append(finding("O411", file, factor=Quantity(factor, "1", limit=_MASS_TOLERANCE), **kg))
+        model_kg, stated_kg = (Quantity(one.total_mass_kg, "kg") for one in (model.bsp, own))
+        by = Quantity(factor, "1", limit=_MASS_TOLERANCE)
+        assumed.append(finding("O411", file, factor=by, model_kg=model_kg, stated_kg=stated_kg))
     values = {c.name: c.default for c in model.coordinates}
     angles = {c.name for c in model.coordinates if c.angle}
     for name in idle:

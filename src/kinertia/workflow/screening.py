@@ -67,8 +67,11 @@ class Screened:
     @property
     def rules(self) -> int:
         """How many rules were asked."""
-        asked_ = [*MOTION_QUESTIONS, *PERSON_QUESTIONS, *(STATIC_QUESTIONS if self.person.static else ())]
-        return len({code for one in asked_ for code in matching(one.code)})
+        of_static = STATIC_QUESTIONS if self.context.standing else ()
+        return len(
+            {code for one in (*MOTION_QUESTIONS, *of_static) for code in matching(one.code)}
+            | {code for one in PERSON_QUESTIONS for code in matching(one.code)}
+        )
 
     @cached_property
     def stops(self) -> list[Finding]:

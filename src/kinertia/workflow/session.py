@@ -12,7 +12,6 @@ from kinertia.diagnostics.result.session import session_contradictions
 from kinertia.errors import SessionError
 from kinertia.estimation.prepared import Prepared
 from kinertia.estimation.result import Fit
-from kinertia.estimation.simultaneous.instrument_warnings import SHOWN_UNIT
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation, InstrumentPrior
 from kinertia.estimation.simultaneous.plates import PLATE_ERRORS, PLATE_UNKNOWNS, plates_with_floor
 from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior
@@ -31,7 +30,7 @@ class SessionInstruments:
     Attributes:
         people: what each person's trials say.
         values: per instrument, per unknown its value, posterior deviation and unit, SI.
-        contradictions: S501 for each unknown of which a person's trials say what those of the others do not.
+        contradictions: of each unknown of which a person says what the others do not (S501).
     """
 
     people: tuple[PersonInstruments, ...]

@@ -8,17 +8,12 @@ body 0.8 to 1.05 times as fast as its markers show.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from itertools import combinations
-
-import numpy as np
+from collections.abc import Iterator
 
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.evidence.caused_velocity import VelocityChanges
 from kinertia.diagnostics.evidence.marker_precision import COARSE_M, USUAL_NOISE_M, USUAL_STEP_M
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
-from kinertia.trial.data import BoolArray, FloatArray, Markers
 
 _QUICK_HZ, _LEAST_QUICK, _USUAL_QUICK, _LEAST_SWING_M_S = 4.0, 0.002, (0.008, 0.06), 1.0
 _MOST_TIMES_UP, _USUAL_TIMES_UP, _OF_A_RATE = 1.15, (0.7, 1.0), 1.8
@@ -37,58 +32,3 @@ def precision(context: RecordingContext) -> Iterator[Finding]:
     if precise.noisy:
         noise = Quantity(precise.noise_m, "m", limit=precise.noise_limit_m, usual=USUAL_NOISE_M)
         yield finding("M132", context.at(), noise_m=noise)
-
-
-def oversmoothed(context: RecordingContext) -> Iterator[Finding]:
-    """M133: markers without the quick part of the motion that the forces show; not asked of who does not step."""
-    trial, owners = context.trial, context.segment_of_label
-    if trial is None or not context.velocities:
-        return
-    quick = _quick_share(trial.markers, owners)
-    if quick is None or quick > _LEAST_QUICK:
-        return
-    changes = VelocityChanges.of(context.velocities)
-    ratio = min(changes.times_up(shown) or 0.0 for shown in (changes.pelvis, changes.centre))
-    if ratio < _MOST_TIMES_UP or (ratio > _OF_A_RATE and _distances_change_m(trial.markers, owners) < _RIGID_M):
-        return
-    yield finding(
-        "M133",
-        context.at(),
-        share=Quantity(quick, "1", limit=_LEAST_QUICK, usual=_USUAL_QUICK),
-        velocity_ratio=Quantity(ratio, "1", limit=_MOST_TIMES_UP, usual=_USUAL_TIMES_UP),
-    )
-
-
-def _quick_share(markers: Markers, owners: Mapping[str, str]) -> float | None:
-    """Of the energy of motion, median over markers of swinging feet; None where no foot swings."""
-    shares = []
-    for k, label in enumerate(markers.labels):
-        seen = np.asarray(np.isfinite(markers.positions[:, k]).all(axis=1))
-        if not owners.get(label, "").startswith("foot") or seen.mean() < _MOSTLY_SEEN:
-            continue
-        velocity = np.gradient(_bridged(markers, k, seen), markers.time, axis=0)
-        velocity -= velocity.mean(axis=0)
-        if np.quantile(np.linalg.norm(velocity, axis=1), 0.95) < _LEAST_SWING_M_S:
-            continue
-        power = np.square(np.abs(np.fft.rfft(velocity * np.hanning(len(velocity))[:, None], axis=0))).sum(axis=1)
-        frequency = np.fft.rfftfreq(len(velocity), 1.0 / markers.rate_hz)
-        shares.append(float(power[frequency > _QUICK_HZ].sum() / power.sum()))
-    return float(np.median(shares)) if shares else None
-
-
-def _bridged(markers: Markers, k: int, seen: BoolArray) -> FloatArray:
-    """(n, 3) m, of one marker."""
-    position = markers.positions[seen, k]
-    return np.column_stack([np.interp(markers.time, markers.time[seen], position[:, axis]) for axis in range(3)])
-
-
-def _distances_change_m(markers: Markers, owners: Mapping[str, str]) -> float:
-    """Between two markers of a shank, median over pairs; infinite where no shank has two."""
-    ranges = []
-    for side in "rl":
-        own = [k for k, label in enumerate(markers.labels) if owners.get(label) == f"shank_{side}"]
-        for one, other in combinations(own, 2):
-            distance = np.linalg.norm(markers.positions[:, one] - markers.positions[:, other], axis=1)
-            distance = distance[np.isfinite(distance)]
-            ranges += [float(np.ptp(np.quantile(distance, (0.02, 0.98))))] if distance.size else []
-    return float(np.median(ranges)) if ranges else np.inf

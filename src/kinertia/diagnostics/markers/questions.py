@@ -6,7 +6,7 @@ from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.markers.axes_and_floor import floor_slope, unit_and_vertical
 from kinertia.diagnostics.markers.computed_markers import computed_markers
 from kinertia.diagnostics.markers.frames import frames
-from kinertia.diagnostics.markers.precision import oversmoothed, precision
+from kinertia.diagnostics.markers.precision import precision
 from kinertia.diagnostics.markers.trajectories import trajectories
 from kinertia.diagnostics.markers.visibility import visible
 from kinertia.diagnostics.runner import Question
@@ -30,7 +30,3 @@ MOTION_QUESTIONS: tuple[Question[RecordingContext], ...] = (
     Question("M14", floor_slope, unless=("M14",)),
     Question("M15", computed_markers, unless=(_SIZE,)),
 )
-LOADED_QUESTIONS: tuple[Question[RecordingContext], ...] = (
-    Question("M13", oversmoothed, unless=("M14", _MADE_UP, "P20", "T20")),
-)
-"""Of motions whose loads are sorted by foot; asked after the plates and the synchronisation."""
