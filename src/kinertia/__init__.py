@@ -22,10 +22,8 @@ if TYPE_CHECKING:
 
     from kinertia.diagnostics.model.model_check import ModelCheck as ModelCheck
     from kinertia.diagnostics.model.model_check import check_model as check_model
-    from kinertia.diagnostics.result.uses import Use as Use
-    from kinertia.diagnostics.result.uses import uses as uses
-    from kinertia.diagnostics.result.verdict import Verdict as Verdict
-    from kinertia.diagnostics.result.verdict import verdicts as verdicts
+    from kinertia.diagnostics.result.suitability import Suitability as Suitability
+    from kinertia.diagnostics.result.suitability import suitability as suitability
     from kinertia.errors import BlockedError as BlockedError
     from kinertia.errors import FileError as FileError
     from kinertia.errors import KinertiaError as KinertiaError
@@ -128,8 +126,7 @@ _ROOMS = {
     "estimation.result": "Fit TrialFit",
     "estimation.simultaneous.fit": "Posterior",
     "diagnostics.model.model_check": "ModelCheck check_model",
-    "diagnostics.result.uses": "Use uses",
-    "diagnostics.result.verdict": "Verdict verdicts",
+    "diagnostics.result.suitability": "Suitability suitability",
     "workflow.estimate": "estimate estimate_bsp estimate_bsp_of_model",
     "workflow.from_files": "fit_subject prepare_subject",
     "workflow.prepare": "prepare",

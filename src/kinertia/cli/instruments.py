@@ -12,7 +12,7 @@ from kinertia.cli.options import Quiet, own_file
 from kinertia.cli.outcome import Outcome
 from kinertia.cli.terminal import out, plain_table, shown_progress
 from kinertia.errors import FileError, SessionError
-from kinertia.estimation.simultaneous.instrument_warnings import SHOWN_UNIT
+from kinertia.estimation.simultaneous.instrument_errors import SHOWN_UNIT
 from kinertia.io.output_folder import write_then_rename
 from kinertia.io.provenance import VERSION, recordings
 from kinertia.io.session_file import read_session, session_text
