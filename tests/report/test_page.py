@@ -10,10 +10,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from kinertia.diagnostics.result.suitability import Suitability
 
 from command_line import run
 from found import FAULT_FREE, UNUSABLE
+from kinertia.diagnostics.result.suitability import Suitability
 from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
 from kinertia.findings.finding import Severity
 from kinertia.io.provenance import provenance_of

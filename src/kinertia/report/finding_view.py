@@ -110,9 +110,13 @@ class FindingView:
         return [_correction(one, self._explained([one])) for one in self._top(Severity.CORRECTED)]
 
     @cached_property
-    def notes(self) -> list[Group]:
-        """Assumptions and advice."""
-        return grouped(self._top(Severity.INFO))
+    def notes(self) -> list[tuple[Group, str]]:
+        """Assumptions and advice, once for each code, and the trials that they are of."""
+        by_code: dict[str, list[Group]] = {}
+        for group in grouped(self._top(Severity.INFO)):
+            by_code.setdefault(group.first.code, []).append(group)
+        trials = (list(filter(None, (each.first.where.trial for each in groups))) for groups in by_code.values())
+        return [(groups[0], first_few(names)) for groups, names in zip(by_code.values(), trials, strict=True)]
 
     def _top(self, severity: Severity) -> list[Finding]:
         return [one for one in self.findings if one.severity is severity and one.is_open]
@@ -154,8 +158,13 @@ def place_text(where: Where, with_trial: bool = False) -> str:
 
 
 def evidence_texts(one: Finding) -> list[str]:
-    """Every quantity of a finding with its name: "level -23 N (limit 15 N)"."""
-    return [f"{outlined('{' + name + '}', '{}')} {evidence_text(one, name)}" for name in one.evidence]
+    """Every quantity of a finding with its name, "level -23 N (limit 15 N)"; words only if the message lacks them."""
+    named = [name for name, each in one.evidence.items() if not _is_said(one, each)]
+    return [f"{outlined('{' + name + '}', '{}')} {evidence_text(one, name)}" for name in named]
+
+
+def _is_said(one: Finding, quantity: Quantity) -> bool:
+    return isinstance(quantity.value, str) and quantity.value in one.message
 
 
 def evidence_text(one: Finding, name: str, signed: bool = False) -> str:
