@@ -28,7 +28,10 @@ from typing import Any
 
 import numpy as np
 
-from kinertia.errors import PriorError
+from kinertia.errors import PriorError, problem_of
+from kinertia.findings.finding import with_evidence
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
 from kinertia.model.bsp import BodySegmentParameters, FloatArray, combine
 from kinertia.model.measures import measures
 
@@ -59,10 +62,14 @@ _POINTED = np.array([[0.0, 0.0, -1.0], [0.0, -1.0, 0.0], [-1.0, 0.0, 0.0]])
 def expect_yeadon() -> None:
     """Raise a PriorError that says how to install the package, unless it is there."""
     if find_spec("yeadon") is None:
-        raise PriorError(
-            "girths and lengths need the package yeadon, which is not installed; install it: "
-            "pip install 'kinertia[measures]'"
-        )
+        words = {
+            "package": "yeadon",
+            "kind": "girths and lengths",
+            "how": "pip install 'kinertia[measures]'",
+            "others": "leave measures out of [prior]",
+        }
+        found = with_evidence("F107", Where(), {name: Quantity(text) for name, text in words.items()})
+        raise PriorError(problem_of(found)).with_finding(found)
 
 
 def stadium_bsp(
