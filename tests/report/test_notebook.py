@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from kinertia.findings.finding import finding
+from kinertia.findings.quantity import Quantity
 from kinertia.report.headline import words
 from kinertia.trial.data import Markers, PlateLoads, Recording
 from report_page import Elements
@@ -37,7 +39,11 @@ def test_recording_shows_itself():
     force = np.zeros((4, 1, 3))
     force[2, 0, 1] = 812.0
     plates = PlateLoads(time, ("FP1",), force, np.zeros((4, 1, 3)), (None,))
-    shown = Elements(Recording("walk", markers, plates, mass_kg=72.6, notes=("beware",))._repr_html_()).text
+    shown = Elements(
+        Recording(
+            "walk", markers, plates, mass_kg=72.6, findings=(finding("F124", unit=Quantity("beware")),)
+        )._repr_html_()
+    ).text
     for text in ("walk", "4 frames at 100 Hz", "2 markers", "72.6 kg", "FP1 812 N", "<B> (seen 75 %)", "beware"):
         assert text in shown
     still = Elements(Recording("static", markers.cut(0.0, 0.0))._repr_html_()).text
