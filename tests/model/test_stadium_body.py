@@ -6,7 +6,8 @@ import pytest
 from kinertia.errors import PriorError
 from kinertia.model.bsp import combine
 from kinertia.model.measures import measures
-from kinertia.model.stadium_body import DENSITY_KG_M3, KINDS, stadium_bsp
+from kinertia.model.stadium_body import DENSITY_KG_M3, KINDS, expect_yeadon, stadium_bsp
+from refusals import refused
 from stadium_people import stadium_people
 
 yeadon = pytest.importorskip("yeadon", reason="needs yeadon (pip install -e '.[test]')")
@@ -93,3 +94,9 @@ def test_a_body_that_cannot_be_is_refused():
     shuffled[[one.name for one in measures()].index("leg_calf_length")] = 0.2
     with pytest.raises(PriorError, match=r"level after 'knee joint centre' is .* mm before it; check the lengths"):
         stadium_bsp(shuffled, CUT_M)
+
+
+def test_a_missing_package_is_named(monkeypatch):
+    monkeypatch.setattr("kinertia.model.stadium_body.find_spec", lambda name: None)
+    with refused("F107", error=PriorError, package="yeadon", how="pip install"):
+        expect_yeadon()
