@@ -52,6 +52,10 @@ def with_model(skeleton: Skeleton, bsp: BodySegmentParameters, **subject) -> Per
     return replace(person(**subject), model=file)
 
 
+UNMOVED = RecordingContext(Recording("walk", Markers(np.array([0.0, 0.1]), ("S",), np.zeros((2, 1, 3)))))
+"""A trial of nothing."""
+
+
 def scaled(markers: Markers, factor: float) -> Markers:
     """About the middle, so that the person stays on the plates."""
     middle = np.nanmean(markers.positions, axis=(0, 1))

@@ -1,6 +1,5 @@
 """What girths and lengths make of the prior."""
 
-import re
 from dataclasses import replace
 
 import numpy as np

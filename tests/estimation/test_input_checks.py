@@ -4,14 +4,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from kinertia.diagnostics.result.warnings import fit_warnings, force_warnings, mass_from_force_kg, two_level_warnings
 from kinertia.diagnostics.evidence.force_mass import force_mass
+from kinertia.diagnostics.result.warnings import fit_warnings, force_warnings, mass_from_force_kg, two_level_warnings
 from kinertia.errors import SettingsError, SubjectError, TrialError
 from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.estimation.input_checks import check_trials, complete_subject
 from kinertia.settings import Subject
-from kinertia.synthetic.walk import walk, walking_subject
-from kinertia.trial.data import FootLoads, Markers, Recording, Trial
+from kinertia.trial.data import Markers, Recording
 
 MARKERS = Markers(np.array([0.0, 0.1]), ("A",), np.zeros((2, 1, 3)))
 STATIC = Recording("static", MARKERS, mass_kg=60.0, height_m=1.7)
@@ -126,4 +125,3 @@ def test_a_motion_that_the_forces_do_not_make_accuses_inverse_kinematics_and_nob
     (said,) = force_warnings(mass, literature, [replace(trial, residuals=wrong)], short_fit.skeleton)
     assert "inverse kinematics went wrong, not the plates" in said
     assert force_warnings(mass, literature, [trial], short_fit.skeleton) == []
-

@@ -161,7 +161,9 @@ def test_mass_in_pounds_and_forces_in_other_units(lab):
     walked, _, marker_set = lab
     pounds = explained(stated_mass(person([walked], marker_set=marker_set, mass_kg=72.6 / POUND)))
     assert [one.code for one in pounds if one.is_open] == ["S112"]
-    kilograms = explained(stated_mass(person([by_plate(walked, 0.10197, 0.10197)], marker_set=marker_set, mass_kg=72.6)))
+    kilograms = explained(
+        stated_mass(person([by_plate(walked, 0.10197, 0.10197)], marker_set=marker_set, mass_kg=72.6))
+    )
     open_ = [(one.code, one.severity) for one in kilograms if one.is_open]
     assert open_ in ([], [("P202", Severity.ERROR)]), "hardly a load is left in some"
 

@@ -21,7 +21,8 @@ def movements():
         for segment in ("pelvis", "torso")
     }
     return {
-        name: InformativeMovements.of(trial.markers, labels["pelvis"], labels["torso"]) for name, trial in trials.items()
+        name: InformativeMovements.of(trial.markers, labels["pelvis"], labels["torso"])
+        for name, trial in trials.items()
     }
 
 

@@ -109,7 +109,11 @@ def test_labels_that_were_exchanged(someone):
     static, walk, marker_set = someone
     knee, ankle = (marker_set.landmarks[f"{name}_lateral_l"][0] for name in ("knee", "ankle"))
     (one,) = found(static, relabelled(walk, {knee: ankle, ankle: knee}), marker_set)
-    assert (one.code, set(one.where.markers), one.evidence["reference"].value) == ("L212", {knee, ankle}, "static trial")
+    assert (one.code, set(one.where.markers), one.evidence["reference"].value) == (
+        "L212",
+        {knee, ankle},
+        "static trial",
+    )
 
 
 @with_joints_and_back

@@ -27,7 +27,6 @@ STATURES_M = {
 PEOPLE = {name: height_m for name, height_m in STATURES_M.items() if is_here(name)}
 
 
-
 @pytest.fixture(params=PEOPLE.items(), ids=list(PEOPLE))
 def standing(request, recording_of):
     """Somebody's static trial."""
