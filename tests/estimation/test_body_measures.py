@@ -151,8 +151,9 @@ def test_a_filled_in_sheet_is_part_of_the_prior_and_of_the_notes(c3d_lab, tmp_pa
     ready = prepare_subject(path)
     thigh = ready.prior.mean.segments.index("thigh_r")
     assert ready.prior.mean.mass_kg[thigh] > ready.literature.mass_kg[thigh]
-    assert any("girths and lengths: 2 of 58 from measures.csv" in note for note in ready.notes)
-    assert any("leg_calf_girth is 20 cm" in warning for warning in ready.warnings)
+    sources = [one.evidence["source"].value for one in ready.findings if one.code == "S408"]
+    assert any("2 of 58" in source and "measures.csv" in source for source in sources)
+    assert [one.where.part for one in ready.findings if one.code == "S403"] == ["leg_calf_girth"]
 
 
 def test_what_is_a_prosthesis_on_both_sides_says_nothing_of_the_others():

@@ -29,8 +29,8 @@ from kinertia.model.skeleton import GRAVITY_M_S2
 
 WARNING_SHARE, ERROR_SHARE = 0.02, 0.10
 """Stated mass and vertical force may differ by this share and twice the SD of the difference."""
-_SAME_KG = 0.04
-"""Share by which two plates may differ in the mass of the body and still agree: usual are 2 %."""
+_SAME = 0.04
+"""Share by which two plates, or a plate and the stated mass, may differ and still agree: usual are 2 %."""
 _REPEATED = 0.005
 """By which a mass by the same plates differs from one occasion to another, SD as a share."""
 _LOAD_KG = 2.0
@@ -167,12 +167,13 @@ def _causes(
     """Likeliest first, and what to do about the first."""
     heavier = one.mass_kg > stated_kg
     other = _LOAD if heavier else _SUPPORT
-    heavy, light = (pick(by_plate, key=by_plate.__getitem__, default="") for pick in (max, min))
-    if by_plate and by_plate[heavy] > (1.0 + _SAME_KG) * by_plate[light]:
-        plate = heavy if heavier else light
-        return (f"gain or zero of {plate}", other, _STATED), f"Check {plate} with a known weight"
     if _near(one.mass_kg / stated_kg, 1.0 / _POUND):
         return (_STATED_OVER_POUND, _STATED), "Give the mass in kg"
+    light, *_, heavy = sorted(by_plate, key=by_plate.__getitem__) if len(by_plate) > 1 else ("", "")
+    if light and by_plate[heavy] > (1.0 + _SAME) * by_plate[light]:
+        plate, right = (heavy, light) if heavier else (light, heavy)
+        if abs(by_plate[right] / stated_kg - 1.0) <= _SAME:
+            return (f"gain or zero of {plate}", other, _STATED), f"Check {plate} with a known weight"
     nearer = [abs(each.mass_kg - one.mass_kg) < abs(each.mass_kg - stated_kg) for each in witnesses]
     if nearer and 2 * sum(nearer) < len(nearer):
         action = "Check the plates with a known weight, unless something was carried"
