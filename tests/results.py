@@ -32,7 +32,7 @@ def walking(turned_deg=0.0, vertical="+Y"):
     return SimpleNamespace(trial=trial, turned_deg=turned_deg)
 
 
-def context(*errors, ready=(), shown=None, prior=None, masses=(), trials=None, **posterior):
+def context(*errors, ready=(), shown=None, prior=None, mass_kg=None, trials=None, **posterior):
     """Of a fit that found these errors of instruments.
 
     Args:
@@ -40,7 +40,7 @@ def context(*errors, ready=(), shown=None, prior=None, masses=(), trials=None, *
         ready: of the prepared person.
         shown: what the trials say of instruments; well known if left out.
         prior: of the instruments.
-        masses: by the forces of "walk", kg.
+        mass_kg: by the forces of "walk".
         trials: name -> kinematics; one walk if left out.
         posterior: anything else of it.
     """
@@ -53,7 +53,7 @@ def context(*errors, ready=(), shown=None, prior=None, masses=(), trials=None, *
         **dict(ready),
     }
     made = ResultContext(SimpleNamespace(posterior=found, trials=tuple(trials)), SimpleNamespace(**prepared))
-    made.__dict__["force_masses"] = {"walk": SimpleNamespace(mass_kg=mass) for mass in masses}
+    made.__dict__["force_masses"] = {"walk": SimpleNamespace(mass_kg=mass_kg)} if mass_kg else {}
     return made
 
 

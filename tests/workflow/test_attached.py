@@ -22,7 +22,7 @@ from kinertia.settings import Attached, KnownSegment, PriorSettings, Settings, S
 from kinertia.synthetic.faults import Faults, measured
 from kinertia.synthetic.laboratory import LabNoise, record, write_lab
 from kinertia.synthetic.walk import MASS_KG, walk, walking_subject
-from kinertia.workflow.attached import not_found_warnings, with_attached
+from kinertia.workflow.attached import with_attached
 from kinertia.workflow.from_files import fit_subject
 from kinertia.workflow.known_body import with_known_body
 from kinertia.workflow.prepare import prepare
@@ -211,16 +211,6 @@ def test_what_cannot_be_is_an_error(change, words):
 def test_entries_that_cannot_be_say_what_is_expected(change, words):
     with pytest.raises(ValidationError, match=words):
         Attached(**{"mass_kg": 10.0, **PACK, **change})
-
-
-def test_a_thing_that_is_not_to_be_told_from_nothing_is_named():
-    pack, weighed = (Attached(mass_kg=mass, **PACK) for mass in ("unknown", "0.2 +- 0.5"))
-    bsp = with_attached(ready(pack)).prior.mean
-    sd = np.full((13, 10), 0.51 * bsp.mass_kg[-1])
-    (said,) = not_found_warnings([pack], bsp, sd)
-    assert said.startswith("[[attached]] rucksack: 7.26 kg are found, with a deviation of 3.70 kg, which is not")
-    assert not not_found_warnings([pack], bsp, 0.9 * sd)
-    assert not not_found_warnings([weighed], bsp, sd)
 
 
 def test_things_that_weigh_more_than_the_scale_said_are_an_error():

@@ -49,9 +49,7 @@ def test_the_sign_of_free_moments(log_odds, expected):
 
 
 def zeros(trial="walk", axis="x", **values_n):
-    return [
-        error(f"zero {axis}", value, 2.4, 1.5, "N", plate, trial, moved=0.5) for plate, value in values_n.items()
-    ]
+    return [error(f"zero {axis}", value, 2.4, 1.5, "N", plate, trial, moved=0.5) for plate, value in values_n.items()]
 
 
 def test_zeros_that_all_plates_have_alike_are_rather_a_force_that_none_measures():

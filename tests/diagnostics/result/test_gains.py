@@ -8,7 +8,7 @@ from kinertia.findings.finding import Severity
 from results import codes, context, error
 
 
-def found(*corrections, masses=(82.5,), trial=None, sd=0.003):
+def found(*corrections, mass_kg=82.5, trial=None, sd=0.003):
     """Of plates with these gains in all trials; in a trial, of whole gains there besides uncertain ones of all."""
     plates = [f"plate {k}" for k in range(1, len(corrections) + 1)]
     lasting = [
@@ -20,7 +20,7 @@ def found(*corrections, masses=(82.5,), trial=None, sd=0.003):
         for gain, plate in zip(corrections, plates, strict=True)
         if trial is not None
     ]
-    return list(gains(context(*lasting, *own, masses=masses)))
+    return list(gains(context(*lasting, *own, mass_kg=mass_kg)))
 
 
 @pytest.mark.parametrize("trial", [None, "walk"])
@@ -36,12 +36,10 @@ def test_what_was_carried_comes_before_the_plates(trial):
 
 
 def test_a_mass_that_is_too_large_comes_before_the_plates():
-    (cause,) = [one for one in found(0.038, 0.045, masses=(71.5,)) if one.code == "P224"]
+    (cause,) = [one for one in found(0.038, 0.045, mass_kg=71.5) if one.code == "P224"]
     assert cause.evidence["gain_error"].value[0] < 0.0
-    assert [word in one for word, one in zip(("mass", "handrail", "amplifier"), cause.causes, strict=False)][:2] == [
-        True,
-        True,
-    ]
+    assert "mass" in cause.causes[0]
+    assert "handrail" in cause.causes[1]
 
 
 @pytest.mark.parametrize("trial", [None, "walk"])
@@ -57,7 +55,7 @@ def test_an_uncertain_gain_is_not_reported():
 
 
 def test_forces_that_show_no_mass_leave_the_gains():
-    (cause,) = [one for one in found(-0.05, -0.05, masses=()) if one.code == "P224"]
+    (cause,) = [one for one in found(-0.05, -0.05, mass_kg=None) if one.code == "P224"]
     assert "mass_by_force_kg" not in cause.evidence
 
 

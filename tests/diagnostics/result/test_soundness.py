@@ -140,6 +140,8 @@ def test_a_heavier_side_explains_single_parameters_and_the_whole(added):
     (one,) = unlike(one_sided=side, away=4.5)
     assert one.code == "R205"
     assert one.evidence["difference_kg"].value == (0.9, 0.4)
-    worn = next(k for k, cause in enumerate(one.causes) if '[[attached]] with segment = "tibia_r" or "calcn_r"' in cause)
+    worn = next(
+        k for k, cause in enumerate(one.causes) if '[[attached]] with segment = "tibia_r" or "calcn_r"' in cause
+    )
     artificial = next(k for k, cause in enumerate(one.causes) if "[segment.tibia_l] and [segment.calcn_l]" in cause)
     assert (worn < artificial) == added

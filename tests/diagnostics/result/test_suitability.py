@@ -74,7 +74,11 @@ def test_a_correction_lowers_nothing(clear):
 
 @pytest.mark.parametrize(
     ("parameter", "lower"),
-    [("mass", {"masses": "use with care"}), ("com_y", {"centres": "use with care"}), ("ixy", {"inertias": "use with care"})],
+    [
+        ("mass", {"masses": "use with care"}),
+        ("com_y", {"centres": "use with care"}),
+        ("ixy", {"inertias": "use with care"}),
+    ],
 )
 def test_an_implausible_parameter_lowers_its_own_output(clear, parameter, lower):
     far = finding("R203", Where(part=f"{parameter} of shank_l"), parameter=Quantity(parameter))
