@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 import typer
 
+import findings
 import house
 import reference
 from command_line import run
@@ -95,6 +96,13 @@ def test_generated_parts_are_up_to_date(page):
     text = page.read_text(encoding="utf-8")
     assert "<!-- generated: " in text
     assert reference.filled(text) == text, "run: python docs/tools/reference.py"
+
+
+def test_pages_about_findings_are_up_to_date():
+    pages = findings.pages()
+    for page, text in pages.items():
+        assert page.read_text(encoding="utf-8") == text, f"{page.name}: run python docs/tools/findings.py"
+    assert set((ROOT / "docs" / "findings").iterdir()) == set(pages) - {ROOT / "docs" / "findings.md"}
 
 
 def _command_lines(text):

@@ -12,6 +12,8 @@ from pathlib import Path
 
 import pytest
 
+from kinertia.findings.rule import FAMILIES
+
 ROOT = Path(__file__).parents[2]
 OLDEST = {
     # platform of uv, and the oldest macOS that all packages have wheels for (SciPy's for ARM begin at 12)
@@ -112,6 +114,12 @@ def test_it_is_one_wheel_for_all_systems_with_names_that_all_allow(wheel):
     for part in {part for name in names for part in name.split("/")}:
         assert not re.search(r'[<>:"\\|?*\x00-\x1f]|[ .]$', part), part
         assert not re.fullmatch(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", part, re.IGNORECASE), part
+
+
+@pytest.mark.slow
+def test_it_carries_the_catalogue_of_findings(wheel):
+    with zipfile.ZipFile(wheel) as archive:
+        assert {f"kinertia/findings/catalogue/{family}.toml" for family in FAMILIES} <= set(archive.namelist())
 
 
 @pytest.mark.slow

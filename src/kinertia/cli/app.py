@@ -35,6 +35,7 @@ kinertia markers FILE         which marker set is it? draft one of your own
 kinertia fit subject.toml     estimate; the results go to the folder out
 kinertia report out           write the report of a fit again
 kinertia compare out1 out2    what differs between fits, and by how much
+kinertia explain P213         what a finding means, and what to do about it
 kinertia export out --csv     all tables of a fit, for other programs
 kinertia crossval subject.toml   do they hold on a held-out trial?
 kinertia plan                 which motions to record, by their error bars
@@ -81,6 +82,7 @@ _MODULES = {
     "crossval": "plan",
     "plan": "plan",
     "instruments": "instruments",
+    "explain": "explain",
     "cohort": "cohort",
     "population": "population",
     "study": "study",

@@ -11,6 +11,7 @@ from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 
 _FIELD = re.compile(r"\{(\w+)(?::([+%#]*))?\}")
+_UNIT_SUFFIX = re.compile(r"_(?:m_s|nm_n|kg_m3|kg|nm|rad|hz|sd|n|m|s)$")
 _LISTED = 4
 
 
@@ -46,14 +47,14 @@ def shown(quantity: Quantity, style: str = "") -> str:
     factor, unit, digits = _scaled(quantity.unit, max((abs(value) for value in values), default=0.0))
     sign = "+" if "+" in style else ""
     if "%" in style:
-        texts = [f"{100.0 * value:{sign}.3g}" for value in values]
+        texts = [f"{100.0 * value:{sign}z.3g}" for value in values]
         unit = "%"
     elif "#" in style:
-        texts = [f"{value:{sign}.0f}" for value in values]
+        texts = [f"{value:{sign}z.0f}" for value in values]
     elif digits < 0:
-        texts = [f"{value:{sign}.3g}" for value in values]
+        texts = [f"{value:{sign}z.3g}" for value in values]
     else:
-        texts = [f"{factor * value:{sign}.{digits}f}" for value in values]
+        texts = [f"{factor * value:{sign}z.{digits}f}" for value in values]
     return f"{', '.join(texts)} {unit}".rstrip()
 
 
@@ -74,6 +75,24 @@ def filled(template: str, where: Where, evidence: Mapping[str, Quantity]) -> str
         return places[name]() if name in places else match.group(0)
 
     return _FIELD.sub(one, template)
+
+
+def outlined(template: str, mark: str = "<{}>") -> str:
+    """A sentence of the catalogue as it reads before anything was measured: `<level>` for `{level_n}`.
+
+    Args:
+        template: with `{names}` of evidence and places.
+        mark: how a name is shown, with its place as `{}`.
+
+    >>> outlined("Forces of {plate} lag by {delay_s:+}.")
+    'Forces of <plate> lag by <delay>.'
+    """
+    return _FIELD.sub(lambda field: mark.format(_UNIT_SUFFIX.sub("", field.group(1)).replace("_", " ")), template)
+
+
+def names_in(template: str) -> tuple[str, ...]:
+    """Evidence and places that a sentence of the catalogue asks for, in its order."""
+    return tuple(field.group(1) for field in _FIELD.finditer(template))
 
 
 def _places(where: Where) -> dict[str, Callable[[], str]]:

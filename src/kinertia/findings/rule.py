@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from dataclasses import dataclass
+from difflib import get_close_matches
 from functools import cache
 from importlib.resources import files
 from typing import Any
@@ -88,10 +89,22 @@ def matching(code: str) -> tuple[str, ...]:
     return tuple(one for one in rules(code[:1]) if one.startswith(code))
 
 
+def nearest(code: str) -> tuple[str, ...]:
+    """Up to three codes that look most like one that is unknown, or whose rule's name does."""
+    names = {one.name: one.code for one in all_rules().values()}
+    close = [*get_close_matches(code.lower(), list(names), n=1), *get_close_matches(code, [*names.values()], n=3)]
+    return tuple(names.get(one, one) for one in close[:3])
+
+
 @cache
 def family_title(family: str) -> str:
     """What a family is about."""
     return str(_read(family).get("title", ""))
+
+
+def page(code: str) -> str:
+    """Page and place of the documentation about a code or question: "findings/force-plates.md#p213"."""
+    return f"findings/{family_title(code[:1]).lower().replace(' ', '-')}.md#{code.lower()}"
 
 
 def _rule(code: str, entry: dict[str, Any]) -> Rule:

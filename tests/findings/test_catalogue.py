@@ -1,0 +1,104 @@
+"""The catalogue as a whole: every code has a complete entry, and no finding explains itself."""
+
+import re
+
+from kinertia.findings.display import names_in
+from kinertia.findings.finding import Severity
+from kinertia.findings.rule import FAMILIES, OUTPUTS, STAGES, all_rules, family_title, matching, questions, rule
+
+RULES = all_rules()
+QUESTIONS = {question for family in FAMILIES for question in questions(family)}
+MOST_WORDS = 25
+NO_EVIDENCE = {"code", "where", "severity", "causes"}
+"""Arguments of `finding`: evidence cannot have these names."""
+
+
+def explained(code):
+    """Codes whose findings are said to be a consequence of this one's."""
+    return {one for entry in rule(code).supersedes for one in matching(entry)}
+
+
+def templates(one):
+    return (one.message, one.effect, one.remedy)
+
+
+def codes_where(condition):
+    return [code for code, one in RULES.items() if condition(one)]
+
+
+def test_every_question_has_answers_and_every_answer_a_question():
+    assert {one.question for one in RULES.values()} == QUESTIONS
+    assert all(question[0] == family and len(question) == 3 for family in FAMILIES for question in questions(family))
+    assert all(family_title(family) for family in FAMILIES)
+
+
+def test_names_are_unique_words():
+    assert len({one.name for one in RULES.values()}) == len(RULES)
+    assert codes_where(lambda one: not re.fullmatch(r"[a-z0-9]+(-[a-z0-9]+)+", one.name)) == []
+
+
+def test_severities_stages_and_outputs_are_known():
+    assert codes_where(lambda one: one.severity not in Severity.__members__) == []
+    assert codes_where(lambda one: one.stage not in STAGES) == []
+    assert codes_where(lambda one: not set(one.affects) <= set(OUTPUTS)) == []
+
+
+def test_everything_is_said_in_sentences():
+    assert codes_where(lambda one: not all(re.fullmatch(r"\S(.*\S)?\.", text) for text in templates(one))) == []
+    assert codes_where(lambda one: not re.fullmatch(r"[A-Z\[].*\S\.", one.detects)) == []
+
+
+def test_messages_are_short():
+    assert codes_where(lambda one: len(re.sub(r"\{[^}]*\}", "x", one.message).split()) > MOST_WORDS) == []
+
+
+def test_remedies_are_one_sentence():
+    assert codes_where(lambda one: re.search(r"[.!?] [A-Z]", one.remedy)) == []
+
+
+def test_braces_hold_names_of_evidence_or_places():
+    for one in RULES.values():
+        for template in templates(one):
+            assert not set("{}") & set(re.sub(r"\{[a-z][a-z0-9_]*(:\+?[%#]?)?\}", "", template)), one.code
+            assert not set(names_in(template)) & NO_EVIDENCE, one.code
+
+
+def test_what_may_be_a_warning_or_error_affects_some_output():
+    def grave(one):
+        return one.severity in ("WARNING", "ERROR") or bool(re.search("WARNING|ERROR", one.escalation))
+
+    # norms are shown beside results and change none
+    assert codes_where(lambda one: grave(one) != bool(one.affects)) == ["F187"]
+
+
+def test_only_errors_are_hard():
+    assert codes_where(lambda one: one.hard and one.severity != "ERROR" and "ERROR" not in one.escalation) == []
+
+
+def test_what_a_rule_explains_and_resolves_is_known():
+    assert codes_where(lambda one: not set(one.supersedes) <= RULES.keys() | QUESTIONS) == []
+    assert codes_where(lambda one: not set(one.resolves) <= RULES.keys()) == []
+    assert codes_where(lambda one: len(set(one.supersedes)) < len(one.supersedes)) == []
+
+
+def test_only_corrections_resolve_and_only_warnings_are_resolved():
+    assert codes_where(lambda one: one.resolves and one.severity != "CORRECTED") == []
+    assert codes_where(lambda one: any(rule(code).severity != "WARNING" for code in one.resolves)) == []
+
+
+def test_no_finding_explains_itself_by_way_of_others():
+    settled = set()
+
+    def follow(code, way):
+        assert code not in way, " > ".join([*way, code])
+        if code not in settled:
+            for one in explained(code):
+                follow(one, [*way, code])
+            settled.add(code)
+
+    for code in RULES:
+        follow(code, [])
+
+
+def test_no_finding_explains_why_a_file_cannot_be_read():
+    assert codes_where(lambda one: any(rule(code).stage == "file" for code in explained(one.code))) == []
