@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from kinertia.diagnostics.result.uses import uses as uses
     from kinertia.diagnostics.result.verdict import Verdict as Verdict
     from kinertia.diagnostics.result.verdict import verdicts as verdicts
-    from kinertia.diagnostics.runner import Overrule as Overrule
     from kinertia.errors import BlockedError as BlockedError
     from kinertia.errors import FileError as FileError
     from kinertia.errors import KinertiaError as KinertiaError
@@ -69,6 +68,7 @@ if TYPE_CHECKING:
     from kinertia.report.saved_fit import load_fit as load_fit
     from kinertia.settings import Attached as Attached
     from kinertia.settings import Instruments as Instruments
+    from kinertia.settings import Overrule as Overrule
     from kinertia.settings import Settings as Settings
     from kinertia.settings import Subject as Subject
     from kinertia.studies.cross_validation import HeldOut as HeldOut
@@ -104,7 +104,7 @@ _ROOMS = {
     "findings.quantity": "Quantity",
     "findings.rule": "Rule rule",
     "findings.where": "Where",
-    "settings": "Attached Instruments Settings Subject",
+    "settings": "Attached Instruments Overrule Settings Subject",
     "trial.data": "FootLoads Markers PlateLoads Recording Trial",
     "trial.plate_assignment": "build_trial",
     "trial.trial_input": "TrialInput",
@@ -123,7 +123,6 @@ _ROOMS = {
     "estimation.result": "Fit TrialFit",
     "estimation.simultaneous.fit": "Posterior",
     "diagnostics.model.model_check": "ModelCheck check_model",
-    "diagnostics.runner": "Overrule",
     "diagnostics.result.uses": "Use uses",
     "diagnostics.result.verdict": "Verdict verdicts",
     "workflow.estimate": "estimate estimate_bsp estimate_bsp_of_model",

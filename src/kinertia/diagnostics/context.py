@@ -10,10 +10,11 @@ from typing import Any
 from kinertia.diagnostics.axes import Axes, AxisNames
 from kinertia.diagnostics.evidence.caused_velocity import CausedVelocity, caused_velocities
 from kinertia.diagnostics.evidence.foot_ways import FootWay, foot_ways
+from kinertia.diagnostics.evidence.force_mass import ForceMass, force_mass
 from kinertia.diagnostics.evidence.load_contacts import Contact, contacts_of
 from kinertia.errors import KinertiaError
 from kinertia.estimation.carried_mass import CarriedMass
-from kinertia.findings.finding import Finding
+from kinertia.findings.finding import Finding, Severity
 from kinertia.findings.where import Where
 from kinertia.model.imported import OsimModel
 from kinertia.model.marker_set import MarkerSet
@@ -127,6 +128,13 @@ class RecordingContext:
         """How fast the body is by markers and by forces, one entry per measured window."""
         return () if self.trial is None else caused_velocities(self.trial, self.segment_of_label)
 
+    @cached_property
+    def force_mass(self) -> ForceMass | None:
+        """Body mass by the vertical force; None where forces or markers do not show it."""
+        if self.trial is None:
+            return None
+        return force_mass(self.segment_of_label, self.trial, self.travel.kind == "stands still")
+
     def at(self, **where: Any) -> Where:
         """A place in this recording: `at(plate="plate 1", **self.along(2))`."""
         return Where(trial=self.name, **where)
@@ -149,6 +157,7 @@ class PersonContext:
         calibrated: markers and joints of the model are to move.
         total_mass: what was stated of the body and of what was worn; None where no mass is known.
         found: findings of the recordings themselves, where a question depends on them.
+        more_statics: recordings in which the person stands, of which none is the static trial.
     """
 
     subject: Subject
@@ -159,3 +168,16 @@ class PersonContext:
     calibrated: bool = False
     total_mass: CarriedMass | None = None
     found: Sequence[Finding] = field(default=())
+    more_statics: Sequence[RecordingContext] = ()
+
+    @property
+    def standing(self) -> Sequence[RecordingContext]:
+        """The static trial, or every recording that may be it."""
+        return self.more_statics if self.static is None else (self.static, *self.more_statics)
+
+    def has_error(self, trial: str, *codes: str) -> bool:
+        """Whether an ERROR of one of these codes, questions or families was found in a trial."""
+        return any(
+            one.severity is Severity.ERROR and one.where.trial == trial and one.code.startswith(codes)
+            for one in self.found
+        )

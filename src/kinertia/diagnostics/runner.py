@@ -11,7 +11,8 @@ from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
 
 from kinertia.findings.finding import Finding, Severity
-from kinertia.findings.rule import matching, rule
+from kinertia.findings.rule import matching
+from kinertia.settings import Overrule
 
 Context = TypeVar("Context")
 
@@ -29,26 +30,6 @@ class Question(Generic[Context]):
     code: str
     ask: Callable[[Context], Iterable[Finding]]
     unless: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class Overrule:
-    """What a user overrules: codes, questions or families.
-
-    Attributes:
-        waive: ERRORs that do not block; shown as waived in every output.
-        ignore: findings below ERROR that are not shown and lower no verdict.
-
-    Examples:
-        >>> kinertia.Overrule(waive=("P244",)).waive
-        ('P244',)
-    """
-
-    waive: tuple[str, ...] = ()
-    ignore: tuple[str, ...] = ()
-
-    def __add__(self, other: Overrule) -> Overrule:
-        return Overrule((*self.waive, *other.waive), (*self.ignore, *other.ignore))
 
 
 def asked(
@@ -125,10 +106,3 @@ def overruled(findings: Iterable[Finding], overrule: Overrule) -> list[Finding]:
 def blocking(findings: Iterable[Finding]) -> list[Finding]:
     """Open ERRORs that no other finding explains: what stops the next stage."""
     return [one for one in findings if one.severity is Severity.ERROR and one.is_open]
-
-
-def unknown_codes(overrule: Overrule) -> list[str]:
-    """What of it is no code, question or family of the catalogue, or cannot be waived."""
-    unknown = [each for each in (*overrule.waive, *overrule.ignore) if not matching(each)]
-    hard = [each for each in overrule.waive if len(each) == 4 and matching(each) and rule(each).hard]
-    return [*unknown, *hard]

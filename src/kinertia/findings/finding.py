@@ -106,6 +106,10 @@ class Finding:
         """The same, found in that trial."""
         return replace(self, where=replace(self.where, trial=trial))
 
+    def in_file(self, file: str) -> Finding:
+        """The same, found in that file."""
+        return replace(self, where=replace(self.where, file=file))
+
     def line(self) -> str:
         """Where and what on one line: `walk  P213 The zero of plate 1 is off ...`."""
         return f"{self.where.trial}  {self.code} {self.message}" if self.where.trial else f"{self.code} {self.message}"

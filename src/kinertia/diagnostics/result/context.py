@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from kinertia.diagnostics.axes import Axes
-from kinertia.diagnostics.subject.force_mass import ForceMass, force_mass
+from kinertia.diagnostics.evidence.force_mass import ForceMass, force_mass
+from kinertia.diagnostics.evidence.markers_centre import owners_of
 from kinertia.estimation.prepared import Prepared
 from kinertia.estimation.result import Fit
 from kinertia.estimation.simultaneous.instrument_errors import InstrumentError
@@ -37,8 +38,9 @@ class ResultContext:
     @cached_property
     def force_masses(self) -> Mapping[str, ForceMass]:
         """Trial -> body mass by its vertical force and its markers; of trials that show it."""
-        masses = (force_mass(self.ready.skeleton, trial.kinematics.trial) for trial in self.fit.trials)
-        return {mass.trial: mass for mass in masses if mass is not None}
+        owners = owners_of(self.ready.skeleton)
+        masses = {trial.name: force_mass(owners, trial.kinematics.trial) for trial in self.fit.trials}
+        return {name: mass for name, mass in masses.items() if mass is not None}
 
     @cached_property
     def _axes(self) -> Mapping[str, Axes]:
