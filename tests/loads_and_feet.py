@@ -1,15 +1,37 @@
-"""What is said of where loads and feet are."""
+"""What is found of where loads and feet are, and when."""
 
-from kinertia.diagnostics.plates.load_places import LoadPlaces
+from kinertia.diagnostics.context import RecordingContext
+from kinertia.diagnostics.plates.place_questions import PLACE_QUESTIONS
+from kinertia.diagnostics.runner import asked, explained
+from kinertia.findings.finding import Severity
+from kinertia.io.marker_set_file import choose_marker_set
+from kinertia.model.marker_set import MarkerSet
+
+COMPETING = ("P204", "P241", "P242", "P243", "P244", "T201", "T211", "T212")
 
 
-def load_places_trouble(recording, feet):
-    """Empty where nothing can be said, too."""
-    places = LoadPlaces.of(recording, feet)
-    return "" if places is None else places.trouble()
+def context_of(recording, feet=None, **more):
+    """Of a recording with the markers of a preset, or with these labels on its feet ("r" and "l")."""
+    if feet is None:
+        return RecordingContext(recording, choose_marker_set(recording.markers.labels), **more)
+    segments = {f"foot_{side}": tuple(labels) for side, labels in feet.items()}
+    return RecordingContext(recording, MarkerSet("feet", {}, segments, {}), **more)
 
 
-def load_places_doubts(recording, feet):
-    """None where nothing can be said, too."""
-    places = LoadPlaces.of(recording, feet)
-    return [] if places is None else places.doubts()
+def place_findings(recording, feet=None, context=None, **more):
+    """What all questions of places find, with causes over their consequences."""
+    return explained(asked(PLACE_QUESTIONS, context or context_of(recording, feet, **more)))
+
+
+def doubted(recording, feet=None, **more):
+    """Codes of what is not explained by another finding and above CORRECTED."""
+    found = place_findings(recording, feet, **more)
+    return [one.code for one in found if one.is_open and one.severity > Severity.CORRECTED]
+
+
+def error_of(recording, feet=None, **more):
+    """The ERROR of the competition of places, rates and delays, or None."""
+    found = [one for one in place_findings(recording, feet, **more) if one.code in COMPETING and one.muted_by is None]
+    errors = [one for one in found if one.severity is Severity.ERROR]
+    assert len({one.code for one in errors}) <= 1
+    return errors[0] if errors else None

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
+from kinertia.diagnostics.context import PersonContext, RecordingContext
 from kinertia.io.osim.reader import read_osim
 from kinertia.model.marker_set import MarkerSet
 from kinertia.model.model_markers import markers_of_model
-from kinertia.trial.data import Recording, Trial
-from kinertia.trial.plate_assignment import build_trial
+from kinertia.settings import Subject
+from kinertia.trial.data import Recording
 from recordings import is_here
 
 
@@ -51,13 +52,8 @@ class Trials:
     def names(self) -> tuple[str, str, str]:
         return self.person.trials
 
-    @property
-    def segments(self) -> Mapping[str, Sequence[str]]:
-        """Labels of the markers on each."""
-        return self.marker_set.segments
-
-    def trial(self, name: str, forces: str | None = None, late_s: float = 0.0) -> Trial:
-        """The trial of this name.
+    def context(self, name: str, forces: str | None = None, late_s: float = 0.0) -> RecordingContext:
+        """The recording of this name.
 
         Args:
             name: of the trial.
@@ -65,9 +61,9 @@ class Trials:
             late_s: by how much they are late.
         """
         recording = self.read(*self.person.files(name, forces))
-        feet = {
-            side: [one for one in own if one in recording.markers.labels]
-            for side, own in self.marker_set.foot_labels().items()
-        }
         plates = replace(recording.plates, time=recording.plates.time + late_s)
-        return build_trial(replace(recording, plates=plates, name=name), feet)
+        return RecordingContext(replace(recording, plates=plates, name=name), self.marker_set)
+
+    def together(self, contexts: Sequence[RecordingContext]) -> PersonContext:
+        """The person with these recordings."""
+        return PersonContext(Subject(mass_kg=self.person.mass_kg), contexts, marker_set=self.marker_set)

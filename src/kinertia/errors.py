@@ -251,3 +251,10 @@ class BlockedError(KinertiaError):
         self.blocking = tuple(blocking)
         self.finding = self.blocking[0] if self.blocking else None
         super().__init__("\n".join(f"{one.line()} {one.remedy}" for one in self.blocking))
+
+
+def findings_of(error: KinertiaError) -> tuple[Finding, ...]:
+    """All findings that stopped a fit, the one that an error is of, or none."""
+    if isinstance(error, BlockedError):
+        return error.findings
+    return () if error.finding is None else (error.finding,)

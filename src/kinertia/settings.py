@@ -341,7 +341,8 @@ def _codes(value: object) -> tuple[str, ...]:
         raise ValueError('must be a list of codes, questions or families in quotes, like ["M102", "R40"]')
     for one in value:
         if not matching(one):
-            near = get_close_matches(one.upper(), all_rules(), n=3, cutoff=0.5)
+            written = one[:1].upper() + one[1:].upper().replace("O", "0")
+            near = get_close_matches(written, all_rules(), n=3, cutoff=0.5)
             hint = f"the nearest are {', '.join(near)}" if near else "see kinertia explain"
             raise ValueError(f"'{one}' is no code, question or family; {hint}")
     return tuple(value)

@@ -121,7 +121,8 @@ def test_a_long_gap_ends_a_stretch(skeleton, trial, motion, start, windows):
     np.testing.assert_allclose(of_stretches, windows, atol=1e-9)
     assert not kinematics.inside(np.array([start + 0.1])).any()
     assert np.abs(kinematics.motion.q - motion.q[kinematics.frames])[:, 3:].max() < np.radians(2.0)
-    assert any("2 measured stretches between 0.050 and 1.950 s are used together" in one for one in kinematics.notes)
+    (found,) = kinematics.findings
+    assert (found.code, found.evidence["count"].value, found.evidence["left_out"].value) == ("P270", 2, 0)
 
 
 def test_a_stretch_that_is_too_short_is_left_out(skeleton, trial):
@@ -129,7 +130,8 @@ def test_a_stretch_that_is_too_short_is_left_out(skeleton, trial):
     measured[80:90] = measured[100:105] = False
     kinematics = solve_kinematics(skeleton, replace(trial, measured=measured), 0.0, 10.0)
     np.testing.assert_allclose(kinematics.windows_s, [(0.05, 0.79), (1.05, 1.95)], atol=1e-9)
-    assert any("10 measured frames are left out: in stretches of less than 11" in one for one in kinematics.notes)
+    (found,) = kinematics.findings
+    assert [found.evidence[name].value for name in ("frames", "count", "left_out")] == [166, 2, 10]
 
 
 def test_the_foot_alone_tells_where_the_shank_is(skeleton, trial):
@@ -149,16 +151,25 @@ def test_no_usable_frame_names_trial_and_counts(skeleton, trial):
     measured = np.zeros(201, dtype=bool)
     measured[100:110] = True
     gapped = hidden(replace(trial, measured=measured), ["foot_l", "shank_l"], 0.9, 1.2)
-    with pytest.raises(TrialError, match=r"trial 'walk': no frame has both .*frames with it: 10"):
-        solve_kinematics(skeleton, gapped, 0.0, 10.0)
-    with pytest.raises(TrialError, match=r"trial 'walk': the longest stretch .* is 10 frames"):
-        solve_kinematics(skeleton, replace(trial, measured=measured), 0.0, 10.0)
+    found = refused(skeleton, gapped)
+    assert (found.code, found.evidence["frames_with_contact"].value) == ("R104", 10)
+    found = refused(skeleton, replace(trial, measured=measured))
+    assert (found.code, found.evidence["frames"].value) == ("P279", 10)
+    assert found.where.span_s == pytest.approx((1.0, 1.09))
+
+
+def refused(skeleton, trial):
+    """The finding of the error that this trial has no kinematics."""
+    with pytest.raises(TrialError) as caught:
+        solve_kinematics(skeleton, trial, 0.0, 10.0)
+    assert caught.value.finding.where.trial == "walk"
+    return caught.value.finding
 
 
 def test_a_coordinate_seen_too_seldom_is_named(skeleton, trial):
     gapped = hidden(trial, ["forearm_r"], 0.04, 3.0)
-    with pytest.raises(TrialError, match=r"trial 'walk': .*elbow_flex_r are visible in 4 frames only"):
-        solve_kinematics(skeleton, gapped, 0.0, 10.0)
+    found = refused(skeleton, gapped)
+    assert (found.code, found.where.part, found.evidence["frames"].value) == ("R102", "elbow_flex_r", 4)
 
 
 def test_a_single_frame_is_too_short(skeleton, trial):
@@ -167,8 +178,8 @@ def test_a_single_frame_is_too_short(skeleton, trial):
         markers=Markers(np.zeros(1), trial.markers.labels, trial.markers.positions[:1]),
         measured=np.ones(1, bool),
     )
-    with pytest.raises(TrialError, match=r"trial 'walk': .*visible in 1 frames only"):
-        solve_kinematics(skeleton, one, 0.0, 10.0)
+    found = refused(skeleton, one)
+    assert (found.code, found.evidence["frames"].value) == ("R102", 1)
 
 
 def test_bridges_are_between_known_frames_and_at_most_a_tenth_of_a_second():

@@ -4,6 +4,9 @@ import numpy as np
 import pytest
 
 from kinertia.errors import MarkerSetError, TrialError
+from kinertia.findings.finding import finding
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
 from kinertia.trial.data import FootLoads, Markers, PlateLoads, Recording
 from kinertia.trial.ground_contact import CONTACT_MARGIN_S, CONTACT_SLACK_S, ground_contact
 from kinertia.trial.plate_assignment import assign_plates, build_trial, measured_frames
@@ -144,16 +147,14 @@ def test_frames_without_forces_are_not_measured():
     expect_window(build_trial(replace(recording, plates=cut), FEET), 0.5, 2.0)
 
 
-def test_wrong_declared_foot_is_noted():
+def test_wrong_declared_foot_is_corrected():
     recording = walk([("r", 0), ("l", 0)])
     declared = replace(recording, plates=replace(recording.plates, declared_feet=("r", "r")))
-    loads, notes = assign_plates(declared, FEET)
+    loads, (found,) = assign_plates(declared, FEET)
     assert (loads.force[800:1200, 1, 1] > 0).all()
-    assert notes == (
-        "walk: plate 2 is declared for the right foot, but from 0.700 to 1.299 s its load is under the left "
-        "foot and was "
-        "given to it",
-    )
+    assert (found.code, found.where.trial, found.where.plate) == ("P277", "walk", "plate 2")
+    assert found.where.span_s == pytest.approx((0.7, 1.299))
+    assert [found.evidence[name].value for name in ("contacts", "declared", "foot")] == [1, "right", "left"]
     right = replace(recording, plates=replace(recording.plates, declared_feet=("r", "l")))
     assert assign_plates(right, FEET)[1] == ()
 
@@ -167,14 +168,12 @@ def merged(recording, columns):
 
 def test_plate_that_carries_both_feet_is_divided():
     recording = walk([("r", 0), ("l", 0)])
-    loads, notes = assign_plates(merged(recording, [0, 1]), FEET)
+    loads, (found,) = assign_plates(merged(recording, [0, 1]), FEET)
     assert (loads.force[200:650, 0, 1] > 0).all()
     assert (loads.force[850:1300, 1, 1] > 0).all()
     np.testing.assert_allclose(loads.force.sum(axis=1), recording.plates.force.sum(axis=1))
-    assert notes == (
-        "walk: belt carries both feet in turn from 0.200 to 1.299 s; each sample was given to the nearer foot, and "
-        "0.2 s around each change count as not measured: of both feet only the sum is known",
-    )
+    assert (found.code, found.where.plate) == ("P275", "belt")
+    assert found.where.span_s == pytest.approx((0.2, 1.299))
 
 
 def test_double_support_on_one_plate_is_not_measured():
@@ -197,18 +196,17 @@ def test_both_feet_on_one_plate_all_the_time_is_said():
     sway = np.zeros_like(force)
     sway[:, 0, 2] = 0.05 * np.sin(2 * np.pi * 0.7 * plates.time)
     squats = replace(standing, markers=markers, plates=replace(plates, force=force, moment=np.cross(sway, force)))
-    with pytest.raises(TrialError, match=r"both feet stand on one plate in \d+ % of the frames, and only the sum"):
-        build_trial(squats, FEET)
+    found = refused(squats)
+    assert found.code == "P278"
+    assert found.evidence["shared"].value > 0.5
+    assert found.causes
 
 
-def test_load_far_from_both_feet_is_noted():
-    recording = walk([("r", 0)])
-    plates = recording.plates
-    shift = np.cross((0.0, 0.0, 1.0), plates.force)
-    far = replace(recording, plates=replace(plates, moment=plates.moment + shift))
-    assert assign_plates(far, FEET)[1] == (
-        "walk: plate 1 is loaded from 0.200 to 0.799 s at 1.00 m from the nearest foot; check that it is the person's",
-    )
+def refused(recording, **more):
+    """The finding of the error that no trial can be made of this recording."""
+    with pytest.raises(TrialError) as caught:
+        build_trial(recording, FEET, **more)
+    return caught.value.finding
 
 
 def test_noise_is_no_contact_and_short_gaps_are_none():
@@ -217,8 +215,8 @@ def test_noise_is_no_contact_and_short_gaps_are_none():
     force[1500:1510, 0, 1] = 25.0
     force[400:410, 0] = moment[400:410, 0] = 0.0
     noisy = replace(recording, plates=replace(recording.plates, force=force, moment=moment))
-    loads, notes = assign_plates(noisy, FEET)
-    assert notes == ("walk: plate 1 has 1 loads shorter than 50 ms, taken as noise",)
+    loads, (found,) = assign_plates(noisy, FEET)
+    assert (found.code, found.where.plate, found.evidence["count"].value) == ("P273", "plate 1", 1)
     assert not loads.force[1400:].any()
     trial = build_trial(noisy, FEET)
     expect_window(trial, 0.3 + CONTACT_MARGIN_S, 1.2 - CONTACT_MARGIN_S)
@@ -246,23 +244,24 @@ def test_users_window():
     recording = walk([("r", 0), ("l", 0)])
     trial = build_trial(recording, FEET, window_s=(0.1, 1.6))
     expect_window(trial, 0.1, 1.6)
-    assert "the window 0.100 to 1.600 s was given by the user" in trial.notes[0]
-    assert "measured in 0.3" in trial.notes[0]
-    with pytest.raises(TrialError, match=r"window 7.000 to 8.000 s holds no frame with forces \(they cover 0.000 to"):
-        build_trial(recording, FEET, window_s=(7.0, 8.0))
+    (found,) = trial.findings
+    assert (found.code, found.where.span_s) == ("P274", (0.1, 1.6))
+    assert found.evidence["spans"].value.startswith("0.3")
+    beside = refused(recording, window_s=(7.0, 8.0))
+    assert (beside.code, beside.where.span_s) == ("P278", (7.0, 8.0))
+    assert beside.evidence["forces"].value.startswith("0.000 to ")
 
 
 def test_nothing_measured_tells_when_feet_were_where():
     slow = walk([("r", 0)], stance_s=0.95)
-    with pytest.raises(
-        TrialError, match=r"right foot on the ground .*on a plate 0.250 to 0.600 s; left foot on the ground"
-    ):
-        build_trial(replace(slow, markers=slow.markers.cut(0.25, 0.60)), FEET)
+    found = refused(replace(slow, markers=slow.markers.cut(0.25, 0.60)))
+    assert found.code == "P278"
+    assert found.evidence["right_plate"].value == "0.250 to 0.600 s"
+    assert {"right_ground", "left_ground", "left_plate"} < set(found.evidence)
     idle = walk([("r", 0)])
     idle = replace(idle, plates=replace(idle.plates, force=0 * idle.plates.force, moment=0 * idle.plates.moment))
-    idle = replace(idle, left_out=("plate 2 was left out, it has no samples",))
-    with pytest.raises(TrialError, match=r"in no frame .*; plate 2 was left out, it has no samples"):
-        build_trial(idle, FEET)
+    idle = replace(idle, findings=(finding("F151", Where(plate="plate 2"), reason=Quantity("it has no samples")),))
+    assert "it has no samples" in refused(idle).evidence["left_out"].value
 
 
 def test_measured_frames_of_loads_that_are_sorted_already():
@@ -274,10 +273,8 @@ def test_measured_frames_of_loads_that_are_sorted_already():
 
 def test_what_is_missing_is_named():
     recording = walk([("r", 0)])
-    with pytest.raises(TrialError, match="no force plates"):
-        build_trial(replace(recording, plates=None), FEET)
-    with pytest.raises(TrialError, match="only one frame"):
-        build_trial(replace(recording, markers=recording.markers.cut(0.5, 0.5)), FEET)
+    assert refused(replace(recording, plates=None)).code == "P271"
+    assert refused(replace(recording, markers=recording.markers.cut(0.5, 0.5))).code == "T104"
     with pytest.raises(MarkerSetError, match=r"'R.Hel' \(nearest: R.Heel"):
         build_trial(recording, {**FEET, "r": ["R.Hel"]})
 
@@ -336,7 +333,7 @@ def test_window_of_whole_trials(real, name):
     trial = build_trial(recording, feet)
     assert len(trial.windows()) == 1
     assert trial.windows()[0] == pytest.approx(window, abs=0.025)
-    wrong = [note for note in trial.notes if "is declared for the right foot" in note]
+    wrong = [one for one in trial.findings if one.code == "P277"]
     assert len(wrong) == (1 if name in ("walking1", "walking2", "squats1") else 0)
 
 

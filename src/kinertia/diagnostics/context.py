@@ -9,9 +9,14 @@ from typing import Any
 
 from kinertia.diagnostics.axes import Axes, AxisNames
 from kinertia.diagnostics.evidence.caused_velocity import CausedVelocity, caused_velocities
-from kinertia.diagnostics.evidence.foot_ways import FootWay, foot_ways
+from kinertia.diagnostics.evidence.copied_frames import without_copied_frames
+from kinertia.diagnostics.evidence.foot_trajectories import FootTrajectory, foot_trajectories
 from kinertia.diagnostics.evidence.force_mass import ForceMass, force_mass
-from kinertia.diagnostics.evidence.load_contacts import Contact, contacts_of
+from kinertia.diagnostics.evidence.loaded_plates import adult_share
+from kinertia.diagnostics.evidence.marker_precision import MarkerPrecision
+from kinertia.diagnostics.evidence.plate_contacts import PlateContact, contacts_of
+from kinertia.diagnostics.evidence.plate_edges import Overhang, overhangs, without
+from kinertia.diagnostics.evidence.trajectory_faults import TrajectoryFaults
 from kinertia.errors import KinertiaError
 from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.findings.finding import Finding, Severity
@@ -71,6 +76,23 @@ class RecordingContext:
         return self.recording.markers.select([label for label in self.marker_set.labels if label in present])
 
     @cached_property
+    def measured_markers(self) -> Markers:
+        """`markers` without copies of lost frames."""
+        return self.markers if self.is_static else without_copied_frames(self.markers)
+
+    @cached_property
+    def marker_precision(self) -> MarkerPrecision:
+        """Rounding and noise of the coordinates."""
+        return MarkerPrecision.of(self.measured_markers)
+
+    @cached_property
+    def trajectory_faults(self) -> TrajectoryFaults:
+        """Spikes, jumps and filled intervals of single markers; of who stands still, repeated spikes only."""
+        segments = {} if self.marker_set is None else self.marker_set.segments
+        coarse = self.is_static or self.marker_precision.rounded or self.marker_precision.noisy
+        return TrajectoryFaults.of(self.measured_markers, segments, coarse)
+
+    @cached_property
     def travel(self) -> Travel:
         """What the person does: walks, stands still, or moves on the spot."""
         return travel(self.markers)
@@ -97,16 +119,31 @@ class RecordingContext:
         return {label: name for name, labels in self.marker_set.segments.items() for label in labels}
 
     @cached_property
-    def foot_trajectories(self) -> tuple[FootWay, FootWay] | None:
+    def foot_trajectories(self) -> tuple[FootTrajectory, FootTrajectory] | None:
         """Right and left foot; None where a foot is hardly seen."""
-        return None if self.feet is None else foot_ways(self.recording.markers, self.feet, self.recording.belt)
+        return None if self.feet is None else foot_trajectories(self.recording.markers, self.feet, self.recording.belt)
 
     @cached_property
-    def contacts(self) -> Sequence[Contact]:
+    def contacts(self) -> Sequence[PlateContact]:
         """Every load on a plate, with where it is on the feet; none without plates or feet."""
         if self.plates is None or self.foot_trajectories is None:
             return ()
         return contacts_of(self.plates, self.foot_trajectories)
+
+    @cached_property
+    def overhangs(self) -> Sequence[Overhang]:
+        """Feet that reach beyond the plate that they stand on; none where its corners are not known."""
+        if self.plates is None or self.feet is None:
+            return ()
+        landmarks = {} if self.marker_set is None else self.marker_set.landmarks
+        toes = {label for side in "rl" for label in landmarks.get(f"toe_{side}", ())}
+        return overhangs(self.plates, self.contacts, self.all_markers, self.feet, toes)
+
+    @cached_property
+    def whole_loads(self) -> PlateLoads | None:
+        """The plates without loads of feet that reach beyond them: these begin late, or end early."""
+        cut = [one.contact for one in self.overhangs if not one.only_toe]
+        return self.plates if self.plates is None or not cut else without(self.plates, cut)
 
     @cached_property
     def loaded(self) -> Trial | KinertiaError | None:
@@ -122,6 +159,11 @@ class RecordingContext:
     def trial(self) -> Trial | None:
         """The trial with its loads sorted by foot, in the laboratory's axes; None where that is impossible."""
         return self.loaded if isinstance(self.loaded, Trial) else None
+
+    @cached_property
+    def adult_share(self) -> float:
+        """Body weight over an adult's, at most 1: limits in newtons, which are those of adults, are times this."""
+        return adult_share(self.plates, self.mass_kg)
 
     @cached_property
     def velocities(self) -> Sequence[CausedVelocity]:

@@ -6,12 +6,12 @@ the relation `supersedes` of the catalogue: there is no order of evaluation that
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
 
 from kinertia.findings.finding import Finding, Severity
-from kinertia.findings.rule import matching
+from kinertia.findings.rule import matching, rule
 from kinertia.settings import Overrule
 
 Context = TypeVar("Context")
@@ -89,20 +89,35 @@ def _resolved(one: Finding, findings: Sequence[Finding]) -> Finding:
     return one
 
 
-def overruled(findings: Iterable[Finding], overrule: Overrule) -> list[Finding]:
+def overruled(
+    findings: Iterable[Finding], overrule: Overrule, of_trials: Mapping[str, Overrule] | None = None
+) -> list[Finding]:
     """Findings with the status that the user gives them: ERRORs are waived unless nothing can be computed, others
-    ignored."""
-    waived = {code for each in overrule.waive for code in matching(each)}
-    ignored = {code for each in overrule.ignore for code in matching(each)}
+    ignored.
 
-    def one(finding: Finding) -> Finding:
-        if finding.severity is Severity.ERROR:
-            return replace(finding, status="waived") if finding.code in waived and not finding.rule.hard else finding
-        return replace(finding, status="ignored") if finding.code in ignored else finding
-
-    return [one(finding) for finding in findings]
+    Args:
+        findings: with what explains each.
+        overrule: in all trials.
+        of_trials: in single trials, by their names.
+    """
+    result = []
+    for one in findings:
+        rule_of_trial = (of_trials or {}).get(one.where.trial or "", Overrule())
+        is_error = one.severity is Severity.ERROR
+        codes = (overrule + rule_of_trial).waive if is_error else (overrule + rule_of_trial).ignore
+        if any(one.code.startswith(code) for code in codes) and not (is_error and one.rule.hard):
+            one = replace(one, status="waived" if is_error else "ignored")
+        result.append(one)
+    return result
 
 
 def blocking(findings: Iterable[Finding]) -> list[Finding]:
     """Open ERRORs that no other finding explains: what stops the next stage."""
     return [one for one in findings if one.severity is Severity.ERROR and one.is_open]
+
+
+def unknown_codes(overrule: Overrule) -> list[str]:
+    """What of it is no code, question or family of the catalogue, or cannot be waived."""
+    unknown = [each for each in (*overrule.waive, *overrule.ignore) if not matching(each)]
+    hard = [each for each in overrule.waive if len(each) == 4 and matching(each) and rule(each).hard]
+    return [*unknown, *hard]

@@ -64,6 +64,10 @@ class Finding:
     muted_by: str | None = None
     status: Status = "open"
 
+    def __post_init__(self) -> None:
+        # saved results hold it as a number
+        object.__setattr__(self, "severity", Severity(self.severity))
+
     @property
     def rule(self) -> Rule:
         """The entry of the catalogue."""

@@ -18,7 +18,6 @@ from kinertia.errors import FileError
 from kinertia.findings.finding import Finding, Severity, finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
-from kinertia.io.lab_axes import file_axis
 from kinertia.io.plate_moments import MOMENTS_FIT
 from kinertia.io.trc import METRES_PER_UNIT
 from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads
@@ -166,13 +165,19 @@ def _small_offsets(where: Where, level_n: FloatArray, rotation: FloatArray) -> l
     return [
         finding(
             "P213",
-            replace(where, axis="vertical" if axis == 1 else None, file_axis=file_axis(rotation, axis)),
+            replace(where, axis="vertical" if axis == 1 else None, file_axis=_file_axis(rotation, axis)),
             Severity.INFO,
             level_n=Quantity(float(level), "N", limit=low),
         )
         for axis, level in enumerate(level_n)
         if low < abs(level) <= high
     ]
+
+
+def _file_axis(rotation: FloatArray, ground_axis: int) -> str:
+    """What the file calls ground axis 0, 1 or 2: "Z" or "-Y"."""
+    index = int(np.argmax(np.abs(rotation[ground_axis])))
+    return f"{'-' if rotation[ground_axis, index] < 0 else ''}{'XYZ'[index]}"
 
 
 def person_on_plates(platforms: Any, people: Sequence[str], labels: Sequence[str], positions: FloatArray) -> str:

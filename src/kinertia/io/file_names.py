@@ -92,7 +92,12 @@ def missing_file(path: Path, written: str, expected: str = "") -> dict[str, Quan
     if expected not in ("", "a file"):
         hint += f" (expected {expected})"
     evidence = {"nearest": Quantity(", ".join(nearest))} if nearest else {}
-    return evidence | {"file": Quantity(path.name), "folder": Quantity(str(folder)), "hint": Quantity(hint)}
+    words = {"file": _printable(path.name), "folder": _printable(str(folder)), "hint": hint}
+    return evidence | {name: Quantity(text) for name, text in words.items()}
+
+
+def _printable(text: str) -> str:
+    return text if text.isprintable() else ascii(text)
 
 
 def _foreign_path(written: str) -> str:

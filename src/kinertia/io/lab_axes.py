@@ -80,12 +80,6 @@ def upright_along_z(positions: FloatArray) -> FloatArray | None:
     return _rotation(2, 1) if upright and on_floor else None
 
 
-def file_axis(rotation: FloatArray, ground_axis: int) -> str:
-    """What the file calls ground axis 0, 1 or 2: "Z" or "-Y"."""
-    index = int(np.argmax(np.abs(rotation[ground_axis])))
-    return f"{'-' if rotation[ground_axis, index] < 0 else ''}{'XYZ'[index]}"
-
-
 def ground_rotation(vertical: str) -> FloatArray:
     """The rotation (3, 3) from axes of which this one is up, "+Z" or the like, to ground axes."""
     return _rotation(*_AXES[vertical])

@@ -53,11 +53,11 @@ def choose_marker_set(labels: Sequence[str]) -> MarkerSet:
     """The preset that fits the labels of a static trial, or of one of pelvis and legs only.
 
     Raises:
-        MarkerSetError: no preset fits; says for the best one what is missing and the nearest labels.
+        MarkerSetError: no preset fits (L101); with what the nearest one lacks, and the labels that look like it.
     """
     best = nearest_preset(labels)
     if not is_worn(best, labels):
-        raise mismatch(best, labels, "no marker-set preset fits the static trial; the nearest is")
+        raise mismatch(best, labels)
     return best
 
 

@@ -16,6 +16,9 @@ from typing import Literal
 import numpy as np
 
 from kinertia.errors import MarkerSetError, TrialError
+from kinertia.findings.finding import Finding, finding
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
 from kinertia.model.marker_set import MarkerSet
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.common_cutoff import Cutoff, common_cutoff
@@ -52,6 +55,7 @@ class Kinematics:
         windows_s: first and last time of every stretch in which all ground contact is measured and all coordinates are
             known, with accelerations; in order.
         notes: assumptions made on the way.
+        findings: which frames are used, and where inverse kinematics did not converge.
     """
 
     trial: Trial
@@ -61,6 +65,7 @@ class Kinematics:
     cutoff_hz: float
     windows_s: tuple[tuple[float, float], ...]
     notes: tuple[str, ...]
+    findings: tuple[Finding, ...] = ()
 
     @property
     def window_s(self) -> tuple[float, float]:
@@ -157,8 +162,8 @@ def solve_kinematics(
     """Inverse kinematics and smoothing of a trial that already faces +X.
 
     Raises:
-        TrialError: no stretch in which all ground contact is measured and all coordinates are known, or a coordinate
-            is known in too few frames to be smoothed.
+        TrialError: R102, R103, a coordinate is known in too few frames to be smoothed, or in none; R104, P279, no
+            frame, or too few, with complete ground contact and all coordinates.
     """
     ik = solve_ik(skeleton, trial.markers, trial.name)
     solved = np.flatnonzero(np.isfinite(ik.q).any(axis=1))
@@ -167,22 +172,22 @@ def solve_kinematics(
         cutoff = common_cutoff(ik.time[shown], ik.q[shown, :3], trial) if smoothing == "gcv" else Cutoff(smoothing)
         spline = smooth(ik.time[shown], ik.q[shown], cutoff.hz)
     except SmoothingError as error:
-        raise TrialError(
-            trial.name,
-            f"enough markers to know {ik.coordinates[error.column]} are visible in {error.n_visible} frames only, too "
-            f"few to smooth it; fill the gaps of the markers or use a longer trial",
-        ) from error
+        part = Where(part=ik.coordinates[error.column])
+        code = "R102" if error.n_visible else "R103"
+        raise TrialError.found(trial.name, code, at=part, frames=Quantity(error.n_visible, "1")) from error
     known = np.all(_bridged(np.isfinite(ik.q), ik.time), axis=1)
     known &= (
         np.abs(ik.time - ik.time[shown].mean())
         <= np.ptp(ik.time[shown]) / 2 - _END_PERIODS / cutoff.hz + TIME_TOLERANCE_S
     )
-    windows, notes = _long_enough(trial, known & trial.measured, known)
+    windows, findings = _long_enough(trial, known & trial.measured, known)
     stuck = int((~ik.converged[solved]).sum())
     if stuck:
-        notes.append(f"{trial.name}: inverse kinematics stopped at its limit of iterations in {stuck} frames")
+        findings.append(finding("R105", Where(trial=trial.name), frames=Quantity(stuck, "1")))
     remarks = [f"{trial.name}: {cutoff.sentence}"] if cutoff.sentence else []
-    return Kinematics(trial, turned_deg, ik, spline, cutoff.hz, windows, (*trial.notes, *remarks, *notes))
+    return Kinematics(
+        trial, turned_deg, ik, spline, cutoff.hz, windows, (*trial.notes, *remarks), (*trial.findings, *findings)
+    )
 
 
 def _bridged(known: np.ndarray, time: np.ndarray) -> np.ndarray:
@@ -198,37 +203,32 @@ def _bridged(known: np.ndarray, time: np.ndarray) -> np.ndarray:
 
 def _long_enough(
     trial: Trial, usable: np.ndarray, known: np.ndarray
-) -> tuple[tuple[tuple[float, float], ...], list[str]]:
-    """First and last time of the stretches of usable frames (n,) that are long enough, and what is left out."""
-    time = trial.markers.time
-    stretches = runs(usable)
-    if not stretches:
-        raise TrialError(
-            trial.name,
-            f"no frame has both measured ground contact (frames with it: {int(trial.measured.sum())}) and enough "
-            f"visible markers for all coordinates (frames with them: {int(known.sum())}); fill marker gaps or use "
-            f"another trial",
-        )
-    used = [(first, last) for first, last in stretches if last - first + 1 >= FEWEST_FRAMES]
+) -> tuple[tuple[tuple[float, float], ...], list[Finding]]:
+    """First and last time of the windows of usable frames (n,) that are long enough; P270 where there are several, or
+    some are left out.
+    """
+    time, where = trial.markers.time, Where(trial=trial.name)
+    windows = runs(usable)
+    if not windows:
+        measured, shown = (Quantity(int(mask.sum()), "1") for mask in (trial.measured, known))
+        raise TrialError.found(trial.name, "R104", frames_with_contact=measured, frames_with_markers=shown)
+    used = [(first, last) for first, last in windows if last - first + 1 >= FEWEST_FRAMES]
     if not used:
-        first, last = max(stretches, key=lambda run: run[1] - run[0])
-        raise TrialError(
-            trial.name,
-            f"the longest stretch with measured ground contact and enough visible markers is {last - first + 1} "
-            f"frames ({time[first]:.3f} to {time[last]:.3f} s); at least {FEWEST_FRAMES} are needed",
-        )
-    windows = tuple((float(time[first]), float(time[last])) for first, last in used)
-    notes = []
-    if len(used) > 1:
-        longest = max(used, key=lambda run: run[1] - run[0])
-        notes.append(
-            f"{trial.name}: {len(used)} measured stretches between {windows[0][0]:.3f} and {windows[-1][1]:.3f} s are "
-            f"used together, {sum(last - first + 1 for first, last in used)} frames; the longest is from "
-            f"{time[longest[0]]:.3f} to {time[longest[1]]:.3f} s"
-        )
-    short = [last - first + 1 for first, last in stretches if (first, last) not in used]
-    if short:
-        notes.append(
-            f"{trial.name}: {sum(short)} measured frames are left out: in stretches of less than {FEWEST_FRAMES}"
-        )
-    return windows, notes
+        first, last = max(windows, key=lambda run: run[1] - run[0])
+        longest = Where(span_s=(float(time[first]), float(time[last])))
+        few = Quantity(last - first + 1, "1", limit=FEWEST_FRAMES)
+        raise TrialError.found(trial.name, "P279", at=longest, frames=few)
+    frames = sum(last - first + 1 for first, last in used)
+    left_out = sum(last - first + 1 for first, last in windows) - frames
+    found = []
+    if len(windows) > 1:
+        found = [
+            finding(
+                "P270",
+                where,
+                frames=Quantity(frames, "1"),
+                count=Quantity(len(used), "1"),
+                left_out=Quantity(left_out, "1"),
+            )
+        ]
+    return tuple((float(time[first]), float(time[last])) for first, last in used), found

@@ -17,6 +17,9 @@ from kinertia.estimation.simultaneous.instruments import InstrumentInformation
 from kinertia.estimation.simultaneous.marker_noise import MarkerNoise
 from kinertia.estimation.simultaneous.one_sided import OneSided
 from kinertia.estimation.simultaneous.unlike import Unlikeness
+from kinertia.findings.finding import Finding
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
 from kinertia.io.object_archive import read_archive, write_archive
 from kinertia.io.provenance import VERSION, Provenance, versions
 from kinertia.model.axis_functions import Composed, PiecewisePolynomial
@@ -30,7 +33,7 @@ from kinertia.motion.inverse_kinematics import InverseKinematics
 from kinertia.motion.kinematics import Kinematics
 from kinertia.motion.smoothing import SmoothedSpline
 from kinertia.report.truth import Truth
-from kinertia.settings import Settings, Subject
+from kinertia.settings import Overrule, Settings, Subject
 from kinertia.trial.belt import Belt
 from kinertia.trial.data import FootLoads, Markers, Trial
 
@@ -60,6 +63,7 @@ _KINDS = (
     InstrumentError, FreeMomentSign,
     Skeleton, Joint, Axis, Marker, Range, PiecewisePolynomial, Composed, BodySegmentParameters,
     OsimModel, OsimJoint, OsimCoordinate, Coupling,
+    Finding, Where, Quantity, Overrule,
     Kinematics, InverseKinematics, SmoothedSpline, Motion, GroundReactions, Trial, Markers, FootLoads, Belt,
 )  # fmt: skip
 """All that a result is made of. Files know the classes by these names: who renames one keeps the old name readable."""

@@ -126,12 +126,14 @@ class IdleReading(NamedTuple):
         peak_n: the largest vertical force of the whole recording, N.
         rings_s: for how long the vertical force is below zero just before feet land and just after they leave, s; 0
             where it does not do both.
+        like_steps: the vertical force comes and goes as under feet, of whatever size.
     """
 
     level_n: tuple[float, float, float]
     drift_n: float
     peak_n: float
     rings_s: float
+    like_steps: bool = False
 
 
 class TorqueColumns(NamedTuple):
@@ -354,6 +356,7 @@ class Trial:
         measured: (n,) True where every foot on the ground stood on a loaded plate.
         notes: one sentence for each assumption made on the way here.
         virtual_sd_m, belt, vertical: as the recording's.
+        findings: how its loads were sorted by foot.
 
     Examples:
         >>> recording = kinertia.read_recording("lab/walk.trc", "lab/walk_grf.mot")
@@ -371,6 +374,7 @@ class Trial:
     notes: tuple[str, ...] = ()
     virtual_sd_m: Mapping[str, float] = field(default_factory=dict)
     belt: Belt | None = None
+    findings: tuple[Finding, ...] = ()
     vertical: str = "+Y"
 
     def __post_init__(self) -> None:

@@ -10,11 +10,15 @@ A hand on a rail, a chair or a second person is not seen.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 
-from kinertia.errors import TrialError
+from kinertia.errors import TrialError, problem_of
+from kinertia.findings.finding import Finding, finding, with_evidence
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
 from kinertia.trial.data import FEET, BoolArray, FloatArray, FootLoads, Markers, Recording, Trial
 from kinertia.trial.ground_contact import (
     BRIDGED_GAP_S,
@@ -31,8 +35,7 @@ __all__ = ["BRIDGED_GAP_S", "FootMarkers", "assign_plates", "build_trial", "meas
 SHORTEST_CONTACT_S = 0.05
 """A load that lasts less than this within the recording is noise of an empty plate."""
 
-FAR_FROM_FEET_M = 0.3
-"""A centre of pressure this far from the middle of both feet is worth a note."""
+FOOT_NAMES = ("right", "left")
 
 SHARED_FRACTION = 0.15
 """A contact that spends at least this part of its time nearer to the other foot carries both feet in turn."""
@@ -43,7 +46,6 @@ DOUBLE_SUPPORT_S = 0.2
 _MOSTLY_SHARED = 0.5
 """Share of the frames with both feet down and one plate loaded from which on that is why nothing is measured."""
 _LISTED_SPANS = 4
-_FOOT_NAMES = ("right", "left")
 
 
 def build_trial(recording: Recording, feet: FootMarkers, window_s: tuple[float, float] | None = None) -> Trial:
@@ -55,32 +57,42 @@ def build_trial(recording: Recording, feet: FootMarkers, window_s: tuple[float, 
         window_s: first and last time (s) that the user vouches for, in place of what the data say.
 
     Raises:
-        TrialError: fewer than two frames, no force plates, or no measured frame; the last message tells when each
-            foot was on the ground and when on a plate.
+        TrialError: T104, fewer than two frames; P271, no force plates; P278, no frame with complete contact.
         MarkerSetError: a foot label is not among the markers.
     """
-    if len(recording.markers.time) < 2:
-        raise TrialError(recording.name, "only one frame; expected a motion, or use the file as a static trial")
-    loads, notes = assign_plates(recording, feet)
+    time = recording.markers.time
+    if len(time) < 2:
+        raise TrialError.found(recording.name, "T104", frames=Quantity(len(time), "1"))
+    loads, findings = assign_plates(recording, feet)
     contact = ground_contact(recording.markers, loads, feet, recording.belt)
-    measured = contact.measured(recording.markers.time)
-    if window_s is not None:
-        spans = _spans(recording.markers.time, measured)
-        time = recording.markers.time
-        measured = contact.inside & within(time, *window_s)
-        notes += (
-            f"{recording.name}: the window {window_s[0]:.3f} to {window_s[1]:.3f} s was given by the user; "
-            f"by the data, all ground contact is measured in {spans}",
-        )
+    complete = contact.measured(time)
+    measured = complete if window_s is None else contact.inside & within(time, *window_s)
     if not measured.any():
-        problem = "; ".join([_nothing_measured(recording.markers.time, loads, contact, window_s), *recording.left_out])
-        raise TrialError(recording.name, problem)
-    told = (*recording.notes, *notes)
-    own = recording.virtual_sd_m, recording.belt, recording.vertical
-    return Trial(recording.name, recording.markers, loads, measured, told, *own)
+        raise _error(_nothing_measured(recording, loads, contact, window_s))
+    if window_s is not None:
+        stated = Quantity(f"{window_s[0]:.3f} to {window_s[1]:.3f} s")
+        spans = Quantity(_spans(time, complete))
+        findings += (finding("P274", Where(trial=recording.name, span_s=window_s), window=stated, spans=spans),)
+    return Trial(
+        recording.name,
+        recording.markers,
+        loads,
+        measured,
+        recording.notes,
+        recording.virtual_sd_m,
+        recording.belt,
+        findings,
+        recording.vertical,
+    )
 
 
-def assign_plates(recording: Recording, feet: FootMarkers) -> tuple[FootLoads, tuple[str, ...]]:
+def no_forces(recording: Recording) -> Finding:
+    """P271, of a recording without plates that can be used."""
+    left_out = Quantity("; ".join(recording.left_out) or "none")
+    return finding("P271", Where(trial=recording.name), left_out=left_out)
+
+
+def assign_plates(recording: Recording, feet: FootMarkers) -> tuple[FootLoads, tuple[Finding, ...]]:
     """Give every load to the foot it is under, whatever the files claim.
 
     A contact is a run of loaded samples on one plate, with gaps below `BRIDGED_GAP_S` bridged; contacts
@@ -90,43 +102,40 @@ def assign_plates(recording: Recording, feet: FootMarkers) -> tuple[FootLoads, t
     whole load counts for the nearer one, since only the sum is known: these samples are `together`.
 
     Returns:
-        the loads by foot, on the plates' time base, and a note for each assumption.
+        the loads by foot, on the plates' time base, and findings: P273 short loads, P275 feet in turn, P277 declared
+        for the other foot.
 
     Raises:
-        TrialError: the recording has no force plates.
+        TrialError: P271, the recording has no force plates.
         MarkerSetError: a foot label is not among the markers.
     """
     plates = recording.plates
     if plates is None:
-        why = f" that can be used: {'; '.join(recording.left_out)}" if recording.left_out else ""
-        raise TrialError(
-            recording.name, f"no force plates{why}; give a force file (.mot, .sto) or a C3D file with plates"
-        )
+        raise _error(no_forces(recording))
     centres = [_centre(recording.markers.select(feet[foot]), plates.time) for foot in FEET]
     covered = (plates.time >= recording.markers.time[0]) & (plates.time <= recording.markers.time[-1])
     force = np.zeros((len(plates.time), 2, 3))
     moment = np.zeros_like(force)
     most, on_plate = np.zeros((len(plates.time), 2)), np.full((len(plates.time), 2), -1)
     together = np.zeros(len(plates.time), dtype=bool)
-    notes: list[str] = []
+    findings: list[Finding] = []
     for p, name in enumerate(plates.names):
-        where = f"{recording.name}: {name}"
+        where = Where(trial=recording.name, plate=name)
         contacts, noise = _contacts(plates.time, plates.force[:, p, 1] > 0)
         if noise:
-            notes.append(f"{where} has {noise} loads shorter than {1000 * SHORTEST_CONTACT_S:g} ms, taken as noise")
+            findings.append(finding("P273", where, count=Quantity(noise, "1")))
+        height_m = 0.0 if plates.corners is None else float(plates.corners[p, :, 1].mean())
+        feet_of = []
         for first, last in contacts:
             piece = slice(first, last + 1)
-            nearer, contact_notes = _nearer_foot(
-                where,
-                plates.time[piece],
+            nearer = _nearer_foot(
                 plates.force[piece, p],
                 plates.moment[piece, p],
                 [centre[piece] for centre in centres],
                 covered[piece],
-                plates.declared_feet[p],
-                0.0 if plates.corners is None else float(plates.corners[p, :, 1].mean()),
+                height_m,
             )
-            notes += contact_notes
+            feet_of.append(nearer)
             together[piece] |= _changing(plates.time[piece], nearer)
             for foot in range(2):
                 force[piece, foot] += np.where((nearer == foot)[:, None], plates.force[piece, p], 0.0)
@@ -134,10 +143,11 @@ def assign_plates(recording: Recording, feet: FootMarkers) -> tuple[FootLoads, t
                 vertical = np.where(nearer == foot, plates.force[piece, p, 1], 0.0)
                 on_plate[piece, foot] = np.where(vertical > most[piece, foot], p, on_plate[piece, foot])
                 most[piece, foot] = np.maximum(most[piece, foot], vertical)
+        findings += _sorted_otherwise(where, plates.time, contacts, feet_of, plates.declared_feet[p])
     noise_n = max(plates.noise_n or (0.0,))
     held = _held(plates.time, on_plate)
     both = together if together.any() else None
-    return FootLoads(plates.time, force, moment, plates.names, held, noise_n, both, plates.corners), tuple(notes)
+    return FootLoads(plates.time, force, moment, plates.names, held, noise_n, both, plates.corners), tuple(findings)
 
 
 def _changing(time: FloatArray, nearer: npt.NDArray[np.int_]) -> BoolArray:
@@ -184,46 +194,53 @@ def _contacts(time: FloatArray, loaded: BoolArray) -> tuple[list[tuple[int, int]
 
 
 def _nearer_foot(
-    where: str,
-    time: FloatArray,
-    force: FloatArray,
-    moment: FloatArray,
-    centres: Sequence[FloatArray],
-    covered: BoolArray,
-    declared: str | None,
-    height_m: float,
-) -> tuple[npt.NDArray[np.int_], list[str]]:
-    """Index of the foot (k,) that each sample of one contact belongs to, and notes."""
+    force: FloatArray, moment: FloatArray, centres: Sequence[FloatArray], covered: BoolArray, height_m: float
+) -> npt.NDArray[np.int_]:
+    """Index of the foot (k,) that each sample of one contact belongs to; -1 where no marker tells."""
     weight = np.where(covered, force[:, 1], 0.0)
     if not weight.any():
-        return np.full(len(time), -1), []
+        return np.full(len(force), -1)
     load = np.where(force[:, 1] > 0, force[:, 1], np.inf)
     at_height = np.column_stack((moment[:, 2] + height_m * force[:, 0], height_m * force[:, 2] - moment[:, 0]))
     pressure = at_height / load[:, None]
     distance = np.stack([np.linalg.norm(pressure - centre, axis=1) for centre in centres], axis=1)
     distance = np.where(np.isfinite(distance), distance, 1e3)
     foot = int(np.argmin(weight @ distance))
-    nearest = float(weight @ distance.min(axis=1) / weight.sum())
-    span = f"from {time[0]:.3f} to {time[-1]:.3f} s"
-    notes = []
-    if nearest > FAR_FROM_FEET_M:
-        notes.append(
-            f"{where} is loaded {span} at {nearest:.2f} m from the nearest foot; check that it is the person's"
-        )
     nearer = np.argmin(distance, axis=1)
-    active = weight > 0
-    if (nearer[active] != foot).mean() >= SHARED_FRACTION:
-        notes.append(
-            f"{where} carries both feet in turn {span}; each sample was given to the nearer foot, and "
-            f"{DOUBLE_SUPPORT_S:g} s around each change count as not measured: of both feet only the sum is known"
+    in_turn = (nearer[weight > 0] != foot).mean() >= SHARED_FRACTION
+    return nearer if in_turn else np.full(len(force), foot)
+
+
+def _sorted_otherwise(
+    where: Where,
+    time: FloatArray,
+    contacts: Sequence[tuple[int, int]],
+    feet: Sequence[npt.NDArray[np.int_]],
+    declared: str | None,
+) -> list[Finding]:
+    """P275 of each contact (first and last sample) that goes from foot to foot, P277 of those under the other foot than
+    the file claims.
+    """
+    findings, other = [], []
+    for (first, last), foot in zip(contacts, feet, strict=True):
+        span = (float(time[first]), float(time[last]))
+        if foot.min() != foot.max():
+            shared = Quantity(span_s(time, first, last), "s")
+            findings.append(finding("P275", replace(where, span_s=span), span_s=shared))
+        elif declared is not None and foot[0] >= 0 and FEET[foot[0]] != declared:
+            other.append(span)
+    if declared is not None and other:
+        claimed = FEET.index(declared)
+        findings.append(
+            finding(
+                "P277",
+                replace(where, span_s=(other[0][0], other[-1][1])),
+                contacts=Quantity(len(other), "1"),
+                declared=Quantity(FOOT_NAMES[claimed]),
+                foot=Quantity(FOOT_NAMES[1 - claimed]),
+            )
         )
-        return nearer, notes
-    if declared is not None and declared != FEET[foot]:
-        notes.append(
-            f"{where} is declared for the {_FOOT_NAMES[FEET.index(declared)]} foot, but {span} its load is "
-            f"under the {_FOOT_NAMES[foot]} foot and was given to it"
-        )
-    return np.full(len(time), foot), notes
+    return findings
 
 
 def _spans(time: FloatArray, mask: BoolArray) -> str:
@@ -233,24 +250,23 @@ def _spans(time: FloatArray, mask: BoolArray) -> str:
 
 
 def _nothing_measured(
-    time: FloatArray, loads: FootLoads, contact: GroundContact, window_s: tuple[float, float] | None
-) -> str:
+    recording: Recording, loads: FootLoads, contact: GroundContact, window_s: tuple[float, float] | None
+) -> Finding:
+    """P278, with when forces were there, or feet on the ground and on plates, and how long both shared a plate."""
+    time, where = recording.markers.time, Where(trial=recording.name, span_s=window_s)
+    left_out = {"left_out": Quantity("; ".join(recording.left_out))} if recording.left_out else {}
     if window_s is not None:
-        return (
-            f"the window {window_s[0]:.3f} to {window_s[1]:.3f} s holds no frame with forces (they cover "
-            f"{_spans(time, contact.inside)}); give a window within them"
-        )
-    shared = contact.ground.all(axis=1) & (contact.loaded.sum(axis=1) == 1)
-    if loads.together is not None and shared.mean() > _MOSTLY_SHARED:
-        return (
-            f"both feet stand on one plate in {100 * shared.mean():.0f} % of the frames, and only the sum of their "
-            f"forces is known; use a trial in which each foot has a plate of its own, or stands alone for a while"
-        )
-    feet = "; ".join(
-        f"{name} foot on the ground {_spans(time, contact.ground[:, foot])}, on a plate "
-        f"{_spans(time, contact.loaded[:, foot])}"
-        for foot, name in enumerate(_FOOT_NAMES)
-    )
-    return (
-        f"in no frame does every foot on the ground stand on a loaded plate ({feet}); use a trial that hits the plates"
-    )
+        forces = {"forces": Quantity(_spans(time, contact.inside)), **left_out}
+        return with_evidence("P278", where, forces, causes=("a window in which there are no forces",))
+    both = contact.ground.all(axis=1) & (contact.loaded.sum(axis=1) == 1)
+    shared = float(both.mean()) if loads.together is not None else 0.0
+    evidence = {"shared": Quantity(shared, "1", limit=_MOSTLY_SHARED)}
+    for foot, name in enumerate(FOOT_NAMES):
+        evidence[f"{name}_ground"] = Quantity(_spans(time, contact.ground[:, foot]))
+        evidence[f"{name}_plate"] = Quantity(_spans(time, contact.loaded[:, foot]))
+    one_plate = ["both feet on one plate, which measures their sum only"] if shared > _MOSTLY_SHARED else []
+    return with_evidence("P278", where, evidence | left_out, causes=tuple(one_plate))
+
+
+def _error(found: Finding) -> TrialError:
+    return TrialError(found.where.trial or "", problem_of(found)).with_finding(found)

@@ -19,6 +19,9 @@ from kinertia.estimation.carried_mass import mass_of
 from kinertia.estimation.input_checks import known
 from kinertia.estimation.prepared import Prepared
 from kinertia.estimation.prior import SECOND_MOMENT_SD, BspPrior, inertia_covariance
+from kinertia.findings.finding import Finding, finding
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Joint, Skeleton
 from kinertia.settings import Attached
@@ -52,7 +55,7 @@ def with_attached(ready: Prepared, by_itself: Collection[str] = ()) -> Prepared:
         skeleton=skeleton,
         prior=prior,
         literature=BodySegmentParameters.from_table(names, table),
-        notes=(*ready.notes, *(_note(one, scale_kg) for one in ready.attached)),
+        findings=(*ready.findings, *(_assumed(one, scale_kg) for one in ready.attached)),
     )
 
 
@@ -150,8 +153,9 @@ def _less_body(prior: BspPrior, by_itself: Collection[str]) -> np.ndarray:
     return change.ravel()
 
 
-def _note(attached: Attached, scale_kg: float) -> str:
+def _assumed(attached: Attached, scale_kg: float) -> Finding:
     mass_kg, sd_kg = mass_of(attached, scale_kg)
     mass = "of unknown mass, which is estimated" if attached.mass_kg is None else f"{mass_kg:.4g} +- {sd_kg:.2g} kg"
     weighed = "weighed with the person" if attached.on_scale else "not on the scale"
-    return f"attached to {attached.segment}: {attached.name}, {mass}, {weighed}"
+    source = Quantity(f"{attached.name} attached to {attached.segment}, {mass}, {weighed}")
+    return finding("S408", Where(part=attached.name), source=source)

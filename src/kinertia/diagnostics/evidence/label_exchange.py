@@ -38,7 +38,9 @@ def swapped_labels(distances: SegmentDistances, trial: str, reference: str) -> I
         reference: "static trial", "model", or another.
     """
     best = _best(distances, _single(distances)) or _best(distances, _double(distances))
-    for pair in () if best is None else best.pairs:
+    if best is None:
+        return
+    for pair in best.pairs:
         yield finding(
             "L212",
             Where(trial=trial, markers=tuple(distances.labels[k] for k in pair)),

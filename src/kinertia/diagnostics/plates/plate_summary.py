@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kinertia.diagnostics.evidence.strides import periods
+from kinertia.diagnostics.plates.cop_on_plate import off_plate
 from kinertia.model.skeleton import GRAVITY_M_S2
-from kinertia.trial.centre_of_pressure import FIRM_LOAD_N, centre_of_pressure
 from kinertia.trial.data import FEET, BoolArray, FloatArray, FootLoads, Recording, Trial
 from kinertia.trial.ground_contact import FootMarkers, bridged
 from kinertia.trial.plate_assignment import SHORTEST_CONTACT_S, assign_plates
@@ -87,9 +87,9 @@ def check_plates(recording: Recording, feet: FootMarkers | None) -> tuple[PlateC
 def _check_plate(recording: Recording, p: int, feet: FootMarkers | None) -> PlateCheck:
     plates = recording.plates
     assert plates is not None
-    force, moment = plates.force[:, p], plates.moment[:, p]
+    vertical = plates.force[:, p, 1]
     if feet is None:
-        contacts = _contacts(plates.time, force[:, 1] > 0, None)
+        contacts = _contacts(plates.time, vertical > 0, None)
     else:
         alone = replace(
             plates,
@@ -105,30 +105,14 @@ def _check_plate(recording: Recording, p: int, feet: FootMarkers | None) -> Plat
             for foot, name in enumerate(FEET)
             for contact in _contacts(loads.time, loads.force[:, foot, 1] > 0, name)
         ]
-    share, distance = None, 0.0
-    firm = force[:, 1] > FIRM_LOAD_N
-    if plates.corners is not None and firm.any():
-        share, distance = _off_plate(force[firm], moment[firm], plates.corners[p])
+    share, distance = off_plate(plates, p) or (None, 0.0)
     ordered = tuple(sorted(contacts, key=lambda contact: contact.start_s))
-    return PlateCheck(plates.names[p], plates.declared_feet[p], float(force[:, 1].max()), ordered, share, distance)
+    return PlateCheck(plates.names[p], plates.declared_feet[p], float(vertical.max()), ordered, share, distance)
 
 
 def _contacts(time: FloatArray, loaded: BoolArray, foot: str | None) -> list[Contact]:
     spans = [(float(time[first]), float(time[last])) for first, last in runs(bridged(time, loaded))]
     return [Contact(foot, start, end) for start, end in spans if end - start >= SHORTEST_CONTACT_S]
-
-
-def _off_plate(force: FloatArray, moment: FloatArray, corners: FloatArray) -> tuple[float, float]:
-    """Share of the samples whose centre of pressure is off the plate (4, 3), and their distance from it (m)."""
-    height = corners[:, 1].mean()
-    pressure = centre_of_pressure(np.concatenate([force, moment], axis=1), float(height))[:, [0, 2]]
-    flat = corners[:, [0, 2]]
-    edges = np.roll(flat, -1, axis=0) - flat
-    normals = np.column_stack([edges[:, 1], -edges[:, 0]]) / np.linalg.norm(edges, axis=1)[:, None]
-    normals *= np.sign(np.einsum("ek,ek->e", normals, flat - flat.mean(axis=0)))[:, None]  # outwards
-    beyond = np.max(np.einsum("ek,sek->se", normals, pressure[:, None] - flat), axis=1)
-    off = beyond > 0
-    return float(off.mean()), float(np.percentile(beyond[off], 95)) if off.any() else 0.0
 
 
 def mass_by_strides(trial: Trial, standing: bool = False) -> ForceMass | None:

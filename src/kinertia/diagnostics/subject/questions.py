@@ -10,7 +10,7 @@ from kinertia.diagnostics.subject.mass import masses_of_trials, stated_mass
 from kinertia.diagnostics.subject.movements import informative_movements
 from kinertia.diagnostics.subject.repeated_trials import repeated_trials
 from kinertia.diagnostics.subject.same_person import static_and_trials, trials_of_one_person
-from kinertia.diagnostics.subject.standing import flat_feet, floor, model_of_static, standing
+from kinertia.diagnostics.subject.standing import flat_feet, floor, standing
 from kinertia.diagnostics.subject.stature import stature
 
 STATIC_QUESTIONS: tuple[Question[RecordingContext], ...] = (
@@ -18,7 +18,6 @@ STATIC_QUESTIONS: tuple[Question[RecordingContext], ...] = (
     Question("M14", floor),
     Question("S20", flat_feet),
     Question("S10", stature),
-    Question("L10", model_of_static),
 )
 PERSON_QUESTIONS: tuple[Question[PersonContext], ...] = (
     Question("S10", stated_and_filed),

@@ -7,10 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.errors import MarkerSetError
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
-from kinertia.model.gait27 import build_gait27
 
 _LOWEST_M = (0.008, 0.050)
 """A marker's own radius is 5 mm and more; soles are under both feet, and markers on the side of a foot are low."""
@@ -69,15 +67,3 @@ def flat_feet(context: RecordingContext) -> Iterator[Finding]:
             difference_m=Quantity(abs(higher_m), "m", limit=_FLAT_M, usual=(0.0, 0.012)),
             landmark=Quantity(landmark),
         )
-
-
-def model_of_static(context: RecordingContext) -> Iterator[Finding]:
-    """L105 or S206: no model can be built from this static trial; that depends on neither stature nor sex."""
-    if context.marker_set is None or not context.marker_set.landmarks:
-        return
-    try:
-        build_gait27(context.recording, context.marker_set, 1.7, "male")
-    except MarkerSetError as error:
-        if error.finding is None:
-            raise
-        yield error.finding.in_trial(context.name)

@@ -9,14 +9,16 @@ people with skin motion of their own differ by at most 10 ms so. Parts of less t
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from kinertia.diagnostics.evidence.caused_velocity import caused_velocities
+from kinertia.diagnostics.context import PersonContext, RecordingContext
 from kinertia.diagnostics.evidence.ups_and_downs import ups_and_downs_of
-from kinertia.trial.data import Trial
+from kinertia.findings.finding import Finding, finding
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
 from kinertia.trial.sampled_time import span_s
 
 _LEAST_WINDOW_S, _MOST_LEFT = 0.8, 0.22
@@ -24,6 +26,7 @@ _LEAST_WINDOW_S, _MOST_LEFT = 0.8, 0.22
 _SHORT_S = 1.0
 _APART_S, _SHORT_APART_S = 0.012, 0.018
 """In longer windows, and in shorter ones."""
+_USUAL_S = (-0.004, 0.004)
 
 
 class TrialDelay(NamedTuple):
@@ -33,24 +36,16 @@ class TrialDelay(NamedTuple):
 
     name: str
     by_pelvis_s: float
-    by_centre_s: float
+    by_markers_s: float
     short: bool = False
 
-    def shown(self) -> str:
-        """The name, and both delays in ms."""
-        return f"{self.name} ({1e3 * self.by_pelvis_s:+.0f} and {1e3 * self.by_centre_s:+.0f} ms)"
 
-
-def trial_delay(trial: Trial, segments: Mapping[str, Sequence[str]]) -> TrialDelay | None:
-    """Over all windows that are long enough to tell; None where none is.
-
-    Args:
-        trial: in axes with Y up.
-        segments: labels of the markers on each segment.
-    """
-    owners = {label: name for name, labels in segments.items() for label in labels}
+def trial_delay(context: RecordingContext) -> TrialDelay | None:
+    """Over all windows that are long enough; None where none is, or nobody moves."""
+    if context.trial is None or context.travel.kind == "stands still":
+        return None
     found, spans = [], []
-    for part in caused_velocities(trial, owners):
+    for part in context.velocities:
         if span_s(part.time) < _LEAST_WINDOW_S:
             continue
         both = ups_and_downs_of(part)
@@ -59,45 +54,34 @@ def trial_delay(trial: Trial, segments: Mapping[str, Sequence[str]]) -> TrialDel
             spans.append(span_s(part.time))
     if not found:
         return None
-    pelvis, centre = np.average(found, axis=0, weights=spans)
-    return TrialDelay(trial.name, float(pelvis), float(centre), max(spans) < _SHORT_S)
+    pelvis, markers = np.average(found, axis=0, weights=spans)
+    return TrialDelay(context.name, float(pelvis), float(markers), max(spans) < _SHORT_S)
 
 
-def uneven_delays(trials: Sequence[Trial], segments: Mapping[str, Sequence[str]]) -> list[str]:
-    """One sentence for each trial of a person whose forces are late by another time than those of the others."""
-    if len(trials) < 2:
-        return []
-    return [sentence for _, sentence in trial_delays_doubts([trial_delay(trial, segments) for trial in trials])]
+def trial_delays(person: PersonContext) -> Iterator[Finding]:
+    """T213: trials whose forces are late by another time than those of the others."""
+    if len(person.trials) > 1:
+        yield from uneven_delays([trial_delay(one) for one in person.trials])
 
 
-def trial_delays_doubts(delays: Sequence[TrialDelay | None]) -> list[tuple[str, str]]:
-    """Trials whose forces are late by another time than those of the others: the later of two, or each that is apart
-    from the middle of three and more; with a sentence.
+def uneven_delays(delays: Sequence[TrialDelay | None]) -> Iterator[Finding]:
+    """T213 of each trial that is apart from the middle of three and more; of two that differ both, since nobody knows
+    which of them is wrong.
     """
-    known = sorted((one for one in delays if one is not None), key=lambda one: one.by_pelvis_s + one.by_centre_s)
+    known = [one for one in delays if one is not None]
     if len(known) < 2:
-        return []
-    values = np.array([[one.by_pelvis_s, one.by_centre_s] for one in known])
+        return
+    values = np.array([[one.by_pelvis_s, one.by_markers_s] for one in known])
+    usual = values[::-1] if len(known) == 2 else np.broadcast_to(np.median(values, axis=0), values.shape)
     limit_s = _SHORT_APART_S if any(one.short for one in known) else _APART_S
-    if len(known) == 2:
-        usual, apart, against = values[0], [1], f"than those of {known[0].shown()}"
-    else:
-        usual, apart = np.median(values, axis=0), list(range(len(known)))
-        against = f"than those of the other trials (medians {1e3 * usual[0]:+.0f} and {1e3 * usual[1]:+.0f} ms)"
-    late_s = values - usual
-    return [
-        (known[k].name, _sentence(known[k], float(late_s[k].mean()), against))
-        for k in apart
-        if np.abs(late_s[k]).min() > limit_s and late_s[k].prod() > 0
-    ]
-
-
-def _sentence(one: TrialDelay, late_s: float, against: str) -> str:
-    word = "later" if late_s > 0 else "earlier"
-    return (
-        f"the forces of {one.shown()} come {1e3 * abs(late_s):.0f} ms {word} {against}, by when "
-        "the pelvis and the middle of all markers go up and down (4 ms are usual): in one of the trials "
-        "cameras and plates did not start together, or one was filtered with a delay; the simultaneous estimate finds "
-        "the delay of each trial and puts it right, nothing else does: correct the start of the forces that are late "
-        "or early"
-    )
+    for one, others, late_s in zip(known, usual, values - usual, strict=True):
+        if np.abs(late_s).min() <= limit_s or late_s.prod() <= 0:
+            continue
+        yield finding(
+            "T213",
+            Where(trial=one.name),
+            delay_s=Quantity(float(late_s.mean()), "s", limit=limit_s, usual=_USUAL_S),
+            by_pelvis_s=Quantity(one.by_pelvis_s, "s"),
+            by_markers_s=Quantity(one.by_markers_s, "s"),
+            others_s=Quantity(tuple(float(each) for each in others), "s"),
+        )

@@ -1,0 +1,88 @@
+"""How well loads fit the feet: whether they are under them, and begin and end when these land and leave.
+
+Every explanation of loads that do not (another rate, a delay, plates interchanged, rotated or displaced) is judged by
+how well they fit once it is undone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from kinertia.diagnostics.evidence.foot_trajectories import FootTrajectory
+from kinertia.diagnostics.evidence.plate_contacts import PlateContact, contacts_of
+from kinertia.findings.finding import Finding
+from kinertia.trial.data import PlateLoads
+
+_FITS_S, FITS_M = 0.03, 0.08
+"""On fault-free trials loads begin and end within 25 ms of foot contact and foot off (RMS over all that the trial
+shows), under the foot."""
+_FEWEST_EDGES = 3
+
+Feet = tuple[FootTrajectory, FootTrajectory]
+
+
+@dataclass(frozen=True)
+class ContactFit:
+    """How well loads fit the feet.
+
+    Attributes:
+        delay_rms_s: RMS of how far loads begin and end from foot contact and foot off; infinite where too few do.
+        far_m: of the load that is farthest from the feet.
+    """
+
+    delay_rms_s: float
+    far_m: float
+
+    @classmethod
+    def of(cls, contacts: Sequence[PlateContact], feet: Feet) -> ContactFit:
+        """Of all contacts of a trial."""
+        delays = [delay for contact in contacts for delay in _delays(contact, feet[contact.foot])]
+        enough = len(delays) >= _FEWEST_EDGES
+        rms_s = float(np.sqrt(np.mean(np.square(delays)))) if enough else np.inf
+        return cls(rms_s, max((one.distance_m for one in contacts), default=np.inf))
+
+    @property
+    def fits(self) -> bool:
+        """Whether they fit as on fault-free trials."""
+        return self.delay_rms_s < _FITS_S and self.far_m < FITS_M
+
+    @property
+    def misfit(self) -> float:
+        """Delay or distance over what fault-free trials show, the larger one; 1 of all that fit as these do."""
+        known_s = self.delay_rms_s if np.isfinite(self.delay_rms_s) else 0.0
+        return max(1.0, known_s / _FITS_S, self.far_m / FITS_M)
+
+
+class Hypothesis(NamedTuple):
+    """One explanation of loads that do not fit the feet: what is found, and the loads once it is undone; None where
+    nothing undoes it.
+    """
+
+    finding: Finding
+    corrected: PlateLoads | None
+
+    def misfit(self, feet: Feet) -> float:
+        """See `ContactFit`."""
+        if self.corrected is None:
+            return np.inf
+        return ContactFit.of(contacts_of(self.corrected, feet), feet).misfit
+
+
+def _delays(contact: PlateContact, foot: FootTrajectory) -> list[float]:
+    """s, of the beginning and of the end of a load, where both load and stance phase show it."""
+    start, end = contact.time[0], contact.time[-1]
+    overlaps = [(min(end, last) - max(start, first), first, last) for first, last, _ in foot.stance_spans]
+    if not overlaps or max(overlaps)[0] <= 0:
+        # a load while the foot swings is off by as much as anything
+        return [float(end - start)]
+    _, first, last = max(overlaps)
+    delays = []
+    if first > foot.time[0] and np.isfinite(contact.start_s):
+        delays.append(contact.start_s - first)
+    if last < foot.time[-1] and np.isfinite(contact.end_s):
+        delays.append(contact.end_s - last)
+    return [float(delay) for delay in delays]

@@ -1,0 +1,245 @@
+"""Where the feet are and when they stand, from their markers alone: what loads on plates are compared with."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from kinertia.trial.belt import Belt
+from kinertia.trial.data import FEET, BoolArray, FloatArray, Markers
+from kinertia.trial.ground_contact import bridged
+from kinertia.trial.sampled_time import TIME_TOLERANCE_S, nearest_samples, runs, span_s
+
+_LOW = 0.15
+"""Share of the frames in which a foot is lowest: then it goes with the ground, or with a treadmill's belt."""
+LEAST_BELT_M_S = 0.3
+_SLOW, _SLOW_M_S = 0.15, (0.3, 1.0)
+"""A foot stands while one of its markers is slower than this share of its own fast speed, within these limits."""
+_LEAST_SWING_M_S = 1.0
+"""Who does not move the feet faster takes no steps."""
+_NOISE_M_S, _FARTHEST_S = 0.15, 0.05
+"""A speed known to the former needs no frames farther apart; frames the latter apart still show landing and leaving."""
+_THIRD_DIFFERENCE = 0.6745 * np.sqrt(20.0)
+"""Median size of third differences of white noise with a deviation of one."""
+_SHORTEST_S, _MOSTLY = 0.1, 0.5
+_LOAD_BEGINS, _LOAD_GOES_ON = 0.25, 0.65
+"""Shares of the line between a foot's outermost markers."""
+_LANDING_S = 0.05
+"""A foot may bear load so long before it stands and after."""
+
+
+@dataclass(frozen=True, eq=False)
+class FootTrajectory:
+    """One foot.
+
+    Attributes:
+        time: (n,) s.
+        back, front: (n, 2) m, horizontal places (x, z) of the two markers that are farthest apart, interpolated where
+            they are not seen; the same for a foot with one marker. The foot swings forwards from back to front.
+        shown: (n,) whether both are seen, but for short gaps.
+        stands: first and last time (s) of every stance phase, and whether the trial shows both ends.
+    """
+
+    time: FloatArray
+    back: FloatArray
+    front: FloatArray
+    shown: BoolArray
+    stance_spans: tuple[tuple[float, float, bool], ...]
+
+    def seen(self, time: FloatArray) -> BoolArray:
+        """(k,) whether both ends are seen at these times, not interpolated."""
+        return self.shown[nearest_samples(self.time, time)]
+
+    def standing(self, time: FloatArray) -> BoolArray:
+        """(k,) whether it stands then, or a little before or after; everywhere where that cannot be told."""
+        if not self.stance_spans:
+            return np.ones(len(time), dtype=bool)
+        slack_s = _LANDING_S + TIME_TOLERANCE_S
+        spans = [(time >= start - slack_s) & (time <= end + slack_s) for start, end, _ in self.stance_spans]
+        result: BoolArray = np.any(spans, axis=0)
+        return result
+
+    def beyond(self, time: FloatArray, place: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """(k,) m, how far places (k, 2) at times (k,) are in front of the back, and in front of the front."""
+        back, front = (self._at(end, time) for end in (self.back, self.front))
+        along = front - back
+        length = np.maximum(np.linalg.norm(along, axis=1), 1e-6)
+        ahead: FloatArray = ((place - back) * along).sum(axis=1) / length
+        return ahead, ahead - length
+
+    def expected_cop(self, time: FloatArray, weight: FloatArray) -> FloatArray:
+        """(k, 2) m, where the load of a step is expected that has this vertical force (k,) N at these times (k,)."""
+        back, front = (self._at(end, time) for end in (self.back, self.front))
+        share = _LOAD_BEGINS + _LOAD_GOES_ON * np.cumsum(weight) / weight.sum()
+        result: FloatArray = back + (front - back) * share[:, None]
+        return result
+
+    def _at(self, end: FloatArray, time: FloatArray) -> FloatArray:
+        return np.column_stack([np.interp(time, self.time, end[:, axis]) for axis in range(2)])
+
+    def offset_m(self, time: FloatArray, place: FloatArray) -> FloatArray:
+        """(k, 2) m from the nearest point between back and front to places (k, 2) on the ground at times (k,)."""
+        back, front = (self._at(end, time) for end in (self.back, self.front))
+        along = front - back
+        share = ((place - back) * along).sum(axis=1) / np.maximum((along * along).sum(axis=1), 1e-12)
+        result: FloatArray = place - back - np.clip(share, 0.0, 1.0)[:, None] * along
+        return result
+
+
+def foot_trajectories(
+    markers: Markers, feet: Mapping[str, Sequence[str]], belt: Belt | None = None
+) -> tuple[FootTrajectory, FootTrajectory] | None:
+    """Right and left foot; None where a foot is hardly seen.
+
+    Args:
+        markers: of a motion, Y up.
+        feet: labels of the markers on each foot, "r" and "l".
+        belt: of the treadmill, where its speed is stated.
+    """
+    places = _foot_places(markers, feet)
+    if places is None:
+        return None
+    places = [_short_gaps_filled(markers.time, place) for place in places]
+    trajectories = []
+    for place, velocity in zip(places, _velocities(markers, places, belt), strict=True):
+        back, front, shown = _ends(markers.time, place)
+        if _swing(velocity, front - back) < 0:
+            back, front = front, back
+        spans = _stance_spans(markers.time, np.linalg.norm(velocity, axis=2))
+        trajectories.append(FootTrajectory(markers.time, back, front, shown, spans))
+    return trajectories[0], trajectories[1]
+
+
+def _swing(velocity: FloatArray, along: FloatArray) -> float:
+    """Positive where the foot is mostly fast (n, m, 3) along this direction (n, 2), not against it."""
+    shown = _seen(velocity).any(axis=1)
+    mean = np.nanmean(velocity[shown][..., [0, 2]], axis=1)
+    return float(((mean * along[shown]).sum(axis=1) * np.linalg.norm(mean, axis=1)).sum())
+
+
+def _seen(place: FloatArray) -> BoolArray:
+    return np.asarray(np.isfinite(place).all(axis=2))
+
+
+def _velocities(markers: Markers, places: Sequence[FloatArray], stated: Belt | None) -> list[FloatArray]:
+    """(n, m, 3) m/s of every marker of each foot against the ground."""
+    velocities = [_velocity(markers.time, place) for place in places]
+    belts = _belts(places, velocities)
+    if stated is None:
+        belts = [belt if np.linalg.norm(belt) >= LEAST_BELT_M_S else np.zeros(3) for belt in belts]
+    else:
+        belts = [stated.under(foot).velocity(markers.time, belt)[:, None] for foot, belt in enumerate(belts)]
+    return [velocity - belt for velocity, belt in zip(velocities, belts, strict=True)]
+
+
+def _velocity(time: FloatArray, place: FloatArray) -> FloatArray:
+    """(n, m, 3) m/s of markers (n, m, 3), by neighbouring frames or, where they are noisy, by frames farther apart.
+
+    The noise is that of third differences, which hardly show how feet move: poses from video jitter by some mm in every
+    frame, a speed of 0.4 m/s that no standing foot has.
+    """
+    step = float(np.median(np.diff(time)))
+    third = np.abs(np.diff(place, 3, axis=0))
+    noise_m = float(np.nanmedian(third)) / _THIRD_DIFFERENCE if np.isfinite(third).any() else 0.0
+    farthest = max(round(_FARTHEST_S / step), 1)
+    k = int(np.clip(np.ceil(noise_m * np.sqrt(1.5) / (step * _NOISE_M_S)), 1, farthest))
+    velocity = np.gradient(place, time, axis=0)
+    if k > 1 and len(time) > 2 * k:
+        velocity[k:-k] = (place[2 * k :] - place[: -2 * k]) / (time[2 * k :] - time[: -2 * k])[:, None, None]
+    return velocity
+
+
+def standing_speeds(markers: Markers, feet: Mapping[str, Sequence[str]]) -> tuple[float, float] | None:
+    """m/s of what the right and the left foot stand on; None where a foot is hardly seen."""
+    places = _foot_places(markers, feet)
+    if places is None:
+        return None
+    right, left = _belts(places, [_velocity(markers.time, place) for place in places])
+    return float(np.linalg.norm(right)), float(np.linalg.norm(left))
+
+
+def _foot_places(markers: Markers, feet: Mapping[str, Sequence[str]]) -> list[FloatArray] | None:
+    """(n, m, 3) m of the markers of each foot; None where a foot is hardly seen."""
+    places = [markers.select([label for label in feet[side] if label in markers.labels]).positions for side in FEET]
+    hardly = len(markers.time) < 5 or min(np.count_nonzero(_seen(place)) for place in places) == 0
+    return None if hardly else places
+
+
+def _belts(places: Sequence[FloatArray], velocities: Sequence[FloatArray]) -> list[FloatArray]:
+    """(3,) m/s of what each foot stands on: of both together, unless they stand on belts of different speeds."""
+    own = [_belt([place], [velocity]) for place, velocity in zip(places, velocities, strict=True)]
+    moving = min(float(np.linalg.norm(belt)) for belt in own) >= LEAST_BELT_M_S
+    apart = float(np.linalg.norm(own[0] - own[1])) >= LEAST_BELT_M_S
+    return own if moving and apart else [_belt(places, velocities)] * len(own)
+
+
+def _belt(places: Sequence[FloatArray], velocities: Sequence[FloatArray]) -> FloatArray:
+    """(3,) m/s, horizontal: median velocity of feet that are lowest."""
+    low = []
+    for place, velocity in zip(places, velocities, strict=True):
+        shown = _seen(velocity).any(axis=1) & _seen(place).any(axis=1)
+        height = np.full(len(place), np.inf)
+        height[shown] = np.nanmean(place[shown, :, 1], axis=1)
+        near = shown & (height <= np.quantile(height[shown], _LOW)) if shown.any() else shown
+        low.append(np.nanmean(velocity[near], axis=1))
+    every = np.concatenate(low)
+    return np.median(every, axis=0) * np.array([1.0, 0.0, 1.0]) if len(every) else np.zeros(3)
+
+
+def _short_gaps_filled(time: FloatArray, place: FloatArray) -> FloatArray:
+    """Places (n, m, 3) with gaps up to `_SHORTEST_S` bridged by a line: markers that flicker do not end a stand."""
+    filled = place.copy()
+    for marker, seen in enumerate(_seen(place).T):
+        frames = np.flatnonzero(seen)
+        for first, last in runs(~seen):
+            inside = len(frames) > 0 and frames[0] < first and last < frames[-1]
+            if inside and span_s(time, first - 1, last + 1) <= _SHORTEST_S:
+                for axis in range(3):
+                    ends = place[[first - 1, last + 1], marker, axis]
+                    gap = slice(first, last + 1)
+                    filled[gap, marker, axis] = np.interp(time[gap], time[[first - 1, last + 1]], ends)
+    return filled
+
+
+def _stance_spans(time: FloatArray, speed: FloatArray) -> tuple[tuple[float, float, bool], ...]:
+    """Where a foot stands whose markers have these speeds (n, m); those not seen may hide where it begins or ends."""
+    slowest = np.nan_to_num(speed, nan=np.inf).min(axis=1)
+    known = slowest[np.isfinite(slowest)]
+    fast = float(np.quantile(known, 0.95)) if known.size else 0.0
+    if fast < _LEAST_SWING_M_S:
+        return ()
+    seen = np.isfinite(speed)
+    hidden = np.asarray(~seen[:, seen.mean(axis=0) > _MOSTLY].all(axis=1))
+
+    def whole(first: int, last: int) -> bool:
+        return first > 0 and last < len(time) - 1 and not bool(hidden[[first - 1, first, last, last + 1]].any())
+
+    stands = bridged(time, slowest < np.clip(_SLOW * fast, *_SLOW_M_S))
+    return tuple(
+        (float(time[first]), float(time[last]), whole(first, last))
+        for first, last in runs(stands)
+        if span_s(time, first, last) >= _SHORTEST_S
+    )
+
+
+def _ends(time: FloatArray, place: FloatArray) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """The two markers that are farthest apart, of those that are often seen together, and where both are (n,)."""
+    flat, seen = place[..., [0, 2]], _seen(place)
+    often = (seen[:, :, None] & seen[:, None]).sum(axis=0)
+    shown = np.flatnonzero(seen.any(axis=0))
+    apart = np.linalg.norm(flat[:, :, None] - flat[:, None], axis=-1)
+    usual = np.full(often.shape, -1.0)
+    for one in shown:
+        for other in shown:
+            if often[one, other] >= _MOSTLY * often.max():
+                usual[one, other] = float(np.nanmedian(apart[:, one, other]))
+    one, other = np.unravel_index(int(np.argmax(usual)), usual.shape)
+    both = seen[:, one] & seen[:, other]
+    return _filled(time, flat[:, one]), _filled(time, flat[:, other]), both
+
+
+def _filled(time: FloatArray, place: FloatArray) -> FloatArray:
+    known = np.isfinite(place).all(axis=1)
+    return np.column_stack([np.interp(time, time[known], place[known, axis]) for axis in range(2)])

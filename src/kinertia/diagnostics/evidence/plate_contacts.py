@@ -1,0 +1,131 @@
+"""Loads on plates while feet are near: when each begins and ends, and how far it is from both feet."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kinertia.diagnostics.evidence.foot_trajectories import FootTrajectory
+from kinertia.trial.centre_of_pressure import centre_of_pressure
+from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads
+from kinertia.trial.ground_contact import bridged
+from kinertia.trial.sampled_time import TIME_TOLERANCE_S, runs, span_s
+
+COP_MIN_FORCE_N = 5 * LOAD_THRESHOLD_N
+CONTACT_FORCE_N, SHORTEST_S = 50.0, 0.15
+FAR_M = 0.15
+"""Half of a load farther than this from both feet is under neither."""
+ONE_STEP_S = 1.5
+"""Longer loads are of both feet, in turn (walking on one belt) or at once (squats)."""
+BETWEEN_M = 0.08
+"""Of a load of both feet at once (squats) most is between them, farther than this from both."""
+_MOSTLY_NEAR, _LEAST_SHARE = 0.7, 0.2
+"""While one foot takes over from the other, the load is under neither."""
+_END = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class PlateContact:
+    """One load on one plate.
+
+    Attributes:
+        plate: its index.
+        start_s, end_s: when it is above `CONTACT_FORCE_N`; NaN for an end that the trial does not show.
+        foot: 0 right, 1 left, under which it mostly is.
+        weight: (k,) N, its vertical force where that is reliable and the foot is seen.
+        time: (k,) s.
+        offset_m: (2, k, 2) m, horizontally from each foot to the centre of pressure.
+        ends_m: how far the first twentieth of the load is in front of the heel, and the last one in front of the toes.
+    """
+
+    plate: int
+    start_s: float
+    end_s: float
+    foot: int
+    weight: FloatArray
+    time: FloatArray
+    offset_m: FloatArray
+    ends_m: tuple[float, float]
+
+    @property
+    def is_step(self) -> bool:
+        """Whether the trial shows all of it, and it is no longer than a step."""
+        return 0.0 < round(self.end_s - self.start_s, 6) < ONE_STEP_S
+
+    @property
+    def in_turn(self) -> bool:
+        """Whether it goes from under one foot to under the other: steps on one long plate, or on a treadmill's belt."""
+        distance = np.linalg.norm(self.offset_m, axis=2)
+        of_right = float(self.weight[distance[0] < distance[1]].sum() / self.weight.sum())
+        near = _quantile(distance.min(axis=0), self.weight, _MOSTLY_NEAR) < FAR_M / 2
+        return near and _LEAST_SHARE < of_right < 1.0 - _LEAST_SHARE
+
+    @property
+    def between(self) -> bool:
+        """Whether most of it is between the feet, under neither: both stand on the plate."""
+        opposite = np.prod(self.offset_m, axis=0).sum(axis=1) < 0
+        apart = (np.linalg.norm(self.offset_m, axis=2) > BETWEEN_M).all(axis=0) & opposite
+        return bool(self.weight[apart].sum() > self.weight.sum() / 2)
+
+    @property
+    def distance_m(self) -> float:
+        """From the nearer foot, within which half of the load is."""
+        return _quantile(np.linalg.norm(self.offset_m, axis=2).min(axis=0), self.weight, 0.5)
+
+    @property
+    def own_offset_m(self) -> FloatArray:
+        """(2,) m, mean distance of the load from its foot along X and Z."""
+        result: FloatArray = self.weight @ self.offset_m[self.foot] / self.weight.sum()
+        return result
+
+
+def contacts_of(plates: PlateLoads, feet: tuple[FootTrajectory, FootTrajectory]) -> list[PlateContact]:
+    """Loads of at least `SHORTEST_S` while markers are there; none whose foot is mostly hidden."""
+    first_s, last_s = feet[0].time[0] - TIME_TOLERANCE_S, feet[0].time[-1] + TIME_TOLERANCE_S
+    point = cop_horizontal(plates)
+    contacts = []
+    for p in range(len(plates.names)):
+        vertical = plates.force[:, p, 1]
+        for first, last in runs(bridged(plates.time, vertical > CONTACT_FORCE_N)):
+            start, end = float(plates.time[first]), float(plates.time[last])
+            rows = np.arange(first, last + 1)
+            time = plates.time[rows]
+            rows = rows[(vertical[rows] > COP_MIN_FORCE_N) & (time >= first_s) & (time <= last_s)]
+            if span_s(plates.time, first, last) < SHORTEST_S or len(rows) < 3:
+                continue
+            off = np.stack([one.offset_m(plates.time[rows], point[rows, p]) for one in feet])
+            near = [float(vertical[rows] @ np.linalg.norm(one, axis=1)) for one in off]
+            foot = int(np.argmin(near))
+            seen = feet[foot].seen(plates.time[rows])
+            if vertical[rows][seen].sum() < vertical[rows].sum() / 2:
+                continue
+            rows, off = rows[seen], off[:, seen]
+            ahead = feet[foot].beyond(plates.time[rows], point[rows, p])
+            ends_m = (_quantile(ahead[0], vertical[rows], _END), _quantile(ahead[1], vertical[rows], 1 - _END))
+            begins, ends = first > 0 and start > first_s, last < len(plates.time) - 1 and end < last_s
+            begin_s, end_s = start if begins else np.nan, end if ends else np.nan
+            contacts.append(PlateContact(p, begin_s, end_s, foot, vertical[rows], plates.time[rows], off, ends_m))
+    return contacts
+
+
+def cop_horizontal(plates: PlateLoads) -> FloatArray:
+    """(k, p, 2) m, centres of pressure (x, z), at the plates' height where that is known."""
+    height = 0.0 if plates.corners is None else plates.corners[:, :, 1].mean(axis=1)[None, :, None]
+    force, moment = plates.force, plates.moment
+    lifted = moment - np.cross(np.array([0.0, 1.0, 0.0]) * height, force)
+    return centre_of_pressure(np.concatenate([force, lifted], axis=2))[..., [0, 2]]
+
+
+def displaced(plates: PlateLoads, by_m: FloatArray) -> PlateLoads:
+    """The same with centres of pressure displaced by `by_m` (x, z), in any shape that fits (k, p, 2)."""
+    by = np.broadcast_to(by_m, (*plates.force.shape[:2], 2))
+    lever = np.stack([by[..., 0], np.zeros(by.shape[:2]), by[..., 1]], axis=-1)
+    return replace(plates, moment=plates.moment + np.cross(lever, plates.force))
+
+
+def _quantile(values: FloatArray, weight: FloatArray, share: float) -> float:
+    """The value below which this share of the weight is."""
+    order = np.argsort(values)
+    passed = np.cumsum(weight[order]) / weight.sum()
+    return float(values[order][min(int(np.searchsorted(passed, share)), len(order) - 1)])

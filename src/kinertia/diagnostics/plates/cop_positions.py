@@ -1,0 +1,180 @@
+"""Are the loads under the feet, at the time when these stand? All explanations of loads that are not compete.
+
+On fault-free trials, measured in six laboratories and made by OpenSim, loads act within 40 mm of the line from heel to
+toe (median over the load), and right and left are off that line by the same outwards, within 8 mm (26 mm with one plate
+20 mm off).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import chain
+
+import numpy as np
+
+from kinertia.diagnostics.context import RecordingContext
+from kinertia.diagnostics.evidence.contact_fit import Hypothesis
+from kinertia.diagnostics.evidence.plate_contacts import FAR_M, PlateContact, displaced
+from kinertia.diagnostics.plates.heel_landing import lands_on_heels, shows_whole_feet
+from kinertia.diagnostics.plates.interchanged_plates import interchanged_plates
+from kinertia.diagnostics.plates.rotated_plates import rotated_plates
+from kinertia.diagnostics.timing.contact_delays import contact_delays, stance_durations
+from kinertia.diagnostics.timing.rate_and_delay import fitted_rate_or_delay
+from kinertia.findings.finding import Finding, Severity, finding, with_evidence
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.rule import rule
+
+_OTHER_UNIT_M, _STRAY_M = 5.0, 0.3
+_OFFSET_M = 0.03
+_BEGIN_M, _END_M = -0.015, 0.06
+"""There is no foot behind the marker at the back of the heel: on fault-free trials, from squats to forefoot runs, the
+first twentieth of a load is 36 to 99 mm in front of it. The last one is at most 25 mm in front of the foremost marker,
+which may be on the metatarsals."""
+_BOTH_BACK_M, _BOTH_FORWARD_M = (0.02, -0.07), (0.13, 0.035)
+"""Where the first twentieth of steps and their last one are both, on average, farther back, or farther forward, no way
+of landing or pushing off is the reason. On nine fault-free trials they are 36 to 85 mm and -58 to 25 mm."""
+_USUAL_BEGIN_M, _USUAL_END_M = (0.035, 0.1), (-0.06, 0.025)
+
+
+def loads_and_feet(context: RecordingContext) -> Iterator[Finding]:
+    """P204, or the explanation (P24, T20, T21) that leaves loads nearest to the feet and to their times, with the
+    others among its causes; of equally good ones that which is asked first. Where loads fit: P243 of small offsets.
+    """
+    if context.is_static or context.foot_trajectories is None or not context.contacts:
+        return
+    if unit := list(_other_unit(context)):
+        yield from unit
+        return
+    if not shows_whole_feet(context):
+        return
+    feet = context.foot_trajectories
+    hypotheses = list(
+        chain(
+            fitted_rate_or_delay(context),
+            stance_durations(context),
+            interchanged_plates(context),
+            contact_delays(context),
+            rotated_plates(context),
+            _displaced(context),
+        )
+    )
+    if hypotheses:
+        ranked = sorted(hypotheses, key=lambda one: one.misfit(feet))
+        yield _with_runners_up([one.finding for one in ranked])
+        return
+    yield from _stray(context)
+    if lands_on_heels(context):
+        yield from _offset(context)
+
+
+def _with_runners_up(ranked: Sequence[Finding]) -> Finding:
+    best = ranked[0]
+    others = {one.code: f"{one.code} {one.message}" for one in ranked[1:] if one.code != best.code}
+    return replace(best, causes=(*(best.causes or rule(best.code).causes), *others.values())) if others else best
+
+
+def _other_unit(context: RecordingContext) -> Iterator[Finding]:
+    """P204: plates whose loads are all out of the laboratory: one alone, where each has columns of its own."""
+    plates = context.plates
+    assert plates is not None
+    nearest: dict[int, float] = {}
+    for contact in context.contacts:
+        nearest[contact.plate] = min(contact.distance_m, nearest.get(contact.plate, np.inf))
+    far = {p: distance for p, distance in nearest.items() if distance >= _OTHER_UNIT_M}
+    for p, distance in far.items():
+        yield finding(
+            "P204",
+            context.at(plate=plates.names[p]),
+            distance_m=Quantity(distance, "m", limit=_OTHER_UNIT_M),
+            plates=Quantity(plates.names[p]),
+        )
+
+
+def _displaced(context: RecordingContext) -> Iterator[Hypothesis]:
+    """Loads that are under no foot: all displaced alike (P243), or not (P244)."""
+    plates = context.plates
+    assert plates is not None
+    # a load of both feet is under neither (P276)
+    loads = [one for one in context.contacts if not one.between]
+    far = [one for one in loads if one.distance_m > FAR_M]
+    if not far or len(far) < len(loads) / 2:
+        return
+    offsets = np.array([one.own_offset_m for one in loads])
+    mean = offsets.mean(axis=0)
+    if np.abs(offsets - mean).max() < FAR_M / 2:
+        offset = Quantity((float(mean[0]), float(mean[1])), "m", limit=FAR_M)
+        found = _origin(context, offset, len(loads), "all loads")
+        yield Hypothesis(found.at(Severity.ERROR), displaced(plates, -mean))
+        return
+    worst = far[0]
+    found = finding(
+        "P244",
+        context.at(plate=plates.names[worst.plate], span_s=(float(worst.time[0]), float(worst.time[-1]))),
+        distance_m=Quantity(worst.distance_m, "m", limit=FAR_M, usual=(0.0, 0.04)),
+    )
+    yield Hypothesis(found, None)
+
+
+def _stray(context: RecordingContext) -> Iterator[Finding]:
+    """P244 as a WARNING: a single load far from both feet, which is another person's or a thing's."""
+    plates = context.plates
+    assert plates is not None
+    for one in context.contacts:
+        if one.distance_m > _STRAY_M and not one.between:
+            where = context.at(plate=plates.names[one.plate], span_s=(float(one.time[0]), float(one.time[-1])))
+            distance = Quantity(one.distance_m, "m", limit=_STRAY_M, usual=(0.0, 0.04))
+            yield finding("P244", where, Severity.WARNING, causes=("another person", "a thing"), distance_m=distance)
+
+
+def _offset(context: RecordingContext) -> Iterator[Finding]:
+    """P243: right and left are off in the same direction of the laboratory."""
+    contacts = context.contacts
+    means = [[one.own_offset_m for one in contacts if one.foot == foot] for foot in range(2)]
+    if not all(means):
+        return
+    mean = (np.mean(means[0], axis=0) + np.mean(means[1], axis=0)) / 2
+    if np.linalg.norm(mean) > _OFFSET_M:
+        offset = Quantity((float(mean[0]), float(mean[1])), "m", limit=_OFFSET_M, usual=(-0.008, 0.008))
+        yield _origin(context, offset, len(contacts), "both feet off their line from heel to toe")
+        return
+    yield from _ends(context, contacts)
+
+
+def _ends(context: RecordingContext, contacts: Sequence[PlateContact]) -> Iterator[Finding]:
+    """P243: loads that begin behind the heel or end in front of the toes: what an offset along the foot does first."""
+    # of two contacts both, lest a second foot on one plate counts
+    ends = np.sort([one.ends_m for one in contacts], axis=0)
+    begin, end = float(ends[len(ends) // 2, 0]), float(ends[(len(ends) - 1) // 2, 1])
+    steps = [one.ends_m for one in contacts if np.isfinite(one.end_s - one.start_s)]
+    excess = 0.0
+    if begin < _BEGIN_M:
+        excess = begin - _USUAL_BEGIN_M[0]
+    elif end > _END_M:
+        excess = end - _USUAL_END_M[1]
+    elif steps:
+        begin, end = (float(each) for each in np.mean(steps, axis=0))
+        excess = _excess_of_both(begin, end)
+    if excess:
+        yield _origin(
+            context,
+            Quantity(excess, "m"),
+            len(contacts),
+            "where loads begin and end on the feet",
+            begin_m=Quantity(begin, "m", usual=_USUAL_BEGIN_M),
+            end_m=Quantity(end, "m", usual=_USUAL_END_M),
+        )
+
+
+def _excess_of_both(begin_m: float, end_m: float) -> float:
+    """m by which steps both begin and end too far back (negative), or too far forward; 0 where they do not."""
+    if begin_m < _BOTH_BACK_M[0] and end_m < _BOTH_BACK_M[1]:
+        return max(begin_m - _USUAL_BEGIN_M[0], end_m - _USUAL_END_M[0])
+    if begin_m > _BOTH_FORWARD_M[0] and end_m > _BOTH_FORWARD_M[1]:
+        return min(begin_m - _USUAL_BEGIN_M[1], end_m - _USUAL_END_M[1])
+    return 0.0
+
+
+def _origin(context: RecordingContext, offset: Quantity, contacts: int, method: str, **measured: Quantity) -> Finding:
+    how = {"contacts": Quantity(contacts, "1"), "method": Quantity(method)}
+    return with_evidence("P243", context.at(), {"offset_m": offset, **measured, **how})

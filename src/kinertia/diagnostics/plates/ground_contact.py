@@ -1,0 +1,98 @@
+"""Is ground contact complete? Loads sorted by foot, frames with complete contact, feet beside or together on plates."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from kinertia.diagnostics.context import RecordingContext
+from kinertia.diagnostics.evidence.plate_contacts import BETWEEN_M, ONE_STEP_S, PlateContact
+from kinertia.diagnostics.evidence.plate_edges import OVERHANG_M
+from kinertia.diagnostics.plates.heel_landing import lands_on_heels
+from kinertia.errors import KinertiaError
+from kinertia.findings.finding import Finding, finding
+from kinertia.findings.quantity import Quantity
+from kinertia.motion.kinematics import FEWEST_FRAMES
+from kinertia.trial.data import BoolArray
+from kinertia.trial.plate_assignment import FOOT_NAMES, no_forces
+from kinertia.trial.sampled_time import span_s
+
+_OUTSIDE_M, _OUTSIDE_SHARE = 0.14, 0.01
+_MOSTLY = 0.5
+_OTHERS_SHARE = 0.25
+"""The centre of pressure divides the line between both feet as they share the load. At foot off of feet without a toe
+marker it is up to 0.19 of the way to the other foot, which stands on the floor."""
+
+
+def complete_contact(context: RecordingContext) -> Iterator[Finding]:
+    """T104, P271, P278: no trial can be made of the recording; P279: it has too few frames with complete contact; P273,
+    P274, P275, P277: how its loads were sorted by foot.
+    """
+    if context.is_static:
+        return
+    if context.plates is None:
+        yield no_forces(context.recording).in_trial(context.name)
+        return
+    if isinstance(context.loaded, KinertiaError):
+        if context.loaded.finding is not None:
+            yield context.loaded.finding
+        return
+    if context.trial is None:
+        return
+    yield from context.trial.findings
+    start, end = context.trial.windows()[0]
+    frames = len(context.trial.markers.cut(start, end).time)
+    if frames < FEWEST_FRAMES:
+        measured = Quantity(frames, "1", limit=FEWEST_FRAMES)
+        yield finding("P279", context.at(span_s=(start, end)), frames=measured)
+
+
+def both_feet(context: RecordingContext) -> Iterator[Finding]:
+    """P276: a load between the feet; both are on the plate, but only the sum of what they do is known. A foot that
+    swings by its markers is on none.
+    """
+    plates, feet = context.plates, context.foot_trajectories
+    if plates is None or feet is None or context.is_static or not lands_on_heels(context):
+        return
+    for contact in context.contacts:
+        away = _under_both(contact) & feet[1 - contact.foot].standing(contact.time)
+        share = float(contact.weight[away].sum() / contact.weight.sum())
+        limit = _MOSTLY if span_s(contact.time) > ONE_STEP_S else _OUTSIDE_SHARE
+        if share > limit:
+            when = contact.time[away]
+            span = (float(when[0]), float(when[-1]))
+            where = context.at(plate=plates.names[contact.plate], span_s=span)
+            yield finding("P276", where, share=Quantity(share, "1", limit=limit))
+
+
+def _under_both(contact: PlateContact) -> BoolArray:
+    """(k,) where the load is between the feet, or away from its own, and the other one bears a good part of it."""
+    own, other = np.linalg.norm(contact.offset_m, axis=2)[[contact.foot, 1 - contact.foot]]
+    opposite = np.prod(contact.offset_m, axis=0).sum(axis=1) < 0
+    away: BoolArray = np.minimum(own, other) > BETWEEN_M
+    away &= opposite
+    # on a treadmill's single belt the feet come in turn, and each sample is sorted (`plate_assignment`)
+    if span_s(contact.time) <= ONE_STEP_S:
+        away |= own > _OUTSIDE_M
+    away &= own > _OTHERS_SHARE * (own + other)
+    return away
+
+
+def plate_edges(context: RecordingContext) -> Iterator[Finding]:
+    """P282: feet that reach beyond the plate that they stand on, onto the floor."""
+    plates = context.plates
+    if plates is None or context.is_static:
+        return
+    for one in context.overhangs:
+        yield finding(
+            "P282",
+            context.at(plate=plates.names[one.plate], span_s=one.span_s),
+            overhang_m=Quantity(one.overhang_m, "m", limit=OVERHANG_M),
+            foot=Quantity(FOOT_NAMES[one.foot]),
+        )
+
+
+def partly_unmeasured(context: RecordingContext) -> list[tuple[float, float]]:
+    """First and last time (s) of what a preparation leaves out: more than a toe of a loaded foot is off its plate."""
+    return [one.span_s for one in context.overhangs if not one.only_toe]

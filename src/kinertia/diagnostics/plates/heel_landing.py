@@ -1,0 +1,34 @@
+"""Whether feet are seen from heel to forefoot, and land on the heel: else loads are not where they are expected."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kinertia.diagnostics.context import RecordingContext
+from kinertia.diagnostics.labels.heading import walks_backwards
+
+_ENDS = (("heel",), ("metatarsal", "toe"))
+_LEAST_LENGTH_M = 0.08
+"""Less than from heel to forefoot of a child of four years."""
+
+
+def lands_on_heels(context: RecordingContext) -> bool:
+    """Whether loads can be expected to go from heel to toe: whole feet, and nobody walks backwards."""
+    if not shows_whole_feet(context) or context.marker_set is None:
+        return False
+    return not walks_backwards(context.all_markers, context.marker_set)
+
+
+def shows_whole_feet(context: RecordingContext) -> bool:
+    """Whether heel and forefoot of both feet are seen: loads are between them, and foot off is not heel off."""
+    feet, marker_set = context.foot_trajectories, context.marker_set
+    if feet is None or marker_set is None:
+        return False
+    markers = context.all_markers
+    shown = {label for label, seen in zip(markers.labels, markers.seen.T, strict=True) if seen.any()}
+    for side in "rl":
+        for names in _ENDS:
+            labels = {label for name in names for label in marker_set.landmarks.get(f"{name}_{side}", ())}
+            if labels and not labels & shown:
+                return False
+    return min(float(np.median(np.linalg.norm(one.front - one.back, axis=1))) for one in feet) > _LEAST_LENGTH_M

@@ -1,0 +1,222 @@
+"""Do loads come when the feet stand? Delays and rates of plates against foot markers.
+
+On fault-free trials, measured in six laboratories and made by OpenSim, loads begin and end within 25 ms of foot contact
+and foot off, and last 0.96 to 1.22 times as long.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kinertia.diagnostics.context import RecordingContext
+from kinertia.diagnostics.evidence.contact_fit import Feet, Hypothesis
+from kinertia.diagnostics.evidence.plate_contacts import (
+    CONTACT_FORCE_N,
+    FAR_M,
+    SHORTEST_S,
+    PlateContact,
+    contacts_of,
+)
+from kinertia.findings.finding import finding, with_evidence
+from kinertia.findings.quantity import Quantity
+from kinertia.trial.data import FloatArray, PlateLoads
+from kinertia.trial.ground_contact import bridged
+from kinertia.trial.sampled_time import runs, span_s
+
+USUAL_S = (-0.025, 0.025)
+_DELAY_S, _LONGEST_DELAY_S = 0.045, 0.25
+"""Clocks and filters delay by less than the latter; what is later began at another time."""
+_RATE = (0.7, 1.4)
+_FEWEST_CONTACTS, _LEAST_RATE_ERROR, _CERTAIN, _EXCLUDED, _MOST_RATE_ERROR = 4, 0.004, 6.0, 3.0, 0.1
+"""Over 14 and 28 contacts of fault-free runs a delay grows by less than 0.001; with a rate that is 1 % off by 0.01.
+More than the last shows in how long loads last."""
+_DELAY_SD_S, _LEAP_S = 0.010, 0.06
+"""A frame or so; and how much a delay cannot change from one contact to the next."""
+
+
+def stance_durations(context: RecordingContext) -> Iterator[Hypothesis]:
+    """T201: feet stand half or twice as long by the markers as by the plates."""
+    plates, feet = context.whole_loads, context.foot_trajectories
+    if plates is None or feet is None:
+        return
+    contacts = contacts_of(plates, feet)
+    last_row, walked = len(plates.time) - 1, [one for one in contacts if _several_steps(one, plates)]
+    loaded = [
+        float(plates.time[last] - plates.time[first])
+        for p, vertical in enumerate(plates.force[..., 1].T)
+        for first, last in runs(bridged(plates.time, vertical > CONTACT_FORCE_N))
+        if first > 0 and last < last_row and span_s(plates.time, first, last) >= SHORTEST_S
+        if not any(one.plate == p and plates.time[first] <= one.time[0] <= plates.time[last] for one in walked)
+    ]
+    standing = _stances(contacts, feet)
+    if not loaded or not standing:
+        return
+    by_plates, by_markers = float(np.median(loaded)), float(np.median(standing))
+    ratio = by_plates / by_markers
+    if _RATE[0] < 1.0 / ratio < _RATE[1]:
+        return
+    found = finding(
+        "T201",
+        context.at(),
+        ratio=Quantity(ratio, "1", usual=(0.96, 1.22)),
+        stance_s=Quantity((by_markers, by_plates), "s"),
+        contacts=Quantity(len(loaded), "1"),
+        method=Quantity("duration of stance by markers and by plates"),
+    )
+    start = float(plates.time[0])
+    yield Hypothesis(found, replace(plates, time=start + (plates.time - start) / ratio))
+
+
+def _stances(contacts: Sequence[PlateContact], feet: Feet) -> list[float]:
+    """s, how long feet stand while they are loaded; of all stance phases where none of them is loaded. Before and after
+    it, somebody may stand on a box or turn round.
+    """
+    loaded = [(one.foot, one.time[0], one.time[-1]) for one in contacts]
+    whole = [(k, start, end) for k, foot in enumerate(feet) for start, end, all_of_it in foot.stance_spans if all_of_it]
+    own = [
+        end - start
+        for k, start, end in whole
+        if any(k == foot and start < last and end > first for foot, first, last in loaded)
+    ]
+    return own or [end - start for _, start, end in whole]
+
+
+def _several_steps(contact: PlateContact, plates: PlateLoads) -> bool:
+    """Whether it goes from foot to foot, and no other plate takes a foot meanwhile."""
+    meanwhile = (plates.time >= contact.time[0]) & (plates.time <= contact.time[-1])
+    others = np.delete(plates.force[meanwhile, :, 1], contact.plate, axis=1)
+    return contact.in_turn and not (others > CONTACT_FORCE_N).any()
+
+
+def contact_delays(context: RecordingContext) -> Iterator[Hypothesis]:
+    """Loads that begin and end earlier or later than foot contact and foot off: ever more so (T201), or by the same
+    (T211; T212 where nobody's clock is so late, or loads are under no foot even then).
+    """
+    plates, feet = context.whole_loads, context.foot_trajectories
+    if plates is None or feet is None:
+        return
+    delays = ContactDelays.of(contacts_of(plates, feet), feet)
+    if delays is None:
+        return
+    if delays.grows():
+        yield _growing(context, plates, delays)
+        return
+    # both ends say so: a plate that was left early, or a foot that drags, moves one
+    delay = delays.delay_s
+    if abs(delay) <= _DELAY_S or min(delays.median_s * np.sign(delay)) < _DELAY_S / 2:
+        return
+    corrected = replace(plates, time=plates.time - delay)
+    far_m = max((one.distance_m for one in contacts_of(corrected, feet)), default=np.inf)
+    measured = {
+        "delay_s": Quantity(delay, "s", limit=_DELAY_S, usual=USUAL_S),
+        "begin_s": Quantity(float(delays.median_s[0]), "s"),
+        "end_s": Quantity(float(delays.median_s[1]), "s"),
+        "contacts": Quantity(len(delays.time), "1"),
+    }
+    if far_m > FAR_M / 2 or abs(delay) > _LONGEST_DELAY_S:
+        distance = Quantity(far_m, "m", limit=FAR_M / 2)
+        yield Hypothesis(with_evidence("T212", context.at(), measured | {"distance_m": distance}), corrected)
+        return
+    causes = ["the trigger or start of one file", "a filter that delays"]
+    if (rate := delays.by_rate(float(plates.time[0]))) is not None:
+        measured["rate_alternative"] = Quantity(rate, "1")
+        causes.append("a wrong sampling rate, which so few contacts do not exclude (T201)")
+    yield Hypothesis(with_evidence("T211", context.at(), measured, causes=tuple(causes)), corrected)
+
+
+def _growing(context: RecordingContext, plates: PlateLoads, delays: ContactDelays) -> Hypothesis:
+    middle_s, rate_error = float(np.median(delays.time)), delays.rate_error
+    first, last = (
+        delays.delay_s + rate_error * (at - middle_s) for at in (float(delays.time.min()), float(delays.time.max()))
+    )
+    found = finding(
+        "T201",
+        context.at(),
+        ratio=Quantity(1.0 / (1.0 - rate_error), "1", usual=(0.999, 1.001)),
+        delay_s=Quantity((first, last), "s"),
+        contacts=Quantity(len(delays.time), "1"),
+        method=Quantity("growing delay of contacts"),
+    )
+    grown = delays.delay_s + rate_error * (plates.time - middle_s)
+    return Hypothesis(found, replace(plates, time=plates.time - grown))
+
+
+@dataclass(frozen=True, eq=False)
+class ContactDelays:
+    """By how much loads begin and end later than foot contact and foot off (n, 2) s, at times (n, 2) s of the plates.
+
+    Attributes:
+        rate_error, rate_error_sd: seconds per second by which the delay grows, and its SD; infinite of one contact.
+    """
+
+    time: FloatArray
+    late_s: FloatArray
+    rate_error: float
+    rate_error_sd: float
+
+    @classmethod
+    def of(cls, contacts: Sequence[PlateContact], feet: Feet) -> ContactDelays | None:
+        """Of whole loads that overlap with a whole stance phase of their foot; None where there are none."""
+        rows = []
+        for contact in contacts:
+            # what goes from foot to foot begins with one of them and ends with the other
+            if contact.in_turn or not np.isfinite(contact.end_s - contact.start_s):
+                continue
+            overlaps = [
+                (min(end, contact.end_s) - max(start, contact.start_s), start, end)
+                for start, end, whole in feet[contact.foot].stance_spans
+                if whole
+            ]
+            if overlaps and max(overlaps)[0] > 0:
+                _, start, end = max(overlaps)
+                rows.append((contact.start_s, contact.end_s, contact.start_s - start, contact.end_s - end))
+        if not rows:
+            return None
+        time, late = np.split(np.array(sorted(rows)), 2, axis=1)
+        return cls(time, late, *_rate_error(time, late))
+
+    @property
+    def median_s(self) -> FloatArray:
+        """(2,) s, of the beginnings and of the ends."""
+        return np.asarray(np.median(self.late_s, axis=0))
+
+    @property
+    def delay_s(self) -> float:
+        """Mean of both."""
+        return float(self.median_s.mean())
+
+    def grows(self) -> bool:
+        """Whether the delay changes over time, and that is no chance."""
+        return (
+            len(self.time) >= _FEWEST_CONTACTS
+            and abs(self.rate_error) > _LEAST_RATE_ERROR
+            and abs(self.rate_error) > _CERTAIN * self.rate_error_sd
+        )
+
+    def by_rate(self, start_s: float) -> float | None:
+        """The other cause of a delay: the rate error of files that begin together and part; None where contacts
+        exclude it.
+        """
+        growth = self.delay_s / max(float(np.median(self.time)) - start_s, 1e-9)
+        if abs(growth) > _MOST_RATE_ERROR or abs(self.rate_error - growth) > _EXCLUDED * self.rate_error_sd:
+            return None
+        return growth / (1.0 - growth)
+
+
+def _rate_error(time: FloatArray, late: FloatArray) -> tuple[float, float]:
+    """Of beginnings and ends alike, and its SD."""
+    steps = np.flatnonzero(np.abs(np.diff(late.mean(axis=1))) > _LEAP_S) + 1
+    # a delay of more than half a step is measured from the wrong stance phase
+    rows = max(np.split(np.arange(len(time)), steps), key=len)
+    at = time[rows] - time[rows].mean(axis=0)
+    spread = float((at * at).sum())
+    if len(rows) < 2 or spread <= 0.0:
+        return 0.0, np.inf
+    off = late[rows] - late[rows].mean(axis=0)
+    rate_error = float((at * off).sum()) / spread
+    free = 2 * len(rows) - 3
+    deviation = max(_DELAY_SD_S, float(np.sqrt(np.square(off - rate_error * at).sum() / free)))
+    return rate_error, deviation / np.sqrt(spread)

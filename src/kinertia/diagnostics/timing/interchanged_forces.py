@@ -1,0 +1,60 @@
+"""Do the forces of two trials of a person go with each other's markers?
+
+Walks of one person are alike, so that interchanged force files pass for plates that are off. But the body goes up and
+down as its own forces cause: of nine pairs of walks of one person, measured and made, what their own forces leave of
+the vertical velocities is 0.6 to 0.8 times what those of the other walk leave.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+
+from kinertia.diagnostics.context import PersonContext, RecordingContext
+from kinertia.diagnostics.evidence.caused_velocity import CausedVelocity, caused_velocities, without_trend
+from kinertia.findings.finding import Finding, finding
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
+
+_BETTER, _EACH_BETTER = 0.8, 0.92
+"""Of both trials together, and of either (0.51 to 0.88 where they are interchanged). Where one is late and the other
+early, either may seem to go with the other's forces, but not both."""
+
+
+def interchanged_forces(person: PersonContext) -> Iterator[Finding]:
+    """S304 of both of two trials whose forces seem to be interchanged."""
+    loaded = [one for one in person.trials if one.trial is not None]
+    own = {one.name: _residual(one.velocities) for one in loaded}
+    for pair in combinations(loaded, 2):
+        kept = [own[one.name] for one in pair]
+        crossed = [_with_forces_of(a, b) for a, b in (pair, pair[::-1])]
+        if np.less(crossed, np.multiply(_EACH_BETTER, kept)).all() and sum(crossed) < _BETTER * sum(kept):
+            for k, one in enumerate(pair):
+                yield finding(
+                    "S304",
+                    Where(trial=one.name),
+                    left_own=Quantity(kept[k], "1"),
+                    left_crossed=Quantity(crossed[k], "1", limit=_EACH_BETTER * kept[k]),
+                    other_trial=Quantity(pair[1 - k].name),
+                )
+
+
+def _with_forces_of(one: RecordingContext, other: RecordingContext) -> float:
+    assert one.trial is not None
+    assert other.trial is not None
+    return _residual(caused_velocities(replace(one.trial, loads=other.trial.loads), one.segment_of_label))
+
+
+def _residual(parts: Sequence[CausedVelocity]) -> float:
+    """Share of the vertical velocities of pelvis and markers' centre that forces leave; NaN where nothing tells."""
+    shown, left = [], []
+    for part in parts:
+        caused = without_trend(part.time, part.caused)[:, 1]
+        for velocity in (part.pelvis, part.centre):
+            up = without_trend(part.time, velocity)[:, 1]
+            shown.append(np.square(up).sum())
+            left.append(np.square(up - caused).sum())
+    return float(np.sqrt(sum(left) / sum(shown))) if shown else float("nan")

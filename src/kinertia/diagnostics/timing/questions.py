@@ -1,0 +1,17 @@
+"""Questions of timing: the belt of one recording, and the forces of several."""
+
+from __future__ import annotations
+
+from kinertia.diagnostics.context import PersonContext, RecordingContext
+from kinertia.diagnostics.runner import Question
+from kinertia.diagnostics.timing.belt_speed import belt_speed
+from kinertia.diagnostics.timing.interchanged_forces import interchanged_forces
+from kinertia.diagnostics.timing.trial_delays import trial_delays
+
+QUESTIONS: tuple[Question[RecordingContext], ...] = (Question("T30", belt_speed),)
+"""Rates and delays compete with positions of plates: `diagnostics.plates.place_questions`."""
+
+PERSON_QUESTIONS: tuple[Question[PersonContext], ...] = (
+    Question("S30", interchanged_forces),
+    Question("T21", trial_delays),
+)

@@ -1,0 +1,287 @@
+"""Loads that are not under the feet, or not when they stand, are named by their cause; fault-free ones never are."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from kinertia.findings.finding import Severity
+from kinertia.io.marker_set_file import choose_marker_set, read_marker_set
+from kinertia.trial.centre_of_pressure import centre_of_pressure
+from kinertia.trial.data import Markers, PlateLoads
+from kinertia.trial.sampled_time import runs
+from loads_and_feet import doubted, error_of, place_findings
+from recordings import RUNS, SQUATS, WALKS
+from walk_on_plates import ALL_STEPS
+from walk_on_plates import FEET as SIMPLE_FEET
+from walk_on_plates import walk as simple_walk
+
+ON_BELTS = {
+    **{f"run, {name}": RUNS[name] for name in RUNS if name != "hamner"},
+    **{f"walk, {name}": WALKS[name] for name in ("synthetic", "gait2354") if name in WALKS},
+}
+
+
+BESIDE_M = {"synthetic": -0.008, "synthetic c3d": -0.010}
+"""Along Z, from the line between heel and toe to the centres of pressure of the package's walk."""
+
+
+@pytest.fixture(params=WALKS)
+def name(request):
+    return request.param
+
+
+@pytest.fixture
+def walk(name, recording_of):
+    """A walk and the labels of its feet."""
+    recording = recording_of(*WALKS[name])
+    feet = choose_marker_set(recording.markers.labels).foot_labels()
+    return recording, {
+        side: [one for one in labels if one in recording.markers.labels] for side, labels in feet.items()
+    }
+
+
+def moved(recording, offset_m, factor=1.0):
+    """Centres of pressure times a factor, and somewhere else."""
+    plates = recording.plates
+    point = centre_of_pressure(np.concatenate((plates.force, plates.moment), axis=2))
+    to = factor * point + np.array(offset_m)
+    return replace(recording, plates=replace(plates, moment=plates.moment + np.cross(to - point, plates.force)))
+
+
+def shifted(recording, by_s):
+    """Forces later by so much."""
+    plates = recording.plates
+    rows = round(by_s / float(plates.time[1] - plates.time[0]))
+    earlier = np.clip(np.arange(len(plates.time)) - rows, 0, len(plates.time) - 1)
+    late = replace(plates, force=plates.force[earlier], moment=plates.moment[earlier])
+    return replace(recording, plates=late)
+
+
+BEYOND_A_PLATE = {"plug-in gait b": ["P282"]}
+"""The right heel lands 45 mm behind plate 1."""
+
+
+def test_fault_free_walks(name, walk):
+    assert doubted(*walk) == BEYOND_A_PLATE.get(name, [])
+
+
+@pytest.mark.parametrize("offset_m", [0.05, -0.05])
+def test_offsets_across_the_walk(name, walk, offset_m):
+    recording, feet = walk
+    (found,) = [one for one in place_findings(moved(recording, (0.0, 0.0, offset_m)), feet) if one.code == "P243"]
+    assert found.severity is Severity.WARNING
+    assert found.evidence["offset_m"].value[1] == pytest.approx(offset_m + BESIDE_M.get(name, 0.0), abs=0.01)
+
+
+@pytest.mark.parametrize("offset_m", [0.3, -0.3])
+def test_other_origins(walk, offset_m):
+    recording, feet = walk
+    assert set(doubted(moved(recording, (offset_m, 0.0, 0.0)), feet)) & {"P243", "P244"}
+
+
+@pytest.mark.parametrize("offset_m", [0.1, -0.1])
+def test_offsets_along_the_walk(name, walk, offset_m):
+    """As long as loads lie along the foot: where they begin and end tells. Synthetic ones begin at the heel itself."""
+    recording, feet = walk
+    ahead_m = 0.02 if name.startswith("synthetic") and offset_m > 0 else 0.0
+    found = place_findings(moved(recording, (offset_m + ahead_m, 0.0, 0.0)), feet)
+    assert "P243" in [one.code for one in found if one.is_open]
+    along = [one.evidence["offset_m"].value for one in found if "begin_m" in one.evidence]
+    assert all(np.sign(one) == np.sign(offset_m * direction(recording)) for one in along)
+
+
+def direction(recording):
+    """1 of somebody who walks along +X."""
+    way = np.nanmedian(recording.markers.positions[-1, :, 0] - recording.markers.positions[0, :, 0])
+    return 1.0 if abs(way) < 0.5 or way > 0 else -1.0
+
+
+def test_points_in_mm(walk):
+    recording, feet = walk
+    found = [one for one in place_findings(moved(recording, (0.0, 0.0, 0.0), factor=1000.0), feet) if one.is_open]
+    assert {one.code for one in found if one.severity is Severity.ERROR} == {"P204"}
+    assert min(one.evidence["distance_m"].value for one in found if one.code == "P204") > 5.0
+
+
+@pytest.mark.parametrize("by_s", [-0.12, 0.09, 0.2])
+def test_delays(walk, by_s):
+    recording, feet = walk
+    found = error_of(shifted(recording, by_s), feet)
+    assert found.code == "T211"
+    assert found.evidence["delay_s"].value == pytest.approx(by_s, abs=0.035)
+
+
+@pytest.mark.parametrize("late_s", [-0.015, 0.015])
+def test_what_the_estimate_corrects_is_no_error(walk, late_s):
+    recording, feet = walk
+    assert error_of(shifted(moved(recording, (0.02, 0.0, 0.0)), late_s), feet) is None
+
+
+def slowed(recording, factor):
+    """With times between frames that are so many times as long."""
+    markers = recording.markers
+    time = markers.time[0] + factor * (markers.time - markers.time[0])
+    return replace(recording, markers=Markers(time, markers.labels, markers.positions))
+
+
+@pytest.mark.parametrize("factor", [0.5, 1.5, 2.0])
+def test_rates(name, walk, factor):
+    """Where half the rate is not shown by when feet land and leave, it is by how long they stand."""
+    recording, feet = walk
+    found = error_of(slowed(recording, factor), feet)
+    assert found.code == "T201"
+    assert found.evidence["ratio"].value == pytest.approx(1 / factor, rel=0.08 if factor == 2.0 else 0.05)
+
+
+def test_a_walk_on_one_long_plate(walk):
+    """A load that goes from foot to foot is no long stance."""
+    recording, feet = walk
+    plates = recording.plates
+    force, moment = (part.sum(axis=1, keepdims=True) for part in (plates.force, plates.moment))
+    one = replace(recording, plates=PlateLoads(plates.time, ("plate",), force, moment, (None,)))
+    assert error_of(one, feet) is None
+
+
+@pytest.mark.parametrize("name", SQUATS)
+def test_squats_on_one_plate(recording_of, name):
+    """The load is between the feet all the time: not of another trial, but both feet on one plate."""
+    squats = recording_of(*SQUATS[name])
+    own = read_marker_set(Path(__file__).parents[2] / "subject4.toml") if name == "subject4" else None
+    feet = (own or choose_marker_set(squats.markers.labels)).foot_labels()
+    plates = squats.plates
+    force, moment = (part.sum(axis=1, keepdims=True) for part in (plates.force, plates.moment))
+    one = replace(squats, plates=PlateLoads(plates.time, ("plate",), force, moment, (None,)))
+    assert error_of(one, feet) is None
+    assert "P276" in doubted(one, feet)
+
+
+@pytest.mark.parametrize("stride_m", [1.2, 0.9])
+def test_a_made_up_walk(stride_m):
+    assert doubted(simple_walk(ALL_STEPS, stride_m=stride_m), SIMPLE_FEET) == []
+
+
+def on_plates(recording):
+    """With plates of 0.6 m squared in the middle of each load."""
+    plates = recording.plates
+    point = centre_of_pressure(np.concatenate((plates.force, plates.moment), axis=2))
+    loaded = plates.force[..., 1] > 0
+    middle = [point[loaded[:, p], p].mean(axis=0) for p in range(len(plates.names))]
+    size = 0.3 * np.array([[1, 0, 1], [-1, 0, 1], [-1, 0, -1], [1, 0, -1]])
+    return replace(recording, plates=replace(plates, corners=np.array([place + size for place in middle])))
+
+
+def test_plates_that_are_interchanged():
+    recording = on_plates(simple_walk([("r", 0), ("l", 0)]))
+    assert doubted(recording, SIMPLE_FEET) == []
+    plates = recording.plates
+    middle = plates.corners.mean(axis=1)
+    there = np.array([middle[1] - middle[0], middle[0] - middle[1]])  # to the other plate's place
+    moment = plates.moment + np.cross(there, plates.force)
+    wrong = replace(plates, force=plates.force[:, ::-1], moment=moment[:, ::-1])
+    found = error_of(replace(recording, plates=wrong), SIMPLE_FEET)
+    assert found.code == "P241"
+    assert [found.evidence[name].value for name in ("plate", "other")] == ["plate 1", "plate 2"]
+    assert found.evidence["after_m"].value < 0.08 < 0.15 < found.evidence["before_m"].value
+
+
+@pytest.mark.parametrize("apart_m", [0.5, -0.4])
+@pytest.mark.parametrize("name", ON_BELTS)
+def test_belts_that_are_interchanged(recording_of, name, apart_m):
+    """Each load lies on the other belt, and goes there as it would on its own."""
+    run = recording_of(*ON_BELTS[name])
+    feet = choose_marker_set(run.markers.labels).foot_labels()
+    offset_m = np.array([[0.0, 0.0, apart_m], [0.0, 0.0, -apart_m]])
+    found = error_of(moved(run, offset_m), feet)
+    assert found.code == "P241"
+    assert found.evidence["before_m"].value == pytest.approx(abs(apart_m), abs=0.04)
+    one_off = error_of(moved(run, np.array([[0.0, 0.0, apart_m], [0.0, 0.0, 0.0]])), feet)
+    assert one_off is None or one_off.code != "P241"
+
+
+def test_both_feet_on_a_plate():
+    """The left foot lands on the right foot's plate, and comes to its own later."""
+    recording = simple_walk([("r", 0), ("l", 0)])
+    plates = recording.plates
+    time = plates.time
+    force, moment = plates.force.copy(), plates.moment.copy()
+    rows = (time >= 0.7) & (time < 0.78)  # both are down from 0.7 to 0.8 s
+    for part in (force, moment):
+        part[rows, 0] += part[rows, 1]
+        part[rows, 1] = 0.0
+    wrong = replace(recording, plates=replace(plates, force=force, moment=moment))
+    (found,) = [one for one in place_findings(wrong, SIMPLE_FEET) if one.severity > Severity.CORRECTED]
+    assert (found.code, found.where.plate) == ("P276", "plate 1")
+    assert found.where.span_s == pytest.approx((0.7, 0.78), abs=0.01)
+
+
+def test_both_feet_explain_feet_in_turn():
+    """D20: one load is told once."""
+    recording = simple_walk([("r", 0), ("l", 0)])
+    plates = recording.plates
+    force, moment = (part.sum(axis=1, keepdims=True) for part in (plates.force, plates.moment))
+    one = replace(recording, plates=PlateLoads(plates.time, ("belt",), force, moment, (None,)))
+    found = {each.code: each.muted_by for each in place_findings(one, SIMPLE_FEET)}
+    assert found == {"P275": "P276", "P276": None}
+
+
+@pytest.mark.parametrize("name", [name for name in RUNS if name != "hamner"])
+def test_a_foot_that_swings_is_on_no_plate(recording_of, name):
+    """A runner's centre of pressure that is off the foot is not the other foot's, which is in the air."""
+    run = recording_of(*RUNS[name])
+    feet = choose_marker_set(run.markers.labels).foot_labels()
+    codes = doubted(moved(run, (0.0, 0.0, 0.13)), feet)
+    assert codes
+    assert "P276" not in codes
+
+
+def along(recording, plate, share):
+    """The centre of pressure of one plate this many times as far from where it is on average under each step."""
+    plates = recording.plates
+    point = centre_of_pressure(np.concatenate((plates.force, plates.moment), axis=2))
+    for first, last in runs(plates.force[:, plate, 1] > 0):
+        step = point[first : last + 1, plate]
+        point[first : last + 1, plate] = step.mean(axis=0) + share * (step - step.mean(axis=0))
+    return replace(recording, plates=replace(plates, moment=np.cross(point, plates.force)))
+
+
+@pytest.mark.parametrize(("share", "code", "size_m"), [(-1.5, "P252", -0.1), (0.0, "P251", 0.0)])
+def test_a_load_that_does_not_progress(share, code, size_m):
+    recording = simple_walk([("r", 0), ("l", 0)])
+    (found,) = [one for one in place_findings(along(recording, 1, share), SIMPLE_FEET) if one.is_open]
+    assert (found.code, found.where.plate) == (code, "plate 2")
+    assert next(iter(found.evidence.values())).value == pytest.approx(size_m, abs=0.03)
+    assert doubted(along(recording, 1, 0.3), SIMPLE_FEET) == []
+
+
+def test_a_mirrored_plate_does_not_hide_both_feet_on_another():
+    """Chain F of the precedence."""
+    recording = along(simple_walk([("r", 0), ("l", 0), ("r", 1)]), 2, -1.5)
+    plates = recording.plates
+    force, moment = plates.force.copy(), plates.moment.copy()
+    rows = (plates.time >= 0.7) & (plates.time < 0.78)
+    for part in (force, moment):
+        part[rows, 0] += part[rows, 1]
+        part[rows, 1] = 0.0
+    wrong = replace(recording, plates=replace(plates, force=force, moment=moment))
+    assert sorted(doubted(wrong, SIMPLE_FEET)) == ["P252", "P276"]
+
+
+def test_a_load_of_somebody_else():
+    recording = simple_walk([("r", 0), ("l", 0), ("r", 1)])
+    shift = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    found = [one for one in place_findings(moved(recording, shift), SIMPLE_FEET) if one.code == "P244"]
+    assert [(one.where.plate, one.severity) for one in found] == [("plate 3", Severity.WARNING)]
+    assert found[0].evidence["distance_m"].value == pytest.approx(0.9, abs=0.11)
+
+
+def test_a_static_trial_is_asked_nothing_and_somebody_who_stands_is(walk):
+    """D10."""
+    recording, feet = walk
+    still = np.repeat(recording.markers.positions[:1], len(recording.markers.time), axis=0)
+    standing = replace(
+        moved(recording, (0.0, 0.0, 0.0), factor=1000.0), markers=replace(recording.markers, positions=still)
+    )
+    assert "P204" in doubted(standing, feet)
+    assert "P204" not in doubted(standing, feet, is_static=True)

@@ -1,0 +1,166 @@
+"""Feet beside their plate, both feet on one, and the known false alarms of recordings from other laboratories."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kinertia.diagnostics.plates.cop_on_plate import cop_on_plate
+from kinertia.diagnostics.plates.ground_contact import partly_unmeasured, plate_edges
+from kinertia.findings.finding import Severity
+from kinertia.model.marker_set import MarkerSet
+from kinertia.trial.centre_of_pressure import centre_of_pressure
+from loads_and_feet import context_of, doubted, place_findings
+from recordings import here
+from walk_on_plates import FEET, walk
+
+HALF_M = np.array([[1, 0, 1], [-1, 0, 1], [-1, 0, -1], [1, 0, -1]]) * [0.3, 0.0, 0.09]
+
+
+def on_plates(behind_m=0.0, steps=(("r", 0), ("l", 0))):
+    """A walk over plates of 0.6 m, which begin so much in front of where the first foot's heel marker stands."""
+    recording = walk(list(steps))
+    plates = recording.plates
+    point = centre_of_pressure(np.concatenate((plates.force, plates.moment), axis=2))
+    loaded = plates.force[..., 1] > 0
+    middle = np.array([point[loaded[:, p], p].mean(axis=0) for p in range(len(plates.names))])
+    middle[0, 0] += 0.2 + behind_m
+    return replace(recording, plates=replace(plates, corners=middle[:, None] + HALF_M))
+
+
+def marker_set(toes=False):
+    """Heel and toe, or heel and metatarsals, of both feet."""
+    front = "toe" if toes else "metatarsal"
+    ends = {("heel", "Heel"), (front, "Toe")}
+    landmarks = {f"{name}_{side}": (f"{side.upper()}.{label}",) for name, label in ends for side in "rl"}
+    return MarkerSet("feet", landmarks, {f"foot_{side}": tuple(FEET[side]) for side in "rl"}, {})
+
+
+def test_a_foot_on_its_plate():
+    assert list(plate_edges(context_of(on_plates(), FEET))) == []
+    assert list(plate_edges(context_of(walk([("r", 0)]), FEET))) == []  # nobody knows where that plate ends
+
+
+def test_a_heel_behind_its_plate():
+    context = context_of(on_plates(0.06), FEET)
+    (found,) = plate_edges(context)
+    assert (found.code, found.severity, found.where.plate) == ("P282", Severity.WARNING, "plate 1")
+    assert found.evidence["overhang_m"].value == pytest.approx(0.06, abs=0.002)
+    assert found.evidence["foot"].value == "right"
+    (span,) = partly_unmeasured(context)
+    assert span == found.where.span_s
+    assert 0.2 <= span[0] < span[1] <= 0.82
+
+
+def test_a_foot_on_two_plates_is_measured():
+    recording = on_plates(0.06)
+    corners = recording.plates.corners.copy()
+    corners[1] = corners[0] - [0.6, 0.0, 0.0]
+    together = replace(recording, plates=replace(recording.plates, corners=corners))
+    assert list(plate_edges(context_of(together, FEET))) == []
+
+
+@pytest.mark.parametrize("toes", [True, False])
+def test_a_toe_may_stay(toes):
+    """In front of its plate by 40 mm."""
+    recording = on_plates(-0.2 - 0.24)
+    context = replace(context_of(recording, FEET), marker_set=marker_set(toes))
+    (found,) = plate_edges(context)
+    assert found.evidence["overhang_m"].value == pytest.approx(0.04, abs=0.002)
+    assert len(partly_unmeasured(context)) == (0 if toes else 1)
+
+
+@pytest.mark.parametrize("behind_m", [0.14, 0.0])
+def test_a_load_that_begins_late_beside_the_plate_shows_no_other_rate(behind_m):
+    """The foot stands for 0.6 s, 0.35 of them with its load on the plate; where all of it is there, rates differ."""
+    recording = on_plates(behind_m, [("r", 0)])
+    plates = recording.plates
+    force, moment = plates.force.copy(), plates.moment.copy()
+    early = plates.time < 0.45
+    force[early] = moment[early] = 0.0
+    late = replace(recording, plates=replace(plates, force=force, moment=moment))
+    assert ("T201" in doubted(late, FEET)) == (behind_m == 0.0)
+
+
+def test_centres_of_pressure_beside_their_plate():
+    recording = on_plates()
+    assert list(cop_on_plate(context_of(recording, FEET))) == []
+    corners = recording.plates.corners + np.array([[[0.5, 0.0, 0.0]], [[0.05, 0.0, 0.0]]])
+    (found,) = cop_on_plate(context_of(replace(recording, plates=replace(recording.plates, corners=corners)), FEET))
+    assert (found.code, found.severity, found.where.plate) == ("P245", Severity.ERROR, "plate 1")
+    assert found.evidence["share"].value == pytest.approx(1.0, abs=0.05)
+
+
+def test_no_forces_and_one_frame():
+    """D7: one severity wherever it is asked."""
+    recording = walk([("r", 0), ("l", 0)])
+    for wrong, code in (
+        (replace(recording, plates=None), "P271"),
+        (replace(recording, markers=recording.markers.cut(0.5, 0.5)), "T104"),
+    ):
+        (found,) = [one for one in place_findings(wrong, FEET) if one.severity is Severity.ERROR]
+        assert found.code == code
+        assert doubted(wrong, FEET, is_static=True) == []
+
+
+def test_a_window_that_is_too_short():
+    (found,) = place_findings(walk([("r", 0), ("l", 0)]), FEET, window_s=(0.5, 0.55))[1:]
+    assert (found.code, found.evidence["frames"].value) == ("P279", 6)
+
+
+def of_field(recording, feet, **landmarks):
+    """A context with these markers on each foot ("HEEL" for "RHEEL" and "LHEEL")."""
+    sides = {"r": "R", "l": "L"}
+    named = {f"{name}_{s}": (sides[s] + label,) for name, label in landmarks.items() for s in sides}
+    segments = {f"foot_{s}": tuple(sides[s] + label for label in feet) for s in sides}
+    return replace(context_of(recording, {"r": [], "l": []}), marker_set=MarkerSet("feet", named, segments, {}))
+
+
+def errors_and_warnings(context):
+    return [one.code for one in place_findings(context.recording, context=context) if one.severity > Severity.CORRECTED]
+
+
+@pytest.mark.parametrize("name", here(["field/lasem/walk01.c3d"]))
+def test_feet_without_a_toe_marker_at_foot_off(recording_of, name):
+    """The other foot is on the floor, half a metre ahead."""
+    assert errors_and_warnings(of_field(recording_of(name), ["HEEL", "P5MT"], heel="HEEL", metatarsal="P5MT")) == []
+
+
+@pytest.mark.parametrize("name", here(["field/lasem/sldj01.c3d", "field/lasem/sldj03.c3d"]))
+def test_a_landing_from_a_box_has_no_other_rate(recording_of, name):
+    context = of_field(recording_of(name), ["HEEL", "TOE", "P5MT", "P1MT"], heel="HEEL", toe="TOE")
+    assert not set(errors_and_warnings(context)) & {"T201", "T211", "T212", "P252", "P243"}
+
+
+@pytest.mark.parametrize("name", here([f"field/unipd/walking{k}.c3d" for k in (1, 3, 5)]))
+def test_feet_that_are_hidden_for_a_while_are_not_displaced(recording_of, name):
+    assert errors_and_warnings(of_field(recording_of(name), ["CA", "VMH"], heel="CA", metatarsal="VMH")) == []
+
+
+BESIDE = {
+    "field/biomechzoo/HC002D/turn.c3d": [("plate 2", "right", 0.018)],
+    "field/biomechzoo/HC032A/turn.c3d": [("plate 1", "left", 0.084)],
+    "field/biomechzoo/HC036A/turn.c3d": [],
+    "field/biomechzoo/HC036A/straight.c3d": [],
+    "pig_c3d/subject_a_walk.c3d": [],
+    "pig_c3d/subject_b_walk.c3d": [("plate 1", "right", 0.045)],
+}
+
+
+@pytest.mark.parametrize("name", here(BESIDE))
+def test_feet_of_other_laboratories(recording_of, name):
+    found = [one for one in place_findings(recording_of(name)) if one.code == "P282"]
+    expected = BESIDE[name]
+    assert [(one.where.plate, one.evidence["foot"].value) for one in found] == [one[:2] for one in expected]
+    assert [one.evidence["overhang_m"].value for one in found] == pytest.approx([one[2] for one in expected], abs=0.003)
+
+
+@pytest.mark.parametrize("name", here([f"field/opensim_core/{name}.c3d" for name in ("walking2", "test_walking")]))
+def test_a_heel_that_lands_before_the_plate_is_no_other_trial(recording_of, name):
+    recording = recording_of(name)
+    context = of_field(recording, ["CAL", "MT1", "MT2"], heel="CAL", metatarsal="MT2")
+    assert set(errors_and_warnings(context)) == {"P282"}
+    assert max(one.overhang_m for one in context.overhangs) > 0.12
+    # with the heel alone nobody knows when a foot leaves the ground
+    heel = of_field(recording, ["CAL"], heel="CAL", metatarsal="MT5")
+    assert not set(errors_and_warnings(heel)) & {"T211", "T212", "T201", "P243", "P244"}

@@ -1,0 +1,116 @@
+"""A wrong rate of the forces is told from a late clock by a delay that grows, where there are contacts enough."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kinertia.io.marker_set_file import choose_marker_set
+from loads_and_feet import error_of
+from recordings import LONG_WALKS, RUNS, WALKS
+
+
+def found_in(recording, rate=1.0, late_s=0.0):
+    """What is found in forces whose time goes at this rate, and which are later."""
+    plates = recording.plates
+    time = plates.time[0] + rate * (plates.time - plates.time[0]) + late_s
+    feet = choose_marker_set(recording.markers.labels).foot_labels()
+    feet = {side: [label for label in own if label in recording.markers.labels] for side, own in feet.items()}
+    return error_of(replace(recording, plates=replace(plates, time=time)), feet)
+
+
+@pytest.fixture(params=RUNS)
+def run(request, recording_of):
+    return recording_of(*RUNS[request.param])
+
+
+@pytest.fixture(params=WALKS)
+def walk(request, recording_of):
+    return recording_of(*WALKS[request.param])
+
+
+@pytest.mark.parametrize("rate", [0.95, 0.98, 0.99, 1.01, 1.02, 1.05])
+def test_a_wrong_rate_of_a_run(run, rate):
+    found = found_in(run, rate)
+    assert found.code == "T201"
+    assert found.evidence["ratio"].value == pytest.approx(rate, abs=0.003)
+
+
+@pytest.mark.parametrize("late_s", [-0.03, 0.0, 0.03])
+def test_a_run_at_its_rate(run, late_s):
+    assert code_of(found_in(run, late_s=late_s)) != "T201"
+
+
+def code_of(found):
+    return None if found is None else found.code
+
+
+@pytest.mark.parametrize("late_s", [-0.07, 0.07])
+def test_a_delay_over_many_contacts(run, late_s):
+    found = found_in(run, late_s=late_s)
+    assert found.code == "T211"
+    assert "rate_alternative" not in found.evidence
+
+
+@pytest.mark.parametrize("share", [0.05, 0.2])
+def test_markers_that_flicker_do_not_change_how_long_feet_stand(walk, share):
+    markers = walk.markers
+    positions = markers.positions.copy()
+    positions[np.random.default_rng(5).random(positions.shape[:2]) < share] = np.nan
+    assert found_in(replace(walk, markers=replace(markers, positions=positions))) is None
+
+
+@pytest.mark.parametrize("side", ["r", "l"])
+def test_a_foot_that_is_hidden_while_it_stands(walk, side):
+    """For a third of a second in the middle of its longest load, with all its markers."""
+    markers, plates = walk.markers, walk.plates
+    own = [
+        markers.labels.index(label)
+        for label in choose_marker_set(markers.labels).foot_labels()[side]
+        if label in markers.labels
+    ]
+    for vertical in plates.force[..., 1].T:
+        middle = float(np.average(plates.time, weights=vertical > 200.0))
+        positions = markers.positions.copy()
+        hidden = np.abs(markers.time - middle) < 0.17
+        positions[np.ix_(hidden, own)] = np.nan
+        assert code_of(found_in(replace(walk, markers=replace(markers, positions=positions)))) != "T201"
+
+
+def test_two_contacts_do_not_distinguish_a_rate_from_a_delay(walk):
+    """Both are named."""
+    found = found_in(walk, 1.05)
+    assert found.code == "T211"
+    assert found.evidence["rate_alternative"].value == pytest.approx(0.05, abs=0.025)
+
+
+@pytest.mark.parametrize("name", LONG_WALKS)
+def test_three_contacts_exclude_a_rate_that_is_far_off(recording_of, name):
+    """To be 100 ms late in the middle of 2.4 s, forces would have to be 10 % slow."""
+    found = found_in(recording_of(*LONG_WALKS[name]), late_s=0.1)
+    assert found.code == "T211"
+    assert "rate_alternative" not in found.evidence
+
+
+def test_fault_free_walks_at_their_rate(walk):
+    assert found_in(walk) is None
+
+
+@pytest.mark.parametrize("noise_mm", [3.0, 5.0])
+def test_markers_that_jitter_are_no_wrong_rate(walk, noise_mm):
+    """Poses and markers from video do, by some millimetres in every frame."""
+    noise = 1e-3 * noise_mm * np.random.default_rng(2).standard_normal(walk.markers.positions.shape)
+    noisy = replace(walk, markers=replace(walk.markers, positions=walk.markers.positions + noise))
+    assert found_in(noisy) is None
+    assert found_in(noisy, 1.6).code == "T201"
+
+
+def test_who_stands_on_a_box_before_the_walk_has_no_other_rate(walk):
+    """Only while feet are loaded plates and markers can be compared."""
+    markers = walk.markers
+    still = np.repeat(markers.positions[:1], round(3.0 * markers.rate_hz), axis=0)
+    positions = np.concatenate([still, markers.positions, np.repeat(markers.positions[-1:], len(still), axis=0)])
+    step_s = float(np.median(np.diff(markers.time)))
+    time = markers.time[0] + step_s * (np.arange(len(positions)) - len(still))
+    before = replace(walk, markers=replace(markers, time=time, positions=positions))
+    assert code_of(found_in(before)) != "T201"

@@ -1,0 +1,54 @@
+"""Interchanged force files of two trials of a person are found; never in fault-free trials, nor in late ones."""
+
+from dataclasses import replace
+from itertools import combinations
+
+import pytest
+
+from kinertia.diagnostics.runner import asked, explained
+from kinertia.diagnostics.timing.interchanged_forces import interchanged_forces
+from kinertia.diagnostics.timing.questions import PERSON_QUESTIONS
+from trials_of_people import PEOPLE, Trials
+
+
+@pytest.fixture(params=PEOPLE)
+def person(request, file_of, recording_of):
+    return Trials(PEOPLE[request.param], file_of, recording_of)
+
+
+@pytest.mark.parametrize("late_s", [0.0, 0.02, -0.05])
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_fault_free_and_late_trials(person, count, late_s):
+    second = person.names[1]
+    for some in combinations(person.names, count):
+        trials = [person.context(name, late_s=late_s if name == second else 0.0) for name in some]
+        assert list(interchanged_forces(person.together(trials))) == []
+
+
+def test_one_late_and_the_other_early(person):
+    first, second, _ = person.names
+    for late_s in (0.01, 0.015, -0.01, -0.015):
+        trials = [person.context(first, late_s=-late_s), person.context(second, late_s=late_s)]
+        assert list(interchanged_forces(person.together(trials))) == []
+
+
+def test_interchanged_force_files(person):
+    first, second, third = person.names
+    trials = [person.context(first, second), person.context(second, first), person.context(third)]
+    found = list(interchanged_forces(person.together(trials)))
+    assert [one.code for one in found] == ["S304", "S304"]
+    assert [(one.where.trial, one.evidence["other_trial"].value) for one in found] == [(first, second), (second, first)]
+    assert all(one.evidence["left_crossed"].value < one.evidence["left_own"].value for one in found)
+
+
+def test_an_interchange_does_not_hide_the_delay_of_a_third_trial(person):
+    """Chain I of the precedence."""
+    first, second, third = person.names
+    trials = [person.context(first, second), person.context(second, first), person.context(third, late_s=0.1)]
+    for name in (first, second):
+        again = person.context(name)
+        trials.append(replace(again, recording=replace(again.recording, name=f"{name} again")))
+    found = explained(asked(PERSON_QUESTIONS, person.together(trials)))
+    muted = {one.where.trial: one.muted_by for one in found if one.code == "T213"}
+    assert muted[third] is None
+    assert {by for name, by in muted.items() if name in (first, second)} <= {"S304"}
