@@ -4,10 +4,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from kinertia.diagnostics.evidence.force_mass import force_mass
-from kinertia.diagnostics.result.warnings import fit_warnings, force_warnings, mass_from_force_kg, two_level_warnings
+from kinertia.diagnostics.result.masses import mass_from_force_kg
 from kinertia.errors import SettingsError, SubjectError, TrialError
-from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.estimation.input_checks import check_trials, complete_subject
 from kinertia.settings import Subject
 from kinertia.trial.data import Markers, Recording
@@ -81,47 +79,3 @@ def test_mass_by_force_knows_the_movement_of_the_body(short_fit):
     body = SimpleNamespace(total_mass_kg=1.1 * literature.total_mass_kg)
     assert mass_from_force_kg(body, other) == pytest.approx(measured)
     assert 68 < measured < 77
-
-
-def warned(fit, mass_kg=None, **changes):
-    result = SimpleNamespace(**{"bsp": fit.literature, "converged": True, "evaluations": 7, **changes})
-    mass = force_mass(fit.skeleton, fit.trials[0].kinematics.trial).mass_kg if mass_kg is None else mass_kg
-    said = force_warnings(CarriedMass.of(mass, ()), fit.literature, fit.trials[:1], fit.skeleton)
-    return said + fit_warnings(CarriedMass.of(mass, ()), fit.literature, result.bsp) + two_level_warnings(result)
-
-
-def test_warnings_come_one_by_one(short_fit):
-    literature = short_fit.literature
-    by_force = force_mass(short_fit.skeleton, short_fit.trials[0].kinematics.trial).mass_kg
-    fine = replace(literature, mass_kg=literature.mass_kg * by_force / literature.total_mass_kg)
-    assert warned(short_fit, bsp=fine) == []
-    assert any("did not converge within 7" in w for w in warned(short_fit, bsp=fine, converged=False))
-    light = replace(fine, mass_kg=fine.mass_kg * 0.96)
-    assert any("estimated total mass" in w and "-4.0 %" in w for w in warned(short_fit, bsp=light))
-    assert any("mean vertical force" in w and "early" in w for w in warned(short_fit, by_force * 1.021, bsp=fine))
-    far = replace(fine, com_m=literature.com_m + np.eye(12, 3) * 0.11)
-    assert any("contradicts the literature" in w and "110 mm" in w for w in warned(short_fit, bsp=far))
-    flat = fine.inertia_kgm2.copy()
-    flat[2] = np.diag([1.0, 0.1, 0.1])
-    (said,) = warned(short_fit, bsp=replace(fine, inertia_kgm2=flat))
-    assert "physically impossible for 1 of 12 segments (thigh_r)" in said
-
-
-def test_how_far_a_centre_of_mass_is_is_told_by_the_prior_where_there_is_one(short_fit):
-    """A trunk may well be 104 mm off: its deviation is 34 mm."""
-    literature, carried = short_fit.literature, CarriedMass.of(short_fit.literature.total_mass_kg, ())
-    far = replace(literature, com_m=literature.com_m + np.eye(12, 3) * 0.104)
-    assert any("moved by 104 mm" in w for w in fit_warnings(carried, literature, far))
-    prior_sd = np.full((12, 10), 0.04)
-    assert fit_warnings(carried, literature, far, prior_sd=prior_sd) == []
-    assert any("moved by 104 mm" in w for w in fit_warnings(carried, literature, far, prior_sd=0.8 * prior_sd))
-
-
-def test_a_motion_that_the_forces_do_not_make_accuses_inverse_kinematics_and_nobody_else(short_fit):
-    trial, literature = short_fit.trials[0], short_fit.literature
-    force = trial.kinematics.foot_loads[:, :, 1].sum(axis=1).mean()
-    wrong = {**trial.residuals, "literature": trial.residuals["literature"] + 0.3 * force * np.eye(6)[1]}
-    mass = CarriedMass.of(force_mass(short_fit.skeleton, trial.kinematics.trial).mass_kg, ())
-    (said,) = force_warnings(mass, literature, [replace(trial, residuals=wrong)], short_fit.skeleton)
-    assert "inverse kinematics went wrong, not the plates" in said
-    assert force_warnings(mass, literature, [trial], short_fit.skeleton) == []

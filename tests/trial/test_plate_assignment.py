@@ -49,9 +49,10 @@ def test_a_foot_on_two_plates_counts_for_the_one_that_carries_more():
 
 
 def test_every_step_on_a_plate():
-    trial = build_trial(walk(ALL_STEPS), FEET)
+    trial = build_trial(replace(walk(ALL_STEPS), vertical="+Z"), FEET)
     assert trial.measured.all()
     assert trial.notes == ()
+    assert trial.vertical == "+Z"
     sides = trial.loads.force[:, :, 1] > 0
     assert sides[:, 0].mean() == pytest.approx(0.6, abs=0.05)
     assert sides[:, 1].mean() == pytest.approx(0.6, abs=0.05)
