@@ -120,6 +120,11 @@ def test_a_foot_on_a_box_is_not_measured():
     expect_window(trial, 0.0, 1.0 - CONTACT_MARGIN_S)
 
 
+def test_a_marker_that_is_hidden_on_the_box_hides_no_other_frame():
+    recording = without(standing(0.3, share=0.6), "L.Toe", 1.0, 3.0)
+    expect_window(build_trial(recording, FEET), 0.0, 1.0 - CONTACT_MARGIN_S)
+
+
 @pytest.mark.parametrize("sway_m", [0.0, 0.02])
 def test_a_foot_held_still_in_the_air_is(sway_m):
     assert build_trial(standing(0.3, share=1.0, sway_m=sway_m), FEET).measured.all()
