@@ -21,7 +21,7 @@ from typing import Any
 import pandas as pd
 
 from kinertia.cli.app import main as kinertia
-from kinertia.estimation.simultaneous.fit import CONTRADICTION_SD
+from kinertia.diagnostics.result.soundness import CONTRADICTION_SD
 from measured_trials import farthest, table
 from walks import WALKS, fit_arguments
 

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import chi2
 
-from kinertia.estimation.simultaneous.instrument_warnings import accuses
+from kinertia.estimation.simultaneous.instrument_errors import InstrumentError
 
 APART = 1.96
 """Deviations beyond which two values, or a value and none, differ (95 %)."""
@@ -180,7 +180,8 @@ def _calibrated(folder: Path) -> Iterator[tuple[tuple[str, str, str], Estimate]]
         if entry["sd"]:
             group = next((group for part, group in _INSTRUMENTS.items() if part in name), "joint")
             numbers = (float(entry[key]) for key in ("value", "sd", "prior_sd"))
-            warned = group in INSTRUMENT_GROUPS and accuses(entry)
+            error = InstrumentError(name, group, None, None, **entry)
+            warned = group in INSTRUMENT_GROUPS and error.supported
             yield (name, group, entry["unit"]), Estimate(folder.name, *numbers, warned)
 
 

@@ -5,7 +5,10 @@ import shutil
 from urllib.parse import urlsplit
 
 from chromium import DESKTOP, playwright
+from found import FAULTY
+from kinertia.findings.overview import Overview
 from kinertia.io.provenance import sha256
+from kinertia.report.finding_view import digest
 
 PATIENCE_MS = 120_000
 
@@ -107,7 +110,7 @@ class Tab:
         return self.app.library.person(name)
 
     def message(self):
-        return self.page.locator(".message.fail").first.inner_text()
+        return self.page.locator(".message.error").first.inner_text()
 
     def quiet(self):
         assert self.errors == []
@@ -120,13 +123,13 @@ def with_everything(person, lab):
     for path in (*lab.glob("*.c3d"), lab / "subject.toml"):
         shutil.copyfile(path, person.folder / path.name)
     person.check.mkdir()
-    found = [{"title": "walk", "verdicts": [{"level": level, "sentence": "s"} for level in ("fail", "caution")]}]
-    outcome = {"inputs": "", "mistakes": ["a file"], "advice": "more", "findings": found}
+    overview = Overview(FAULTY, 61, 2, ("walk 2",))
+    outcome = {"inputs": "", **digest(overview)}
     (person.check / "outcome.json").write_text(json.dumps(outcome))
     person.results.mkdir()
     (person.results / "fit.json").write_text("{}")
     page = "<!doctype html><html lang=en><title>report</title><main><h1>report</h1></main>"
     (person.results / "report.html").write_text(page)
-    outcome = {"inputs": "", "level": "caution", "headline": "Usable with care.", "ended": 1.7e9}
+    outcome = {**outcome, "ended": 1.7e9}
     outcome["summary"] = sha256(person.results / "fit.json")
     (person.results / "outcome.json").write_text(json.dumps(outcome))

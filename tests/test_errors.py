@@ -5,6 +5,7 @@ import pickle
 import pytest
 
 from kinertia.errors import (
+    BlockedError,
     FileError,
     KinertiaError,
     MarkerSetError,
@@ -15,7 +16,10 @@ from kinertia.errors import (
     SubjectError,
     TrialError,
 )
+from kinertia.findings.finding import finding
+from kinertia.findings.quantity import Quantity
 
+TWICE = finding("F173", names=Quantity("one, one"), problem=Quantity("each needs a name"))
 ERRORS = [
     KinertiaError("in words"),
     FileError("walk.trc", "is empty", 3),
@@ -26,6 +30,8 @@ ERRORS = [
     SettingsError("cutoff"),
     SessionError("plates"),
     OsimError("model.osim", "has no bodies"),
+    FileError.found("walk.trc", "F104", 3, found=Quantity("it is empty")),
+    BlockedError([TWICE], [TWICE]),
 ]
 
 

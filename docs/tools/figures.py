@@ -186,7 +186,7 @@ def _opensim_moments(data: Path, work: Path) -> pd.DataFrame:
 
 def _verdict_strip(figure: plt.Figure, fitted: dict) -> None:
     """What the fit says of its joint moments and of the left plate, below the curves."""
-    use = next(one["use"] for one in fitted["uses"] if one["output"] == "joint moments")
+    use = next(one["use"] for one in fitted["suitability"] if one["output"] == "joint moments")
     crosstalk = fitted["calibration"]["plate left: free moment"]
     found, usual = (1e3 * crosstalk[name] for name in ("value", "prior_sd"))
     fill, edge = _USE_COLORS[use]

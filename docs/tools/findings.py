@@ -39,13 +39,16 @@ along the positive axis, is rotated counter-clockwise seen from above, or comes 
 
 ## Overruling { #overruling }
 
-In the subject file, for all its trials or below one `[[trial]]`:
+In the subject file, for all its trials, or for one as `[trial.diagnostics]` below its `[[trial]]`:
 
 ```toml
 [diagnostics]
 ignore = ["M102", "R40"]   # codes or questions that are left out of the verdict
 waive = ["P244"]           # errors that do not block; outputs are then to be used with care at best
 ```
+
+For a whole study the same table is in a file
+[`kinertia.toml`](subject-file.md#diagnostics-which-findings-are-overruled).
 
 ## All codes
 """

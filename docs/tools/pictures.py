@@ -20,7 +20,7 @@ from kinertia.cli.measured_demo import write_measured_lab
 
 FOLDER = Path(__file__).resolve().parents[1] / "figures"
 PAGES = {
-    "report": ("report.html", "#verdict", [".headline", ".uses", "#body-mass", "#changes"], 1160),
+    "report": ("report.html", "#verdict", [".headline", ".uses", ".steps"], 1160),
     "report-cycle": ("report.html", "figure:has(#cycle-moments)", ["#cycle-moments", ".save"], 1130),
     "report-view": ("report.html", "#view", ["canvas", "#view .controls", "#view .legend"], 920),
     "check": ("check.html", "#recording2", [".checks", "#recording2-forces", "#recording2-pressure"], 1400),

@@ -17,7 +17,7 @@ import typer
 from kinertia.cli.app import application
 from kinertia.io.subject_file import InstrumentsFiles, Model, PriorFiles, TrialFiles
 from kinertia.model.marker_set import LANDMARKS, SEGMENTS, WIDTHS
-from kinertia.settings import Attached, KnownSegment, Settings, Subject, Table
+from kinertia.settings import Attached, Diagnostics, KnownSegment, Settings, Subject, Table
 
 DOCS = Path(__file__).resolve().parents[1]
 PAGES = tuple(DOCS / name for name in ("commands.md", "subject-file.md"))
@@ -79,7 +79,8 @@ def _table(model: type[Table]) -> str:
         if field.is_required():
             default = "" if name == "name" else "is an error"
         else:
-            default = "" if name == "name" or field.default is None else f"`{str(field.default).lower()}`"
+            nothing = name == "name" or field.default in (None, (), Diagnostics())
+            default = "" if nothing else f"`{str(field.default).lower()}`"
         rows.append(f"| `{name}` | {(field.description or '')} | {default} |")
     return "\n".join(rows)
 
@@ -108,6 +109,7 @@ _GENERATED = {
     "prior": lambda: _table(PriorFiles),
     "segment": lambda: _table(KnownSegment),
     "attached": lambda: _table(Attached),
+    "diagnostics": lambda: _table(Diagnostics),
 }
 
 

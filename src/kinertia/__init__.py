@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from kinertia.diagnostics.result.uses import uses as uses
     from kinertia.diagnostics.result.verdict import Verdict as Verdict
     from kinertia.diagnostics.result.verdict import verdicts as verdicts
-    from kinertia.diagnostics.runner import Overrule as Overrule
     from kinertia.errors import BlockedError as BlockedError
     from kinertia.errors import FileError as FileError
     from kinertia.errors import KinertiaError as KinertiaError
@@ -69,6 +68,7 @@ if TYPE_CHECKING:
     from kinertia.report.saved_fit import load_fit as load_fit
     from kinertia.settings import Attached as Attached
     from kinertia.settings import Instruments as Instruments
+    from kinertia.settings import Overrule as Overrule
     from kinertia.settings import Settings as Settings
     from kinertia.settings import Subject as Subject
     from kinertia.studies.cross_validation import HeldOut as HeldOut
@@ -86,25 +86,30 @@ if TYPE_CHECKING:
     from kinertia.trial.data import Trial as Trial
     from kinertia.trial.plate_assignment import build_trial as build_trial
     from kinertia.trial.trial_input import TrialInput as TrialInput
+    from kinertia.workflow.check import PersonCheck as PersonCheck
+    from kinertia.workflow.check import check_person as check_person
+    from kinertia.workflow.check import check_recording as check_recording
     from kinertia.workflow.estimate import estimate as estimate
     from kinertia.workflow.estimate import estimate_bsp as estimate_bsp
     from kinertia.workflow.estimate import estimate_bsp_of_model as estimate_bsp_of_model
     from kinertia.workflow.from_files import fit_subject as fit_subject
     from kinertia.workflow.from_files import prepare_subject as prepare_subject
+    from kinertia.workflow.person import Person as Person
+    from kinertia.workflow.person import read_person as read_person
     from kinertia.workflow.prepare import prepare as prepare
     from kinertia.workflow.prepare_osim import prepare_osim as prepare_osim
     from kinertia.workflow.recording import RecordingCheck as RecordingCheck
-    from kinertia.workflow.recording import check_recording as check_recording
 
 _ROOMS = {
     "errors": (
-        "BlockedError FileError KinertiaError MarkerSetError OsimError SessionError SettingsError SubjectError TrialError"
+        "BlockedError FileError KinertiaError MarkerSetError OsimError SessionError SettingsError SubjectError "
+        "TrialError"
     ),
     "findings.finding": "Finding Severity finding",
     "findings.quantity": "Quantity",
     "findings.rule": "Rule rule",
     "findings.where": "Where",
-    "settings": "Attached Instruments Settings Subject",
+    "settings": "Attached Instruments Overrule Settings Subject",
     "trial.data": "FootLoads Markers PlateLoads Recording Trial",
     "trial.plate_assignment": "build_trial",
     "trial.trial_input": "TrialInput",
@@ -123,14 +128,15 @@ _ROOMS = {
     "estimation.result": "Fit TrialFit",
     "estimation.simultaneous.fit": "Posterior",
     "diagnostics.model.model_check": "ModelCheck check_model",
-    "diagnostics.runner": "Overrule",
     "diagnostics.result.uses": "Use uses",
     "diagnostics.result.verdict": "Verdict verdicts",
     "workflow.estimate": "estimate estimate_bsp estimate_bsp_of_model",
     "workflow.from_files": "fit_subject prepare_subject",
     "workflow.prepare": "prepare",
     "workflow.prepare_osim": "prepare_osim",
-    "workflow.recording": "RecordingCheck check_recording",
+    "workflow.check": "PersonCheck check_person check_recording",
+    "workflow.person": "Person read_person",
+    "workflow.recording": "RecordingCheck",
     "synthetic.walk": "SyntheticSubject SyntheticTrial walk walking_subject",
     "studies.cross_validation": "HeldOut cross_validate",
     "studies.plan": "Plan plan",

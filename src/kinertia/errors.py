@@ -6,12 +6,12 @@ attributes. The command line prints the message as one line and exits with statu
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Self
 
-from kinertia.findings.finding import Finding, with_evidence
+from kinertia.findings.finding import Finding, Severity, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 
@@ -76,7 +76,14 @@ class FileError(KinertiaError):
 
     @classmethod
     def found(
-        cls, path: str | Path, code: str, line: int | None = None, *, at: Where | None = None, **evidence: Quantity
+        cls,
+        path: str | Path,
+        code: str,
+        line: int | None = None,
+        known: Mapping[str, Quantity] | None = None,
+        *,
+        at: Where | None = None,
+        **evidence: Quantity,
     ) -> Self:
         """The error of a rule of the catalogue, with its evidence.
 
@@ -84,16 +91,22 @@ class FileError(KinertiaError):
             path: the file.
             code: of the rule.
             line: one-based.
+            known, evidence: what was measured, the headline first.
             at: plate, markers or time that it is about.
-            evidence: what was measured, the headline first.
 
         Examples:
             >>> from kinertia import FileError, Quantity
             >>> FileError.found("walk.mot", "F142", force=Quantity("ground_force_v")).finding.code
             'F142'
         """
-        made = with_evidence(code, replace(at or Where(), file=Path(path).name, line=line), evidence)
-        return cls(path, problem_of(made), line).with_finding(made)
+        return cls.of(path, with_evidence(code, at or Where(), {**(known or {}), **evidence}), line)
+
+    @classmethod
+    def of(cls, path: str | Path, found: Finding, line: int | None = None) -> Self:
+        """The error of a finding, in this file and line."""
+        where = replace(found.where, file=Path(path).name, line=line)
+        placed = replace(found, where=where, severity=Severity.ERROR)
+        return cls(path, problem_of(placed), line).with_finding(placed)
 
 
 class MarkerSetError(KinertiaError):
@@ -144,7 +157,7 @@ class TrialError(KinertiaError):
             at: plate, markers or time that it is about.
             evidence: what was measured, the headline first.
         """
-        made = with_evidence(code, replace(at or Where(), trial=trial), evidence)
+        made = with_evidence(code, replace(at or Where(), trial=trial), evidence, Severity.ERROR)
         return cls(trial, problem_of(made)).with_finding(made)
 
 
@@ -213,6 +226,14 @@ class OsimError(FileError):
         self.kind = kind
         super().__init__(path, problem, line)
 
+    @classmethod
+    def about(cls, path: str | Path, found: Finding, line: int | None = None) -> Self:
+        """The error of a finding about an element: of the name and kind that its evidence has."""
+        error = cls.of(path, found, line)
+        texts = [found.evidence[name].value for name in ("element", "kind") if name in found.evidence]
+        error.element, error.kind = (str(text) for text in (*texts, "", "")[:2])
+        return error
+
 
 class BlockedError(KinertiaError):
     """Findings that stop a fit: all ERRORs of all trials at once.
@@ -230,3 +251,10 @@ class BlockedError(KinertiaError):
         self.blocking = tuple(blocking)
         self.finding = self.blocking[0] if self.blocking else None
         super().__init__("\n".join(f"{one.line()} {one.remedy}" for one in self.blocking))
+
+
+def findings_of(error: KinertiaError) -> tuple[Finding, ...]:
+    """All findings that stopped a fit, the one that an error is of, or none."""
+    if isinstance(error, BlockedError):
+        return error.findings
+    return () if error.finding is None else (error.finding,)

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo, model_validator
+
+from kinertia.findings.rule import all_rules, matching, rule
 
 
 def folder_of(info: ValidationInfo) -> Path:
@@ -310,3 +314,66 @@ class Attached(Table):
         description="its extent along the same axes, for its inertia: that of a solid block; left out: of a ball of "
         "the density of water",
     )
+
+
+@dataclass(frozen=True)
+class Overrule:
+    """What a user overrules: codes, questions or families.
+
+    Attributes:
+        waive: ERRORs that do not block; shown as waived in every output.
+        ignore: findings below ERROR that are not shown and lower no verdict.
+
+    Examples:
+        >>> kinertia.Overrule(waive=("P244",)).waive
+        ('P244',)
+    """
+
+    waive: tuple[str, ...] = ()
+    ignore: tuple[str, ...] = ()
+
+    def __add__(self, other: Overrule) -> Overrule:
+        return Overrule((*self.waive, *other.waive), (*self.ignore, *other.ignore))
+
+
+def _codes(value: object) -> tuple[str, ...]:
+    if not isinstance(value, list | tuple) or not all(isinstance(one, str) for one in value):
+        raise ValueError('must be a list of codes, questions or families in quotes, like ["M102", "R40"]')
+    for one in value:
+        if not matching(one):
+            written = one[:1].upper() + one[1:].upper().replace("O", "0")
+            near = get_close_matches(written, all_rules(), n=3, cutoff=0.5)
+            hint = f"the nearest are {', '.join(near)}" if near else "see kinertia explain"
+            raise ValueError(f"'{one}' is no code, question or family; {hint}")
+    return tuple(value)
+
+
+def _waivable(value: object) -> tuple[str, ...]:
+    codes = _codes(value)
+    if hard := [one for one in codes if one in all_rules() and rule(one).hard]:
+        raise ValueError(f"'{hard[0]}' cannot be waived, since nothing can be computed with it")
+    return codes
+
+
+class Diagnostics(Table):
+    """What of the findings is overruled, in a study, for one person or for one trial.
+
+    Examples:
+        >>> kinertia.settings.Diagnostics(waive=["P244"], ignore=["M102", "R40"]).overrule
+        Overrule(waive=('P244',), ignore=('M102', 'R40'))
+    """
+
+    ignore: Annotated[tuple[str, ...], BeforeValidator(_codes)] = Field(
+        default=(), description='findings below ERROR that are not shown and lower no verdict, like ["M102", "R40"]'
+    )
+    waive: Annotated[tuple[str, ...], BeforeValidator(_waivable)] = Field(
+        default=(), description='ERRORs that do not stop an estimate and are shown as waived, like ["P244"]'
+    )
+
+    @property
+    def overrule(self) -> Overrule:
+        """The same as findings take it."""
+        return Overrule(self.waive, self.ignore)
+
+    def __add__(self, other: Diagnostics) -> Diagnostics:
+        return Diagnostics(ignore=(*self.ignore, *other.ignore), waive=(*self.waive, *other.waive))

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from kinertia.errors import FileError
 from kinertia.io.bsp_file import read_bsp
 from kinertia.model.bsp import PARAMETERS, UNITS
+from refusals import refused
 
 VALUES = [(name, unit, 0.1 * k, 0.01 * (k + 1)) for k, (name, unit) in enumerate(zip(PARAMETERS, UNITS, strict=True))]
 ROWS = [f"{side},{name},{unit},9,{value},{sd}\n" for side in ("thigh_r", "thigh_l") for name, unit, value, sd in VALUES]
@@ -36,27 +36,29 @@ def test_a_segment_that_was_held_has_no_deviations(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "words"),
+    ("old", "new", "line", "code", "evidence"),
     [
-        (",sd\n", ",other\n", r"line 1: lacks the column sd; found .*; expected the bsp.csv of a simultaneous fit"),
-        ("thigh_r,mass", "thigh_r,weight", r"line 2: unknown parameter 'weight'; expected one of mass, com_x"),
-        ("thigh_r,mass,kg", "thigh_r,mass,lb", r"line 2: thigh_r mass is in 'lb'; expected kg"),
-        ("thigh_l,mass,kg,9,0.0,", "thigh_l,mass,kg,9,,", r"line 12: estimate is ''; expected a number"),
-        ("kg,9,0.0,0.01", "kg,9,0.0,0", r"line 2: the sd of thigh_r mass must be positive"),
-        ("m,9,0.1,0.02", "m,9,0.1,-0.02", r"line 3: the sd of thigh_r com_x must be positive"),
-        ("thigh_r,com_x", "thigh_r,mass", "is in 'm'; expected kg"),
-        ("thigh_l,com_x,m,9,0.1,0.02\n", "", "thigh_l lacks com_x"),
-        (GOOD[GOOD.index("\n") + 1 :], "", "a heading and no rows"),
+        (",sd\n", ",other\n", 1, "F103", {"expected": "sd", "found": "segment, parameter", "kind": "simultaneous"}),
+        ("thigh_r,mass", "thigh_r,weight", 2, "F183", {"parameter": "weight", "problem": "mass, com_x"}),
+        ("thigh_r,mass,kg", "thigh_r,mass,lb", 2, "F183", {"problem": "'lb'; expected kg"}),
+        ("thigh_l,mass,kg,9,0.0,", "thigh_l,mass,kg,9,,", 12, "F105", {"column": "estimate", "cell": ""}),
+        ("kg,9,0.0,0.01", "kg,9,0.0,0", 2, "F183", {"parameter": "mass", "problem": "sd must be positive"}),
+        ("m,9,0.1,0.02", "m,9,0.1,-0.02", 3, "F183", {"parameter": "com_x", "problem": "sd must be positive"}),
+        ("thigh_r,com_x", "thigh_r,mass", 3, "F183", {"problem": "'m'; expected kg"}),
+        ("thigh_r,com_y,m,9,0.2,0.03", "thigh_r,com_x,m,9,0.2,0.03", 4, "F183", {"problem": "twice"}),
+        ("thigh_l,com_x,m,9,0.1,0.02\n", "", None, "F183", {"parameter": "com_x", "problem": "missing"}),
+        (GOOD[GOOD.index("\n") + 1 :], "", 1, "F104", {"rows": 0}),
     ],
 )
-def test_what_cannot_be_is_told_with_its_line(tmp_path, old, new, words):
+def test_what_cannot_be_is_named_with_its_line(tmp_path, old, new, line, code, evidence):
     path = tmp_path / "bsp.csv"
     assert old in GOOD
     path.write_text(GOOD.replace(old, new))
-    with pytest.raises(FileError, match=words):
+    with refused(code, line, **evidence) as caught:
         read_bsp(path)
+    assert code != "F183" or caught.value.finding.where.part in ("thigh_r", "thigh_l")
 
 
 def test_no_such_file(tmp_path):
-    with pytest.raises(FileError, match="no such file"):
+    with refused("F101", None):
         read_bsp(tmp_path / "bsp.csv")

@@ -2,9 +2,10 @@ import numpy as np
 import pytest
 
 from c3d_writer import plate_parameters, write_c3d
-from kinertia.errors import FileError
+from kinertia.findings.finding import Severity
 from kinertia.io.c3d import read_c3d
 from recordings import here, is_here
+from refusals import codes, only, refused
 
 GRAVITY = 9.80665
 CORNERS = np.array([[[0, 500, 0], [500, 500, 0], [500, 0, 0], [0, 0, 0]]], float)  # mm, type 2: z down
@@ -40,7 +41,7 @@ VARIETY = {
     "c3d_variety/duplicate_labels.c3d": (1050, 22, 0),
     "c3d_variety/ist.c3d": (134, 24, 2),
     "c3d_variety/motion_analysis_walk.c3d": (151, 37, 2),
-    "c3d_variety/plates_kistler_type3.c3d": "has no points",
+    "c3d_variety/plates_kistler_type3.c3d": "F164",
     "c3d_variety/plates_type1.c3d": (634, 22, 1),
     "c3d_variety/rotations_only.c3d": (340, 36, 0),
     "c3d_variety/subject_prefixed_labels.c3d": (333, 86, 2),
@@ -56,7 +57,7 @@ LARGE = ("c3d_variety/bts.c3d", "c3d_variety/plates_kistler_type3.c3d")
 def test_every_maker(file_of, name):
     expected, path = VARIETY[name], file_of(name)
     if isinstance(expected, str):
-        with pytest.raises(FileError, match=expected):
+        with refused(expected):
             read_c3d(path)
         return
     recording = read_c3d(path)
@@ -155,7 +156,8 @@ def test_load_about_the_ground_origin(tmp_path):
         tmp_path / "x.c3d", points, labels, stepping(), {**SCREEN, "FORCE_PLATFORM": plate_parameters(CORNERS)}
     )
     recording = read_c3d(path)
-    assert recording.notes == ("x.c3d: lab axes with +Z up were turned to Y up",)
+    assert codes(recording.findings) == ["F133"]
+    only(recording.findings, "F133", axis="+Z")
     np.testing.assert_allclose(recording.markers.positions[0, 0], [0.25, 0.03, -0.24], atol=1e-6)
     expect_centre_of_pressure(recording.plates, 0.3, -0.2, [30, 600, -20])
     np.testing.assert_allclose(recording.plates.time[:3], [0, 0.001, 0.002])
@@ -221,7 +223,8 @@ def test_load_on_the_plate_is_reversed(tmp_path):
     )
     recording = read_c3d(path)
     expect_centre_of_pressure(recording.plates, 0.3, -0.2, [30, 600, -20])
-    assert "plate 1 reports a force that points down, the load on the plate; it was reversed" in recording.notes[-1]
+    reversed_ = only(recording.findings, "F157", force_n=-600.0)
+    assert (reversed_.where.plate, reversed_.severity) == ("plate 1", Severity.CORRECTED)
 
 
 def test_unloaded_plate_is_zero(tmp_path):
@@ -230,16 +233,26 @@ def test_unloaded_plate_is_zero(tmp_path):
         tmp_path / "x.c3d",
         points,
         labels,
-        stepping(vertical=-15.0),
+        stepping(vertical=-18.0),
         {**SCREEN, "FORCE_PLATFORM": plate_parameters(CORNERS)},
     )
     recording = read_c3d(path)
     assert not recording.plates.force.any()
     assert not recording.plates.moment.any()
-    assert recording.notes[-2:] == (
-        "x.c3d: plate 1 reads (30, 15, -20) N when unloaded; this was not subtracted",
-        "x.c3d: plate 1 never reaches 20 N",
+    assert codes(recording.findings) == ["F133"], "such an offset is examined with the recording"
+
+
+def test_a_small_zero_offset_is_reported_and_left(tmp_path):
+    points, labels = standing()
+    analogs = np.concatenate((stepping(vertical=-7.0)[:100], stepping()[100:])) * [0.3, 0.3, 1.0, 1.0, 1.0, 1.0]
+    plate = {**SCREEN, "FORCE_PLATFORM": plate_parameters(CORNERS)}
+    recording = read_c3d(write_c3d(tmp_path / "x.c3d", points, labels, analogs, plate))
+    offsets = {one.where.file_axis: one for one in recording.findings if one.code == "P213"}
+    assert {axis: one.evidence["level_n"].value for axis, one in offsets.items()} == pytest.approx(
+        {"X": 9.0, "Z": 7.0, "-Y": -6.0}, abs=0.01
     )
+    assert {one.severity for one in offsets.values()} == {Severity.INFO}
+    assert offsets["Z"].where.axis == "vertical"
 
 
 def plates_left_out(tmp_path, plate, **arguments):
@@ -247,13 +260,17 @@ def plates_left_out(tmp_path, plate, **arguments):
     path = write_c3d(tmp_path / "x.c3d", points, labels, stepping(), {**SCREEN, "FORCE_PLATFORM": plate}, **arguments)
     recording = read_c3d(path)
     assert recording.plates is None
-    return " ".join(recording.notes)
+    return only(recording.findings, "F151")
 
 
 def test_plates_that_cannot_be_used_are_left_out(tmp_path):
-    assert "force plates (types 5) were left out" in plates_left_out(tmp_path, plate_parameters(CORNERS, kind=5))
-    assert "its corners do not form a plate" in plates_left_out(tmp_path, plate_parameters(1e8 * CORNERS))
-    assert "its corners do not form a plate" in plates_left_out(tmp_path, plate_parameters(0 * CORNERS))
+    unreadable = plates_left_out(tmp_path, plate_parameters(CORNERS, kind=5))
+    assert "types 5" in unreadable.evidence["reason"].value
+    assert unreadable.where.plate is None
+    for size in (1e8, 0.0):
+        lost = plates_left_out(tmp_path, plate_parameters(size * CORNERS))
+        assert (lost.where.plate, lost.severity) == ("plate 1", Severity.WARNING)
+        assert lost.evidence["edges_m"].value == pytest.approx([0.5 * size] * 4)
 
 
 def test_analog_without_a_number(tmp_path):
@@ -263,17 +280,9 @@ def test_analog_without_a_number(tmp_path):
     path = write_c3d(
         tmp_path / "x.c3d", points, labels, analogs, {**SCREEN, "FORCE_PLATFORM": plate_parameters(CORNERS)}
     )
-    with pytest.raises(FileError, match=r"plate 1 has no number at 0.025 s"):
+    with refused("F172", None, time_s=0.025) as caught:
         read_c3d(path)
-
-
-def test_plate_somewhere_else_is_noted(tmp_path):
-    points, labels = standing()
-    analogs = stepping() * [1, 1, 1, 10, 10, 10]
-    path = write_c3d(
-        tmp_path / "x.c3d", points, labels, analogs, {**SCREEN, "FORCE_PLATFORM": plate_parameters(CORNERS)}
-    )
-    assert "centre of pressure of plate 1 lies" in read_c3d(path).notes[-1]
+    assert caught.value.finding.where.plate == "plate 1"
 
 
 @pytest.mark.parametrize("vertical", ["+Z", "-Y", "+X", "-X", "+Y", "-Z"])
@@ -286,10 +295,10 @@ def test_vertical_axis(tmp_path, vertical):
     path = write_c3d(tmp_path / "x.c3d", points @ to_lab.T, labels, parameters={"POINT": {"Y_SCREEN": [vertical]}})
     recording = read_c3d(path)
     np.testing.assert_allclose(recording.markers.positions[0, :, 1], points[0, :, 2] / 1000, atol=1e-6)
-    assert not [note for note in recording.notes if "believed" in note]
+    assert codes(recording.findings) == ["F133"] * (vertical != "+Y")
     blind = read_c3d(write_c3d(tmp_path / "y.c3d", points @ to_lab.T, labels))
     np.testing.assert_allclose(blind.markers.positions, recording.markers.positions, atol=1e-6)
-    assert f"no vertical axis given (POINT:Y_SCREEN); {vertical} was found from the markers' extents" in blind.notes[0]
+    only(blind.findings, "F131", axis=vertical, source="markers", entry="POINT:Y_SCREEN")
     gaps = np.linalg.norm(np.diff(recording.markers.positions[0], axis=0), axis=1)
     np.testing.assert_allclose(gaps, np.linalg.norm(np.diff(points[0], axis=0), axis=1) / 1000, atol=1e-6)
 
@@ -298,17 +307,18 @@ def test_contradicted_vertical_axis_is_noted(tmp_path):
     points, labels = standing()
     parameters = {"POINT": {"Y_SCREEN": ["+Y"]}, "FORCE_PLATFORM": plate_parameters(CORNERS)}
     recording = read_c3d(write_c3d(tmp_path / "x.c3d", points, labels, stepping(), parameters))
-    assert "POINT:Y_SCREEN says +Y is up but the plates' forces say +Z; +Z was used" in recording.notes[0]
+    wrong = only(recording.findings, "F132", stated="+Y", axis="+Z", source="forces")
+    assert wrong.severity is Severity.CORRECTED
     expect_centre_of_pressure(recording.plates, 0.3, -0.2, [30, 600, -20])
     recording = read_c3d(write_c3d(tmp_path / "x.c3d", points, labels, parameters={"POINT": {"Y_SCREEN": ["+Y"]}}))
-    assert "the markers' extents say +Z; +Z was used" in recording.notes[0]
+    only(recording.findings, "F132", stated="+Y", axis="+Z", source="markers")
 
 
 def test_arms_spread_wider_than_tall_do_not_turn_the_lab(tmp_path):
     points, labels = standing(labels=("RHEE", "RASI", "LFIN", "RFIN"))
     points[:, 2], points[:, 3] = [-700, 240, 1300], [1100, 240, 1300]
     recording = read_c3d(write_c3d(tmp_path / "x.c3d", points, labels, parameters=SCREEN))
-    assert recording.notes[0] == "x.c3d: lab axes with +Z up were turned to Y up"
+    assert codes(recording.findings) == ["F133"]
 
 
 def test_labels(tmp_path):
@@ -324,15 +334,18 @@ def test_labels(tmp_path):
     toe = recording.markers.select(["RTOE"]).positions[:, 0]
     assert np.isnan(toe[3:6]).all()
     np.testing.assert_allclose(toe[0] * 1000, points[0, 2][[0, 2, 1]] * [1, 1, -1], atol=1e-3)
-    for words in (
-        "several subjects; 'Ann:' was removed from the labels, Bob keep theirs",
-        "3 model outputs among the points were left out (Ann:RKneeAngles, LHipForce, Listed)",
-        "2 unnamed points were left out",
-        "repeated labels, the first with data was kept: RTOE",
-        "1 marker positions 0 0 0 were taken as missing",
-        "2 marker positions -9999 -9999 -9999 were taken as missing",
-    ):
-        assert [note for note in recording.notes if words in note]
+    counts = {
+        one.evidence["what"].value: one.evidence["count"].value for one in recording.findings if one.code == "F163"
+    }
+    assert counts == {
+        "label prefixes 'Ann:' (not those of Bob)": 5,
+        "model outputs (Ann:RKneeAngles, LHipForce, Listed)": 3,
+        "unnamed points": 2,
+    }
+    assert only(recording.findings, "F113", label="RTOE", count=3).severity is Severity.INFO
+    missing = {one.evidence["written"].value: one for one in recording.findings if one.code == "F115"}
+    assert {what: one.evidence["count"].value for what, one in missing.items()} == {"0 0 0": 1, "-9999 -9999 -9999": 2}
+    assert {one.where.markers for one in missing.values()} == {("RTOE",)}
 
 
 def test_more_than_255_labels(tmp_path):
@@ -357,6 +370,7 @@ def test_measurements(tmp_path, given, height_m):
     assert recording.mass_kg == 70.0
     assert recording.height_m == pytest.approx(height_m)
     assert recording.measurements == {"LKneeWidth": pytest.approx(0.1)}
+    only(recording.findings, "F124", unit={1610.0: "mm", 161.0: "cm", 1.61: "m"}[given])
 
 
 def test_time_of_a_cropped_trial(tmp_path):
@@ -369,25 +383,26 @@ def test_files_that_are_no_trial(tmp_path):
     points, labels = standing()
     path = write_c3d(tmp_path / "x.c3d", points, labels, stepping(), SCREEN)
     whole = path.read_bytes()
-    for content, words in (
-        (b"", "the file is empty"),
-        (b"PathFileType\t4\n" * 100, "not a C3D file"),
-        (whole[:100], "truncated: it has 100 of at least 512 bytes"),
-        (whole[:700], "truncated: it has 700 of at least 7104 bytes"),
-        (whole[:-1], "truncated: it has 7103 of at least 7104 bytes"),
-        (whole[:515] + b"\0" + whole[516:], "broken C3D file .*processor"),
-        (whole.replace(b"POINT", b"PAINT"), "has no points"),
+    for content, code, evidence in (
+        (b"", "F104", {"bytes": 0}),
+        (b"PathFileType\t4\n" * 100, "F103", {"kind": "C3D"}),
+        (whole[:100], "F104", {"bytes": 100, "announced": 512}),
+        (whole[:700], "F104", {"bytes": 700, "announced": 7104}),
+        (whole[:-1], "F104", {"bytes": 7103, "announced": 7104}),
+        (b"\1" + whole[1:], "F106", {"what": "block 1"}),
+        (whole[:515] + b"\0" + whole[516:], "F106", {"what": "processor"}),
+        (whole.replace(b"POINT", b"PAINT"), "F164", {}),
     ):
         path.write_bytes(content)
-        with pytest.raises(FileError, match=words):
+        with refused(code, None, **evidence):
             read_c3d(path)
-    with pytest.raises(FileError, match="no such file"):
+    with refused("F101", None):
         read_c3d(tmp_path / "y.c3d")
-    with pytest.raises(FileError, match="POINT:UNITS is 'inch'"):
+    with refused("F121", None, unit="inch"):
         read_c3d(write_c3d(tmp_path / "x.c3d", points, labels, unit="inch"))
-    with pytest.raises(FileError, match="no markers with data"):
+    with refused("F164", None):
         read_c3d(write_c3d(tmp_path / "x.c3d", points, [f"{label}Angles" for label in labels]))
-    with pytest.raises(FileError, match="no markers with data"):
+    with refused("F164", None):
         read_c3d(write_c3d(tmp_path / "x.c3d", points * np.nan, labels))
 
 
@@ -396,5 +411,5 @@ def test_a_file_cut_anywhere(file_of, tmp_path, file):
     whole = file_of(file).read_bytes()
     for size in (10, 600, 20_000, 200_000, len(whole) - 20_000):
         (tmp_path / "x.c3d").write_bytes(whole[:size])
-        with pytest.raises(FileError, match="truncated"):
+        with refused("F104", None):
             read_c3d(tmp_path / "x.c3d")

@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 
 from c3d_writer import plate_parameters, write_c3d
-from kinertia.errors import FileError, TrialError
+from kinertia.errors import TrialError
+from kinertia.findings.finding import Severity
 from kinertia.io.c3d import read_c3d
 from kinertia.io.recording import read_recording
 from kinertia.trial.plate_assignment import assign_plates
-from kinertia.workflow.recording import check_recording
+from refusals import codes, only, refused
 
 
 @pytest.mark.parametrize("unit_in_file", ["", "m", "inch"])
@@ -19,7 +20,7 @@ def test_a_stated_length_unit_goes_before_what_the_file_says(tmp_path, unit_in_f
     assert recording.length_unit == "cm"
     extents = np.ptp(recording.markers.positions[..., 1], axis=1)
     np.testing.assert_allclose(extents, np.ptp(person[..., 2], axis=1), atol=1e-6)
-    assert f"read in cm, as stated; POINT:UNITS says '{unit_in_file}'" in " ".join(recording.notes)
+    only(recording.findings, "F123", stated="cm", unit=f"'{unit_in_file}'")
 
 
 @pytest.mark.parametrize(("unit", "metres"), [("mm", 0.001), ("cm", 0.01), ("m", 1.0)])
@@ -31,10 +32,12 @@ def test_an_empty_length_unit_is_inferred_from_the_size_of_a_person(tmp_path, un
     np.testing.assert_allclose(
         np.ptp(recording.markers.positions[..., 1], axis=1), np.ptp(person[..., 2], axis=1), atol=1e-6
     )
-    assert f"POINT:UNITS is empty; taken as {unit}" in " ".join(recording.notes)
+    inferred = only(recording.findings, "F122", unit=unit)
+    assert inferred.evidence["extent_m"].value == pytest.approx(np.ptp(person, axis=1).max(), rel=0.2)
     ant = write_c3d(tmp_path / "y.c3d", 0.1 * person, [f"M{k}" for k in range(9)], unit="")
-    with pytest.raises(FileError, match=r"POINT:UNITS is empty, and its markers, which reach 0\.1"):
+    with refused("F121", None, what="POINT:UNITS", unit="not stated") as caught:
         read_c3d(ant)
+    assert 0.1 < caught.value.finding.evidence["extent"].value < 0.2
 
 
 def test_a_length_unit_is_inferred_though_no_frame_shows_every_marker(tmp_path):
@@ -70,15 +73,17 @@ def test_moments_in_another_unit_than_lengths_are_converted(tmp_path, unit, per_
     x, y, _ = PLATE_AXES @ [0.05, -0.04, 0.0]
     force = recording.plates.force[:, 0]
     np.testing.assert_allclose(recording.plates.moment[:, 0], np.cross((x, 0.0, -y), force), atol=1e-3)
-    said = [note for note in recording.notes if f"the moments of plate 1 are in {unit}, points in mm" in note]
-    assert len(said) == (per_unit != 1.0)
+    assert codes(recording.findings) == [*["F152"] * (per_unit != 1.0), "F133"]
+    for one in recording.findings[:-1]:
+        assert (one.where.plate, one.evidence["unit"].value, one.severity) == ("plate 1", unit, Severity.CORRECTED)
 
 
-def test_why_a_plate_was_left_out_is_said_where_forces_are_missed(tmp_path):
-    reason = "plate 1 was left out, its moments are in Nm while points are in mm"
+def test_a_plate_whose_moments_nobody_can_convert_is_left_out(tmp_path):
     recording = read_recording(on_turned_plate(tmp_path / "x.c3d", "Nm", 1e3, kind=4))
+    assert recording.plates is None
+    found = only(recording.findings, "F151", reason="in Nm while points are in mm")
+    assert (found.where.plate, found.severity) == ("plate 1", Severity.WARNING)
+    assert recording.left_out == (found.message,)
     with pytest.raises(TrialError) as caught:
         assign_plates(recording, {"r": ("M0",), "l": ("M1",)})
     assert caught.value.finding.code == "P271"
-    assert reason in caught.value.finding.evidence["left_out"].value
-    assert [verdict.sentence for verdict in check_recording(recording).verdicts if reason in verdict.sentence]

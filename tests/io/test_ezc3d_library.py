@@ -12,6 +12,7 @@ import pytest
 
 from kinertia.io.c3d import read_c3d
 from kinertia.io.c3d_write import write_c3d
+from refusals import refused
 
 WITHOUT_EZC3D = """
     import sys
@@ -48,6 +49,12 @@ def test_without_ezc3d_other_files_are_read_and_results_are_told_from(tmp_path):
     """
     done = _python(code, tmp_path)
     assert done.stdout.strip() == "('A', 'B') True", done.stderr
+
+
+def test_a_missing_reader_is_named(c3d_lab, monkeypatch):
+    monkeypatch.setattr("kinertia.io.ezc3d_library.ezc3d", None)
+    with refused("F107", None, package="ezc3d", how="conda install", others="TRC"):
+        read_c3d(c3d_lab / "walk.c3d")
 
 
 @pytest.fixture

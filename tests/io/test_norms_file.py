@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from kinertia.errors import FileError
 from kinertia.io.norms_file import read_norms
+from refusals import refused
 
 PLAIN = (
     "quantity,percent,mean,sd\nknee_angle_angle,50,10.5,4\nknee_angle_angle,0,5.25,3.5\nhip_flexion_moment,0,-0.1,0.2\n"
@@ -37,32 +37,35 @@ def test_norms_are_read_in_the_order_of_percent(tmp_path, text, encoding):
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "line", "words"),
+    ("old", "new", "line", "code", "evidence"),
     [
-        ("sd\n", "spread\n", 1, "lacks the column sd; found quantity, percent, mean, spread"),
-        ("10.5", "ten", 2, "mean is 'ten'; expected a number"),
-        ("10.5", "nan", 2, "mean is 'nan'; expected a finite number"),
-        (",3.5\n", "\n", 3, "sd is ''; expected a number"),
-        ("5.25,", "5,25,", 3, "5 cells in a row; expected 4 as in the heading; a number has a decimal point"),
-        (",3.5\n", ",-3.5\n", 3, "sd is -3.5"),
-        ("angle,50", "angle,500", 2, "percent is 500; expected 0 to 100 %"),
-        ("angle,50", "angle,0", 3, "knee_angle_angle at 0 % is there already"),
+        ("sd\n", "spread\n", 1, "F103", {"expected": "sd", "found": "quantity, percent, mean, spread"}),
+        ("mean,sd\n", "mean,mean,sd\n", 1, "F113", {"label": "mean", "count": 2}),
+        ("10.5", "ten", 2, "F105", {"cell": "ten", "column": "mean"}),
+        ("10.5", "nan", 2, "F105", {"cell": "nan", "expected": "finite"}),
+        (",3.5\n", "\n", 3, "F105", {"cell": "", "column": "sd"}),
+        ("5.25,", "5,25,", 3, "F105", {"cells": 5, "columns": 4, "expected": "decimal points"}),
+        (",3.5\n", ",-3.5\n", 3, "F187", {"sd": -3.5}),
+        ("angle,50", "angle,500", 2, "F187", {"percent": 500.0}),
+        ("angle,50", "angle,0", 3, "F187", {"problem": "twice"}),
     ],
 )
-def test_a_wrong_file_is_told_with_its_line(tmp_path, old, new, line, words):
-    with pytest.raises(FileError, match=r"norms\.csv") as error:
+def test_a_wrong_file_is_refused_with_its_line(tmp_path, old, new, line, code, evidence):
+    with refused(code, line, **evidence):
         norms(tmp_path, PLAIN.replace(old, new, 1))
-    assert words in str(error.value)
-    assert error.value.line == line
 
 
-def test_a_file_without_rows_is_told(tmp_path):
-    with pytest.raises(FileError, match="a heading and no rows"):
+def test_a_file_without_rows_or_text_is_refused(tmp_path):
+    with refused("F104", 1, rows=0):
         norms(tmp_path, PLAIN.partition("\n")[0])
+    with refused("F104", None):
+        norms(tmp_path, " \n")
+    with refused("F103", None, expected="UTF-8"):
+        norms(tmp_path, PLAIN, "utf-16")
 
 
-def test_percents_that_are_shares_are_told(tmp_path):
+def test_percents_that_are_shares_are_refused(tmp_path):
     path = tmp_path / "norms.csv"
     path.write_text("quantity,percent,mean,sd\nknee_angle_moment,0.0,0.1,0.05\nknee_angle_moment,1.0,0.1,0.05\n")
-    with pytest.raises(FileError, match="percent is at most 1; expected 0 to 100 %"):
+    with refused("F187", None, percent=1.0):
         read_norms(path)

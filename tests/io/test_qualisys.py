@@ -1,13 +1,15 @@
 """TSV files of Qualisys Track Manager, written to its documented format: markers and plates come back."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from kinertia.errors import FileError
+from kinertia.findings.finding import Severity
 from kinertia.io.recording import read_recording
 from lab_files import CORNERS_M, LAB, lab_walk, write_qtm
+from refusals import codes, only, refused
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +29,7 @@ def test_a_trial_comes_back(tmp_path, walk, local, counted):
     np.testing.assert_allclose(recording.plates.moment, walk.plates.moment, atol=1e-3)
     np.testing.assert_allclose(recording.plates.corners, CORNERS_M @ LAB.T, atol=1e-6)
     assert (recording.length_unit, recording.vertical) == ("mm", "+Z")
-    assert any("plates from walk_f_1.tsv, walk_f_2.tsv" in note for note in recording.notes)
+    assert codes(recording.findings) == ["F133"]
 
 
 def test_a_plate_named_brings_the_others(tmp_path, walk):
@@ -50,7 +52,10 @@ def test_moments_that_contradict_the_centre_of_pressure_are_not_used(tmp_path, w
     rows = [line if not line[:1].lstrip("-").isdigit() else swapped(line) for line in rows]
     plate.write_text("\n".join(rows))
     recording = read_recording(path)
-    assert any("walk_f_1.tsv: moments and centre of pressure contradict each other" in note for note in recording.notes)
+    found = only(recording.findings, "F153")
+    assert (found.where.file, found.severity) == ("walk_f_1.tsv", Severity.WARNING)
+    assert found.where.plate == recording.plates.names[0]
+    assert found.evidence["misses"].value > 0.05
     np.testing.assert_allclose(recording.plates.moment[..., [0, 2]], walk.plates.moment[..., [0, 2]], atol=1e-3)
 
 
@@ -72,24 +77,40 @@ def test_missing_markers_are_missing(tmp_path, walk):
 
 
 BAD = {
-    "no marker names": (lambda text: text.replace("MARKER_NAMES", "NAMES"), "has no MARKER_NAMES"),
-    "no rate": (lambda text: text.replace("FREQUENCY\t100", "FREQUENCY\tEXT"), "FREQUENCY is 'EXT'"),
-    "no rows": (lambda text: text[: text.index("MARKER_NAMES")], "no row of numbers"),
-    "a word in a row": (lambda text: text[:-40] + "\tnone\t" + text[-30:], "not a number|values, expected"),
+    "no marker names": (lambda text: text.replace("MARKER_NAMES", "NAMES"), "F164", {"found": "MARKER_NAMES"}),
+    "no rate": (lambda text: text.replace("FREQUENCY\t100", "FREQUENCY\tEXT"), "F114", {"value": "EXT"}),
+    "no rows": (lambda text: text[: text.index("MARKER_NAMES")], "F103", {}),
+    "a word in a row": (lambda text: text[:-40] + "\tnone\t" + text[-30:], "F105", {}),
 }
 
 
-@pytest.mark.parametrize(("spoil", "said"), BAD.values(), ids=BAD.keys())
-def test_what_is_wrong_is_said(tmp_path, walk, spoil, said):
+@pytest.mark.parametrize(("spoil", "code", "evidence"), BAD.values(), ids=BAD.keys())
+def test_what_is_wrong_is_named(tmp_path, walk, spoil, code, evidence):
     path = write_qtm(tmp_path / "walk.tsv", walk)
     path.write_text(spoil(path.read_text()))
-    with pytest.raises(FileError, match=said):
+    with refused(code, **evidence):
         read_recording(path)
 
 
-def test_a_plate_without_corners_is_named(tmp_path, walk):
+def test_a_header_that_counts_other_frames_is_a_finding(tmp_path, walk):
+    path = write_qtm(tmp_path / "walk.tsv", walk)
+    path.write_text(re.sub(r"NO_OF_FRAMES\t\d+", "NO_OF_FRAMES\t7", path.read_text()))
+    only(read_recording(path).findings, "F111", announced=7, found=len(walk.markers.time), what="frames")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "code", "evidence"),
+    [
+        ("FORCE_PLATE_CORNER_NEGX_NEGY_X", "SOMETHING", "F114", {"key": "CORNER_NEGX_NEGY_X", "value": "missing"}),
+        ("COP_X", "COP_Q", "F156", {"columns": "COP_X"}),
+        ("FREQUENCY\t1000", "FREQUENCY\t500", "F155", {"rate_hz": 500.0, "other": "walk_f_1.tsv"}),
+    ],
+)
+def test_a_wrong_plate_is_named(tmp_path, walk, old, new, code, evidence):
     path = write_qtm(tmp_path / "walk.tsv", walk)
     plate = tmp_path / "walk_f_2.tsv"
-    plate.write_text(plate.read_text().replace("FORCE_PLATE_CORNER_NEGX_NEGY_X", "SOMETHING"))
-    with pytest.raises(FileError, match="no FORCE_PLATE_CORNER_NEGX_NEGY_X"):
+    assert old in plate.read_text()
+    plate.write_text(plate.read_text().replace(old, new))
+    with refused(code, None, **evidence) as caught:
         read_recording(path)
+    assert caught.value.path == plate

@@ -1,14 +1,20 @@
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
 
 from c3d_writer import write_c3d
-from kinertia.errors import FileError, TrialError
+from kinertia.errors import TrialError
+from kinertia.findings.finding import finding
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
 from kinertia.io.recording import read_recording
 from kinertia.io.sto import write_sto
 from kinertia.io.trc import write_trc
 from kinertia.trial.data import Markers
 from kinertia.trial.marker_quality import axes_trouble, extent_m
+from refusals import codes, only, refused
 
 
 @pytest.fixture
@@ -31,7 +37,8 @@ def test_text_files(files):
     assert recording.name == "walk"
     assert recording.markers.labels == ("R.Heel",)
     assert recording.plates.force[0, 0, 1] == 400.0
-    assert recording.notes == ("walk_grf.mot: no torque columns for ground_force; the free moment was taken as zero",)
+    assert recording.findings == ()
+    np.testing.assert_allclose(recording.plates.moment[0, 0], np.cross((0, 400, 0), (0, 400, 0)))
 
 
 @pytest.fixture
@@ -70,9 +77,10 @@ def test_somebody_upright_along_z_in_a_trc_file_is_turned_and_the_forces_with_th
     np.testing.assert_allclose(lab.plates.force, ground.plates.force)
     np.testing.assert_allclose(lab.plates.moment, ground.plates.moment, atol=1e-9)
     assert (ground.vertical, lab.vertical) == ("+Y", "+Z")
-    assert ground.notes == ()
-    assert lab.notes == ("walk.trc: people stand upright along Z; markers, and forces with them, were turned to Y up",)
-    with pytest.raises(FileError, match="in ground_force_vy, along Y, but in the markers people stand along Z"):
+    assert ground.findings == ()
+    assert codes(lab.findings) == ["F133"]
+    only(lab.findings, "F133", axis="+Z")
+    with refused("P201", axis="Y", vertical="Z", peak_n=(30.0, 700.0, 20.0)):
         read_recording(tmp_path / "lab" / "walk.trc", tmp_path / "ground" / "walk.mot")
 
 
@@ -81,7 +89,7 @@ def test_whoever_may_lie_is_not_turned(tmp_path, upright, shift):
     lying = z_up(upright.positions) + np.array([0.0, 0.0, shift])
     write_trc(tmp_path / "walk.trc", Markers(upright.time, upright.labels, lying))
     recording = read_recording(tmp_path / "walk.trc")
-    assert recording.notes == ()
+    assert recording.findings == ()
     assert "which should be up" in axes_trouble(extent_m(recording.markers))
 
 
@@ -96,7 +104,8 @@ def test_forces_of_a_force_file_go_before_those_of_the_c3d_file(files, c3d_lab):
     recording = read_recording(c3d_lab / "walk.c3d", files / "walk_grf.mot")
     assert recording.plates.names == ("ground_force",)
     assert recording.mass_kg == pytest.approx(72.6)
-    assert "walk.c3d: its own force plates were not used, the force file was" in recording.notes
+    assert only(recording.findings, "F158").where.file == "walk.c3d"
+    assert [one for one in recording.findings if one.where.plate is not None] == []
 
 
 def test_loads_file_alone_names_its_forces(file_of):
@@ -110,26 +119,49 @@ def test_strings_will_do(files):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "words"),
+    ("arguments", "code", "evidence"),
     [
-        (("walk_grf.mot",), "cannot read markers from a '.mot' file; expected .trc, .c3d, .tsv or .csv"),
-        (("walk.xlsx",), "cannot read markers from a '.xlsx' file; expected .trc, .c3d, .tsv or .csv"),
-        (("walk.trc", "walk.c3d"), "cannot read forces from a '.c3d' file; expected .mot, .sto or .tsv"),
-        (("walk.trc", "walk_grf.mot", "walk.trc"), "cannot read external loads from a '.trc' file; expected .xml"),
-        (("wlak.trc",), "no such file; looked in {folder}, the nearest names there are walk.trc"),
-        (("walk.trc", "walk_grff.mot"), "nearest names there are walk_grf.mot"),
-        (("walk.trc", "walk_grf.mot", "walk.xml"), "no such file"),
+        (("walk_grf.mot",), "F102", {"given": ".mot", "what": "hold markers", "expected": ".trc, .c3d, .tsv or .csv"}),
+        (("walk.xlsx",), "F102", {"given": ".xlsx", "what": "hold markers"}),
+        (("walk.trc", "walk.c3d"), "F102", {"given": ".c3d", "what": "hold forces", "expected": ".mot, .sto or .tsv"}),
+        (("walk.trc", "walk_grf.mot", "walk.trc"), "F102", {"given": ".trc", "what": "external loads"}),
+        (("walk.trc", "walk.tsv"), "F102", {"given": "Qualisys", "expected": ".tsv"}),
+        (("wlak.trc",), "F101", {"file": "wlak.trc", "nearest": "walk.trc"}),
+        (("walk.trc", "walk_grff.mot"), "F101", {"nearest": "walk_grf.mot"}),
+        (("walk.trc", "walk_grf.mot", "walk.xml"), "F101", {"file": "walk.xml"}),
     ],
 )
-def test_wrong_and_missing_files(files, arguments, words):
-    with pytest.raises(FileError) as caught:
+def test_wrong_and_missing_files(files, arguments, code, evidence):
+    (files / "walk.tsv").touch()
+    with refused(code, None, **evidence):
         read_recording(*(files / name for name in arguments))
-    assert words.format(folder=files) in str(caught.value)
+
+
+def test_only_c3d_files_take_a_unit_of_length(files):
+    with refused("F102", what="length_unit"):
+        read_recording(files / "walk.trc", length_unit="mm")
 
 
 def test_forces_and_markers_that_do_not_overlap(files):
     write_forces(files / "late.mot", 5.0)
-    with pytest.raises(
-        TrialError, match=r"trial 'walk': forces from 5.000 to 6.000 s and markers from 0.000 to 1.000 s"
-    ):
+    with refused("T111", error=TrialError, forces_s=(5.0, 6.0), markers_s=(0.0, 1.0)) as caught:
         read_recording(files / "walk.trc", files / "late.mot")
+    assert caught.value.finding.where.trial == "walk"
+
+
+def test_a_force_that_no_plate_measures(files):
+    columns = {f"ground_force_{kind}{axis}": np.full(1001, 2e6 * (axis == "y")) for kind in "vp" for axis in "xyz"}
+    write_sto(files / "strong.mot", pd.DataFrame(columns, index=np.arange(1001) / 1000), in_degrees=False, name="grf")
+    with refused("F172", error=TrialError, force_n=2e6, time_s=0.0, what="force"):
+        read_recording(files / "walk.trc", files / "strong.mot")
+
+
+def test_notes_are_what_was_assumed_and_corrected(files):
+    whole = finding(
+        "F131", Where("walk.c3d"), axis=Quantity("+Z"), source=Quantity("markers"), entry=Quantity("Y_SCREEN")
+    )
+    lost = finding("F151", Where("walk.c3d", plate="plate 1"), reason=Quantity("no samples"))
+    recording = replace(read_recording(files / "walk.trc"), findings=(whole, lost))
+    assert [note.startswith("walk.c3d: ") for note in recording.notes] == [True]
+    assert len(recording.left_out) == 1
+    assert [one.where.plate for one in recording.with_plates_of("one").findings] == [None, "plate 1 (one)"]

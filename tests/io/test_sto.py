@@ -5,9 +5,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from kinertia.errors import FileError
 from kinertia.io.sto import read_sto, read_table, write_sto
 from recordings import here
+from refusals import only, refused
 
 HEADER = "walk\nversion=1\nnRows=2\nnColumns=3\ninDegrees=yes\nendheader\n"
 TABLE = "time\ta\tb\n0\t1\t2\n0.5\t3\t4\n"
@@ -82,43 +82,43 @@ def test_empty_cell_is_nan(write):
 
 
 @pytest.mark.parametrize(
-    ("right", "wrong", "words"),
+    ("right", "wrong", "line", "announced", "found"),
     [
-        ("nRows=2", "nRows=901", "line 3 of its header announces 901 rows, the file has 2"),
-        ("nRows=2", "datarows 1", "line 3 of its header announces 1 rows, the file has 2"),
-        ("nColumns=3", "nColumns=4", "line 4 of its header announces 4 columns, the file has 3"),
+        ("nRows=2", "nRows=901", 3, 901, 2),
+        ("nRows=2", "datarows 1", 3, 1, 2),
+        ("nRows=2", "nRows=two", 3, "two", 2),
+        ("nColumns=3", "nColumns=4", 4, 4, 3),
     ],
 )
-def test_a_header_that_miscounts_is_a_note(write, right, wrong, words):
+def test_a_header_that_miscounts_is_a_finding(write, right, wrong, line, announced, found):
     table = read_table(write(HEADER.replace(right, wrong) + TABLE))
     np.testing.assert_array_equal(table.values, [[1, 2], [3, 4]])
-    assert len(table.notes) == 1
-    assert words in table.notes[0]
-    assert read_table(write(HEADER + TABLE)).notes == ()
+    assert only(table.findings, "F111", announced=announced, found=found).where.line == line
+    assert read_table(write(HEADER + TABLE)).findings == ()
 
 
 BROKEN = {
-    "short row": (HEADER + TABLE.replace("0.5\t3\t4", "0.5\t3"), 9, "2 values, expected 3"),
-    "long row": (HEADER + TABLE.replace("0.5\t3\t4", "0.5\t3\t4\t5"), 9, "4 values, expected 3"),
-    "not a number": (HEADER + TABLE.replace("3", "three"), 9, "'three' in column 2"),
-    "truth values": (HEADER + TABLE.replace("\t1", "\tTrue").replace("\t3", "\tFalse"), 8, "'True' in column 2"),
-    "no time": (HEADER + TABLE.replace("0.5", ""), 9, "no time"),
-    "no time column": (HEADER + TABLE.replace("time", "frame"), 7, "first column is 'frame'"),
-    "repeated": (HEADER + TABLE.replace("a\tb", "a\ta"), 7, "repeated column labels a"),
-    "no label": (HEADER + TABLE.replace("a\tb", "\tb"), 7, "column 2 has no label"),
-    "no endheader": (TABLE, None, "no line 'endheader'"),
-    "nothing after": (HEADER, 6, "ends after 'endheader'"),
-    "no rows": (HEADER.replace("nRows=2", "").replace("nColumns=3", "") + "time\ta\n", None, "no rows"),
-}
+    "short row": (HEADER + TABLE.replace("0.5\t3\t4", "0.5\t3"), 9, "F105", {"cells": 2, "columns": 3}),
+    "long row": (HEADER + TABLE.replace("0.5\t3\t4", "0.5\t3\t4\t5"), 9, "F105", {"cells": 4, "columns": 3}),
+    "not a number": (HEADER + TABLE.replace("3", "three"), 9, "F105", {"cell": "three", "column": 2}),
+    "truth values": (
+        HEADER + TABLE.replace("\t1", "\tTrue").replace("\t3", "\tFalse"), 8, "F105", {"cell": "True", "column": 2}
+    ),
+    "no time": (HEADER + TABLE.replace("0.5", ""), 9, "F105", {"found": "without a time"}),
+    "no time column": (HEADER + TABLE.replace("time", "frame"), 7, "F114", {"value": "frame"}),
+    "repeated": (HEADER + TABLE.replace("a\tb", "a\ta"), 7, "F113", {"label": "a", "count": 2}),
+    "no label": (HEADER + TABLE.replace("a\tb", "\tb"), 7, "F114", {"key": "column 2", "value": "missing"}),
+    "no endheader": (TABLE, None, "F103", {"found": "endheader"}),
+    "nothing after": (HEADER, 6, "F104", {}),
+    "no rows": (HEADER.replace("nRows=2", "").replace("nColumns=3", "") + "time\ta\n", None, "F104", {"rows": 0}),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("case", BROKEN)
 def test_broken_files(write, case):
-    text, line, words = BROKEN[case]
-    with pytest.raises(FileError) as caught:
+    text, line, code, evidence = BROKEN[case]
+    with refused(code, line, **evidence):
         read_sto(write(text))
-    assert words in str(caught.value)
-    assert caught.value.line == line
 
 
 @settings(deadline=None, max_examples=50, suppress_health_check=[HealthCheck.function_scoped_fixture])

@@ -14,6 +14,7 @@ from kinertia.io.subject_draft import init_subject
 from kinertia.io.subject_file import read_subject
 from kinertia.settings import Settings
 from recordings import here
+from refusals import refused
 
 TRIALS = ("DJ1", "squats1", "walking1", "walking2", "walkingTI1", "walkingTO1", "walkingTS1")
 LABORATORIES = {
@@ -44,7 +45,7 @@ def test_init_matches_the_files_of_a_laboratory(name, tmp_path, sample_walk, fil
     text = init_subject(folder)
     for file in folder.iterdir():
         (tmp_path / file.name).touch()
-    with pytest.raises(FileError, match="lacks 'sex'"):
+    with refused("F191", key="sex"):
         draft(tmp_path, text)
     result = draft(tmp_path, completed(text))
     assert result.model.static.name == static
@@ -179,7 +180,7 @@ def test_init_leaves_other_persons_forces_alone_and_says_so(tmp_path, sample_wal
     text = init_subject(person / "MarkerData")
     assert "# No forces were found for subject01_walk1.trc" in text
     assert "# forces = " in text
-    with pytest.raises(FileError, match="holds no file of markers, but its folders ID, MarkerData do"):
+    with refused("F108", problem="its folders ID, MarkerData do"):
         init_subject(person)
 
 
@@ -228,9 +229,9 @@ def test_init_explains_every_setting(tmp_path):
 
 
 def test_init_without_recordings(tmp_path):
-    with pytest.raises(FileError, match=r"holds no file of markers \(\.trc"):
+    with refused("F108", problem="no file of markers (.trc"):
         init_subject(tmp_path)
-    with pytest.raises(FileError, match="no such folder"):
+    with refused("F101", file="nowhere"):
         init_subject(tmp_path / "nowhere")
 
 
@@ -283,7 +284,7 @@ def test_folders_that_hold_markers_are_named_however_deep(tmp_path):
     for folder, name in (("Static", "cal"), ("Walking/trial1", "markers")):
         (tmp_path / folder).mkdir(parents=True)
         trc(tmp_path / folder / f"{name}.trc", 3)
-    with pytest.raises(FileError, match="its folders Static, Walking/trial1 do; give that of one person"):
+    with refused("F108", problem="its folders Static, Walking/trial1 do"):
         init_subject(tmp_path)
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import lab_files
-from kinertia.errors import FileError
 from kinertia.io.recording import read_recording
+from refusals import refused
 
 
 @pytest.mark.parametrize("name", ["pig_c3d/subject_a_walk.c3d"])
@@ -34,16 +34,16 @@ def test_a_walk_comes_back(recording_of, tmp_path, monkeypatch, kind, name):
 
 
 @pytest.mark.parametrize(
-    ("kind", "old", "new", "words"),
+    ("kind", "old", "new", "code", "evidence"),
     [
-        ("tsv", "MARKER_NAMES\tHead", "MARKER_NAMES\tL.Toe", "L.Toe more than once"),
-        ("tsv", "FREQUENCY\t100", "FREQUENCY\t0", "FREQUENCY is 0"),
-        ("tsv", "NO_OF_FRAMES\t1", "NO_OF_FRAMES\tnan", "NO_OF_FRAMES is 'nan"),
-        ("csv", "\n100\n", "\n1..0\n", "the rate of the section is '1..0'"),
-        ("csv", "\n1,0,", "\n1,-.-,", "'-.-' is not a number"),
+        ("tsv", "MARKER_NAMES\tHead", "MARKER_NAMES\tL.Toe", "F113", {"label": "L.Toe", "count": 2}),
+        ("tsv", "FREQUENCY\t100", "FREQUENCY\t0", "F114", {"key": "FREQUENCY", "value": "0"}),
+        ("tsv", "NO_OF_FRAMES\t1", "NO_OF_FRAMES\tnan", "F114", {"key": "NO_OF_FRAMES", "value": "nan"}),
+        ("csv", "\n100\n", "\n1..0\n", "F114", {"value": "1..0"}),
+        ("csv", "\n1,0,", "\n1,-.-,", "F105", {"cell": "-.-", "column": 2}),
     ],
 )
-def test_broken_exports_are_refused(tmp_path, kind, old, new, words):
+def test_broken_exports_are_refused(tmp_path, kind, old, new, code, evidence):
     recording = lab_files.lab_walk()
     markers = recording.markers
     order = [len(markers.labels) - 1, *range(len(markers.labels) - 1)]
@@ -54,5 +54,5 @@ def test_broken_exports_are_refused(tmp_path, kind, old, new, words):
     text = path.read_text(encoding="utf-8")
     assert old in text, text[:500]
     path.write_text(text.replace(old, new), encoding="utf-8")
-    with pytest.raises(FileError, match=words):
+    with refused(code, **evidence):
         read_recording(path)

@@ -6,10 +6,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from kinertia.errors import FileError
 from kinertia.io.trc import read_trc, read_trc_recording, write_trc
 from kinertia.trial.data import Markers
 from recordings import here
+from refusals import codes, only, refused
 
 HEADER = (
     "PathFileType\t4\t(X/Y/Z)\tx.trc\n"
@@ -68,11 +68,11 @@ def test_whole_files_as_opensim_reads_them(file_of, opensim, name):
 
 def test_rounded_times_are_put_back_on_their_grid(file_of):
     recording = read_trc_recording(file_of("gait2354/subject01_walk1.trc"))
-    markers, notes = recording.markers, recording.notes
+    markers = recording.markers
     assert recording.length_unit == "mm"
     np.testing.assert_allclose(markers.time, np.arange(151) / 60, atol=1e-12)
-    assert len(notes) == 1
-    assert "rounded by up to 0.33 ms" in notes[0]
+    rounded = only(recording.findings, "T102", rate_hz=60.0)
+    assert rounded.evidence["rounding_s"].value == pytest.approx(0.33e-3, rel=0.02)
 
 
 @pytest.mark.parametrize(("rate", "decimals", "frames"), [(60, 3, 3), (60, 2, 3), (120, 3, 4), (59.94, 3, 10)])
@@ -123,90 +123,96 @@ def test_units(write, unit, metres):
 @pytest.mark.parametrize("cells", ["4\t5\t6\t\t\t", "4\t5\t6", "4\t5\t6\tNaN\tnan\tNaN", "4\t5\t6\t0\t0\t0.0"])
 def test_missing_markers(write, cells):
     recording = read_trc_recording(write(HEADER + ROWS.replace("1\t2\t3\t4\t5\t6", cells)))
-    markers, notes = recording.markers, recording.notes
+    markers = recording.markers
     assert np.isnan(markers.positions[:, 1]).all()
     np.testing.assert_allclose(markers.positions[0, 0], [0.004, 0.005, 0.006])
-    assert [note for note in notes if "0 0 0" in note] == list(notes)
-    assert bool(notes) == cells.endswith("0.0")
+    assert codes(recording.findings) == ["F115"] * cells.endswith("0.0")
+    for one in recording.findings:
+        assert (one.evidence["count"].value, one.where.markers) == (3, ("L Heel",))
 
 
-def test_a_header_that_miscounts_its_frames_is_a_note(write):
+def test_a_header_that_miscounts_its_frames_is_a_finding(write):
     recording = read_trc_recording(write(HEADER.replace("\t3\t2\t", "\t4\t2\t") + ROWS))
     assert len(recording.markers.time) == 3
-    assert "announces 4 frames, the file has 3: all of them were read" in recording.notes[0]
+    only(recording.findings, "F111", announced=4, found=3, what="frames")
 
 
-def test_a_header_that_miscounts_its_markers_is_a_note_where_labels_and_columns_agree(write):
+def test_a_header_that_miscounts_its_markers_is_a_finding_where_labels_and_columns_agree(write):
     recording = read_trc_recording(write(HEADER.replace("\t3\t2\t", "\t3\t12\t") + ROWS))
     assert recording.markers.positions.shape == (3, 2, 3)
-    assert "announces 12 markers, the file has 2: all of them were read" in recording.notes[0]
+    only(recording.findings, "F111", announced=12, found=2, what="markers")
 
 
 THIRD = ROWS.replace("\t6\n", "\t6\t7\t8\t9\n")
 """Rows with numbers of a third marker."""
 BROKEN = {
-    "lost label": (HEADER.replace("\t3\t2\t", "\t3\t3\t") + THIRD, 4, "2 marker labels, expected 3"),
-    "label too many": (HEADER.replace("L Heel", "X\t\t\tL Heel") + ROWS, 4, "3 marker labels, expected 2"),
-    "no labels": (HEADER.replace("R.Heel", "").replace("L Heel", "") + ROWS, 4, "no marker labels"),
-    "odd count": (HEADER.replace("\t3\t2\t", "\t3.5\t2\t") + ROWS, 3, "NumFrames is 3.5"),
-    "unit": (HEADER.replace("mm", "inch") + ROWS, 3, "unknown unit 'inch'"),
-    "not a number": (HEADER + ROWS.replace("2\t0.01\t1", "2\t0.01\tx"), 7, "'x' in column 3"),
-    "decimal comma": (HEADER + ROWS.replace("0.01", "0,01"), 7, "'0,01' in column 2"),
-    "too long": (HEADER + ROWS.replace("2\t0.01\t1", "2\t0.01\t1\t1"), 7, "9 values, expected 8"),
-    "half a marker": (HEADER + ROWS.replace("2\t0.01\t1\t2\t3\t4\t5\t6", "2\t0.01\t1\t2\t3\t4\t5"), 7, "L Heel"),
-    "infinite": (HEADER + ROWS.replace("3\t0.02\t1", "3\t0.02\tinf"), 8, "infinite value in column 3"),
-    "no time": (HEADER + ROWS.replace("2\t0.01", "2\t"), 7, "no time"),
-    "time goes back": (HEADER + ROWS.replace("0.02", "0.01"), 8, "time goes from 0.01 s to 0.01 s"),
-    "uneven": (HEADER + ROWS.replace("0.01", "0.013"), 7, "expected 0.01 s for equal steps"),
-    "wrong rate": (HEADER.replace("100\t100\t3", "60\t60\t3") + ROWS, 3, "DataRate is 60 Hz"),
-    "rate nan": (HEADER.replace("100\t100\t3", "nan\t100\t3") + ROWS, 3, "DataRate is 'nan'"),
-    "count nan": (HEADER.replace("\t3\t2\t", "\tnan\t2\t") + ROWS, 3, "NumFrames is 'nan'"),
-    "count inf": (HEADER.replace("\t3\t2\t", "\t3\tinf\t") + ROWS, 3, "NumMarkers is 'inf'"),
-    "no rate": (HEADER.replace("100\t100\t3", "x\t100\t3") + ROWS, 3, "DataRate is 'x'"),
-    "repeated label": (HEADER.replace("L Heel", "R.Heel") + ROWS, 4, "repeated marker labels R.Heel"),
-    "no key": (HEADER.replace("NumMarkers", "Markers") + ROWS, 2, "lacks NumMarkers"),
-    "lost value": (HEADER.replace("100\t100\t3\t2\tmm", "100\t100\t3\t2") + ROWS, 3, "7 values for 8"),
-    "another file": ("nColumns=3\nendheader\n" + ROWS, 1, "begin with 'PathFileType'"),
-    "ends in header": ("\n".join(HEADER.split("\n")[:3]), 3, "ends within its header"),
-    "no rows": (HEADER, 3, "the file has 0"),
-    "truncated": ((HEADER + ROWS)[:-10], 8, "R.Heel has only some"),
+    "lost label": (HEADER.replace("\t3\t2\t", "\t3\t3\t") + THIRD, 4, "F112", {"labels": 2, "announced": 3}),
+    "label too many": (HEADER.replace("L Heel", "X\t\t\tL Heel") + ROWS, 4, "F112", {"labels": 3, "columns": 8}),
+    "no labels": (HEADER.replace("R.Heel", "").replace("L Heel", "") + ROWS, 4, "F164", {}),
+    "odd count": (HEADER.replace("\t3\t2\t", "\t3.5\t2\t") + ROWS, 3, "F114", {"key": "NumFrames", "value": "3.5"}),
+    "unit": (HEADER.replace("mm", "inch") + ROWS, 3, "F121", {"unit": "inch"}),
+    "not a number": (HEADER + ROWS.replace("2\t0.01\t1", "2\t0.01\tx"), 7, "F105", {"cell": "x", "column": 3}),
+    "decimal comma": (
+        HEADER + ROWS.replace("0.01", "0,01"), 7, "F105", {"cell": "0,01", "column": 2, "expected": "decimal point"}
+    ),
+    "too long": (HEADER + ROWS.replace("2\t0.01\t1", "2\t0.01\t1\t1"), 7, "F105", {"cells": 9, "columns": 8}),
+    "half a marker": (HEADER + ROWS.replace("2\t0.01\t1\t2\t3\t4\t5\t6", "2\t0.01\t1\t2\t3\t4\t5"), 7, "F105",
+                      {"marker": "L Heel"}),
+    "infinite": (HEADER + ROWS.replace("3\t0.02\t1", "3\t0.02\tinf"), 8, "F105", {"column": 3}),
+    "no time": (HEADER + ROWS.replace("2\t0.01", "2\t"), 7, "F105", {"found": "without a time"}),
+    "time goes back": (HEADER + ROWS.replace("0.02", "0.01"), 8, "T101", {"after": 0.01, "step_s": 0.0}),
+    "uneven": (HEADER + ROWS.replace("0.01", "0.013"), 7, "T101", {"after": 0.013, "usual_s": 0.01}),
+    "wrong rate": (HEADER.replace("100\t100\t3", "60\t60\t3") + ROWS, 3, "T103", {"header_hz": 60, "column_hz": 100}),
+    "rate nan": (HEADER.replace("100\t100\t3", "nan\t100\t3") + ROWS, 3, "F114", {"key": "DataRate", "value": "nan"}),
+    "count nan": (HEADER.replace("\t3\t2\t", "\tnan\t2\t") + ROWS, 3, "F114", {"key": "NumFrames", "value": "nan"}),
+    "count inf": (HEADER.replace("\t3\t2\t", "\t3\tinf\t") + ROWS, 3, "F114", {"key": "NumMarkers", "value": "inf"}),
+    "no rate": (HEADER.replace("100\t100\t3", "x\t100\t3") + ROWS, 3, "F114", {"key": "DataRate", "value": "x"}),
+    "repeated label": (HEADER.replace("L Heel", "R.Heel") + ROWS, 4, "F113", {"label": "R.Heel", "count": 2}),
+    "no key": (HEADER.replace("NumMarkers", "Markers") + ROWS, 2, "F114", {"key": "NumMarkers", "value": "missing"}),
+    "lost value": (HEADER.replace("100\t100\t3\t2\tmm", "100\t100\t3\t2") + ROWS, 3, "F114", {"expected": "8"}),
+    "another file": ("nColumns=3\nendheader\n" + ROWS, 1, "F103", {"found": "nColumns=3", "expected": "PathFileType"}),
+    "ends in header": ("\n".join(HEADER.split("\n")[:3]), 3, "F104", {"lines": 3}),
+    "no rows": (HEADER, 3, "F104", {"rows": 0, "announced": 3}),
+    "truncated": ((HEADER + ROWS)[:-10], 8, "F105", {"marker": "R.Heel"}),
+    "cut within a row": ((HEADER.replace("\t3\t2\t", "\t9\t2\t") + ROWS)[:-8], 8, "F104", {"rows": 3, "announced": 9}),
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("case", BROKEN)
 def test_broken_files(write, case):
-    text, line, words = BROKEN[case]
-    with pytest.raises(FileError, match="line") as caught:
+    text, line, code, evidence = BROKEN[case]
+    with refused(code, line, **evidence):
         read_trc(write(text))
-    assert words in str(caught.value)
-    assert caught.value.line == line
 
 
 def test_the_subjects_name_before_the_labels_is_taken_off(write):
     path = write(HEADER.replace("R.Heel", "Anna:R.Heel").replace("L Heel", "Anna:L Heel") + ROWS)
     recording = read_trc_recording(path)
     assert recording.markers.labels == ("R.Heel", "L Heel")
-    assert recording.notes == ("x.trc: the prefix 'Anna:' was removed from the labels",)
+    assert codes(recording.findings) == ["F163"]
+    only(recording.findings, "F163", count=2, what="'Anna:'")
     both = read_trc_recording(write(HEADER.replace("R.Heel", "Anna:A").replace("L Heel", "A") + ROWS))
     assert both.markers.labels == ("Anna:A", "A")
 
 
 def test_lost_frame_in_the_middle(write):
     rows = "".join(f"{k}\t{0.01 * (k + (k > 50)):.2f}\t1\t2\t3\t4\t5\t6\n" for k in range(100))
-    with pytest.raises(FileError, match=r"line 57: time goes from 0.5 s to 0.52 s"):
+    with refused("T101", 57, before=0.5, after=0.52, usual_s=0.01):
         read_trc(write(HEADER.replace("\t3\t2\t", "\t100\t2\t") + rows))
 
 
 def test_missing_empty_and_binary_files(write, tmp_path):
     path = write("")
-    with pytest.raises(FileError, match="empty"):
+    with refused("F104"):
         read_trc(path)
-    with pytest.raises(FileError, match=r"no such file; looked in .*nearest names there are x.trc"):
+    with refused("F101", folder=str(tmp_path), nearest="x.trc"):
         read_trc(tmp_path / "X.trc")
-    with pytest.raises(FileError, match="no folder"):
+    with refused("F101", folder="nowhere", hint="folder does not exist"):
         read_trc(tmp_path / "nowhere" / "x.trc")
+    with refused("F102", given="folder"):
+        read_trc(tmp_path)
     path.write_bytes(b"PathFileType\0\0\1")
-    with pytest.raises(FileError, match="binary"):
+    with refused("F103"):
         read_trc(path)
 
 
@@ -257,6 +263,7 @@ def test_places_that_stand_for_missing_markers(write, number):
     row = "\t".join([number] * 3)
     recording = read_trc_recording(write(HEADER + ROWS.replace("1\t2\t3", row, 1)))
     assert np.isnan(recording.markers.positions).all(axis=2).sum() == 1
-    assert "x.trc: 1 marker positions -9999 -9999 -9999 were taken as missing (R.Heel)" in recording.notes
+    found = only(recording.findings, "F115", count=1, written="-9999 -9999 -9999")
+    assert found.where.markers == ("R.Heel",)
     alone = read_trc_recording(write(HEADER + ROWS.replace("1\t2\t3", f"{number}\t2\t3", 1)))
     assert np.isfinite(alone.markers.positions).all()

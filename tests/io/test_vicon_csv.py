@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinertia.errors import FileError
 from kinertia.io.recording import read_recording
 from lab_files import lab_walk, write_nexus
+from refusals import ANY, codes, only, refused
 
 QUARTER = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 TURNS = {
@@ -35,8 +35,9 @@ def test_a_trial_comes_back_whatever_axes_its_forces_are_in(tmp_path, walk, turn
     np.testing.assert_allclose(recording.plates.time, walk.plates.time, atol=1e-9)
     np.testing.assert_allclose(recording.plates.force, walk.plates.force, atol=1e-5)
     np.testing.assert_allclose(recording.plates.moment, walk.plates.moment, atol=1e-3)
-    turned = [note for note in recording.notes if "in the plate's axes" in note]
-    assert len(turned) == (0 if np.array_equal(turn, np.eye(3)) else 2)
+    rotated = [] if np.array_equal(turn, np.eye(3)) else ["F154", "F154"]
+    assert codes(recording.findings) == [*rotated, "F133"]
+    assert [one.where.plate for one in recording.findings[:-1]] == list(recording.plates.names)[: len(rotated)]
 
 
 def test_an_empty_cell_is_a_missing_marker(tmp_path, walk):
@@ -49,29 +50,56 @@ def test_an_empty_cell_is_a_missing_marker(tmp_path, walk):
 
 
 BAD = {
-    "no trajectories": (lambda text: text.replace("Trajectories", "Joints"), "no section Trajectories"),
-    "another table": (lambda text: "a,b\n1,2\n3,4\n5,6\n7,8\n9,10\n", "no section of an ASCII export"),
-    "a frame left out": (lambda text: text.replace("\n21,0,", "\n22,0,", 2), "frame 22 follows frame 20"),
-    "a word": (lambda text: text.replace("\n7,0,", "\n7,0,none", 2), "'none.*' is not a number"),
+    "no trajectories": (lambda text: text.replace("Trajectories", "Joints"), None, "F164", {}),
+    "no labels": (lambda text: re.sub(r"\n,,[^\n]*Head[^\n]*", "\n", text, count=1), None, "F164", {}),
+    "another table": (lambda text: "a,b\n1,2\n3,4\n5,6\n7,8\n9,10\n", None, "F103", {}),
+    "a frame left out": (
+        lambda text: text.replace("\n21,0,", "\n22,0,", 2),
+        ANY,
+        "T101",
+        {"step_s": 0.02, "usual_s": 0.01},
+    ),
+    "a word": (lambda text: text.replace("\n7,0,", "\n7,0,none", 2), ANY, "F105", {"cell": "none", "column": 3}),
+    "too many cells": (
+        lambda text: text.replace("\n7,0,", "\n7,0,1,1,", 2),
+        ANY,
+        "F105",
+        {"found": "values in the row"},
+    ),
     "an infinite number": (
         lambda text: text.replace("\n7,0,0.000000,", "\n7,0,1e400,", 1),
-        "infinite value in column 3",
+        ANY,
+        "F105",
+        {"cell": "1e400", "column": 3},
     ),
-    "no frame": (
-        lambda text: text.replace("\n7,3,", "\n,3,", 1),
-        "line 69: the sample of frame nan, sub frame 3, is not",
-    ),
-    "a sample lost": (
-        lambda text: re.sub("\n7,3,[^\n]*", "", text, count=1),
-        "line 69: the sample of frame 7, sub frame 4",
-    ),
-    "odd units": (lambda text: text.replace("N.mm", "lbf.in"), "moments in 'lbf.in'"),
+    "no frame": (lambda text: text.replace("\n7,3,", "\n,3,", 1), 69, "T101", {"after": "no number"}),
+    "a sample lost": (lambda text: re.sub("\n7,3,[^\n]*", "", text, count=1), 69, "T101", {"step_s": 0.002}),
+    "odd units": (lambda text: text.replace("N.mm", "lbf.in"), None, "F121", {"unit": "lbf.in", "what": "moments"}),
 }
 
 
-@pytest.mark.parametrize(("spoil", "said"), BAD.values(), ids=BAD.keys())
-def test_what_is_wrong_is_said(tmp_path, walk, spoil, said):
+@pytest.mark.parametrize(("spoil", "line", "code", "evidence"), BAD.values(), ids=BAD.keys())
+def test_what_is_wrong_is_named(tmp_path, walk, spoil, line, code, evidence):
     path = write_nexus(tmp_path / "walk.csv", walk)
     path.write_text(spoil(path.read_text()))
-    with pytest.raises(FileError, match=said):
+    with refused(code, line, **evidence):
         read_recording(path)
+
+
+def test_a_plate_without_a_centre_of_pressure_is_left_out(tmp_path, walk):
+    path = write_nexus(tmp_path / "walk.csv", walk)
+    first, second = read_recording(path).plates.names
+    path.write_text(path.read_text().replace(f"{first} - CoP", "Something - CoP"))
+    recording = read_recording(path)
+    assert only(recording.findings, "F151").where.plate == first
+    assert recording.plates.names == (second,)
+
+
+def test_moments_that_contradict_the_centre_of_pressure_are_not_used(tmp_path, walk):
+    """Moments about y and z are exchanged."""
+    path = write_nexus(tmp_path / "walk.csv", walk)
+    path.write_text(path.read_text().replace("Mx,My,Mz", "Mx,Mz,My"))
+    recording = read_recording(path)
+    found = [one for one in recording.findings if one.code == "F153"]
+    assert [one.where.plate for one in found] == list(recording.plates.names)
+    assert all(one.evidence["misses"].value > 0.05 for one in found)

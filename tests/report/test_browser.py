@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 
 from chromium import DESKTOP, PHONE, Opened, colour, ink, playwright
+from found import FAULT_FREE, UNUSABLE
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.report.comparison import render_comparison
 from kinertia.report.page import render
@@ -221,14 +222,7 @@ def test_the_summary_is_two_pages_that_say_whose_they_are(demo):
     page.emulate_media(media="null")
     assert len(scales) == 3
     assert min(scales) * SMALLEST_LETTERS_PX * POINTS_PER_PX > 5.5, "points, of the smallest letters"
-    assert shown == [
-        "Verdict",
-        "What may be used",
-        "What the estimate changed",
-        "Gait cycle",
-        "Strides",
-        "Joint moments",
-    ]
+    assert shown == ["Verdict", "What may be used", "Do this next", "Joint moments", "Body", "Gait cycle", "Strides"]
     assert len(headings) == 2
     assert all("synthetic walker" in one and "72.6 kg" in one and "Laboratory: Ward <5>" in one for one in headings)
     assert pages(page, prefer_css_page_size=True) == 2
@@ -240,27 +234,34 @@ def pages(page, **paper):
     return len(re.findall(rb"/Type\s*/Page\b", page.pdf(**paper)))
 
 
-@pytest.mark.parametrize("count", [1, 3, 12])
-def test_the_summary_is_two_pages_whatever_was_warned_of(browser, fit, tmp_path, count):
-    """On A4 and on Letter; what has no room is counted, and is in the whole report."""
+@pytest.mark.parametrize("findings", [FAULT_FREE, UNUSABLE])
+def test_the_summary_is_two_pages_whatever_was_found(browser, fit, tmp_path, findings):
+    """On A4 and on Letter; the three steps that come first are on it."""
     path = tmp_path / "report.html"
-    warned = tuple(f"warning {k}: " + "a sentence of some length, " * (4 + 5 * (k % 2)) for k in range(count))
-    path.write_text(render(replace(fit, warnings=warned)), encoding="utf-8")
+    path.write_text(render(replace(fit, findings=findings, rules=61)), encoding="utf-8")
     page = Opened(browser, path).page
     page.evaluate("window.print = () => {}")
     for paper in ({"prefer_css_page_size": True}, {"format": "Letter"}):
         page.locator("details.print").evaluate("part => (part.open = true)")
         page.get_by_role("button", name="Summary, two pages").click()
         page.emulate_media(media="print")
-        listed = page.locator("#verdict li:visible").filter(has_text=re.compile("warning|more in")).all_inner_texts()
+        steps = page.locator("#verdict ol li:visible").count()
         wide = page.evaluate("document.documentElement.scrollWidth - innerWidth")
         page.emulate_media(media="null")
         assert pages(page, **paper) == 2
         assert wide <= 0
-        hidden = count - sum(one.startswith("warning") for one in listed)
-        assert 0 <= hidden < count
-        assert listed[-1].startswith(f"and {hidden} more" if hidden else "warning")
-    assert page.locator("#verdict li:visible").filter(has_text=re.compile(r"^warning \d")).count() == count
+        assert steps == (3 if findings is UNUSABLE else 0)
+    page.close()
+
+
+@pytest.mark.parametrize("viewport", [DESKTOP, PHONE])
+def test_codes_lead_to_what_they_mean(browser, fit, tmp_path, viewport):
+    path = tmp_path / "report.html"
+    path.write_text(render(replace(fit, findings=UNUSABLE, rules=61)), encoding="utf-8")
+    page = Opened(browser, path, viewport).page
+    page.locator("#verdict .steps a.code").first.click()
+    playwright.expect(page.locator("#explain-P244")).to_be_in_viewport()
+    assert page.evaluate("document.documentElement.scrollWidth") <= viewport["width"]
     page.close()
 
 

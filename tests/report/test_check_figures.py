@@ -8,12 +8,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from kinertia.findings.overview import Overview
 from kinertia.io.recording import read_recording
 from kinertia.report.check_figures import extremes_kept, force_figure, pressure_figure
 from kinertia.report.check_page import render_check
 from kinertia.report.marker_view import marker_scene
 from kinertia.report.plots import as_plotly
-from kinertia.workflow.recording import check_recording
+from kinertia.workflow.check import check_recording
 from report_page import figures_of, numbers
 
 
@@ -21,6 +22,12 @@ from report_page import figures_of, numbers
 def walked(c3d_lab):
     recording = read_recording(c3d_lab / "walk.c3d")
     return check_recording(recording, mass_kg=72.6)
+
+
+def page_of(recording):
+    """The page of one recording and what was found in it."""
+    check = check_recording(recording)
+    return render_check([Overview(check.findings, 61, 1)], [check])
 
 
 def test_ground_is_blue_or_red_in_contacts_and_grey_where_no_fit_can_use_the_frames(walked):
@@ -98,7 +105,7 @@ def test_page_draws_gaps_and_what_plotly_knows(walked):
     positions = markers.positions.copy()
     positions[40:60, markers.labels.index("LKNE")] = np.nan
     gappy = replace(walked.recording, markers=replace(markers, positions=positions))
-    figures = figures_of(render_check([("walk", check_recording(gappy))]))
+    figures = figures_of(page_of(gappy))
     assert set(figures) == {f"recording1-{kind}" for kind in ("forces", "pressure", "gaps")}
     for figure in figures.values():
         go.Figure(figure["data"], figure["layout"])
@@ -109,12 +116,11 @@ def test_page_draws_gaps_and_what_plotly_knows(walked):
 
 def test_a_recording_without_forces_or_marker_set_still_has_a_page(walked):
     recording = replace(walked.recording, plates=None)
-    assert figures_of(render_check([("walk", check_recording(recording))])) == {}
+    assert figures_of(page_of(recording)) == {}
     renamed = replace(recording.markers, labels=tuple(f"M{k}" for k in range(len(recording.markers.labels))))
-    page = render_check([("walk", check_recording(replace(recording, markers=renamed)))])
-    assert "no marker set fits" in page
+    assert 'href="#explain-L101"' in page_of(replace(recording, markers=renamed))
     single = replace(recording, markers=recording.markers.cut(2.0, 2.0))
-    assert "<canvas" in render_check([("walk", check_recording(single))])
+    assert "<canvas" in page_of(single)
 
 
 def test_markers_are_joined_to_the_middle_of_their_segment(walked):

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from kinertia.report.cohort_instruments import drift
-from kinertia.report.cohort_outcomes import lead, outcome_parts, outcomes_of, reason_of
+from kinertia.report.cohort_outcomes import lead, outcome_parts, overruled_in_vain
 from kinertia.report.cohort_page import PAGE, _curves, _mean_curves, _outliers, write_cohort_page
 from kinertia.report.cohort_tables import write_tables
 from report_page import figures_of
@@ -26,71 +26,74 @@ def cohort(fit, tmp_path):
 def test_the_page_says_who_passed_and_who_is_far(cohort):
     write_cohort_page(cohort)
     page = (cohort / PAGE).read_text(encoding="utf-8")
-    assert "10 people; 7 passed every check" in page
+    assert "10 people: 6 use, 1 use with care, 1 do not use, 2 not fitted." in page
     text = re.sub(r"<[^>]+>", " ", page)
-    assert re.search(r"trial \.\.\.: no force plates\s+2\s+lost0, lost1", text)
-    assert re.search(r"walk: residual force # N is beyond # N\s+1\s+Ben", text)
+    assert re.search(r"lost0\s+P271", " ".join(text.split()))
+    assert re.search(r"P271\s+ERROR\s+no forces\s+2\s+2\s+0\s+0\s+lost0 *, *lost1", " ".join(text.split()))
+    assert re.search(r"P244\s+ERROR\s+cop not under feet\s+2\s+0\s+0\s+2\s+62 mm\s+Ben", " ".join(text.split()))
+    assert "T301: 1 people" in text
+    assert "R40: 1 people" in text
     links = re.findall(r'<a href="(people/[^"]+)">([^<]+)</a>: ([^<]+)', page)
     assert [link[:2] for link in links] == [("people/Zo%C3%AB%20%26/report.html", "Zoë &amp;")]
     assert links[0][2].startswith("mass of thigh, right, ")
     assert "Knee moment, flexion + (N m/kg)" in json.dumps(figures_of(page))
 
 
-def test_whose_results_are_usable_with_care_has_not_passed_everything(tmp_path):
-    """As the person's own report has it; a person with a warning in two trials is one person."""
-    people = [person_record(name, 0, "") for name in ("Anna", "Ben & Co", "Zoë")] + [
-        person_record("Eve", 1, "walk7: residual force 12 N is beyond 10 N"),
-        person_record(
-            "lost", 2, "/data/lost/subject.toml, line 3: forces = 'a.mot': no such file in /data/lost; did you mean"
-        ),
-    ]
-    sound = {
-        "trials": [{"name": "walk1"}, {"name": "walk2"}],
-        "verdicts": [{"level": "pass", "sentence": "s"}],
-        "warnings": [],
-    }
-    doubted = {
-        **sound,
-        "warnings": ["walk1: 3 labels jump; look", "walk2: 4 labels jump; look", "plate 1: gain: +3.9 %"],
-    }
-    careful = {**sound, "verdicts": [{"level": "caution", "sentence": "walk2: marginal (8.5 N); so"}]}
-    failed = {**sound, "verdicts": [{"level": "fail", "sentence": "walk1: residual force 12 N is beyond 10 N"}]}
-    for name, result in (("Anna", sound), ("Ben & Co", doubted), ("Zoë", careful), ("Eve", failed)):
-        (tmp_path / "people" / name).mkdir(parents=True)
-        (tmp_path / "people" / name / "fit.json").write_text(json.dumps(result), encoding="utf-8")
-    outcomes = outcomes_of(tmp_path, pd.DataFrame([asdict(record) for record in people]))
-    assert lead(outcomes).startswith("5 people; 1 passed every check, 2 are usable with care.")
-    passed, doubts = outcome_parts(outcomes)
-    assert [trace["name"] for trace in passed.figure.data] == [
-        "passed (1)",
-        "with care (2)",
-        "not fitted (1)",
-        "a check failed (1)",
-    ]
-    assert [(row[0], row[1], re.sub("<[^>]+>", "", row[2])) for row in passed.rows] == [
-        ("residual force # N is beyond # N", "1", "Eve"),
-        ("forces = ...: no such file in ...", "1", "lost"),
-    ]
-    assert [row[:2] for row in doubts.rows] == [
-        ("# labels jump", "1"),
-        ("plate #: gain: # %", "1"),
-        ("marginal (# N)", "1"),
-    ]
-    assert doubts.rows[0][2] == '<a href="people/Ben%20%26%20Co/report.html">Ben &amp; Co</a>'
+def found(person, code, severity="WARNING", status="open", muted_by=None, value=None, unit=None):
+    """A row of the table of findings."""
+    of = {"severity": severity, "status": status, "muted_by": muted_by, "value": value, "unit": unit}
+    return {"person": person, "code": code, **of}
 
 
-@pytest.mark.parametrize(
-    ("sentence", "reason"),
+@pytest.fixture
+def people():
+    """Anna's result may be used, that of Ben & Co with care, Eve's not; nobody could fit the last."""
+    records = [
+        person_record("Anna", verdict="use", overruled="M102 P21"),
+        person_record("Ben & Co", verdict="use with care", overruled="P244"),
+        person_record("Eve", 1, "R301", "do not use"),
+        person_record("lost", 2, "P278 no window", overruled="P244"),
+    ]
+    return pd.DataFrame([asdict(record) for record in records])
+
+
+FINDINGS = pd.DataFrame(
     [
-        ("residual at the motion's bandwidth (10 Hz): within OpenSim's guideline", None),
-        ("plate 2: x: -7.3 mm, free moment: +4.1 N m/kN (expected within 0.73 N m/kN); check", None),
-        ("C:\\lab\\x.toml, line 3: no such file 'a b.mot'; did", "no such file ..."),
-        ("no file walks/a.c3d in D:\\lab; did", "no file ... in ..."),
-    ],
+        found("Ben & Co", "P213", value=-20.0, unit="N"),
+        found("Ben & Co", "P213", value=30.0, unit="N"),
+        found("Ben & Co", "P214", muted_by="P213"),
+        found("Eve", "P213", value=26.0, unit="N", status="ignored"),
+        found("Eve", "R301", "ERROR", value=12.0, unit="N"),
+        found("lost", "P278", "ERROR"),
+    ]
 )
-def test_reasons_lose_paths_and_names_but_no_apostrophes_and_units(sentence, reason):
-    expected = re.sub(r"[-+]?[\d.]+", "#", sentence.split(";")[0]) if reason is None else reason
-    assert reason_of(sentence) == expected
+
+
+def test_people_are_counted_by_verdict(people):
+    assert lead(people).startswith("4 people: 1 use, 1 use with care, 1 do not use, 1 not fitted.")
+    verdicts, not_fitted, *_ = outcome_parts(people, FINDINGS)
+    assert [trace["name"] for trace in verdicts.figure.data] == [
+        "use (1)", "use with care (1)", "do not use (1)", "not fitted (1)",
+    ]  # fmt: skip
+    assert not_fitted.rows == [("lost", '<a class="code" href="#explain-P278">P278</a> no window')]
+
+
+def test_findings_are_counted_by_code_the_worst_first(people):
+    by_code = next(part for part in outcome_parts(people, FINDINGS) if "open" in part.headings)
+    rows = [tuple(re.sub("<[^>]+>", "", cell) for cell in row) for row in by_code.rows]
+    assert [(row[0], row[1], *row[3:8]) for row in rows] == [
+        ("P278", "ERROR", "1", "1", "0", "0", ""),
+        ("R301", "ERROR", "1", "1", "0", "0", "12 N"),
+        ("P213", "WARNING", "2", "2", "0", "1", "26 N"),
+        ("P214", "WARNING", "1", "0", "1", "0", ""),
+    ]
+    assert by_code.rows[3][-1] == '<a href="people/Ben%20%26%20Co/report.html">Ben &amp; Co</a>'
+    assert by_code.rows[0][-1] == "lost", "who has no report is not linked"
+
+
+def test_codes_that_are_overruled_in_vain_are_listed(people):
+    """P21 stands for P213, which was found."""
+    assert overruled_in_vain(people, FINDINGS) == ["P244: 2 people", "M102: 1 people"]
 
 
 def rows_of(changes, sd):
@@ -133,7 +136,7 @@ def test_knees_of_models_with_opposite_signs_are_not_averaged(tmp_path):
 def test_a_cohort_of_whom_nobody_was_fitted_has_a_page(tmp_path):
     write_tables(tmp_path, [person_record("lost", 2, "no force plates")], with_csv=False)
     write_cohort_page(tmp_path)
-    assert "1 people; 0 passed" in (tmp_path / PAGE).read_text(encoding="utf-8")
+    assert "1 people: 1 not fitted." in (tmp_path / PAGE).read_text(encoding="utf-8")
 
 
 def instrument(person, day, value, sd, prior_sd=0.01, with_session=False):

@@ -4,6 +4,7 @@ import shutil
 from dataclasses import replace
 from unittest import mock
 
+import pandas as pd
 import pytest
 
 from kinertia.io.subject_file import read_subject
@@ -26,7 +27,10 @@ def job(c3d_lab, tmp_path):
 def test_an_error_in_the_files_is_their_record(job):
     record = fit_person(job)
     assert (record.status, record.inputs, record.fitted) == (2, job.inputs, False)
-    assert "static" in record.sentence
+    assert record.verdict == ""
+    found = pd.read_parquet(job.cohort / "failed" / "A.parquet")
+    assert set(found.person) == {"A"}
+    assert set(found.severity) >= {"ERROR"}
     assert not (job.cohort / "people" / "A").exists()
 
 

@@ -1,21 +1,30 @@
 """Tables of everybody, from the rows beside each person's results."""
 
 import hashlib
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 import pytest
 
 import kinertia
+from found import RESIDUAL, UNEXPLAINED, WAIVED, ZERO
+from kinertia.errors import BlockedError
+from kinertia.findings.finding import finding
+from kinertia.findings.where import Where
 from kinertia.io.provenance import VERSION
 from kinertia.report import cohort_tables
-from kinertia.report.cohort_tables import write_person, write_tables
+from kinertia.report.cohort_tables import write_findings, write_person, write_tables
 from kinertia.studies.cohort_record import Place, Record
 
+FOUND = (
+    replace(RESIDUAL, where=Where(trial="early")),
+    *(replace(one, where=replace(one.where, trial="late")) for one in (ZERO, UNEXPLAINED, WAIVED)),
+)
 PEOPLE = ("Ben", "=cmd", "Anna")
 RECORDS = [
-    *(Record(name, 0, "", "9f", VERSION, 2, 1.5) for name in PEOPLE),
-    Record("Clara", 2, "trial 'walk': no force plates", "", VERSION, 1, 0.1),
+    *(Record(name, 0, "", "9f", VERSION, 2, 1.5, "use with care") for name in PEOPLE),
+    Record("Clara", 2, "walk  P271 No usable force plates.", "9f", VERSION, 1, 0.1),
 ]
 
 
@@ -28,7 +37,10 @@ def cohort(short_fit, tmp_path_factory):
     folder = tmp_path_factory.mktemp("cohort")
     for name in PEOPLE:
         Place(folder, name).results.mkdir(parents=True)
-        write_person(Place(folder, name).results, name, short_fit)
+        write_person(Place(folder, name).results, name, replace(short_fit, findings=FOUND))
+    no_forces = [finding("P271", Where(trial="walk"))]
+    Place(folder, "Clara").findings.parent.mkdir()
+    write_findings(Place(folder, "Clara").findings, "Clara", BlockedError(no_forces, no_forces))
     write_tables(folder, RECORDS, with_csv=True)
     return folder
 
@@ -59,8 +71,23 @@ def test_trials_have_residuals_marker_errors_seconds_and_verdicts(cohort, short_
     assert late.residual_force_max_N_estimate == force.max()
     assert late.marker_rms_m_final == pytest.approx(np.sqrt((fitted.marker_errors_m["final"] ** 2).mean()))
     assert late.seconds == pytest.approx(fitted.seconds["total"], abs=1e-4)
-    assert late.verdict in ("pass", "caution", "fail")
-    assert bool(late.against) == (late.verdict == "fail")
+    assert trials.verdict[:2].tolist() == ["do not use", "use with care"]
+    assert trials.errors[:2].tolist() == ["R301", ""]
+
+
+def test_findings_are_rows_with_their_headline_and_those_of_people_without_results(cohort):
+    rows = pd.read_parquet(cohort / "findings.parquet")
+    assert list(rows.columns) == [
+        "person", "trial", "plate", "code", "severity", "status", "muted_by", "value", "unit",
+    ]  # fmt: skip
+    own = rows[rows.person == "Anna"].set_index("code")
+    assert own.index.tolist() == [one.code for one in FOUND]
+    assert own.loc["P213", ["trial", "plate", "severity", "status", "value", "unit"]].tolist() == [
+        "late", "plate 1", "WARNING", "open", -23.1, "N",
+    ]  # fmt: skip
+    assert own.muted_by["P214"] == "P213"
+    assert own.status["P244"] == "waived"
+    assert rows[rows.person == "Clara"].code.tolist() == ["P271"]
 
 
 def test_curves_are_those_of_the_fit(cohort, short_fit):
@@ -78,7 +105,7 @@ def test_csv_files_have_the_same_rows_and_no_formula(cohort):
         assert csv.shape == table.shape
     assert "\n'=cmd," in (cohort / "people.csv").read_text(encoding="utf-8")
     clara = pd.read_csv(cohort / "people.csv").iloc[-1]
-    assert (clara.person, clara.status, clara.sentence) == ("Clara", 2, "trial 'walk': no force plates")
+    assert (clara.person, clara.status, clara.sentence) == ("Clara", 2, "walk  P271 No usable force plates.")
 
 
 def test_the_same_people_give_the_same_bytes_and_csv_files_are_never_of_others(cohort):

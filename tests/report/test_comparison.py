@@ -1,5 +1,6 @@
 """What differs between results: found where it was put, and nowhere else."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -7,10 +8,10 @@ import pandas as pd
 import pytest
 
 from command_line import run
+from found import FAULT_FREE, FAULTY, UNUSABLE
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.report.comparison import comparison_columns, differences, moments_figure, remarks, render_comparison
 from kinertia.report.files import save_fit
-from kinertia.report.headline import words
 from kinertia.report.same_quantities import same_segment, same_sign
 from report_page import Elements
 
@@ -40,7 +41,7 @@ def test_without_error_bars_nothing_is_called_changed(fit, two_level):
     assert {one.changed for one in differences(fit, two_level)} == {None}
     assert set(comparison_columns({"a": fit, "b": two_level})["changed"]) == {None}
     page = render_comparison({"a": fit, "b": two_level})
-    assert '<p class="headline">No error bars, differences only.</p>' in page, "neither pass nor caution"
+    assert '<p class="headline">No error bars, differences only.</p>' in page, "of no severity"
     assert "<td>no</td>" not in page
     assert "<td>no</td>" in render_comparison({"a": fit, "again": fit})
 
@@ -56,12 +57,11 @@ def test_error_bars_are_explained_where_there_are_any(fit, two_level):
     assert said.endswith("so nothing tells a change from chance: a, which all are compared with")
 
 
-@pytest.mark.parametrize("warnings", [(), ("a doubt",)])
-def test_a_fit_has_the_word_that_its_report_has(fit, warnings):
-    one = replace(fit, warnings=warnings)
-    page = Elements(render_comparison({"one": one, "two": one})).text
-    marks = {"pass": "✓ pass", "caution": "~ caution", "fail": "✗ fail"}
-    assert [mark for mark in marks.values() if mark in page] == [marks[words(one).level]]
+@pytest.mark.parametrize("findings", [FAULT_FREE, FAULTY, UNUSABLE])
+def test_a_fit_has_the_verdict_that_its_report_has(fit, findings):
+    one = replace(fit, findings=findings)
+    page = render_comparison({"one": one, "two": one})
+    assert re.findall(r'<td class="level">(.*?)</td>', page) == [one.overview.verdict] * 2
 
 
 @pytest.mark.slow

@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from kinertia.diagnostics.result.suitability import suitability
 from kinertia.errors import FileError
 from kinertia.io.output_folder import check_folder
 from kinertia.io.sto import read_sto
@@ -59,7 +60,10 @@ def test_fit_json_keeps_its_contract(saved):
         "literature": fit.literature.mass_kg.sum(),
         "estimate": fit.estimate.mass_kg.sum(),
     }
-    assert fit_summary["warnings"] == list(fit.warnings)
+    assert fit_summary["findings"] == [one.to_dict() for one in fit.findings]
+    assert (fit_summary["verdict"], fit_summary["rules_run"]) == (fit.overview.verdict, fit.rules)
+    assert [one["output"] for one in fit_summary["suitability"]] == [one.output for one in suitability(fit)]
+    assert (fit_summary["warnings"], fit_summary["corrections"]) == (list(fit.warnings), list(fit.corrections))
     assert fit_summary["notes"] == list(fit.notes)
     assert fit_summary["converged"] == fit.converged
     (trial,) = fit_summary["trials"]

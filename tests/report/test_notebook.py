@@ -1,8 +1,10 @@
 """What notebooks show of fits, trials and recordings."""
 
+from dataclasses import replace
+
 import numpy as np
 
-from kinertia.report.headline import words
+from found import FAULTY, ZERO
 from kinertia.trial.data import Markers, PlateLoads, Recording
 from report_page import Elements
 
@@ -11,8 +13,10 @@ def test_fit_trial_and_parameters_show_themselves(fit, two_level):
     for one in (fit, two_level):
         shown = Elements(one._repr_html_())
         assert one.subject.name in shown.text
-        assert words(one).headline in shown.text
+        assert one.overview.line in shown.text
         assert len(shown.named("tr")) == 1 + 4 + 1 + 120
+    found = Elements(replace(fit, findings=FAULTY)._repr_html_()).text
+    assert ZERO.message in found
     trial = fit.trials[0].kinematics.trial
     shown = Elements(trial._repr_html_()).text
     assert f"{len(trial.markers.time)} frames at 100 Hz" in shown

@@ -12,13 +12,14 @@ import numpy as np
 import pytest
 
 from command_line import run
-from kinertia.diagnostics.result.verdict import verdicts
+from found import FAULT_FREE, UNUSABLE
+from kinertia.diagnostics.result.suitability import Suitability
 from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
 from kinertia.io.provenance import provenance_of
 from kinertia.io.subject_file import read_subject
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.motion.dynamics import Motion
-from kinertia.report.headline import words
+from kinertia.report.headline import purposes, words
 from kinertia.report.page import MOST_TRIALS, bsp_rows, render
 from kinertia.report.plotly_script import packed_script
 from kinertia.report.wording import fixed
@@ -28,21 +29,32 @@ from report_page import Elements, figures_of
 MOST_BYTES = 3_200_000
 MOST_BYTES_OF_MANY = 4_500_000
 """However many trials there are, and however long."""
-PARTS = ["verdict", "cycle", "bsp", "residuals", "kinematics", "moments", "markers", "view", "computed"]
+PARTS = [
+    "verdict", "moments", "body", "findings", "changed", "cycle", "bsp", "residuals", "kinematics", "moments-over-time",
+    "markers", "view", "computed", "explained",
+]  # fmt: skip
 
 
-@pytest.mark.parametrize("which", ["fit", "two_level"])
-def test_headline_follows_the_worst_judgement(which, request):
-    fit = request.getfixturevalue(which)
-    page_words = words(fit)
-    levels = [verdict.level for verdict in verdicts(fit)]
-    assert page_words.judgements == tuple(verdicts(fit))
-    worst = "fail" if "fail" in levels else "caution" if "caution" in levels else "pass"
-    assert page_words.level == ("caution" if worst == "pass" and fit.warnings else worst)
-    assert words(replace(fit, warnings=("a plate is off",))).level != "pass"
-    stopped = words(replace(fit, converged=False))
-    assert stopped.level == "fail"
-    assert f"{levels.count('fail') + fit.converged} of {len(levels)} checks" in stopped.headline
+@pytest.mark.parametrize(
+    ("segments", "together"),
+    [
+        (("use", "use", "use"), "use"),
+        (("use", "use with care", "do not use"), "use with care"),
+        (("do not use", "do not use", "do not use"), "do not use"),
+    ],
+)
+def test_purposes_follow_the_outputs(segments, together):
+    names = ("segment masses", "centres of mass", "moments of inertia")
+    outputs = [
+        Suitability("joint moments", "use with care", "why", ("P213",)),
+        *(Suitability(name, use, "why") for name, use in zip(names, segments, strict=True)),
+        Suitability("motion", "use", "why"),
+    ]
+    moments, parameters, opensim = purposes(outputs, no_body=False)
+    assert (moments.use, parameters.use, opensim.use) == ("use with care", together, "use with care")
+    assert moments.codes == opensim.codes == ("P213",)
+    *_, opensim = purposes(outputs, no_body=True)
+    assert (opensim.use, opensim.codes) == ("do not use", ("R202",))
 
 
 def test_estimates_far_from_the_literature_are_named(fit):
@@ -68,16 +80,10 @@ def test_what_the_data_say_is_counted(fit, two_level):
     sd[0] *= np.sqrt(1 - 0.8)
     sd[1] *= np.sqrt(1 - 0.5)
     knowledge = words(replace(fit, posterior=replace(fit.posterior, sd=sd))).knowledge
-    assert "10 are measured " in knowledge[0]
-    assert "10 informed by the data;" in knowledge[0]
-    assert "100 are hardly informed" in knowledge[0]
-    assert "about as uncertain as the literature's" in knowledge[0]
-    assert knowledge[1:4] == (
-        "masses measured: pelvis",
-        "masses informed by the data: torso",
-        "masses hardly informed by the data, not to be read as this person's: thigh; shank; foot; upper arm; forearm",
-    )
-    assert knowledge[4].startswith("17 combinations cannot be seen in any motion")
+    assert re.findall(r"(?<!\S)\d+(?= )", knowledge[0])[:5] == ["120", "10", "75", "10", "100"]
+    masses = [sentence.partition(": ")[2] for sentence in knowledge[1:4]]
+    assert masses == ["pelvis", "torso", "thigh; shank; foot; upper arm; forearm"]
+    assert knowledge[4].startswith("17 combinations")
     (only,) = words(two_level).knowledge
     assert "no error bars" in only
 
@@ -102,15 +108,15 @@ def of_model(fit):
 def test_held_segments_are_named_and_not_counted(of_model):
     knowledge = words(of_model).knowledge
     assert knowledge[0].startswith("of 100 parameters")
-    assert "kept as the model has them, not estimated: forearm" in knowledge
-    assert not any("forearm" in sentence for sentence in knowledge if sentence.startswith("masses"))
+    (fixed_segments,) = [sentence for sentence in knowledge if "forearm" in sentence]
+    assert fixed_segments.endswith("not estimated: forearm")
     page = render(of_model)
     figures = figures_of(page)
     for figure in ("changes", "bsp-change", "bsp-departure", "products-change"):
         for axis in ("yaxis", "yaxis2"):
             assert not any("forearm" in name for name in figures[figure]["layout"][axis]["ticktext"])
     assert len(figures["bsp-information"]["layout"]["yaxis"]["ticktext"]) == 10
-    assert "Kept as the model has them" in Elements(page).text
+    assert "not estimated: forearm" in Elements(page).text
     held = [row for row in bsp_rows(of_model) if row["segment"].startswith("forearm")]
     assert len(held) == 20
     assert {row["evidence"] for row in held} == {"held"}
@@ -122,7 +128,7 @@ def test_start_is_called_what_it_is(fit, of_model):
     for one, word in ((fit, "literature values"), (of_model, "the model's own values")):
         assert any(word in (trace.name or "") for trace in one.plot.residuals().data)
         assert any(word in (trace.name or "") for trace in one.plot.moments().data)
-    assert "literature" not in Elements(render(replace(of_model, warnings=(), notes=()))).text.lower()
+    assert "literature" not in Elements(render(replace(of_model, findings=(), notes=()))).text.lower()
 
 
 def test_numbers_in_the_table_have_the_digits_of_their_unit(fit):
@@ -173,13 +179,15 @@ def test_the_change_of_motion_is_told_against_inverse_kinematics(fit):
 def test_page_has_all_parts_and_is_small_enough(page):
     elements = Elements(page)
     sections = [attrs["id"] for attrs in elements.named("section")]
-    assert sections == PARTS
+    assert [name for name in PARTS if name in sections] == sections
+    assert set(PARTS) - set(sections) <= {"explained"}
     assert len(page.encode()) <= MOST_BYTES
     assert page.count(packed_script()) == 1
     ids = [attrs["id"] for _, attrs in elements.tags if "id" in attrs]
     assert len(set(ids)) == len(ids)
-    links = {attrs["href"] for attrs in elements.named("a")}
-    assert links == {f"#{name}" for name in (*PARTS, "main")}
+    links = {attrs["href"].removeprefix("#") for attrs in elements.named("a")}
+    assert links <= set(ids)
+    assert set(PARTS) - {"changed", "moments-over-time", "explained"} <= links
 
 
 def test_every_picture_has_words_and_data(page):
@@ -225,7 +233,8 @@ def test_names_cannot_become_markup(fit, page):
         subject=subject,
         skeleton=skeleton,
         trials=(replace(trial, kinematics=replace(kinematics, trial=renamed, ik=ik)),),
-        warnings=(EVIL,),
+        findings=tuple(replace(one, where=replace(one.where, trial=EVIL, plate=EVIL)) for one in UNUSABLE),
+        left_out=(EVIL,),
         notes=(EVIL,),
     )
     made = Elements(render(evil))
@@ -242,19 +251,36 @@ def test_names_cannot_become_markup(fit, page):
     assert not any("<" in one for one in labels)
 
 
-def test_report_tells_warnings_assumptions_and_settings(fit):
-    shown = Elements(render(replace(fit, warnings=("beware of the dog",), notes=("the dog bites",)))).text
-    for text in ("beware of the dog", "the dog bites", "simultaneous", "hip_centre", "numpy", fit.subject.name):
-        assert text in shown
+def test_report_shows_findings_notes_and_settings(fit):
+    shown = replace(fit, findings=UNUSABLE, rules=61, left_out=("walk 2",), notes=("the dog bites",))
+    page = render(shown)
+    elements = Elements(page)
+    open_ones = [one for one in UNUSABLE if one.status != "ignored"]
+    for text in ("the dog bites", "simultaneous", "hip_centre", "numpy", fit.subject.name, "walk 2"):
+        assert text in elements.text
+    for one in open_ones:
+        assert one.message in elements.text
+        assert one.remedy in elements.text or one.muted_by or one.severity.name in ("CORRECTED", "INFO")
     for name in fit.posterior.calibration:
-        assert name in shown
+        assert name in elements.text
+    explained = {attrs["id"] for attrs in elements.named("h3") if attrs.get("id", "").startswith("explain-")}
+    assert explained == {f"explain-{one.code}" for one in open_ones}
+    (headline,) = re.findall(r'<p class="headline (\w+)', page)
+    assert headline == "error"
+
+
+def test_the_first_screen_of_fault_free_data_has_nothing_to_do(fit):
+    page = render(replace(fit, findings=FAULT_FREE, rules=61))
+    assert '<ol class="steps' not in page
+    assert page.count('<article class="finding') == 0
+    assert re.findall(r'<p class="headline (\w+)', page) == ["info"]
 
 
 def test_two_level_report_says_that_it_has_no_error_bars(two_level):
     elements = Elements(render(two_level))
     assert "no error bars" in elements.text
     assert "evidence" not in elements.text
-    assert {attrs["id"] for attrs in elements.named("section")} == set(PARTS)
+    assert {attrs["id"] for attrs in elements.named("section")} >= set(PARTS) - {"explained"}
 
 
 def prolonged(trial, times):
@@ -350,8 +376,3 @@ def test_three_trials_with_strides_stay_below_3_2_mb(fit):
     made = render(replace(fit, trials=fit.trials * 3, posterior=posterior))
     assert 'id="cycle"' in made
     assert len(made.encode()) < MOST_BYTES
-
-
-def test_the_printed_moments_over_time_say_whose_trial_they_are(fit, page):
-    """The summary on paper shows those of class "first" alone."""
-    assert f"<h3 class=first>{fit.trials[0].name}</h3>" in page

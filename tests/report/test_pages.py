@@ -12,6 +12,7 @@ from matplotlib.image import imread
 
 import study_results
 from chromium import DESKTOP, Opened, colour, playwright
+from found import FAULTY, UNUSABLE
 from kinertia.report.accuracy import render_accuracy
 from kinertia.report.check_page import save_check_page
 from kinertia.report.cohort_page import PAGE, write_cohort_page
@@ -25,14 +26,16 @@ from kinertia.report.populations import render_populations
 from kinertia.report.sensitivity import render_sensitivity
 from kinertia.report.table1 import render_table1
 from kinertia.report.table1_variants import render_variants
-from kinertia.workflow.files import PersonFiles, check_files, files_by_name
+from kinertia.settings import Subject
+from kinertia.workflow.check import check_person
+from kinertia.workflow.files import files_by_name, read_files
 from study_results import ACCURACIES, HELD_OUT, OUTCOMES, PLAN, POPULATIONS_STUDY, SOUND
 
 axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="needs axe (pip install -e '.[test]')")
 
 pytestmark = pytest.mark.slow
 
-REPORTS = ("report", "three trials", "two-level")
+REPORTS = ("report", "findings", "three trials", "two-level")
 """One page with other data: the first is looked at in all looks, the others in two."""
 STUDIES = ("plan", "crossval", "cohort", "accuracy", "populations", "sensitivity", "faults", "table1", "variants")
 """Pages of one template."""
@@ -52,9 +55,10 @@ def pages(demo_run, fit, two_level, c3d_lab, tmp_path_factory):
     folder = tmp_path_factory.mktemp("pages")
 
     def check():
-        wanted = files_by_name([c3d_lab / "static.c3d", c3d_lab / "walk.c3d"])
-        recordings, mistakes = check_files(PersonFiles(wanted))
-        return save_check_page(recordings, [], [*mistakes, "lost.trc: no such file"], folder / "check")
+        files = files_by_name([c3d_lab / "static.c3d", c3d_lab / "walk.c3d"])
+        checked = check_person(read_files(files, Subject(name="person", mass_kg=80.0)))
+        found = replace(checked.overview, findings=(*checked.findings, *FAULTY), left_out=("walk 2",))
+        return save_check_page([found], checked.recordings, [], folder / "check")
 
     def cohort():
         (folder / "cohort").mkdir()
@@ -68,6 +72,7 @@ def pages(demo_run, fit, two_level, c3d_lab, tmp_path_factory):
 
     made = {
         "report": lambda: demo_run[1] / "report.html",
+        "findings": lambda: written("findings.html", render(replace(fit, findings=UNUSABLE, rules=61))),
         "three trials": lambda: written("three.html", render(three_times(fit))),
         "two-level": lambda: demo_run[1] / "two-level" / "report.html",
         "comparison": lambda: written("compare.html", render_comparison({"one": fit, "two": two_level})),

@@ -1,4 +1,4 @@
-"""Mistakes in the files of the measured walk that comes with the package are named by `check`, and refused by a fit."""
+"""Faults in the files of a synthetic walk are identified by `check`, and block a fit."""
 
 import json
 import re
@@ -7,18 +7,23 @@ import numpy as np
 import pytest
 
 from command_line import run
-from kinertia.errors import TrialError
+from found import FAULTY
+from kinertia.errors import BlockedError
+from kinertia.findings.finding import Severity, finding
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.rule import all_rules
+from kinertia.findings.where import Where
 from kinertia.io.subject_file import read_subject
-from kinertia.report.faults import counts, faults_markdown, save_faults
+from kinertia.report.faults import code_rows, counts, faults_markdown, save_faults
 from kinertia.studies.faults import (
     FaultOutcome,
-    Finding,
     JointMoments,
     SoundWalk,
     change,
     checked,
     judged,
     outcome_of,
+    reported,
     run_faults,
     run_sound,
     sound_laboratories,
@@ -41,6 +46,7 @@ LEFT_TO_THE_FIT = {
 }
 """What `check` says nothing about: the study in `docs/faults.md` tells what becomes of it."""
 QUICK_EVERY = 6
+CASE = FaultOutcome("walk", "fault", "not possible")
 
 
 @pytest.fixture(scope="module")
@@ -50,9 +56,9 @@ def person(c3d_lab):
 
 @pytest.fixture(scope="module")
 def sound(person, tmp_path_factory):
-    """What is said of the walk as it is: nothing."""
+    """The walk as it is, in which nothing is found."""
     findings = checked(write_person(tmp_path_factory.mktemp("sound"), person))
-    assert findings == []
+    assert reported(findings) == []
     return findings
 
 
@@ -72,37 +78,55 @@ def test_mistakes_are_named(mistake, person, sound, tmp_path):
     assert (spoilt is None) == (mistake.name in NOT_POSSIBLE)
     if spoilt is None:
         return
-    judgement = judged(mistake, sound, checked(write_person(tmp_path, spoilt)))
+    judgement = judged(CASE, mistake, sound, checked(write_person(tmp_path, spoilt)), "check")
     if mistake.name in LEFT_TO_THE_FIT:
         assert judgement is None
     else:
         assert judgement is not None
-        assert judgement[0] == "named", judgement[1]
+        assert judgement.outcome == "named", judgement.code
 
 
 @pytest.mark.parametrize("name", ["all left and right labels swapped", "forces 100 ms late"])
-def test_a_fit_refuses_what_check_refuses(name, person, sound, tmp_path):
+def test_a_fit_is_blocked_by_what_blocks_check(name, person, tmp_path):
     mistake = next(one for one in MISTAKES if one.name == name)
     path = write_person(tmp_path, mistake.change(person, np.random.default_rng(5)))
-    (level, sentence, _), *_ = checked(path)
-    assert level == "fail"
-    with pytest.raises(TrialError) as refused:
+    errors = {one.code for one in reported(checked(path)) if one.severity is Severity.ERROR}
+    with pytest.raises(BlockedError) as blocked:
         prepare_subject(path)
-    assert refused.value.problem == sentence
+    assert {one.code for one in blocked.value.blocking} == errors
+    assert errors & mistake.codes
 
 
-def test_judgement():
-    mistake = Mistake("x", lambda person, rng: person, "zero")
-    known = [Finding("caution", "2.0 % off")]
-    assert judged(mistake, known, [Finding("caution", "3.5 % off")]) is None
-    assert judged(mistake, known, [Finding("fail", "3.5 % off")]) == ("warned", "3.5 % off")
-    two, one = (Finding("caution", f"plate 1: {rest}; check it") for rest in ("x: 9 mm, gain: 4 %", "gain: 5 %"))
-    assert judged(mistake, [two], [one]) is None
-    assert judged(mistake, [one], [two]) == ("warned", two.sentence)
-    cautioned, failed = Finding("caution", "the zero is wrong"), Finding("fail", "no frame")
-    assert judged(mistake, known, [cautioned]) == ("named", cautioned.sentence)
-    assert judged(mistake, known, [cautioned, failed]) == ("warned", failed.sentence)
-    assert judged(mistake, [Finding("caution", "zero 1 N")], [Finding("caution", "zero 9 N")]) == ("named", "zero 9 N")
+def test_every_fault_has_codes_of_the_catalogue():
+    assert {code for one in MISTAKES for code in one.codes} <= set(all_rules())
+    assert [one.name for one in MISTAKES if not one.codes] == ["the other sex"]
+
+
+WALK, ZERO_FAULT = Where(trial="walk", plate="plate 1"), Mistake("x", lambda person, rng: person, frozenset({"P213"}))
+
+
+def outcome(before, after):
+    """Outcome and code of a fault of the zero."""
+    judgement = judged(CASE, ZERO_FAULT, before, after, "check")
+    return None if judgement is None else (judgement.outcome, judgement.code)
+
+
+def test_a_new_code_of_the_fault_names_it_whatever_else_is_new():
+    jump, zero = finding("M112", Where(trial="walk"), Severity.ERROR), finding("P213", WALK)
+    assert outcome([], [jump]) == ("warned", "M112")
+    assert outcome([], [jump, zero]) == ("named", "P213")
+    assert outcome([jump], [jump, zero]) == ("named", "P213")
+    assert outcome([], [zero.muted("P211")]) is None
+    assert outcome([], [finding("R111", Where(trial="walk"))]) is None, "an assumption"
+
+
+def test_what_is_found_without_the_fault_is_new_where_it_is_worse_or_another_size():
+    zero = finding("P213", WALK)
+    assert outcome([zero], [zero]) is None
+    assert outcome([zero], [zero.at(Severity.ERROR)]) == ("named", "P213")
+    small, alike, large = (finding("P213", WALK, level_n=Quantity(value, "N", sd=1.0)) for value in (5.0, 7.0, 9.0))
+    assert outcome([small], [alike]) is None
+    assert outcome([small], [large]) == ("named", "P213")
 
 
 def test_changes_are_counted_in_deviations():
@@ -119,15 +143,15 @@ def outcomes():
     """Of two walks and three mistakes, made up."""
     walks = [
         SoundWalk("one", None, (), None),
-        SoundWalk("other", None, (Finding("caution", "mass"), Finding("caution", "plate", "fit")), None),
+        SoundWalk("other", None, FAULTY, JointMoments(None, (), None, None)),
     ]
     of_mistakes = [
-        FaultOutcome("one", "a", "named", "said", "check"),
-        FaultOutcome("other", "a", "named", "said", "fit", 2.0, 3.0),
-        FaultOutcome("one", "b", "silent", "", "", 2.0, 3.0),
+        FaultOutcome("one", "a", "named", "P213", "said", "check"),
+        FaultOutcome("other", "a", "named", "P215", "said", "fit", 2.0, 3.0),
+        FaultOutcome("one", "b", "silent", change_sd=2.0, change_nm=3.0),
         FaultOutcome("other", "b", "not possible"),
-        FaultOutcome("one", "c", "harmless", "", "", 0.5, 1.0),
-        FaultOutcome("other", "c", "warned", "other", "check"),
+        FaultOutcome("one", "c", "harmless", change_sd=0.5, change_nm=1.0),
+        FaultOutcome("other", "c", "warned", "M113", "other", "check"),
     ]
     laboratories = [SoundWalk("laboratory 1", None, (), JointMoments(None, (), None, None))]
     return walks, of_mistakes, laboratories
@@ -137,15 +161,21 @@ def test_page(outcomes, tmp_path):
     page = faults_markdown(*outcomes)
     assert "| a | named | named \\* |" in page
     assert "| b | **silent** | – |" in page
-    assert "Of 5 mistakes made, 2 are named (40 %), 1 warned of with another cause, 1 harmless, and 1 do silent" in page
+    assert "Of 5 faults, 2 are named (40 %), 1 warned of with other codes, 1 harmless, and 1 silent." in page
     assert "| **named / possible** | **1 / 3** | **1 / 2** |" in page
-    assert "| none: the walk as it is | nothing said | 1 by check; 1 by fit |" in page
-    assert "Of 2 sound walks 2 are refused. Of 1 other synthetic people in sound laboratories 0 are refused" in page
-    assert "- one: nothing\n- other: mass (check); plate (fit)\n- laboratory 1: nothing" in page
+    assert "| none: the walk as it is | none | M113 P213 P215 T214 |" in page
+    assert "Of 2 fault-free walks 1 are blocked, and 2 have a warning." in page
+    assert "- one: nothing\n- other: M113 " in page
     assert counts(outcomes[1]) == {"named": 2, "warned": 1, "harmless": 1, "silent": 1}
     content = json.loads((save_faults(*outcomes, tmp_path / "out") / "faults.json").read_text())
     assert content["outcomes"][0]["change_nm"] is None
-    assert content["sound"]["other"][1]["by"] == "fit"
+    assert [one["code"] for one in content["sound"]["other"]] == [one.code for one in FAULTY]
+
+
+def test_codes_are_counted(outcomes):
+    walks, of_faults, laboratories = outcomes
+    rows = {code: tuple(map(int, numbers)) for code, _, *numbers in code_rows([*walks, *laboratories], of_faults)}
+    assert rows == {"M113": (0, 1, 1), "P213": (1, 0, 1), "P215": (1, 0, 1), "T214": (0, 0, 1)}
 
 
 def test_command(outcomes, c3d_lab, tmp_path, monkeypatch):
@@ -166,7 +196,10 @@ def test_command(outcomes, c3d_lab, tmp_path, monkeypatch):
 def test_sound_laboratories_are_not_doubted(tmp_path):
     """Two people whose bodies, markers and plates differ as those of sound laboratories do."""
     people = run_sound(sound_laboratories(tmp_path, 2))
-    assert [one.findings for one in people] == [(), ()]
+    assert [[one.code for one in reported(each.findings) if one.severity > Severity.CORRECTED] for each in people] == [
+        [],
+        [],
+    ]
     moments = [one.moments.moment_nm for one in people]
     assert moments[0].shape != moments[1].shape or np.abs(moments[0] - moments[1]).max() > 1.0
 
@@ -179,10 +212,10 @@ def test_study_of_a_walk(tmp_path):
     picked = [one for one in MISTAKES if one.name in wanted]
     (sound,), outcomes_of_faults = run_faults({"walk": synthetic_walk(tmp_path / "lab")}, picked)
     assert sound.moments is not None
-    assert not any(one.level == "fail" for one in sound.findings)
+    assert not any(one.severity is Severity.ERROR for one in reported(sound.findings))
     by_name = {one.mistake: one for one in outcomes_of_faults}
     assert (by_name["forces in kg"].outcome, by_name["forces in kg"].by) == ("named", "check")
     other = by_name["the other sex"]
     assert other.outcome in ("harmless", "named", "warned")
     assert other.change_sd < 1.0
-    assert outcome_of(sound, Mistake("none", lambda person, rng: None, "")).outcome == "not possible"
+    assert outcome_of(sound, Mistake("none", lambda person, rng: None, frozenset())).outcome == "not possible"

@@ -1,4 +1,4 @@
-"""Of two causes that look alike the likelier one is named first: mistakes in files of a synthetic walk."""
+"""Of two causes that look alike the likelier one is found: faults in files of a synthetic walk."""
 
 from dataclasses import replace
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import butter, filtfilt
 
-from kinertia.studies.faults import checked, synthetic_walk
+from kinertia.studies.faults import checked, reported, synthetic_walk
 from kinertia.synthetic.measured_person import acting, loads_of, read_person, write_person
 
 
@@ -17,10 +17,9 @@ def person(tmp_path_factory):
     return read_person(subject, np.random.default_rng(1))
 
 
-def said(folder, person):
-    """The first sentence of `kinertia check`; empty where there is none."""
-    findings = checked(write_person(folder, person))
-    return findings[0].sentence if findings else ""
+def found(folder, person):
+    """What `kinertia check` finds, by code, the worst first."""
+    return {one.code: one for one in reversed(reported(checked(write_person(folder, person))))}
 
 
 def with_force(person, change):
@@ -37,7 +36,7 @@ def with_places(person, change):
 
 
 def test_nothing_is_said_of_sound_files(person, tmp_path):
-    assert said(tmp_path, person) == ""
+    assert found(tmp_path, person) == {}
 
 
 @pytest.mark.parametrize("plate", [0, 1])
@@ -48,9 +47,9 @@ def test_a_gain_or_a_zero_of_one_plate_is_no_wrong_rate(person, tmp_path, plate,
         force[:, plate] = gain * force[:, plate] + [0.0, zero_n, 0.0]
         return force
 
-    sentence = said(tmp_path, with_force(person, change))
-    assert sentence.startswith("the gain of ")
-    assert "or the zero of one of them" in sentence
+    codes = set(found(tmp_path, with_force(person, change)))
+    assert "P221" in codes
+    assert not any(code.startswith("T20") for code in codes)
 
 
 @pytest.mark.parametrize("plate", [0, 1])
@@ -60,10 +59,9 @@ def test_a_horizontal_zero_that_drifts_is_named_with_its_plate_and_axis(person, 
         force[:, plate, 0] += np.linspace(0.0, 60.0, len(time))
         return force
 
-    sentence = said(tmp_path, with_force(person, change))
-    assert sentence.startswith("the zero of the horizontal force of ")
-    assert person.plates.names[plate] in sentence
-    assert "along X is wrong, or drifts" in sentence
+    zero = found(tmp_path, with_force(person, change))["P212"]
+    assert zero.where.plate == person.plates.names[plate]
+    assert zero.where.axis == "fore-aft"
 
 
 def test_markers_that_were_smoothed_too_much(person, tmp_path):
@@ -71,8 +69,7 @@ def test_markers_that_were_smoothed_too_much(person, tmp_path):
         high = butter(2, 2.0 / (markers.rate_hz / 2))
         return filtfilt(*high, markers.positions, axis=0)
 
-    sentence = said(tmp_path, with_places(person, change))
-    assert sentence.startswith("the markers look smoothed far too much")
+    assert next(iter(reversed(found(tmp_path, with_places(person, change))))) == "M133"
 
 
 def test_markers_that_were_smoothed_as_usual(person, tmp_path):
@@ -80,7 +77,7 @@ def test_markers_that_were_smoothed_as_usual(person, tmp_path):
         high = butter(2, 6.0 / (markers.rate_hz / 2))
         return filtfilt(*high, markers.positions, axis=0)
 
-    assert said(tmp_path, with_places(person, change)) == ""
+    assert found(tmp_path, with_places(person, change)) == {}
 
 
 def test_small_spikes_are_no_jumps(person, tmp_path):
@@ -89,9 +86,9 @@ def test_small_spikes_are_no_jumps(person, tmp_path):
         places[7::15, markers.labels.index(person.marker_set.segments["shank_r"][0])] += 0.03
         return places
 
-    sentence = said(tmp_path, with_places(person, change))
-    assert sentence.startswith("spikes: single frames in which markers are off their way: ")
-    assert "jump" not in sentence
+    codes = set(found(tmp_path, with_places(person, change)))
+    assert "M111" in codes
+    assert "M112" not in codes
 
 
 def test_labels_swapped_in_the_static_trial_come_before_another_session(person, tmp_path):
@@ -101,9 +98,9 @@ def test_labels_swapped_in_the_static_trial_come_before_another_session(person, 
     swapped = person.in_static(
         lambda markers: replace(markers, labels=tuple(swaps.get(label, label) for label in markers.labels))
     )
-    findings = checked(write_person(tmp_path, swapped))
-    assert "look swapped" in findings[0].sentence
-    assert not [one for one in findings if "another session" in one.sentence]
+    codes = set(found(tmp_path, swapped))
+    assert codes & {"L208", "L212"}
+    assert "S204" not in codes
 
 
 @pytest.mark.parametrize("plates", [[0], [1], [0, 1]])
@@ -113,7 +110,6 @@ def test_the_gain_of_one_axis(person, tmp_path, plates):
         force[:, plates, 0] *= 2.0
         return force
 
-    sentence = said(tmp_path, with_force(person, change))
-    assert sentence.startswith("the gain of the horizontal force of ")
-    assert ("all plates" if len(plates) > 1 else person.plates.names[plates[0]]) in sentence
-    assert float(sentence.partition("reads ")[2].partition(" times")[0]) == pytest.approx(2.0, rel=0.2)
+    gain = found(tmp_path, with_force(person, change))["P222"]
+    assert gain.where.plate == (None if len(plates) > 1 else person.plates.names[plates[0]])
+    assert next(iter(gain.evidence.values())).value == pytest.approx(1.0, rel=0.4)

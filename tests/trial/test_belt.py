@@ -7,11 +7,11 @@ import pytest
 
 from kinertia.diagnostics.evidence.foot_trajectories import foot_trajectories
 from kinertia.diagnostics.timing.belt_speed import belt_speed
-from kinertia.errors import FileError
 from kinertia.io.belt_file import read_belt
 from kinertia.trial.belt import Belt
 from kinertia.trial.plate_assignment import build_trial
 from loads_and_feet import context_of
+from refusals import refused
 from walk_on_plates import ALL_STEPS, FEET, walk
 
 STEPS = [("r", 0), ("l", 0), ("r", 1)]
@@ -89,16 +89,17 @@ def test_files_of_two_belts(tmp_path, kind):
 
 
 @pytest.mark.parametrize(
-    ("name", "text", "words"),
+    ("name", "text", "code", "evidence"),
     [
-        ("a.csv", "time_s,right_m_s\n0,1\n", "lacks the column speed_m_s; found time_s, right_m_s; expected a row per"),
-        ("a.csv", "time_s,right_m_s,left_m_s\n0,1,50\n", "speeds from 1 to 50; expected 0 to 15 m/s"),
-        ("a.mot", "grf\nendheader\ntime\tbelt_speed_left\n0\t1\n1\t1\n", "nor belt_speed_right and belt_speed_left"),
+        ("a.csv", "time_s,right_m_s\n0,1\n", "F103", {"found": "time_s, right_m_s", "expected": "speed_m_s"}),
+        ("a.csv", "time_s,right_m_s,left_m_s\n0,1,50\n", "F181", {"speed_m_s": (1.0, 50.0)}),
+        ("a.csv", "time_s,speed_m_s\n1,1\n1,1\n", "F181", {"problem": "grow"}),
+        ("a.mot", "grf\nendheader\ntime\tbelt_speed_left\n0\t1\n1\t1\n", "F181", {"problem": "belt_speed_right and"}),
     ],
 )
-def test_files_without_speeds(tmp_path, name, text, words):
+def test_files_without_speeds(tmp_path, name, text, code, evidence):
     (tmp_path / name).write_text(text)
-    with pytest.raises(FileError, match=words):
+    with refused(code, **evidence):
         read_belt(tmp_path / name)
 
 

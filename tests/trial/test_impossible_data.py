@@ -6,6 +6,7 @@ import pytest
 
 from kinertia.errors import TrialError
 from kinertia.trial.data import Markers, PlateLoads, Recording
+from refusals import refused
 
 TIME = np.arange(10) / 100
 MARKERS = Markers(TIME, ("HEEL", "TOE"), np.zeros((10, 2, 3)))
@@ -19,32 +20,39 @@ def changed(array, place, value):
 
 
 @pytest.mark.parametrize(
-    ("markers", "problem"),
+    ("markers", "code", "evidence"),
     [
-        ({"time": changed(TIME, 3, np.nan)}, "trial 'walk': the times of the markers must be numbers, each later"),
-        ({"time": changed(TIME, 3, 0.02)}, "the times of the markers must be numbers, each later"),
-        ({"time": np.where(TIME < 0.045, TIME, TIME + 0.05)}, r"step to the next frame is 0\.06 s at 0\.0400 s"),
-        ({"positions": changed(MARKERS.positions, (4, 1, 2), -np.inf)}, "place of TOE at 0.040 s is infinite"),
+        ({"time": changed(TIME, 3, np.nan)}, "T101", {"before": 0.02, "after": "no number"}),
+        ({"time": changed(TIME, 3, 0.02)}, "T101", {"before": 0.02, "after": 0.02, "step_s": 0.0, "usual_s": 0.01}),
+        ({"time": np.where(TIME < 0.045, TIME, TIME + 0.05)}, "T101", {"before": 0.04, "step_s": 0.06}),
+        (
+            {"positions": changed(MARKERS.positions, (4, 1, 2), -np.inf)},
+            "F171",
+            {"position_m": -np.inf, "time_s": 0.04},
+        ),
     ],
 )
-def test_markers_that_no_camera_saw(markers, problem):
-    with pytest.raises(TrialError, match=problem):
+def test_markers_that_no_camera_saw(markers, code, evidence):
+    with refused(code, error=TrialError, **evidence) as caught:
         Recording("walk", replace(MARKERS, **markers))
+    where = caught.value.finding.where
+    assert (where.trial, where.markers) == ("walk", ("TOE",) if code == "F171" else ())
 
 
 @pytest.mark.parametrize(
-    ("plates", "problem"),
+    ("plates", "code", "plate", "evidence"),
     [
-        ({"time": TIME[::-1]}, "the times of the plates must be numbers, each later"),
-        ({"names": ("one", "one")}, "two plates have one name"),
-        ({"declared_feet": ("right", "l")}, "declared_feet has 'right'"),
-        ({"force": changed(PLATES.force, (7, 1, 0), np.nan)}, "force or moment of two at 0.0700 s is not a number"),
-        ({"moment": changed(PLATES.moment, (2, 0, 1), np.inf)}, "force or moment of one at 0.0200 s is not a number"),
+        ({"time": TIME[::-1]}, "T101", None, {"before": 0.09, "after": 0.08}),
+        ({"names": ("one", "one")}, "F173", None, {"names": "one, one"}),
+        ({"declared_feet": ("right", "l")}, "F173", "one", {"problem": "'right'"}),
+        ({"force": changed(PLATES.force, (7, 1, 0), np.nan)}, "F172", "two", {"time_s": 0.07}),
+        ({"moment": changed(PLATES.moment, (2, 0, 1), np.inf)}, "F172", "one", {"time_s": 0.02}),
     ],
 )
-def test_plates_that_measured_nothing(plates, problem):
-    with pytest.raises(TrialError, match=problem):
+def test_plates_that_measured_nothing(plates, code, plate, evidence):
+    with refused(code, error=TrialError, **evidence) as caught:
         Recording("walk", MARKERS, replace(PLATES, **plates))
+    assert caught.value.finding.where.plate == plate
 
 
 def test_what_pandas_gives_will_do():

@@ -15,7 +15,7 @@ import typer
 from kinertia.cli.failure import STATUS, show_failure
 from kinertia.cli.outcome import add_command
 from kinertia.cli.terminal import out, show_error
-from kinertia.errors import KinertiaError
+from kinertia.errors import BlockedError, KinertiaError
 from kinertia.io.output_folder import INTERRUPTIONS
 from kinertia.io.provenance import VERSION
 
@@ -131,6 +131,9 @@ def run(app: typer.Typer, given: Sequence[str]) -> None:
     try:
         with _ended_in_order():
             app(args=given, prog_name="kinertia")
+    except BlockedError as error:
+        for line in str(error).split("\n"):
+            show_error(line)
     except KinertiaError as error:
         show_error(str(error))
     except OSError as error:

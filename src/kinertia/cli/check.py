@@ -4,28 +4,48 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import suppress
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 from rich.table import Table
 
-from kinertia.cli.options import Force, Quiet, Sex, Verbose, number, results_folder
+from kinertia.cli.findings_view import show_overview
+from kinertia.cli.options import Force, Quiet, Sex, Verbose, Waive, number, overrule_of, results_folder
 from kinertia.cli.outcome import Outcome
-from kinertia.cli.terminal import out, plain_table, show_error, show_verdicts, shown_progress
-from kinertia.diagnostics.model.model_check import ModelCheck, check_model
-from kinertia.diagnostics.result.verdict import stands_against
-from kinertia.diagnostics.subject.telling_movements import missing_movements
-from kinertia.errors import FileError, KinertiaError
+from kinertia.cli.terminal import out, plain_table, shown_progress
+from kinertia.errors import FileError
+from kinertia.findings.finding import Severity
+from kinertia.findings.overview import Overview
 from kinertia.io.marker_set_file import read_marker_set
 from kinertia.io.osim.reader import read_osim
 from kinertia.io.subject_file import read_subject, subject_file_in
 from kinertia.model.anthropometry import check_subject
 from kinertia.report.check_page import save_check_page
-from kinertia.workflow.files import PersonFiles, check_files, files_by_name, files_of_subject
+from kinertia.settings import Subject
+from kinertia.workflow.check import ModelOverview, PersonCheck, check_osim, check_person
+from kinertia.workflow.files import files_by_name, read_files
+from kinertia.workflow.person import Person, read_person
 from kinertia.workflow.recording import RecordingCheck
 
-_LISTED = 8
+
+@dataclass(frozen=True, eq=False)
+class _Checked:
+    """Everything that was asked for."""
+
+    person: PersonCheck | None
+    models: Sequence[ModelOverview] = field(default=())
+
+    @property
+    def overviews(self) -> list[Overview]:
+        of_person = [] if self.person is None else [self.person.overview]
+        return [*of_person, *(one.overview for one in self.models)]
+
+    @property
+    def status(self) -> int:
+        """1 where an ERROR is open."""
+        return int(any(one.severity >= Severity.ERROR for overview in self.overviews for one in overview.open))
 
 
 def check(
@@ -49,30 +69,24 @@ def check(
         typer.Option(parser=number, metavar="M", help="Stature, m, to compare models with the literature."),
     ] = None,
     sex: Sex = None,
+    static: Annotated[Path | None, typer.Option(help="Static trial; found among the files if left out.")] = None,
     markers: Annotated[
         str | None, typer.Option(help="Marker set: a preset or a TOML file; found from the labels if left out.")
     ] = None,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Folder for the same results as a page, check.html.")
     ] = None,
+    waive: Waive = None,
     force: Force = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> Outcome:
     """Show what is in measured files or in a model, and whether it can be used.
 
-    Measured: rates, units, axes; markers and gaps; force plates and which foot
-    is on them; the stretch in which all ground contact is measured; the
-    vertical force against body mass; the mean vertical
-    moment over whole strides, which should be near zero; swapped labels,
-    mirrored axes, spikes, jumps, lost or invented frames; forces with a wrong
-    axis, sign, unit, zero, gain, place or clock.
-    With the static trial: whether it is of the same person and session, and
-    goes with the stature.
-
-    Model: total mass; each segment against the literature for this person;
-    impossible, rounded or placeholder inertias; left against right.
-    Exit status 1 if a check failed: no fit or no simulation can rest on it.
+    Asks the questions that a fit asks up to inverse kinematics: markers,
+    labels, force plates, synchronisation, the subject, the OpenSim model.
+    Each finding has a code; kinertia explain CODE says what it means.
+    Exit status 1 if an ERROR is open: no fit or no simulation can rest on it.
 
     [bold]Examples[/]
 
@@ -89,78 +103,62 @@ def check(
     check_subject(70.0 if mass is None else mass, 1.7 if height is None else height, sex or "male")
     files = [subject_file_in(path) if _holds_subject_file(path) else path for path in files]
     subjects = [path for path in files if path.suffix.lower() == ".toml"]
-    if subjects and (len(files) > 1 or any(given is not None for given in (loads, mass, height, sex, markers))):
+    if subjects and (len(files) > 1 or any(one is not None for one in (loads, mass, height, sex, markers, static))):
         raise FileError(subjects[0], "a subject file says it all; give it alone, without other files and options")
-    models, mistakes = _check_models([path for path in files if path.suffix.lower() == ".osim"], mass, height, sex)
+    overrule = overrule_of(waive)
+    osim = [read_osim(path) for path in files if path.suffix.lower() == ".osim"]
     measured = [path for path in files if path.suffix.lower() != ".osim"]
-    marker_set = None if markers is None else read_marker_set(markers)
-    if subjects:
-        wanted = files_of_subject(read_subject(subjects[0]))
-        models += wanted.models
-    else:
-        wanted = PersonFiles(files_by_name(measured, loads), marker_set, mass, height)
+    who = Subject.model_validate({"name": "person", "mass_kg": mass, "height_m": height, "sex": sex})
     with shown_progress() as progress:
-        recordings, more = check_files(wanted, lambda share: progress("reading", share))
-    mistakes += more
-    page = None if output is None else save_check_page(recordings, models, mistakes, output)
+        if subjects:
+            wanted = read_subject(subjects[0])
+            person: Person | None = read_person(wanted, progress).with_overrule(overrule)
+        else:
+            marker_set = None if markers is None else read_marker_set(markers)
+            named = files_by_name(measured if static is None else [*measured, static], loads)
+            person = (
+                read_files(named, who, marker_set, overrule, static, lambda share: progress("reading", share))
+                if named
+                else None
+            )
+        checked = _Checked(
+            None if person is None else check_person(person), [check_osim(one, who, overrule) for one in osim]
+        )
+    recordings = () if checked.person is None else checked.person.recordings
+    page = None if output is None else save_check_page(checked.overviews, recordings, checked.models, output)
     with suppress(SystemExit):  # rich's, where nobody reads on (| head)
-        _show(recordings, models, page, verbose)
-    for mistake in mistakes:
-        show_error(mistake)
-    judged = [one.verdicts for _, one in recordings] + [one.verdicts for _, one in models]
-    status = 2 if mistakes else int(any(map(stands_against, judged)))
-    return Outcome(_told(recordings, models, mistakes), status)
+        _show(checked, page, verbose)
+    return Outcome(_for_scripts(checked), checked.status)
 
 
 def _holds_subject_file(path: Path) -> bool:
     return path.is_dir() and any(each.suffix.lower() == ".toml" for each in path.iterdir())
 
 
-def _told(
-    recordings: Sequence[tuple[str, RecordingCheck]], models: Sequence[tuple[str, ModelCheck]], mistakes: Sequence[str]
-) -> dict[str, Any]:
+def _for_scripts(checked: _Checked) -> dict[str, Any]:
     """The same for scripts."""
+    findings = [one.to_dict() for overview in checked.overviews for one in overview.findings]
+    recordings = () if checked.person is None else checked.person.recordings
+    return {
+        "verdict": [one.verdict for one in checked.overviews],
+        "rules_run": sum(one.rules for one in checked.overviews),
+        "findings": findings,
+        "recordings": [{"name": one.context.name, "facts": dict(one.facts())} for one in recordings],
+        "models": [{"name": one.name, "facts": dict(one.facts.facts())} for one in checked.models],
+    }
 
-    def each(found: Sequence[tuple[str, RecordingCheck | ModelCheck]]) -> list[dict[str, Any]]:
-        return [
-            {"name": name, "verdicts": [verdict._asdict() for verdict in one.verdicts], "facts": dict(one.facts())}
-            for name, one in found
-        ]
 
-    return {"recordings": each(recordings), "models": each(models), "errors": list(mistakes)}
-
-
-def _show(
-    recordings: Sequence[tuple[str, RecordingCheck]],
-    models: Sequence[tuple[str, ModelCheck]],
-    page: Path | None,
-    verbose: bool,
-) -> None:
-    """Everything on the terminal."""
-    for title, recording in recordings:
-        _show_recording(title, recording, verbose)
-    lacking = missing_movements(recording.telling for _, recording in recordings if recording.plates)
-    if lacking is not None:
-        out.print(f"\n{lacking}")
-    for title, model in models:
-        _show_model(title, model)
+def _show(checked: _Checked, page: Path | None, verbose: bool) -> None:
+    """The verdict, at most three findings, and with `verbose` everything that is in the files."""
+    if verbose and checked.person is not None:
+        for recording in checked.person.recordings:
+            _show_recording(recording)
+    for model in checked.models if verbose else ():
+        _show_model(model)
+    for overview in checked.overviews:
+        show_overview(overview, verbose)
     if page is not None:
         out.print(f"page in {page}", soft_wrap=True)
-
-
-def _check_models(
-    paths: Sequence[Path], mass_kg: float | None, height_m: float | None, sex: str | None
-) -> tuple[list[tuple[str, ModelCheck]], list[str]]:
-    """Findings by title, and a sentence for each model that cannot be read."""
-    checks, mistakes = [], []
-    for path in paths:
-        try:
-            model = read_osim(path)
-        except KinertiaError as error:
-            mistakes.append(str(error))
-            continue
-        checks.append((path.name, check_model(model.skeleton, model.bsp, mass_kg, height_m, sex)))
-    return checks, mistakes
 
 
 def _show_facts(title: str, facts: Sequence[tuple[str, str]]) -> None:
@@ -171,34 +169,26 @@ def _show_facts(title: str, facts: Sequence[tuple[str, str]]) -> None:
     out.print(table)
 
 
-def _show_model(title: str, model_check: ModelCheck) -> None:
-    _show_facts(title, model_check.facts())
-    table = plain_table(*model_check.columns)
-    for row in model_check.rows():
+def _show_model(model: ModelOverview) -> None:
+    _show_facts(model.name, model.facts.facts())
+    table = plain_table(*model.facts.columns)
+    for row in model.facts.rows():
         table.add_row(*row)
     out.print(table)
-    show_verdicts(model_check.verdicts)
-    for sentence in model_check.left_out:
-        out.print(f"left out: {sentence}")
 
 
-def _show_recording(title: str, recording_check: RecordingCheck, verbose: bool) -> None:
-    _show_facts(title, recording_check.facts())
-    shown = [one for one in recording_check.markers if verbose or one.share < 1.0]
+def _show_recording(recording: RecordingCheck) -> None:
+    _show_facts(recording.context.name, recording.facts())
+    shown = [one for one in recording.markers if one.share < 1.0]
     if shown:
         gaps = plain_table("marker", "seen\n(%)", "longest gap\n(s)")
-        for one in shown if verbose else shown[:_LISTED]:
+        for one in shown:
             gaps.add_row(one.label, f"{100 * one.share:.0f}", f"{one.longest_gap_s:.2f}")
         out.print(gaps)
-        if not verbose and len(shown) > _LISTED:
-            out.print(f"and {len(shown) - _LISTED} more markers with gaps (--verbose lists them)")
-    if recording_check.plates:
+    if recording.plates:
         plates = plain_table("plate", "foot on plate", "peak\n(N)", "off plate\n(% of load)")
         plates.padding = (0, 1)
-        for plate in recording_check.plates:
+        for plate in recording.plates:
             off = "-" if plate.outside_share is None else f"{100 * plate.outside_share:.0f}"
             plates.add_row(plate.name, plate.stood_on(), f"{plate.peak_n:.0f}", off)
         out.print(plates)
-    show_verdicts(recording_check.verdicts)
-    for note in recording_check.notes:
-        out.print(f"assumed: {note}")

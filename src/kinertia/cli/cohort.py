@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -61,8 +62,8 @@ def cohort(
         bool,
         typer.Option(
             "--learn",
-            help="Fit everybody again with what the others teach of bodies, and of plates and clock of the day; the "
-            "results go to the folder learnt.",
+            help="Refit everyone with group body data and same-day plate and synchronisation calibration; the results "
+            "go to the folder learnt.",
         ),
     ] = False,
     csv: Annotated[bool, typer.Option("--csv", help="Write all tables as CSV, too.")] = False,
@@ -85,8 +86,8 @@ def cohort(
     correcting files: only those are fitted whose files or settings have
     changed. It runs on Dask, which the extra "cohort" installs.
 
-    Exit status 1 if a check of somebody failed, or somebody could not be
-    fitted: people.csv says who, and why.
+    Exit status 1 if an ERROR of somebody's result is open, or somebody could
+    not be fitted: people.csv lists who, and why.
 
     [bold]Examples[/]
 
@@ -144,7 +145,7 @@ def _planned(one: Standing) -> dict[str, Any]:
 
 def _ended(record: Record) -> dict[str, Any]:
     """How a person's fit ended, for scripts."""
-    return {name: getattr(record, name) for name in ("person", "status", "sentence", "seconds")}
+    return {name: getattr(record, name) for name in ("person", "status", "verdict", "sentence", "seconds")}
 
 
 @dataclass(frozen=True)
@@ -280,15 +281,14 @@ def _report_plan(everybody: Sequence[Standing], where: _Where) -> None:
 def _report(outcomes: Sequence[Record], output: Path) -> None:
     noted = [record for record in outcomes if record.status]
     for record in noted[:_MOST_SHOWN]:
-        word = "fail" if record.fitted else "not fitted"
-        out.print(f"{word}: {record.person}: {record.sentence}", soft_wrap=True)
+        out.print(f"{record.verdict or 'not fitted'}: {record.person}: {record.sentence}", soft_wrap=True)
     if noted[_MOST_SHOWN:]:
         out.print(f"... and {len(noted) - _MOST_SHOWN} more, in people.csv")
-    fitted = sum(record.fitted for record in outcomes)
-    passed = len(outcomes) - len(noted)
-    out.print(f"{len(outcomes)} people: {fitted} fitted, {passed} of them without a failed check")
+    verdicts = Counter(record.verdict or "not fitted" for record in outcomes)
+    said = ", ".join(f"{count} {word}" for word, count in verdicts.most_common())
+    out.print(f"{len(outcomes)} people: {said}")
     out.print(
-        f"results in {output}: cohort.html, cohort.parquet, trials.parquet, cycles.parquet, instruments.parquet, "
-        "people.csv, people",
+        f"results in {output}: cohort.html, cohort.parquet, trials.parquet, findings.parquet, cycles.parquet, "
+        "instruments.parquet, people.csv, people",
         soft_wrap=True,
     )

@@ -8,13 +8,13 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from kinertia.cli.fit_report import report_fit, report_verdicts
+from kinertia.cli.findings_view import show_overview
 from kinertia.cli.measured_demo import run_measured_demo
 from kinertia.cli.options import Force, Output, Quiet, results_folder
 from kinertia.cli.outcome import Outcome
 from kinertia.cli.synthetic_demo import Demo, run_demo
 from kinertia.cli.terminal import out, plain_table, shown_progress
-from kinertia.diagnostics.result.verdict import stands_against, verdicts
+from kinertia.findings.finding import Severity
 from kinertia.report.files import summary
 from kinertia.trial.rms import rms_length
 
@@ -54,20 +54,18 @@ def demo(
 def _measured_demo(folder: Path) -> Outcome:
     with shown_progress() as progress:
         fit = run_measured_demo(folder, progress)
-    judged = verdicts(fit)
     out.print(
-        "\nA measured walk, of which nobody knows the truth: OpenSim's gait2354 example, a man walking over force "
+        "\nA measured walk, of which the truth is unknown: OpenSim's gait2354 example, a man walking over force "
         "plates, from https://github.com/opensim-org/opensim-models (Apache License 2.0)."
     )
-    report_fit(fit)
-    report_verdicts(judged, fit, verbose=False, elsewhere="report.html has them all")
+    show_overview(fit.overview, verbose=False)
     lab = folder / "lab"
     out.print(
         f"results in {folder}, the laboratory's files in {lab}\n"
         f"to see what the files are like: kinertia check {lab / 'subject.toml'}",
         soft_wrap=True,
     )
-    return Outcome({"folder": str(folder), **summary(fit)}, int(stands_against(judged)))
+    return Outcome({"folder": str(folder), **summary(fit)}, int(fit.overview.severity is Severity.ERROR))
 
 
 def _against_truth(result: Demo) -> dict[str, Any]:
@@ -138,9 +136,7 @@ def _report_demo(result: Demo, folder: Path) -> None:
     )
     out.print(_verdict(rms_errors[0], rms_errors[1]) + "\n")
     out.print(_two_level_verdict(rms_errors[0], rms_errors[2]) + "\n")
-    for name, one in (("estimate", fit), ("two-level", result.two_level)):
-        for warning in one.warnings:
-            out.print(f"warning ({name}): {warning}")
+    show_overview(fit.overview, verbose=False)
     out.print(
         f"results in {folder}, the laboratory's files in {folder / 'lab'}, truth against estimate in "
         f"{folder / 'bsp_truth.csv'}\n"

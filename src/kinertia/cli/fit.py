@@ -10,18 +10,19 @@ from typing import Annotated, Any, get_args
 import numpy as np
 import typer
 
-from kinertia.cli.fit_report import report_fit, report_verdicts
-from kinertia.cli.options import Force, Output, Quiet, Sex, Verbose, number, results_folder
-from kinertia.cli.outcome import Outcome
+from kinertia.cli.findings_view import show_overview
+from kinertia.cli.fit_report import report_tables
+from kinertia.cli.options import Force, Output, Quiet, Sex, Verbose, Waive, number, overrule_of, results_folder
+from kinertia.cli.outcome import Outcome, of_error
 from kinertia.cli.terminal import out, show_error, shown_progress
-from kinertia.diagnostics.result.verdict import stands_against, verdicts
 from kinertia.errors import FileError, KinertiaError
 from kinertia.estimation.result import Fit
+from kinertia.findings.finding import Severity
 from kinertia.io.file_names import same_folder
 from kinertia.io.provenance import command_line, provenance_of
 from kinertia.io.subject_file import SubjectFile, read_subject, subject_file_in, subject_from_options, with_settings
 from kinertia.report.files import save_fit, summary
-from kinertia.settings import Settings
+from kinertia.settings import Overrule, Settings
 from kinertia.workflow.from_files import fit_subject
 
 
@@ -64,17 +65,21 @@ def fit(
     method: Annotated[
         str | None, typer.Option(help="Estimator: simultaneous (default) or two-level.", autocompletion=_methods)
     ] = None,
+    waive: Waive = None,
     force: Force = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
+    shown_table: Annotated[
+        bool, typer.Option("--table", help="Show residuals and the table of segments as well.")
+    ] = False,
 ) -> Outcome:
     """Estimate body segment parameters from gait.
 
     Of several subject files each gets a folder of its name in the folder for
     the results; an error in one does not keep the others from being fitted.
 
-    Exit status 1 if there is an estimate but a check of it failed
-    (see kinertia --help).
+    Exit status 1 if there is an estimate but an ERROR of it is open, or a
+    trial was left out (see kinertia --help).
 
     [bold]Examples[/]
 
@@ -101,7 +106,7 @@ def fit(
         "--model": model,
         "--calibrate": calibrate or None,
     }
-    runs = _runs(trials, output, options, method)
+    runs = _runs(trials, output, options, method, overrule_of(waive))
     for one in runs:
         names = [trial.name for trial in one.wanted.trials]
         results_folder(one.folder, force, names if len(names) > 1 else ())
@@ -113,14 +118,16 @@ def fit(
             if len(runs) == 1:
                 raise
             show_error(f"{one.given}: {error}")
+            summaries.append({"folder": None, "file": str(one.given), **of_error(error)})
             status = 2
             continue
-        judged = verdicts(result)
-        status = max(status, int(stands_against(judged)))
+        overview = result.overview
+        status = max(status, int(overview.severity is Severity.ERROR or bool(overview.left_out)))
         summaries.append({"folder": str(one.folder), **summary(result), "bsp": _bsp_rows(result)})
         if not quiet:
-            report_fit(result)
-            report_verdicts(judged, result, verbose)
+            if verbose or shown_table:
+                report_tables(result)
+            show_overview(overview, verbose)
             out.print(f"results in {one.folder}", soft_wrap=True)
     return Outcome(summaries if len(runs) > 1 else summaries[0], status)
 
@@ -139,9 +146,12 @@ class _Run:
     wanted: SubjectFile
     folder: Path
     command: str
+    overrule: Overrule
 
 
-def _runs(trials: Sequence[Path], output: Path, options: dict[str, Any], method: str | None) -> list[_Run]:
+def _runs(
+    trials: Sequence[Path], output: Path, options: dict[str, Any], method: str | None, overrule: Overrule
+) -> list[_Run]:
     """Everybody, each with a folder of their own if there are several; all subject files are read here."""
     folders = [output]
     if len(trials) > 1:
@@ -154,7 +164,13 @@ def _runs(trials: Sequence[Path], output: Path, options: dict[str, Any], method:
                 raise FileError(trials[k], f"its results would go to {name}, as those of {before[0]}; rename one file")
         folders = [output / name for name in names]
     return [
-        _Run(path, _wanted(path, options, method), folder, _command(path, options, method, folder))
+        _Run(
+            path,
+            _wanted(path, options, method),
+            folder,
+            _command(path, {**options, "--waive": overrule.waive or None}, method, folder),
+            overrule,
+        )
         for path, folder in zip(trials, folders, strict=True)
     ]
 
@@ -167,7 +183,7 @@ def _name(path: Path) -> str:
 def _fitted(one: _Run) -> Fit:
     """The fit, which is in its folder."""
     with shown_progress() as progress:
-        result = fit_subject(one.wanted, progress)
+        result = fit_subject(one.wanted, progress, one.overrule)
     save_fit(result, one.folder, provenance_of(one.wanted, one.command), force=True)
     return result
 
@@ -175,13 +191,15 @@ def _fitted(one: _Run) -> Fit:
 def _command(trial: Path, options: dict[str, Any], method: str | None, output: Path) -> str:
     """The command line that repeats this run."""
     given = {**options, "--method": method, "-o": output}
-    words = [
-        str(word)
-        for name, value in given.items()
-        if value is not None
-        for word in ([name] if value is True else [name, value])
-    ]
+    words = [str(word) for name, value in given.items() if value is not None for word in _words(name, value)]
     return command_line(["kinertia", "fit", str(trial), *words])
+
+
+def _words(name: str, value: Any) -> list[Any]:
+    """An option as it is typed."""
+    if isinstance(value, tuple):
+        return [word for each in value for word in (name, each)]
+    return [name] if value is True else [name, value]
 
 
 def _wanted(trial: Path, options: dict[str, Any], method: str | None) -> SubjectFile:

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from kinertia.cli.terminal import out, plain_table, show_verdicts, show_warning
-from kinertia.diagnostics.result.verdict import Verdict
+from kinertia.cli.terminal import out, plain_table
 from kinertia.estimation.identifiability import evidence
 from kinertia.estimation.result import Fit
 from kinertia.report.files import summary
@@ -18,8 +16,8 @@ _MARKS = {"measured": "**", "informed": "*", "assumed": "", "held": ""}
 _STAGES = ("literature", "corrected", "estimate")
 
 
-def report_fit(fit: Fit) -> None:
-    """Who and how, residuals of every trial, the table of segments, masses and warnings."""
+def report_tables(fit: Fit) -> None:
+    """Who and how, residuals of every trial, the table of segments, and masses."""
     fit_summary = summary(fit)
     subject, mass = fit_summary["subject"], fit_summary["total_mass_kg"]
     height = None if subject["height_m"] is None else f"{subject['height_m']:g} m"
@@ -39,26 +37,8 @@ def report_fit(fit: Fit) -> None:
     out.print(f"total mass (kg): {masses}{beside}\n")
     if fit_summary["asymmetry"]:
         out.print(f"left and right: {'; '.join(fit_summary['asymmetry'])}\n")
-    if fit.corrections:
-        out.print("Corrections applied (apparent):")
-        for correction in fit.corrections:
-            out.print(f"- {correction}")
-        out.print()
-    for warning in fit.warnings:
-        show_warning(warning)
-
-
-def report_verdicts(
-    judged: Sequence[Verdict], fit: Fit, verbose: bool, elsewhere: str = "--verbose shows them"
-) -> None:
-    """The verdicts, of which the passed ones and the assumptions are details; `elsewhere` says where to find these."""
-    show_verdicts(verdict for verdict in judged if verbose or verdict.level != "pass")
-    if not verbose:
-        passed = sum(verdict.level == "pass" for verdict in judged)
-        out.print(f"pass: {passed} of {len(judged)} checks ({elsewhere})")
-        return
     for note in fit.notes:
-        out.print(f"assumed: {note}")
+        out.print(f"assumed: {note}", soft_wrap=True)
     for trial in fit.trials:
         spent = ", ".join(f"{stage} {seconds:.1f}" for stage, seconds in trial.seconds.items())
         out.print(f"{trial.name}: seconds: {spent}")

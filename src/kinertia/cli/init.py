@@ -10,6 +10,7 @@ import typer
 from kinertia.cli.outcome import Outcome
 from kinertia.cli.terminal import out
 from kinertia.errors import FileError
+from kinertia.io.file_names import missing_file
 from kinertia.io.measures_file import measures_sheet
 from kinertia.io.output_folder import write_then_rename
 from kinertia.io.subject_draft import FILL_IN, NO_FORCES, init_subject
@@ -51,7 +52,9 @@ def init(
 def _measures(folder: Path) -> Outcome:
     sheet, picture = folder / "measures.csv", folder / "measures.svg"
     if not folder.is_dir():
-        raise FileError(folder, "is no folder; give that of the person's files")
+        raise FileError.found(
+            folder, "F101", None, missing_file(folder, str(folder), "the folder of the person's files")
+        )
     if sheet.exists():
         raise FileError(sheet, "exists already and is left alone; remove it to write a new one")
     write_then_rename(picture, measures_picture())

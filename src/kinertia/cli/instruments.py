@@ -7,9 +7,10 @@ from typing import Annotated
 
 import typer
 
+from kinertia.cli.findings_view import show_all
 from kinertia.cli.options import Quiet, own_file
 from kinertia.cli.outcome import Outcome
-from kinertia.cli.terminal import out, plain_table, show_warning, shown_progress
+from kinertia.cli.terminal import out, plain_table, shown_progress
 from kinertia.errors import FileError, SessionError
 from kinertia.estimation.simultaneous.instrument_warnings import SHOWN_UNIT
 from kinertia.io.output_folder import write_then_rename
@@ -56,7 +57,14 @@ def instruments(
         for instrument, each in session.values.items()
     }
     names = [person.name for person in session.people]
-    return Outcome({"file": str(output), "people": names, "found": found, "warnings": session.contradictions})
+    return Outcome(
+        {
+            "file": str(output),
+            "people": names,
+            "found": found,
+            "findings": [one.to_dict() for one in session.contradictions],
+        }
+    )
 
 
 def _wanted(path: Path) -> SubjectFile:
@@ -76,5 +84,4 @@ def _report(session: SessionInstruments) -> None:
             factor, shown = SHOWN_UNIT[unit]
             table.add_row(instrument, unknown, f"{value * factor:+.1f}", f"{sd * factor:.1f}", shown)
     out.print(table)
-    for sentence in session.contradictions:
-        show_warning(sentence)
+    show_all(session.contradictions)

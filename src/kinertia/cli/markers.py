@@ -27,7 +27,7 @@ def markers(
 ) -> Outcome:
     """Show the labels of a file against every marker-set preset, and draft a marker set from them.
 
-    A preset is recognised by itself where a file has at least 80 % of its labels, or of those of its pelvis, legs and
+    A preset is recognised by itself where a file has two thirds of its labels, or of those of its pelvis, legs and
     feet. For any other set give -o, complete the draft, and name it with --markers.
 
     [bold]Examples[/]

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from kinertia.cli.terminal import be_quiet
+from kinertia.diagnostics.runner import unknown_codes
 from kinertia.errors import FileError
+from kinertia.findings.rule import matching
 from kinertia.io.output_folder import check_folder, expect_own_folder
-from kinertia.settings import number_of, sex_of
+from kinertia.settings import Overrule, number_of, sex_of
 
 
 def results_folder(folder: Path, force: bool, sub_folders: Collection[str] = ()) -> None:
@@ -52,12 +54,29 @@ def sex(text: str) -> str:
 Sex = Annotated[
     str | None, typer.Option(parser=sex, metavar="SEX", help="male or female (m, f): which table of the literature.")
 ]
+Waive = Annotated[
+    list[str] | None,
+    typer.Option("--waive", metavar="CODE", help="Go on in spite of this ERROR; shown as waived. May be repeated."),
+]
 Output = Annotated[Path, typer.Option("--output", "-o", help="Folder for the results; Kinertia's own are replaced.")]
 Force = Annotated[bool, typer.Option("--force", help="Write into a folder that holds other files, too.")]
 Quiet = Annotated[
     bool, typer.Option("--quiet", "-q", callback=be_quiet, help="Show errors only; the exit status says the rest.")
 ]
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Show every assumption and detail as well.")]
+
+
+def overrule_of(waive: Sequence[str] | None) -> Overrule:
+    """What `--waive` overrules.
+
+    Raises:
+        BadParameter: no such code, or one that cannot be waived.
+    """
+    overrule = Overrule(waive=tuple(code.upper() for code in waive or ()))
+    for code in unknown_codes(overrule):
+        hard = "cannot be waived: nothing can be computed with it" if matching(code) else "is no code of a finding"
+        raise typer.BadParameter(f"{code} {hard}; see kinertia explain {code[:1]}")
+    return overrule
 
 
 def own_file(output: Path, read: Callable[[Path], object], command: str) -> None:

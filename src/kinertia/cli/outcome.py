@@ -12,6 +12,7 @@ from typing import Annotated, Any, NoReturn, get_type_hints
 import typer
 
 from kinertia.cli.terminal import out, print_json
+from kinertia.errors import KinertiaError, findings_of
 
 _AS_JSON = Annotated[bool, typer.Option("--json", help="Print the results as JSON, for scripts, and nothing else.")]
 
@@ -38,6 +39,11 @@ def add_command(app: typer.Typer, command: Callable[..., Any], name: str | None 
     app.command(name)(_with_json(command, hints) if hints["return"] is Outcome else command)
 
 
+def of_error(error: KinertiaError) -> dict[str, Any]:
+    """What a script needs of an error: its text, and the findings that it is of."""
+    return {"error": str(error), "findings": [one.to_dict() for one in findings_of(error)]}
+
+
 def _with_json(command: Callable[..., Outcome], hints: Mapping[str, Any]) -> Callable[..., NoReturn]:
     signature = inspect.signature(command)
     own = "as_json" in signature.parameters
@@ -46,8 +52,13 @@ def _with_json(command: Callable[..., Outcome], hints: Mapping[str, Any]) -> Cal
     def run(*, as_json: bool, **given: Any) -> NoReturn:
         if own:
             given["as_json"] = as_json
-        with out.capture() if as_json else nullcontext():
-            outcome = command(**given)
+        try:
+            with out.capture() if as_json else nullcontext():
+                outcome = command(**given)
+        except KinertiaError as error:
+            if as_json:
+                print_json(of_error(error))
+            raise
         if as_json:
             print_json(outcome.content)
         raise typer.Exit(outcome.status)

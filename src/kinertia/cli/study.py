@@ -39,7 +39,7 @@ from kinertia.report.table1 import save_table1, table1_rows, table1_summary
 from kinertia.report.table1_variants import HEADINGS as VARIANT_HEADINGS
 from kinertia.report.table1_variants import save_variants, variants_frame, variants_rows
 from kinertia.studies.accuracy import SCENARIOS, run_accuracy
-from kinertia.studies.faults import run_faults, run_sound, sound_laboratories, synthetic_walk
+from kinertia.studies.faults import reported, run_faults, run_sound, sound_laboratories, synthetic_walk
 from kinertia.studies.populations import run_populations
 from kinertia.studies.sensitivity import KINDS, run_sensitivity
 from kinertia.studies.table1 import CONDITIONS, Table1, measured_trial, run_table1, study_trial
@@ -214,20 +214,22 @@ def sensitivity(
 def faults(
     walks: Annotated[
         list[Path] | None,
-        typer.Argument(metavar="[SUBJECT]...", help="Subject files of sound walks to spoil besides the synthetic one."),
+        typer.Argument(
+            metavar="[SUBJECT]...", help="Subject files of fault-free walks to use besides the synthetic one."
+        ),
     ] = None,
     workers: Workers = None,
     output: Output = Path("out"),
     force: Force = False,
     quiet: Quiet = False,
 ) -> Outcome:
-    """Is a wrong measurement named? Fifty known mistakes in sound walks, one at a time.
+    """Is a wrong measurement identified? Fifty known faults in fault-free walks, one at a time.
 
-    Swapped labels, wrong axes, units, clocks and zeros, another person's static
-    trial and the like are made in the files of sound walks: a synthetic one,
-    and yours. Each goes to kinertia check, and to kinertia fit where that has
-    no doubts. What is said of sound walks, and of ten synthetic people in
-    sound laboratories, is counted, too.
+    Swapped labels, wrong axes, units, delays and zeros, another person's static
+    trial and the like are made in the files of fault-free walks: a synthetic
+    one, and yours. Each goes to kinertia check, and to kinertia fit where that
+    does not identify it. Findings are counted by code, those in fault-free
+    walks and of ten synthetic people in fault-free laboratories as well.
 
     [bold]Examples[/]
 
@@ -242,9 +244,9 @@ def faults(
         for wanted in given:
             name = wanted.subject.name
             sources[name if name not in sources else f"{name} ({len(sources)})"] = wanted
-        sound, outcomes = run_faults(sources, workers=workers, progress=lambda share: progress("mistakes", share))
+        sound, outcomes = run_faults(sources, workers=workers, progress=lambda share: progress("faults", share))
         people = sound_laboratories(Path(folder), SOUND_LABORATORIES)
-        laboratories = run_sound(people, workers, lambda share: progress("sound laboratories", share))
+        laboratories = run_sound(people, workers, lambda share: progress("fault-free laboratories", share))
     save_faults(sound, outcomes, laboratories, output)
     shown = plain_table("", *(one.name for one in sound))
     for kind in counts(()):
@@ -252,10 +254,10 @@ def faults(
     out.print(shown)
     for one in outcomes:
         if one.outcome in ("silent", "warned"):
-            out.print(f"{one.outcome}: {one.walk}: {one.mistake}" + (f": {one.said}" if one.said else ""))
+            out.print(f"{one.outcome}: {one.walk}: {one.mistake}" + (f": {one.code} {one.said}" if one.said else ""))
     for walk in laboratories:
-        for finding in walk.findings:
-            out.print(f"sound {walk.name}: {finding.by}: {finding.sentence}")
+        for finding in reported(walk.findings):
+            out.print(f"fault-free {walk.name}: {finding.line()}")
     out.print(f"results in {output}: faults.html, faults.md, faults.json", soft_wrap=True)
     return Outcome(faults_summary(sound, outcomes, laboratories))
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from kinertia.cli.compiling import compile_once
-from kinertia.diagnostics.result.verdict import Verdict
 
 if TYPE_CHECKING:
     from rich.console import Capture, Console
@@ -52,7 +51,6 @@ class Stream:
 
 
 out, err = Stream(), Stream(stderr=True)
-_COLOURS = {"pass": "green", "caution": "yellow", "fail": "bold red"}
 
 
 def print_json(content: Mapping[str, Any] | Sequence[Any]) -> None:
@@ -81,21 +79,6 @@ def show_error(message: str) -> None:
 
     text = Text("error: ", style="bold red").append(" ".join(message.split("\n")), style="not bold default")
     err.print(text, soft_wrap=True)
-
-
-def show_warning(sentence: str) -> None:
-    """One of a result's, on standard output."""
-    from rich.text import Text
-
-    out.print(Text("warning: ", style="bold yellow").append(sentence, style="not bold default"))
-
-
-def show_verdicts(verdicts: Iterable[Verdict]) -> None:
-    """One paragraph each, the level first."""
-    from rich.text import Text
-
-    for level, sentence in verdicts:
-        out.print(Text(f"{level}: ", style=_COLOURS[level]).append(sentence, style="not bold default"))
 
 
 @contextmanager

@@ -9,12 +9,17 @@ from typing import Any
 
 from kinertia.diagnostics.axes import Axes, AxisNames
 from kinertia.diagnostics.evidence.caused_velocity import CausedVelocity, caused_velocities
+from kinertia.diagnostics.evidence.copied_frames import without_copied_frames
 from kinertia.diagnostics.evidence.foot_trajectories import FootTrajectory, foot_trajectories
+from kinertia.diagnostics.evidence.force_mass import ForceMass, force_mass
+from kinertia.diagnostics.evidence.loaded_plates import adult_share
+from kinertia.diagnostics.evidence.marker_precision import MarkerPrecision
 from kinertia.diagnostics.evidence.plate_contacts import PlateContact, contacts_of
 from kinertia.diagnostics.evidence.plate_edges import Overhang, overhangs
+from kinertia.diagnostics.evidence.trajectory_faults import TrajectoryFaults
 from kinertia.errors import KinertiaError
 from kinertia.estimation.carried_mass import CarriedMass
-from kinertia.findings.finding import Finding
+from kinertia.findings.finding import Finding, Severity
 from kinertia.findings.where import Where
 from kinertia.model.imported import OsimModel
 from kinertia.model.marker_set import MarkerSet
@@ -69,6 +74,23 @@ class RecordingContext:
             return self.recording.markers
         present = set(self.recording.markers.labels)
         return self.recording.markers.select([label for label in self.marker_set.labels if label in present])
+
+    @cached_property
+    def measured_markers(self) -> Markers:
+        """`markers` without copies of lost frames."""
+        return self.markers if self.is_static else without_copied_frames(self.markers)
+
+    @cached_property
+    def marker_precision(self) -> MarkerPrecision:
+        """Rounding and noise of the coordinates."""
+        return MarkerPrecision.of(self.measured_markers)
+
+    @cached_property
+    def trajectory_faults(self) -> TrajectoryFaults:
+        """Spikes, jumps and filled intervals of single markers; of who stands still, repeated spikes only."""
+        segments = {} if self.marker_set is None else self.marker_set.segments
+        coarse = self.is_static or self.marker_precision.rounded or self.marker_precision.noisy
+        return TrajectoryFaults.of(self.measured_markers, segments, coarse)
 
     @cached_property
     def travel(self) -> Travel:
@@ -133,9 +155,21 @@ class RecordingContext:
         return self.loaded if isinstance(self.loaded, Trial) else None
 
     @cached_property
+    def adult_share(self) -> float:
+        """Body weight over an adult's, at most 1: limits in newtons, which are those of adults, are times this."""
+        return adult_share(self.plates, self.mass_kg)
+
+    @cached_property
     def velocities(self) -> Sequence[CausedVelocity]:
         """How fast the body is by markers and by forces, one entry per measured window."""
         return () if self.trial is None else caused_velocities(self.trial, self.segment_of_label)
+
+    @cached_property
+    def force_mass(self) -> ForceMass | None:
+        """Body mass by the vertical force; None where forces or markers do not show it."""
+        if self.trial is None:
+            return None
+        return force_mass(self.segment_of_label, self.trial, self.travel.kind == "stands still")
 
     def at(self, **where: Any) -> Where:
         """A place in this recording: `at(plate="plate 1", **self.along(2))`."""
@@ -159,6 +193,7 @@ class PersonContext:
         calibrated: markers and joints of the model are to move.
         total_mass: what was stated of the body and of what was worn; None where no mass is known.
         found: findings of the recordings themselves, where a question depends on them.
+        more_statics: recordings in which the person stands, of which none is the static trial.
     """
 
     subject: Subject
@@ -169,3 +204,16 @@ class PersonContext:
     calibrated: bool = False
     total_mass: CarriedMass | None = None
     found: Sequence[Finding] = field(default=())
+    more_statics: Sequence[RecordingContext] = ()
+
+    @property
+    def standing(self) -> Sequence[RecordingContext]:
+        """The static trial, or every recording that may be it."""
+        return self.more_statics if self.static is None else (self.static, *self.more_statics)
+
+    def has_error(self, trial: str, *codes: str) -> bool:
+        """Whether an ERROR of one of these codes, questions or families was found in a trial."""
+        return any(
+            one.severity is Severity.ERROR and one.where.trial == trial and one.code.startswith(codes)
+            for one in self.found
+        )

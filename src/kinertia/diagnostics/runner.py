@@ -6,12 +6,13 @@ the relation `supersedes` of the catalogue: there is no order of evaluation that
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
 
 from kinertia.findings.finding import Finding, Severity
 from kinertia.findings.rule import matching, rule
+from kinertia.settings import Overrule
 
 Context = TypeVar("Context")
 
@@ -29,26 +30,6 @@ class Question(Generic[Context]):
     code: str
     ask: Callable[[Context], Iterable[Finding]]
     unless: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class Overrule:
-    """What a user overrules: codes, questions or families.
-
-    Attributes:
-        waive: ERRORs that do not block; shown as waived in every output.
-        ignore: findings below ERROR that are not shown and lower no verdict.
-
-    Examples:
-        >>> kinertia.Overrule(waive=("P244",)).waive
-        ('P244',)
-    """
-
-    waive: tuple[str, ...] = ()
-    ignore: tuple[str, ...] = ()
-
-    def __add__(self, other: Overrule) -> Overrule:
-        return Overrule((*self.waive, *other.waive), (*self.ignore, *other.ignore))
 
 
 def asked(
@@ -108,18 +89,26 @@ def _resolved(one: Finding, findings: Sequence[Finding]) -> Finding:
     return one
 
 
-def overruled(findings: Iterable[Finding], overrule: Overrule) -> list[Finding]:
+def overruled(
+    findings: Iterable[Finding], overrule: Overrule, of_trials: Mapping[str, Overrule] | None = None
+) -> list[Finding]:
     """Findings with the status that the user gives them: ERRORs are waived unless nothing can be computed, others
-    ignored."""
-    waived = {code for each in overrule.waive for code in matching(each)}
-    ignored = {code for each in overrule.ignore for code in matching(each)}
+    ignored.
 
-    def one(finding: Finding) -> Finding:
-        if finding.severity is Severity.ERROR:
-            return replace(finding, status="waived") if finding.code in waived and not finding.rule.hard else finding
-        return replace(finding, status="ignored") if finding.code in ignored else finding
-
-    return [one(finding) for finding in findings]
+    Args:
+        findings: with what explains each.
+        overrule: in all trials.
+        of_trials: in single trials, by their names.
+    """
+    result = []
+    for one in findings:
+        rule_of_trial = (of_trials or {}).get(one.where.trial or "", Overrule())
+        is_error = one.severity is Severity.ERROR
+        codes = (overrule + rule_of_trial).waive if is_error else (overrule + rule_of_trial).ignore
+        if any(one.code.startswith(code) for code in codes) and not (is_error and one.rule.hard):
+            one = replace(one, status="waived" if is_error else "ignored")
+        result.append(one)
+    return result
 
 
 def blocking(findings: Iterable[Finding]) -> list[Finding]:

@@ -41,6 +41,16 @@ def with_elbows_that_bend_forwards(
     return turned, first_poses(turned, trials)
 
 
+def elbow_rotations(before: Skeleton, after: Skeleton) -> dict[str, float]:
+    """By how much `with_elbows_that_bend_forwards` has turned elbow axes about the upper arm: side -> rad.
+
+    Sides that it has left alone are not in it.
+    """
+    names = {side: f"arm_rot_{side}" for side in "rl"}
+    rotations = {side: after.locked.get(name, 0.0) - before.locked.get(name, 0.0) for side, name in names.items()}
+    return {side: float(rotation) for side, rotation in rotations.items() if rotation != 0.0}
+
+
 def _bends_backwards(skeleton: Skeleton, poses: Sequence[InverseKinematics], elbow: str) -> bool:
     angles = _angles(poses, elbow)
     return len(angles) > 0 and bool(np.median(angles) < skeleton.ranges[elbow].low - _BACKWARDS_RAD)

@@ -26,9 +26,12 @@ from itertools import product, zip_longest
 
 import numpy as np
 
-from kinertia.errors import PriorError
+from kinertia.errors import PriorError, problem_of
 from kinertia.estimation.gaussian_update import updated
 from kinertia.estimation.prior import BspPrior
+from kinertia.findings.finding import Finding, Severity, with_evidence
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
 from kinertia.model.bsp import PARAMETERS, BodySegmentParameters
 from kinertia.model.measures import GIRTH_OVER_WIDTH, girths_with_widths, log_size, measures, usual_build
 from kinertia.model.skeleton import Skeleton
@@ -58,7 +61,7 @@ _KINDS_OF_PART = {
 _STEP = 1e-4
 _TELLS = ("mass", "com", "ixx", "iyy", "izz")
 _FAR_SD = 4.0
-_FEW_DOUBTS = 3
+_FEW = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,14 +72,14 @@ class MeasuredBody:
         values: (7, 5) mass (kg), centre of mass along the segment (m) and moments of inertia (kg m2) of `KINDS`.
         covariance: (35, 35) of their errors.
         total_kg, total_sd_kg: the whole body's mass.
-        doubts: one sentence for each measurement that hardly goes with the others.
+        findings: one for each measurement that hardly goes with the others.
     """
 
     values: np.ndarray
     covariance: np.ndarray
     total_kg: float
     total_sd_kg: float
-    doubts: tuple[str, ...]
+    findings: tuple[Finding, ...]
 
 
 def expected_measures(mass_kg: float, height_m: float, mass_sd_kg: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
@@ -133,28 +136,26 @@ def measured_body(
     places, values, sd = (np.array(each) for each in zip(*rows, strict=True))
     seen, noise = np.eye(len(names))[places], np.diag(np.square(sd))
     logs, left = updated(expected, spread, seen, np.log(values), noise)
-    doubts = _doubts(stated, seen @ expected, seen @ spread @ seen.T + noise, np.log(values))
+    implausible = _implausible(stated, seen @ expected, seen @ spread @ seen.T + noise, np.log(values))
     try:
-        return _with_errors(logs, left, lumbar_m, doubts)
+        return _with_errors(logs, left, lumbar_m, implausible)
     except PriorError as error:
-        if doubts:  # the likelier cause, and in the words of the sheet
-            more = len(doubts) - _FEW_DOUBTS
-            others = f"; and {more} more like these: are they in cm, and of this person?" if more > 0 else ""
-            told = "; ".join(doubts[:_FEW_DOUBTS])
-            raise PriorError(f"no body has these girths and lengths: {told}{others}") from error
+        if implausible:  # the likelier cause, and in the words of the sheet
+            blocking = [one.at(Severity.ERROR) for one in implausible]
+            told = "; ".join(one.message for one in blocking[:_FEW])
+            raise PriorError(f"no body has these girths and lengths: {told}").with_finding(blocking[0]) from error
         raise
 
 
-def _doubts(
+def _implausible(
     stated: Mapping[str, tuple[float, float]], expected: np.ndarray, covariance: np.ndarray, values: np.ndarray
-) -> tuple[str, ...]:
-    """Measurements that are far from what all others lead to expect, and cross-sections that cannot be."""
+) -> tuple[Finding, ...]:
+    """S403: measurements that are far from what all others imply, and cross-sections that cannot be."""
     information = np.linalg.inv(covariance)
     away = information @ (values - expected) / np.sqrt(np.diag(information))
     others = values - information @ (values - expected) / np.diag(information)
-    doubts = [
-        f"{name} is {100 * value:.4g} cm; mass, height and the other measures lead to expect about "
-        f"{100 * np.exp(others[k]):.3g} cm: measured at another place, or a slip of the pen?"
+    found = [
+        _unlike(name, Quantity(value, "m"), Quantity(float(np.exp(others[k])), "m"), distance_sd=_in_sd(away[k]))
         for k, (name, (value, _)) in enumerate(stated.items())
         if abs(away[k]) > _FAR_SD
     ]
@@ -164,11 +165,21 @@ def _doubts(
             ratio = stated[one][0] / stated[other][0]
             low, high = GIRTH_OVER_WIDTH
             if not 0.95 * low < ratio < 1.05 * high:
-                doubts.append(f"{one} is {ratio:.2f} times {other}; that of any cross-section is 2 to 3.14 times")
-    return tuple(doubts)
+                measure = f"{one}, as a multiple of {other},"
+                found.append(_unlike(measure, Quantity(ratio, "1"), Quantity("2 to 3.14"), ratio=Quantity(ratio, "1")))
+    return tuple(found)
 
 
-def _with_errors(logs: np.ndarray, covariance: np.ndarray, lumbar_m: float, doubts: tuple[str, ...]) -> MeasuredBody:
+def _in_sd(distance: float) -> Quantity:
+    return Quantity(float(abs(distance)), "1", limit=_FAR_SD)
+
+
+def _unlike(measure: str, value: Quantity, expected: Quantity, **by: Quantity) -> Finding:
+    evidence = {"value_m": value, "expected_m": expected, "measure": Quantity(measure), **by}
+    return with_evidence("S403", Where(part=measure), evidence)
+
+
+def _with_errors(logs: np.ndarray, covariance: np.ndarray, lumbar_m: float, found: tuple[Finding, ...]) -> MeasuredBody:
     """The body of measures whose logarithms have this mean and covariance."""
     middle = np.exp(logs)
     values = _told(middle, lumbar_m)
@@ -184,7 +195,7 @@ def _with_errors(logs: np.ndarray, covariance: np.ndarray, lumbar_m: float, doub
     errors += other @ other.T
     mass = slice(0, None, len(_TELLS))
     total_sd = float(np.sqrt(_HOW_MANY @ errors[mass, mass] @ _HOW_MANY))
-    return MeasuredBody(values, errors, _total_kg(values[:, 0]), total_sd, doubts)
+    return MeasuredBody(values, errors, _total_kg(values[:, 0]), total_sd, found)
 
 
 def _slopes(measures_m: np.ndarray, lumbar_m: float, values: np.ndarray) -> np.ndarray:
@@ -264,7 +275,9 @@ def with_measures(
     """
     names = prior.mean.segments
     if missing := [kind for kind in KINDS if kind not in names]:
-        raise PriorError(f"[prior] measures are of the built-in model's segments; this model has no {missing[0]}")
+        inputs = {"one": Quantity("[prior] measures"), "other": Quantity(f"a model without {missing[0]}")}
+        found = with_evidence("S405", Where(), inputs)
+        raise PriorError(problem_of(found)).with_finding(found)
     lengths_m, hip, lumbar = _joint_lengths(skeleton)
     body = measured_body(stated, lengths_m, float(lumbar[1] - hip[1]), mass_kg, height_m, mass_sd_kg)
     seen = np.zeros((body.values.size, 10 * len(names)))

@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from kinertia.errors import PriorError
+from kinertia.errors import PriorError, problem_of
+from kinertia.findings.finding import with_evidence
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
 from kinertia.settings import Attached
 
 UNKNOWN_SHARE, UNKNOWN_SHARE_SD = 0.10, 0.15
@@ -50,11 +53,10 @@ class CarriedMass:
         body = scale_kg - sum(mass for (mass, _), weighed in masses if weighed)
         if body < min(_LIGHTEST_KG, scale_kg):
             names = ", ".join(one.name for one in attached if one.on_scale)
-            raise PriorError(
-                f"[[attached]] {names}: {scale_kg - body:.4g} kg, weighed with the person (on_scale = true), of the "
-                f"{scale_kg:.4g} kg under [subject]: that leaves {body:.4g} kg for the person; give masses in kg, and "
-                "on_scale = false for what the scale did not weigh"
-            )
+            problem = f"weighed with the person (on_scale = true), it leaves {body:.4g} kg of {scale_kg:.4g} kg"
+            left = {"left_kg": Quantity(body, "kg"), "name": Quantity(names), "problem": Quantity(problem)}
+            found = with_evidence("S406", Where(part=names), left)
+            raise PriorError(problem_of(found)).with_finding(found)
         beside = [mass for mass, weighed in masses if not weighed]
         return cls(body, scale_kg + sum(mass for mass, _ in beside), sum(sd * sd for _, sd in beside) ** 0.5)
 

@@ -13,83 +13,27 @@ spoilt ones, of which the turned sign is tried first. Then the quadratic at the 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from kinertia.estimation.prepared import Prepared
-from kinertia.estimation.result import TrialFit
+from kinertia.estimation.simultaneous.evidence import FreeMomentSign
 from kinertia.estimation.simultaneous.fit import SimultaneousFit, held_against
 from kinertia.motion.dynamics import residual
 from kinertia.motion.kinematics import Kinematics
 from kinertia.trial.centre_of_pressure import FIRM_LOAD_N, free_moment, with_turned_free_moments
 from kinertia.trial.rms import rms
 
-_LESS = 0.8
-"""Share of what is left as measured, below which what is left with the sign turned speaks against the sign."""
 _LARGE = 0.5
 """Share of what is left, below which twice the free moments are too small for the measured motion to judge."""
 _PLAINLY = 1.2
 """Times as much left with the sign turned: it is right. Where so much less is left, the turned one is tried first."""
 _NONE_NM = 0.2
 """RMS of free moments that are as good as none: turned, they move no joint moment by more than twice that."""
-_WRONG_ODDS = 0.25
-"""Of a wrong sign to a right one before anything is measured: of some ten laboratories, two had it wrong."""
-_SURE = float(np.log(0.95 / 0.05))
-"""Logarithm of the odds at which a sign counts as found: a chance of 95 %."""
 VERTICAL = 4
 """Moment about the upward axis, among force and moment."""
-
-
-@dataclass(frozen=True)
-class FreeMomentSign:
-    """What a person's trials say of the sign of the free moments.
-
-    Attributes:
-        log_odds: logarithm of how much likelier the trials are with the sign turned.
-        rms_nm: of the free moments, N m.
-
-    >>> FreeMomentSign(59.0, 2.0).wrong, FreeMomentSign(1.0, 2.0).open, FreeMomentSign(-20.0, 2.0).open
-    (True, True, False)
-    """
-
-    log_odds: float
-    rms_nm: float
-
-    @property
-    def _posterior(self) -> float:
-        return self.log_odds + float(np.log(_WRONG_ODDS))
-
-    @property
-    def wrong(self) -> bool:
-        """Whether it is wrong in the files."""
-        return self._posterior > _SURE
-
-    @property
-    def open(self) -> bool:
-        """Whether these trials leave it open."""
-        return abs(self._posterior) <= _SURE
-
-    @property
-    def correction(self) -> str:
-        """The sentence where it was turned, else ""."""
-        if not self.wrong:
-            return ""
-        return (
-            f"Free moments: wrong sign in the force files, corrected (log odds at least {self.log_odds:.0f} for the "
-            f"other sign over all trials; {self.rms_nm:.1f} N m RMS)"
-        )
-
-    @property
-    def note(self) -> str:
-        """The sentence where it stays open, else ""."""
-        if not self.open:
-            return ""
-        return (
-            f"free moments: sign as in the force files, which these trials cannot judge (log odds {self.log_odds:+.1f} "
-            f"for the other sign; {self.rms_nm:.1f} N m RMS); add a walk"
-        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,14 +41,12 @@ class Signed:
     """The estimate with the likelier sign.
 
     Attributes:
-        fitted: the estimate.
+        fitted: the estimate; its posterior has the sign.
         ready: the person with the free moments that it is from.
-        sign: what was found; None where there was nothing to ask.
     """
 
     fitted: SimultaneousFit
     ready: Prepared
-    sign: FreeMomentSign | None
 
 
 def with_likelier_sign(ready: Prepared, fit: Callable[[Prepared, Sequence[Kinematics]], SimultaneousFit]) -> Signed:
@@ -117,7 +59,7 @@ def with_likelier_sign(ready: Prepared, fit: Callable[[Prepared, Sequence[Kinema
     rms_nm = rms(np.concatenate([_free_nm(k.foot_loads) for k in ready.kinematics]))
     left = _left_turned(ready) if rms_nm >= _NONE_NM else np.inf
     if left > _PLAINLY:
-        return Signed(fit(ready, ()), ready, None)
+        return Signed(fit(ready, ()), ready)
     turned = tuple(
         replace(k, trial=replace(k.trial, loads=with_turned_free_moments(k.trial.loads))) for k in ready.kinematics
     )
@@ -129,11 +71,15 @@ def with_likelier_sign(ready: Prepared, fit: Callable[[Prepared, Sequence[Kinema
     to_turned = -1.0 if likely_wrong else 1.0
     sign = FreeMomentSign(0.0 if otherwise is None else to_turned * (otherwise - found), rms_nm)
     if not sign.open and sign.wrong is likely_wrong:
-        return Signed(fitted, first, sign)
+        return Signed(_with_sign(fitted, sign), first)
     instead = fit(second, ())
     sign = FreeMomentSign(to_turned * (instead.result.evidence.found - found), rms_nm)
     kept, used, beside = (fitted, first, instead) if sign.wrong is likely_wrong else (instead, second, fitted)
-    return Signed(held_against(kept, beside, used.kinematics) if sign.open else kept, used, sign)
+    return Signed(_with_sign(held_against(kept, beside) if sign.open else kept, sign), used)
+
+
+def _with_sign(fitted: SimultaneousFit, sign: FreeMomentSign) -> SimultaneousFit:
+    return replace(fitted, posterior=replace(fitted.posterior, free_moment_sign=sign))
 
 
 def _left_turned(ready: Prepared) -> float:
@@ -146,21 +92,6 @@ def _left_turned(ready: Prepared) -> float:
         as_is, turned = _left_nm(left, _free_nm(k.foot_loads))
         ratios.append(turned / as_is)
     return float(np.exp(np.mean(np.log(ratios))))
-
-
-def free_moment_sign_warnings(trials: Iterable[TrialFit]) -> Iterator[str]:
-    """A sentence for each trial whose free moments go with the measured motion once their sign is turned: for an
-    estimate that has no evidence.
-    """
-    for trial in trials:
-        as_is, turned = left_moments_nm(trial.residuals["literature"][:, VERTICAL], trial.kinematics.foot_loads)
-        if turned < _LESS * as_is:
-            yield (
-                f"{trial.name}: the plates' free moments (about the vertical, under each foot) seem to have the wrong "
-                f"sign: with it turned, {turned:.1f} N m (RMS) are left between forces and motion in place of "
-                f"{as_is:.1f}; check the sign of the vertical moment (Mz of a C3D file, the torque about the upward "
-                f"axis of a force file), and export the forces again"
-            )
 
 
 def left_moments_nm(left: np.ndarray, foot_loads: np.ndarray) -> tuple[float, float]:

@@ -27,9 +27,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kinertia.errors import PriorError
-from kinertia.estimation.person_information import PersonInformation
+from kinertia.errors import PriorError, problem_of
+from kinertia.estimation.person_information import PersonInformation, unusable
 from kinertia.estimation.prior import BspPrior
+from kinertia.findings.finding import with_evidence
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
 from kinertia.io.population_file import PopulationFile
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.sides import by_side
@@ -100,10 +103,10 @@ class LearntPrior:
             PriorError: it was learnt with another model.
         """
         if literature.mean.segments != self.segments:
-            raise PriorError(
-                f"the group's prior is of the segments {', '.join(self.segments)}; this model has "
-                f"{', '.join(literature.mean.segments)}: learn it from fits with the same model"
-            )
+            of = f"a group prior of {len(self.segments)} segments ({', '.join(self.segments)})"
+            inputs = {"one": Quantity(of), "other": Quantity(f"a model of {', '.join(literature.mean.segments)}")}
+            found = with_evidence("S405", Where(), inputs)
+            raise PriorError(problem_of(found)).with_finding(found)
         sd = literature.sd.ravel()
         table = literature.mean.table().ravel() + sd * self.mean
         mean = BodySegmentParameters.from_table(self.segments, table)
@@ -120,10 +123,11 @@ def learn(people: Sequence[PersonInformation]) -> LearntPrior:
         PriorError: too few, or estimated with different models.
     """
     if len(people) < FEWEST_PEOPLE:
-        raise PriorError(f"{len(people)} people; a group's mean and spread take at least {FEWEST_PEOPLE}")
+        reason = f"its mean and spread take at least {FEWEST_PEOPLE}"
+        raise unusable(f"A group of {len(people)}", reason, people=Quantity(len(people), "1", limit=FEWEST_PEOPLE))
     segments = people[0].segments
     if other := next((one for one in people if one.segments != segments), None):
-        raise PriorError(f"{other.name} was estimated with another model than {people[0].name}")
+        raise unusable(other.name, f"estimated with another model than {people[0].name}")
     # in coordinates in which the literature's people are uncorrelated, where nothing is close to singular
     correlations = np.mean([_correlation(one.literature.covariance) for one in people], axis=0)
     root = np.linalg.cholesky(correlations)

@@ -13,10 +13,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinertia.errors import PriorError
+from kinertia.errors import PriorError, problem_of
 from kinertia.estimation.population import population_prior
 from kinertia.estimation.prior import BspPrior, literature_prior
 from kinertia.estimation.result import Fit
+from kinertia.findings.finding import with_evidence
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
 from kinertia.model.bsp import BodySegmentParameters, block_diagonal, dynamic_by_table
 
 _OWN_PRIOR = 1e-6
@@ -87,6 +90,14 @@ def _relative(literature: BspPrior, body: BodySegmentParameters) -> tuple[np.nda
     return along * sd / sd[:, None], moved / sd
 
 
+def unusable(person: str, reason: str, **evidence: Quantity) -> PriorError:
+    """S409: a person, or a group, from whom no prior can be learnt."""
+    found = with_evidence(
+        "S409", Where(part=person), {**evidence, "person": Quantity(person), "reason": Quantity(reason)}
+    )
+    return PriorError(problem_of(found)).with_finding(found)
+
+
 def information_of(fit: Fit) -> PersonInformation:
     """What the recordings of a fit say.
 
@@ -95,11 +106,11 @@ def information_of(fit: Fit) -> PersonInformation:
     """
     name = fit.subject.name
     if fit.posterior is None:
-        raise PriorError(f"{name}: estimated by the two-level method, which has no error bars")
+        raise unusable(name, "estimated by the two-level method, which has no error bars")
     literature = literature_prior(fit.literature)
     own = population_prior(literature, fit.subject).prior
     if fit.file is not None or not np.allclose(fit.posterior.prior_sd, own.sd, rtol=_OWN_PRIOR):
-        raise PriorError(f"{name}: leant on another prior than the literature's of the built-in model")
+        raise unusable(name, "estimated with another prior than the tables' for the built-in model")
     return person_information(name, literature, own, fit.estimate, fit.posterior.covariance)
 
 

@@ -23,6 +23,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kinertia.estimation.prior import BspPrior
+from kinertia.findings.finding import Finding, Severity, with_evidence
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.settings import Subject
 
@@ -38,40 +41,58 @@ _PAVOL = {
     "female": {"thigh": 0.1162, "shank": 0.0456, "foot": 0.0123, "upper_arm": 0.0301, "forearm": 0.0141 + 0.0054},
 }
 """Shares of body mass; the forearm with its hand."""
-HELP = "measured segments ([segment.thigh_r] mass_kg = ...), squats or a swaying trunk as further trials would help"
+
+
+@dataclass(frozen=True)
+class Population:
+    """Which people the person is one of, why, and whether that was stated."""
+
+    name: str
+    reason: str
+    stated: bool
+
+    def finding(self, subject: Subject) -> Finding | None:
+        """S401 where the tables do not describe them."""
+        if self.name == "adult":
+            return None
+        evidence = {"population": Quantity(self.name), "reason": Quantity(self.reason)}
+        if subject.mass_kg is not None and subject.height_m is not None:
+            evidence["bmi"] = Quantity(subject.mass_kg / subject.height_m**2, "kg/m2", limit=OBESE_KG_M2)
+        if subject.age_years is not None:
+            evidence["age"] = Quantity(subject.age_years, "a")
+        return with_evidence("S401", Where(), evidence, Severity.INFO if self.stated else Severity.WARNING)
 
 
 @dataclass(frozen=True, eq=False)
 class PopulationPrior:
-    """A prior, and what the user should know of it: one sentence each."""
+    """A prior, and what was assumed for it."""
 
     prior: BspPrior
-    notes: tuple[str, ...]
-    warnings: tuple[str, ...]
+    findings: tuple[Finding, ...]
 
 
 def population_prior(prior: BspPrior, subject: Subject, body_kg: float | None = None) -> PopulationPrior:
-    """The prior for this person: as the subject says, or by age and body-mass index.
+    """The prior for this person: as the subject states, or by age and body-mass index.
 
     Args:
         prior: the literature's, or that of a scaled model.
         subject: mass and height may be unknown.
         body_kg: of the body alone, where things were weighed with it; None: the mass of the subject.
     """
-    stated = subject.population
-    population, why = (
-        (stated, "as stated") if stated is not None else _by_age_and_build(subject, body_kg or subject.mass_kg)
-    )
-    said = []
-    if population == "elderly" and subject.sex is not None:
+    population = population_of(subject, body_kg)
+    if population.name == "elderly" and subject.sex is not None:
         prior = _spread(_with_masses(prior, _PAVOL[subject.sex]), keep_masses=True)
-        said.append("segment masses by Pavol 2002, deviations of all else half as large again")
-    elif population != "adult":
+    elif population.name != "adult":
         prior = _spread(prior)
-        said.append("no numbers that could be checked: young adults' values with deviations half as large again")
-    sentences = [f"population: {population} ({why}), of whom the tables are not: {one}; {HELP}" for one in said]
-    notes, warnings = (sentences, []) if stated is not None else ([], sentences)
-    return PopulationPrior(prior, tuple(notes), tuple(warnings))
+    assumed = population.finding(subject)
+    return PopulationPrior(prior, () if assumed is None else (assumed,))
+
+
+def population_of(subject: Subject, body_kg: float | None = None) -> Population:
+    """As stated, or by age, body-mass index and stature; arguments as of `population_prior`."""
+    if subject.population is not None:
+        return Population(subject.population, "as stated", True)
+    return Population(*_by_age_and_build(subject, body_kg or subject.mass_kg), False)
 
 
 def _by_age_and_build(subject: Subject, mass_kg: float | None) -> tuple[str, str]:

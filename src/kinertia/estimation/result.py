@@ -16,6 +16,8 @@ from kinertia.estimation.identifiability import evidence
 from kinertia.estimation.input_checks import known
 from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
 from kinertia.estimation.simultaneous.fit import Posterior
+from kinertia.findings.finding import Finding, Severity
+from kinertia.findings.overview import Overview
 from kinertia.model.anthropometry import SEGMENTS
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.imported import OsimModel
@@ -198,10 +200,12 @@ class Fit:
         trials: one entry per trial.
         converged: whether the estimator met its criterion.
         posterior: error bars and calibration; None after two-level, which has none.
-        warnings: what the user should know before using the numbers; one sentence each.
-        notes: assumptions made on the way; one sentence each.
+        findings: all of them, with what explains and what overrules each.
+        notes: how the trials were prepared; one sentence each.
         file: the OpenSim model that the skeleton is from, if it is.
-        corrections: apparent errors of instruments and files that the estimate has put right; one sentence each.
+        left_out: names of the trials that could not be used.
+        rules: how many rules were asked.
+        evaluations: of the two-level estimate; 0 of the other one.
 
     Examples:
         >>> mass = fit.bsp[fit.bsp.parameter == "mass"]  # fit = kinertia.fit_subject("subject.toml")
@@ -219,10 +223,27 @@ class Fit:
     trials: tuple[TrialFit, ...]
     converged: bool
     posterior: Posterior | None
-    warnings: tuple[str, ...]
+    findings: tuple[Finding, ...]
     notes: tuple[str, ...]
     file: OsimModel | None = None
-    corrections: tuple[str, ...] = ()
+    left_out: tuple[str, ...] = ()
+    rules: int = 0
+    evaluations: int = 0
+
+    @property
+    def overview(self) -> Overview:
+        """What the findings come to: verdict, counts, what is open in order of importance."""
+        return Overview(self.findings, self.rules, len(self.trials) + len(self.left_out), self.left_out)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Messages of open ERRORs and WARNINGs; deprecated: use `findings`."""
+        return tuple(one.line() for one in self.overview.open if one.severity >= Severity.WARNING)
+
+    @property
+    def corrections(self) -> tuple[str, ...]:
+        """Messages of what was found and corrected; deprecated: use `findings`."""
+        return tuple(one.line() for one in self.overview.open if one.severity is Severity.CORRECTED)
 
     @cached_property
     def bsp(self) -> pd.DataFrame:

@@ -64,6 +64,10 @@ class Finding:
     muted_by: str | None = None
     status: Status = "open"
 
+    def __post_init__(self) -> None:
+        # saved results hold it as a number
+        object.__setattr__(self, "severity", Severity(self.severity))
+
     @property
     def rule(self) -> Rule:
         """The entry of the catalogue."""
@@ -105,6 +109,10 @@ class Finding:
     def in_trial(self, trial: str) -> Finding:
         """The same, found in that trial."""
         return replace(self, where=replace(self.where, trial=trial))
+
+    def in_file(self, file: str) -> Finding:
+        """The same, found in that file."""
+        return replace(self, where=replace(self.where, file=file))
 
     def line(self) -> str:
         """Where and what on one line: `walk  P213 The zero of plate 1 is off ...`."""

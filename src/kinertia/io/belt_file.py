@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from kinertia.errors import FileError
+from kinertia.findings.quantity import Quantity
 from kinertia.io.csv_file import has_columns, read_csv
 from kinertia.io.sto import read_table
 from kinertia.trial.belt import Belt
@@ -34,11 +35,11 @@ def read_belt(stated: float | tuple[float, float] | Path | None) -> Belt | None:
     path = stated
     time, speed = _from_table(path) if path.suffix.lower() in (".mot", ".sto") else _from_csv(path)
     if not (np.isfinite(speed).all() and (np.diff(time) > 0).all()):
-        raise FileError(path, "expected times that grow and a speed at each of them")
+        raise FileError.found(path, "F181", problem=Quantity("times must grow, with a speed at each of them"))
     if speed.min() < 0 or speed.max() > _FASTEST_M_S:
-        raise FileError(
-            path, f"speeds from {speed.min():g} to {speed.max():g}; expected 0 to {_FASTEST_M_S:g} m/s of a treadmill"
-        )
+        range_ = Quantity((float(speed.min()), float(speed.max())), "m/s", limit=_FASTEST_M_S)
+        problem = f"speeds from {speed.min():g} to {speed.max():g} m/s; a treadmill's are 0 to {_FASTEST_M_S:g} m/s"
+        raise FileError.found(path, "F181", speed_m_s=range_, problem=Quantity(problem))
     return Belt(time, speed)
 
 
@@ -47,9 +48,8 @@ def _from_table(path: Path) -> tuple[np.ndarray, np.ndarray]:
     table = read_table(path)
     names = next((names for names in (_ONE, _TWO) if set(names) <= set(table.labels)), None)
     if names is None:
-        found = ", ".join(table.labels)
-        expected = f"no column {_ONE[0]} with the speed of the belt in m/s, nor {' and '.join(_TWO)} for two belts"
-        raise FileError(path, f"has {expected}; found {found}")
+        lacking = f"no column {_ONE[0]} in m/s, nor {' and '.join(_TWO)} for two belts"
+        raise FileError.found(path, "F181", problem=Quantity(f"{lacking}; found {', '.join(table.labels)}"))
     return table.time, _one_or_two(table.columns(list(names)))
 
 

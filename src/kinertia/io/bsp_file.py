@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from kinertia.errors import FileError
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
 from kinertia.io.csv_file import read_csv
 from kinertia.model.bsp import PARAMETERS, UNITS
 
@@ -43,21 +45,26 @@ def read_bsp(path: Path) -> BspTable:
     for row in read_csv(path, _COLUMNS, "the bsp.csv of a simultaneous fit (two-level has no sd)"):
         line, segment, parameter, written_unit = row.line, *(row.cells[name] for name in _COLUMNS[:3])
         if parameter not in PARAMETERS:
-            raise FileError(path, f"unknown parameter '{parameter}'; expected one of {', '.join(PARAMETERS)}", line)
+            raise _wrong(path, line, segment, parameter, f"no such parameter; those are {', '.join(PARAMETERS)}")
         unit = UNITS[PARAMETERS.index(parameter)]
         if written_unit != unit:
-            raise FileError(path, f"{segment} {parameter} is in '{written_unit}'; expected {unit}", line)
+            raise _wrong(path, line, segment, parameter, f"its unit is '{written_unit}'; expected {unit}")
         if parameter in values.setdefault(segment, {}):
-            raise FileError(path, f"{segment} {parameter} stands there twice", line)
+            raise _wrong(path, line, segment, parameter, "it is there twice")
         values[segment][parameter] = row.number("estimate"), row.number("sd")
         if not values[segment][parameter][1] > 0.0:
             without_sd.setdefault(segment, {})[parameter] = line
     for segment, known in values.items():
         if lacking := [name for name in PARAMETERS if name not in known]:
-            raise FileError(path, f"{segment} lacks {', '.join(lacking)}")
+            raise _wrong(path, None, segment, ", ".join(lacking), "missing")
     for segment, lines in without_sd.items():
         parameter, line = next(iter(lines.items()))
         if any(sd != 0.0 for _, sd in values[segment].values()):
-            raise FileError(path, f"the sd of {segment} {parameter} must be positive", line)
+            raise _wrong(path, line, segment, parameter, "its sd must be positive")
     table = np.array([[known[name] for name in PARAMETERS] for known in values.values()])
     return BspTable(path.name, tuple(values), table[..., 0], table[..., 1])
+
+
+def _wrong(path: Path, line: int | None, segment: str, parameter: str, problem: str) -> FileError:
+    words = {"parameter": Quantity(parameter), "problem": Quantity(problem)}
+    return FileError.found(path, "F183", line, words, at=Where(part=segment))

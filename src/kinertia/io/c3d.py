@@ -18,14 +18,18 @@ from typing import Any
 import numpy as np
 
 from kinertia.errors import FileError
-from kinertia.io.c3d_plates import lab_plates, person_on_plates, to_ground_plates
+from kinertia.findings.display import first_few
+from kinertia.findings.finding import Finding, Severity, finding, with_evidence
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
+from kinertia.io.c3d_plates import lab_plates, person_on_plates, plate_left_out, to_ground_plates
 from kinertia.io.c3d_structure import doubts_about, with_plain_samples
 from kinertia.io.ezc3d_library import C3dContent, C3dTrouble, expect_ezc3d, read_apart, read_content
 from kinertia.io.lab_axes import to_ground
 from kinertia.io.number_table import expect_file
-from kinertia.io.subject_prefix import people_among, without_prefixes
+from kinertia.io.subject_prefix import left_out, people_among, without_prefixes
 from kinertia.io.theia import POSE_SD_M, Poses, virtual_markers, virtual_places
-from kinertia.io.trc import METRES_PER_UNIT, stand_ins
+from kinertia.io.trc import METRES_PER_UNIT, read_as_missing, stand_ins, unknown_unit
 from kinertia.trial.data import FloatArray, Markers, Recording
 
 _OUTPUT_LISTS = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS")
@@ -44,7 +48,7 @@ def read_c3d(path: str | Path, length_unit: str | None = None, standing: bool = 
     begin at zero.
 
     Plates: types 1 to 4 (ezc3d reads no others); moment about the ground origin; samples with less than
-    `LOAD_THRESHOLD_N` of vertical force are zero. Plates that cannot be read are left out with a note, so
+    `LOAD_THRESHOLD_N` of vertical force are zero. Plates that cannot be read are left out (F151), so
     `plates` is None when none is left.
 
     Poses of segments (Theia), in a file without points: virtual markers at the landmarks of the marker set "theia".
@@ -60,33 +64,30 @@ def read_c3d(path: str | Path, length_unit: str | None = None, standing: bool = 
             or ezc3d is not installed.
     """
     path = Path(path)
-    file, left_out = _open(path)
+    file, plate_findings = _open(path)
     parameters = file["parameters"]
     poses = _poses(file)
     if poses is None:
-        labels, positions, label_notes = _markers(path, file)
+        labels, positions, label_findings = _markers(path, file)
     else:
-        labels, positions, label_notes = (), np.stack(list(poses.translation.values()), axis=1), []
-    unit_name, unit_notes = _length_unit(path, parameters, positions, length_unit)
+        labels, positions, label_findings = (), np.stack(list(poses.translation.values()), axis=1), []
+    unit_name, unit_findings = _length_unit(path, parameters, positions, length_unit)
     unit = METRES_PER_UNIT[unit_name]
     if poses is not None:
         poses = poses.scaled(unit)
         places = virtual_places(poses)
         labels, positions = tuple(places), virtual_markers(poses.standing() if standing else poses, places) / unit
-        label_notes = [
-            f"{path.name}: no markers, but poses of segments; {len(labels)} virtual markers were made of them, with a "
-            f"deviation of {POSE_SD_M * 1e3:.0f} mm each" + (", of the person standing upright" if standing else "")
-        ]
+        made = Quantity("the person standing upright" if standing else "segment poses")
+        sizes = {"count": Quantity(len(labels), "1"), "sd_m": Quantity(POSE_SD_M, "m")}
+        label_findings = [with_evidence("F165", Where(path.name), {**sizes, "source": made})]
     time = _times(file, "points" if poses is None else "rotations")[: len(positions)]
-    plates, more_left_out, plate_notes = lab_plates(path, file, unit_name)
-    left_out += more_left_out
+    plates, more_findings = lab_plates(path, file, unit_name)
     stated = str(_values(parameters, "POINT", "Y_SCREEN", [""])[0]).strip().upper()
-    rotation, up, axis_notes = to_ground(path, stated, "POINT:Y_SCREEN", unit * positions, plates)
+    rotation, up, axis_findings = to_ground(path, stated, "POINT:Y_SCREEN", unit * positions, plates)
     markers = Markers(time, labels, unit * positions @ rotation.T)
-    ground_plates, load_notes = to_ground_plates(path, plates, rotation, _times(file, "analogs"))
-    mass, height, measurements, subject_notes = _subject(path, parameters)
-    left_out_notes = [f"{path.name}: {reason}" for reason in left_out]
-    notes = [*unit_notes, *label_notes, *left_out_notes, *plate_notes, *axis_notes, *load_notes, *subject_notes]
+    ground_plates, load_findings = to_ground_plates(path, plates, rotation, _times(file, "analogs"))
+    mass, height, measurements, subject_findings = _subject(path, parameters)
+    of_plates = (*plate_findings, *more_findings, *axis_findings, *load_findings)
     virtual = {} if poses is None else dict.fromkeys(labels, POSE_SD_M)
     return Recording(
         path.stem,
@@ -95,37 +96,34 @@ def read_c3d(path: str | Path, length_unit: str | None = None, standing: bool = 
         mass,
         height,
         measurements,
-        tuple(notes),
+        (*unit_findings, *label_findings, *of_plates, *subject_findings),
         unit_name,
         up,
         virtual,
-        left_out=tuple(left_out),
     )
 
 
-def _open(path: Path) -> tuple[C3dContent, list[str]]:
-    """What is in the file, with forces where ezc3d can work them out, and why plates were left out."""
+def _open(path: Path) -> tuple[C3dContent, list[Finding]]:
+    """What is in the file, with forces where ezc3d can work them out, and plates that were left out (F151)."""
     expect_file(path)
     expect_ezc3d(path)
     doubt = doubts_about(path)
-    left_out = []
+    findings = []
     try:
         with _plain(path) as readable:
             file = read_apart(readable) if doubt else read_content(readable)
     except C3dTrouble as error:
         problem = f"{doubt}; {error}" if doubt else str(error)
-        raise FileError(path, f"broken C3D file ({problem}); export it again") from None
+        raise FileError.found(path, "F106", what=Quantity(problem)) from None
     parameters = file["parameters"]
     if file["trouble"] and _values(parameters, "FORCE_PLATFORM", "USED", [0])[0]:
         types = ", ".join(map(str, _values(parameters, "FORCE_PLATFORM", "TYPE", [])))
-        left_out.append(f"force plates (types {types}) were left out, they cannot be read: {file['trouble']}")
+        reason = f"they are of types {types} and cannot be read, {file['trouble']}"
+        findings.append(plate_left_out(path, None, reason))
     if not file["data"]["points"].shape[1] and _poses(file) is None:
-        raise FileError(
-            path,
-            "has no points; expected marker trajectories, or poses of pelvis, thighs, shanks, feet and toes as Theia "
-            "has them (forces alone are not enough)",
-        )
-    return file, left_out
+        found = "no points, nor poses of pelvis, thighs, shanks, feet and toes as Theia has them"
+        raise FileError.found(path, "F164", found=Quantity(found))
+    return file, findings
 
 
 @contextlib.contextmanager
@@ -159,32 +157,25 @@ def _values(parameters: Any, group: str, name: str, default: Any) -> Any:
     return default
 
 
-def _length_unit(path: Path, parameters: Any, positions: FloatArray, stated: str | None) -> tuple[str, list[str]]:
+def _length_unit(path: Path, parameters: Any, positions: FloatArray, stated: str | None) -> tuple[str, list[Finding]]:
     """Its name; where the file has none, the one in which markers (n, m, 3) are as far apart as on a person."""
     unit = str(_values(parameters, "POINT", "UNITS", [""])[0]).strip().lower()
     if stated is not None:
-        differs = f"{path.name}: lengths were read in {stated}, as stated; POINT:UNITS says '{unit}'"
+        differs = finding("F123", Where(path.name), stated=Quantity(stated), unit=Quantity(f"'{unit}'"))
         return stated, [] if unit == stated else [differs]
     if unit in METRES_PER_UNIT:
         return unit, []
     if unit:
-        raise FileError(
-            path,
-            f"POINT:UNITS is '{unit}'; expected mm, cm or m: correct it, or state length_unit in the subject file",
-        )
+        raise unknown_unit(path, "lengths (POINT:UNITS)", f"'{unit}'")
     size = _size(positions)
     low, high = _PERSON_M
     likely = [name for name, metres in METRES_PER_UNIT.items() if low < size * metres < high]
     if len(likely) != 1:
-        raise FileError(
-            path,
-            f"POINT:UNITS is empty, and its markers, which reach {size:.3g} units, are a person's in none of mm, cm "
-            f"and m; write the unit into the parameter, or state it: length_unit in the subject file",
-        )
-    return likely[0], [
-        f"{path.name}: POINT:UNITS is empty; taken as {likely[0]}, in which the markers reach "
-        f"{size * METRES_PER_UNIT[likely[0]]:.2f} m; if that is wrong, state it: length_unit in the subject file"
-    ]
+        unit = f"not stated, and no person's markers reach {size:.3g} of one"
+        extent = {"extent": Quantity(size, "1")} if np.isfinite(size) else {}
+        raise unknown_unit(path, "lengths (POINT:UNITS)", unit, known=extent)
+    extent_m = Quantity(size * METRES_PER_UNIT[likely[0]], "m", usual=_PERSON_M)
+    return likely[0], [finding("F122", Where(path.name), extent_m=extent_m, unit=Quantity(likely[0]))]
 
 
 def _size(positions: FloatArray) -> float:
@@ -214,7 +205,7 @@ def _continued(parameters: Any, name: str) -> list[str]:
     return entries
 
 
-def _markers(path: Path, file: Any) -> tuple[tuple[str, ...], FloatArray, list[str]]:
+def _markers(path: Path, file: Any) -> tuple[tuple[str, ...], FloatArray, list[Finding]]:
     """Labels and positions (n, m, 3) in lab axes and file units of the points that are places."""
     positions = np.moveaxis(file["data"]["points"][:3], 0, 2).swapaxes(0, 1).copy()
     missing = stand_ins(positions)
@@ -229,34 +220,27 @@ def _markers(path: Path, file: Any) -> tuple[tuple[str, ...], FloatArray, list[s
     own = [labels[k] for k in kept]
     people = list(people_among([label for label, k in zip(own, kept, strict=True) if seen[k]]))
     on_plates = person_on_plates(file["data"].get("platform", []), people, own, positions[:, kept])
-    names, notes = without_prefixes(path, own, people[0] if len(people) == 1 else on_plates)
+    names, findings = without_prefixes(path, own, people[0] if len(people) == 1 else on_plates)
     if on_plates:
-        notes.append(f"{path.name}: of {', '.join(people)} it is {on_plates} who is on the plates")
+        who = {"person": Quantity(on_plates), "people": Quantity(", ".join(people))}
+        findings.append(with_evidence("F162", Where(path.name), who))
     chosen: dict[str, int] = {}
     for k, name in zip(kept, names, strict=True):
         if name not in chosen or (not seen[chosen[name]] and seen[k]):
             chosen[name] = k
     if not chosen or not seen[list(chosen.values())].any():
-        raise FileError(
-            path, "has no markers with data among its points; expected marker trajectories, export them too"
-        )
+        raise FileError.found(path, "F164", found=Quantity(f"none of its {len(labels)} points has a label and data"))
     if outputs:
-        notes.append(
-            f"{path.name}: {len(outputs)} model outputs among the points were left out ({_some(sorted(outputs))})"
-        )
+        findings.append(left_out(path, len(outputs), f"model outputs ({first_few(sorted(outputs))})"))
     if unnamed:
-        notes.append(f"{path.name}: {len(unnamed)} unnamed points were left out")
-    repeated = [name for name, times in Counter(names).items() if times > 1]
-    if repeated:
-        notes.append(f"{path.name}: repeated labels, the first with data was kept: {_some(repeated)}")
-    for what, where in missing.items():
-        if count := where[:, list(chosen.values())].sum():
-            notes.append(f"{path.name}: {count} marker positions {what} were taken as missing")
-    return tuple(chosen), positions[:, list(chosen.values())], notes
-
-
-def _some(names: list[str]) -> str:
-    return ", ".join(names[:8]) + (", ..." if len(names) > 8 else "")
+        findings.append(left_out(path, len(unnamed), "unnamed points"))
+    for name, times in Counter(names).items():
+        if times > 1:
+            evidence = {"count": Quantity(times, "1"), "label": Quantity(name)}
+            findings.append(with_evidence("F113", Where(path.name, markers=(name,)), evidence, Severity.INFO))
+    of_markers = {what: where[:, list(chosen.values())] for what, where in missing.items()}
+    findings += read_as_missing(path, tuple(chosen), of_markers)
+    return tuple(chosen), positions[:, list(chosen.values())], findings
 
 
 def _outputs(parameters: Any, labels: list[str]) -> set[str]:
@@ -266,7 +250,7 @@ def _outputs(parameters: Any, labels: list[str]) -> set[str]:
     return {label for label in labels if label in listed or _OUTPUT_NAME.search(label)}
 
 
-def _subject(path: Path, parameters: Any) -> tuple[float | None, float | None, dict[str, float], list[str]]:
+def _subject(path: Path, parameters: Any) -> tuple[float | None, float | None, dict[str, float], list[Finding]]:
     """Mass (kg), height (m) and other lengths (m) from the PROCESSING group that Plug-in Gait writes."""
     numbers: dict[str, float] = {}
     for key in parameters.get("PROCESSING", ()):
@@ -283,6 +267,6 @@ def _subject(path: Path, parameters: Any) -> tuple[float | None, float | None, d
         per_metre, word = 1.0, "m"
     elif height is not None and height < 300:
         per_metre, word = 100.0, "cm"
-    note = f"{path.name}: the lengths in PROCESSING were taken as {word}"
+    taken = finding("F124", Where(path.name), unit=Quantity(word))
     height_m = None if height is None else height / per_metre
-    return mass, height_m, {key: value / per_metre for key, value in lengths.items()}, [note]
+    return mass, height_m, {key: value / per_metre for key, value in lengths.items()}, [taken]

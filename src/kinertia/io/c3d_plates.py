@@ -8,21 +8,26 @@ and the free moment; ezc3d's moment has the opposite sign there, so the moment i
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from kinertia.errors import FileError
+from kinertia.findings.finding import Finding, Severity, finding, with_evidence
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
+from kinertia.io.plate_moments import MOMENTS_FIT
 from kinertia.io.trc import METRES_PER_UNIT
 from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads
 from kinertia.trial.idle_plate import without_idle
+from kinertia.trial.impossible_data import impossible_load
 
 _CORNER_LIMIT_M = 50.0
 _EDGE_LIMITS_M = (0.1, 10.0)
-_OUTSIDE_LIMIT_M = 0.05
-_OFFSET_LIMIT_N = 5.0
+_ZERO_N = (5.0, 15.0)
+"""A zero offset between these is worth a note; beyond, the plate's zeros are examined with all else."""
 _FEWEST_IDLE_SAMPLES = 50
 _MUCH_NEARER = 0.5
 
@@ -55,36 +60,50 @@ class LabPlates:
         return result
 
 
-def lab_plates(path: Path, file: Any, length_unit: str) -> tuple[LabPlates | None, list[str], list[str]]:
+def lab_plates(path: Path, file: Any, length_unit: str) -> tuple[LabPlates | None, list[Finding]]:
     """The plates that can be used, in lab axes; None where there is none. `length_unit` is the file's: mm, cm or m.
 
-    Also why others were left out, and notes.
+    Also what was found of them: those that were left out (F151), units that were converted (F152).
     """
     unit = METRES_PER_UNIT[length_unit]
     platforms = file["data"].get("platform", [])
     group = file["parameters"].get("FORCE_PLATFORM", {})
-    names, forces, moments, corners, left_out, notes = [], [], [], [], [], []
+    names, forces, moments, corners = [], [], [], []
+    findings: list[Finding] = []
     for number, platform in enumerate(platforms, start=1):
         name = f"plate {number}"
         places = unit * platform["corners"].T
         kind = int(group["TYPE"]["value"][number - 1])
         stated, moment_unit = _moment_unit(file, group, number - 1, length_unit)
-        trouble = _corner_trouble(places) or ("" if platform["force"].size else "it has no samples")
+        reason, edges = _corner_trouble(places)
+        if not platform["force"].size:
+            reason = reason or "it has no samples"
         if moment_unit != unit and kind == 4:  # nobody knows what its matrix makes of them
-            trouble = trouble or f"its moments are in {stated} while points are in {length_unit}"
-        if trouble:
-            left_out.append(f"{name} was left out, {trouble}")
+            reason = reason or f"its moments are in {stated} while points are in {length_unit}"
+        if reason:
+            findings.append(plate_left_out(path, name, reason, **edges))
             continue
         if moment_unit != unit:
-            notes.append(f"{path.name}: the moments of {name} are in {stated}, points in {length_unit}: converted")
+            units = {"unit": Quantity(stated), "length_unit": Quantity(length_unit)}
+            findings.append(with_evidence("F152", Where(path.name, plate=name), units))
         names.append(name)
         forces.append(platform["force"].T)
         moments.append(_moment(platform, kind, unit, moment_unit))
         corners.append(places)
     if not names:
-        return None, left_out, notes
+        return None, findings
     plates = LabPlates(tuple(names), np.stack(forces, axis=1), np.stack(moments, axis=1), np.array(corners))
-    return plates, left_out, notes
+    return plates, findings
+
+
+def plate_left_out(path: Path, plate: str | None, reason: str, **evidence: Quantity) -> Finding:
+    """That a plate, or all of them, cannot be used."""
+    return with_evidence("F151", Where(path.name, plate=plate), {**evidence, "reason": Quantity(reason)})
+
+
+def contradicting_moments(path: Path, plate: str, misses: float) -> Finding:
+    """That moments miss the centre of pressure by this share, which was taken without a free moment."""
+    return finding("F153", Where(path.name, plate=plate), misses=Quantity(misses, "1", limit=MOMENTS_FIT))
 
 
 def _moment(platform: Any, kind: int, unit: float, moment_unit: float) -> FloatArray:
@@ -109,47 +128,56 @@ def _axes(corners: FloatArray) -> FloatArray:
 
 def to_ground_plates(
     path: Path, plates: LabPlates | None, rotation: FloatArray, time: FloatArray
-) -> tuple[PlateLoads | None, list[str]]:
+) -> tuple[PlateLoads | None, list[Finding]]:
     """Loads on the person in ground axes, zero where nobody stands on a plate."""
     if plates is None:
-        return None, [f"{path.name}: no force plate that can be used"]
+        return None, []
     force, moment = plates.force @ rotation.T, plates.moment @ rotation.T
     corners = None if plates.corners is None else plates.corners @ rotation.T
-    notes, noises, idle = [], [], []
+    findings, noises, idle = [], [], []
     for p, name in enumerate(plates.names):
         vertical = np.nan_to_num(force[:, p, 1])
-        if vertical[np.argmax(np.abs(vertical))] < -LOAD_THRESHOLD_N:
+        where = Where(path.name, plate=name)
+        largest = float(vertical[np.argmax(np.abs(vertical))])
+        if largest < -LOAD_THRESHOLD_N:
             force[:, p] *= -1
             moment[:, p] *= -1
-            notes.append(
-                f"{path.name}: {name} reports a force that points down, the load on the plate; it was reversed"
-            )
+            findings.append(finding("F157", where, force_n=Quantity(largest, "N")))
         loaded = force[:, p, 1] >= LOAD_THRESHOLD_N
         lost = np.isnan(force[:, p]).any(axis=1) | (loaded & np.isnan(moment[:, p]).any(axis=1))
         if lost.any():
-            raise FileError(path, f"{name} has no number at {time[lost][0]:g} s; expected one for every sample")
-        offset = np.median(force[~loaded, p], axis=0) if (~loaded).sum() >= _FEWEST_IDLE_SAMPLES else np.zeros(3)
-        if np.linalg.norm(offset) > _OFFSET_LIMIT_N:
-            reading = ", ".join(f"{value:.0f}" for value in offset)
-            notes.append(f"{path.name}: {name} reads ({reading}) N when unloaded; this was not subtracted")
+            raise FileError.of(path, impossible_load(name, "force or moment", float(time[lost][0])))
+        if (~loaded).sum() >= _FEWEST_IDLE_SAMPLES:
+            findings += _small_offsets(where, np.median(force[~loaded, p], axis=0), rotation)
         plate = without_idle(time, force[:, p], np.nan_to_num(moment[:, p]))
         force[:, p], moment[:, p] = plate.force, plate.moment
         noises.append(plate.noise_n)
         idle.append(plate.idle)
-        if not loaded.any():
-            notes.append(f"{path.name}: {name} never reaches {LOAD_THRESHOLD_N:g} N")
-        elif (
-            corners is not None
-            and (outside := _outside(force[loaded, p], moment[loaded, p], corners[p])) > _OUTSIDE_LIMIT_M
-        ):
-            notes.append(
-                f"{path.name}: the centre of pressure of {name} lies {100 * outside:.0f} cm outside its "
-                "corners; check the plate's corners, origin and units"
-            )
     loads = PlateLoads(
         time, plates.names, force, moment, (None,) * len(plates.names), corners, tuple(noises), tuple(idle)
     )
-    return loads, notes
+    return loads, findings
+
+
+def _small_offsets(where: Where, level_n: FloatArray, rotation: FloatArray) -> list[Finding]:
+    """Axes along which an unloaded plate reads (3,) N a little: a note, since nothing was subtracted."""
+    low, high = _ZERO_N
+    return [
+        finding(
+            "P213",
+            replace(where, axis="vertical" if axis == 1 else None, file_axis=_file_axis(rotation, axis)),
+            Severity.INFO,
+            level_n=Quantity(float(level), "N", limit=low),
+        )
+        for axis, level in enumerate(level_n)
+        if low < abs(level) <= high
+    ]
+
+
+def _file_axis(rotation: FloatArray, ground_axis: int) -> str:
+    """What the file calls ground axis 0, 1 or 2: "Z" or "-Y"."""
+    index = int(np.argmax(np.abs(rotation[ground_axis])))
+    return f"{'-' if rotation[ground_axis, index] < 0 else ''}{'XYZ'[index]}"
 
 
 def person_on_plates(platforms: Any, people: Sequence[str], labels: Sequence[str], positions: FloatArray) -> str:
@@ -176,7 +204,8 @@ def person_on_plates(platforms: Any, people: Sequence[str], labels: Sequence[str
     return nearest if others and far[nearest] < _MUCH_NEARER * far[others[0]] else ""
 
 
-def _corner_trouble(corners: FloatArray) -> str:
+def _corner_trouble(corners: FloatArray) -> tuple[str, dict[str, Quantity]]:
+    """Why corners (4, 3) m are no plate's, and the lengths of its edges; nothing where they are."""
     edges = np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1)
     low, high = _EDGE_LIMITS_M
     if (
@@ -185,8 +214,11 @@ def _corner_trouble(corners: FloatArray) -> str:
         and low < edges.min()
         and edges.max() < high
     ):
-        return ""
-    return f"its corners do not form a plate (edges of {', '.join(f'{edge:.3g}' for edge in edges)} m)"
+        return "", {}
+    return (
+        f"its corners do not form a plate (edges of {', '.join(f'{edge:.3g}' for edge in edges)} m)",
+        {"edges_m": Quantity(tuple(map(float, edges)), "m")},
+    )
 
 
 def _moment_unit(file: Any, group: Any, plate: int, length: str) -> tuple[str, float]:
@@ -199,14 +231,3 @@ def _moment_unit(file: Any, group: Any, plate: int, length: str) -> tuple[str, f
     unit = str(units[channel]) if channel < len(units) else ""
     said = "".join(letter for letter in unit.lower() if letter.isalpha())
     return unit, METRES_PER_UNIT[said[1:] if said in ("nm", "nmm", "ncm") else length]
-
-
-def _outside(force: FloatArray, moment: FloatArray, corners: FloatArray) -> float:
-    """How far (m) the load-weighted mean centre of pressure lies outside the box around the corners."""
-    total = force[:, 1].sum()
-    height = corners[:, 1].mean()
-    x = (moment[:, 2].sum() + height * force[:, 0].sum()) / total
-    z = (height * force[:, 2].sum() - moment[:, 0].sum()) / total
-    low, high = corners[:, [0, 2]].min(axis=0), corners[:, [0, 2]].max(axis=0)
-    place = np.array([x, z])
-    return float(np.max(np.maximum(low - place, place - high)))

@@ -15,6 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from kinertia.errors import FileError
+from kinertia.findings.quantity import Quantity
+from kinertia.io.number_table import mismatch
 
 _BLOCK = 512
 _BYTE_ORDERS = {84: ("<", 15), 85: ("<", 13), 86: (">", 12)}
@@ -82,20 +84,25 @@ def doubts_about(path: Path) -> str:
     size = path.stat().st_size
     if len(block) < _BLOCK or len(section) < 4:
         needed = _BLOCK if len(block) < _BLOCK else start + _BLOCK
-        raise FileError(path, f"truncated: it has {size} of at least {needed} bytes; copy or export it again")
+        raise _too_short(path, size, needed)
     order, sign_byte = _BYTE_ORDERS.get(section[3], ("<", 15))
     header = _header(block, order)
     number = 4 if block[sign_byte] & 0x80 else 2
     data = _BLOCK * (header.data_block - 1) + number * (4 * header.points + header.analogs) * header.frames
     needed = max(start + _BLOCK * section[2], data)
     if size < needed:
-        raise FileError(path, f"truncated: it has {size} of at least {needed} bytes; copy or export it again")
+        raise _too_short(path, size, needed)
     if section[3] not in _BYTE_ORDERS:
         return f"its processor is {section[3]}"
     if section[3] == 85:
         return "its numbers are DEC's"
     parameters, doubt = _parameters(path, section, order)
     return doubt or _header_doubt(header, start + _BLOCK * section[2]) or _doubt(header, parameters)
+
+
+def _too_short(path: Path, size: int, needed: int) -> FileError:
+    counts = {"bytes": Quantity(size, "1"), "announced": Quantity(needed, "1")}
+    return FileError.found(path, "F104", None, counts, found=Quantity(f"it has {size} of at least {needed} bytes"))
 
 
 def trial_date(path: Path) -> tuple[int, ...]:
@@ -149,11 +156,9 @@ def with_plain_samples(path: Path) -> bytes | None:
         return None
     plain = samples - taken_off
     if np.abs(plain).max() > 32767:
-        raise FileError(
-            path,
-            f"analog samples are up to {np.abs(plain).max()} steps from ANALOG:OFFSET, more than can be read of 16-bit "
-            "integers; correct ANALOG:FORMAT or OFFSET, or export it with floating-point numbers",
-        )
+        steps = int(np.abs(plain).max())
+        what = f"samples are up to {steps} steps from ANALOG:OFFSET, beyond 16-bit integers (see ANALOG:FORMAT)"
+        raise FileError.found(path, "F106", steps=Quantity(steps, "1", limit=32767), what=Quantity(what))
     words[:, 4 * header.points :] = plain.reshape(frames, -1)
     offsets[:] = 0
     return bytes(content)
@@ -164,12 +169,13 @@ def _sections(path: Path) -> tuple[bytes, int, bytes]:
     with path.open("rb") as stream:
         block = stream.read(_BLOCK)
         if not block:
-            raise FileError(path, "the file is empty; expected a C3D file, export it again")
+            raise FileError.found(path, "F104", bytes=Quantity(0, "1"), found=Quantity("it is empty"))
         if len(block) < 2 or block[1] != 0x50:
-            raise FileError(path, "not a C3D file (its second byte is not 50 hex); check what was exported")
+            raise mismatch(path, "a C3D file", f"{block[1:2].hex() or 'no'} as second byte", "50 (hexadecimal)")
         start = _BLOCK * (block[0] - 1)
         if start < _BLOCK:
-            raise FileError(path, f"its parameters begin in block {block[0]}; expected 2 or later, export it again")
+            what = f"its parameters begin in block {block[0]}, not in 2 or later"
+            raise FileError.found(path, "F106", what=Quantity(what))
         stream.seek(start)
         section = stream.read(4)
         if len(section) == 4:
@@ -205,7 +211,8 @@ def _parameters(path: Path, section: bytes, order: str) -> tuple[_Parameters, st
     at, odd = 4, ""
 
     def broken(what: str) -> FileError:
-        return FileError(path, f"broken C3D file: {what} at byte {at} of its parameters; export it again")
+        place = {"byte": Quantity(at, "1")}
+        return FileError.found(path, "F106", None, place, what=Quantity(f"{what}, at byte {at} of its parameters"))
 
     while at + 2 <= len(section) and section[at]:
         length, group = struct.unpack_from("bb", section, at)

@@ -16,7 +16,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from kinertia.errors import FileError
-from kinertia.io.number_table import expect_file
+from kinertia.findings.quantity import Quantity
+from kinertia.io.number_table import expect_file, malformed, mismatch, wrong_cells
+from kinertia.io.sto import expect_once
 
 _SEPARATORS = ",;\t"
 _BEGINNING_BYTES = 2000
@@ -53,12 +55,15 @@ class Row:
         try:
             value = float(cell.replace(",", ".") if decimal_comma else cell)
         except ValueError:
-            raise FileError(self.path, f"{column} is '{cell}'; expected a number", self.line) from None
+            raise self._malformed(column, "a number") from None
         if not math.isfinite(value):
-            raise FileError(
-                self.path, f"{column} is '{cell}'; expected a finite number; leave out rows without a value", self.line
-            )
+            raise self._malformed(column, "a finite number (leave out rows without a value)")
         return value
+
+    def _malformed(self, column: str, expected: str) -> FileError:
+        cell = self.cells[column]
+        known = {"cell": Quantity(cell), "column": Quantity(column)}
+        return malformed(self.path, self.line, f"'{cell}' in column {column}", expected, **known)
 
 
 def has_columns(path: Path, columns: Sequence[str]) -> bool:
@@ -100,26 +105,26 @@ def read_csv(path: Path, columns: Sequence[str], expected: str) -> Iterator[Row]
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except UnicodeDecodeError:
-        raise FileError(path, "not UTF-8 text; save it as CSV UTF-8 (Excel: 'CSV UTF-8')") from None
+        raise mismatch(path, expected, "text that is not UTF-8", "CSV in UTF-8 (Excel: 'CSV UTF-8')") from None
     first = next((number for number, line in enumerate(lines) if line.strip()), None)
     if first is None:
-        raise FileError(path, f"the file is empty; expected {expected}")
+        raise FileError.found(path, "F104", found=Quantity(f"it is empty, and no {expected}"))
     table, separator, heading = _opened(lines[first:])
     if lacking := [name for name in columns if name not in heading]:
-        found = ", ".join(heading)
-        raise FileError(path, f"lacks the column {', '.join(lacking)}; found {found}; expected {expected}", first + 1)
-    if several := [name for name in columns if heading.count(name) > 1]:
-        raise FileError(path, f"has several columns {', '.join(several)}; leave one of them", first + 1)
+        raise mismatch(path, expected, f"the columns {', '.join(heading)}", f"also {', '.join(lacking)}", first + 1)
+    expect_once(path, [name for name in heading if name in columns], first + 1)
     empty = True
     for cells in table:
         line = first + table.line_num
         if not any(cell.strip() for cell in cells):
             continue
         if any(cells[len(heading) :]):
-            hint = "; a number has a decimal point where commas separate cells" if separator == "," else ""
-            raise FileError(path, f"{len(cells)} cells in a row; expected {len(heading)} as in the heading{hint}", line)
+            hint = ", with decimal points where commas separate cells" if separator == "," else ""
+            raise wrong_cells(path, line, len(cells), len(heading), hint)
         empty = False
         by_column = dict(zip_longest(heading, (cell.strip() for cell in cells[: len(heading)]), fillvalue=""))
         yield Row(path, line, by_column, decimal_commas=separator != ",")
     if empty:
-        raise FileError(path, f"a heading and no rows; expected {expected}", first + 1)
+        rows = {"rows": Quantity(0, "1")}
+        found = Quantity(f"it has a heading and no rows, and is no {expected}")
+        raise FileError.found(path, "F104", first + 1, rows, found=found)

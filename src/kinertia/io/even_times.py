@@ -7,7 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from kinertia.errors import FileError
+from kinertia.findings.finding import Finding, finding
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
 from kinertia.trial.data import FloatArray
+from kinertia.trial.impossible_data import step_evidence
 
 _MOST_DECIMALS = 7
 _COARSEST_S = 0.01
@@ -28,8 +32,8 @@ def rounding_s(time: FloatArray) -> float:
     return 0.0
 
 
-def even_times(path: Path, time: FloatArray) -> tuple[FloatArray, tuple[str, ...]]:
-    """Times (k,) s of forces as they are, or on the even grid that they were rounded from, with a note.
+def even_times(path: Path, time: FloatArray) -> tuple[FloatArray, tuple[Finding, ...]]:
+    """Times (k,) s of forces as they are, or on the even grid that they were rounded from, with what was found (T102).
 
     Nothing tells the rate but the times: the grid is the straight line through them. At 2000 Hz and in whole
     milliseconds every other step is zero.
@@ -49,15 +53,19 @@ def even_times(path: Path, time: FloatArray) -> tuple[FloatArray, tuple[str, ...
     rounded = 0 < unit <= _COARSEST_S and step > 0 and error <= _OFF * unit
     often = odd.size >= _FEWEST_ODD and odd.size > _ODD_SHARE * steps.size
     if odd.size and not (rounded and often):
-        before, after = time[odd[0]], time[odd[0] + 1]
-        raise FileError(
-            path,
-            f"time goes from {before:g} s to {after:g} s where its step is {usual:g} s; expected equal "
-            "steps, export the forces without gaps",
-        )
+        raise uneven(path, None, time[odd[0]], time[odd[0] + 1], usual)
     if not rounded or error <= _NOTICED * step:
         return time, ()
-    note = (
-        f"{path.name}: times are rounded to {1e3 * unit:g} ms; the even times of {1 / step:.4g} Hz were taken instead"
+    return even, (times_rounded(path, unit, 1 / step),)
+
+
+def uneven(path: Path, line: int | None, before: float, after: float, usual: float) -> FileError:
+    """The error of two times (s) whose step is not the usual one."""
+    return FileError.found(path, "T101", line, step_evidence(before, after, usual))
+
+
+def times_rounded(path: Path, rounding: float, rate_hz: float) -> Finding:
+    """That times were rounded by so many seconds, and those at an even rate taken in their place."""
+    return finding(
+        "T102", Where(path.name), rounding_s=Quantity(float(rounding), "s"), rate_hz=Quantity(float(rate_hz), "Hz")
     )
-    return even, (note,)

@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from kinertia.errors import FileError
+from kinertia.findings.quantity import Quantity
 
 try:
     import ezc3d
@@ -48,11 +49,9 @@ class C3dTrouble(Exception):
 def expect_ezc3d(path: Path) -> None:
     """Raise a FileError about a C3D file that says how to install ezc3d, unless it is there."""
     if ezc3d is None:
-        raise FileError(
-            path,
-            "C3D files need the package ezc3d, which is not installed (pip has none for Linux on ARM); "
-            "install it (conda install -c conda-forge ezc3d), or export TRC and MOT files",
-        )
+        how = "conda install -c conda-forge ezc3d; pip has none for Linux on ARM"
+        kinds = {"kind": Quantity("C3D files"), "others": Quantity("export TRC and MOT files")}
+        raise FileError.found(path, "F107", None, kinds, package=Quantity("ezc3d"), how=Quantity(how))
 
 
 def read_content(path: Path) -> C3dContent:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import unicodedata
 from collections.abc import Sequence
+from difflib import get_close_matches
 from pathlib import Path
+
+from kinertia.findings.quantity import Quantity
 
 _DEVICES = re.compile(r"(con|prn|aux|nul|conin\$|conout\$|(com|lpt)[0-9¹²³]) *", re.IGNORECASE)
 _FORBIDDEN = re.compile(r'[<>:"/\\|?*\x00-\x1f]|[ .]$')
@@ -38,10 +40,9 @@ def trouble_as_folders(trials: Sequence[str]) -> tuple[int, str] | None:
     """The first of several trials whose name cannot be that of a folder beside those before, and why."""
     for index, name in enumerate(trials if len(trials) > 1 else ()):
         if not fits_everywhere(name):
-            quoted = json.dumps(name, ensure_ascii=False)
             return index, (
-                f'name = {quoted}: must be a name that a folder can have on every system: none of < > : " / \\ | ? *, '
-                "no dot or blank at the end, no device of Windows (CON, NUL, COM1, ...)"
+                'a folder on every system has none of < > : " / \\ | ? *, no dot or blank at the end, and is no device '
+                "of Windows (CON, NUL, COM1, ...)"
             )
         if taken := next((file for file in RESULT_FILES if same_folder(file, name)), None):
             return index, f"the results have a file {taken}, not a folder"
@@ -72,10 +73,37 @@ def _at_home(written: str) -> Path:
         return Path(written)
 
 
-def path_trouble(written: str) -> str | None:
-    """What is wrong with a path that leads nowhere, where it is Windows' way to write it; None if that is not it."""
+def missing_file(path: Path, written: str, expected: str = "") -> dict[str, Quantity]:
+    """Evidence of F101: the file, the folder in which it was looked for, and what is there in its place.
+
+    Args:
+        path: that leads to no file.
+        written: the same as the user wrote it.
+        expected: what it should be, in words.
+    """
+    folder = path.parent.absolute()
+    exists = os.path.isdir(folder)
+    names = sorted(entry.name for entry in folder.iterdir()) if exists else []
+    nearest = get_close_matches(path.name, names, n=3, cutoff=0.4)
+    hint = "nothing there has a name like it" if exists else "that folder does not exist"
+    if nearest:
+        hint = f"the nearest name{'s' * (len(nearest) > 1)} there: {', '.join(nearest)}"
+    hint = _foreign_path(written) or hint
+    if expected not in ("", "a file"):
+        hint += f" (expected {expected})"
+    evidence = {"nearest": Quantity(", ".join(nearest))} if nearest else {}
+    words = {"file": _printable(path.name), "folder": _printable(str(folder)), "hint": hint}
+    return evidence | {name: Quantity(text) for name, text in words.items()}
+
+
+def _printable(text: str) -> str:
+    return text if text.isprintable() else ascii(text)
+
+
+def _foreign_path(written: str) -> str:
+    """What is wrong with a path that leads nowhere, where it is Windows' way to write it; empty if that is not it."""
     if any(ord(letter) < 32 for letter in written):
-        return "has a tab or line end in it, which TOML makes of \\t and \\n in double quotes; write / instead of \\"
+        return "the path has a tab or line end, which TOML makes of \\t and \\n in double quotes: write / instead of \\"
     if _DRIVE.match(written) and not Path(written).is_absolute():
-        return f"is on drive {written[:2]} of Windows, which this computer does not have; give the path from here"
-    return None
+        return f"drive {written[:2]} of Windows is not on this computer: give the path from here"
+    return ""

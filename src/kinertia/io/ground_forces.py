@@ -11,12 +11,16 @@ from pathlib import Path, PureWindowsPath
 import numpy as np
 
 from kinertia.errors import FileError
+from kinertia.findings.finding import Finding, finding, with_evidence
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
 from kinertia.io.even_times import even_times
 from kinertia.io.file_names import path_from
-from kinertia.io.number_table import expect_file
+from kinertia.io.number_table import expect_file, mismatch
 from kinertia.io.sto import TimeTable, read_table
 from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads
 from kinertia.trial.idle_plate import PlateLoad, without_idle
+from kinertia.trial.impossible_data import impossible_load
 from kinertia.trial.torque_columns import torque_columns
 
 _FOOT_WORDS = {"r": "r", "right": "r", "l": "l", "left": "l"}
@@ -43,26 +47,26 @@ def read_forces(mot_path: str | Path | None, loads_path: str | Path | None = Non
 
     Below `LOAD_THRESHOLD_N` of vertical force the point of application is garbage: such samples are set to zero, unless
     they are how a load begins or ends (`idle_plate`). Where no torque is given, the free moment is zero.
-    Times that were rounded when written are put back on the even grid they came from. `read_forces_with_notes` tells
+    Times that were rounded when written are put back on the even grid they came from. `read_forces_with_findings` has
     what was assumed.
 
     Raises:
         FileError: a file is missing or broken, a column that is needed is not there, a load is not expressed
             in ground, time does not grow, a loaded sample is NaN, or the forces point down.
     """
-    return read_forces_with_notes(mot_path, loads_path)[0]
+    return read_forces_with_findings(mot_path, loads_path)[0]
 
 
-def read_forces_with_notes(
+def read_forces_with_findings(
     mot_path: str | Path | None, loads_path: str | Path | None = None, turn: FloatArray | None = None
-) -> tuple[PlateLoads, tuple[str, ...]]:
-    """`read_forces` and the assumptions made while reading, one sentence each.
+) -> tuple[PlateLoads, tuple[Finding, ...]]:
+    """`read_forces` and what was assumed while reading.
 
     Args:
         mot_path, loads_path: as there.
         turn: rotation (3, 3) from the axes of the file to ground axes, where they are others.
     """
-    notes: tuple[str, ...] = ()
+    findings: tuple[Finding, ...] = ()
     if loads_path is None:
         if mot_path is None:
             raise ValueError("read_forces needs a force file or an ExternalLoads file")
@@ -72,12 +76,12 @@ def read_forces_with_notes(
     else:
         loads_path = Path(loads_path)
         root = _external_loads(loads_path)
-        groups, notes = _groups_by_identifier(root, loads_path)
+        groups, findings = _groups_by_identifier(root, loads_path)
         path, more = (Path(mot_path), ()) if mot_path is not None else _datafile(root, loads_path)
-        notes += more
+        findings += more
         table = read_table(path)
         _expect_columns(groups, table, path, loads_path)
-    time, time_notes = even_times(path, table.time)
+    time, time_findings = even_times(path, table.time)
     table = replace(table, time=time)
     turn = np.eye(3) if turn is None else turn
     wrenches = [_wrench(path, table, group, turn) for group in groups]
@@ -91,31 +95,31 @@ def read_forces_with_notes(
         idle=tuple(plate.idle for plate in wrenches),
         torques=torque_columns(*_stated(table, groups, turn)),
     )
-    return loads, (*notes, *table.notes, *time_notes, *_remarks(path, loads, groups))
+    return loads, (*findings, *table.findings, *time_findings)
 
 
 def _wrench(path: Path, table: TimeTable, group: _Columns, turn: FloatArray) -> PlateLoad:
     """Force (k, 3) and moment about the ground origin (k, 3), zero where nobody stands on the plate."""
     force = _triple(table, group.force) @ turn.T
-    _expect_numbers(path, table, group.force, np.ones(len(force), dtype=bool))
+    _expect_numbers(path, table, group, group.force, np.ones(len(force), dtype=bool))
     up, largest = int(np.argmax(turn[1])), int(np.argmax(np.abs(force @ turn).max(axis=0)))
     if largest == 1 != up:
-        raise FileError(
-            path,
-            f"the largest forces are in {group.force}y, along Y, but in the markers people stand along {'XYZ'[up]}; "
-            "export markers and forces in the same axes, Y up",
-        )
+        peaks = tuple(map(float, np.abs(force @ turn).max(axis=0)))
+        axes = {
+            "peak_n": Quantity(peaks, "N"),
+            "axis": Quantity("Y"),
+            "vertical": Quantity("XYZ"[up]),
+            "column": Quantity(f"{group.force}y"),
+        }
+        raise FileError.found(path, "P201", None, axes, at=Where(plate=group.name))
     if force[np.argmax(np.abs(force[:, 1])), 1] < -LOAD_THRESHOLD_N:
-        raise FileError(
-            path,
-            f"the largest vertical force in {group.force}{'xyz'[up]} is {force[:, 1].min():.0f} N, downward; expected "
-            f"{'XYZ'[up]} up and the force on the person, turn the sign or the axes before export",
-        )
+        down = {"force_n": Quantity(float(force[:, 1].min()), "N"), "column": Quantity(f"{group.force}{'xyz'[up]}")}
+        raise FileError.found(path, "F157", None, down, at=Where(plate=group.name))
     loaded = force[:, 1] >= LOAD_THRESHOLD_N
-    _expect_numbers(path, table, group.point, loaded)
+    _expect_numbers(path, table, group, group.point, loaded)
     moment = np.cross(_triple(table, group.point) @ turn.T, force)
     if group.torque is not None:
-        _expect_numbers(path, table, group.torque, loaded)
+        _expect_numbers(path, table, group, group.torque, loaded)
         moment = moment + _triple(table, group.torque) @ turn.T
     return without_idle(table.time, force, moment)
 
@@ -134,26 +138,12 @@ def _triple(table: TimeTable, identifier: str) -> FloatArray:
     return table.columns([identifier + axis for axis in "xyz"])
 
 
-def _expect_numbers(path: Path, table: TimeTable, identifier: str, where: np.ndarray) -> None:
+def _expect_numbers(path: Path, table: TimeTable, group: _Columns, identifier: str, where: np.ndarray) -> None:
     broken = np.argwhere(np.isnan(_triple(table, identifier)) & where[:, None])
     if broken.size:
         row, axis = broken[0]
-        raise FileError(
-            path,
-            f"column {identifier}{'xyz'[axis]} has no number at {table.time[row]:g} s; expected one for "
-            "every loaded sample, fill the gap or cut the trial before export",
-        )
-
-
-def _remarks(path: Path, loads: PlateLoads, groups: Sequence[_Columns]) -> list[str]:
-    idle = [name for name, force in zip(loads.names, loads.force.swapaxes(0, 1), strict=True) if not force.any()]
-    still = [group.name for group in groups if group.torque is None]
-    notes = []
-    if idle:
-        notes.append(f"{path.name}: {', '.join(idle)} never reaches {LOAD_THRESHOLD_N:g} N")
-    if still:
-        notes.append(f"{path.name}: no torque columns for {', '.join(still)}; the free moment was taken as zero")
-    return notes
+        column = f"column {identifier}{'xyz'[axis]}"
+        raise FileError.of(path, impossible_load(group.name, column, float(table.time[row])))
 
 
 def _groups_by_name(path: Path, table: TimeTable) -> list[_Columns]:
@@ -163,11 +153,8 @@ def _groups_by_name(path: Path, table: TimeTable) -> list[_Columns]:
     for force in forces:
         stem = force[:-1]
         if not _has(table, stem + "p"):
-            raise FileError(
-                path,
-                f"{force}x has no point of application; expected {stem}px, {stem}py and {stem}pz, or an "
-                "ExternalLoads file",
-            )
+            expected = Quantity(f"{stem}px, {stem}py and {stem}pz, or an ExternalLoads file")
+            raise FileError.found(path, "F142", force=Quantity(f"{force}x"), expected=expected)
         candidates = [stem + "m", stem + "t"]
         candidates += [stem.replace("force", word) + end for word in ("torque", "moment") for end in ("", "m", "t")]
         torque = next((c for c in candidates if c != stem and _has(table, c)), None)
@@ -175,11 +162,7 @@ def _groups_by_name(path: Path, table: TimeTable) -> list[_Columns]:
         feet = {_FOOT_WORDS[word] for word in words if word in _FOOT_WORDS}
         groups.append(_Columns(stem.strip("_ "), force, stem + "p", torque, feet.pop() if len(feet) == 1 else None))
     if not groups:
-        raise FileError(
-            path,
-            "no ground reaction forces: expected columns like ground_force_vx, ground_force_vy, "
-            f"ground_force_vz, but it has {_listed(columns)}; rename them or give an ExternalLoads file",
-        )
+        raise FileError.found(path, "F141", columns=Quantity(_listed(columns)))
     return groups
 
 
@@ -196,57 +179,61 @@ def _external_loads(path: Path) -> ElementTree.Element:
     try:
         root = ElementTree.parse(path).getroot()
     except ElementTree.ParseError as error:
-        raise FileError(
-            path, f"not XML ({error}); expected an ExternalLoads file, export it again", error.position[0]
-        ) from None
+        raise mismatch(path, "XML", str(error), "an ExternalLoads file", error.position[0]) from None
     except (LookupError, ValueError) as error:  # what Python's codecs say of its encoding
-        raise FileError(path, f"not XML ({error}); save it as UTF-8", 1) from None
+        raise mismatch(path, "XML", str(error), "UTF-8", 1) from None
     if root.find(".//ExternalForce") is None:
-        raise FileError(path, "no ExternalForce in it; expected an OpenSim ExternalLoads file")
+        raise mismatch(path, "an ExternalLoads file", "no ExternalForce", "one for each load")
     return root
 
 
-def _datafile(root: ElementTree.Element, loads_path: Path) -> tuple[Path, tuple[str, ...]]:
+def _datafile(root: ElementTree.Element, loads_path: Path) -> tuple[Path, tuple[Finding, ...]]:
     """Where the force file is that the loads name, and what was assumed.
 
     Of a whole path on another computer, often one with Windows, the file of that name beside the loads counts.
     """
     name = (root.findtext(".//datafile") or "").strip()
     if not name or name.lower() == "unassigned":
-        raise FileError(loads_path, "names no datafile; give the MOT or STO file of the forces beside it")
+        raise FileError.found(loads_path, "F148", None, _relocated("''", "it names no MOT or STO file"))
     path = path_from(loads_path.parent, name)
     if path.is_file():
         return path, ()
     named = PureWindowsPath(name)  # knows both separators
     beside = loads_path.parent / named.name
     if named.root and beside.is_file():
-        return beside, (f"{loads_path.name}: its datafile {name} is not there; {beside.name} beside it was read",)
-    raise FileError(loads_path, f"its datafile {name} is not at {path.absolute()}; give the force file beside it")
+        read = _relocated(name, f"it does not exist, and {beside.name} beside the file was read")
+        return beside, (with_evidence("F148", Where(loads_path.name), read),)
+    raise FileError.found(loads_path, "F148", None, _relocated(name, f"there is no file {path.absolute()}"))
 
 
-def _groups_by_identifier(root: ElementTree.Element, path: Path) -> tuple[list[_Columns], tuple[str, ...]]:
-    groups, notes = [], []
+def _relocated(path: str, outcome: str) -> dict[str, Quantity]:
+    return {"path": Quantity(path), "outcome": Quantity(outcome)}
+
+
+def _groups_by_identifier(root: ElementTree.Element, path: Path) -> tuple[list[_Columns], tuple[Finding, ...]]:
+    groups, disabled = [], []
     for number, element in enumerate(root.iter("ExternalForce"), start=1):
         name = element.get("name") or f"load {number}"
         if _text(element, "isDisabled") == "true" or _text(element, "appliesForce") == "false":
-            notes.append(f"{path.name}: {name} is disabled there and was left out")
+            disabled.append(name)
             continue
         for tag in ("force_expressed_in_body", "point_expressed_in_body"):
             body = _text(element, tag) or "ground"
             if body.rsplit("/", 1)[-1] != "ground":
-                raise FileError(path, f"{name} has {tag} = {body}; expected ground, transform the load before export")
+                raise FileError.found(path, "F146", at=Where(part=body), load=Quantity(name), entry=Quantity(tag))
         force, point = _text(element, "force_identifier"), _text(element, "point_identifier")
         for tag, identifier in (("force_identifier", force), ("point_identifier", point)):
             if not identifier:
-                raise FileError(path, f"{name} has no {tag}; expected the beginning of its three column names")
+                needed = Quantity(f"a {tag}, the beginning of its three column names")
+                raise FileError.found(path, "F143", load=Quantity(name), identifier=needed, found=Quantity("none"))
         side = re.search(r"_([rl])$", _text(element, "applied_to_body"))
         groups.append(
             _Columns(name, force, point, _text(element, "torque_identifier") or None, side[1] if side else None)
         )
     if not groups:
-        raise FileError(path, "all its external forces are disabled; expected at least one that applies")
+        raise FileError.found(path, "F147", load=Quantity(", ".join(disabled)))
     _expect_own_columns(groups, path)
-    return groups, tuple(notes)
+    return groups, tuple(finding("F147", Where(path.name, plate=name), load=Quantity(name)) for name in disabled)
 
 
 def _expect_own_columns(groups: Sequence[_Columns], path: Path) -> None:
@@ -260,20 +247,14 @@ def _expect_own_columns(groups: Sequence[_Columns], path: Path) -> None:
             mine = f"the {what} of {group.name}"
             if taken.setdefault(identifier, mine) != mine or identifier == group.torque:
                 other = f"the torque of {group.name}" if identifier == group.torque else taken[identifier]
-                raise FileError(
-                    path,
-                    f"{other} and {mine} are the same columns, {identifier}x, {identifier}y and {identifier}z; "
-                    "expected columns of its own for each: correct the identifier",
-                )
+                both = {"load": Quantity(mine), "other": Quantity(other), "identifier": Quantity(identifier)}
+                raise FileError.found(path, "F144", None, both)
     for group in groups:
         for what, named in (("point", group.point), ("torque", group.torque or "")):
             owner = forces.get(_plate_name(named), group.force)
             if owner != group.force and _plate_name(owner) != _plate_name(group.force):
-                raise FileError(
-                    path,
-                    f"{group.name} takes its force from {group.force} and its {what} from {named}, which by its name "
-                    f"goes with {owner}: correct the identifier",
-                )
+                mixed = {"load": Quantity(group.name), "what": Quantity(what), "identifier": Quantity(named)}
+                raise FileError.found(path, "F145", None, mixed, force=Quantity(group.force), owner=Quantity(owner))
 
 
 def _plate_name(identifier: str) -> tuple[str, ...]:
@@ -292,9 +273,6 @@ def _expect_columns(groups: Sequence[_Columns], table: TimeTable, path: Path, lo
         for identifier in filter(None, (group.force, group.point, group.torque)):
             missing = [identifier + axis for axis in "xyz" if identifier + axis not in table.labels]
             if missing:
-                raise FileError(
-                    path,
-                    f"no column {', '.join(missing)}, which {loads_path.name} names for {group.name} by the "
-                    f"identifier '{identifier}'; correct the identifier, the columns are "
-                    f"{_listed(table.labels)}",
-                )
+                needed = Quantity(f"columns {', '.join(missing)} by its identifier '{identifier}'")
+                names = {"load": Quantity(f"{group.name} ({loads_path.name})"), "identifier": needed}
+                raise FileError.found(path, "F143", None, names, found=Quantity(_listed(table.labels)))

@@ -7,6 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kinertia.findings.finding import Finding, finding, with_evidence
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
 from kinertia.trial.data import BoolArray, FloatArray
 from kinertia.trial.marker_quality import UPRIGHT_SHARE
 
@@ -20,18 +23,18 @@ _AXES = {sign + "XYZ"[axis]: (axis, -1 if sign == "-" else 1) for axis in range(
 
 def to_ground(
     path: Path, stated: str, where: str, positions: FloatArray, plates: LabPlates | None
-) -> tuple[FloatArray, str, list[str]]:
+) -> tuple[FloatArray, str, list[Finding]]:
     """From the axes of a laboratory to ground axes, by the file's word and by the data.
 
     Args:
-        path: the file, for messages.
+        path: the file, for findings.
         stated: the axis that it calls vertical, "+Z" or the like; empty where it says nothing.
         where: it says so, or would say so.
         positions: (n, m, 3) m, markers in the laboratory's axes; NaN where not seen.
         plates: what stood on the floor, if anything.
 
     Returns:
-        the rotation (3, 3), the axis that is up, and notes.
+        the rotation (3, 3), the axis that is up, and what was found (F131 to F133).
     """
     stated_up = _AXES.get(stated)
     seen = positions[_seen(positions).any(axis=1)]
@@ -39,22 +42,23 @@ def to_ground(
     floor = np.zeros(3) if plates is None or plates.corners is None else plates.corners.mean(axis=(0, 1))
     force = np.zeros(3) if plates is None else plates.loaded_direction()
     if np.abs(force).max() > 0.8:
-        axis, why = int(np.argmax(np.abs(force))), "the plates' forces"
+        axis, source = int(np.argmax(np.abs(force))), "forces of the plates"
     else:
-        axis, why = int(np.argmax(extent)), "the markers' extents"
+        axis, source = int(np.argmax(extent)), "extents of the markers"
         if stated_up is not None and extent[stated_up[0]] > 0.5 * extent[axis]:
             axis = stated_up[0]
     middle = np.nanmedian(seen, axis=(0, 1))[axis] - floor[axis]
     data_up = (axis, 1 if middle >= 0 else -1)
     up = f"{'+-'[data_up[1] < 0]}{'XYZ'[axis]}"
-    notes = []
+    found, place = {"axis": Quantity(up), "source": Quantity(source), "entry": Quantity(where)}, Where(path.name)
+    findings = []
     if stated_up is None:
-        notes.append(f"{path.name}: no vertical axis given ({where}); {up} was found from {why}")
+        findings.append(with_evidence("F131", place, found))
     elif stated_up != data_up:
-        notes.append(f"{path.name}: {where} says {stated} is up but {why} say {up}; {up} was used")
+        findings.append(with_evidence("F132", place, {"stated": Quantity(stated), **found}))
     if up != "+Y":
-        notes.append(f"{path.name}: lab axes with {up} up were turned to Y up")
-    return _rotation(*data_up), up, notes
+        findings.append(finding("F133", place, axis=Quantity(up)))
+    return _rotation(*data_up), up, findings
 
 
 def upright_along_z(positions: FloatArray) -> FloatArray | None:

@@ -12,6 +12,8 @@ from importlib import resources
 from pathlib import Path
 
 from kinertia.errors import FileError
+from kinertia.findings.quantity import Quantity
+from kinertia.io.number_table import expect_file
 from kinertia.io.toml_lines import TomlFile, parse_toml, read_toml
 from kinertia.model.marker_set import (
     LANDMARKS,
@@ -43,8 +45,7 @@ def read_marker_set(name: str | Path) -> MarkerSet:
         path = Path(f"{name}.toml")
         return _marker_set(parse_toml(text, path), path)
     path = Path(name)
-    if not path.is_file():
-        raise FileError(path, f"no such marker set; give a TOML file or one of the presets {', '.join(preset_names())}")
+    expect_file(path, f"a TOML file, or one of the presets {', '.join(preset_names())}")
     return _marker_set(read_toml(path, "a marker set"), path)
 
 
@@ -52,11 +53,11 @@ def choose_marker_set(labels: Sequence[str]) -> MarkerSet:
     """The preset that fits the labels of a static trial, or of one of pelvis and legs only.
 
     Raises:
-        MarkerSetError: no preset fits; says for the best one what is missing and the nearest labels.
+        MarkerSetError: no preset fits (L101); with what the nearest one lacks, and the labels that look like it.
     """
     best = nearest_preset(labels)
     if not is_worn(best, labels):
-        raise mismatch(best, labels, "no marker-set preset fits the static trial; the nearest is")
+        raise mismatch(best, labels)
     return best
 
 
@@ -84,24 +85,22 @@ def _marker_set(document: TomlFile, path: Path) -> MarkerSet:
     known = {"name": None, "landmarks": LANDMARKS, "segments": SEGMENTS, "widths": WIDTHS}
     for table, entries in content.items():
         if table not in known:
-            raise FileError(
-                path, f"unknown entry '{table}'; a marker set has {', '.join(known)}", document.line((table,))
-            )
+            raise _wrong(path, document.line((table,)), f"unknown entry '{table}'; it has {', '.join(known)}")
         names = known[table]
         if names is None:
             continue
         if not isinstance(entries, dict):
-            raise FileError(path, f"'{table}' must be a table, [{table}]", document.line((table,)))
+            raise _wrong(path, document.line((table,)), f"'{table}' must be a table, [{table}]")
         for entry, value in entries.items():
             _check_entry(path, document, table, entry, value, names)
     segments = {segment: _labels(content.get("segments", {}).get(segment, ())) for segment in SEGMENTS}
     if len(segments["pelvis"]) < 3:
-        raise FileError(path, "[segments] pelvis must list at least three markers")
+        line = document.line(("segments", "pelvis"))
+        raise _wrong(path, line, "[segments] pelvis must list at least three markers")
     for side in ("asis_r", "asis_l"):
         if side not in content.get("landmarks", {}):
-            raise FileError(
-                path, f"[landmarks] must name {side}: it makes the pelvis frame, and tells which way one faces"
-            )
+            problem = f"[landmarks] lacks {side}, which makes the pelvis frame and shows which way one faces"
+            raise _wrong(path, document.line(("landmarks",)), problem)
     return MarkerSet(
         name=str(content.get("name", path.stem)),
         landmarks={key: _labels(value) for key, value in content.get("landmarks", {}).items()},
@@ -113,12 +112,16 @@ def _marker_set(document: TomlFile, path: Path) -> MarkerSet:
 def _check_entry(path: Path, document: TomlFile, table: str, entry: str, value: object, names: Sequence[str]) -> None:
     if entry not in names:
         near = difflib.get_close_matches(entry, names, n=1)
-        hint = f"; did you mean {near[0]}?" if near else f"; known: {', '.join(names)}"
-        raise FileError(path, f"unknown [{table}] entry '{entry}'{hint}", document.line((table, entry)))
+        hint = f"the nearest is {near[0]}" if near else f"known are {', '.join(names)}"
+        raise _wrong(path, document.line((table, entry)), f"unknown [{table}] entry '{entry}'; {hint}")
     items = value if isinstance(value, list) else [value]
     if not items or not all(isinstance(item, str) and item for item in items):
         what = f"[{table}] {entry} must be a label or a list of labels, not {value!r}"
-        raise FileError(path, what, document.line((table, entry)))
+        raise _wrong(path, document.line((table, entry)), what)
+
+
+def _wrong(path: Path, line: int | None, problem: str) -> FileError:
+    return FileError.found(path, "F186", line, problem=Quantity(problem))
 
 
 def _labels(value: str | Sequence[str]) -> tuple[str, ...]:

@@ -10,6 +10,7 @@ from difflib import get_close_matches
 from pathlib import Path
 
 from kinertia.errors import FileError
+from kinertia.findings.quantity import Quantity
 from kinertia.io.csv_file import has_columns, read_csv
 from kinertia.model.measures import Measure, measures
 
@@ -58,27 +59,33 @@ def read_measures(path: Path) -> BodyMeasures:
         name = row.cells["measure"]
         if name not in known:
             near = get_close_matches(name, known, n=1)
-            hint = f"; did you mean '{near[0]}'?" if near else "; kinertia init --measures writes a sheet with all"
-            raise FileError(path, f"unknown measure '{name}'{hint}", row.line)
+            hint = f"the nearest is '{near[0]}'" if near else "kinertia init --measures writes a sheet with all"
+            raise _wrong(path, row.line, name, f"no such measure; {hint}")
         if not row.cells["cm"]:
             continue
         if name in values:
-            raise FileError(path, f"{name} stands there twice", row.line)
+            raise _wrong(path, row.line, name, "it is there twice")
         values[name] = (
             _length_m(path, row.line, known[name], row.number("cm")),
             (row.number("sd_cm") / 100.0 if row.cells.get("sd_cm") else known[name].sd_m),
         )
         if not values[name][1] > 0.0:
-            raise FileError(path, f"the sd of {name} must be positive", row.line)
+            raise _wrong(path, row.line, name, "its sd must be positive")
     if not values:
-        raise FileError(path, "no value in the column cm; fill in what was measured, or leave measures out of [prior]")
+        problem = "no value in the column cm; fill in what was measured, or leave measures out of [prior]"
+        raise _wrong(path, None, "the sheet", problem)
     return BodyMeasures(path.name, values)
 
 
 def _length_m(path: Path, line: int, measure: Measure, value_cm: float) -> float:
     if _SHORTEST_CM <= value_cm <= _LONGEST_CM:
         return value_cm / 100.0
-    problem = f"{measure.name} is {value_cm:g} cm; expected {_SHORTEST_CM:g} to {_LONGEST_CM:g} cm"
+    problem = f"{value_cm:g} cm; expected {_SHORTEST_CM:g} to {_LONGEST_CM:g} cm"
     if value_cm > 0.0:
-        problem += f"; was it in {'m' if value_cm < _SHORTEST_CM else 'mm'}?"
-    raise FileError(path, problem, line)
+        problem += f" (was it in {'m' if value_cm < _SHORTEST_CM else 'mm'}?)"
+    raise _wrong(path, line, measure.name, problem, value_m=Quantity(value_cm / 100.0, "m", limit=_LONGEST_CM / 100.0))
+
+
+def _wrong(path: Path, line: int | None, measure: str, problem: str, **evidence: Quantity) -> FileError:
+    words = {"measure": Quantity(measure), "problem": Quantity(problem)}
+    return FileError.found(path, "F182", line, evidence | words)

@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from kinertia.errors import FileError
+from kinertia.findings.quantity import Quantity
 from kinertia.io.csv_file import Row, read_csv
 
 COLUMNS = ("quantity", "percent", "mean", "sd")
@@ -50,19 +51,23 @@ def read_norms(path: str | Path) -> dict[str, Norm]:
         _expect_sound(row, percent, sd)
         curve = rows.setdefault(quantity, {})
         if percent in curve:
-            raise FileError(row.path, f"{quantity} at {percent:g} % is there already; give each percent once", row.line)
+            raise _wrong(row.path, row.line, f"{quantity} at {percent:g} % is there twice")
         curve[percent] = (mean, sd)
     if rows and 0.0 < max(map(max, rows.values())) <= _LARGEST_SHARE:
-        problem = "percent is at most 1; expected 0 to 100 % of the gait cycle: multiply the column by 100"
-        raise FileError(path, problem)
+        largest = Quantity(max(map(max, rows.values())), "1")
+        raise _wrong(Path(path), None, "percent is at most 1; multiply the column by 100", percent=largest)
     return {name: _norm(curve) for name, curve in rows.items()}
 
 
 def _expect_sound(row: Row, percent: float, sd: float) -> None:
     if not 0 <= percent <= 100:
-        raise FileError(row.path, f"percent is {percent:g}; expected 0 to 100 % of the gait cycle", row.line)
+        raise _wrong(row.path, row.line, f"percent is {percent:g}", percent=Quantity(percent, "1", limit=100.0))
     if sd < 0:
-        raise FileError(row.path, f"sd is {sd:g}; expected a standard deviation, which is not negative", row.line)
+        raise _wrong(row.path, row.line, f"sd is {sd:g}, and no SD is negative", sd=Quantity(sd, "1", limit=0.0))
+
+
+def _wrong(path: Path, line: int | None, problem: str, **evidence: Quantity) -> FileError:
+    return FileError.found(path, "F187", line, evidence, problem=Quantity(problem))
 
 
 def _norm(curve: Mapping[float, Sequence[float]]) -> Norm:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+import os
 import re
 from collections.abc import Sequence
-from difflib import get_close_matches
 from pathlib import Path
 
 import numpy as np
 
 from kinertia.errors import FileError
+from kinertia.findings.quantity import Quantity
+from kinertia.io.file_names import missing_file
 from kinertia.trial.data import FloatArray
 
 
@@ -23,24 +25,36 @@ def read_lines(path: Path) -> list[str]:
     expect_file(path)
     content = path.read_bytes()
     if not content.strip():
-        raise FileError(path, "the file is empty; expected a header and rows of numbers, export it again")
+        raise FileError.found(path, "F104", found=Quantity("it is empty"))
     if b"\0" in content[:4096]:
-        raise FileError(path, f"a binary file; expected the text of a {path.suffix} file, export it again")
+        kind = f"the text of a {path.suffix} file"
+        raise mismatch(path, kind, "bytes of a binary file", "text")
     text = content.decode("utf-8-sig", errors="replace")
     return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
 
 
-def expect_file(path: Path) -> None:
+def expect_file(path: Path, expected: str = "a file") -> None:
     """Raise a FileError that names the folder and the nearest names in it, unless `path` is a file."""
-    if path.is_file():
+    if os.path.isfile(path):
         return
-    folder = path.parent.absolute()
-    if not folder.is_dir():
-        raise FileError(path, f"no such file: there is no folder {folder}; give the path of an existing file")
-    names = [entry.name for entry in folder.iterdir() if entry.is_file()]
-    nearest = get_close_matches(path.name, names, n=3, cutoff=0.4)
-    hint = f"the nearest names there are {', '.join(nearest)}" if nearest else "nothing there has a name like it"
-    raise FileError(path, f"no such file; looked in {folder}, {hint}")
+    if os.path.isdir(path):
+        raise wrong_kind(path, "A folder", "be read here", expected)
+    raise FileError.found(path, "F101", None, missing_file(path, str(path), expected))
+
+
+def wrong_kind(path: Path, given: str, what: str, expected: str, line: int | None = None) -> FileError:
+    """The error that `given` "cannot {what}; expected {expected}"."""
+    return FileError.found(path, "F102", line, given=Quantity(given), what=Quantity(what), expected=Quantity(expected))
+
+
+def mismatch(path: Path, kind: str, found: str, expected: str, line: int | None = None) -> FileError:
+    """The error that the content "is not {kind}: found {found}, expected {expected}"."""
+    return FileError.found(path, "F103", line, found=Quantity(found), kind=Quantity(kind), expected=Quantity(expected))
+
+
+def malformed(path: Path, line: int | None, found: str, expected: str, **known: Quantity) -> FileError:
+    """The error of a cell or row: "found {found}; expected {expected}"; `cell` and `column` where it is one cell."""
+    return FileError.found(path, "F105", line, known, found=Quantity(found), expected=Quantity(expected))
 
 
 def read_rows(
@@ -73,7 +87,9 @@ def read_rows(
         values = np.array(rows, dtype=float).reshape(len(rows), columns)
     if np.isinf(values).any():
         row_index, column_index = np.argwhere(np.isinf(values))[0]
-        raise FileError(path, f"infinite value in column {column_index + 1}; expected a number", numbers[row_index])
+        cell = {"cell": Quantity("inf"), "column": Quantity(int(column_index) + 1, "1")}
+        found = f"an infinite value in column {column_index + 1}"
+        raise malformed(path, numbers[row_index], found, "a finite number", **cell)
     return values, numbers
 
 
@@ -91,11 +107,7 @@ def _complete(lines: list[str], columns: int) -> FloatArray | None:
 def _row(path: Path, number: int, line: str, columns: int, may_be_short: bool) -> list[float]:
     cells = line.split("\t") if "\t" in line else line.split()
     if len(cells) > columns or (len(cells) < columns and not may_be_short):
-        raise FileError(
-            path,
-            f"the row has {len(cells)} values, expected {columns} as the header says; repair or export it again",
-            number,
-        )
+        raise wrong_cells(path, number, len(cells), columns)
     try:
         row = list(map(float, cells))
     except ValueError:
@@ -110,5 +122,12 @@ def _cell(path: Path, line: int, column: int, cell: str) -> float:
         return float(cell)
     except ValueError:
         commas = re.fullmatch(r"\s*[-+]?\d+,\d+(e[-+]?\d+)?\s*", cell, re.IGNORECASE)
-        hint = "export it again with decimal points" if commas else "repair or export it again"
-        raise FileError(path, f"'{cell.strip()}' in column {column} is not a number; {hint}", line) from None
+        expected = "a number with a decimal point" if commas else "a number"
+        known = {"cell": Quantity(cell.strip()), "column": Quantity(column, "1")}
+        raise malformed(path, line, f"'{cell.strip()}' in column {column}", expected, **known) from None
+
+
+def wrong_cells(path: Path, line: int, cells: int, columns: int, hint: str = "") -> FileError:
+    """The error of a row that has too many or too few cells."""
+    counts = {"cells": Quantity(cells, "1"), "columns": Quantity(columns, "1")}
+    return malformed(path, line, f"{cells} values in the row", f"{columns} by the header{hint}", **counts)

@@ -5,13 +5,12 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 from kinertia.errors import SettingsError
 from kinertia.io.belt_file import read_belt
 from kinertia.io.marker_set_file import read_marker_set
 from kinertia.io.recording import read_recording
-from kinertia.io.subject_file import SubjectFile
+from kinertia.io.subject_file import SubjectFile, TrialFiles
 from kinertia.model.marker_set import MarkerSet
 from kinertia.trial.data import Recording
 from kinertia.trial.plate_names import plate_of_trial
@@ -28,19 +27,28 @@ def read_inputs(
     Raises:
         KinertiaError: a file is missing or broken.
     """
-    static = read_recording(_static(wanted), length_unit=wanted.model.length_unit, standing=True)
+    static = read_static(wanted)
     marker_set = None if wanted.model.markers is None else read_marker_set(wanted.model.markers)
-    return static, read_trials(wanted, progress), marker_set
+    trials = []
+    for k, files in enumerate(wanted.trials):
+        progress("reading", k / len(wanted.trials))
+        trials.append(read_trial(wanted, files))
+    return static, trials, marker_set
 
 
-def _static(wanted: SubjectFile) -> Path:
+def read_static(wanted: SubjectFile) -> Recording:
+    """The static trial of a subject file.
+
+    Raises:
+        KinertiaError: there is none, or its file is missing or broken.
+    """
     if wanted.model.static is None:
         raise SettingsError("[model] names an OpenSim model; this needs a static trial (static = ...)")
-    return wanted.model.static
+    return read_recording(wanted.model.static, length_unit=wanted.model.length_unit, standing=True)
 
 
-def read_trials(wanted: SubjectFile, progress: Progress = lambda stage, share: None) -> list[TrialInput]:
-    """The trials by their names in the subject file.
+def read_trial(wanted: SubjectFile, files: TrialFiles) -> TrialInput:
+    """One of the trials of a subject file, by its name there.
 
     Columns of the same name in the force files of two trials need not come from the same plate (laboratories sort steps
     into such files), so each trial's are plates of their own, unless the subject file says that they are the same; the
@@ -49,16 +57,12 @@ def read_trials(wanted: SubjectFile, progress: Progress = lambda stage, share: N
     Raises:
         KinertiaError: a file is missing or broken.
     """
-    inputs = []
-    for k, files in enumerate(wanted.trials):
-        progress("reading", k / len(wanted.trials))
-        started = time.perf_counter()
-        recording = read_recording(files.markers, files.forces, files.loads, files.length_unit)
-        seconds = time.perf_counter() - started
-        plates = recording.plates
-        apart = files.forces is not None and len(wanted.trials) > 1 and not wanted.instruments.same_plates
-        if plates is not None and apart:
-            plates = replace(plates, names=tuple(plate_of_trial(name, files.name) for name in plates.names))
-        recording = replace(recording, name=files.name, plates=plates, belt=read_belt(files.belt_speed_m_s))
-        inputs.append(TrialInput(recording, files.window_s, seconds))
-    return inputs
+    started = time.perf_counter()
+    recording = read_recording(files.markers, files.forces, files.loads, files.length_unit)
+    seconds = time.perf_counter() - started
+    plates = recording.plates
+    apart = files.forces is not None and len(wanted.trials) > 1 and not wanted.instruments.same_plates
+    if plates is not None and apart:
+        plates = replace(plates, names=tuple(plate_of_trial(name, files.name) for name in plates.names))
+    recording = replace(recording, name=files.name, plates=plates, belt=read_belt(files.belt_speed_m_s))
+    return TrialInput(recording, files.window_s, seconds)

@@ -16,7 +16,7 @@ import numpy as np
 
 from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray
 
-_FITS = 0.05
+MOMENTS_FIT = 0.05
 """Moments agree with the centre of pressure if they miss it by no more than this share (RMS)."""
 _FEWEST = 10
 
@@ -35,7 +35,7 @@ class PlateMoments(NamedTuple):
     @property
     def agree(self) -> bool:
         """Moments and centre of pressure say the same."""
-        return self.misses <= _FITS
+        return self.misses <= MOMENTS_FIT
 
     @classmethod
     def of(cls, force: FloatArray, moment: FloatArray, point: FloatArray) -> PlateMoments:
@@ -56,6 +56,6 @@ class PlateMoments(NamedTuple):
         left = moment - at + np.cross(centre, force)
         size = moment[loaded, :2] - moment[loaded, :2].mean(axis=0)
         misses = float(np.sqrt(np.square(left[loaded, :2]).sum() / max(np.square(size).sum(), 1e-12)))
-        if misses <= _FITS:
+        if misses <= MOMENTS_FIT:
             at[:, 2] += left[:, 2]
         return cls(at, misses)

@@ -15,6 +15,7 @@ import numpy as np
 from pydantic import Field, ValidationError, model_validator
 
 from kinertia.errors import FileError
+from kinertia.findings.quantity import Quantity
 from kinertia.io.toml_lines import read_toml
 from kinertia.model.bsp import PARAMETERS
 from kinertia.settings import Table
@@ -72,8 +73,9 @@ def read_population(path: Path) -> PopulationFile:
     except ValidationError as error:
         first = error.errors()[0]
         place = ".".join(map(str, first["loc"])) or "its numbers"
-        problem = f"not what kinertia population wrote: {place}: {first['msg']}; write it anew"
-        raise FileError(path, problem, document.line(first["loc"]) or document.last_line) from None
+        line = document.line(first["loc"]) or document.last_line
+        evidence = {"entry": Quantity(place), "problem": Quantity(f"{place}: {first['msg']}")}
+        raise FileError.found(path, "F185", line, evidence) from None
 
 
 def population_text(population: PopulationFile) -> str:

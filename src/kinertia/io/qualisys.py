@@ -16,10 +16,14 @@ from pathlib import Path
 import numpy as np
 
 from kinertia.errors import FileError
-from kinertia.io.c3d_plates import LabPlates, to_ground_plates
+from kinertia.findings.finding import Finding
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
+from kinertia.io.c3d_plates import LabPlates, contradicting_moments, to_ground_plates
 from kinertia.io.lab_axes import to_ground
-from kinertia.io.number_table import read_lines, read_rows
+from kinertia.io.number_table import mismatch, read_lines, read_rows
 from kinertia.io.plate_moments import PlateMoments
+from kinertia.io.sto import expect_once, header_entry, other_count
 from kinertia.io.trc import seen_positions
 from kinertia.trial.data import FloatArray, Markers, Recording
 
@@ -42,7 +46,7 @@ def read_qualisys(path: str | Path, forces: Sequence[Path] | None = None) -> Rec
     """
     path = Path(path)
     beside = plates_beside(path) if forces is None else list(forces)
-    markers, notes = _markers(path)
+    markers, findings = _markers(path)
     single_plates = [_plate(file) for file in beside]
     plates, time = None, np.zeros(0)
     if single_plates:
@@ -54,15 +58,14 @@ def read_qualisys(path: str | Path, forces: Sequence[Path] | None = None) -> Rec
             np.stack([one.moment for one in single_plates], axis=1),
             np.stack([one.corners for one in single_plates]),
         )
-    rotation, up, axis_notes = to_ground(path, "+Z", "Qualisys' usual setting", markers.positions, plates)
-    ground, load_notes = to_ground_plates(path, plates, rotation, time) if plates is not None else (None, [])
-    read = [f"{path.name}: plates from {', '.join(file.name for file in beside)}"] if beside else []
-    more = [note for one in single_plates for note in one.notes]
+    rotation, up, axis_findings = to_ground(path, "+Z", "Qualisys' usual setting", markers.positions, plates)
+    ground, load_findings = to_ground_plates(path, plates, rotation, time)
+    more = [one for plate in single_plates for one in plate.findings]
     return Recording(
         path.stem,
         markers.rotated(rotation),
         ground,
-        notes=(*notes, *read, *more, *axis_notes, *load_notes),
+        findings=(*findings, *more, *axis_findings, *load_findings),
         length_unit="mm",
         vertical=up,
     )
@@ -88,7 +91,7 @@ def _header(path: Path, lines: Sequence[str]) -> tuple[dict[str, list[str]], int
         if _is_number(name):
             return header, number
         header.setdefault(name.strip(), [value.strip() for value in values])
-    raise FileError(path, "no row of numbers in it; expected a TSV file of Qualisys Track Manager, export it again")
+    raise mismatch(path, "a TSV file of Qualisys Track Manager", "no row of numbers", "a header and rows of numbers")
 
 
 def _is_number(cell: str) -> bool:
@@ -102,41 +105,40 @@ def _is_number(cell: str) -> bool:
 def _number(path: Path, header: dict[str, list[str]], name: str) -> float:
     value = (header.get(name) or [""])[0]
     if not _is_number(value):
-        problem = f"{name} is '{value}'" if name in header else f"its header has no {name}"
-        raise FileError(path, f"{problem}; expected a number, as Qualisys Track Manager writes it with a TSV header")
+        known = f"'{value}'" if name in header else "missing"
+        raise header_entry(path, None, name, known, "a number, as Qualisys Track Manager writes it with a TSV header")
     if not np.isfinite(float(value)):
-        raise FileError(path, f"{name} is '{value}'; expected a finite number")
+        raise header_entry(path, None, name, f"'{value}'", "a finite number")
     return float(value)
 
 
 def _rate(path: Path, header: dict[str, list[str]]) -> float:
     rate_hz = _number(path, header, "FREQUENCY")
     if not 0.0 < rate_hz < _FASTEST_HZ:
-        raise FileError(path, f"FREQUENCY is {rate_hz:g}; expected frames or samples per second, export it again")
+        raise header_entry(path, None, "FREQUENCY", f"{rate_hz:g}", "frames or samples per second")
     return rate_hz
 
 
-def _markers(path: Path) -> tuple[Markers, list[str]]:
-    """Markers in the laboratory's axes, m, and notes."""
+def _markers(path: Path) -> tuple[Markers, list[Finding]]:
+    """Markers in the laboratory's axes, m, and what was found."""
     lines = read_lines(path)
     header, first = _header(path, lines)
     labels = tuple(label for label in header.get("MARKER_NAMES", ()) if label)
     if not labels:
-        raise FileError(path, "its header has no MARKER_NAMES; export 3D data with the TSV header included")
-    if repeated := [label for label in dict.fromkeys(labels) if labels.count(label) > 1]:
-        raise FileError(path, f"MARKER_NAMES has {', '.join(repeated)} more than once; give every marker its own label")
+        found = "no MARKER_NAMES in its header; export 3D data with the TSV header included"
+        raise FileError.found(path, "F164", found=Quantity(found))
+    expect_once(path, labels, None)
     rate = _rate(path, header)
     stated = int(_number(path, header, "NO_OF_FRAMES"))
     counted = {"Frame", "Time"} <= {name for cells in ([k, *v] for k, v in header.items()) for name in cells}
     wide = 3 * len(labels) + 2 * counted
     text = [line.replace("NULL", "") for line in lines]
     values, numbers = read_rows(path, text, first, wide, may_be_short=True)
-    positions, zero_notes = seen_positions(path, values[:, 2 * counted :], labels, numbers)
-    notes = [*zero_notes]
+    positions, findings = seen_positions(path, values[:, 2 * counted :], labels, numbers)
     if stated != len(values):
-        notes.append(f"{path.name}: its header announces {stated} frames, the file has {len(values)}: all were read")
+        findings.append(other_count(path, None, stated, len(values), "frames"))
     start = values[0, 1] if counted else 0.0
-    return Markers(start + np.arange(len(values)) / rate, labels, _MM * positions), notes
+    return Markers(start + np.arange(len(values)) / rate, labels, _MM * positions), findings
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,7 +150,7 @@ class _Plate:
     force: FloatArray
     moment: FloatArray
     corners: FloatArray
-    notes: list[str]
+    findings: list[Finding]
 
 
 def _plate(path: Path) -> _Plate:
@@ -156,7 +158,8 @@ def _plate(path: Path) -> _Plate:
     header, first = _header(path, lines)
     names = next(([key, *values] for key, values in header.items() if "Force_X" in (key, *values)), None)
     if names is None or any(column not in names for column in _COLUMNS):
-        raise FileError(path, f"expected columns {', '.join(_COLUMNS)}, as Qualisys Track Manager exports forces")
+        lacking = ", ".join(column for column in _COLUMNS if column not in (names or ()))
+        raise FileError.found(path, "F156", at=Where(plate=path.stem), columns=Quantity(f"the columns {lacking}"))
     values, _ = read_rows(path, [line.replace("NULL", "") for line in lines], first, len(names), may_be_short=True)
     force, moment, point = (
         values[:, [names.index(f"{what}_{axis}") for axis in "XYZ"]] for what in ("Force", "Moment", "COP")
@@ -170,13 +173,9 @@ def _plate(path: Path) -> _Plate:
         force, moment, point = force @ turned, moment @ turned, corners.mean(axis=0) + point @ turned
     moments = PlateMoments.of(force, moment, point)
     name = (header.get("FORCE_PLATE_NAME") or [path.stem])[0] or path.stem
-    notes = []
-    if not moments.agree and np.isfinite(moments.misses):
-        notes.append(
-            f"{path.name}: moments and centre of pressure contradict each other (by {100 * moments.misses:.0f} %); the "
-            f"centre of pressure was taken, without a free moment"
-        )
-    return _Plate(name, _rate(path, header), force, moments.about_origin, corners, notes)
+    wrong = not moments.agree and np.isfinite(moments.misses)
+    findings = [contradicting_moments(path, name, moments.misses)] if wrong else []
+    return _Plate(name, _rate(path, header), force, moments.about_origin, corners, findings)
 
 
 def _axes(corners: FloatArray) -> FloatArray:
@@ -190,8 +189,6 @@ def _axes(corners: FloatArray) -> FloatArray:
 def _expect_alike(files: Sequence[Path], plates: Sequence[_Plate]) -> None:
     for file, plate in zip(files, plates, strict=True):
         if plate.rate_hz != plates[0].rate_hz or len(plate.force) != len(plates[0].force):
-            raise FileError(
-                file,
-                f"{len(plate.force)} samples at {plate.rate_hz:g} Hz, {files[0].name} has {len(plates[0].force)} at "
-                f"{plates[0].rate_hz:g} Hz; export all plates of the trial together",
-            )
+            counts = {"samples": Quantity(len(plate.force), "1"), "rate_hz": Quantity(plate.rate_hz, "Hz")}
+            other = f"{files[0].name} has {len(plates[0].force)} at {plates[0].rate_hz:g} Hz"
+            raise FileError.found(file, "F155", None, counts, other=Quantity(other))

@@ -7,12 +7,16 @@ from pathlib import Path
 
 import numpy as np
 
-from kinertia.errors import FileError, TrialError
-from kinertia.io.ground_forces import read_forces_with_notes
+from kinertia.errors import FileError, TrialError, problem_of
+from kinertia.findings.finding import Finding, finding
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
+from kinertia.io.ground_forces import read_forces_with_findings
 from kinertia.io.lab_axes import upright_along_z
-from kinertia.io.number_table import expect_file
+from kinertia.io.number_table import expect_file, wrong_kind
 from kinertia.io.trc import read_trc_recording
 from kinertia.trial.data import FloatArray, Recording
+from kinertia.trial.impossible_data import impossible_load, impossible_position
 
 MARKER_FILES = (".trc", ".c3d", ".tsv", ".csv")
 FORCE_FILES = (".mot", ".sto", ".tsv")
@@ -61,24 +65,29 @@ def read_recording(
     if loads_path is not None:
         _expect_kind(Path(loads_path), (".xml",), "external loads")
     if forces_path is not None or loads_path is not None:
-        plates, notes = read_forces_with_notes(forces_path, loads_path, turn)
+        plates, findings = read_forces_with_findings(forces_path, loads_path, turn)
         if recording.plates is not None:
-            notes = (f"{markers_path.name}: its own force plates were not used, the force file was", *notes)
-        recording = replace(recording, plates=plates, notes=(*recording.notes, *notes), left_out=())
+            findings = (finding("F158", Where(markers_path.name)), *findings)
+        recording = replace(recording, plates=plates, findings=(*_of_markers(recording), *findings))
     _expect_overlap(recording)
     _expect_laboratory(markers_path, recording)
     return recording
+
+
+def _of_markers(recording: Recording) -> list[Finding]:
+    """Without what was found of its own plates, where those of a force file take their place."""
+    return [one for one in recording.findings if one.code != "F151" and one.where.plate is None]
 
 
 def _read_markers(path: Path, plate: Path | None, length_unit: str | None, standing: bool) -> Recording:
     """What a file of markers holds; readers are loaded by those who have such files."""
     kind = path.suffix.lower()
     if length_unit is not None and kind != ".c3d":
-        raise FileError(path, "length_unit is for C3D files; this one says its own unit")
+        raise wrong_kind(path, f"A '{kind}' file", "take a length_unit, since it states its own", "a .c3d file")
     if plate is not None:
         expect_file(plate)
         if kind != ".tsv":
-            raise FileError(plate, "a plate of Qualisys goes with markers of Qualisys; expected a .tsv file of markers")
+            raise wrong_kind(plate, "A plate of Qualisys", f"go with markers in a '{kind}' file", "a .tsv file of them")
     if kind == ".c3d":
         from kinertia.io.c3d import read_c3d
 
@@ -96,14 +105,19 @@ def _read_markers(path: Path, plate: Path | None, length_unit: str | None, stand
 
 def _turned(recording: Recording, path: Path, turn: FloatArray) -> Recording:
     """Markers of a TRC file, which takes Y to be up and has not been written so."""
-    note = f"{path.name}: people stand upright along Z; markers, and forces with them, were turned to Y up"
-    return replace(recording, markers=recording.markers.rotated(turn), vertical="+Z", notes=(*recording.notes, note))
+    rotated = finding("F133", Where(path.name), axis=Quantity("+Z"), source=Quantity("upright people"))
+    return replace(
+        recording,
+        markers=recording.markers.rotated(turn),
+        vertical="+Z",
+        findings=(*recording.findings, rotated),
+    )
 
 
 def _expect_kind(path: Path, suffixes: tuple[str, ...], what: str) -> None:
     if path.suffix.lower() not in suffixes:
         known = " or ".join(filter(None, (", ".join(suffixes[:-1]), suffixes[-1])))
-        raise FileError(path, f"cannot read {what} from a '{path.suffix}' file; expected {known}")
+        raise wrong_kind(path, f"A '{path.suffix}' file", f"hold {what}", known)
     expect_file(path)
 
 
@@ -113,22 +127,20 @@ def _expect_laboratory(path: Path, recording: Recording) -> None:
     far = np.argwhere(np.abs(markers.positions) > _FARTHEST_M)
     if far.size:
         frame, marker, axis = far[0]
-        raise FileError(
-            path,
-            f"marker {markers.labels[marker]} is {markers.positions[frame, marker, axis]:.3g} m away at "
-            f"{markers.time[frame]:g} s; expected at most {_FARTHEST_M:g} m: repair the number, or the unit of lengths",
-        )
+        position_m, time_s = float(markers.positions[frame, marker, axis]), float(markers.time[frame])
+        wrong = impossible_position(markers.labels[marker], position_m, time_s, _FARTHEST_M)
+        raise FileError.of(path, wrong)
     if plates is None:
         return
     loads = np.concatenate((plates.force, plates.moment / _FARTHEST_M), axis=2)
     strong = np.argwhere(~(np.abs(loads) < _STRONGEST_N))
     if strong.size:
         frame, plate, axis = strong[0]
-        raise TrialError(
-            recording.name,
-            f"{plates.names[plate]} has a {'force' if axis < 3 else 'moment'} that no plate measures at "
-            f"{plates.time[frame]:g} s; repair the number, or the unit of forces",
-        )
+        what, unit, limit = ("force", "N", _STRONGEST_N) if axis < 3 else ("moment", "N m", _STRONGEST_N * _FARTHEST_M)
+        name, value = "force_n" if axis < 3 else "moment_nm", float(plates.wrench[frame, plate, axis])
+        size = {name: Quantity(value, unit, limit=limit)} if np.isfinite(value) else {}
+        load = impossible_load(plates.names[plate], what, float(plates.time[frame]), **size)
+        raise TrialError(recording.name, problem_of(load)).with_finding(load.in_trial(recording.name))
 
 
 def _expect_overlap(recording: Recording) -> None:
@@ -136,8 +148,5 @@ def _expect_overlap(recording: Recording) -> None:
         return
     markers, forces = recording.markers.time, recording.plates.time
     if forces[0] > markers[-1] or forces[-1] < markers[0]:
-        raise TrialError(
-            recording.name,
-            f"forces from {forces[0]:.3f} to {forces[-1]:.3f} s and markers from {markers[0]:.3f} to "
-            f"{markers[-1]:.3f} s do not overlap; give files of the same trial on the same clock",
-        )
+        forces_s, markers_s = (Quantity((float(time[0]), float(time[-1])), "s") for time in (forces, markers))
+        raise TrialError.found(recording.name, "T111", forces_s=forces_s, markers_s=markers_s)

@@ -15,6 +15,7 @@ from typing import Annotated
 from pydantic import Field, ValidationError, model_validator
 
 from kinertia.errors import FileError
+from kinertia.findings.quantity import Quantity
 from kinertia.io.toml_lines import read_toml
 from kinertia.settings import Table
 
@@ -78,10 +79,10 @@ def read_session(path: Path) -> tuple[PersonInstruments, ...]:
         return SessionFile.model_validate(document.content).people
     except ValidationError as error:
         first = error.errors()[0]
-        problem = (
-            f"not what kinertia instruments wrote: {'.'.join(map(str, first['loc']))}: {first['msg']}; write it anew"
-        )
-        raise FileError(path, problem, document.line(first["loc"]) or document.last_line) from None
+        place = ".".join(map(str, first["loc"])) or "its numbers"
+        line = document.line(first["loc"]) or document.last_line
+        evidence = {"entry": Quantity(place), "problem": Quantity(f"{place}: {first['msg']}")}
+        raise FileError.found(path, "F184", line, evidence) from None
 
 
 def session_text(

@@ -11,7 +11,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kinertia.errors import FileError
-from kinertia.io.number_table import read_lines, read_rows
+from kinertia.findings.finding import Finding, with_evidence
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
+from kinertia.io.number_table import malformed, mismatch, read_lines, read_rows
 from kinertia.io.output_folder import write_then_rename
 from kinertia.trial.data import FloatArray
 
@@ -31,14 +34,14 @@ class TimeTable:
         labels: of the k columns.
         values: (n, k).
         in_degrees: whether its angles are in degrees; None where the file does not say.
-        notes: what was assumed while reading, one sentence each.
+        findings: what was assumed while reading.
     """
 
     time: FloatArray
     labels: tuple[str, ...]
     values: FloatArray
     in_degrees: bool | None
-    notes: tuple[str, ...] = ()
+    findings: tuple[Finding, ...] = ()
 
     def columns(self, labels: Sequence[str]) -> FloatArray:
         """(n, c) the columns of these labels."""
@@ -67,22 +70,22 @@ def read_table(path: str | Path) -> TimeTable:
     lines = read_lines(path)
     end = next((number for number, line in enumerate(lines, start=1) if line.strip().lower() == "endheader"), None)
     if end is None:
-        raise FileError(path, "not a STO or MOT file: no line 'endheader'; check what was exported")
+        raise mismatch(path, "a STO or MOT file", "no line 'endheader'", "one at the end of the header")
     header = _header(lines[: end - 1])
     label_line = next((number for number in range(end + 1, len(lines) + 1) if lines[number - 1].strip()), None)
     if label_line is None:
-        raise FileError(path, "ends after 'endheader'; expected column labels and rows, export the file again", end)
+        raise FileError.found(path, "F104", end, found=Quantity("it ends after 'endheader', without labels and rows"))
     labels = _labels(path, lines[label_line - 1], label_line)
     values, line_numbers = read_rows(path, lines, label_line + 1, len(labels))
     if not len(values):
-        raise FileError(path, "no rows after the column labels; export the file again")
-    notes = _wrong_counts(path, header, len(values), len(labels))
+        raise FileError.found(path, "F104", rows=Quantity(0, "1"), found=Quantity("no rows follow the column labels"))
+    findings = _wrong_counts(path, header, len(values), len(labels))
     time = values[:, 0]
     if np.isnan(time).any():
-        raise FileError(path, "the row has no time", line_numbers[int(np.argmax(np.isnan(time)))])
+        raise malformed(path, line_numbers[int(np.argmax(np.isnan(time)))], "a row without a time", "one in column 1")
     stated = header.get("indegrees")
     in_degrees = None if stated is None else stated[0].lower() == "yes"
-    return TimeTable(time, tuple(labels[1:]), values[:, 1:], in_degrees, notes)
+    return TimeTable(time, tuple(labels[1:]), values[:, 1:], in_degrees, findings)
 
 
 def write_sto(path: str | Path, table: pd.DataFrame, in_degrees: bool, name: str, remark: str = "") -> None:
@@ -132,27 +135,38 @@ def _labels(path: Path, line: str, number: int) -> list[str]:
     cells = line.rstrip().split("\t") if "\t" in line.strip() else line.split()
     labels = [cell.strip() for cell in cells]
     if labels[0].lower() != "time":
-        raise FileError(path, f"the first column is '{labels[0]}', expected 'time'; export the file again", number)
+        raise header_entry(path, number, "the first column", f"'{labels[0]}'", "'time'")
     if "" in labels:
-        raise FileError(path, f"column {labels.index('') + 1} has no label; export the file again", number)
-    repeated = [label for label, times in Counter(labels).items() if times > 1]
-    if repeated:
-        raise FileError(
-            path,
-            f"repeated column labels {', '.join(repeated)}; expected each once, rename or remove the others",
-            number,
-        )
+        raise header_entry(path, number, f"the label of column {labels.index('') + 1}", "missing", "a name")
+    expect_once(path, labels, number)
     return labels
 
 
-def _wrong_counts(path: Path, header: dict[str, tuple[str, int]], rows: int, columns: int) -> tuple[str, ...]:
-    """What the header says that the file has not: a note, since the rows say what is there (OpenSim reads it, too)."""
-    notes = []
-    for keys, count, what in ((_ROW_KEYS, rows, "rows"), (_COLUMN_KEYS, columns, "columns")):
-        for stated, line in (header[key] for key in keys if key in header):
-            if not stated.isdigit() or int(stated) != count:
-                notes.append(
-                    f"{path.name}: line {line} of its header announces {stated} {what}, the file has {count}: all of "
-                    f"them were read"
-                )
-    return tuple(notes)
+def header_entry(path: Path, line: int | None, key: str, value: str, expected: str) -> FileError:
+    """The error that in the header {key} is {value}, expected {expected}."""
+    return FileError.found(path, "F114", line, key=Quantity(key), value=Quantity(value), expected=Quantity(expected))
+
+
+def expect_once(path: Path, labels: Sequence[str], line: int | None) -> None:
+    """Raise a FileError that names the labels that occur more than once."""
+    repeated = {label: count for label, count in Counter(labels).items() if count > 1}
+    if repeated:
+        names = Quantity(", ".join(repeated))
+        raise FileError.found(path, "F113", line, count=Quantity(max(repeated.values()), "1"), label=names)
+
+
+def _wrong_counts(path: Path, header: dict[str, tuple[str, int]], rows: int, columns: int) -> tuple[Finding, ...]:
+    """What the header says that the file has not: no error, since rows say what is there (OpenSim reads it, too)."""
+    return tuple(
+        other_count(path, line, float(stated) if stated.isdecimal() else stated, count, what)
+        for keys, count, what in ((_ROW_KEYS, rows, "rows"), (_COLUMN_KEYS, columns, "columns"))
+        for stated, line in (header[key] for key in keys if key in header)
+        if not stated.isdecimal() or int(stated) != count
+    )
+
+
+def other_count(path: Path, line: int | None, announced: float | str, found: int, what: str) -> Finding:
+    """What a header announces, and what the file has of it."""
+    unit = "" if isinstance(announced, str) else "1"
+    counts = {"announced": Quantity(announced, unit), "found": Quantity(found, "1")}
+    return with_evidence("F111", Where(path.name, line), {**counts, "what": Quantity(what)})

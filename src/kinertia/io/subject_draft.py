@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from kinertia.errors import FileError, KinertiaError
-from kinertia.io.file_names import RESULT_FILES
+from kinertia.findings.quantity import Quantity
+from kinertia.io.file_names import RESULT_FILES, missing_file
 from kinertia.io.measures_file import is_measures_sheet
 from kinertia.io.qualisys import plates_beside
 from kinertia.io.recording import MARKER_FILES, read_recording
@@ -46,7 +47,7 @@ def init_subject(folder: str | Path, nearby: bool = True) -> str:
     """
     folder = Path(folder).resolve()
     if not folder.is_dir():
-        raise FileError(folder, "no such folder; give the one that holds the recordings")
+        raise FileError.found(folder, "F101", None, missing_file(folder, str(folder), "the folder of the recordings"))
     files = _expect_files(folder)
     c3d = [file for file in files if file.suffix.lower() == ".c3d"]
     trc = [file for file in files if file.suffix.lower() != ".c3d" and _holds_markers(file)]
@@ -100,23 +101,17 @@ def _expect_files(folder: Path) -> list[Path]:
     files = sorted(path for path in folder.iterdir() if not path.name.startswith("."))  # archives of Macs have twins
     for file in files:
         if not _is_utf8(file.name):
-            raise FileError(file, "its name is not UTF-8, so that no subject file can name it; rename it")
+            reason = Quantity("it is not UTF-8, so that no subject file can hold it")
+            raise FileError.found(file, "F192", name=Quantity(ascii(file.name)), problem=reason)
     if not any(map(is_capture, files)):
+        problem = f"holds no file of markers ({', '.join(MARKER_FILES)})"
         inside = [one for file in files for one in (file, *_entries(file)) if any(map(is_capture, _entries(one)))]
         if len(inside) == 1:
-            raise FileError(
-                folder, f"holds no file of markers, but its folder {_relative(inside[0], folder)} does; give that one"
-            )
-        if inside:
+            problem += f", but its folder {_relative(inside[0], folder)} does; give that one"
+        elif inside:
             listed = ", ".join(_relative(one, folder) for one in inside[:_LISTED]) + (", ..." * (len(inside) > _LISTED))
-            raise FileError(
-                folder,
-                f"holds no file of markers, but its folders {listed} do; give that of one person, with the static "
-                "trial in it, or copy the files of one person into one folder",
-            )
-        raise FileError(
-            folder, f"holds no file of markers ({', '.join(MARKER_FILES)}); give the folder that holds the recordings"
-        )
+            problem += f", but its folders {listed} do; give one person's, with the static trial in it"
+        raise FileError.found(folder, "F108", problem=Quantity(problem))
     return files
 
 

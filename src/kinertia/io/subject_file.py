@@ -38,6 +38,9 @@
     [prior]
     bsp = "spring/bsp.csv"         # an earlier estimate in place of the literature's
 
+    [diagnostics]                  # for the person; [trial.diagnostics] for the trial above it
+    ignore = ["M102"]              # findings that do not count; `waive` for ERRORs that do not stop an estimate
+
 `read_subject` checks it whole and names the line of what is wrong; `kinertia.io.subject_draft` drafts one.
 """
 
@@ -45,106 +48,37 @@ from __future__ import annotations
 
 import datetime
 import difflib
-import json
 import os
 import re
 from collections.abc import Mapping
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path, PureWindowsPath
-from typing import Annotated, Any, Literal
+from typing import Any, TypeVar
 
-from pydantic import (
-    BeforeValidator,
-    Field,
-    ValidationError,
-    ValidationInfo,
-    model_validator,
-)
+from pydantic import Field, ValidationError, model_validator
 
-from kinertia.errors import FileError, SettingsError, SubjectError
-from kinertia.io.file_names import path_from, path_trouble, trouble_as_folders
-from kinertia.io.marker_set_file import preset_names
-from kinertia.io.toml_lines import Location, read_toml
+from kinertia.errors import FileError, SettingsError, SubjectError, problem_of
+from kinertia.findings.finding import Finding, finding, with_evidence
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
+from kinertia.io.file_names import trouble_as_folders
+from kinertia.io.subject_values import BeltSpeed, CodedError, File, LengthUnit, MarkerSetName, TrialName, Window, shown
+from kinertia.io.toml_lines import Location, TomlFile, read_toml
 from kinertia.model.anthropometry import check_subject
 from kinertia.settings import (
     Attached,
+    Diagnostics,
     Instruments,
     KnownSegment,
     PriorSettings,
     Settings,
     Subject,
     Table,
-    folder_of,
     number_of,
 )
 
-
-def _file(value: object, info: ValidationInfo) -> Path:
-    """An existing file, absolute; a relative one counts from the subject file's folder (the context)."""
-    if not isinstance(value, str | Path):
-        raise ValueError("must be a path in quotes")
-    path = path_from(folder_of(info), str(value)).resolve()
-    if os.path.isfile(path):  # false where the system allows no such name
-        return path
-    if os.path.isdir(path):
-        raise ValueError(f"{path} is a folder; give a file")
-    if trouble := path_trouble(str(value)):
-        raise ValueError(trouble)
-    names = sorted(entry.name for entry in path.parent.iterdir()) if os.path.isdir(path.parent) else []
-    near = difflib.get_close_matches(path.name, names, n=1)
-    raise ValueError(f"no such file in {path.parent}" + (f"; did you mean '{near[0]}'?" if near else ""))
-
-
-def _marker_set(value: object, info: ValidationInfo) -> str | Path:
-    if value in preset_names():
-        return str(value)
-    try:
-        return _file(value, info)
-    except ValueError as error:
-        presets = ", ".join(f"'{name}'" for name in preset_names())
-        raise ValueError(f"{error}; give a marker set's TOML file or one of the presets {presets}") from None
-
-
-def _trial_name(value: object) -> str:
-    """A name that can be a folder's: the results of several trials go to one folder each."""
-    if isinstance(value, str) and value.strip(" .") and not set(value) & set("/\\\0"):
-        return value
-    raise ValueError("must be a name that a folder can have: not empty, and without / and \\")
-
-
-def _window(value: object) -> tuple[float, float]:
-    match value:
-        case [int() | float() as start, int() | float() as end] if start < end:
-            return float(start), float(end)
-    raise ValueError("must be [start, end] in seconds, the start before the end")
-
-
-def _belt_speed(value: object, info: ValidationInfo) -> float | tuple[float, float] | Path:
-    match value:
-        case str() | Path():
-            return _file(value, info)
-        case {"right": right, "left": left, **others} if not others:
-            return _one_belt_speed(right), _one_belt_speed(left)
-        case (right, left):  # as it is once read
-            return _one_belt_speed(right), _one_belt_speed(left)
-    return _one_belt_speed(value)
-
-
-def _one_belt_speed(value: object) -> float:
-    if isinstance(value, int | float) and not isinstance(value, bool) and 0 < value <= 15:
-        return float(value)
-    raise ValueError(
-        "must be the speed of a treadmill's belt in m/s (up to 15), of two belts { right = 1.2, left = 0.6 }, or a "
-        "file with it over time"
-    )
-
-
-File = Annotated[Path, BeforeValidator(_file)]
-MarkerSetName = Annotated[str | Path, BeforeValidator(_marker_set)]
-TrialName = Annotated[str, BeforeValidator(_trial_name)]
-Window = Annotated[tuple[float, float], BeforeValidator(_window)]
-LengthUnit = Literal["mm", "cm", "m"]
-BeltSpeed = Annotated[float | tuple[float, float] | Path, BeforeValidator(_belt_speed)]
+T = TypeVar("T", bound=Table)
 
 
 class Model(Table):
@@ -180,6 +114,7 @@ class TrialFiles(Table):
         description="of a treadmill: m/s, of two belts `{ right = 1.2, left = 0.6 }`, or a file with it over time; "
         "left out: by standing feet",
     )
+    diagnostics: Diagnostics = Field(default=Diagnostics(), description="findings that are overruled in this trial")
 
     @model_validator(mode="before")
     @classmethod
@@ -231,6 +166,16 @@ class SubjectFile(Table):
     prior: PriorFiles = PriorFiles()
     segments: dict[str, KnownSegment] = Field(default={}, alias="segment")
     attached: tuple[Attached, ...] = Field(default=(), strict=False)
+    diagnostics: Diagnostics = Diagnostics()
+
+
+class StudyFile(Table):
+    """What holds for all subject files in its folder and in those below."""
+
+    diagnostics: Diagnostics = Diagnostics()
+
+
+STUDY_FILE = "kinertia.toml"
 
 
 def subject_file_in(folder: Path) -> Path:
@@ -239,18 +184,24 @@ def subject_file_in(folder: Path) -> Path:
     Raises:
         FileError: there is none, or several of which none is called subject.toml.
     """
-    paths = sorted(path for path in folder.iterdir() if path.suffix.lower() == ".toml" and path.name[0] != ".")
+    paths = sorted(
+        path
+        for path in folder.iterdir()
+        if path.suffix.lower() == ".toml" and path.name[0] != "." and path.name != STUDY_FILE
+    )
     named = [path for path in paths if path.name.lower() == "subject.toml"] or paths
     if len(named) == 1:
         return named[0]
     if not named:
-        raise FileError(folder, f"holds no subject file; draft one with: kinertia init {folder}")
+        problem = Quantity(f"holds no subject file; draft one with: kinertia init {folder}")
+        raise FileError.found(folder, "F108", problem=problem)
     listed = ", ".join(path.name for path in named)
-    raise FileError(folder, f"holds several .toml files ({listed}) and none is subject.toml; name the one you mean")
+    problem = Quantity(f"holds several .toml files ({listed}), none of them subject.toml")
+    raise FileError.found(folder, "F108", problem=problem)
 
 
 def read_subject(path: str | Path) -> SubjectFile:
-    """Read and check a subject file.
+    """Read and check a subject file; what the study file above it overrules holds, too.
 
     Raises:
         FileError: the file is missing, not TOML, or says something that cannot be (unknown key, missing or
@@ -259,30 +210,46 @@ def read_subject(path: str | Path) -> SubjectFile:
     """
     path = Path(path).resolve()
     document = read_toml(path, "a subject file (subject.toml)")
-    try:
-        result = SubjectFile.model_validate(document.content, context={"folder": path.parent})
-    except ValidationError as error:
-        # a trial with an error in it does not count, so that pydantic also finds too few trials
-        errors = [one for one in error.errors() if one["type"] != "too_short" or not one["input"]]
-        # a key that is not known explains one that is missing
-        errors = [one for one in errors if one["type"] == "extra_forbidden"] or errors
-        line, sentence = min((document.line(one["loc"]) or document.last_line, _sentence(one)) for one in errors)
-        raise FileError(path, sentence, line) from None
+    result = _validated(SubjectFile, document, path)
     if lack := _incomplete(result):
-        place, sentence = lack
-        raise FileError(path, sentence, document.line(place) or document.last_line)
+        place, found = lack
+        raise FileError.of(path, found, document.line(place) or document.last_line)
     subject = result.subject
     mass_kg = 70.0 if subject.mass_kg is None else subject.mass_kg  # left open: any plausible value
     height_m = 1.7 if subject.height_m is None else subject.height_m
     try:
         check_subject(mass_kg, height_m, subject.sex or "male")
     except SubjectError as error:
-        raise FileError(path, str(error), document.line(("subject", error.field))) from error
+        entry, _, expected = str(error).partition(": ")
+        known = {"key": Quantity(error.field), "value": Quantity(str(error.value))}
+        wrong = error.finding or _wrong_entry(entry, expected.rstrip("."), known)
+        raise FileError.of(path, wrong, document.line(("subject", error.field))) from error
     if trouble := trouble_as_folders([trial.name for trial in result.trials]):
         index, problem = trouble
-        advice = 'give this trial a name = "..." of its own'
-        raise FileError(path, f"{problem}; {advice}", document.line(("trial", index, "name")))
-    return result
+        words = {"name": Quantity(shown(result.trials[index].name)), "problem": Quantity(problem)}
+        raise FileError.found(path, "F192", document.line(("trial", index, "name")), words)
+    return result.model_copy(update={"diagnostics": _of_study(path.parent) + result.diagnostics})
+
+
+def _of_study(folder: Path) -> Diagnostics:
+    """What the nearest `kinertia.toml` overrules, in the folder or in one above it."""
+    path = next((one / STUDY_FILE for one in (folder, *folder.parents) if os.path.isfile(one / STUDY_FILE)), None)
+    if path is None:
+        return Diagnostics()
+    return _validated(StudyFile, read_toml(path, f"a study file ({STUDY_FILE})"), path).diagnostics
+
+
+def _validated(kind: type[T], document: TomlFile, path: Path) -> T:
+    try:
+        return kind.model_validate(document.content, context={"folder": path.parent})
+    except ValidationError as error:
+        # a trial with an error in it does not count, so that pydantic also finds too few trials
+        errors = [one for one in error.errors() if one["type"] != "too_short" or not one["input"]]
+        # a key that is not known explains one that is missing
+        errors = [one for one in errors if one["type"] == "extra_forbidden"] or errors
+        lines = [(document.line(one["loc"]) or document.last_line, _finding(one)) for one in errors]
+        line, found = min(lines, key=lambda one: (one[0], one[1].message))
+        raise FileError.of(path, found, line) from None
 
 
 def subject_from_options(content: Mapping[str, Any]) -> SubjectFile:
@@ -294,28 +261,37 @@ def subject_from_options(content: Mapping[str, Any]) -> SubjectFile:
     try:
         result = SubjectFile.model_validate(content, context={"folder": Path.cwd()})
     except ValidationError as error:
-        raise SettingsError(_sentence(error.errors()[0])) from None
-    if problem := _incomplete(result):
-        raise SettingsError(problem[1])
+        raise _settings_error(_finding(error.errors()[0])) from None
+    if lack := _incomplete(result):
+        raise _settings_error(lack[1])
     return result
 
 
-def _incomplete(wanted: SubjectFile) -> tuple[Location, str] | None:
+def _settings_error(found: Finding) -> SettingsError:
+    return SettingsError(problem_of(found)).with_finding(found)
+
+
+def _incomplete(wanted: SubjectFile) -> tuple[Location, Finding] | None:
     """Where and what the entries lack, or have too much of, for the kind of model."""
     model = wanted.model
     for table, key, value in (("model", "static", model.static), ("subject", "sex", wanted.subject.sex)):
         if value is None and model.osim is None:
-            return (table, key), _sentence({"loc": (table, key), "type": "missing"})
+            return (table, key), _finding({"loc": (table, key), "type": "missing"})
     if model.osim is not None:
         for key, given in (("static", model.static), ("markers", model.markers)):
             if given is not None:
-                return ("model", key), f"[model] has both osim and {key}; the OpenSim model says it all, remove {key}"
+                return ("model", key), _conflict("osim", f"{key} in [model] (the OpenSim model has all of it)")
         if wanted.settings.method == "two-level":
-            problem = 'method = "two-level" works on the built-in model only; remove it, or give a static trial'
-            return ("settings", "method"), problem
+            two_level = 'method = "two-level" (which works on the built-in model only)'
+            return ("settings", "method"), _conflict(two_level, "osim in [model]")
     elif model.calibrate:
-        return ("model", "calibrate"), "[model] calibrate goes with osim; the built-in model is always calibrated"
+        static = "a static trial (the built-in model is always calibrated)"
+        return ("model", "calibrate"), _conflict("calibrate in [model]", static)
     return None
+
+
+def _conflict(one: str, other: str) -> Finding:
+    return finding("F193", one=Quantity(one), other=Quantity(other))
 
 
 def with_settings(wanted: SubjectFile, **values: Any) -> SubjectFile:
@@ -328,10 +304,10 @@ def with_settings(wanted: SubjectFile, **values: Any) -> SubjectFile:
         settings = Settings.model_validate({**wanted.settings.model_dump(), **values})
     except ValidationError as error:
         detail = error.errors()[0]
-        raise SettingsError(_sentence({**detail, "loc": ("settings", *detail["loc"])})) from None
+        raise _settings_error(_finding({**detail, "loc": ("settings", *detail["loc"])})) from None
     changed = wanted.model_copy(update={"settings": settings})
-    if problem := _incomplete(changed):
-        raise SettingsError(problem[1])
+    if lack := _incomplete(changed):
+        raise _settings_error(lack[1])
     return changed
 
 
@@ -344,38 +320,58 @@ TABLES: dict[str, type[Table]] = dict(
     prior=PriorFiles,
     segment=KnownSegment,
     attached=Attached,
+    diagnostics=Diagnostics,
 )
 """Of a subject file, by their names there."""
 
 
-def _sentence(detail: Any) -> str:
-    """One sentence for the user from one of pydantic's errors."""
+def _finding(detail: Any) -> Finding:
+    """What one of pydantic's errors is: F191 with entry, expectation, key and value, or what has a code of its own."""
     *holder, key = detail["loc"]
-    table, kind = str(holder[0] if holder else key), detail["type"]
-    inside = ".".join(part for part in holder if isinstance(part, str))
+    error = detail.get("ctx", {}).get("error")
+    if isinstance(error, CodedError):
+        return replace(error.found, evidence={**error.found.evidence, "key": Quantity(str(key))})
+    known = {"key": Quantity(str(key))}
+    if "input" in detail:
+        known["value"] = Quantity(shown(detail["input"]))
+    return _wrong_entry(*_entry_and_expectation(detail, [str(part) for part in holder], str(key)), known)
+
+
+def _wrong_entry(entry: str, expected: str, known: Mapping[str, Quantity]) -> Finding:
+    return with_evidence("F191", Where(), {**known, "entry": Quantity(entry), "expected": Quantity(expected)})
+
+
+def _entry_and_expectation(detail: Any, holder: list[str], key: str) -> tuple[str, str]:
+    kind, top = detail["type"], (*holder, key)[0]
+    names = [part for part in holder if not part.isdigit()]
+    table = next((name for name in reversed(names) if name in TABLES), top)
+    heading = f"[[{table}]]" if table in ("trial", "attached") else f"[{table}]"
     if kind == "extra_forbidden":
-        known = list(TABLES[table].model_fields) if holder else list(TABLES)
-        near = difflib.get_close_matches(str(key), known, n=1)
-        hint = f"did you mean '{near[0]}'?" if near else f"known: {', '.join(known)}"
-        return f"unknown key '{key}'{f' in [{inside}]' if holder else ''}; {hint}"
-    if table == "segment" and len(detail["loc"]) < 3:
-        return "every segment is a table of its own under a heading like [segment.thigh_r]"
-    if table == "trial" and (not holder or isinstance(key, int)) and kind != "missing":
-        return "every trial is a table of its own under the heading [[trial]], in double brackets"
-    if table == "attached" and (not holder or isinstance(key, int)) and kind != "missing":
-        return "everything attached is a table of its own under the heading [[attached]], in double brackets"
+        fields = list(TABLES[table].model_fields) if holder else list(TABLES)
+        near = difflib.get_close_matches(key, fields, n=1)
+        hint = f"the nearest is '{near[0]}'" if near else f"known are {', '.join(fields)}"
+        return f"unknown key '{key}'" + (f" in [{'.'.join(names)}]" if names else ""), hint
+    if top == "segment" and len(detail["loc"]) < 3:
+        return "[segment]", "every segment is a table of its own under a heading like [segment.thigh_r]"
+    if top in ("trial", "attached") and (not holder or key.isdigit()) and kind != "missing":
+        what = "trial" if top == "trial" else "attached item"
+        return heading, f"every {what} is a table of its own under the heading [[{top}]], in double brackets"
     if not holder:
-        heading = f"[[{table}]]" if table in ("trial", "attached") else f"[{table}]"
-        return f"there is no heading {heading} with its entries below; add it"
+        return heading, "there is no such heading; add it, with its entries below"
     if kind == "missing":
-        heading = f"[[{table}]]" if table == "attached" else f"[{table}]"
-        return f"{heading} lacks '{key}' ({TABLES[table].model_fields[key].description}); add it"
-    problem = re.sub("^(Input|String) should", "must", detail["msg"]).replace("'", '"')
+        return f"{heading} lacks '{key}'", f"add it ({TABLES[table].model_fields[key].description})"
+    return f"{key} = {shown(detail['input'])}", _expectation(detail)
+
+
+def _expectation(detail: Any) -> str:
+    """What a value must be."""
+    kind = detail["type"]
     if kind == "value_error":
-        problem = str(detail["ctx"]["error"])
+        return str(detail["ctx"]["error"])
     if kind == "bool_type":
-        problem = "must be true or false, without quotes"
+        return "must be true or false, without quotes"
+    expected = re.sub("^(Input|String) should", "must", detail["msg"]).replace("'", '"')
     if kind == "float_type" and isinstance(detail["input"], str):
         with suppress(ValueError):
-            problem += f"; write it without quotes: {number_of(detail['input']):g}"
-    return f"{key} = {json.dumps(detail['input'], default=str, ensure_ascii=False)}: {problem}"
+            expected += f"; write it without quotes: {number_of(detail['input']):g}"
+    return expected

@@ -7,6 +7,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from kinertia.errors import FileError
+from kinertia.findings.finding import Finding, finding
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
 
 _PERSON_SHARE = 0.5
 """Of the labels of whoever has most; what has fewer is no second person, but a wand, or a label gone astray."""
@@ -18,8 +21,8 @@ def people_among(labels: Sequence[str]) -> dict[str, int]:
     return {name: count for name, count in prefixes if count > _PERSON_SHARE * prefixes[0][1]}
 
 
-def without_prefixes(path: Path, labels: Sequence[str], subject: str = "") -> tuple[list[str], list[str]]:
-    """Labels without `subject:`, and notes; only the person of the trial loses the prefix.
+def without_prefixes(path: Path, labels: Sequence[str], subject: str = "") -> tuple[list[str], list[Finding]]:
+    """Labels without `subject:`, and what was found (F163); only the person of the trial loses the prefix.
 
     Args:
         path: the file.
@@ -34,15 +37,15 @@ def without_prefixes(path: Path, labels: Sequence[str], subject: str = "") -> tu
         return list(labels), []
     if len(people) > 1 and not subject:
         counted = ", ".join(f"{name}: {count}" for name, count in people.items())
-        raise FileError(
-            path,
-            f"markers of several people ({counted}), and nothing tells which of them is meant, as loaded plates "
-            "under one of them would; export it with one of them only",
-        )
+        raise FileError.found(path, "F161", people=Quantity(counted), count=Quantity(len(people), "1"))
     subject = subject or next(iter(people))
     others = {label.split(":", 1)[0] for label in labels if ":" in label} - {subject}
-    notes = [f"{path.name}: the prefix '{subject}:' was removed from the labels"]
-    if others:
-        keep = f"{', '.join(sorted(others))} keep theirs"
-        notes = [f"{path.name}: several subjects; '{subject}:' was removed from the labels, {keep}"]
-    return [label.removeprefix(subject + ":") for label in labels], notes
+    names = [label.removeprefix(subject + ":") for label in labels]
+    kept = f" (not those of {', '.join(sorted(others))})" if others else ""
+    count = sum(label != name for label, name in zip(labels, names, strict=True))
+    return names, [left_out(path, count, f"label prefixes '{subject}:'{kept}")]
+
+
+def left_out(path: Path, count: int, what: str) -> Finding:
+    """That so many points, or parts of labels, were left out."""
+    return finding("F163", Where(path.name), count=Quantity(count, "1"), what=Quantity(what))

@@ -10,7 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from kinertia.errors import FileError
+from kinertia.io.number_table import expect_file, mismatch
 
 Location = tuple[str | int, ...]
 """Place of a table or key from the top: ("trial", 1, "markers")."""
@@ -44,14 +44,13 @@ def read_toml(path: Path, expected: str) -> TomlFile:
     Raises:
         FileError: no such file, not UTF-8, not TOML; with the line.
     """
-    if not path.is_file():
-        raise FileError(path, f"no such file; expected {expected}")
+    expect_file(path, expected)
     raw = path.read_bytes()
     try:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = raw[: error.start].count(b"\n") + 1
-        raise FileError(path, "not UTF-8 text; save the file in the UTF-8 encoding", line) from error
+        raise mismatch(path, expected, "text that is not UTF-8", "the UTF-8 encoding", line) from error
     return parse_toml(text, path)
 
 
@@ -64,19 +63,17 @@ def parse_toml(text: str, path: Path) -> TomlFile:
     try:
         return TomlFile(text, tomllib.loads(text))
     except RecursionError:
-        raise FileError(
-            path, "not valid TOML: brackets within brackets, too many to read; correct or remove them"
-        ) from None
+        raise mismatch(path, "TOML", "brackets within brackets, too many to read", "few of them") from None
     except tomllib.TOMLDecodeError as error:
         what, _, where = str(error).rpartition(" (at ")
         number = re.match(r"line (\d+)", where)
         line = int(number[1]) if number else text.count("\n") + 1
-        slashes = "; write paths with / instead of \\"  # TOML reads \d and \U as the beginning of something else
-        hints = {"Invalid value": "; put text in quotes", "Unescaped": slashes, "Invalid hex value": slashes}
-        hint = next((hint for start, hint in hints.items() if what.startswith(start)), "")
+        slashes = "paths with / instead of \\"  # TOML reads \d and \U as the beginning of something else
+        hints = {"Invalid value": "text in quotes", "Unescaped": slashes, "Invalid hex value": slashes}
+        expected = next((hint for start, hint in hints.items() if what.startswith(start)), "key = value")
         if comma := re.search(r"=\s*([-+]?\d+),(\d+)\s*(#|$)", text.splitlines()[line - 1] if number else ""):
-            hint = f"; a number has a decimal point, not a comma: {comma[1]}.{comma[2]}"
-        raise FileError(path, f"not valid TOML: {what}{hint}", line) from error
+            expected = f"a decimal point, not a comma: {comma[1]}.{comma[2]}"
+        raise mismatch(path, "TOML", what[:1].lower() + what[1:], expected, line) from error
 
 
 def quoted(text: str) -> str:
@@ -93,9 +90,14 @@ def find_lines(text: str) -> dict[Location, int]:
     places: dict[Location, int] = {}
     table: Location = ()
     counts: dict[Location, int] = {}
+
+    def below(keys: Location) -> Location:
+        """In the last table of an array: `[trial.diagnostics]` below the second `[[trial]]`."""
+        return (keys[0], counts[keys[:1]], *keys[1:]) if keys[:1] in counts and len(keys) > 1 else keys
+
     for number, line in enumerate(text.split("\n"), start=1):
         if heading := re.match(r"\s*(\[\[?)\s*([\w.\"' -]+?)\s*\]\]?\s*(#.*)?$", line):
-            place = table = _keys(heading[2])
+            place = table = below(_keys(heading[2]))
             if heading[1] == "[[":
                 counts[place] = counts.get(place, -1) + 1
                 place = table = (*place, counts[place])

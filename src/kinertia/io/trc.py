@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
+from collections.abc import Mapping, Sequence
 from itertools import islice
 from pathlib import Path
 
 import numpy as np
 
 from kinertia.errors import FileError
-from kinertia.io.even_times import rounding_s
-from kinertia.io.number_table import read_lines, read_rows
+from kinertia.findings.finding import Finding, finding
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
+from kinertia.io.even_times import rounding_s, times_rounded, uneven
+from kinertia.io.number_table import malformed, mismatch, read_lines, read_rows
 from kinertia.io.output_folder import write_then_rename
+from kinertia.io.sto import expect_once, header_entry, other_count
 from kinertia.io.subject_prefix import without_prefixes
 from kinertia.trial.data import BoolArray, FloatArray, Markers, Recording
 
@@ -21,6 +25,7 @@ METRES_PER_UNIT = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 _HEADER_KEYS = ("DataRate", "NumFrames", "NumMarkers", "Units")
 _FIRST_ROW_LINE = 6
 _TIME_TOLERANCE_FRAMES = 0.25
+_SHOWN = 40
 _STAND_INS = {"0 0 0": (0.0,), "-9999 -9999 -9999": (-9999.0, -9.999)}
 
 
@@ -29,7 +34,7 @@ def read_trc(path: str | Path) -> Markers:
 
     Empty cells, NaN and the triples 0 0 0 and -9999 -9999 -9999 are missing markers; `subject:` before the labels is
     taken off. Frame times that were rounded when written are put back on the uniform grid they came from.
-    `read_trc_recording` tells what was needed.
+    `read_trc_recording` has what was assumed.
 
     Raises:
         FileError: the file is missing or is not a complete, consistent TRC file; with the line.
@@ -43,32 +48,35 @@ def read_trc_recording(path: str | Path) -> Recording:
     lines = read_lines(path)
     header = _header(path, lines)
     labels = _labels(path, lines)
-    label_notes = _label_notes(path, lines, labels, _count(path, header, "NumMarkers"))
+    findings = _other_markers(path, lines, labels, _count(path, header, "NumMarkers"))
     values, line_numbers = read_rows(path, lines, _first_row(lines), 2 + 3 * len(labels), may_be_short=True)
     frames = _count(path, header, "NumFrames")
-    if not len(values):
-        raise FileError(path, f"the header announces {frames} frames but the file has 0; export the file again", 3)
-    last = lines[line_numbers[-1] - 1].split("\t")
-    if len(values) < frames and len(last) < 2 + 3 * len(labels):
-        raise FileError(
-            path,
-            f"ends in the middle of a row, and has {len(values)} of the {frames} frames that its header announces: a "
-            "part of it is lost; copy or export the file again",
-            line_numbers[-1],
-        )
-    counted = f"{path.name}: its header announces {frames} frames, the file has {len(values)}: all of them were read"
-    count_notes = () if len(values) == frames else (counted,)
-    time, time_notes = _uniform_time(path, values[:, 1], line_numbers, _number(path, header, "DataRate"))
-    positions, position_notes = seen_positions(path, values[:, 2:], labels, line_numbers)
+    _expect_whole(path, lines, len(values), frames, line_numbers[-1] if line_numbers else 3, 2 + 3 * len(labels))
+    if len(values) != frames:
+        findings.append(other_count(path, 3, frames, len(values), "frames"))
+    time, time_findings = _uniform_time(path, values[:, 1], line_numbers, _number(path, header, "DataRate"))
+    positions, position_findings = seen_positions(path, values[:, 2:], labels, line_numbers)
     unit = header["Units"].lower()
     if unit not in METRES_PER_UNIT:
-        raise FileError(path, f"unknown unit '{header['Units']}'; expected mm, cm or m after Units", 3)
-    names, prefix_notes = without_prefixes(path, labels)
+        raise unknown_unit(path, "lengths", f"'{header['Units']}'", line=3)
+    names, prefix_findings = without_prefixes(path, labels)
     if len(set(names)) == len(names):
-        labels, label_notes = tuple(names), (*label_notes, *prefix_notes)
+        labels, findings = tuple(names), [*findings, *prefix_findings]
     markers = Markers(time, labels, positions * METRES_PER_UNIT[unit])
-    notes = (*label_notes, *count_notes, *time_notes, *position_notes)
-    return Recording(path.stem, markers, notes=notes, length_unit=unit)
+    return Recording(path.stem, markers, findings=(*findings, *time_findings, *position_findings), length_unit=unit)
+
+
+def unknown_unit(
+    path: Path,
+    what: str,
+    unit: str,
+    expected: str = "mm, cm or m",
+    line: int | None = None,
+    known: Mapping[str, Quantity] | None = None,
+) -> FileError:
+    """The error that the unit of {what} is {unit}, expected {expected}."""
+    words = {"unit": Quantity(unit), "what": Quantity(what), "expected": Quantity(expected)}
+    return FileError.found(path, "F121", line, {**(known or {}), **words})
 
 
 def write_trc(path: str | Path, markers: Markers) -> None:
@@ -106,21 +114,23 @@ def header_frames(path: Path) -> int:
     with path.open(encoding="utf-8-sig", errors="replace") as stream:
         lines = list(islice(stream, _FIRST_ROW_LINE))
     if not lines:
-        raise FileError(path, "the file is empty; export it again")
+        raise FileError.found(path, "F104", found=Quantity("it is empty"))
     return _count(path, _header(path, lines), "NumFrames")
 
 
 def _header(path: Path, lines: list[str]) -> dict[str, str]:
     if not lines[0].lstrip().startswith("PathFileType"):
-        raise FileError(path, "not a TRC file: expected it to begin with 'PathFileType'; check what was exported", 1)
+        raise mismatch(path, "a TRC file", f"'{lines[0].strip()[:_SHOWN]}'", "'PathFileType'", 1)
     if len(lines) < _FIRST_ROW_LINE:
-        raise FileError(path, f"ends within its header after {len(lines)} lines; export it again", len(lines))
+        counted = {"lines": Quantity(len(lines), "1")}
+        found = Quantity(f"it ends within its header, after {len(lines)} lines")
+        raise FileError.found(path, "F104", len(lines), counted, found=found)
     names, values = lines[1].split(), lines[2].split()
     missing = [key for key in _HEADER_KEYS if key not in names]
     if missing:
-        raise FileError(path, f"the header lacks {', '.join(missing)}; export the file again", 2)
+        raise header_entry(path, 2, ", ".join(missing), "missing", "one value of each")
     if len(values) != len(names):
-        raise FileError(path, f"{len(values)} values for {len(names)} header names; export the file again", 3)
+        raise header_entry(path, 3, "the row of values", f"{len(values)} long", f"{len(names)}, one for each name")
     return dict(zip(names, values, strict=True))
 
 
@@ -130,14 +140,14 @@ def _number(path: Path, header: dict[str, str], key: str) -> float:
     except ValueError:
         number = math.nan
     if not math.isfinite(number):
-        raise FileError(path, f"{key} is '{header[key]}', expected a number; export the file again", 3)
+        raise header_entry(path, 3, key, f"'{header[key]}'", "a number")
     return number
 
 
 def _count(path: Path, header: dict[str, str], key: str) -> int:
     number = _number(path, header, key)
     if number < 0 or number != int(number):
-        raise FileError(path, f"{key} is {header[key]}, expected a whole number; export the file again", 3)
+        raise header_entry(path, 3, key, f"'{header[key]}'", "a whole number")
     return int(number)
 
 
@@ -148,32 +158,36 @@ def _cells(line: str) -> list[str]:
 def _labels(path: Path, lines: list[str]) -> tuple[str, ...]:
     labels = tuple(cell for cell in _cells(lines[3]) if cell)[2:]
     if not labels:
-        raise FileError(path, "no marker labels; export it again", 4)
-    repeated = [label for label, times in Counter(labels).items() if times > 1]
-    if repeated:
-        raise FileError(
-            path,
-            f"repeated marker labels {', '.join(repeated)}; expected each once, rename or remove the others",
-            4,
-        )
+        raise FileError.found(path, "F164", 4, found=Quantity("the row of labels is empty"))
+    expect_once(path, labels, 4)
     return labels
 
 
-def _label_notes(path: Path, lines: list[str], labels: tuple[str, ...], count: int) -> tuple[str, ...]:
-    """A sentence where the header counts other markers than the labels and the columns of numbers, which agree.
+def _expect_whole(path: Path, lines: list[str], rows: int, frames: int, line: int, columns: int) -> None:
+    """Raise a FileError about a file without rows, or one that ends within a row and before its last frame."""
+    found = f"it has {rows} of the {frames} frames that its header announces"
+    if rows and not (rows < frames and len(lines[line - 1].split("\t")) < columns):
+        return
+    if rows:
+        found = f"it ends within a row, and {found.removeprefix('it ')}"
+    counts = {"rows": Quantity(rows, "1"), "announced": Quantity(frames, "1")}
+    raise FileError.found(path, "F104", line, counts, found=Quantity(found))
+
+
+def _other_markers(path: Path, lines: list[str], labels: tuple[str, ...], count: int) -> list[Finding]:
+    """That the header counts other markers than the labels and the columns of numbers, which agree.
 
     Raises:
         FileError: labels and columns do not agree either, so that nobody knows which label is whose.
     """
     if len(labels) == count:
-        return ()
+        return []
     rows = lines[_first_row(lines) :]
     columns = max((len(_cells(row.rstrip())) for row in rows), default=0)
     if columns != 2 + 3 * len(labels):
-        raise FileError(
-            path, f"{len(labels)} marker labels, expected {count} as NumMarkers says; correct or export it again", 4
-        )
-    return (f"{path.name}: its header announces {count} markers, the file has {len(labels)}: all of them were read",)
+        counts = {"labels": Quantity(len(labels), "1"), "columns": Quantity(columns, "1")}
+        raise FileError.found(path, "F112", 4, counts, announced=Quantity(count, "1"))
+    return [other_count(path, 3, count, len(labels), "markers")]
 
 
 def _first_row(lines: list[str]) -> int:
@@ -183,7 +197,7 @@ def _first_row(lines: list[str]) -> int:
 
 def _uniform_time(
     path: Path, time: FloatArray, line_numbers: list[int], rate_hz: float
-) -> tuple[FloatArray, tuple[str, ...]]:
+) -> tuple[FloatArray, tuple[Finding, ...]]:
     """Times on an exactly uniform grid; DataRate gives the step, or the time column where that fits better."""
     _expect_even_steps(path, time, line_numbers)
     if len(time) == 1:
@@ -192,8 +206,8 @@ def _uniform_time(
     at_rate = time[0] + np.arange(len(time)) / rate_hz if rate_hz > 0 else np.full(len(time), np.inf)
     # three frames at 60 Hz, told to the millisecond, run at 60.6 Hz by their ends
     if abs(rate_hz * step - 1) > 0.01 and np.abs(time - at_rate).max() > rounding_s(time):
-        problem = f"DataRate is {rate_hz:g} Hz but the time column runs at {1 / step:.6g} Hz"
-        raise FileError(path, f"{problem}; correct the wrong one", 3)
+        rates = {"header_hz": Quantity(rate_hz, "Hz"), "column_hz": Quantity(float(1 / step), "Hz")}
+        raise FileError.found(path, "T103", 3, rates)
     frames = np.arange(len(time))
     uniform = time[0] + frames / rate_hz
     if np.abs(time - uniform).max() > _TIME_TOLERANCE_FRAMES * step:
@@ -201,52 +215,56 @@ def _uniform_time(
     error = np.abs(time - uniform)
     if error.max() > _TIME_TOLERANCE_FRAMES * step:
         row = int(np.argmax(error))
-        problem = f"time {time[row]:g} s, expected {uniform[row]:g} s for equal steps of {step:.6g} s"
-        raise FileError(path, f"{problem}; Kinertia needs a constant frame rate, export one", line_numbers[row])
+        raise uneven(path, line_numbers[row], time[row - 1], time[row], step)
     if error.max() <= 1e-9:
         return time, ()
-    note = (
-        f"{path.name}: frame times are rounded by up to {1000 * error.max():.2g} ms; the uniform times of "
-        f"{1 / (uniform[1] - uniform[0]):.6g} Hz were taken instead"
-    )
-    return uniform, ((note,) if error.max() > 1e-6 else ())
+    rounded = times_rounded(path, error.max(), 1 / (uniform[1] - uniform[0]))
+    return uniform, ((rounded,) if error.max() > 1e-6 else ())
 
 
 def _expect_even_steps(path: Path, time: FloatArray, line_numbers: list[int]) -> None:
     if np.isnan(time).any():
         row = int(np.argmax(np.isnan(time)))
-        raise FileError(path, "the row has no time; expected it in column 2", line_numbers[row])
+        raise malformed(path, line_numbers[row], "a row without a time", "one in column 2")
     steps = np.diff(time)
     usual = float(np.median(steps)) if steps.size else 0.0
     back = np.flatnonzero(steps <= 0)
     odd = back if back.size else np.flatnonzero(np.abs(steps - usual) > 0.5 * usual)
     if odd.size:
         row = int(odd[0]) + 1
-        problem = f"time goes from {time[row - 1]:g} s to {time[row]:g} s where its step is {usual:g} s"
-        raise FileError(path, f"{problem}; expected every frame, export gaps as empty cells", line_numbers[row])
+        raise uneven(path, line_numbers[row], time[row - 1], time[row], usual)
 
 
 def seen_positions(
     path: Path, values: FloatArray, labels: tuple[str, ...], line_numbers: list[int]
-) -> tuple[FloatArray, tuple[str, ...]]:
-    """Positions (n, m, 3) of rows of x, y, z of every marker, NaN where these are missing or stand for it, notes."""
+) -> tuple[FloatArray, list[Finding]]:
+    """Positions (n, m, 3) of rows of x, y, z of every marker, NaN where these are missing or stand for it (F115)."""
     positions = values.reshape(len(values), len(labels), 3)
     absent = np.isnan(positions)
     partly = np.argwhere(absent.any(axis=2) & ~absent.all(axis=2))
     if partly.size:
         row, marker = partly[0]
-        raise FileError(
-            path,
-            f"marker {labels[marker]} has only some of its three coordinates; expected all or none, repair the row",
-            line_numbers[row],
-        )
-    notes = []
-    for what, where in stand_ins(positions).items():
+        found = f"one or two coordinates of marker {labels[marker]}"
+        known = {"marker": Quantity(labels[marker])}
+        raise malformed(path, line_numbers[row], found, "all three of them, or none", **known)
+    stood_in = stand_ins(positions)
+    for where in stood_in.values():
         positions[where] = np.nan
-        if where.any():
-            named = ", ".join(label for k, label in enumerate(labels) if where[:, k].any())
-            notes.append(f"{path.name}: {where.sum()} marker positions {what} were taken as missing ({named})")
-    return positions, tuple(notes)
+    return positions, read_as_missing(path, labels, stood_in)
+
+
+def read_as_missing(path: Path, labels: Sequence[str], stood_in: Mapping[str, BoolArray]) -> list[Finding]:
+    """Which positions (n, m) only stood for a missing marker, by what they were."""
+    return [
+        finding(
+            "F115",
+            Where(path.name, markers=tuple(label for k, label in enumerate(labels) if where[:, k].any())),
+            count=Quantity(int(where.sum()), "1"),
+            written=Quantity(written),
+        )
+        for written, where in stood_in.items()
+        if where.any()
+    ]
 
 
 def stand_ins(positions: FloatArray) -> dict[str, BoolArray]:

@@ -18,11 +18,16 @@ from pathlib import Path
 import numpy as np
 
 from kinertia.errors import FileError
-from kinertia.io.c3d_plates import LabPlates, to_ground_plates
+from kinertia.findings.finding import Finding, finding
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
+from kinertia.io.c3d_plates import LabPlates, contradicting_moments, plate_left_out, to_ground_plates
+from kinertia.io.even_times import uneven
 from kinertia.io.lab_axes import to_ground
-from kinertia.io.number_table import read_lines
+from kinertia.io.number_table import malformed, mismatch, read_lines, wrong_cells
 from kinertia.io.plate_moments import PlateMoments
-from kinertia.io.trc import METRES_PER_UNIT, seen_positions
+from kinertia.io.sto import header_entry
+from kinertia.io.trc import METRES_PER_UNIT, seen_positions, unknown_unit
 from kinertia.trial.data import FloatArray, Markers, Recording
 
 _HEADER_LINES = 5
@@ -58,17 +63,17 @@ def read_vicon_csv(path: str | Path) -> Recording:
     path = Path(path)
     sections = dict(_sections(path))
     if "Trajectories" not in sections:
-        names = ", ".join(sections) or "none"
-        raise FileError(path, f"no section Trajectories (sections: {names}); export them from Vicon Nexus, too")
-    markers, notes = _markers(path, sections["Trajectories"])
-    plates, time, plate_notes = _plates(path, sections.get("Devices"), markers.rate_hz)
-    rotation, up, axis_notes = to_ground(path, "+Z", "Vicon's usual setting", markers.positions, plates)
-    ground, load_notes = to_ground_plates(path, plates, rotation, time) if plates is not None else (None, [])
+        found = f"no section Trajectories (sections: {', '.join(sections)})"
+        raise FileError.found(path, "F164", found=Quantity(found))
+    markers, findings = _markers(path, sections["Trajectories"])
+    plates, time, plate_findings = _plates(path, sections.get("Devices"), markers.rate_hz)
+    rotation, up, axis_findings = to_ground(path, "+Z", "Vicon's usual setting", markers.positions, plates)
+    ground, load_findings = to_ground_plates(path, plates, rotation, time)
     return Recording(
         path.stem,
         markers.rotated(rotation),
         ground,
-        notes=(*notes, *plate_notes, *axis_notes, *load_notes),
+        findings=(*findings, *plate_findings, *axis_findings, *load_findings),
         length_unit="mm",
         vertical=up,
     )
@@ -83,10 +88,7 @@ def _sections(path: Path) -> Iterator[tuple[str, _Section]]:
         if cells[k] and cells[k][0] and not any(cells[k][1:]) and _header_at(cells, k)
     ]  # fmt: skip
     if not begins:
-        raise FileError(
-            path,
-            "no section of an ASCII export of Vicon Nexus in it; expected Trajectories and Devices, export it again",
-        )
+        raise mismatch(path, "an ASCII export of Vicon Nexus", "no section of one", "Trajectories and Devices")
     for begin in begins:
         names = cells[begin + 3]
         rows, width = [], len(names)
@@ -107,7 +109,7 @@ def _rate(path: Path, line: int, cell: str) -> float:
     except ValueError:
         rate_hz = 0.0
     if not 0.0 < rate_hz < _FASTEST_HZ:
-        raise FileError(path, f"the rate of the section is '{cell}'; expected frames per second, export it again", line)
+        raise header_entry(path, line, "the rate of the section", f"'{cell}'", "frames per second")
     return rate_hz
 
 
@@ -129,74 +131,77 @@ def _carried(cells: Sequence[str], width: int) -> tuple[str, ...]:
 
 def _numbers(path: Path, line: int, row: Sequence[str], width: int) -> list[float]:
     if len(row) > width and any(row[width:]):
-        raise FileError(
-            path, f"the row has {len(row)} values, expected {width} as the header says; export it again", line
-        )
+        raise wrong_cells(path, line, len(row), width)
     values = []
-    for cell in (list(row) + [""] * width)[:width]:
+    for column, cell in enumerate((list(row) + [""] * width)[:width], start=1):
         try:
             values.append(float(cell) if cell else np.nan)
         except ValueError:
-            raise FileError(path, f"'{cell}' is not a number; repair or export it again", line) from None
+            known = {"cell": Quantity(cell), "column": Quantity(column, "1")}
+            raise malformed(path, line, f"'{cell}' in column {column}", "a number", **known) from None
     if np.isinf(values).any():
         column = int(np.argmax(np.isinf(values))) + 1
-        raise FileError(path, f"infinite value in column {column}; expected a number, export it again", line)
+        known = {"cell": Quantity(row[column - 1]), "column": Quantity(column, "1")}
+        raise malformed(path, line, f"an infinite value in column {column}", "a finite number", **known)
     return values
 
 
-def _markers(path: Path, section: _Section) -> tuple[Markers, list[str]]:
-    """Markers in the laboratory's axes, m, and notes; what is not in a unit of length is no marker."""
+def _markers(path: Path, section: _Section) -> tuple[Markers, list[Finding]]:
+    """Markers in the laboratory's axes, m, and what was found; what is not in a unit of length is no marker."""
     owners = [owner for owner in dict.fromkeys(section.owners) if len(section.columns(owner, "XYZ")) == 3]
     places = {owner: section.columns(owner, "XYZ") for owner in owners}
     places = {o: at for o, at in places.items() if section.units[at[0]] in METRES_PER_UNIT}
     labels = [owner.rsplit(":", 1)[-1] for owner in places]
     kept = {label: at for label, at in zip(labels, places.values(), strict=True) if label and not label.startswith("*")}
     if not kept or not len(section.rows):
-        raise FileError(path, "no trajectories in its section Trajectories; label the markers and export it again")
+        raise FileError.found(path, "F164", found=Quantity("no labelled ones in its section Trajectories"))
     unit = METRES_PER_UNIT[section.units[next(iter(kept.values()))[0]]]
     values = section.rows[:, [column for at in kept.values() for column in at]]
     lines = list(range(section.first_line, section.first_line + len(values)))
-    positions, notes = seen_positions(path, values, tuple(kept), lines)
+    positions, findings = seen_positions(path, values, tuple(kept), lines)
     frames = section.rows[:, 0]
     odd = np.flatnonzero(np.diff(frames) != 1)
     if odd.size:
-        raise FileError(
-            path,
-            f"frame {frames[odd[0] + 1]:g} follows frame {frames[odd[0]]:g}; expected every frame",
-            lines[odd[0] + 1],
-        )
-    return Markers((frames - 1.0) / section.rate_hz, tuple(kept), unit * positions), list(notes)
+        before, after = (frames[odd[0] : odd[0] + 2] - 1.0) / section.rate_hz
+        raise uneven(path, lines[odd[0] + 1], before, after, 1.0 / section.rate_hz)
+    return Markers((frames - 1.0) / section.rate_hz, tuple(kept), unit * positions), findings
 
 
-def _plates(path: Path, section: _Section | None, camera_hz: float) -> tuple[LabPlates | None, FloatArray, list[str]]:
+def _plates(
+    path: Path, section: _Section | None, camera_hz: float
+) -> tuple[LabPlates | None, FloatArray, list[Finding]]:
+    """Plates in the laboratory's axes, the times of their samples, and what was found of them."""
     if section is None:
         return None, np.zeros(0), []
     time = (section.rows[:, 0] - 1.0) / camera_hz + section.rows[:, 1] / section.rate_hz
     _expect_every_sample(path, section, time)
-    names, forces, moments, notes = [], [], [], []
+    names, forces, moments = [], [], []
+    findings: list[Finding] = []
     for owner in dict.fromkeys(section.owners):
         name, dash, what = owner.rpartition(" - ")
         if not dash or what != "Force":
             continue
         at = [section.columns(f"{name} - {kind}", columns) for kind, columns in _GROUPS]
         if any(len(columns) != 3 for columns in at):
-            notes.append(f"{path.name}: {name} was left out: expected its Force, Moment and CoP, three columns each")
+            findings.append(plate_left_out(path, name, "it lacks columns; expected three of Force, Moment and CoP"))
             continue
         force, moment, point = (section.rows[:, columns] for columns in at)
         units = [section.units[columns[0]] for columns in at[1:]]
         if units[0] not in _NEWTON_METRES or units[1] not in METRES_PER_UNIT:
-            raise FileError(
-                path, f"{name}: moments in '{units[0]}' and CoP in '{units[1]}'; expected N.mm or N.m, and mm"
-            )
+            known = f"'{units[0]}' and '{units[1]}'"
+            raise unknown_unit(path, f"moments and CoP of {name}", known, "N.mm or N.m, and mm")
         moment, point = _NEWTON_METRES[units[0]] * moment, METRES_PER_UNIT[units[1]] * point
-        force, moments_found, note = _in_lab_axes(force, moment, point)
-        notes += [f"{path.name}: {name}: {note}"] if note else []
+        force, moments_found, rotated = _in_lab_axes(force, moment, point)
+        if rotated:
+            findings.append(finding("F154", Where(path.name, plate=name)))
+        if not moments_found.agree and np.isfinite(moments_found.misses):
+            findings.append(contradicting_moments(path, name, moments_found.misses))
         names.append(name)
         forces.append(force)
         moments.append(moments_found.about_origin)
     if not names:
-        return None, time, notes
-    return LabPlates(tuple(names), np.stack(forces, axis=1), np.stack(moments, axis=1), None), time, notes
+        return None, time, findings
+    return LabPlates(tuple(names), np.stack(forces, axis=1), np.stack(moments, axis=1), None), time, findings
 
 
 def _expect_every_sample(path: Path, section: _Section, time: FloatArray) -> None:
@@ -204,13 +209,9 @@ def _expect_every_sample(path: Path, section: _Section, time: FloatArray) -> Non
     steps = section.rate_hz * np.diff(time, prepend=time[:1] - 1.0 / section.rate_hz)
     odd = np.flatnonzero(~(np.abs(steps - 1.0) < _HALF_A_SAMPLE))
     if odd.size:
-        frame, sub_frame = section.rows[odd[0], :2]
-        raise FileError(
-            path,
-            f"the sample of frame {frame:g}, sub frame {sub_frame:g}, is not the one after that before it; expected "
-            f"every sample at {section.rate_hz:g} Hz: export the section Devices again",
-            section.first_line + int(odd[0]),
-        )
+        row = int(odd[0])
+        before = time[row - 1] if row else time[0] - steps[0] / section.rate_hz
+        raise uneven(path, section.first_line + row, before, time[row], 1.0 / section.rate_hz)
 
 
 _GROUPS = (("Force", ("Fx", "Fy", "Fz")), ("Moment", ("Mx", "My", "Mz")), ("CoP", ("Cx", "Cy", "Cz")))
@@ -221,18 +222,12 @@ _TURNS = [
 """A plate's axes in the laboratory's: turned by quarters, z up or down; the first is none."""
 
 
-def _in_lab_axes(force: FloatArray, moment: FloatArray, point: FloatArray) -> tuple[FloatArray, PlateMoments, str]:
-    """Force and moments in the axes of the centre of pressure, and what was done for it."""
+def _in_lab_axes(force: FloatArray, moment: FloatArray, point: FloatArray) -> tuple[FloatArray, PlateMoments, bool]:
+    """Force and moments in the axes of the centre of pressure, and whether they were rotated for that."""
     tried = [PlateMoments.of(force @ turn.T, moment @ turn.T, point) for turn in _TURNS]
     best = int(np.argmin([one.misses for one in tried]))
     if not np.isfinite(tried[best].misses):
-        return force, tried[0], ""
+        return force, tried[0], False
     if tried[best].misses > _MUCH_BETTER * tried[0].misses:
         best = 0
-    said = "" if best == 0 else "force and moment are in the plate's axes, as their centre of pressure tells; turned"
-    if not tried[best].agree:
-        said = (
-            f"moments and centre of pressure contradict each other (by {100 * tried[best].misses:.0f} %); the centre "
-            f"of pressure was taken, without a free moment"
-        )
-    return force @ _TURNS[best].T, tried[best], said
+    return force @ _TURNS[best].T, tried[best], best != 0

@@ -20,7 +20,10 @@ from importlib.resources import files
 
 import numpy as np
 
-from kinertia.errors import SubjectError
+from kinertia.errors import SubjectError, problem_of
+from kinertia.findings.finding import finding
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
 from kinertia.model.bsp import MIRROR_SIGNS, BodySegmentParameters, FloatArray, combine
 
 SEGMENTS = (
@@ -83,6 +86,7 @@ class _Part:
 
 _UNITS_OF_HEIGHT = {"millimetres": 300.0, "centimetres": 100.0, "inches": 20.0, "feet": 3.0}
 """Least height in each."""
+_OTHER_UNIT = "another unit"
 
 
 def check_subject(mass_kg: float, height_m: float, sex: str) -> None:
@@ -92,14 +96,18 @@ def check_subject(mass_kg: float, height_m: float, sex: str) -> None:
         SubjectError: mass outside 10-300 kg, height outside 0.5-2.5 m, or another sex.
     """
     if not 10.0 <= mass_kg <= 300.0:
-        hint = "that looks like grams; " if 1000.0 < mass_kg < np.inf else ""
-        raise SubjectError("mass_kg", mass_kg, f"{hint}give the body mass in kilograms, between 10 and 300.")
+        unit = "grams" if 1000.0 < mass_kg < np.inf else _OTHER_UNIT
+        raise _implausible("mass_kg", "mass", mass_kg, Quantity(mass_kg, "kg"), unit)
     if not 0.5 <= height_m <= 2.5:
-        unit = next((name for name, least in _UNITS_OF_HEIGHT.items() if height_m > least), "")
-        hint = f"that looks like {unit}; " if unit else ""
-        raise SubjectError("height_m", height_m, f"{hint}give the stature in metres, between 0.5 and 2.5.")
+        unit = next((name for name, least in _UNITS_OF_HEIGHT.items() if height_m > least), _OTHER_UNIT)
+        raise _implausible("height_m", "stature", height_m, Quantity(height_m, "m"), unit)
     if sex not in _DUMAS_STATURE_M:
-        raise SubjectError("sex", sex, "the tables know 'male' and 'female'; give the one to use.")
+        raise _implausible("sex", "sex", sex, Quantity(str(sex)), "neither male nor female")
+
+
+def _implausible(field: str, quantity: str, value: object, shown: Quantity, unit: str) -> SubjectError:
+    found = finding("S102", Where(part=quantity), value=shown, quantity=Quantity(quantity), unit=Quantity(unit))
+    return SubjectError(field, value, problem_of(found)).with_finding(found)
 
 
 def reference_lengths(height_m: float, sex: str) -> dict[str, float]:
@@ -186,14 +194,11 @@ def _check_geometry(geometry: BodyGeometry, height_m: float, source: str) -> Non
         if length is None:
             raise SubjectError(name, length, f"this length is missing; the '{source}' table needs it, in metres.")
         if not 0.0 < length < height_m:
-            raise SubjectError(name, length, "a segment length must lie between 0 and the stature; give it in metres.")
+            raise _implausible(name, f"length of {name}", length, Quantity(length, "m"), _OTHER_UNIT)
     rise = geometry.lumbar_joint_m[1] - geometry.mid_hip_m[1]
     if not 0.0 < rise < height_m:
-        raise SubjectError(
-            "lumbar_joint_m",
-            geometry.lumbar_joint_m,
-            f"this is {rise:g} m above the mid hip; check the pelvis markers.",
-        )
+        what = "height of the lumbar joint above the hips"
+        raise _implausible("lumbar_joint_m", what, rise, Quantity(rise, "m"), "misplaced pelvis markers")
 
 
 def _dumas_parts(height_m: float, sex: str, geometry: BodyGeometry) -> Iterator[_Part]:

@@ -8,13 +8,16 @@ joint Dumas et al. (2007); shoulder Rab et al. (2002).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from kinertia.errors import MarkerSetError
+from kinertia.errors import MarkerSetError, problem_of
+from kinertia.findings.finding import finding
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
 from kinertia.model.anthropometry import reference_lengths
 from kinertia.model.marker_set import MarkerSet, nearest_labels
 from kinertia.trial.data import Recording
@@ -63,13 +66,16 @@ class Landmarks:
         wanted = [label for name in missing for label in self.marker_set.landmarks.get(name, ())]
         near = nearest_labels(wanted, list(self.markers))
         hints = [f"{label} (nearest: {' or '.join(n)})" if n else label for label, n in near.items()]
-        labels = f" (labels {', '.join(hints)})" if hints else " (not named in the marker set)"
-        raise MarkerSetError(
-            f"the {joint} needs the landmarks {', '.join(missing)}{labels}, which the static trial does not show; "
-            f"correct the marker set '{self.marker_set.name}' or choose another static trial",
-            missing,
-            near,
-        )
+        labels = f"labels {', '.join(hints)}" if hints else "not named in the marker set"
+        raise _missing(joint, f"{', '.join(missing)} ({labels})", missing, near)
+
+
+def _missing(
+    joint: str, landmark: str, missing: Sequence[str], nearest: Mapping[str, list[str]] | None = None
+) -> MarkerSetError:
+    """L105: what the static trial lacks for a joint."""
+    found = finding("L105", Where(part=joint), landmark=Quantity(landmark))
+    return MarkerSetError(problem_of(found), missing, dict(nearest or {})).with_finding(found)
 
 
 def find_landmarks(static: Recording, marker_set: MarkerSet) -> Landmarks:
@@ -170,12 +176,8 @@ def _hinge(marks: Landmarks, joint: str, proximal: np.ndarray, wand: str, side: 
         return (marks[lateral] + marks[medial]) / 2, across / np.linalg.norm(across)
     if joint not in marks.widths or wand not in marks:
         marks.require(joint, lateral, medial) if wand not in marks else marks.require(joint, lateral)
-        raise MarkerSetError(
-            f"the {joint} needs a medial marker or the joint's width, and the static trial has neither; "
-            f"use a static trial with medial markers, a C3D file with the widths in PROCESSING, or give the width "
-            f"in the subject file: {joint.rpartition('_')[0]}_width_mm = ... under [subject]",
-            [medial],
-        )
+        width = f"{joint.rpartition('_')[0]}_width_mm under [subject]"
+        raise _missing(joint, f"a medial marker ({medial}) or its width ({width}, or in the C3D file)", [medial])
     marks.require(joint, lateral, wand)
     half = marks.widths[joint] / 2 + _MARKER_RADIUS_M
     centre = _chord(proximal, marks[lateral], marks[wand], half)

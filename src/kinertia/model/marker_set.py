@@ -8,9 +8,12 @@ from __future__ import annotations
 import difflib
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
-from kinertia.errors import MarkerSetError
+from kinertia.errors import MarkerSetError, problem_of
+from kinertia.findings.display import first_few
+from kinertia.findings.finding import Finding, finding
+from kinertia.findings.quantity import Quantity
 from kinertia.trial.data import Markers
 
 SEGMENTS = (
@@ -42,8 +45,11 @@ LANDMARKS = (
     "sternal_notch",
     "head_top",
 )
-ENOUGH_WORN = 0.8
-"""Share of a preset's labels, or of those of its pelvis, legs and feet, from which on a recording has it."""
+ENOUGH_LABELS = 2.0 / 3.0
+"""Share of a set's labels, or of those of its pelvis, legs and feet, from which on a recording has it, be the set named
+or a preset. Measured recordings that lack part of their own set have 0.76 and more; two of other laboratories' sets
+have up to 0.62 of the labels of Plug-in Gait, which mean something else there."""
+_SIDES = {"r": "right", "l": "left"}
 _LEGS = ("pelvis", "thigh", "shank", "foot")
 WIDTHS = tuple(f"{name}_{side}" for name in ("knee", "ankle", "elbow") for side in "rl")
 
@@ -58,6 +64,7 @@ class MarkerSet:
         segments: segment -> labels of the markers that move with it.
         widths: joint -> name of a measurement (m) that comes with the static file.
         in_model: one frame, where an OpenSim model has them in its default pose; None for a laboratory's.
+        respelled: label of the preset -> how a recording spells it, where that differs.
 
     Examples:
         >>> kinertia.read_marker_set("plug-in-gait").foot_labels()["r"]
@@ -69,6 +76,7 @@ class MarkerSet:
     segments: Mapping[str, tuple[str, ...]]
     widths: Mapping[str, str]
     in_model: Markers | None = None
+    respelled: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -82,8 +90,8 @@ class MarkerSet:
 
 
 def spelled_as(marker_set: MarkerSet, labels: Sequence[str]) -> MarkerSet:
-    """The set with the labels that these lack spelled as these are, where capitals and punctuation alone tell them
-    apart, and one label only comes into question; its name says so.
+    """The set with the labels that these lack spelled as these are, where capitals and punctuation alone differ, and
+    one label only comes into question.
 
     Args:
         marker_set: whose labels somebody may have typed anew, or a program has changed.
@@ -96,24 +104,22 @@ def spelled_as(marker_set: MarkerSet, labels: Sequence[str]) -> MarkerSet:
     spelled = {label: place[folded(label)] for label in wanted if folded(label) in place and own[folded(label)] == 2}
     if not spelled:
         return marker_set
-    label, written = next(iter(spelled.items()))
-    more = f" and {len(spelled) - 1} more alike" if len(spelled) > 1 else ""
 
     def respelled(entries: Mapping[str, tuple[str, ...]]) -> dict[str, tuple[str, ...]]:
         return {name: tuple(spelled.get(one, one) for one in each) for name, each in entries.items()}
 
     return replace(
         marker_set,
-        name=f"{marker_set.name} ({written} taken as {label}{more})",
         landmarks=respelled(marker_set.landmarks),
         segments=respelled(marker_set.segments),
+        respelled=spelled,
     )
 
 
 def check_marker_set(marker_set: MarkerSet, labels: Sequence[str]) -> None:
     """Raise MarkerSetError when a marker set that the user named does not belong to these labels."""
-    if share_worn(marker_set, labels) < 0.5:
-        raise mismatch(marker_set, labels, "the static trial does not carry the marker set")
+    if not is_worn(marker_set, labels):
+        raise mismatch(marker_set, labels)
 
 
 def share_worn(marker_set: MarkerSet, labels: Sequence[str]) -> float:
@@ -127,27 +133,37 @@ def is_worn(marker_set: MarkerSet, labels: Sequence[str]) -> bool:
 
     Without trunk and arms a set still makes a model (`diagnostics.subject.unseen_body`), without legs it does not.
     """
-    return share_worn(marker_set, labels) >= ENOUGH_WORN or _legs_worn(marker_set, labels) >= ENOUGH_WORN
+    return max(share_worn(marker_set, labels), _legs_worn(marker_set, labels)) >= ENOUGH_LABELS
 
 
 def _legs_worn(marker_set: MarkerSet, labels: Sequence[str]) -> float:
     """Share of the labels of pelvis, legs and feet that are among these."""
-    legs = {label for name in SEGMENTS if name.startswith(_LEGS) for label in marker_set.segments[name]}
-    return len(legs & set(labels)) / len(legs)
+    legs = {label for name, own in marker_set.segments.items() if name.startswith(_LEGS) for label in own}
+    return len(legs & set(labels)) / max(len(legs), 1)
 
 
-def mismatch(marker_set: MarkerSet, labels: Sequence[str], what: str) -> MarkerSetError:
-    """The error that lists what the labels lack of a set; `what` begins its sentence."""
+def mismatch(marker_set: MarkerSet, labels: Sequence[str]) -> MarkerSetError:
+    """The error that these labels are not the set's (L101), with what they lack of it."""
     missing = [label for label in marker_set.labels if label not in labels]
     nearest = nearest_labels(missing, labels)
-    listed = ", ".join(label + _hint(nearest[label]) for label in missing)
-    return MarkerSetError(
-        f"{what} '{marker_set.name}', which lacks {len(missing)} of {len(marker_set.labels)} labels: {listed}; "
-        f"write a marker set of your own as TOML (kinertia markers FILE -o SET.toml drafts it) and name it under "
-        f"[model] markers",
-        missing,
-        nearest,
+    found = no_marker_set(marker_set.name, len(marker_set.labels), nearest)
+    return MarkerSetError(problem_of(found), missing, nearest).with_finding(found)
+
+
+def no_marker_set(name: str, count: int, missing: Mapping[str, Sequence[str]]) -> Finding:
+    """L101: too many labels of a set of so many are missing, each with those that look like it."""
+    return finding(
+        "L101",
+        labels_found=Quantity(float(count - len(missing)), "1", limit=ENOUGH_LABELS * count),
+        labels=Quantity(float(count), "1"),
+        name=Quantity(name),
+        missing=Quantity(with_nearest(missing)),
     )
+
+
+def with_nearest(missing: Mapping[str, Sequence[str]]) -> str:
+    """The first of these labels, each with those that look most like it."""
+    return first_few([f"{label} ({' or '.join(near)}?)" if near else label for label, near in missing.items()])
 
 
 def nearest_labels(missing: Sequence[str], labels: Sequence[str]) -> dict[str, list[str]]:
@@ -161,8 +177,14 @@ def nearest_labels(missing: Sequence[str], labels: Sequence[str]) -> dict[str, l
     }
 
 
-def _hint(near: Sequence[str]) -> str:
-    return f" (nearest: {' or '.join(near)})" if near else ""
+def in_words(name: str) -> str:
+    """A landmark, joint or segment of one side as people call it.
+
+    >>> in_words("knee_r")
+    'right knee'
+    """
+    head, _, side = name.rpartition("_")
+    return f"{_SIDES[side]} {head.replace('_', ' ')}" if side in _SIDES else name
 
 
 def folded(label: str) -> str:

@@ -19,7 +19,7 @@ def markers_of_model(model: OsimModel) -> MarkerSet:
     """
     markers = model.skeleton.markers
     if not markers:
-        raise OsimError(model.path, "no markers in it; scale the model with OpenSim's Scale tool, which places them")
+        raise OsimError.found(model.path, "O106")
     owners = {marker.label: segment_of(marker.segment) or marker.segment for marker in markers}
     names = dict.fromkeys(("foot_r", "foot_l", *owners.values()))
     segments = {name: tuple(label for label, owner in owners.items() if owner == name) for name in names}

@@ -28,7 +28,10 @@ from typing import Any
 
 import numpy as np
 
-from kinertia.errors import PriorError
+from kinertia.errors import PriorError, problem_of
+from kinertia.findings.finding import Severity, with_evidence
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
 from kinertia.model.bsp import BodySegmentParameters, FloatArray, combine
 from kinertia.model.measures import measures
 
@@ -86,7 +89,7 @@ def stadium_bsp(
     for solid in (solid for segment in person.segments for solid in segment.solids):
         if not solid.height > 0.0:
             level = solid.label.partition(": ")[2]
-            raise PriorError(f"the level after '{level}' is {-1e3 * solid.height:.0f} mm before it; check the lengths")
+            raise _impossible(f"the level after '{level}'", Quantity(solid.height, "m"), "a level beyond it")
     pelvis, torso = _cut_at(
         _dense([*person.P.solids, *person.T.solids, *person.C.solids], _TRUNK, density_kg_m3), lumbar_m
     )
@@ -143,10 +146,15 @@ def _cut_at(trunk: Sequence[tuple[Any, float]], height_m: float) -> tuple[list[A
         bottom += solid.height
         if height_m == bottom:
             return list(trunk[: k + 1]), list(trunk[k + 1 :])
-    raise PriorError(
-        f"the lumbar joint is {1e3 * height_m:.0f} mm above the hip joint centres, the nipples {1e3 * bottom:.0f} mm "
-        "by the measures; check the heights of the trunk and the pelvis markers"
-    )
+    what = "the height of the lumbar joint above the hips, by markers,"
+    raise _impossible(what, Quantity(height_m, "m"), f"less than {bottom:.2f} m, the height of the nipples")
+
+
+def _impossible(measure: str, value: Quantity, expected: str) -> PriorError:
+    """S403 of measures that no body has."""
+    stated = {"measure": Quantity(measure), "value_m": value, "expected_m": Quantity(expected)}
+    found = with_evidence("S403", Where(part=measure), stated, Severity.ERROR)
+    return PriorError(problem_of(found)).with_finding(found)
 
 
 def _upwards(stack: Sequence[tuple[Any, float]]) -> tuple[float, np.ndarray, np.ndarray]:

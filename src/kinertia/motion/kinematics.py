@@ -25,7 +25,6 @@ from kinertia.motion.common_cutoff import Cutoff, common_cutoff
 from kinertia.motion.dynamics import Motion
 from kinertia.motion.inverse_kinematics import InverseKinematics, solve_ik
 from kinertia.motion.one_thread import one_blas_thread
-from kinertia.motion.range_ends import range_notes
 from kinertia.motion.smoothing import SmoothedSpline, SmoothingError, smooth
 from kinertia.trial.data import Markers, Trial
 from kinertia.trial.sampled_time import TIME_TOLERANCE_S, runs, span_s, within
@@ -186,7 +185,6 @@ def solve_kinematics(
     if stuck:
         findings.append(finding("R105", Where(trial=trial.name), frames=Quantity(stuck, "1")))
     remarks = [f"{trial.name}: {cutoff.sentence}"] if cutoff.sentence else []
-    remarks += [f"{trial.name}: {sentence}" for sentence in range_notes(skeleton, ik)]
     return Kinematics(
         trial, turned_deg, ik, spline, cutoff.hz, windows, (*trial.notes, *remarks), (*trial.findings, *findings)
     )

@@ -1,64 +1,106 @@
-"""`check.html`: the findings of `kinertia check` as one page that needs nothing else."""
+"""`check.html`: what `kinertia check` found, as one page that needs nothing else."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from kinertia.diagnostics.model.model_check import ModelCheck
+from kinertia.findings.finding import Finding, Severity
+from kinertia.findings.overview import Overview
 from kinertia.io.output_folder import complete_folder
 from kinertia.report.check_figures import MOST_CONTACTS, force_figure, pressure_figure
 from kinertia.report.figure import Figure, written
+from kinertia.report.finding_view import FindingView
 from kinertia.report.marker_figures import gap_figure
 from kinertia.report.marker_view import marker_scene
 from kinertia.report.page import MOST_TRIALS, VIEW_FRAMES
 from kinertia.report.rendering import rendered
 from kinertia.report.scene import view
+from kinertia.workflow.check import ModelOverview
 from kinertia.workflow.recording import RecordingCheck
+
+_LEFT_OUT = "left out"
+
+
+@dataclass(frozen=True)
+class Checked:
+    """What is said of one recording or model as a whole: verdict, and findings by code."""
+
+    name: str
+    anchor: str
+    verdict: str
+    codes: tuple[str, ...]
 
 
 def save_check_page(
-    recordings: Sequence[tuple[str, RecordingCheck]],
-    models: Sequence[tuple[str, ModelCheck]],
-    mistakes: Sequence[str],
+    overviews: Sequence[Overview],
+    recordings: Sequence[RecordingCheck],
+    models: Sequence[ModelOverview],
     folder: str | Path,
 ) -> Path:
     """Write `check.html` into a folder; returns the file.
 
     Args:
-        recordings, models: findings, each with its title.
-        mistakes: one sentence for each file that could not be read.
+        overviews: what was found, of the person and of each model.
+        recordings: what is in each, the static trial first.
+        models: what is in each.
         folder: is made if need be.
 
     Raises:
         FileError: the folder cannot be written to.
     """
-    page = render_check(recordings, models, mistakes)
+    page = render_check(overviews, recordings, models)
     with complete_folder(folder, "check") as work:
         (work / "check.html").write_text(page, encoding="utf-8")
     return Path(folder) / "check.html"
 
 
 def render_check(
-    recordings: Sequence[tuple[str, RecordingCheck]],
-    models: Sequence[tuple[str, ModelCheck]] = (),
-    mistakes: Sequence[str] = (),
+    overviews: Sequence[Overview],
+    recordings: Sequence[RecordingCheck],
+    models: Sequence[ModelOverview] = (),
 ) -> str:
     """The page as text; arguments as those of `save_check_page`. The first six recordings have pictures."""
     pictured = recordings[:MOST_TRIALS]
     most_frames = VIEW_FRAMES // max(len(pictured), 1)
-    scenes = [(title, marker_scene(found.recording, found.used_set, most_frames)) for title, found in pictured]
+    scenes = [(one.context.name, marker_scene(one.recording, one.used_set, most_frames)) for one in pictured]
+    of_models = [model.overview for model in models]
+    of_person = [one for one in overviews if not any(one is other for other in of_models)]
+    headlines = [("", one) for one in of_person] + [(model.name, model.overview) for model in models]
+    left_out = {name for one in of_person for name in one.left_out}
     return rendered(
         "check.html.j2",
         title="Kinertia check",
+        headlines=headlines if len(headlines) > 1 else [("", one) for _, one in headlines],
+        found=FindingView([*of_person, *(_named(model) for model in models)]),
+        files=[
+            *(_recording(one, f"recording{k}", left_out) for k, one in enumerate(recordings, start=1)),
+            *(_checked(one.name, f"model{k}", one.overview.findings) for k, one in enumerate(models, start=1)),
+        ],
         recordings=recordings,
-        pictures=[check_figures(found) for _, found in pictured],
+        pictures=[check_figures(one) for one in pictured],
         scenes=view(scenes) if scenes else None,
         most_contacts=MOST_CONTACTS,
         models=models,
-        mistakes=mistakes,
     )
+
+
+def _named(model: ModelOverview) -> Overview:
+    """Findings of a model with its file, since several may be on the page."""
+    return replace(model.overview, findings=[one.in_file(model.name) for one in model.overview.findings])
+
+
+def _recording(one: RecordingCheck, anchor: str, left_out: set[str]) -> Checked:
+    checked = _checked(one.context.name, anchor, one.findings)
+    return replace(checked, verdict=_LEFT_OUT) if checked.name in left_out else checked
+
+
+def _checked(name: str, anchor: str, findings: Sequence[Finding]) -> Checked:
+    overview = Overview(findings, 0, 1)
+    found = [one.code for one in overview.open if one.severity > Severity.INFO]
+    return Checked(name, anchor, overview.verdict, tuple(dict.fromkeys(found)))
 
 
 def check_figures(check: RecordingCheck) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kinertia.estimation.simultaneous.instrument_warnings import CLOCK_OF, SHOWN_UNIT
+from kinertia.estimation.simultaneous.instrument_errors import CLOCK_OF, SHOWN_UNIT
 from kinertia.estimation.simultaneous.plates import ZERO_UNKNOWNS
 from kinertia.report import style
 from kinertia.report.panels import Panel, plain, small_multiples

@@ -1,169 +1,124 @@
-"""Who of a cohort passed, whose results are to be used with care, who did not pass, and why: reasons counted.
-
-A fit of which no check failed may have cautions and warnings; its report then says "usable with care", and so does the
-page.
-"""
+"""What came of everybody in a cohort: verdicts counted, findings counted by code, and what was overruled in vain."""
 
 from __future__ import annotations
 
-import json
-import re
 from collections import Counter
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
 from urllib.parse import quote
 
+import numpy as np
 from markupsafe import Markup, escape
 
+from kinertia.findings.display import outlined, shown
+from kinertia.findings.finding import Severity
+from kinertia.findings.overview import DO_NOT_USE, USE, WITH_CARE
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.rule import matching, rule
 from kinertia.report.result_page import Part
 from kinertia.report.row_figures import bar_figure
-from kinertia.studies.cohort_record import AGAINST, PASSED, Place
 
 if TYPE_CHECKING:
     import pandas as pd
 
-_MOST_REASONS, _MOST_NAMES = 12, 5
-_FIT = "fit.json"
-_WORDS = ("passed", "with care", "not fitted", "a check failed")
-_QUOTED_OR_PATH = re.compile(
-    r"(?<!\w)'[^']*'"  # and no apostrophes
-    r'|"[^"]*"'
-    r"|(?<!\S)([A-Za-z]:)?[/\\][^\s;,]+"  # and no units, such as N m/kN
-    r"|[^\s;,]+[/\\][^\s;,]*\.\w{2,4}\b"
-)
+PEOPLE = ("person", "status", "sentence", "verdict", "overruled")
+FINDINGS = ("person", "code", "severity", "status", "muted_by", "value", "unit")
+"""Columns that are read of the two tables."""
+NOT_FITTED = "not fitted"
+_WORDS = (USE, WITH_CARE, DO_NOT_USE, NOT_FITTED)
+_MOST_NAMES, _MOST_PEOPLE = 5, 20
+_HEADINGS = ("code", "severity", "finding", "people", "open", "explained by another", "overruled", "median size", "who")
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """How a person's fit ended.
-
-    Attributes:
-        person: name.
-        fitted: whether there are results.
-        failed: why there are none, or which checks failed.
-        doubts: cautions and warnings.
-    """
-
-    person: str
-    fitted: bool
-    failed: tuple[str, ...]
-    doubts: tuple[str, ...]
-
-    @property
-    def word(self) -> str:
-        """One of `_WORDS`."""
-        if not self.fitted:
-            return "not fitted"
-        if self.failed:
-            return "a check failed"
-        return "with care" if self.doubts else "passed"
-
-
-def outcomes_of(folder: Path, people: pd.DataFrame) -> list[Outcome]:
-    """Everybody's, from the list of people and each one's `fit.json`."""
-    found = []
-    for person, status, sentence in zip(people["person"], people["status"], people["sentence"], strict=True):
-        fitted = status in (PASSED, AGAINST)
-        result = _result(Place(folder, person).results / _FIT) if fitted else {}
-        failed, doubts = _judged(result)
-        if status != PASSED and not failed:
-            failed = (sentence,)
-        found.append(Outcome(person, fitted, failed, doubts))
-    return found
-
-
-def _result(path: Path) -> Mapping[str, Any]:
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return {}
-    return content if isinstance(content, dict) else {}
-
-
-def _judged(result: Mapping[str, Any]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Checks that failed; cautions and warnings. Without the names of trials, which are not the others'."""
-    trials = [trial["name"] for trial in result.get("trials", ())]
-
-    def nameless(sentence: str) -> str:
-        return next(
-            (sentence.removeprefix(f"{name}: ") for name in trials if sentence.startswith(f"{name}: ")), sentence
-        )
-
-    by_level: dict[str, list[str]] = {"pass": [], "caution": [], "fail": []}
-    for verdict in result.get("verdicts", ()):
-        by_level[verdict["level"]].append(nameless(verdict["sentence"]))
-    warnings = [nameless(sentence) for sentence in result.get("warnings", ())]
-    return tuple(by_level["fail"]), (*by_level["caution"], *warnings)
-
-
-def lead(outcomes: Iterable[Outcome]) -> str:
+def lead(people: pd.DataFrame) -> str:
     """The page's first sentence."""
-    counts = _counts(outcomes)
-    careful = counts["with care"]
-    care = f", {careful} {'is' if careful == 1 else 'are'} usable with care" if careful else ""
-    total = sum(counts.values())
-    return (
-        f"{total} people; {counts['passed']} passed every check{care}. Each one's report is in people/NAME/report.html."
-    )
+    counts = _counts(people)
+    said = ", ".join(f"{count} {word}" for word, count in counts.items() if count)
+    return f"{len(people)} people: {said}. Each one's report is in people/NAME/report.html."
 
 
-def _counts(outcomes: Iterable[Outcome]) -> dict[str, int]:
-    counted = Counter(one.word for one in outcomes)
-    return {word: counted[word] for word in _WORDS}
+def _counts(people: pd.DataFrame) -> dict[str, int]:
+    counted = Counter(people["verdict"])
+    return {word: counted[word if word in (USE, WITH_CARE, DO_NOT_USE) else ""] for word in _WORDS}
 
 
-def outcome_parts(outcomes: Iterable[Outcome]) -> list[Part]:
-    """How many passed, and the reasons of the others: numbers in a sentence do not make another reason."""
-    everybody = list(outcomes)
-    counts = _counts(everybody)
+def outcome_parts(people: pd.DataFrame, findings: pd.DataFrame) -> Iterator[Part]:
+    """Verdicts, people without results and why, findings by code, what was overruled in vain, what the codes mean."""
+    counts = _counts(people)
     bars = bar_figure(
         ["people"],
         {f"{word} ({count})": [count] for word, count in counts.items()},
         ", ".join(f"{count} {word}" for word, count in counts.items()),
         "people",
     )
-    failed = _reasons({one.person: one.failed for one in everybody}, everybody)
-    doubts = _reasons({one.person: one.doubts for one in everybody}, everybody)
-    parts = [Part("Who passed", figure=bars, headings=("why not", "people", "who"), rows=failed)]
-    if doubts:
-        text = "Cautions and warnings of results, which count as passed for the exit status."
-        parts.append(Part("What to look at", (text,), headings=("what", "people", "who"), rows=doubts))
-    return parts
+    without = people[people["verdict"] == ""]
+    rows = [(name, _with_links(text)) for name, text in zip(without["person"], without["sentence"], strict=True)]
+    more = (f"{len(rows)} people; the others are in people.csv.",) if len(rows) > _MOST_PEOPLE else ()
+    yield Part("Verdicts", figure=bars)
+    if rows:
+        yield Part("Not fitted", more, headings=("person", "why"), rows=rows[:_MOST_PEOPLE])
+    if len(findings):
+        fitted = set(people["person"][people["verdict"] != ""])
+        text = "Every finding: findings.parquet. Open: neither explained by another finding nor overruled."
+        yield Part("Findings by code", (text,), headings=_HEADINGS, rows=_by_code(findings, fitted))
+    if vain := overruled_in_vain(people, findings):
+        yield Part("Overruled, but never found", listed=vain)
+    if len(findings):
+        meanings = [_meaning(code) for code in sorted(findings["code"].unique())]
+        yield Part("What the codes mean", headings=("code", "detects", "effect", "remedy"), rows=meanings)
 
 
-def _reasons(sentences: Mapping[str, Iterable[str]], everybody: Iterable[Outcome]) -> list[tuple[str, str, str]]:
-    """The most frequent ones first, each person once, linked to the report if there is one."""
-    shown = {one.person: _linked(one) for one in everybody}
-    names: dict[str, list[str]] = {}
-    for person, said in sentences.items():
-        for reason in dict.fromkeys(map(reason_of, said)):
-            names.setdefault(reason, []).append(person)
-    counted = Counter({reason: len(who) for reason, who in names.items()})
-    return [
-        (
-            reason,
-            str(count),
-            Markup(", ").join(shown[person] for person in names[reason][:_MOST_NAMES])
-            + (", ..." if count > _MOST_NAMES else ""),
-        )
-        for reason, count in counted.most_common(_MOST_REASONS)
-    ]
+def _by_code(findings: pd.DataFrame, fitted: set[str]) -> list[tuple[str, ...]]:
+    """A row for each code, the worst and most frequent first."""
+    rows = []
+    for code, of in findings.groupby("code", observed=True):
+        severity = max(Severity[name] for name in of["severity"].unique())
+        muted = of["muted_by"].notna() & (of["status"] == "open")
+        overruled, people = of["status"] != "open", of["person"].unique().tolist()
+        counts = [
+            len(people),
+            len(of) - int(overruled.sum()) - int(muted.sum()),
+            int(muted.sum()),
+            int(overruled.sum()),
+        ]
+        names = Markup(", ").join(linked(name) if name in fitted else escape(name) for name in people[:_MOST_NAMES])
+        cells = (_link(str(code)), severity.name, rule(str(code)).name.replace("-", " "), *map(str, counts))
+        more = names + (", ..." if len(people) > _MOST_NAMES else "")
+        rows.append(((-severity, -len(people), str(code)), (*cells, _median(of), more)))
+    return [cells for _, cells in sorted(rows, key=lambda row: row[0])]
 
 
-def _linked(one: Outcome) -> Markup:
-    return linked(one.person) if one.fitted else escape(one.person)
+def _median(of: pd.DataFrame) -> str:
+    """Median of the headline's size; empty where there is none."""
+    known = of.dropna(subset=["value"])
+    if not len(known):
+        return ""
+    return shown(Quantity(float(np.median(known["value"].abs())), str(known["unit"].iloc[0])))
+
+
+def overruled_in_vain(people: pd.DataFrame, findings: pd.DataFrame) -> list[str]:
+    """Codes, questions or families that people waive or ignore, and that nothing was ever found of."""
+    said = Counter(code for text in people["overruled"] for code in text.split())
+    found = set(findings["code"].unique())
+    return [f"{code}: {count} people" for code, count in said.most_common() if not found & set(matching(code))]
+
+
+def _meaning(code: str) -> tuple[str, ...]:
+    one = rule(code)
+    anchor = Markup('<span id="explain-{}">{}</span>').format(code, code)
+    return anchor, one.detects, outlined(one.effect), outlined(one.remedy)
+
+
+def _link(code: str) -> Markup:
+    return Markup('<a class="code" href="#explain-{}">{}</a>').format(code, code)
+
+
+def _with_links(sentence: str) -> Markup:
+    """A sentence whose codes lead to what they mean."""
+    words = (_link(word) if len(word) == 4 and matching(word) == (word,) else escape(word) for word in sentence.split())
+    return Markup(" ").join(words)
 
 
 def linked(person: str) -> Markup:
     """The name, which leads to the person's report."""
     return Markup('<a href="people/{}/report.html">{}</a>').format(quote(person), person)
-
-
-def reason_of(sentence: str) -> str:
-    """The first clause without paths and numbers."""
-    text = re.sub(r"^[^ ]*[/\\][^:]*?(, line \d+)?: ", "", sentence)
-    text = _QUOTED_OR_PATH.sub("...", text)
-    text = re.sub(r"[-+]?\d+([.,]\d+)*", "#", text)
-    return re.split(r"; |(?<!\.)\. ", text, maxsplit=1)[0] or "no reason given"

@@ -1,4 +1,4 @@
-"""`cohort.html`: who of a cohort passed, what changed, who is far from the others, and the mean curves.
+"""`cohort.html`: verdicts and findings of a cohort, what changed, who is far from the others, and the mean curves.
 
 Made from the cohort's tables: of ten thousand people, curves are summed up piece by piece, and names held once.
 """
@@ -19,7 +19,7 @@ from kinertia.motion.gait_cycle import PERCENT
 from kinertia.report import style
 from kinertia.report.bsp_figures import NAMES, segment_name
 from kinertia.report.cohort_instruments import COLUMNS, drift
-from kinertia.report.cohort_outcomes import lead, linked, outcome_parts, outcomes_of
+from kinertia.report.cohort_outcomes import FINDINGS, PEOPLE, lead, linked, outcome_parts
 from kinertia.report.cycle_figures import band, mean_line
 from kinertia.report.figure import Figure
 from kinertia.report.panels import Panel, small_multiples
@@ -45,14 +45,13 @@ _SIZES = {"force (N)": "force_rms_N", "moment (N m)": "moment_rms_Nm"}
 
 def write_cohort_page(folder: Path) -> None:
     """Write the page beside the tables that `write_tables` has written into the folder."""
-    people = _read(folder, "people", ("person", "status", "sentence"))
-    outcomes = outcomes_of(folder, people)
-    parts = outcome_parts(outcomes)
+    people = _read(folder, "people", PEOPLE)
+    parts = list(outcome_parts(people, _read(folder, "findings", FINDINGS)))
     if (people["status"] <= AGAINST).any():
         bsp = _read(folder, "cohort", ("person", "segment", "parameter", "literature", "estimate", "sd"))
         parts += [*_changes(bsp), _residuals(folder), _outliers(bsp), *_mean_curves(folder)]
         parts += drift(_read(folder, "instruments", COLUMNS))
-    write_then_rename(folder / PAGE, render_parts("Cohort", lead(outcomes), parts))
+    write_then_rename(folder / PAGE, render_parts("Cohort", lead(people), parts))
 
 
 def _read(folder: Path, table: str, columns: Sequence[str]) -> pd.DataFrame:

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import time
 import traceback
+from dataclasses import replace
 
-from kinertia.diagnostics.result.verdict import verdicts
 from kinertia.errors import KinertiaError
 from kinertia.estimation.result import Fit
+from kinertia.findings.finding import Severity
 from kinertia.io.output_folder import complete_folder, write_then_rename
 from kinertia.io.provenance import VERSION, command_line, provenance_of
 from kinertia.io.recording_date import session_date
 from kinertia.io.subject_file import SubjectFile, read_subject
-from kinertia.report.cohort_tables import write_person
+from kinertia.report.cohort_tables import write_findings, write_person
 from kinertia.report.files import save_fit
 from kinertia.studies.cohort_cluster import Job
 from kinertia.studies.cohort_record import AGAINST, BAD_INPUT, FAILED, PASSED, RECORD, Place, Record, inputs_of
@@ -29,7 +30,9 @@ def fit_person(job: Job) -> Record:
     if job.kinertia != VERSION:
         versions = f"the worker has Kinertia {VERSION}, the command {job.kinertia}: install the same on both"
         return job.record(FAILED, versions, settled=False)
-    log = Place(job.cohort, job.person).log
+    place = Place(job.cohort, job.person)
+    place.findings.unlink(missing_ok=True)
+    log = place.log
     if was_ended(log, job.run):
         return job.record(FAILED, no_end(job.limit_s, log), settled=False)
     try:
@@ -48,15 +51,26 @@ def fit_person(job: Job) -> Record:
 def _fitted(job: Job, started: float) -> Record:
     """How the fit ended, its results in their place."""
     wanted = read_subject(job.subject)
+    overruled = _overruled(wanted)
     try:
         fit = fit_subject(wanted)
     except KinertiaError as error:
-        return job.record(BAD_INPUT, str(error), _unchanged(job), time.perf_counter() - started)
-    judged = verdicts(fit)
-    against = "; ".join(verdict.sentence for verdict in judged if verdict.level == "fail")
-    record = job.record(AGAINST if against else PASSED, against, True, time.perf_counter() - started)
+        write_findings(Place(job.cohort, job.person).findings, job.person, error)
+        record = job.record(BAD_INPUT, str(error), _unchanged(job), time.perf_counter() - started)
+        return replace(record, overruled=overruled)
+    overview = fit.overview
+    against = [one.line() for one in overview.open if one.severity is Severity.ERROR]
+    against += [f"{name} left out" for name in overview.left_out]
+    record = job.record(AGAINST if against else PASSED, "; ".join(against), True, time.perf_counter() - started)
+    record = replace(record, verdict=overview.verdict, overruled=overruled)
     _save(fit, wanted, job, record)
     return record
+
+
+def _overruled(wanted: SubjectFile) -> str:
+    """Codes that the subject file waives or ignores, for all trials or single ones."""
+    given = [wanted.diagnostics.overrule, *(trial.diagnostics.overrule for trial in wanted.trials)]
+    return " ".join(dict.fromkeys(code for each in given for code in (*each.waive, *each.ignore)))
 
 
 def _save(fit: Fit, wanted: SubjectFile, job: Job, record: Record) -> None:
@@ -82,6 +96,6 @@ def _failed(job: Job, error: Exception) -> Record:
     """Kinertia's own failure, with a log beside its record."""
     log = Place(job.cohort, job.person).log
     last_line = traceback.format_exception_only(error)[-1].strip()
-    sentence = f"Kinertia failed, which it should not on any input ({last_line}); please send {log} to its developers"
+    sentence = f"Internal error ({last_line}). Please send {log} to the developers."
     write_then_rename(log, "".join(traceback.format_exception(error)))
     return job.record(FAILED, sentence, settled=not isinstance(error, MemoryError))

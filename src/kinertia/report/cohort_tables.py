@@ -7,17 +7,18 @@ from __future__ import annotations
 
 import csv
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import asdict
 from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from kinertia.diagnostics.result.verdict import residual_verdicts, verdict_of_markers, worst_level
-from kinertia.errors import FileError
+from kinertia.errors import FileError, KinertiaError, findings_of
 from kinertia.estimation.cycles import UNITS, cycle_columns
 from kinertia.estimation.result import Fit
+from kinertia.findings.finding import Finding, Severity
+from kinertia.findings.overview import Overview
 from kinertia.io.csv_file import read_csv
 from kinertia.io.spreadsheet import inert
 from kinertia.io.working_folder import working_folder
@@ -45,7 +46,12 @@ _COLUMNS: Mapping[str, Mapping[str, str]] = {
         **dict.fromkeys(("n_frames", "n_dynamic_frames"), "int64"),
         **dict.fromkeys(("window_start_s", "window_end_s", *_NUMBERS, "seconds"), "double"),
         **dict.fromkeys(("marker_rms_m_ik", "marker_rms_m_final", *_RESIDUALS), "double"),
-        **dict.fromkeys(("verdict", "against"), "string"),
+        **dict.fromkeys(("verdict", "errors"), "string"),
+    },
+    "findings": {
+        **dict.fromkeys(("person", "trial", "plate", "code", "severity", "status", "muted_by"), "string"),
+        "value": "double",
+        "unit": "string",
     },
     "cycles": {
         **dict.fromkeys(("person", "trial", "side"), "string"),
@@ -61,7 +67,9 @@ _COLUMNS: Mapping[str, Mapping[str, str]] = {
     "people": {
         "person": "string",
         "status": "int64",
+        "verdict": "string",
         "sentence": "string",
+        "overruled": "string",
         "inputs": "string",
         "kinertia": "string",
         "trials": "int64",
@@ -69,7 +77,7 @@ _COLUMNS: Mapping[str, Mapping[str, str]] = {
     },
 }
 """Columns of every table with their types, as pyarrow names them."""
-OF_A_PERSON = ("cohort", "trials", "cycles", "instruments")
+OF_A_PERSON = ("cohort", "trials", "findings", "cycles", "instruments")
 _ROWS_AT_ONCE, _PEOPLE_AT_ONCE = 50_000, 200
 """Whichever is reached first ends a piece of a table. A file keeps a line on each column of each piece, which for ten
 thousand people with a piece each would be more than the numbers; and small tables that wait take more memory than
@@ -86,12 +94,21 @@ def write_person(folder: Path, person: str, fit: Fit, day: date | None = None, w
         day: of the recording, if it is known.
         with_session: whether the fit knew what others say of plates and clock.
     """
+    of_person = (_bsp(fit), _trials(fit), _findings(fit.findings), _cycles(fit), _instruments(fit, day, with_session))
+    for name, columns in zip(OF_A_PERSON, of_person, strict=True):
+        _write_rows(folder / f"{name}.parquet", name, person, columns)
+
+
+def write_findings(path: Path, person: str, error: KinertiaError) -> None:
+    """Write the findings of an error that leaves a person without results."""
+    _write_rows(path, "findings", person, _findings(findings_of(error)))
+
+
+def _write_rows(path: Path, name: str, person: str, columns: Mapping[str, Any]) -> None:
     from pyarrow import parquet
 
-    of_person = (_bsp(fit), _trials(fit), _cycles(fit), _instruments(fit, day, with_session))
-    for name, columns in zip(OF_A_PERSON, of_person, strict=True):
-        rows = len(next(iter(columns.values())))
-        parquet.write_table(_table(name, {"person": [person] * rows, **columns}), folder / f"{name}.parquet")
+    rows = len(next(iter(columns.values())))
+    parquet.write_table(_table(name, {"person": [person] * rows, **columns}), path)
 
 
 def write_tables(cohort: Path, records: Iterable[Record], with_csv: bool) -> None:
@@ -108,6 +125,8 @@ def write_tables(cohort: Path, records: Iterable[Record], with_csv: bool) -> Non
                 folder = Place(cohort, record.person).results
                 for name in OF_A_PERSON:
                     tables[name].add(parquet.read_table(folder / f"{name}.parquet"))
+            elif record.inputs and (path := Place(cohort, record.person).findings).is_file():
+                tables["findings"].add(parquet.read_table(path))
 
 
 def fitted_people(cohort: Path) -> set[str] | None:
@@ -134,8 +153,8 @@ def read_cohort(folder: str | Path) -> dict[str, Any]:
         folder: that `kinertia cohort` has written.
 
     Returns:
-        by name: "cohort" (body segment parameters), "trials", "cycles", "instruments" (plates and clock), and
-        "people", who is in it and how it ended.
+        by name: "cohort" (body segment parameters), "trials", "findings", "cycles", "instruments" (plates and
+        synchronisation), and "people", who is in it and how it ended.
 
     Raises:
         FileError: no cohort is there.
@@ -167,7 +186,7 @@ def _bsp(fit: Fit) -> dict[str, Any]:
 
 
 def _trials(fit: Fit) -> dict[str, Any]:
-    """What `fit.json` says of every trial, and the trial's own verdicts."""
+    """What `fit.json` says of every trial, the verdict on it, and codes of its open ERRORs."""
     rows = []
     for of_trial, trial in zip(summary(fit)["trials"], fit.trials, strict=True):
         row = {
@@ -176,13 +195,30 @@ def _trials(fit: Fit) -> dict[str, Any]:
             if isinstance(value, dict)
             for stage, one in value.items()
         }
-        judged = [*residual_verdicts(trial), verdict_of_markers(fit, trial)]
+        own = Overview([one for one in fit.findings if one.where.trial in (None, trial.name)], 0, 1)
         row |= {key: value for key, value in of_trial.items() if not isinstance(value, dict)}
-        row |= {"trial": trial.name, "seconds": row["seconds_total"], "verdict": worst_level(judged)}
+        row |= {"trial": trial.name, "seconds": row["seconds_total"], "verdict": own.verdict}
         row |= dict(zip(("window_start_s", "window_end_s"), of_trial["window_s"], strict=True))
-        row["against"] = "; ".join(verdict.sentence for verdict in judged if verdict.level == "fail")
+        row["errors"] = " ".join(dict.fromkeys(one.code for one in own.open if one.severity is Severity.ERROR))
         rows.append(row)
     return {name: [row[name] for row in rows] for name in _COLUMNS["trials"] if name != "person"}
+
+
+def _findings(found: Sequence[Finding]) -> dict[str, Any]:
+    """A row for each finding, muted and overruled ones included, with the headline's value."""
+    heads = [
+        next((one for one in each.evidence.values() if isinstance(one.value, float | int)), None) for each in found
+    ]
+    return {
+        "trial": [one.where.trial for one in found],
+        "plate": [one.where.plate for one in found],
+        "code": [one.code for one in found],
+        "severity": [one.severity.name for one in found],
+        "status": [one.status for one in found],
+        "muted_by": [one.muted_by for one in found],
+        "value": [None if one is None else float(one.value) for one in heads],  # type: ignore[arg-type]
+        "unit": [None if one is None else one.unit for one in heads],
+    }
 
 
 def _cycles(fit: Fit) -> dict[str, Any]:

@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from kinertia.diagnostics.result.verdict import verdicts
 from kinertia.estimation.cycles import UNITS as UNITS_OF_CURVES
 from kinertia.estimation.result import Fit
 from kinertia.model.bsp import PARAMETERS, UNITS
@@ -22,7 +21,6 @@ from kinertia.report.coordinate_titles import load_title, panels_of
 from kinertia.report.cycle_figures import curves_of, mean_curve, mean_line
 from kinertia.report.cycle_table import stride_rows
 from kinertia.report.figure import Figure, written
-from kinertia.report.headline import level_of
 from kinertia.report.panels import Panel, plain, small_multiples
 from kinertia.report.rendering import rendered
 from kinertia.report.same_quantities import same_segment, same_sign
@@ -212,7 +210,7 @@ def _head(name: str, fit: Fit) -> dict[str, Any]:
         "method": fit.settings.method,
         "model": fit.skeleton.name,
         "trials": ", ".join(trial.name for trial in fit.trials),
-        "level": level_of(fit, verdicts(fit)),
+        "verdict": fit.overview.verdict,
     }
 
 

@@ -1,8 +1,9 @@
-"""The fault study on paper: a page, `faults.md` with the table, `faults.json` with every sentence."""
+"""The fault study on paper: a page, `faults.md` with the tables, `faults.json` with every finding."""
 
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -10,30 +11,37 @@ from typing import Any
 
 import numpy as np
 
+from kinertia.findings.finding import Severity
+from kinertia.findings.rule import rule
 from kinertia.io.output_folder import complete_folder
 from kinertia.io.provenance import VERSION
 from kinertia.report.result_page import Part, render_parts
 from kinertia.report.row_figures import bar_figure
-from kinertia.studies.faults import FaultOutcome, SoundWalk
+from kinertia.studies.faults import FaultOutcome, SoundWalk, reported
 
+_CODE_HEADINGS = ("code", "finding", "named", "warned", "fault-free walks")
 _BARS = ("named", "warned", "harmless", "silent")
-_PAGE = """# Which mistakes are named?
+_PAGE = """# Which faults are identified?
 
 Laboratories make mistakes: swapped labels, a wrong axis, another person's static trial. Each of {count} known ones was
-made in the files of {walks} walks, one at a time, and given to `kinertia check`; what it did not doubt was fitted.
+made in the files of {walks} walks, one at a time, and given to `kinertia check`; what it did not identify was fitted.
 `kinertia study faults` does so, with your own walks as well, and writes this page.
 
-- **named**: the first new sentence names the cause (by `check` or, marked \\*, by the fit)
-- **warned**: something new is said, but of another cause
-- **harmless**: nothing is said, and no joint moment of the legs changes by more than its standard deviation (RMS)
-- **silent**: nothing is said, and one does
-- –: the walk has nothing to make the mistake with (Plug-in Gait has no inner markers, force files have no plates)
+- **named**: a new open finding has a code of the fault (by `check` or, marked \\*, by the fit, which may correct it)
+- **warned**: new findings have other codes only
+- **harmless**: nothing is new, and no joint moment of the legs changes by more than its standard deviation (RMS)
+- **silent**: nothing is new, and one does
+- –: the walk has nothing to make the fault with (Plug-in Gait has no medial markers, force files have no plates)
 
 {summary}
 
 {table}
 
-Sentences and changes of the joint moments are in `faults.json`.
+Findings and changes of the joint moments are in `faults.json`.
+
+## By code
+
+{codes}
 
 ## What cannot be named
 
@@ -67,41 +75,55 @@ Sentences and changes of the joint moments are in `faults.json`.
   of when they did; and between 3 and 7 Hz sound forces move the body 0.4 to 1.3 times as fast as the markers show,
   filtered ones 0.2 to 1.0 times.
 
-## What is said of sound walks
+## What is found in fault-free walks
 
 {sound}
 """
 
 
 def counts(outcomes: Sequence[FaultOutcome]) -> dict[str, int]:
-    """How many mistakes came to each outcome; those that are not possible are left out."""
+    """How many faults came to each outcome; those that are not possible are left out."""
     return {kind: sum(one.outcome == kind for one in outcomes) for kind in _BARS}
 
 
 def faults_markdown(
     sound: Sequence[SoundWalk], outcomes: Sequence[FaultOutcome], laboratories: Sequence[SoundWalk]
 ) -> str:
-    """The table and what it comes to."""
-    rows = [["mistake", *(walk.name for walk in sound)], ["---"] * (1 + len(sound)), *faults_rows(sound, outcomes)]
+    """The tables and what they come to."""
     emphasised = {"silent": "**silent**", "named*": "named \\*"}
-    *most, last = [[row[0], *(emphasised.get(cell, cell) for cell in row[1:])] for row in rows]
+    *most, last = [[row[0], *(emphasised.get(cell, cell) for cell in row[1:])] for row in faults_rows(sound, outcomes)]
     return _PAGE.format(
-        count=len(rows) - 4,
+        count=len(most) - 1,
         walks=len(sound),
         summary=faults_sentence(sound, outcomes, laboratories),
-        table="\n".join(f"| {' | '.join(cells)} |" for cells in (*most, [f"**{cell}**" for cell in last])),
+        table=_table(["fault", *(walk.name for walk in sound)], [*most, [f"**{cell}**" for cell in last]]),
+        codes=_table(_CODE_HEADINGS, code_rows([*sound, *laboratories], outcomes)),
         sound="\n".join(f"- {sentence}" for sentence in _said_of_sound([*sound, *laboratories])),
     )
 
 
+def _table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    return "\n".join(f"| {' | '.join(cells)} |" for cells in (headings, ["---"] * len(headings), *rows))
+
+
+def code_rows(fault_free: Sequence[SoundWalk], outcomes: Sequence[FaultOutcome]) -> list[list[str]]:
+    """A row for each code: how many faults it identifies, of how many it is the first other finding, and in how many
+    fault-free walks it is found.
+    """
+    named, warned = (Counter(one.code for one in outcomes if one.outcome == kind) for kind in ("named", "warned"))
+    without = Counter(code for walk in fault_free for code in {one.code for one in reported(walk.findings)})
+    codes = sorted({*named, *warned, *without} - {""})
+    return [[code, rule(code).name, str(named[code]), str(warned[code]), str(without[code])] for code in codes]
+
+
 def faults_rows(sound: Sequence[SoundWalk], outcomes: Sequence[FaultOutcome]) -> list[list[str]]:
-    """One row per mistake, a column per walk; the first row is of no mistake, the last one counts those named among
+    """One row per fault, a column per walk; the first row is of no fault, the last one counts those named among
     those possible.
     """
     by_case = {(one.walk, one.mistake): one for one in outcomes}
     mistakes = dict.fromkeys(one.mistake for one in outcomes)
     rows = [[name, *(_cell(by_case[walk.name, name]) for walk in sound)] for name in mistakes]
-    rows.insert(0, ["none: the walk as it is", *(_doubts(walk) for walk in sound)])
+    rows.insert(0, ["none: the walk as it is", *(_codes(walk) for walk in sound)])
     return [*rows, ["named / possible", *(_named(walk.name, outcomes) for walk in sound)]]
 
 
@@ -112,34 +134,29 @@ def faults_sentence(
     sums = counts(outcomes)
     possible = sum(sums.values())
     return (
-        f"Of {possible} mistakes made, {sums['named']} are named ({100 * sums['named'] / max(possible, 1):.0f} %), "
-        f"{sums['warned']} warned of with another cause, {sums['harmless']} harmless, and {sums['silent']} do silent "
-        f"harm. Of {len(sound)} sound walks {_refused(sound)} are refused. Of {len(laboratories)} other synthetic "
-        f"people in sound laboratories {_refused(laboratories)} are refused, and something is said of "
-        f"{_doubted(laboratories)}."
+        f"Of {possible} faults, {sums['named']} are named ({100 * sums['named'] / max(possible, 1):.0f} %), "
+        f"{sums['warned']} warned of with other codes, {sums['harmless']} harmless, and {sums['silent']} silent. "
+        f"Of {len(sound)} fault-free walks {_count(sound, Severity.ERROR)} are blocked, and "
+        f"{_count(sound, Severity.WARNING)} have a warning. Of {len(laboratories)} other people in fault-free "
+        f"synthetic laboratories {_count(laboratories, Severity.ERROR)} are blocked, and "
+        f"{_count(laboratories, Severity.WARNING)} have a warning."
     )
 
 
-def _doubts(walk: SoundWalk) -> str:
-    """How many sentences are said of a sound walk, by whom."""
-    said = {by: sum(one.by == by for one in walk.findings) for by in ("check", "fit")}
-    return "; ".join(f"{count} by {by}" for by, count in said.items() if count) or "nothing said"
+def _codes(walk: SoundWalk) -> str:
+    """Codes that are found in a fault-free walk, the worst first."""
+    return " ".join(dict.fromkeys(one.code for one in reported(walk.findings))) or "none"
 
 
-def _refused(walks: Sequence[SoundWalk]) -> int:
-    """Of how many `check` says that they fail, or the fit that it is not possible."""
-    by_check = [any((one.level, one.by) == ("fail", "check") for one in walk.findings) for walk in walks]
-    return sum(refused or walk.moments is None for walk, refused in zip(walks, by_check, strict=True))
-
-
-def _doubted(walks: Sequence[SoundWalk]) -> int:
-    return sum(bool(walk.findings) for walk in walks)
+def _count(walks: Sequence[SoundWalk], least: Severity) -> int:
+    """In how many there is something at least as severe; a walk that cannot be fitted is blocked."""
+    return sum(walk.moments is None or any(one.severity >= least for one in reported(walk.findings)) for walk in walks)
 
 
 def _said_of_sound(sound: Sequence[SoundWalk]) -> list[str]:
-    """What `check` and the fit say of walks as they are."""
-    said = ("; ".join(f"{one.sentence} ({one.by})" for one in walk.findings) or "nothing" for walk in sound)
-    return [f"{walk.name}: {sentences}" for walk, sentences in zip(sound, said, strict=True)]
+    """What is found in walks as they are."""
+    found = ("; ".join(f"{one.code} {one.message}" for one in reported(walk.findings)) or "nothing" for walk in sound)
+    return [f"{walk.name}: {sentences}" for walk, sentences in zip(sound, found, strict=True)]
 
 
 def render_faults(
@@ -151,20 +168,21 @@ def render_faults(
     figure = bar_figure(
         names,
         {kind: [one[kind] for one in sums] for kind in _BARS},
-        "How many mistakes in each walk are named, warned of, harmless or silent.",
-        "mistakes that are possible in this walk",
+        "How many faults in each walk are named, warned of, harmless or silent.",
+        "faults that are possible in this walk",
     )
     words = (
-        "Named: the first new sentence names the cause (by check or, marked *, by the fit). Warned: something new is "
-        "said, but of another cause. Harmless: nothing is said, and no joint moment of the legs changes by more than "
-        "its standard deviation. Silent: nothing is said, and one does. –: the walk has nothing to make it with."
+        "Named: a new open finding has a code of the fault (by check or, marked *, by the fit). Warned: new findings "
+        "have other codes only. Harmless: nothing is new, and no joint moment of the legs changes by more than its "
+        "standard deviation. Silent: nothing is new, and one does. –: the walk has nothing to make the fault with."
     )
-    rows = faults_rows(sound, outcomes)
+    codes = code_rows([*sound, *laboratories], outcomes)
     parts = [
-        Part("Outcomes", (words,), figure, headings=("mistake", *names), rows=rows),
-        Part("What is said of sound walks", listed=_said_of_sound([*sound, *laboratories])),
+        Part("Outcomes", (words,), figure, headings=("fault", *names), rows=faults_rows(sound, outcomes)),
+        Part("By code", headings=_CODE_HEADINGS, rows=codes),
+        Part("What is found in fault-free walks", listed=_said_of_sound([*sound, *laboratories])),
     ]
-    return render_parts("Which mistakes are named?", faults_sentence(sound, outcomes, laboratories), parts)
+    return render_parts("Which faults are identified?", faults_sentence(sound, outcomes, laboratories), parts)
 
 
 def _cell(one: FaultOutcome) -> str:
@@ -199,7 +217,7 @@ def faults_summary(
     """What `faults.json` says."""
     return {
         "kinertia": VERSION,
-        "sound": {walk.name: [one._asdict() for one in walk.findings] for walk in (*sound, *laboratories)},
+        "sound": {walk.name: [one.to_dict() for one in walk.findings] for walk in (*sound, *laboratories)},
         "outcomes": [
             {key: None if isinstance(value, float) and not np.isfinite(value) else value for key, value in row.items()}
             for row in map(asdict, outcomes)

@@ -9,14 +9,14 @@ import csv
 import json
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from kinertia.diagnostics.result.uses import uses
-from kinertia.diagnostics.result.verdict import verdicts
-from kinertia.diagnostics.result.warnings import mass_from_force_kg
+from kinertia.diagnostics.result.masses import mass_from_force_kg
+from kinertia.diagnostics.result.suitability import suitability
 from kinertia.estimation.cycles import Stage, cycle_columns, spatiotemporal_columns
 from kinertia.estimation.forces_used import forces_before, forces_used
 from kinertia.estimation.identifiability import BaseParameters
@@ -186,8 +186,11 @@ def summary(fit: Fit) -> dict[str, Any]:
         **_posterior_summary(fit),
         "asymmetry": asymmetry_sentences(fit),
         "trials": [_trial_summary(fit, trial) for trial in fit.trials],
-        "uses": [{"output": use.output, "use": use.word, "reason": use.reason} for use in uses(fit)],
-        "verdicts": [verdict._asdict() for verdict in verdicts(fit)],
+        "verdict": fit.overview.verdict,
+        "rules_run": fit.rules,
+        "trials_left_out": list(fit.left_out),
+        "findings": [one.to_dict() for one in fit.findings],
+        "suitability": [asdict(one) for one in suitability(fit, fit.findings, fit.left_out)],
         "warnings": list(fit.warnings),
         "corrections": list(fit.corrections),
         "notes": list(fit.notes),

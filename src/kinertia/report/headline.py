@@ -1,20 +1,22 @@
-"""The report's first part: a fit in words, for somebody who reads nothing else.
+"""The report's first part: for what a fit may be used, and beside that what the estimate changed, in words.
 
-Whether numbers can be used is judged in `diagnostics.result.verdict`; here that is put beside how far the motion was
-changed to get there, what the data say about the body, and where the estimate leaves what it started from.
+Findings say what is wrong; `suitability` says what follows for each output, and here that is read for the purposes that
+people have.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from kinertia.diagnostics.result.uses import Use, uses
-from kinertia.diagnostics.result.verdict import Level, Verdict, verdicts, worst_level
+from kinertia.diagnostics.result.suitability import Suitability, suitability
 from kinertia.estimation.identifiability import INFORMED, MEASURED, evidence
 from kinertia.estimation.result import Fit, TrialFit
+from kinertia.findings.finding import Severity
+from kinertia.findings.overview import DO_NOT_USE, USE, WITH_CARE
 from kinertia.report.bsp_figures import DEPARTURE_SD, NAMES, departures, estimated_rows, segment_name
 from kinertia.report.coordinate_titles import title_of
 from kinertia.report.time_figures import motion_change
@@ -23,10 +25,29 @@ from kinertia.trial.rms import rms
 
 _LISTED_FAR = 12
 _EVIDENCE = {
-    "measured": "measured",
-    "informed": "informed by the data",
-    "assumed": "hardly informed by the data, not to be read as this person's",
+    "measured": "well informed by the data",
+    "informed": "partly informed by the data",
+    "assumed": "not informed by the data, not to be read as this person's",
 }
+IMPOSSIBLE = "R202"
+"""The code of bodies that cannot exist."""
+_WORST_FIRST = (DO_NOT_USE, WITH_CARE, USE)
+
+
+class Purpose(NamedTuple):
+    """What people do with a result, whether they may with this one, why, and codes of what stands against it.
+
+    Attributes:
+        name: of the purpose.
+        use: "use", "use with care" or "do not use".
+        reason: with a number.
+        codes: of the findings that lower it.
+    """
+
+    name: str
+    use: str
+    reason: str
+    codes: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -34,50 +55,56 @@ class Words:
     """A fit in sentences.
 
     Attributes:
-        level: `level_of`.
-        headline: what it means for using the numbers.
-        uses: `kinertia.diagnostics.result.uses.uses`.
-        judgements: `kinertia.diagnostics.result.verdict.verdicts`.
+        purposes: what it may be used for.
+        outputs: the same by output.
         motion: how far the motion was changed.
         knowledge: what the data could and could not tell about the body segment parameters.
         departures: estimates more than two prior SDs from the prior's mean.
     """
 
-    level: Level
-    headline: str
-    uses: tuple[Use, ...]
-    judgements: tuple[Verdict, ...]
+    purposes: tuple[Purpose, ...]
+    outputs: tuple[Suitability, ...]
     motion: tuple[str, ...]
     knowledge: tuple[str, ...]
     departures: tuple[str, ...]
 
 
-def level_of(fit: Fit, judgements: Iterable[Verdict]) -> Level:
-    """A fit in one word: the worst of its judgements; a warning is worth a caution."""
-    level = worst_level(judgements)
-    return "caution" if level == "pass" and fit.warnings else level
-
-
 def words(fit: Fit) -> Words:
-    """The verdict on a fit."""
-    judgements = tuple(verdicts(fit))
-    level = level_of(fit, judgements)
-    counts = [sum(one.level == wanted for one in judgements) for wanted in ("fail", "caution")]
-    warned = f"{len(fit.warnings)} warning{'s' if len(fit.warnings) > 1 else ''}" if fit.warnings else ""
-    calls = (
-        ""
-        if not counts[1]
-        else f"{counts[1]} of {len(judgements)} checks call{'s' if counts[1] == 1 else ''} for caution"
-    )
-    headline = {
-        "pass": "All checks passed: forces, motion and model agree.",
-        "caution": f"Usable with care: {'; '.join(filter(None, (calls, warned)))}.",
-        "fail": f"Do not use these numbers as they are: {counts[0]} of {len(judgements)} checks failed.",
-    }[level]
-    if level == "fail" and warned:
-        headline += f" Read the {warned}."
+    """A fit in sentences."""
+    outputs = suitability(fit, fit.findings, fit.left_out)
     motion = tuple(sentence for trial in fit.trials for sentence in _motion(fit, trial))
-    return Words(level, headline, tuple(uses(fit)), judgements, motion, _knowledge(fit), _departures(fit))
+    return Words(purposes(outputs, impossible(fit)), outputs, motion, _knowledge(fit), _departures(fit))
+
+
+def impossible(fit: Fit) -> bool:
+    """Whether a body was estimated that cannot exist, which no simulation takes."""
+    return any(one.code == IMPOSSIBLE and one.severity is Severity.ERROR for one in fit.findings)
+
+
+def purposes(outputs: Sequence[Suitability], no_body: bool) -> tuple[Purpose, ...]:
+    """Three purposes from the five outputs: moments in the clinic, parameters in print, the next step in OpenSim."""
+    of = {one.output: one for one in outputs}
+    moments, motion = of["joint moments"], of["motion"]
+    segments = [of[name] for name in ("segment masses", "centres of mass", "moments of inertia")]
+    uses = {one.use for one in segments}
+    by_use = [
+        f"{use}: {', '.join(one.output for one in segments if one.use == use)}"
+        for use in (USE, WITH_CARE, DO_NOT_USE)
+        if use in uses
+    ]
+    reason = segments[0].reason if len(uses) == 1 else "; ".join(by_use)
+    codes = tuple(dict.fromkeys(code for one in segments for code in one.codes))
+    together = uses.pop() if len(uses) == 1 else WITH_CARE
+    worse = min((moments, motion), key=lambda one: _WORST_FIRST.index(one.use))
+    both = tuple(dict.fromkeys((*moments.codes, *motion.codes)))
+    opensim = Purpose("Next OpenSim step (RRA, CMC)", worse.use, worse.reason, both)
+    if no_body:
+        opensim = opensim._replace(use=DO_NOT_USE, reason="a segment is physically impossible", codes=(IMPOSSIBLE,))
+    return (
+        Purpose("Joint moments for clinical use", moments.use, moments.reason, moments.codes),
+        Purpose("Segment parameters in a paper", together, reason, codes),
+        opensim,
+    )
 
 
 def _motion(fit: Fit, trial: TrialFit) -> list[str]:
@@ -90,8 +117,8 @@ def _motion(fit: Fit, trial: TrialFit) -> list[str]:
     moved = 1e3 * np.linalg.norm(change[:, :3], axis=1)
     overall = float(np.degrees(rms(change[:, angles])))
     return [
-        f"{trial.name}: the model's markers are {before:.1f} mm (RMS) from the measured ones after inverse kinematics "
-        f"and {after:.1f} mm after the estimate",
+        f"{trial.name}: model and measured markers are {before:.1f} mm (RMS) apart by inverse kinematics and "
+        f"{after:.1f} mm by the estimate",
         f"{trial.name}: joint angles were changed by {overall:.1f} degrees (RMS), most of all {name} by "
         f"{each[worst]:.1f}; the pelvis was moved by {rms(moved):.0f} mm (RMS), {np.nanmax(moved):.0f} mm at most",
     ]
@@ -100,17 +127,16 @@ def _motion(fit: Fit, trial: TrialFit) -> list[str]:
 def _knowledge(fit: Fit) -> tuple[str, ...]:
     if fit.posterior is None:
         return (
-            "the two-level method has no error bars: it cannot tell which parameters the data show and which they do "
-            "not. Small residuals alone prove nothing about single parameters; the simultaneous method does tell",
+            "the two-level method has no error bars, so that it is unknown which parameters the data inform. Small "
+            "residuals alone prove nothing about single parameters; use the simultaneous method",
         )
     posterior = fit.posterior
     grades = [evidence(value) for value in posterior.information[posterior.prior_sd > 0]]
     counts = {word: grades.count(word) for word in _EVIDENCE}
     sentences = [
-        f"of {len(grades)} parameters {counts['measured']} are measured (information above {100 * MEASURED:g} %) "
-        f"and {counts['informed']} informed by the data; {counts['assumed']} are hardly informed (below "
-        f'{100 * INFORMED:g} %; "assumed" in the table): their values are about as uncertain as '
-        f"{start_of(fit).whose}, even where they moved"
+        f"of {len(grades)} parameters {counts['measured']} are well informed by the data (information above "
+        f"{100 * MEASURED:g} %), {counts['informed']} partly and {counts['assumed']} not (below {100 * INFORMED:g} %; "
+        f'"assumed" in the table): the latter remain about as uncertain as {start_of(fit).whose}, even where they moved'
     ]
     masses = {fit.estimate.segments[i]: evidence(posterior.information[i, 0]) for i in estimated_rows(fit)}
     for word, meaning in _EVIDENCE.items():
@@ -120,8 +146,8 @@ def _knowledge(fit: Fit) -> tuple[str, ...]:
         sentences.append(kept)
     if never := posterior.base.never:
         sentences.append(
-            f"{hidden_combinations(fit)} combinations cannot be seen in any motion, such as {never[0]}: all are "
-            "listed above the table"
+            f"{hidden_combinations(fit)} combinations show in no motion, such as {never[0]}: all are listed above the "
+            "table"
         )
     return tuple(sentences)
 
@@ -130,7 +156,7 @@ def held_sentence(fit: Fit) -> str:
     """Names the segments that were not estimated; empty where all were."""
     estimated = set(estimated_rows(fit))
     names = [name for i, name in enumerate(fit.estimate.segments) if i not in estimated]
-    return f"kept as the model has them, not estimated: {_segments(names)}" if names else ""
+    return f"fixed at the model's values, not estimated: {_segments(names)}" if names else ""
 
 
 def hidden_combinations(fit: Fit) -> int:

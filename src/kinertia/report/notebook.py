@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from kinertia.estimation.result import Fit, TrialFit
-from kinertia.report.headline import words
+from kinertia.report.finding_view import lines
 from kinertia.report.page import bsp_rows, residual_rows
 from kinertia.report.rendering import rendered
 from kinertia.report.wording import start_of
@@ -12,11 +12,11 @@ from kinertia.trial.rms import rms
 
 
 def fit_html(fit: Fit) -> str:
-    """Verdict, warnings, residuals and body segment parameters."""
+    """Verdict, findings, residuals and body segment parameters."""
     return rendered(
         "notebook_fit.html.j2",
         fit=fit,
-        words=words(fit),
+        found=lines(fit.findings),
         residuals=residual_rows(fit.trials),
         start=start_of(fit).word,
         rows=bsp_rows(fit),

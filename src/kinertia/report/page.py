@@ -14,7 +14,7 @@ import numpy as np
 from kinertia.estimation.forces_used import forces_used, full_bandwidth
 from kinertia.estimation.identifiability import evidence
 from kinertia.estimation.result import Fit, TrialFit
-from kinertia.estimation.simultaneous.instrument_warnings import SHOWN_UNIT
+from kinertia.estimation.simultaneous.instrument_errors import SHOWN_UNIT
 from kinertia.io.provenance import Provenance, versions
 from kinertia.model.bsp import PARAMETERS
 from kinertia.report.body_figure import body_figure
@@ -32,6 +32,7 @@ from kinertia.report.bsp_figures import (
 from kinertia.report.cycle_figures import MOST_STRIDES, Norms, cycle_figures, has_spread
 from kinertia.report.cycle_table import stride_rows
 from kinertia.report.figure import Figure, written
+from kinertia.report.finding_view import FindingView
 from kinertia.report.headline import held_sentence, hidden_combinations, words
 from kinertia.report.marker_figures import fit_gap_figure, marker_figure, rms_by_marker
 from kinertia.report.rendering import rendered
@@ -55,9 +56,6 @@ MOST_TRIALS = 6
 """Trials whose curves are shown; all are in the table of residuals and in the files."""
 VIEW_FRAMES = 300
 """In the 3-D view; as those of the curves, shared by the trials, so that the page stays below 3.2 MB."""
-
-_SUMMARY_LINES, _LINE_LETTERS = 8, 95
-"""Of warnings in the printed summary, whose first page has no room for more, and letters in one of them."""
 
 
 def render(
@@ -85,7 +83,7 @@ def render(
         words=words(fit),
         start=start_of(fit),
         expected=expected_of(fit),
-        in_summary=warnings_in_summary(fit.warnings),
+        found=FindingView([fit.overview]),
         held=held_sentence(fit),
         hidden=hidden_combinations(fit),
         asymmetry=asymmetry_sentences(fit),
@@ -120,12 +118,6 @@ def render(
         most_events=MOST_EVENTS,
         seconds={trial.name: dict(trial.seconds) for trial in fit.trials},
     )
-
-
-def warnings_in_summary(warnings: Sequence[str]) -> int:
-    """How many the printed summary has room for, from the first on; at least one."""
-    lines = np.cumsum([-(-len(warning) // _LINE_LETTERS) for warning in warnings])
-    return max(int(np.searchsorted(lines, _SUMMARY_LINES, side="right")), 1)
 
 
 def _written(figure: Figure | None) -> dict[str, Any] | None:

@@ -13,7 +13,9 @@ import jinja2
 from jinja2.bccache import Bucket
 from markupsafe import Markup
 
+from kinertia.findings.display import outlined
 from kinertia.io.provenance import VERSION
+from kinertia.report.finding_view import LOOKS, asks
 from kinertia.report.plotly_script import packed_script
 from kinertia.report.wording import fixed
 
@@ -53,7 +55,8 @@ def templates_of(package: str) -> jinja2.Environment:
 def _environment() -> jinja2.Environment:
     environment = templates_of("kinertia.report")
     environment.globals.update(asset=_asset, packed_script=lambda: Markup(packed_script()))
-    environment.filters["fixed"] = fixed
+    environment.globals.update(asks=asks, looks=LOOKS)
+    environment.filters.update(fixed=fixed, outlined=outlined)
     return environment
 
 

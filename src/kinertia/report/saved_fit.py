@@ -10,11 +10,16 @@ from kinertia.errors import FileError
 from kinertia.estimation.identifiability import BaseParameters, Combination
 from kinertia.estimation.result import Fit, TrialFit
 from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
+from kinertia.estimation.simultaneous.evidence import FreeMomentSign
 from kinertia.estimation.simultaneous.fit import Posterior
+from kinertia.estimation.simultaneous.instrument_errors import InstrumentError
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation
 from kinertia.estimation.simultaneous.marker_noise import MarkerNoise
 from kinertia.estimation.simultaneous.one_sided import OneSided
 from kinertia.estimation.simultaneous.unlike import Unlikeness
+from kinertia.findings.finding import Finding
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
 from kinertia.io.object_archive import read_archive, write_archive
 from kinertia.io.provenance import VERSION, Provenance, versions
 from kinertia.model.axis_functions import Composed, PiecewisePolynomial
@@ -28,7 +33,7 @@ from kinertia.motion.inverse_kinematics import InverseKinematics
 from kinertia.motion.kinematics import Kinematics
 from kinertia.motion.smoothing import SmoothedSpline
 from kinertia.report.truth import Truth
-from kinertia.settings import Settings, Subject
+from kinertia.settings import Overrule, Settings, Subject
 from kinertia.trial.belt import Belt
 from kinertia.trial.data import FootLoads, Markers, Trial
 
@@ -55,8 +60,10 @@ class SavedFit:
 _KINDS = (
     SavedFit, Provenance, Truth, Fit, TrialFit, CurveDeviations, Subject, Settings,
     Posterior, InstrumentInformation, MarkerNoise, BaseParameters, Combination, Unlikeness, OneSided,
+    InstrumentError, FreeMomentSign,
     Skeleton, Joint, Axis, Marker, Range, PiecewisePolynomial, Composed, BodySegmentParameters,
     OsimModel, OsimJoint, OsimCoordinate, Coupling,
+    Finding, Where, Quantity, Overrule,
     Kinematics, InverseKinematics, SmoothedSpline, Motion, GroundReactions, Trial, Markers, FootLoads, Belt,
 )  # fmt: skip
 """All that a result is made of. Files know the classes by these names: who renames one keeps the old name readable."""

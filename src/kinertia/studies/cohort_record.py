@@ -33,12 +33,15 @@ class Record:
 
     Attributes:
         person: name.
-        status: 0 passed, 1 a check failed, 2 an error in the person's files, 70 Kinertia or its process failed.
-        sentence: what failed; empty where nothing did.
+        status: 0 fitted, 1 fitted with an open ERROR or without a trial, 2 an error in the files, 70 Kinertia or
+            its process failed.
+        sentence: what stands against it; empty where nothing does.
         inputs: SHA-256 of all that went in; empty where the same input may end otherwise.
         kinertia: version that did it.
         trials: how many.
         seconds: of computing.
+        verdict: on the result, "use", "use with care" or "do not use"; empty without one.
+        overruled: codes that the subject file waives or ignores, with spaces between them.
     """
 
     person: str
@@ -48,6 +51,8 @@ class Record:
     kinertia: str
     trials: int
     seconds: float
+    verdict: str = ""
+    overruled: str = ""
 
     @property
     def fitted(self) -> bool:
@@ -75,6 +80,11 @@ class Place:
     def failure(self) -> Path:
         """The record of a person without results."""
         return self.cohort / "failed" / f"{self.person}.json"
+
+    @property
+    def findings(self) -> Path:
+        """The findings of a person without results."""
+        return self.cohort / "failed" / f"{self.person}.parquet"
 
     @property
     def log(self) -> Path:
@@ -143,7 +153,7 @@ def keep(cohort: Path, record: Record) -> None:
     if not record.fitted:
         write_then_rename(place.failure, record.text())
         return
-    for path in (place.failure, place.log):
+    for path in (place.failure, place.findings, place.log):
         path.unlink(missing_ok=True)
 
 

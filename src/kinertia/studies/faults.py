@@ -1,8 +1,8 @@
-"""Is a wrong measurement named? Known mistakes are made in the files of real walks, one at a time.
+"""Is a wrong measurement identified? Known faults are made in the files of real walks, one at a time.
 
-`kinertia check` looks at the files first; what it does not doubt is fitted, and its joint moments are compared with
-those of the sound files. What is said of sound files is counted, too: of the walks as they are, and of other people in
-laboratories without mistakes.
+`kinertia check` looks at the files first; what it does not identify or block is fitted, and its joint moments are
+compared with those of the fault-free files. Findings in fault-free files are counted, too: of the walks as they are,
+and of other people in laboratories without faults.
 """
 
 from __future__ import annotations
@@ -12,38 +12,36 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 
-from kinertia.diagnostics.result.verdict import verdicts
-from kinertia.errors import KinertiaError
+from kinertia.errors import KinertiaError, findings_of
 from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.result import Fit
 from kinertia.estimation.simultaneous.instruments import FLOOR_PRIOR, PLATE_PRIOR
+from kinertia.findings.finding import Finding, Severity
+from kinertia.findings.overview import in_order
+from kinertia.findings.quantity import Quantity
 from kinertia.io.subject_file import SubjectFile, read_subject
 from kinertia.studies.parallel import in_parallel
 from kinertia.synthetic import load_mistakes as plates
 from kinertia.synthetic.laboratory import LabNoise, record, write_lab
-from kinertia.synthetic.measured_person import MeasuredPerson, read_person, write_person
+from kinertia.synthetic.measured_person import MeasuredPerson, write_person
+from kinertia.synthetic.measured_person import read_person as read_measured
 from kinertia.synthetic.mistakes import MISTAKES, Mistake
 from kinertia.synthetic.walk import walk, walking_subject
-from kinertia.workflow.files import check_files, files_of_subject
+from kinertia.workflow.check import check_person
 from kinertia.workflow.from_files import fit_subject
+from kinertia.workflow.person import read_person
 
 Outcome = Literal["named", "warned", "harmless", "silent", "not possible"]
-"""What became of a mistake: named; warned with another cause; moments within their deviations; neither; there is
+"""What became of a fault: identified; other findings are new; moments within their deviations; neither; there is
 nothing to make it with."""
 _WALK_S, _PLATE_RATE_HZ, _START, _SAMPLES_PER_FRAME = 2.7, 1000.0, 0.75, 10
+_CHANGED_SD = 3.0
+"""By which the size of a finding differs from that in the fault-free files before it counts as new."""
 _LEGS = re.compile(r"(hip|knee|ankle|subtalar)_")
-
-
-class Finding(NamedTuple):
-    """What was said of files or of their fit: "fail" or "caution", the sentence, and by whom ("check" or "fit")."""
-
-    level: str
-    sentence: str
-    by: str = "check"
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +56,7 @@ class JointMoments:
 
 @dataclass(frozen=True, eq=False)
 class SoundWalk:
-    """A walk as it is: what is said of it, and its joint moments; None where it cannot be fitted."""
+    """A walk as it is: what is found in it, and its joint moments; None where it cannot be fitted."""
 
     name: str
     subject: SubjectFile
@@ -73,16 +71,17 @@ class FaultOutcome:
     Attributes:
         walk, mistake: names.
         outcome: see `Outcome`.
-        said: the first new sentence; empty where there is none.
-        by: who said it: "check" or "fit".
+        code: of the finding that identifies it, else of the worst new one; empty where there is none.
+        said: its message.
+        by: what found it: "check" or "fit".
         change_sd, change_nm: change of the joint moments (RMS) over their deviations (RMS), and in N m, of the
-        coordinate
-            where the former is largest; NaN where no fit was made.
+            coordinate where the former is largest; NaN where no fit was made.
     """
 
     walk: str
     mistake: str
     outcome: Outcome
+    code: str = ""
     said: str = ""
     by: str = ""
     change_sd: float = np.nan
@@ -95,7 +94,7 @@ def run_faults(
     workers: int | None = None,
     progress: Callable[[float], None] = lambda share: None,
 ) -> tuple[list[SoundWalk], list[FaultOutcome]]:
-    """What is said of the walks as they are, and of each with every mistake.
+    """What is found in the walks as they are, and in each with every fault.
 
     Args:
         walks: subject files by name; of each the first trial is used.
@@ -113,7 +112,7 @@ def run_sound(
     workers: int | None = None,
     progress: Callable[[float], None] = lambda share: None,
 ) -> list[SoundWalk]:
-    """What is said of walks as they are; arguments as of `run_faults`."""
+    """What is found in walks as they are; arguments as of `run_faults`."""
     return in_parallel(_sound, list(walks.items()), workers, progress)
 
 
@@ -129,7 +128,7 @@ def sound_laboratories(folder: Path, count: int) -> dict[str, SubjectFile]:
         trial = walk(person, _WALK_S, _PLATE_RATE_HZ, _START)
         noise = LabNoise(camera_sd_m=rng.uniform(0.0002, 0.001), force_sd_n=rng.uniform(0.5, 3.0))
         recorded = write_lab(folder / f"{number} lab", record(person, trial, noise, rng, _SAMPLES_PER_FRAME))
-        measured = read_person(read_subject(recorded), rng)
+        measured = read_measured(read_subject(recorded), rng)
         x, z, gain, turn = (
             float(rng.normal(0.0, prior.sound_sd))
             for prior in (FLOOR_PRIOR["x"], FLOOR_PRIOR["z"], PLATE_PRIOR["gain"], FLOOR_PRIOR["turn"])
@@ -162,11 +161,10 @@ def _sound(case: tuple[str, SubjectFile]) -> SoundWalk:
         try:
             fit = fit_subject(path)
         except KinertiaError as error:
-            findings.append(Finding("fail", str(error), "fit"))
+            findings = findings_of(error) or findings
         else:
-            findings += of_fit(fit)
-            moments = moments_of(fit)
-    return SoundWalk(name, subject, tuple(findings), moments)
+            findings, moments = fit.findings, moments_of(fit)
+    return SoundWalk(name, subject, findings, moments)
 
 
 def _spoilt(case: tuple[SoundWalk, str]) -> FaultOutcome:
@@ -175,74 +173,77 @@ def _spoilt(case: tuple[SoundWalk, str]) -> FaultOutcome:
 
 
 def outcome_of(sound: SoundWalk, mistake: Mistake) -> FaultOutcome:
-    """Make the mistake in the files of the walk, and see what becomes of it."""
+    """Make the fault in the files of the walk, and see what becomes of it."""
     person = mistake.change(_person(sound.subject, sound.name), np.random.default_rng(_seed(mistake.name)))
+    case = FaultOutcome(sound.name, mistake.name, "not possible")
     if person is None:
-        return FaultOutcome(sound.name, mistake.name, "not possible")
+        return case
     with TemporaryDirectory() as folder:
         path = write_person(Path(folder), person)
-        by_check = checked(path)
-        judgement = judged(mistake, sound.findings, by_check)
-        if judgement is not None:
-            return FaultOutcome(sound.name, mistake.name, judgement[0], judgement[1], "check")
+        by_check = judged(case, mistake, sound.findings, checked(path), "check")
+        if by_check is not None and by_check.outcome == "named":
+            return by_check
         try:
             fit = fit_subject(path)
         except KinertiaError as error:
-            judgement = judged(mistake, sound.findings, [Finding("fail", str(error), "fit")])
-            outcome, said = judgement or ("warned", str(error))
-            return FaultOutcome(sound.name, mistake.name, outcome, said, "fit")
+            by_fit = judged(case, mistake, sound.findings, findings_of(error), "fit")
+            return by_check or by_fit or replace(case, outcome="warned", said=str(error), by="fit")
     sd, nm = change(sound.moments, moments_of(fit))
-    judgement = judged(mistake, sound.findings, of_fit(fit))
-    if judgement is not None:
-        return FaultOutcome(sound.name, mistake.name, judgement[0], judgement[1], "fit", sd, nm)
-    return FaultOutcome(sound.name, mistake.name, "harmless" if sd <= 1.0 else "silent", "", "", sd, nm)
+    silent = replace(case, outcome="harmless" if sd <= 1.0 else "silent")
+    by_fit = judged(case, mistake, sound.findings, fit.findings, "fit")
+    return replace(by_fit or by_check or silent, change_sd=sd, change_nm=nm)
 
 
 def _person(subject: SubjectFile, name: str) -> MeasuredPerson:
-    return read_person(subject, np.random.default_rng(_seed(name)))
+    return read_measured(subject, np.random.default_rng(_seed(name)))
 
 
 def _seed(name: str) -> list[int]:
     return list(name.encode())
 
 
-def checked(subject: Path) -> list[Finding]:
-    """What `kinertia check` doubts."""
+def checked(subject: Path) -> tuple[Finding, ...]:
+    """What `kinertia check` finds."""
     try:
-        checks, unreadable = check_files(files_of_subject(read_subject(subject)))
+        return check_person(read_person(read_subject(subject))).findings
     except KinertiaError as error:
-        return [Finding("fail", str(error))]
-    findings = [Finding("fail", sentence) for sentence in unreadable]
-    return findings + [Finding(*verdict) for _, one in checks for verdict in one.verdicts if verdict.level != "pass"]
+        return findings_of(error)
 
 
-def of_fit(fit: Fit) -> list[Finding]:
-    """What `kinertia fit` doubts or has corrected once it has computed."""
-    warned = [Finding("caution", sentence, "fit") for sentence in (*fit.warnings, *fit.corrections)]
-    return warned + [Finding(*verdict, "fit") for verdict in verdicts(fit) if verdict.level != "pass"]
+def reported(findings: Sequence[Finding]) -> list[Finding]:
+    """What a user reads first: open findings that are no mere assumptions, the worst first."""
+    return in_order(one for one in findings if one.is_open and one.severity > Severity.INFO)
 
 
 def judged(
-    mistake: Mistake, sound: Sequence[Finding], findings: Sequence[Finding]
-) -> tuple[Literal["named", "warned"], str] | None:
-    """Whether the first and worst of what is new names the mistake; None where nothing is new.
-
-    New is what is not said of the sound files in the same words, clause by clause, whatever the numbers. Where nothing
-    is, other numbers in words that name the mistake do.
+    case: FaultOutcome, mistake: Mistake, sound: Sequence[Finding], findings: Sequence[Finding], by: str
+) -> FaultOutcome | None:
+    """The outcome by what is new beside the fault-free files: "named" where a code of the fault is among it, "warned"
+    where others are; None where nothing is new.
     """
-    before = {(one.level, clause) for one in sound for clause in _clauses(one.sentence)}
-    new = [one for one in findings if any((one.level, clause) not in before for clause in _clauses(one.sentence))]
-    worst = [one for one in new if one.level == "fail"] or new
-    if worst:
-        named = re.search(mistake.named, worst[0].sentence) is not None
-        return ("named" if named else "warned"), worst[0].sentence
-    again = [one for one in findings if one not in sound and re.search(mistake.named, one.sentence)]
-    return ("named", again[0].sentence) if again else None
+    new = [one for one in reported(findings) if _is_new(one, reported(sound))]
+    naming = [one for one in new if one.code in mistake.codes]
+    if not new:
+        return None
+    first = (naming or new)[0]
+    outcome: Outcome = "named" if naming else "warned"
+    return replace(case, outcome=outcome, code=first.code, said=first.message, by=by)
 
 
-def _clauses(sentence: str) -> list[str]:
-    words = re.sub(r"[-+]?\d[\d.]*", "#", sentence)
-    return re.split(r"[,;:] ", words)
+def _is_new(one: Finding, before: Sequence[Finding]) -> bool:
+    """Whether it is not found there before, at least as severe and of about the same size."""
+    same = [other for other in before if other.code == one.code and other.where.overlaps(one.where)]
+    return not any(other.severity >= one.severity and not _differ(_headline(one), _headline(other)) for other in same)
+
+
+def _headline(one: Finding) -> Quantity | None:
+    return next((each for each in one.evidence.values() if isinstance(each.value, float)), None)
+
+
+def _differ(one: Quantity | None, other: Quantity | None) -> bool:
+    if one is None or other is None or one.sd is None or not isinstance(one.value, float):
+        return False
+    return isinstance(other.value, float) and abs(one.value - other.value) > _CHANGED_SD * one.sd
 
 
 def moments_of(fit: Fit) -> JointMoments:

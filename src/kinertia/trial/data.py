@@ -18,11 +18,14 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from kinertia.errors import MarkerSetError, TrialError
-from kinertia.findings.finding import Finding
+from kinertia.errors import MarkerSetError, TrialError, problem_of
+from kinertia.findings.finding import Finding, Severity, finding
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
 from kinertia.trial import display
 from kinertia.trial.belt import Belt
-from kinertia.trial.impossible_data import marker_trouble, plate_trouble
+from kinertia.trial.impossible_data import impossible_markers, impossible_plates
+from kinertia.trial.plate_names import plate_of_trial
 from kinertia.trial.sampled_time import nearest_samples, windows, within
 
 FloatArray = npt.NDArray[np.float64]
@@ -123,12 +126,14 @@ class IdleReading(NamedTuple):
         peak_n: the largest vertical force of the whole recording, N.
         rings_s: for how long the vertical force is below zero just before feet land and just after they leave, s; 0
             where it does not do both.
+        like_steps: the vertical force comes and goes as under feet, of whatever size.
     """
 
     level_n: tuple[float, float, float]
     drift_n: float
     peak_n: float
     rings_s: float
+    like_steps: bool = False
 
 
 class TorqueColumns(NamedTuple):
@@ -209,12 +214,11 @@ class Recording:
         mass_kg: body mass if the file tells, else None.
         height_m: body height if the file tells, else None.
         measurements: further lengths of the subject in m, by the file's own keys (`LKneeWidth`).
-        notes: one sentence for each assumption made while reading.
+        findings: what was found and assumed while reading.
         length_unit: of the marker file ("mm"); everything here is in m.
         vertical: the marker file's axis that points up ("+Z"); here it is +Y.
         virtual_sd_m: label -> deviation (m) of each coordinate, of markers that nobody wore: made of something else.
         belt: of the treadmill, where its speed is stated.
-        left_out: of plates that the file has and that cannot be used, why; among the notes, too.
 
     Raises:
         TrialError: times that are no clock's, infinite places of markers, forces that are not numbers, two plates of
@@ -232,30 +236,55 @@ class Recording:
     mass_kg: float | None = None
     height_m: float | None = None
     measurements: dict[str, float] = field(default_factory=dict)
-    notes: tuple[str, ...] = ()
+    findings: tuple[Finding, ...] = ()
     length_unit: str = "m"
     vertical: str = "+Y"
     virtual_sd_m: Mapping[str, float] = field(default_factory=dict)
     belt: Belt | None = None
-    left_out: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         markers, plates = self.markers, self.plates
-        trouble = marker_trouble(markers.time, markers.labels, markers.positions)
-        if not trouble and plates is not None:
-            trouble = plate_trouble(plates.time, plates.names, plates.declared_feet, plates.wrench)
-        if trouble:
-            raise TrialError(self.name, trouble)
+        wrong = impossible_markers(markers.time, markers.labels, markers.positions)
+        if wrong is None and plates is not None:
+            wrong = impossible_plates(plates.time, plates.names, plates.declared_feet, plates.wrench)
+        if wrong is not None:
+            raise TrialError(self.name, problem_of(wrong)).with_finding(wrong.in_trial(self.name))
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was assumed and corrected while reading, one sentence each."""
+        told = [one for one in self.findings if one.severity < Severity.WARNING]
+        return tuple(f"{one.where.file or self.name}: {one.message}" for one in told)
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """Of plates that the file has and that cannot be used, why."""
+        return tuple(one.message for one in self.findings if one.code == "F151")
+
+    def with_plates_of(self, trial: str) -> Recording:
+        """The same with plates that are called as those of this trial, in its findings, too."""
+        findings = tuple(
+            one if one.where.plate is None
+            else replace(one, where=replace(one.where, plate=plate_of_trial(one.where.plate, trial)))
+            for one in self.findings
+        )  # fmt: skip
+        if self.plates is None:
+            return replace(self, findings=findings)
+        names = tuple(plate_of_trial(name, trial) for name in self.plates.names)
+        return replace(self, plates=replace(self.plates, names=names), findings=findings)
 
     def without_empty_markers(self) -> Recording:
-        """The same without markers that no frame shows, and a note that names them."""
+        """The same without markers that no frame shows, and findings that name them (M101)."""
         seen = self.markers.seen
         labels = [label for column, label in enumerate(self.markers.labels) if seen[:, column].any()]
         if len(labels) == len(self.markers.labels):
             return self
-        empty = [label for label in self.markers.labels if label not in labels]
-        note = f"{self.name}: visible in no frame, left out: {', '.join(empty)}"
-        return replace(self, markers=self.markers.select(labels), notes=(*self.notes, note))
+        empty = [
+            finding("M101", Where(trial=self.name, markers=(label,)), share=Quantity(0.0, "1"))
+            for label in self.markers.labels
+            if label not in labels
+        ]
+        return replace(self, markers=self.markers.select(labels), findings=(*self.findings, *empty))
 
     def _repr_html_(self) -> str:
         """What a notebook shows: frames, markers and their gaps, force plates, notes."""
@@ -326,7 +355,7 @@ class Trial:
         loads: the loads of the two feet, in their own (usually faster) time base.
         measured: (n,) True where every foot on the ground stood on a loaded plate.
         notes: one sentence for each assumption made on the way here.
-        virtual_sd_m, belt: as the recording's.
+        virtual_sd_m, belt, vertical: as the recording's.
         findings: how its loads were sorted by foot.
 
     Examples:
@@ -346,6 +375,7 @@ class Trial:
     virtual_sd_m: Mapping[str, float] = field(default_factory=dict)
     belt: Belt | None = None
     findings: tuple[Finding, ...] = ()
+    vertical: str = "+Y"
 
     def __post_init__(self) -> None:
         _expect_shape("measured", self.measured, (len(self.markers.time),))

@@ -14,7 +14,7 @@ from itertools import combinations
 import numpy as np
 
 from kinertia.trial.centre_of_pressure import FIRM_LOAD_N
-from kinertia.trial.data import LOAD_THRESHOLD_N, BoolArray, FloatArray, PlateLoads
+from kinertia.trial.data import LOAD_THRESHOLD_N, BoolArray, FloatArray
 from kinertia.trial.rms import rms
 
 _FEWEST = 10
@@ -44,19 +44,6 @@ def exchanged_torques(vertical: FloatArray, torque: FloatArray) -> dict[int, int
         ):
             pairs |= {a: b, b: a}
     return pairs
-
-
-def exchanged_torques_doubts(plates: PlateLoads) -> list[str]:
-    """Pairs of plates whose free moments are exchanged."""
-    others = [one.belongs_to for one in plates.torques or ()]
-    return [
-        f"the free moments (torques) of {plates.names[a]} and {plates.names[b]} are exchanged: each is there while the "
-        "other plate carries the person, and next to nothing while its own does; moments of hip rotation and of the "
-        "subtalar joints are off by some N m; give each plate its own torque columns (torque_identifier of an "
-        "ExternalLoads file)"
-        for a, b in enumerate(others)
-        if b is not None and a < b
-    ]
 
 
 def _goes_with(torque: FloatArray, without: BoolArray, other: BoolArray, vertical: FloatArray) -> bool:

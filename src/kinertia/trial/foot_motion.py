@@ -7,13 +7,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinertia.errors import MarkerSetError
+from kinertia.errors import MarkerSetError, problem_of
+from kinertia.findings.finding import finding
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
 from kinertia.trial.belt import Belt
 from kinertia.trial.data import BoolArray, FloatArray, Markers
 from kinertia.trial.sampled_time import runs, span_s
 
 _SPEED_SPAN_S = 0.01
-_FILLED_GAP_S = 0.2
+_FILLED_GAP_S, _SEEN_SHARE = 0.2, 0.5
 _STEP_M = 0.03
 """Contacts whose heights differ by more stand on steps, boxes or a ramp; less is how a foot lands and rolls."""
 _STILL_M_S, _STILL_SPAN_S, _STILL_S = 0.05, 0.1, 0.2
@@ -144,13 +147,12 @@ def _short_gaps_filled(markers: Markers) -> FloatArray:
     Only for telling whether a foot is on the ground.
     """
     seen = markers.seen
-    kept = np.flatnonzero(seen.mean(axis=0) >= 0.5)
+    kept = np.flatnonzero(seen.mean(axis=0) >= _SEEN_SHARE)
     if not kept.size:
-        raise MarkerSetError(
-            f"the foot markers {', '.join(markers.labels)} are each seen in less than half of the frames; "
-            "use a trial that shows the feet or give other markers",
-            markers.labels,
-        )
+        where = Where(part="foot", markers=markers.labels)
+        share = Quantity(float(seen.mean(axis=0).max()), "1", limit=_SEEN_SHARE)
+        found = finding("M104", where, share=share, labels=Quantity(", ".join(markers.labels)))
+        raise MarkerSetError(problem_of(found), markers.labels).with_finding(found)
     positions = markers.positions[:, kept].copy()
     for column, marker in enumerate(kept):
         for first, last in runs(~seen[:, marker]):

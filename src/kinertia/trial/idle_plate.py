@@ -15,7 +15,7 @@ import numpy as np
 from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.data import LOAD_THRESHOLD_N, BoolArray, FloatArray, IdleReading
 from kinertia.trial.force_resolution import ringing_s
-from kinertia.trial.sampled_time import TIME_TOLERANCE_S, nearest_samples
+from kinertia.trial.sampled_time import TIME_TOLERANCE_S, nearest_samples, runs, span_s
 
 LONGEST_TAIL_S = 0.03
 """A foot lands or leaves within less; what lasts longer below the threshold is an offset."""
@@ -24,9 +24,14 @@ _FEWEST_IDLE = 20
 _IDLE_MOST_N, _STEADY_N = 3 * LOAD_THRESHOLD_N, 5.0
 """An idle level is below the first, and varies by less than the second: a foot that lands or leaves does not."""
 _BLOCK_S, _FEWEST_BLOCKS = 0.1, 4
-_IDLE_BLOCK_N, _STEADY_BLOCK_N = 150.0, 15.0
+_IDLE_BLOCK_N, _STEADY_BLOCK_N, _IDLE_SHARE, _LEAST_PEAK_N = 150.0, 15.0, 0.2, 100.0
 """In a tenth of a second in which nobody steps on or off, a plate reads less than the first, and varies by less than
-the second."""
+the second. Of what it carries at its peak, if that is a load, it reads less than a fifth: half a child is 100 N."""
+_RANGE_PERCENT, _RISING, _MOST_RISING, _SHORTEST_STEP_S = (1.0, 99.0), (0.2, 0.5), 0.2, 0.1
+"""Between 20 and 50 % of its peak a force under feet is for less than a tenth of the time, noise for two fifths."""
+_SWAYS, _ROUGH = 0.03, 0.1
+"""Of the peak: deviation of the load of feet that stay, at least, and its largest change from sample to sample, at
+most; noise that makes a zero of some newtons deviate as much jumps by more."""
 _GAUSSIAN = 1.4826
 """Deviation of Gaussian noise over its median absolute deviation."""
 
@@ -66,21 +71,44 @@ def without_idle(time: FloatArray, force: FloatArray, moment: FloatArray) -> Pla
 
 def idle_reading(time: FloatArray, force: FloatArray) -> IdleReading:
     """What a plate reads (k, 3) N while nobody stands on it: in tenths of a second in which little changes."""
-    peak_n, rings_s = float(np.abs(force[:, 1]).max(initial=0.0)), ringing_s(time, force[:, 1])
+    peak_n = float(np.abs(force[:, 1]).max(initial=0.0))
+    course = ringing_s(time, force[:, 1]), _like_steps(time, force[:, 1])
     every = max(2, round(_BLOCK_S / float(np.median(np.diff(time))))) if len(time) > 1 else 2
     count = len(time) // every
     if not count:
-        return IdleReading((np.nan,) * 3, np.nan, peak_n, rings_s)
+        return IdleReading((np.nan,) * 3, np.nan, peak_n, *course)
     blocks = force[: count * every].reshape(count, every, 3)
     low, high = np.percentile(blocks[..., 1], (5, 95), axis=1)
     level = np.median(blocks, axis=1)
-    idle = (high - low < _STEADY_BLOCK_N) & (np.abs(level[:, 1]) < _IDLE_BLOCK_N)
+    most = min(_IDLE_BLOCK_N, _IDLE_SHARE * peak_n) if peak_n > _LEAST_PEAK_N else _IDLE_BLOCK_N
+    idle = (high - low < _STEADY_BLOCK_N) & (np.abs(level[:, 1]) < most)
     if idle.sum() < _FEWEST_BLOCKS:
-        return IdleReading((np.nan,) * 3, np.nan, peak_n, rings_s)
+        return IdleReading((np.nan,) * 3, np.nan, peak_n, *course)
     x, y, z = (float(value) for value in np.median(level[idle], axis=0))
     when = time[: count * every].reshape(count, every).mean(axis=1)[idle]
     drift_n = float(np.polyfit(when - when.mean(), level[idle, 1], 1)[0]) * float(time[-1] - time[0])
-    return IdleReading((x, y, z), drift_n, peak_n, rings_s)
+    return IdleReading((x, y, z), drift_n, peak_n, *course)
+
+
+def _like_steps(time: FloatArray, vertical: FloatArray) -> bool:
+    """Whether a force (k,) of whatever unit is like the load of feet: it pushes one way, is either next to nothing or
+    nearly all there, and stays so for a while; or it is always there and sways smoothly.
+
+    Noise, drift and hum go both ways or never back to zero, are in between as often as not, leave the upper half at
+    once, or are rough.
+    """
+    if len(time) < _FEWEST_IDLE:
+        return False
+    low, high = np.percentile(vertical if vertical.max() > -vertical.min() else -vertical, _RANGE_PERCENT)
+    share = np.abs(vertical) / max(float(high), 1e-12)
+    if low > _RISING[1] * high:
+        after = time - time.mean()
+        sways = share - np.polyval(np.polyfit(after, share, 1), after)
+        return bool(np.std(sways) > _SWAYS) and float(np.abs(np.diff(share)).max()) < _ROUGH
+    between = float(((share > _RISING[0]) & (share < _RISING[1])).mean())
+    lasts = [span_s(time, first, last) for first, last in runs(share > _RISING[1])]
+    returns = bool(abs(low) < _RISING[0] * high)
+    return returns and between < _MOST_RISING and max(lasts, default=0.0) >= _SHORTEST_STEP_S
 
 
 def load_threshold_n(vertical: FloatArray) -> float:

@@ -8,47 +8,85 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from kinertia.findings.finding import Finding, finding, with_evidence
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
+
 _UNEVEN = 0.5
 """Of a usual step between frames, by which others may differ: clocks of cameras jitter."""
 
 
-def marker_trouble(time: np.ndarray, labels: Sequence[str], positions: np.ndarray) -> str:
-    """What is impossible in the times (n,) and places (n, m, 3) of markers, as part of a sentence; empty if nothing."""
-    if trouble := _clock_trouble("markers", time):
-        return trouble
+def impossible_markers(time: np.ndarray, labels: Sequence[str], positions: np.ndarray) -> Finding | None:
+    """What is impossible in the times (n,) and positions (n, m, 3) of markers; None if nothing is."""
+    if wrong := _not_growing(time):
+        return wrong
     steps = np.diff(time)
     usual = float(np.median(steps)) if len(steps) else 0.0
     if len(steps) and (away := np.abs(steps - usual)).max() > _UNEVEN * usual:
         k = int(np.argmax(away))
-        return (
-            f"the step to the next frame is {steps[k]:.4g} s at {time[k]:.4f} s, of most others {usual:.4g} s; frames "
-            "must follow one another evenly: where one is missing, have it, with NaN for its markers"
-        )
+        return with_evidence("T101", Where(), step_evidence(time[k], time[k + 1], usual))
     infinite = np.argwhere(np.isinf(positions))
     if len(infinite):
-        frame, marker, _ = infinite[0]
-        where = f"{labels[marker]} at {time[frame]:.3f} s"
-        return f"the place of {where} is infinite; a marker that was not seen has NaN"
-    return ""
+        frame, marker, axis = infinite[0]
+        return impossible_position(labels[marker], float(positions[frame, marker, axis]), float(time[frame]))
+    return None
 
 
-def plate_trouble(time: np.ndarray, names: Sequence[str], feet: Sequence[str | None], wrench: np.ndarray) -> str:
+def impossible_plates(
+    time: np.ndarray, names: Sequence[str], feet: Sequence[str | None], wrench: np.ndarray
+) -> Finding | None:
     """The same of the times (k,), the declared feet (p,) and the forces and moments (k, p, 6) of plates."""
-    if trouble := _clock_trouble("plates", time):
-        return trouble
+    if wrong := _not_growing(time):
+        return wrong
     if len(set(names)) != len(names):
-        return f"two plates have one name ({', '.join(names)}) and would be taken for one; give each a name of its own"
-    if odd := [foot for foot in feet if foot not in ("r", "l", None)]:
-        return f"declared_feet has {odd[0]!r}; give 'r', 'l' or None for each plate"
+        problem = Quantity("each needs a name of its own")
+        return finding("F173", names=Quantity(", ".join(names)), problem=problem)
+    if odd := [(name, foot) for name, foot in zip(names, feet, strict=True) if foot not in ("r", "l", None)]:
+        name, foot = odd[0]
+        return finding(
+            "F173",
+            Where(plate=name),
+            names=Quantity(name),
+            problem=Quantity(f"declared_feet has {foot!r} in place of 'r', 'l' or None"),
+        )
     lost = np.argwhere(~np.isfinite(wrench))
     if len(lost):
         sample, plate, _ = lost[0]
-        where = f"{names[plate]} at {time[sample]:.4f} s"
-        return f"force or moment of {where} is not a number; have zeros where nobody stands, and cut what is lost"
-    return ""
+        return impossible_load(names[plate], "force or moment", float(time[sample]))
+    return None
 
 
-def _clock_trouble(whose: str, time: np.ndarray) -> str:
-    if np.isfinite(time).all() and (np.diff(time) > 0.0).all():
-        return ""
-    return f"the times of the {whose} must be numbers, each later than the one before"
+def impossible_position(label: str, position_m: float, time_s: float, limit_m: float | None = None) -> Finding:
+    """That a marker is somewhere where no laboratory is."""
+    where = Where(markers=(label,), span_s=(time_s, time_s))
+    return finding("F171", where, position_m=Quantity(position_m, "m", limit=limit_m), time_s=Quantity(time_s, "s"))
+
+
+def impossible_load(plate: str, what: str, time_s: float, **size: Quantity) -> Finding:
+    """That a force or moment of a plate is no number, or of a size that no plate measures."""
+    found = Quantity("no number" if not size else "more than any plate measures")
+    where = Where(plate=plate, span_s=(time_s, time_s))
+    words = {"time_s": Quantity(time_s, "s"), "what": Quantity(what), "found": found}
+    return with_evidence("F172", where, {**size, **words})
+
+
+def step_evidence(before: float, after: float, usual: float) -> dict[str, Quantity]:
+    """Evidence of T101: the step between two times, which ones, and the usual step, s."""
+    seconds = {"step_s": after - before, "usual_s": usual, "before": before, "after": after}
+    return {
+        name: Quantity(float(value), "s") if np.isfinite(value) else Quantity("no number")
+        for name, value in seconds.items()
+    }
+
+
+def _not_growing(time: np.ndarray) -> Finding | None:
+    """The first time that is no number, or not later than the one before."""
+    steps = np.diff(time)
+    odd = np.flatnonzero(~(steps > 0.0))
+    if odd.size:
+        known = steps[np.isfinite(steps)]
+        usual = float(np.median(known)) if known.size else float("nan")
+        return with_evidence("T101", Where(), step_evidence(time[odd[0]], time[odd[0] + 1], usual))
+    if not np.isfinite(time).all():
+        return with_evidence("T101", Where(), step_evidence(time[0], time[-1], float("nan")))
+    return None

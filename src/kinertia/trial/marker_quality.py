@@ -14,7 +14,6 @@ STANDING_RANGE_M = 0.03
 _LEAST_WALK_M = 0.5
 """Less way than this is no net travel."""
 UPRIGHT_SHARE = 0.7
-_PLAUSIBLE_EXTENT_M = (0.3, 2.8)
 
 
 @dataclass(frozen=True)
@@ -102,23 +101,3 @@ def extent_m(markers: Markers) -> FloatArray:
     if not len(shown):
         return np.full(3, np.nan)
     return np.asarray(np.median(np.nanmax(shown, axis=1) - np.nanmin(shown, axis=1), axis=0))
-
-
-def axes_trouble(extent: FloatArray) -> str:
-    """Why the vertical or the unit must be wrong, by the extent of a person's markers (m); empty if plausible."""
-    if np.isnan(extent).any():
-        return ""
-    low, high = _PLAUSIBLE_EXTENT_M
-    largest = float(extent.max())
-    if not low <= largest <= high:
-        return (
-            f"the markers of one frame reach {largest:.3g} m, which no person does; the file's unit of length must be "
-            f"wrong, correct it"
-        )
-    if extent[1] < UPRIGHT_SHARE * largest:
-        axis = "XYZ"[int(np.argmax(extent))]
-        return (
-            f"the markers reach {largest:.2f} m along {axis} and {extent[1]:.2f} m along Y, which should be up; turn "
-            f"the file's axes to Y up before export"
-        )
-    return ""

@@ -82,6 +82,7 @@ def build_trial(recording: Recording, feet: FootMarkers, window_s: tuple[float, 
         recording.virtual_sd_m,
         recording.belt,
         findings,
+        recording.vertical,
     )
 
 

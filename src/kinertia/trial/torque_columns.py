@@ -12,17 +12,13 @@ from __future__ import annotations
 import numpy as np
 
 from kinertia.trial.centre_of_pressure import FIRM_LOAD_N
-from kinertia.trial.data import FloatArray, PlateLoads, TorqueColumns
+from kinertia.trial.data import FloatArray, TorqueColumns
 from kinertia.trial.exchanged_torques import exchanged_torques
 from kinertia.trial.rms import rms
 
 _FEWEST = 20
 _MOVES_M = 0.02
 """Under a foot that lands and leaves the centre of pressure moves by 0.2 m, in squats by 0.1."""
-_LONG_ARM_M = 0.005
-"""A load that is off by so much moves joint moments by 2 to 4 N m."""
-_LITTLE, _SOME_NM, _LARGEST_NM = 0.1, 0.2, 10.0
-"""RMS of free moments of walks and runs: 0.8 to 6 N m."""
 
 
 def torque_columns(force: FloatArray, point: FloatArray, torque: FloatArray) -> tuple[TorqueColumns, ...]:
@@ -45,54 +41,3 @@ def torque_columns(force: FloatArray, point: FloatArray, torque: FloatArray) -> 
         x, y, z = (rms(values) for values in own.T)
         columns.append(TorqueColumns(arm, (x, y, z), elsewhere.get(p)))
     return tuple(columns)
-
-
-def torque_columns_doubts(plates: PlateLoads) -> list[str]:
-    """Plates whose torques are not the free moments at their centres of pressure, by what stood in the file."""
-    columns = list(zip(plates.names, plates.torques or (), strict=plates.torques is not None))
-    turned = [(name, one) for name, one in columns if _is_turned(one)]
-    elsewhere = [(name, one) for name, one in columns if one.arm_m > _LONG_ARM_M and not _is_turned(one)]
-    return [*_about_another_point(elsewhere), *_other_axes(turned)]
-
-
-def _is_turned(columns: TorqueColumns) -> bool:
-    """Whether a free moment stands in the column of a horizontal axis."""
-    x, y, z = columns.rms_nm
-    across = float(np.hypot(x, z))
-    return bool(columns.arm_m > 0.0 and _SOME_NM < across < _LARGEST_NM and y < _LITTLE * across)
-
-
-def _about_another_point(found: list[tuple[str, TorqueColumns]]) -> list[str]:
-    if not found:
-        return []
-    shown = "; ".join(
-        f"those of {name} have horizontal parts of {np.hypot(one.rms_nm[0], one.rms_nm[2]):.1f} N m (RMS under load), "
-        f"{1e3 * one.arm_m:.0f} mm times the vertical force (median)"
-        for name, one in found
-    )
-    return [
-        f"the torques of the force file do not go with the points of application beside them: {shown}; at a centre of "
-        "pressure there are none (up to 1 mm are usual): likeliest the torques are moments about another point (the "
-        "plate's middle or its sensors), which moves the loads under the feet by so much; export the free moment "
-        "(about the vertical through the centre of pressure, horizontal parts zero), or, as points of application, "
-        "the points that the torques are about"
-    ]
-
-
-def _other_axes(found: list[tuple[str, TorqueColumns]]) -> list[str]:
-    if not found:
-        return []
-    shown = "; ".join(
-        f"those of {name} are {max(one.rms_nm[0], one.rms_nm[2]):.1f} N m along {'Z' if _along_z(one) else 'X'} and "
-        f"{one.rms_nm[1]:.1f} along Y (RMS under load)"
-        for name, one in found
-    )
-    return [
-        f"the torques of the force file are about a horizontal axis: {shown}; at a centre of pressure they are about "
-        "the vertical, Y, and of this size: likeliest the torques were not turned with the forces, and the free moment "
-        "stands in the column of another axis; turn torques as forces and points are, and export them again"
-    ]
-
-
-def _along_z(columns: TorqueColumns) -> bool:
-    return columns.rms_nm[2] > columns.rms_nm[0]

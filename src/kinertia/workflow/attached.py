@@ -19,6 +19,9 @@ from kinertia.estimation.carried_mass import mass_of
 from kinertia.estimation.input_checks import known
 from kinertia.estimation.prepared import Prepared
 from kinertia.estimation.prior import SECOND_MOMENT_SD, BspPrior, inertia_covariance
+from kinertia.findings.finding import Finding, finding
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Joint, Skeleton
 from kinertia.settings import Attached
@@ -27,8 +30,6 @@ _UNKNOWN_SIZE_SD = 0.5
 """Relative deviation of the second moments of something whose size is not given."""
 _WATER_KG_M3 = 1000.0
 _GROUND = "ground"
-_TOLD_SD = 2.0
-"""Deviations of its mass by which something is told from nothing."""
 
 
 def with_attached(ready: Prepared, by_itself: Collection[str] = ()) -> Prepared:
@@ -54,7 +55,7 @@ def with_attached(ready: Prepared, by_itself: Collection[str] = ()) -> Prepared:
         skeleton=skeleton,
         prior=prior,
         literature=BodySegmentParameters.from_table(names, table),
-        notes=(*ready.notes, *(_note(one, scale_kg) for one in ready.attached)),
+        findings=(*ready.findings, *(_assumed(one, scale_kg) for one in ready.attached)),
     )
 
 
@@ -152,23 +153,9 @@ def _less_body(prior: BspPrior, by_itself: Collection[str]) -> np.ndarray:
     return change.ravel()
 
 
-def not_found_warnings(attached: Sequence[Attached], estimate: BodySegmentParameters, sd: np.ndarray) -> list[str]:
-    """One sentence for each thing of unknown mass of which nothing is found; `sd` (s, 10) of the estimate's table."""
-    warnings = []
-    for one in attached:
-        row = estimate.segments.index(one.name)
-        mass_kg, sd_kg = float(estimate.mass_kg[row]), float(sd[row, 0])
-        if one.mass_kg is None and mass_kg < _TOLD_SD * sd_kg:
-            weighed = "" if one.on_scale else ", is mass_kg under [subject] without it, and are the plates' gains right"
-            warnings.append(
-                f"[[attached]] {one.name}: {mass_kg:.2f} kg are found, with a deviation of {sd_kg:.2f} kg, which is "
-                f"not to be told from nothing; was it there{weighed}? A known mass would help (mass_kg)"
-            )
-    return warnings
-
-
-def _note(attached: Attached, scale_kg: float) -> str:
+def _assumed(attached: Attached, scale_kg: float) -> Finding:
     mass_kg, sd_kg = mass_of(attached, scale_kg)
     mass = "of unknown mass, which is estimated" if attached.mass_kg is None else f"{mass_kg:.4g} +- {sd_kg:.2g} kg"
     weighed = "weighed with the person" if attached.on_scale else "not on the scale"
-    return f"attached to {attached.segment}: {attached.name}, {mass}, {weighed}"
+    source = Quantity(f"{attached.name} attached to {attached.segment}, {mass}, {weighed}")
+    return finding("S408", Where(part=attached.name), source=source)

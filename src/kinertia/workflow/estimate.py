@@ -8,12 +8,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kinertia.diagnostics.result.mirrored_free_moments import mirrored_free_moments_warning
-from kinertia.diagnostics.result.unseen_turn import unseen_turn_note
-from kinertia.diagnostics.result.warnings import fit_warnings, force_warnings, turning_warnings, two_level_warnings
-from kinertia.diagnostics.subject.telling_movements import TellingMovements, missing_movements
-from kinertia.estimation.forces_used import forces_used
-from kinertia.estimation.free_moment_sign import free_moment_sign_warnings, with_likelier_sign
+from kinertia.diagnostics.result.context import ResultContext
+from kinertia.diagnostics.result.questions import ESTIMATE_QUESTIONS, RESULT_QUESTIONS, judged
+from kinertia.diagnostics.runner import explained, overruled
+from kinertia.estimation.free_moment_sign import with_likelier_sign
 from kinertia.estimation.prepared import Prepared, Progress
 from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.result import Fit, TrialFit
@@ -22,7 +20,7 @@ from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
 from kinertia.estimation.simultaneous.fit import Posterior, SimultaneousFit, fit_simultaneous
 from kinertia.estimation.simultaneous.model_uncertainty import ModelUncertainty
 from kinertia.estimation.two_level import Window, correct_pelvis, estimate_two_level, stretches
-from kinertia.model.anatomy import segment_of
+from kinertia.findings.rule import matching
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.gait27 import VIRTUAL_TRUNK
 from kinertia.model.imported import OsimModel
@@ -33,11 +31,14 @@ from kinertia.motion.ground_reactions import GroundReactions, ground_reactions, 
 from kinertia.motion.kinematics import Kinematics
 from kinertia.motion.one_thread import one_blas_thread
 from kinertia.motion.smoothing import interpolate
-from kinertia.settings import Attached, Settings, Subject
+from kinertia.settings import Attached, Overrule, Settings, Subject
 from kinertia.trial.data import Recording
 from kinertia.trial.trial_input import TrialInput
-from kinertia.workflow.attached import not_found_warnings, with_attached
+from kinertia.workflow.attached import with_attached
 from kinertia.workflow.prepare import prepare
+
+_RULES = len({code for one in (*ESTIMATE_QUESTIONS, *RESULT_QUESTIONS) for code in matching(one.code)})
+"""How many rules are asked of an estimate."""
 
 
 @one_blas_thread
@@ -50,6 +51,7 @@ def estimate_bsp(
     progress: Progress = lambda stage, share: None,
     prior: BspPrior | None = None,
     attached: Sequence[Attached] = (),
+    overrule: Overrule | None = None,
 ) -> Fit:
     """Body segment parameters of a person from a static trial and one or more gait trials.
 
@@ -62,11 +64,12 @@ def estimate_bsp(
         progress: called as the work goes on.
         prior: of the body segment parameters, for the simultaneous estimate; the literature's if None.
         attached: what the person wore or carried in all gait trials.
+        overrule: findings that do not block, or are not shown.
 
     Raises:
         KinertiaError: the subject, a marker set or a trial cannot be used; the message says why and what to do.
     """
-    ready = prepare(subject, static, inputs, settings, marker_set, progress, attached)
+    ready = prepare(subject, static, inputs, settings, marker_set, progress, attached, overrule)
     return estimate(ready if prior is None else replace(ready, prior=prior), progress)
 
 
@@ -79,6 +82,7 @@ def estimate_bsp_of_model(
     calibrate: bool = False,
     progress: Progress = lambda stage, share: None,
     attached: Sequence[Attached] = (),
+    overrule: Overrule | None = None,
 ) -> Fit:
     """Body segment parameters of a person whose scaled OpenSim model is known, by the simultaneous estimate.
 
@@ -90,13 +94,14 @@ def estimate_bsp_of_model(
         calibrate: let markers and joint centres move; else they stay where the model has them.
         progress: called as the work goes on.
         attached: what the person wore or carried in all trials.
+        overrule: findings that do not block, or are not shown.
 
     Raises:
         KinertiaError: the subject, the model or a trial cannot be used; the message says why and what to do.
     """
     from kinertia.workflow.prepare_osim import prepare_osim
 
-    ready = prepare_osim(subject, model, inputs, settings, calibrate, progress, attached)
+    ready = prepare_osim(subject, model, inputs, settings, calibrate, progress, attached, overrule)
     return estimate(ready, progress)
 
 
@@ -114,23 +119,7 @@ def estimate(ready: Prepared, progress: Progress = lambda stage, share: None) ->
     settings, ready = ready.settings, with_attached(ready)
     estimator = _two_level if settings.method == "two-level" else _simultaneous
     outcome = estimator(ready, settings, time.perf_counter(), progress)
-    prior_sd = None if outcome.posterior is None else outcome.posterior.prior_sd
-    warnings = (
-        *ready.warnings,
-        *turning_warnings(ready.skeleton, [trial.kinematics for trial in outcome.trials]),
-        *outcome.warnings,
-        *([] if outcome.posterior is None else not_found_warnings(ready.attached, outcome.bsp, outcome.posterior.sd)),
-        *_mirrored_free_moments(outcome),
-        *force_warnings(
-            ready.carried,
-            ready.literature,
-            outcome.trials,
-            ready.skeleton,
-            None if outcome.posterior is None else outcome.posterior.calibration,
-        ),
-        *fit_warnings(ready.carried, ready.literature, outcome.bsp, ready.uncertainty.source, prior_sd),
-    )
-    return Fit(
+    fit = Fit(
         subject=ready.subject,
         settings=settings,
         skeleton=outcome.skeleton,
@@ -139,45 +128,15 @@ def estimate(ready: Prepared, progress: Progress = lambda stage, share: None) ->
         trials=outcome.trials,
         converged=outcome.converged,
         posterior=outcome.posterior,
-        warnings=tuple(dict.fromkeys(warnings)),
-        notes=(
-            *ready.notes,
-            *_force_notes(outcome.trials, settings),
-            *outcome.notes,
-            *_turn_notes(outcome.posterior, ready),
-            *_movement_notes(ready),
-        ),
+        findings=ready.findings,
+        notes=ready.notes,
         file=ready.file,
-        corrections=outcome.corrections,
+        left_out=ready.left_out,
+        rules=ready.rules + _RULES,
+        evaluations=outcome.evaluations,
     )
-
-
-def _mirrored_free_moments(outcome: _Outcome) -> list[str]:
-    """What is left of free moments once plates and signs that are wrong have been named."""
-    if outcome.posterior is None:
-        return []
-    return list(filter(None, [mirrored_free_moments_warning(outcome.posterior.calibration)]))
-
-
-def _force_notes(trials: Sequence[TrialFit], settings: Settings) -> list[str]:
-    """Per trial, which ground reactions the joint moments are from."""
-    return [f"{t.name}: {forces_used(t.reactions, settings, t.motion_hz).sentence}" for t in trials]
-
-
-def _turn_notes(posterior: Posterior | None, ready: Prepared) -> list[str]:
-    """Turned plates that these trials would not show."""
-    note = "" if posterior is None else unseen_turn_note(posterior.instruments, ready.uncertainty.instruments)
-    return [note] if note else []
-
-
-def _movement_notes(ready: Prepared) -> list[str]:
-    """What the trials lack that would tell more."""
-    labels: dict[str | None, list[str]] = {}
-    for marker in ready.skeleton.markers:
-        labels.setdefault(segment_of(marker.segment), []).append(marker.label)
-    pelvis, torso = (labels.get(name, []) for name in ("pelvis", "torso"))
-    lacking = missing_movements(TellingMovements.of(k.trial.markers, pelvis, torso) for k in ready.kinematics)
-    return [] if lacking is None else [lacking]
+    found = explained([*ready.findings, *judged(ResultContext(fit, ready))])
+    return replace(fit, findings=tuple(overruled(found, ready.overrule, ready.overrule_of)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,9 +148,7 @@ class _Outcome:
     trials: tuple[TrialFit, ...]
     converged: bool
     posterior: Posterior | None
-    warnings: tuple[str, ...]
-    corrections: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
+    evaluations: int = 0
 
 
 def _two_level(ready: Prepared, settings: Settings, started: float, progress: Progress) -> _Outcome:
@@ -210,8 +167,7 @@ def _two_level(ready: Prepared, settings: Settings, started: float, progress: Pr
         motion = joined([next(motions) for _ in parts])
         estimates.append(_Estimated(ready.skeleton, motion, None, k.cutoff_hz, k.foot_loads, smoothed, smoothed, None))
     trials = _trial_fits(ready, result.bsp, estimates, started)
-    warnings = (*free_moment_sign_warnings(trials), *two_level_warnings(result))
-    return _Outcome(ready.skeleton, result.bsp, trials, result.converged, None, warnings)
+    return _Outcome(ready.skeleton, result.bsp, trials, result.converged, None, result.evaluations)
 
 
 def named_by_source(ready: Prepared) -> ModelUncertainty:
@@ -237,7 +193,7 @@ def _simultaneous(ready: Prepared, settings: Settings, started: float, progress:
         )
 
     signed = with_likelier_sign(ready, fit)
-    fitted, ready, sign = signed.fitted, signed.ready, signed.sign
+    fitted, ready = signed.fitted, signed.ready
     result = fitted.result
     parts = (
         fitted.skeletons,
@@ -253,10 +209,7 @@ def _simultaneous(ready: Prepared, settings: Settings, started: float, progress:
         for skeleton, motion, course, bandwidth, loads, reactions, sd, k in zip(*parts, ready.kinematics, strict=True)
     ]
     trials = _trial_fits(ready, fitted.bsp, estimates, started)
-    said = ([], []) if sign is None else (list(filter(None, [sign.correction])), list(filter(None, [sign.note])))
-    corrections, notes = (*said[0], *fitted.corrections), tuple(said[1])
-    outcome = fitted.skeleton, fitted.bsp, trials, result.converged, fitted.posterior
-    return _Outcome(*outcome, fitted.warnings, corrections, notes)
+    return _Outcome(fitted.skeleton, fitted.bsp, trials, result.converged, fitted.posterior)
 
 
 @dataclass(frozen=True, eq=False)

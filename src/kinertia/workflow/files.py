@@ -1,100 +1,30 @@
-"""What `kinertia check` looks at together: the recordings of a person, by their files or by a subject file."""
+"""Which files make one recording, and what a person is of whom there are files only: for `kinertia check`."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
-from kinertia.diagnostics.labels.marker_set_match import common_marker_set
-from kinertia.diagnostics.model.model_check import ModelCheck, check_model_of_subject
-from kinertia.diagnostics.result.verdict import Verdict
-from kinertia.diagnostics.subject.camera_scale import trial_scales
-from kinertia.diagnostics.timing.trial_delays import trial_delays_doubts
-from kinertia.errors import FileError, KinertiaError
-from kinertia.io.belt_file import read_belt
-from kinertia.io.marker_set_file import read_marker_set
-from kinertia.io.osim.reader import read_osim
+from kinertia.errors import FileError
 from kinertia.io.qualisys import is_plate_file
 from kinertia.io.recording import FORCE_FILES, MARKER_FILES, read_recording
 from kinertia.io.subject_draft import STATIC_NAME, matched_by_name
-from kinertia.io.subject_file import SubjectFile
 from kinertia.model.marker_set import MarkerSet
-from kinertia.model.model_markers import markers_of_model
-from kinertia.settings import Subject
-from kinertia.trial.data import Recording
+from kinertia.settings import Overrule, Subject
 from kinertia.trial.marker_quality import travel
-from kinertia.workflow.joint_widths import with_widths
-from kinertia.workflow.recording import RecordingCheck, check_recording
+from kinertia.trial.trial_input import TrialInput
+from kinertia.workflow.person import Person, Unread
 
 
 @dataclass(frozen=True)
 class RecordingFiles:
-    """The files of one recording, the window that the user vouches for, and what the trial is called."""
+    """The files of one recording."""
 
     markers: Path
     forces: Path | None = None
     loads: Path | None = None
-    window_s: tuple[float, float] | None = None
-    length_unit: str | None = None
-    belt_speed_m_s: float | tuple[float, float] | Path | None = None
-    name: str | None = None
-
-    @property
-    def title(self) -> str:
-        """Names of the files."""
-        return ", ".join(path.name for path in (self.markers, self.forces, self.loads) if path is not None)
-
-
-@dataclass(frozen=True)
-class PersonFiles:
-    """What is to be checked of one person.
-
-    Attributes:
-        recordings: the static trial, if there is one, and the others.
-        marker_set: the laboratory's, or the markers of an OpenSim model; found among the presets if None.
-        mass_kg, height_m: of who walked, where they are known.
-        static: which of the recordings is the static trial; if None, the only one in which the person stands still.
-        subject: who walked, with the widths of joints that were stated.
-        models: the OpenSim model by its name, where something speaks against it.
-    """
-
-    recordings: tuple[RecordingFiles, ...]
-    marker_set: MarkerSet | None = None
-    mass_kg: float | None = None
-    height_m: float | None = None
-    static: RecordingFiles | None = None
-    subject: Subject | None = None
-    models: tuple[tuple[str, ModelCheck], ...] = ()
-
-
-def files_of_subject(subject: SubjectFile) -> PersonFiles:
-    """What a subject file names."""
-    named = subject.model.markers
-    trials = [
-        RecordingFiles(
-            trial.markers,
-            trial.forces,
-            trial.loads,
-            trial.window_s,
-            trial.length_unit,
-            trial.belt_speed_m_s,
-            trial.name,
-        )
-        for trial in subject.trials
-    ]
-    marker_set = None if named is None else read_marker_set(named)
-    who = subject.subject
-    if subject.model.osim is not None:
-        model = read_osim(subject.model.osim)
-        marker_set = markers_of_model(model)
-        doubted = check_model_of_subject(model.skeleton, model.bsp)
-        models = () if doubted is None else ((model.path.name, doubted),)
-        return PersonFiles(tuple(trials), marker_set, who.mass_kg, who.height_m, subject=who, models=models)
-    if subject.model.static is None:
-        return PersonFiles(tuple(trials), marker_set, who.mass_kg, who.height_m, subject=who)
-    static = RecordingFiles(subject.model.static, length_unit=subject.model.length_unit)
-    return PersonFiles((static, *trials), marker_set, who.mass_kg, who.height_m, static, who)
 
 
 def files_by_name(files: Sequence[Path], loads: Path | None = None) -> tuple[RecordingFiles, ...]:
@@ -133,51 +63,48 @@ def unknown_kind(path: Path) -> FileError:
     return FileError(path, f"a '{path.suffix}' file cannot be checked; expected {known}{hint}")
 
 
-def check_files(
-    wanted: PersonFiles, progress: Callable[[float], None] = lambda share: None
-) -> tuple[list[tuple[str, RecordingCheck]], list[str]]:
-    """Findings by title, and a sentence for each recording that cannot be read."""
-    recordings, mistakes = _read(wanted.recordings, progress)
-    marker_set = wanted.marker_set
-    if marker_set is None:
-        marker_set = common_marker_set([recording for _, recording in recordings])
-    mass_kg, height_m = (
-        getattr(wanted, quantity) or _common([getattr(recording, quantity) for _, recording in recordings])
-        for quantity in ("mass_kg", "height_m")
+def read_files(
+    wanted: Sequence[RecordingFiles],
+    subject: Subject,
+    marker_set: MarkerSet | None = None,
+    overrule: Overrule | None = None,
+    static: Path | None = None,
+    progress: Callable[[float], None] = lambda share: None,
+) -> Person:
+    """A person of whom there are files only: a recording in which the person stands still is the static trial.
+
+    Args:
+        wanted: the files of each recording.
+        subject: what is stated.
+        marker_set: the laboratory's; found among the presets if None.
+        overrule: what the user overrules.
+        static: which file is the static trial; by the data if None.
+        progress: called with the share of files that are read.
+
+    Raises:
+        KinertiaError: no recording can be read.
+    """
+    unread, recordings = Unread(), []
+    for k, one in enumerate(wanted):
+        progress(k / len(wanted))
+        recording = unread.tried(partial(read_recording, one.markers, one.forces, one.loads), one.markers.stem)
+        recordings += [] if recording is None else [recording]
+    unread.expect_any(recordings)
+    if static is None:
+        stands = [travel(one.markers).kind == "stands still" for one in recordings]
+    else:
+        stands = [one.name == static.stem for one in recordings]
+    statics = [one for one, is_static in zip(recordings, stands, strict=True) if is_static]
+    moving = [one for one, is_static in zip(recordings, stands, strict=True) if not is_static]
+    return Person(
+        subject=subject,
+        trials=[TrialInput(one) for one in moving],
+        static=statics[0] if len(statics) == 1 else None,
+        more_statics=statics if len(statics) > 1 else (),
+        marker_set=marker_set,
+        overrule=overrule or Overrule(),
+        unread=tuple(unread.findings),
     )
-    statics = [r for one, r in recordings if one is wanted.static] or [
-        r for _, r in recordings if travel(r.markers).kind == "stands still"
-    ]
-    checks = []
-    for one, recording in recordings:
-        static = statics[0] if len(statics) == 1 and recording is not statics[0] else None
-        own_set, is_static = marker_set, one is wanted.static
-        if marker_set is not None and any(recording is each for each in statics):
-            others = [other for _, other in recordings if other is not recording]
-            recording, own_set, _ = with_widths(recording, others, marker_set, wanted.subject or Subject(name="person"))
-        judged = check_recording(recording, own_set, mass_kg, one.window_s, static, height_m, is_static)
-        checks.append((one.title, judged))
-    doubts = trial_delays_doubts([one.delay for _, one in checks])
-    if marker_set is not None:
-        moving = [recording for _, recording in recordings if all(recording is not each for each in statics)]
-        doubts += trial_scales([(one.name, one.markers) for one in moving], marker_set)
-    return _with_doubts(checks, doubts), mistakes
-
-
-def _with_doubts(
-    checks: Sequence[tuple[str, RecordingCheck]], doubts: Sequence[tuple[str, str]]
-) -> list[tuple[str, RecordingCheck]]:
-    """Findings by title, with what trials say of one another: name and sentence."""
-    told = {
-        name: tuple(Verdict("caution", sentence) for each, sentence in doubts if each == name) for name, _ in doubts
-    }
-    return [(title, replace(one, verdicts=(*one.verdicts, *told.get(one.recording.name, ())))) for title, one in checks]
-
-
-def _common(stated: Sequence[float | None]) -> float | None:
-    """What all files of a person say that say anything."""
-    values = {value for value in stated if value is not None}
-    return values.pop() if len(values) == 1 else None
 
 
 def _matched(marked: Sequence[Path], forces: Sequence[Path]) -> dict[Path, Path]:
@@ -189,19 +116,3 @@ def _matched(marked: Sequence[Path], forces: Sequence[Path]) -> dict[Path, Path]
         groups = [[p for p in paths if bool(STATIC_NAME.search(p.stem)) == static] for paths in (marked, forces)]
         pairs |= matched_by_name(*groups)
     return pairs
-
-
-def _read(
-    wanted: Sequence[RecordingFiles], progress: Callable[[float], None]
-) -> tuple[list[tuple[RecordingFiles, Recording]], list[str]]:
-    """The recordings, and a sentence for each that cannot be read."""
-    recordings, mistakes = [], []
-    for k, one in enumerate(wanted):
-        progress(k / len(wanted))
-        try:
-            recording = read_recording(one.markers, one.forces, one.loads, one.length_unit)
-            name = one.name or recording.name
-            recordings.append((one, replace(recording, name=name, belt=read_belt(one.belt_speed_m_s))))
-        except KinertiaError as error:
-            mistakes.append(str(error))
-    return recordings, mistakes

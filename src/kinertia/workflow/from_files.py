@@ -12,12 +12,16 @@ from typing import TYPE_CHECKING
 from kinertia.errors import PriorError, SessionError, SettingsError
 from kinertia.estimation.prepared import Prepared, Progress
 from kinertia.estimation.result import Fit
-from kinertia.io.person_recordings import read_inputs, read_trials
+from kinertia.findings.finding import finding
+from kinertia.findings.quantity import Quantity
 from kinertia.io.provenance import command_line, recordings
 from kinertia.io.subject_file import InstrumentsFiles, PriorFiles, SubjectFile, read_subject
+from kinertia.settings import Overrule
 from kinertia.workflow.attached import with_attached
 from kinertia.workflow.estimate import estimate
-from kinertia.workflow.prepare import prepare
+from kinertia.workflow.person import read_person
+from kinertia.workflow.prepare import prepared
+from kinertia.workflow.screening import screen
 
 if TYPE_CHECKING:
     from kinertia.estimation.learnt_prior import LearntPrior
@@ -25,12 +29,17 @@ if TYPE_CHECKING:
     from kinertia.io.session_file import PersonInstruments
 
 
-def prepare_subject(subject: str | Path | SubjectFile, progress: Progress = lambda stage, share: None) -> Prepared:
+def prepare_subject(
+    subject: str | Path | SubjectFile,
+    progress: Progress = lambda stage, share: None,
+    overrule: Overrule | None = None,
+) -> Prepared:
     """All that an estimator needs of the person in a subject file: everything read, calibrated, solved and smoothed.
 
     Args:
         subject: the file, or what `read_subject` made of it.
         progress: called as the work goes on.
+        overrule: what is overruled besides what the subject file says.
 
     Raises:
         KinertiaError: a file is missing or broken, or something in it cannot be used.
@@ -40,13 +49,11 @@ def prepare_subject(subject: str | Path | SubjectFile, progress: Progress = lamb
     _expect_no_mirrored_prosthesis(wanted)
     session = _session(wanted)
     measures = _measures(wanted)
-    ready = with_attached(_with_known_body(_prepared(wanted, progress), wanted, measures))
+    ready = with_attached(_with_known_body(_prepared(wanted, progress, overrule or Overrule()), wanted, measures))
     if known.model_copy(update={"date": None}) == InstrumentsFiles():
         return ready
     if wanted.settings.method == "two-level":
-        return replace(
-            ready, notes=(*ready.notes, "[instruments] is not used: two-level takes plates and clock as exact")
-        )
+        return _with_unused(ready, "[instruments]")
     from kinertia.workflow.session import with_instruments
 
     return with_instruments(ready, known, session, recordings(wanted))
@@ -88,13 +95,18 @@ def _with_known_body(ready: Prepared, wanted: SubjectFile, measures: BodyMeasure
     if wanted.prior == PriorFiles() and not wanted.segments:
         return ready
     if wanted.settings.method == "two-level":
-        return replace(ready, notes=(*ready.notes, "[prior] and [segment] are not used: two-level leans on no prior"))
+        return _with_unused(ready, "[prior] and [segment]")
     from kinertia.io.bsp_file import read_bsp
     from kinertia.workflow.known_body import with_known_body
 
     earlier = None if wanted.prior.bsp is None else read_bsp(wanted.prior.bsp)
     group = None if wanted.prior.population is None else _group(wanted, wanted.prior.population)
     return with_known_body(ready, wanted.prior, earlier, wanted.segments, group, measures)
+
+
+def _with_unused(ready: Prepared, entry: str) -> Prepared:
+    """The same with what the subject file says in vain."""
+    return replace(ready, findings=(*ready.findings, finding("F194", entry=Quantity(entry))))
 
 
 def _group(wanted: SubjectFile, path: Path) -> LearntPrior:
@@ -126,27 +138,29 @@ def check_plates(wanted: SubjectFile) -> None:
         )
 
 
-def _prepared(wanted: SubjectFile, progress: Progress) -> Prepared:
-    if wanted.model.osim is not None:
-        from kinertia.io.osim.reader import read_osim
-        from kinertia.workflow.prepare_osim import prepare_osim
+def _prepared(wanted: SubjectFile, progress: Progress, overrule: Overrule) -> Prepared:
+    screened = screen(read_person(wanted, progress).with_overrule(overrule))
+    if wanted.model.osim is None:
+        return prepared(screened, wanted.settings, progress)
+    from kinertia.workflow.prepare_osim import prepared_osim
 
-        model, trials = read_osim(wanted.model.osim), read_trials(wanted, progress)
-        calibrate, attached = wanted.model.calibrate, wanted.attached
-        return prepare_osim(wanted.subject, model, trials, wanted.settings, calibrate, progress, attached)
-    static, inputs, marker_set = read_inputs(wanted, progress)
-    return prepare(wanted.subject, static, inputs, wanted.settings, marker_set, progress, wanted.attached)
+    return prepared_osim(screened, wanted.settings, progress)
 
 
-def fit_subject(subject: str | Path | SubjectFile, progress: Progress = lambda stage, share: None) -> Fit:
+def fit_subject(
+    subject: str | Path | SubjectFile,
+    progress: Progress = lambda stage, share: None,
+    overrule: Overrule | None = None,
+) -> Fit:
     """Body segment parameters of the person in a subject file: what `kinertia fit` does, in one call.
 
     Args:
         subject: the file, or what `read_subject` made of it.
         progress: called as the work goes on, with a stage's name and the share of it that is done.
+        overrule: what is overruled besides what the subject file says.
 
     Raises:
         KinertiaError: a file is missing or broken, or something in it cannot be used.
     """
     wanted = subject if isinstance(subject, SubjectFile) else read_subject(subject)
-    return estimate(prepare_subject(wanted, progress), progress)
+    return estimate(prepare_subject(wanted, progress, overrule), progress)

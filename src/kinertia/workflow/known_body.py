@@ -21,9 +21,13 @@ from kinertia.estimation.input_checks import known as known_value
 from kinertia.estimation.learnt_prior import LearntPrior
 from kinertia.estimation.prepared import Prepared
 from kinertia.estimation.prior import BspPrior, literature_prior, with_symmetry
+from kinertia.findings.display import shown
+from kinertia.findings.finding import Finding, finding
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
 from kinertia.io.bsp_file import BspTable
 from kinertia.io.measures_file import BodyMeasures
-from kinertia.model.bsp import PARAMETERS, BodySegmentParameters
+from kinertia.model.bsp import PARAMETERS, UNITS, BodySegmentParameters
 from kinertia.model.measures import measures as all_measures
 from kinertia.settings import Attached, KnownSegment, PriorSettings
 from kinertia.workflow.attached import with_attached
@@ -60,27 +64,40 @@ def with_known_body(
     """
     body = len(ready.prior.mean.segments)
     ready = with_attached(*_leaning_on(ready, settings, earlier, segments, group))
-    prior, notes, warnings = ready.prior, list(ready.notes), list(ready.warnings)
+    prior, found = ready.prior, list(ready.findings)
     if measures is not None:
-        prior = _with_measures(ready, prior, segments, measures, notes, warnings)
+        prior, more = _with_measures(ready, prior, segments, measures)
+        found += more
     measured = _measured(prior, segments)
     for (row, column), (value, sd) in measured.items():
         k = 10 * row + column
-        name = f"{prior.mean.segments[row]} {PARAMETERS[column]}"
+        segment, parameter = prior.mean.segments[row], PARAMETERS[column]
         expected, own = prior.mean.table().ravel()[k], float(np.sqrt(prior.covariance[k, k]))
-        away = (value - expected) / np.hypot(own, sd)
-        source = segments[prior.mean.segments[row]].source or "no source given"
-        notes.append(f"known: {name} {value:.4g} +- {sd:.2g} ({source}); the prior says {expected:.4g} +- {own:.2g}")
-        if abs(away) > _UNLIKE_SD:
-            warnings.append(
-                f"{name}, given as {value:.4g} +- {sd:.2g}, is {abs(away):.1f} deviations from what the prior expects, "
-                f"{expected:.4g} +- {own:.2g}; is its unit right, and the segment cut at the joint?"
+        unit = UNITS[column]
+        stated = Quantity(value, unit, sd=sd)
+        source = segments[segment].source or "no source given"
+        found.append(_leans_on(f"{segment} {parameter}, {shown(stated)} +- {sd:.2g} ({source})"))
+        distance = abs(value - expected) / float(np.hypot(own, sd))
+        if distance > _UNLIKE_SD:
+            found.append(
+                finding(
+                    "S402",
+                    Where(part=f"{segment} {parameter}"),
+                    distance_sd=Quantity(distance, "1", limit=_UNLIKE_SD),
+                    stated=stated,
+                    expected=Quantity(float(expected), unit, sd=own),
+                )
             )
     if settings.masses_kept:
         kept = _kept(prior, body, ready.attached)
         measured = {**kept, **measured}
-        notes.append("prior: the masses are kept")
-    return replace(ready, prior=_given(prior, measured), notes=tuple(notes), warnings=tuple(warnings))
+        found.append(_leans_on("masses kept as they are"))
+    return replace(ready, prior=_given(prior, measured), findings=tuple(found))
+
+
+def _leans_on(source: str) -> Finding:
+    """What the prior is from."""
+    return finding("S408", source=Quantity(source))
 
 
 def _leaning_on(
@@ -91,7 +108,7 @@ def _leaning_on(
     group: LearntPrior | None,
 ) -> tuple[Prepared, Collection[str]]:
     """The person with the prior that measurements then move, and segments whose masses are no shares of the body's."""
-    prior, notes = ready.prior, list(ready.notes)
+    prior, found = ready.prior, list(ready.findings)
     if group is not None:
         if earlier is not None:
             raise PriorError("[prior] has both bsp and population; the person's own estimate says more: keep bsp")
@@ -100,19 +117,19 @@ def _leaning_on(
                 "[prior] population is learnt of the built-in model's segments; OpenSim models have others"
             )
         prior = replace(group.of(literature_prior(ready.literature)), mass_sd_kg=prior.mass_sd_kg)
-        notes.append(f"prior: learnt from {group.people} people in place of the literature's")
+        found.append(_leans_on(f"learnt from {group.people} people in place of the literature's"))
     if earlier is not None:
         prior = _from_earlier(prior, earlier)
-        notes.append(f"prior: {earlier.name} in place of the literature; the same trials must not be in it")
+        found.append(_leans_on(f"{earlier.name} in place of the literature; the same trials must not be in it"))
     if settings.sides_correlation is not None:
         covariance = with_symmetry(prior.covariance, prior.mean.segments, settings.sides_correlation)
         prior = replace(prior, covariance=covariance)
     artificial = [name for name, known in segments.items() if known.prosthesis]
     for name in artificial:
         prior = with_prosthesis(prior, name)
-        notes.append(f"{name} is a prosthesis: it leans neither on the tables' deviations nor on the other side")
+        found.append(_leans_on(f"{name} is a declared prosthesis: neither reference data nor symmetry is used for it"))
     by_itself = artificial if earlier is None else prior.mean.segments
-    return replace(ready, prior=prior, notes=tuple(notes)), by_itself
+    return replace(ready, prior=prior, findings=tuple(found)), by_itself
 
 
 def _kept(prior: BspPrior, body: int, attached: Sequence[Attached]) -> dict[tuple[int, int], tuple[float, float]]:
@@ -131,28 +148,22 @@ def _with_measures(
     prior: BspPrior,
     segments: Mapping[str, KnownSegment],
     measures: BodyMeasures,
-    notes: list[str],
-    warnings: list[str],
-) -> BspPrior:
-    """The prior that girths and lengths have moved; adds to notes and warnings."""
+) -> tuple[BspPrior, list[Finding]]:
+    """The prior that girths and lengths have moved, and what was found of them."""
     if ready.file is not None:
         raise PriorError("[prior] measures are of the built-in model's segments, which OpenSim models cut elsewhere")
     body_kg, height_m = ready.carried.body_kg, known_value(ready.subject.height_m)
     artificial = [name for name, known in segments.items() if known.prosthesis]
     body_sd = body_sd_kg(known_value(ready.subject.mass_kg), ready.attached)
     prior, body = with_measures(prior, ready.skeleton, measures.values, body_kg, height_m, artificial, body_sd)
-    total = f"{body.total_kg:.1f} +- {body.total_sd_kg:.1f} kg"
-    notes.append(
-        f"girths and lengths: {len(measures.values)} of {len(all_measures())} from {measures.name}, the others as "
-        f"expected of this mass, height and them; Yeadon's body of these has {total}, the person {body_kg:.1f} kg"
-    )
-    warnings += [f"{measures.name}: {doubt}" for doubt in body.doubts]
+    found = [
+        _leans_on(f"{len(measures.values)} of {len(all_measures())} girths and lengths from {measures.name}"),
+        *(one.in_file(measures.name) for one in body.findings),
+    ]
     if abs(body.total_kg - body_kg) > _UNLIKE_SD * np.hypot(body.total_sd_kg, body_sd):
-        warnings.append(
-            f"{measures.name}: Yeadon's body of these girths and lengths has {total}, the person {body_kg:.1f} kg; are "
-            "all of them in cm, and of this person?"
-        )
-    return prior
+        yeadon = Quantity(body.total_kg, "kg", sd=body.total_sd_kg)
+        found.append(finding("S404", Where(file=measures.name), yeadon_kg=yeadon, stated_kg=Quantity(body_kg, "kg")))
+    return prior, found
 
 
 def _from_earlier(prior: BspPrior, earlier: BspTable) -> BspPrior:

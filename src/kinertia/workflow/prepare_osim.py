@@ -7,21 +7,14 @@ frame: the trial is not turned. The prior is around the model's own body segment
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from kinertia.diagnostics.doubts import motion_doubts, trial_doubts, uneven_scales, warnings_of
-from kinertia.diagnostics.model.density import points
-from kinertia.diagnostics.model.model_doubts import model_doubts
-from kinertia.diagnostics.model.model_on_person import moved_doubts
-from kinertia.diagnostics.model.person_size import size_trouble
-from kinertia.diagnostics.subject.force_mass import check_force_masses
-from kinertia.diagnostics.subject.repeated_trials import repeated_trials
-from kinertia.diagnostics.timing.exchanged_forces import exchanged_forces
-from kinertia.diagnostics.timing.trial_delays import uneven_delays
-from kinertia.errors import OsimError, TrialError
+from kinertia.diagnostics.model.model_on_person import moved_markers
+from kinertia.diagnostics.model.range_limits import range_findings
+from kinertia.errors import OsimError
 from kinertia.estimation.calibration import adapt, first_poses, hold_uninformed
 from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.estimation.input_checks import check_trials, complete_subject, known
@@ -29,19 +22,20 @@ from kinertia.estimation.population import population_prior
 from kinertia.estimation.prepared import Prepared, Progress
 from kinertia.estimation.prior import SCALE_SD, BspPrior, literature_prior
 from kinertia.estimation.simultaneous.model_uncertainty import JOINT_CENTRE_SD_M, MARKER_SD_M, ModelUncertainty
+from kinertia.findings.finding import Finding, finding
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
 from kinertia.model.anatomy import segment_of
 from kinertia.model.bsp import BodySegmentParameters, impossible_segments
 from kinertia.model.imported import OsimModel
-from kinertia.model.model_markers import markers_of_model
 from kinertia.model.skeleton import Axis, Skeleton
-from kinertia.motion.kinematics import solve_kinematics
 from kinertia.motion.one_thread import one_blas_thread
-from kinertia.motion.range_ends import clamped_doubts
-from kinertia.settings import Attached, Settings, Subject
-from kinertia.trial.data import Trial
-from kinertia.trial.plate_assignment import build_trial
+from kinertia.settings import Attached, Overrule, Settings, Subject
 from kinertia.trial.trial_input import TrialInput
+from kinertia.workflow.kinematics import Turned, seen_markers, solved_trials
+from kinertia.workflow.person import Person
 from kinertia.workflow.prepare import LOWER_BODY_SD_M, UPPER_BODY_SD_M
+from kinertia.workflow.screening import Screened, screen
 
 LIGHT_KG = 0.5
 """Bodies that weigh less together than this move with their joints, but are not estimated."""
@@ -57,65 +51,61 @@ def prepare_osim(
     calibrate: bool = False,
     progress: Progress = lambda stage, share: None,
     attached: Sequence[Attached] = (),
+    overrule: Overrule | None = None,
 ) -> Prepared:
     """The model fitted to all trials; the arguments are `estimate_bsp_of_model`'s.
 
     Raises:
-        KinertiaError: the subject, the model or a trial cannot be used.
+        BlockedError: findings leave no trial, with all of them.
+        KinertiaError: the subject cannot be used.
     """
-    settings = settings or Settings()
-    recordings = [item.recording for item in inputs]
-    check_trials(recordings)
-    subject, warnings = complete_subject(subject, recordings, mass_only=True)
-    warnings += repeated_trials(recordings, [item.window_s for item in inputs])
-    warnings += _doubted(model)
-    feet = _feet(model)
+    person = Person(
+        subject, inputs, model=model, calibrate=calibrate, attached=attached, overrule=overrule or Overrule()
+    )
+    return prepared_osim(screen(person), settings or Settings(), progress)
+
+
+@one_blas_thread
+def prepared_osim(screened: Screened, settings: Settings, progress: Progress = lambda stage, share: None) -> Prepared:
+    """A screened person with an OpenSim model.
+
+    Raises:
+        BlockedError: findings leave no trial, with all of them.
+        KinertiaError: the subject cannot be used.
+    """
+    person = screened.person
+    model = person.model
+    assert model is not None
+    check_trials(person.recordings)
+    usable = screened.usable
+    subject = complete_subject(person.subject, person.recordings, mass_only=True)
     progress("calibration", 0.0)
     started = time.perf_counter()
-    trials = []
-    for item in inputs:
-        trial, doubts = _looked_at(model, item, feet)
-        warnings += doubts
-        trials.append(trial)
-    marker_set = markers_of_model(model)
-    warnings += exchanged_forces(trials, marker_set.segments) or uneven_delays(trials, marker_set.segments)
-    warnings += uneven_scales(trials, marker_set)
+    read_s = {item.recording.name: item.read_seconds for item in person.trials}
+    turned = [Turned(seen_markers(one), 0.0, read_s[one.name]) for one in usable]
+    trials = [one.trial for one in turned]
     may_hold = {c.name: c.default for c in model.coordinates if c.name not in model.skeleton.coordinates[:6]}
+    feet = _feet(model)
     skeleton = replace(model.skeleton, feet=(feet["r"][0], feet["l"][0]))
-    carried = CarriedMass.of(known(subject.mass_kg), attached)
-    check_force_masses(skeleton, carried, trials)
+    total = CarriedMass.of(known(subject.mass_kg), person.attached)
     poses = first_poses(skeleton, trials)
     skeleton, idle = hold_uninformed(skeleton, trials, poses, may_hold)
-    if calibrate:
+    found: list[Finding] = []
+    if person.calibrate:
         skeleton = adapt(with_centre_offsets(model, skeleton), trials, poses, _marker_sd(skeleton), {}).skeleton
-        warnings += moved_doubts(model.skeleton, skeleton, [trial.markers for trial in trials])
-    calibration_s = (time.perf_counter() - started) / len(inputs)
-    own, factor = at_mass(model.bsp, carried.body_kg)
-    _check_inertias(model, _split(skeleton, own)[0])
+        found += moved_markers(model.skeleton, skeleton, [trial.markers for trial in trials])
+    calibration_s = (time.perf_counter() - started) / len(trials)
+    own, factor = at_mass(model.bsp, total.body_kg)
     prior, held = parted(skeleton, own)
-    expected = population_prior(prior, subject.model_copy(update={"sex": None}), carried.body_kg)
+    expected = population_prior(prior, subject.model_copy(update={"sex": None}), total.body_kg)
     prior = expected.prior
     centres = {name: JOINT_CENTRE_SD_M for name in skeleton.locked if "/offset_" in name}
-    uncertainty = ModelUncertainty(centres, MARKER_SD_M if calibrate else None, held, "the model's own values")
-
-    kinematics, seconds = [], []
-    for k, trial in enumerate(trials):
-        progress("inverse kinematics", k / len(trials))
-        started = time.perf_counter()
-        kinematics.append(solve_kinematics(skeleton, trial, 0.0, settings.cutoff_hz))
-        warnings += [f"{trial.name}: {one}" for one in clamped_doubts(skeleton, kinematics[k].ik)]
-        ik_s = time.perf_counter() - started
-        seconds.append({"read": inputs[k].read_seconds, "calibration": calibration_s, "ik": ik_s})
-    notes = [
-        f"OpenSim model: {model.path.name}",
-        *expected.notes,
-        *_mass_note(model, own, factor),
-        *_idle_note(model, idle),
-        *_held_note(skeleton, held),
-        *([] if held is None else _impossible_note(model, held)),
-        *_marker_notes(model, trials),
-        *(note for k in kinematics for note in k.notes),
-    ]
+    uncertainty = ModelUncertainty(centres, MARKER_SD_M if person.calibrate else None, held, "the model's own values")
+    solved = solved_trials(skeleton, turned, settings.cutoff_hz, calibration_s, progress)
+    for k in solved.kinematics:
+        found += [one.in_trial(k.trial.name) for one in range_findings(skeleton, k.ik)]
+    found += [*solved.findings, *_assumed(model, factor, own, idle, held)]
+    findings = screened.overruled([*screened.findings, *found])
     return Prepared(
         subject=subject,
         settings=settings,
@@ -124,49 +114,16 @@ def prepare_osim(
         prior=prior,
         uncertainty=uncertainty,
         file=model,
-        kinematics=tuple(kinematics),
-        seconds=tuple(seconds),
-        warnings=(*warnings, *expected.warnings, *_impossible_warning(model, prior.mean)),
-        notes=tuple(dict.fromkeys(notes)),
-        attached=tuple(attached),
+        kinematics=solved.kinematics,
+        seconds=solved.seconds,
+        findings=tuple(findings),
+        notes=(f"OpenSim model: {model.path.name}", *(note for k in solved.kinematics for note in k.notes)),
+        attached=tuple(person.attached),
+        overrule=person.overrule,
+        overrule_of=person.overrule_of,
+        left_out=screened.left_out_by(findings),
+        rules=screened.rules,
     )
-
-
-def _doubted(model: OsimModel) -> list[str]:
-    """Warnings of the model by itself.
-
-    Raises:
-        OsimError: it has no markers, or lengths in another unit.
-    """
-    if not model.skeleton.markers:
-        raise OsimError(model.path, "no markers in it; scale the model with OpenSim's Scale tool, which places them")
-    if trouble := size_trouble(model.skeleton, model.bsp):
-        raise OsimError(model.path, trouble)
-    return [f"{model.path.name}: {sentence}" for sentence in model_doubts(model.skeleton, model.bsp)]
-
-
-def _impossible_warning(model: OsimModel, estimated: BodySegmentParameters) -> list[str]:
-    told = _impossible(model, estimated)
-    return [f"{each}; the estimate starts from them, so correct them first ({_what_is_wrong(model)})" for each in told]
-
-
-def _impossible_note(model: OsimModel, held: BodySegmentParameters) -> list[str]:
-    told = _impossible(model, held)
-    return [
-        f"{each}, which are kept as they are: too light to change the results ({_what_is_wrong(model)})"
-        for each in told
-    ]
-
-
-def _impossible(model: OsimModel, bsp: BodySegmentParameters) -> list[str]:
-    own = [name for name in impossible_segments(model.bsp) if name in bsp.segments]
-    if not own:
-        return []
-    return [f"{model.path.name}: the model's own mass properties are physically impossible for {', '.join(own)}"]
-
-
-def _what_is_wrong(model: OsimModel) -> str:
-    return f"kinertia check {model.path.name} says what is wrong"
 
 
 def _feet(model: OsimModel) -> dict[str, list[str]]:
@@ -180,30 +137,37 @@ def _feet(model: OsimModel) -> dict[str, list[str]]:
     for side, name in zip("rl", ("right", "left"), strict=True):
         bodies = [body for body in model.skeleton.segments if segment_of(body) == f"foot_{side}"]
         if not bodies:
-            raise OsimError(
-                model.path, f"no body of the {name} foot; expected one named calcn_{side}, foot_{side} or the like"
-            )
+            raise OsimError.found(model.path, "O107", side=Quantity(name))
         feet[side] = sorted(bodies, key=lambda body: -mass[body])
     return feet
 
 
-def _looked_at(model: OsimModel, item: TrialInput, feet: Mapping[str, Sequence[str]]) -> tuple[Trial, list[str]]:
-    """The trial with its loads sorted by foot, and warnings."""
-    recording = item.recording.without_empty_markers()
-    labels = {}
-    for (side, bodies), name in zip(feet.items(), ("right", "left"), strict=True):
-        worn = [marker.label for marker in model.skeleton.markers if marker.segment in bodies]
-        labels[side] = [label for label in worn if label in recording.markers.labels]
-        if not labels[side]:
-            raise TrialError(
-                recording.name,
-                f"no marker of the {name} foot is in the file (the model has {', '.join(worn) or 'none'} there); it "
-                f"takes one to tell which plate the foot stands on",
-            )
-    marker_set = markers_of_model(model)
-    warnings = warnings_of(recording.name, trial_doubts(recording, marker_set, None, labels))
-    trial = build_trial(recording, labels, item.window_s)
-    return trial, [*warnings, *warnings_of(trial.name, motion_doubts(recording, trial, marker_set))]
+def _assumed(
+    model: OsimModel,
+    factor: float,
+    own: BodySegmentParameters,
+    idle: Sequence[str],
+    held: BodySegmentParameters | None,
+) -> list[Finding]:
+    """What was done to the model on the way: masses scaled, coordinates locked, bodies kept."""
+    file = Where(file=model.path.name)
+    assumed = []
+    if abs(factor - 1.0) >= _MASS_TOLERANCE:
+        model_kg, stated_kg = (Quantity(one.total_mass_kg, "kg") for one in (model.bsp, own))
+        by = Quantity(factor, "1", limit=_MASS_TOLERANCE)
+        assumed.append(finding("O411", file, factor=by, model_kg=model_kg, stated_kg=stated_kg))
+    values = {c.name: c.default for c in model.coordinates}
+    angles = {c.name for c in model.coordinates if c.angle}
+    for name in idle:
+        value = Quantity(values[name], "rad" if name in angles else "m")
+        assumed.append(finding("O412", replace(file, part=name), value=value))
+    if held is not None:
+        impossible = set(impossible_segments(model.bsp))
+        for name in held.segments:
+            mass_kg = float(held.mass_kg[held.segments.index(name)])
+            possible = Quantity("impossible, but too light to matter" if name in impossible else "possible")
+            assumed.append(finding("O413", replace(file, part=name), mass_kg=Quantity(mass_kg, "kg"), physics=possible))
+    return assumed
 
 
 def with_centre_offsets(model: OsimModel, skeleton: Skeleton) -> Skeleton:
@@ -271,70 +235,6 @@ def _split(skeleton: Skeleton, own: BodySegmentParameters) -> tuple[BodySegmentP
     return estimated, rest
 
 
-def _check_inertias(model: OsimModel, estimated: BodySegmentParameters) -> None:
-    """The prior is around the model's own inertias: without any there is none.
-
-    Raises:
-        OsimError: a body has mass and no inertia.
-    """
-    if without := points(estimated):
-        masses = dict(zip(model.bsp.segments, model.bsp.mass_kg, strict=True))
-        listed = ", ".join(f"{name} ({masses[name]:.3g} kg)" for name in without)
-        raise OsimError(
-            model.path,
-            f"moments of inertia of zero or less for bodies that have mass: {listed}; expected positive ones (kg m2), "
-            f"around which the fit estimates; most likely they were left out: give them, or scale the model from one "
-            f"that has them",
-            element=without[0],
-        )
-
-
 def _part(bsp: BodySegmentParameters, names: Sequence[str]) -> BodySegmentParameters:
     rows = [bsp.segments.index(name) for name in names]
     return BodySegmentParameters(tuple(names), bsp.mass_kg[rows], bsp.com_m[rows], bsp.inertia_kgm2[rows])
-
-
-def _mass_note(model: OsimModel, own: BodySegmentParameters, factor: float) -> list[str]:
-    if abs(factor - 1.0) < _MASS_TOLERANCE:
-        return []
-    return [
-        f"the model weighs {model.bsp.total_mass_kg:.1f} kg, the person {own.total_mass_kg:.1f} kg: all its masses and "
-        f"inertias are multiplied by {factor:.3f} before the estimate"
-    ]
-
-
-def _idle_note(model: OsimModel, idle: Sequence[str]) -> list[str]:
-    if not idle:
-        return []
-    values = {c.name: c.default for c in model.coordinates}
-    angles = {c.name for c in model.coordinates if c.angle}
-    listed = ", ".join(
-        f"{name} ({np.degrees(values[name]):.0f} deg)" if name in angles else f"{name} ({values[name]:.3f} m)"
-        for name in idle
-    )
-    return [f"no marker shows these coordinates, which are locked at their defaults: {listed}"]
-
-
-def _held_note(skeleton: Skeleton, held: BodySegmentParameters | None) -> list[str]:
-    if held is None:
-        return []
-    parents = {joint.child: joint.parent for joint in skeleton.joints}
-    listed = ", ".join(f"{name} ({parents[name]})" for name in held.segments)
-    return [
-        f"bodies that weigh less than {LIGHT_KG:g} kg or move as one with another are estimated as one with it: they "
-        f"keep the model's own parameters, and what the data say of them goes to the neighbour (in brackets the "
-        f"parent): {listed}"
-    ]
-
-
-def _marker_notes(model: OsimModel, trials: Sequence[Trial]) -> list[str]:
-    notes = []
-    known_labels = set(model.skeleton.labels)
-    for trial in trials:
-        extra = [label for label in trial.markers.labels if label not in known_labels]
-        absent = [label for label in model.skeleton.labels if label not in trial.markers.labels]
-        if extra:
-            notes.append(f"{trial.name}: markers that the model does not have, left out: {', '.join(extra)}")
-        if absent:
-            notes.append(f"{trial.name}: markers of the model that it does not have: {', '.join(absent)}")
-    return notes

@@ -8,18 +8,19 @@ from typing import TypeAlias
 
 import numpy as np
 
+from kinertia.diagnostics.result.session import session_contradictions
 from kinertia.errors import SessionError
 from kinertia.estimation.prepared import Prepared
 from kinertia.estimation.result import Fit
-from kinertia.estimation.simultaneous.instrument_warnings import SHOWN_UNIT
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation, InstrumentPrior
 from kinertia.estimation.simultaneous.plates import PLATE_ERRORS, PLATE_UNKNOWNS, plates_with_floor
 from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior
+from kinertia.findings.finding import Finding, finding
+from kinertia.findings.quantity import Quantity
 from kinertia.io.session_file import PersonInstruments
 from kinertia.settings import Instruments
 
 InstrumentValues: TypeAlias = dict[str, dict[str, tuple[float, float, str]]]
-_APART_SD = 3.0
 
 
 @dataclass(frozen=True)
@@ -29,12 +30,12 @@ class SessionInstruments:
     Attributes:
         people: what each person's trials say.
         values: per instrument, per unknown its value, posterior deviation and unit, SI.
-        contradictions: one sentence for each unknown of which a person says what the others do not.
+        contradictions: of each unknown of which a person says what the others do not (S501).
     """
 
     people: tuple[PersonInstruments, ...]
     values: InstrumentValues
-    contradictions: tuple[str, ...] = ()
+    contradictions: tuple[Finding, ...] = ()
 
 
 def person_instruments(fit: Fit, files: Sequence[str]) -> PersonInstruments:
@@ -62,19 +63,11 @@ def person_instruments(fit: Fit, files: Sequence[str]) -> PersonInstruments:
 
 def session_instruments(people: Sequence[PersonInstruments], stated: Instruments) -> SessionInstruments:
     """All that the people of a session say together, under what the laboratory states."""
-    apart = []
+    apart: list[Finding] = []
     # of two, one contradicts the other
     for person in people if len(people) > 2 else people[: len(people) - 1]:
         rest = _values([other for other in people if other is not person], stated)
-        for instrument, unknowns in _values([person], stated).items():
-            for unknown, (value, sd, unit) in unknowns.items():
-                other, other_sd, _ = rest.get(instrument, {}).get(unknown, (value, sd, unit))
-                if abs(value - other) > _APART_SD * np.hypot(sd, other_sd):
-                    factor, shown = SHOWN_UNIT[unit]
-                    apart.append(
-                        f"{instrument}: {unknown}: {value * factor:+.1f} {shown} by the trials of {person.name}, "
-                        f"{other * factor:+.1f} by those of the others; were all measured with the same instruments?"
-                    )
+        apart += session_contradictions(person.name, _values([person], stated), rest)
     return SessionInstruments(tuple(people), _values(people, stated), tuple(apart))
 
 
@@ -124,13 +117,13 @@ def with_instruments(
             f"({', '.join(sorted(own))}); plates are told by their names"
         )
     prior = InstrumentPrior.stated(stated, [_information(person) for person in others])
-    notes = ready.notes
+    findings = ready.findings
     if session:
         left_out = [person.name for person in session if person not in others]
         of = f"plates and clock are known from {_listed([p.name for p in others])}" if others else "nothing of others"
         own_trials = f"; what {_listed(left_out)} said is left out: the same files are in this fit" if left_out else ""
-        notes = (*notes, f"session: {of}{own_trials}")
-    return replace(ready, uncertainty=replace(ready.uncertainty, instruments=prior), notes=notes)
+        findings = (*findings, finding("S408", source=Quantity(f"session: {of}{own_trials}")))
+    return replace(ready, uncertainty=replace(ready.uncertainty, instruments=prior), findings=findings)
 
 
 def _listed(names: Sequence[str]) -> str:

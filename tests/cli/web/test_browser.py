@@ -51,14 +51,14 @@ def test_plug_in_gait_from_dropping_to_the_verdict_and_as_on_the_command_line(ta
     tab.page.get_by_role("link", name="Go on").click()
     tab.arrived()
     assert tab.page.get_by_role("heading", level=1).inner_text() == "Subject A"
-    playwright.expect(tab.page.locator(".message.caution")).to_contain_text("lacks 'sex'")
+    playwright.expect(tab.page.locator(".message.warning")).to_contain_text("lacks 'sex'")
     tab.fill(sex="male", mass="72,6", height="1.803").check().checked()
     playwright.expect(tab.page.locator("section[aria-labelledby=check] .headline")).to_be_in_viewport()
     verdict = tab.estimate().verdict()
     theirs = load_fit(fitted(tmp_path / "out", c3d_lab / "subject.toml").folder)
     ours = load_fit(tab.person().results)
     assert (ours.estimate.table() == theirs.estimate.table()).all()
-    assert "Do not use" in verdict or "Usable" in verdict or "passed" in verdict
+    assert verdict.lower() == ours.overview.line
     with tab.page.expect_download() as download:
         tab.page.get_by_role("link", name="Save all results (zip)").click()
     assert download.value.suggested_filename == "Subject A.zip"
@@ -193,7 +193,7 @@ def test_what_was_entered_is_kept_when_files_come_or_go_and_on_other_pages(tab, 
     playwright.expect(mass).to_have_value("43.0")
     mass.fill("heavy")
     tab.page.get_by_role("button", name="Remove other.csv").click()
-    playwright.expect(tab.page.locator(".message.fail")).to_contain_text("heavy")
+    playwright.expect(tab.page.locator(".message.error")).to_contain_text("heavy")
     playwright.expect(mass).to_have_value("heavy")
     playwright.expect(tab.page.get_by_role("button", name="Remove other.csv")).to_be_visible()
     tab.quiet()
@@ -228,7 +228,7 @@ def test_a_wrong_mass_is_said_in_place(tab, c3d_lab):
     assert tab.page.get_by_label("Body mass (kg)").input_value() == "heavy"
     tab.fill(mass="70").check().checked()
     found = tab.page.locator(".findings")
-    playwright.expect(found).to_contain_text("stated mass 70.0 kg")
+    playwright.expect(found).to_contain_text("S111")
     tab.quiet()
 
 

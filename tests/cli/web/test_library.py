@@ -15,8 +15,10 @@ from kinertia.cli.web.jobs import Jobs
 from kinertia.cli.web.library import Library, started
 from kinertia.cli.web.person_page import standing
 from kinertia.errors import FileError
+from kinertia.findings.overview import Overview
 from kinertia.io.file_names import fits_everywhere
 from kinertia.io.provenance import sha256
+from kinertia.report.finding_view import digest
 
 
 @pytest.fixture
@@ -111,18 +113,18 @@ def test_what_was_not_finished_is_said_to_be_interrupted_and_what_was_stays(libr
     (ben.results / "fit.json").write_text("{}")
     outcome = {
         "summary": sha256(ben.results / "fit.json"),
-        "level": "pass",
-        "headline": "All checks passed.",
+        **digest(Overview((), 61, 1)),
         "ended": 1.7e9,
     }
     (ben.results / "outcome.json").write_text(json.dumps(outcome))
     with library.opened():
         told = {person.name: standing(person, Jobs()) for person in library.people()}
     assert "Interrupted" in told["Anna"].sentence
-    assert told["Ben"].sentence == "All checks passed."
+    assert told["Ben"].sentence == "use: nothing found; 61 rules, 1 of 1 trials"
     assert told["Ben"].fitted
+    assert told["Ben"].look == "info"
     (ben.results / "fit.json").write_text('{"kinertia": "of the command line"}')
-    assert standing(ben, Jobs()).level == "", "what is told of other results is not told of these"
+    assert standing(ben, Jobs()).look == "", "what is told of other results is not told of these"
 
 
 def test_a_record_that_is_broken_is_none(library):

@@ -53,7 +53,7 @@ def test_reload_second_tab_and_cancel_during_a_fit(browser, app, waiting):
     playwright.expect(second.page.locator("progress")).to_have_attribute("value", "0.3")
     second.page.get_by_role("button", name="Cancel").click()
     for one in (second, first):
-        playwright.expect(one.page.locator(".message.caution")).to_contain_text("Cancelled.", timeout=PATIENCE_MS)
+        playwright.expect(one.page.locator(".message.warning")).to_contain_text("Cancelled.", timeout=PATIENCE_MS)
         playwright.expect(one.page.get_by_role("button", name="Estimate", exact=True)).to_be_visible()
         one.quiet()
 
@@ -92,7 +92,7 @@ def test_a_crash_of_one_fit_is_said_and_the_next_one_is_done(browser, app, monke
         tab.page.goto(f"{app.address}people/{ready(app.library, name, c3d_lab).name}")
         tab.estimate()
         playwright.expect(tab.page.locator("[data-progress]")).to_have_count(0, timeout=PATIENCE_MS)
-        messages = tab.page.locator("section[aria-labelledby=results] .message.fail")
+        messages = tab.page.locator("section[aria-labelledby=results] .message.error")
         playwright.expect(messages).to_have_count(1 if said else 0)
         if said:
             assert said in tab.message()
@@ -139,7 +139,7 @@ def test_a_person_is_renamed_and_results_stay_those_of_the_files(tab, app, c3d_l
     tab.page.get_by_label("Name in the library").press("Enter")
     playwright.expect(tab.page.get_by_role("heading", level=1)).to_have_text("Eva (spring)")
     results = tab.page.locator("section[aria-labelledby=results]")
-    playwright.expect(results.locator(".headline")).to_have_text("Usable with care.")
+    playwright.expect(results.locator(".headline")).to_have_class("headline warning")
     playwright.expect(results.get_by_text("before your last change")).to_have_count(0)
     tab.quiet()
 

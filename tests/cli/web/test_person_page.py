@@ -30,7 +30,7 @@ def test_what_is_missing_is_said_in_the_words_of_the_form(tmp_path, written, ins
             (person.folder / name).write_bytes(b"")
         person.subject.write_text(WHOLE.replace(written, instead))
         page = app.ask("/people/Anna").text.replace("&#39;", "'")
-    (message,) = re.findall(r'<p class="message caution">(.*?)</p>', page, re.DOTALL)
+    (message,) = re.findall(r'<p class="message warning">(.*?)</p>', page, re.DOTALL)
     assert plain in message
     assert re.search(r"subject\.toml(, line \d+)?: ", message)
     assert as_the_command_line in message

@@ -1,14 +1,14 @@
-"""Forces at a wrong rate are told from a late clock within two steps; sound ones and late ones are not doubted."""
+"""Forces at a wrong rate are told from late ones within two steps; files at a wrong rate by how fast the body falls."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from kinertia.diagnostics.evidence.caused_velocity import caused_velocities
-from kinertia.diagnostics.timing.force_rate import rate_doubts
-from kinertia.io.marker_set_file import choose_marker_set
-from kinertia.trial.plate_assignment import build_trial
+from kinertia.diagnostics.timing.force_rate import force_rate
+from kinertia.findings.finding import Severity
+from kinertia.trial.data import Markers
+from plate_findings import context_of
 from recordings import LONG_WALKS, WALKS
 
 SOUND = {**WALKS, "synthetic, long": LONG_WALKS["synthetic"]}
@@ -26,40 +26,57 @@ def walk(request, recording_of):
     return recording_of(*SOUND[request.param])
 
 
-def doubts(recording, rate=1.0, late_s=0.0, gain=(1.0, 1.0)):
+def found(recording, rate=1.0, late_s=0.0, gain=(1.0, 1.0)):
     """With forces whose time goes at this rate, which are later, and whose plates have other gains."""
     plates = recording.plates
     time = plates.time[0] + rate * (plates.time - plates.time[0]) + late_s
     factor = np.array(gain)[:, None]
     wrong = replace(plates, time=time, force=factor * plates.force, moment=factor * plates.moment)
-    marker_set = choose_marker_set(recording.markers.labels)
-    present = set(recording.markers.labels)
-    feet = {side: [one for one in own if one in present] for side, own in marker_set.foot_labels().items()}
-    owners = {label: name for name, labels in marker_set.segments.items() for label in labels}
-    trial = build_trial(replace(recording, plates=wrong), feet)
-    return rate_doubts(trial, caused_velocities(trial, owners))
+    return [*force_rate(context_of(replace(recording, plates=wrong)))]
 
 
 @pytest.mark.parametrize(
     ("late_s", "gain"), [(0.0, (1, 1)), (0.02, (1, 1)), (-0.02, (1, 1)), (0, (1.1, 1)), (0, (1, 1.1))]
 )
 def test_forces_at_their_rate(walk, late_s, gain):
-    assert doubts(walk, late_s=late_s, gain=gain) == []
+    assert found(walk, late_s=late_s, gain=gain) == []
 
 
 @pytest.mark.parametrize("name", [name for name in RATES if name in SOUND])
 def test_forces_at_another_rate(recording_of, name):
     for rate in RATES[name]:
-        (doubt,) = doubts(recording_of(*SOUND[name]), rate)
-        assert doubt.startswith("markers and forces do not run at the same speed")
-        assert float(doubt.partition("of about ")[2].partition(":")[0]) == pytest.approx(rate, abs=0.011)
+        (one,) = found(recording_of(*SOUND[name]), rate)
+        assert (one.code, one.severity) == ("T201", Severity.WARNING)
+        assert one.evidence["ratio"].value == pytest.approx(rate, abs=0.011)
+        begin, end = one.evidence["delay_s"].value
+        assert (end > begin) == (rate > 1)
 
 
 def test_windows_that_are_too_short_say_nothing(recording_of):
     """A single support and what is around it."""
     whole = recording_of(*WALKS["synthetic"])
-    assert doubts(whole, 1.02) != []
+    assert found(whole, 1.02) != []
     short = [replace(whole, markers=whole.markers.cut(1.2, 2.05))]
     short += [recording_of(*WALKS[name]) for name in ("plug-in gait a",) if name in WALKS]
     for walk in short:
-        assert doubts(walk, 1.02) == []
+        assert found(walk, 1.02) == []
+
+
+TOO_SHORT_AT_TWICE = ("plug-in gait a", "plug-in gait b")
+
+
+@pytest.mark.parametrize(
+    ("name", "factor"),
+    [(name, factor) for name in WALKS for factor in (2.0, 0.5) if factor > 1 or name not in TOO_SHORT_AT_TWICE],
+)
+def test_a_file_at_another_rate(recording_of, name, factor):
+    """Markers and forces of one file, which has one time base."""
+    walk = recording_of(*WALKS[name])
+
+    def stretched(time):
+        return time[0] + factor * (time - time[0])
+
+    markers, plates = walk.markers, replace(walk.plates, time=stretched(walk.plates.time))
+    slow = replace(walk, markers=Markers(stretched(markers.time), markers.labels, markers.positions), plates=plates)
+    (one,) = [one for one in force_rate(context_of(slow)) if one.code == "T202"]
+    assert one.evidence["rate_factor"].value == pytest.approx(1 / factor, rel=0.2)

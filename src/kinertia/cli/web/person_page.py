@@ -20,6 +20,7 @@ from kinertia.cli.web.rows import rows as rows_of
 from kinertia.cli.web.uploads import LIMITS
 from kinertia.errors import KinertiaError
 from kinertia.model.marker_set import SEGMENTS
+from kinertia.report.finding_view import LOOKS
 
 _ENDED = {
     "cancelled": "Cancelled.",
@@ -34,14 +35,14 @@ class Standing:
 
     Attributes:
         name: of the person.
-        level: "pass", "caution" or "fail" of the results; empty without.
+        look: "info", "warning" or "error" by the verdict on the results; empty without.
         sentence: where they stand, in words.
         when: of the last change.
         fitted: whether there are results.
     """
 
     name: str
-    level: str
+    look: str
     sentence: str
     when: str
     fitted: bool
@@ -50,7 +51,7 @@ class Standing:
 def standing(person: Person, jobs: Jobs) -> Standing:
     """Where a person stands."""
     outcome = person.outcome("results") if person.fitted else {}
-    sentence, notes = outcome.get("headline", ""), person.notes()
+    sentence, notes = outcome.get("line", ""), person.notes()
     job = jobs.of(person, "fit") or jobs.of(person, "check")
     if job is not None:
         what = "Fit" if job.kind == "fit" else "Check"
@@ -61,7 +62,7 @@ def standing(person: Person, jobs: Jobs) -> Standing:
         if how:
             sentence = _ENDED.get(how.get("how", ""), how.get("message", sentence))
     when = time.strftime("%Y-%m-%d %H:%M", time.localtime(outcome.get("ended", person.changed())))
-    return Standing(person.name, outcome.get("level", ""), sentence, when, person.fitted)
+    return Standing(person.name, LOOKS.get(outcome.get("verdict", ""), ""), sentence, when, person.fitted)
 
 
 def progress(person: Person, jobs: Jobs) -> dict[str, Any]:
@@ -114,7 +115,7 @@ def person_page(
     rows = file_table(person.files(), dict(content))
     notes = person.notes()
     found = trouble(person) if person.subject.is_file() else notes.get("draft", "")
-    checked, results = person.outcome("check"), person.outcome("results")
+    checked, results = (_known(person.outcome(kind)) for kind in ("check", "results"))
     return page(
         request,
         "person.html.j2",
@@ -142,7 +143,7 @@ def person_page(
         check=checked,
         check_page=(person.check / "check.html").is_file(),
         check_old=bool(checked) and checked.get("inputs") != person.inputs,
-        counts=_counts(checked),
+        looks=LOOKS,
         results=results if person.fitted else {},
         fitted=person.fitted,
         results_old=bool(results) and results.get("inputs") != person.inputs,
@@ -156,15 +157,13 @@ def _how(notes: Mapping[str, Any], kind: str) -> dict[str, str]:
     ended = notes.get(kind, {})
     how = ended.get("how", "")
     if how == "failed":
-        return {"level": "fail", "sentence": ended.get("message", "")}
-    return {"level": "caution", "sentence": _ENDED[how]} if how in _ENDED else {}
+        return {"level": "error", "sentence": ended.get("message", "")}
+    return {"level": "warning", "sentence": _ENDED[how]} if how in _ENDED else {}
 
 
-def _counts(checked: Mapping[str, Any]) -> dict[str, int]:
-    levels = [verdict["level"] for found in checked.get("findings", ()) for verdict in found["verdicts"]]
-    counts = {level: levels.count(level) for level in ("fail", "caution", "pass")}
-    counts["fail"] += len(checked.get("mistakes", ()))
-    return counts
+def _known(outcome: Mapping[str, Any]) -> Mapping[str, Any]:
+    """An outcome of this version; none of one that had no verdict."""
+    return outcome if "verdict" in outcome else {}
 
 
 def _result_files(person: Person) -> list[str]:

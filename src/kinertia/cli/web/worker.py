@@ -27,34 +27,28 @@ Progress = Callable[[str, float], None]
 
 def check(person: Person, progress: Progress) -> None:
     """What `kinertia check` does with the subject file: check.html, and its findings for the page."""
-    from kinertia.diagnostics.subject.telling_movements import missing_movements
     from kinertia.report.check_page import save_check_page
-    from kinertia.workflow.files import check_files, files_of_subject
+    from kinertia.report.finding_view import digest
+    from kinertia.workflow.check import check_person
+    from kinertia.workflow.person import read_person
 
-    recordings, mistakes = check_files(
-        files_of_subject(read_subject(person.subject)), lambda share: progress("reading", share)
-    )
-    findings = [
-        {"title": title, "verdicts": [verdict._asdict() for verdict in found.verdicts]} for title, found in recordings
-    ]
-    advice = missing_movements(found.telling for _, found in recordings if found.plates)
+    checked = check_person(read_person(read_subject(person.subject), progress))
     with complete_folder(person.check, "app") as work:
-        save_check_page(recordings, (), mistakes, work)
-        _write(work, {"inputs": person.inputs, "findings": findings, "mistakes": mistakes, "advice": advice})
+        save_check_page([checked.overview], checked.recordings, (), work)
+        _write(work, {"inputs": person.inputs, **digest(checked.overview)})
 
 
 def fit(person: Person, progress: Progress) -> None:
     """What `kinertia fit` does with the subject file: the results, and the subject file that they are of."""
     from kinertia.io.provenance import provenance_of
     from kinertia.report.files import save_fit
-    from kinertia.report.headline import words
+    from kinertia.report.finding_view import digest
     from kinertia.workflow.from_files import fit_subject
 
     begun = time.time()
     wanted = read_subject(person.subject)
     result = fit_subject(wanted, progress)
     progress("writing the results", 0.0)
-    told = words(result)
     command = command_line(["kinertia", "fit", str(person.subject), "-o", str(person.results)])
     with complete_folder(person.results, "app") as work:
         save_fit(result, work, provenance_of(wanted, command), force=True)
@@ -65,8 +59,7 @@ def fit(person: Person, progress: Progress) -> None:
             {
                 "inputs": person.inputs,
                 "summary": sha256(work / SUMMARY),
-                "level": told.level,
-                "headline": told.headline,
+                **digest(result.overview),
                 "ended": ended,
                 "seconds": round(ended - begun, 1),
             },

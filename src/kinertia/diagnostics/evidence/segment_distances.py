@@ -1,4 +1,4 @@
-"""Distances between markers of one segment, before and in a trial: what tells a body, its markers and its scale.
+"""Distances between markers of one segment, before and in a trial: they show whose body it is, and on which scale.
 
 Compared are pelvis, legs and feet: medians over the frames. The upper body is left out, whose skin moves with the arms.
 """
@@ -59,10 +59,9 @@ class SegmentDistances:
         return self.static[at], self.trial[at]
 
     def worst_pair(self) -> str:
-        """The two labels whose distances differ most, and by how much."""
-        off = self.differences()
-        worst = int(np.argmax(np.abs(off)))
-        return f"{' to '.join(self.labels[k] for k in self.pairs[worst])}, {1e3 * off[worst]:+.0f} mm"
+        """The two labels whose distances differ most: "RASI to LASI"."""
+        worst = int(np.argmax(np.abs(self.differences())))
+        return " to ".join(self.labels[k] for k in self.pairs[worst])
 
     def differences(self, order: NDArray[np.int_] | None = None) -> FloatArray:
         """(p,) m, by how much the pairs are farther apart in the trial, with its markers in another order."""

@@ -1,15 +1,17 @@
-"""Which marker set a recording has, and what of it."""
+"""L10: does a marker set fit the labels? Which of its labels a recording has, lacks, and spells otherwise."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from kinertia.diagnostics.result.verdict import Verdict
+from kinertia.diagnostics.context import RecordingContext
 from kinertia.errors import MarkerSetError
+from kinertia.findings.finding import Finding, finding
+from kinertia.findings.quantity import Quantity
 from kinertia.io.marker_set_file import choose_marker_set, nearest_preset
-from kinertia.model.marker_set import MarkerSet, check_marker_set, nearest_labels
+from kinertia.model.marker_set import MarkerSet, is_worn, nearest_labels, no_marker_set, with_nearest
 from kinertia.trial.data import Recording
 
 
@@ -45,16 +47,7 @@ def common_marker_set(recordings: Sequence[Recording]) -> MarkerSet | None:
 def match_labels(labels: Sequence[str], marker_set: MarkerSet | None) -> tuple[MarkerSetMatch, MarkerSet | None]:
     """How the labels fit the set, or the nearest preset; and the set if it is theirs."""
     wanted = nearest_preset(labels) if marker_set is None else marker_set
-    used: MarkerSet | None = wanted
-    try:
-        if marker_set is None:
-            choose_marker_set(labels)
-        elif marker_set.landmarks:
-            check_marker_set(marker_set, labels)
-        elif not set(marker_set.labels) & set(labels):
-            used = None
-    except MarkerSetError:
-        used = None
+    used = wanted if (is_worn(wanted, labels) if wanted.landmarks else set(wanted.labels) & set(labels)) else None
     others = tuple(label for label in labels if label not in wanted.labels)
     missing = nearest_labels([label for label in wanted.labels if label not in labels], others)
     return MarkerSetMatch(
@@ -62,19 +55,19 @@ def match_labels(labels: Sequence[str], marker_set: MarkerSet | None) -> tuple[M
     ), used
 
 
-def judged_labels(match: MarkerSetMatch) -> list[Verdict]:
-    """Whether a fit knows which marker is where."""
-    had = match.n_labels - len(match.missing)
-    if match.fits:
-        return [Verdict("pass", f"{had} of the {match.n_labels} labels of the marker set {match.name} are present")]
-    if match.of_model:
-        return [Verdict("fail", f"no label of the model {match.name} is in the file; expected its markers' names")]
-    nearest = f"of the nearest, {match.name}, {had} of {match.n_labels} labels are present"
-    nearest = nearest if had else "no preset shares a label with the file"
-    return [
-        Verdict(
-            "fail",
-            f"no marker set fits ({nearest}), so it is unknown which markers are on which foot; write a marker set as "
-            f"TOML (kinertia markers FILE -o SET.toml drafts it) and name it with --markers",
+def labels_match(context: RecordingContext) -> Iterator[Finding]:
+    """L101; L102; L103, one per label."""
+    match, used = match_labels(context.all_markers.labels, context.marker_set)
+    if used is None:
+        yield replace(no_marker_set(match.name, match.n_labels, match.missing), where=context.at())
+        return
+    if match.missing:
+        yield finding(
+            "L102",
+            context.at(markers=tuple(match.missing)),
+            missing=Quantity(float(len(match.missing)), "1"),
+            name=Quantity(match.name),
+            labels=Quantity(with_nearest(match.missing)),
         )
-    ]
+    for label, written in used.respelled.items():
+        yield finding("L103", context.at(markers=(written,)), written=Quantity(written), label=Quantity(label))

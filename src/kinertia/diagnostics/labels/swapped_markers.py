@@ -1,80 +1,88 @@
-"""Are the labels of a trial right? Finds markers that were given each other's names, by trying the exchange.
+"""L212 and R106, by the model of the static trial: finds labels that are swapped by trying the swap.
 
 Swapped markers pull the model away, so that the largest error need not be theirs, and the model that fits best may be
 far from the truth (a foot turned round). What gives them away is that everything falls into place once they are
-exchanged.
+swapped back.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import combinations
 
 import numpy as np
 
-from kinertia.errors import TrialError
+from kinertia.estimation.calibration import sampled
+from kinertia.findings.finding import Finding, finding
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
+from kinertia.model.gait27 import ARM_ROTATIONS
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.inverse_kinematics import solve_ik
-from kinertia.trial.data import Markers
+from kinertia.trial.data import Markers, Recording, Trial
 
 _FRAMES = 3
 _ENOUGH_M2 = 1e-6
 """Errors of centimetres are compared: fits that would gain less than the square of a millimetre may stop."""
 _MOST_STEPS = 8
-"""The right exchange falls into place in a few steps (on measured walks with four); what takes more is none."""
+"""The right swap falls into place in a few steps (on measured walks with four); what takes more is none."""
 _SUSPECT_M = 0.025
 """Markers that the static model misses by less than this are not doubted."""
 _MOST_SUSPECTS = 8
-_CURED = 0.55
-"""Two markers were swapped if exchanging them brings their errors below this share of what they were."""
+_RESOLVED_SHARE = 0.55
+"""Two labels were swapped if swapping them back brings their errors below this share of what they were."""
 _LOST_M = 0.08
 """The static model fits the trial not at all if it misses the markers by more than this (root mean square)."""
 
 
-def check_labels(skeleton: Skeleton, name: str, markers: Markers) -> None:
-    """Raise TrialError when two markers look swapped, or the model cannot follow the markers at all.
+def labels_by_model(skeleton: Skeleton, trial: Trial | Recording) -> Iterator[Finding]:
+    """L212: two labels look swapped; else R106: the model cannot follow the markers at all; or R103: no frame shows
+    enough of them.
 
-    Every two of the markers with the largest errors are exchanged in turn. Markers close together on a part that can
-    turn freely (both wrist markers) cannot be told apart; exchanging them does no harm.
+    Every two of the markers with the largest errors are swapped in turn. Markers close together on a part that can
+    turn freely (both wrist markers) cannot be distinguished; swapping them does no harm.
 
     Args:
-        skeleton: the static model, with free arm rotations.
-        name: the trial's, for the message.
-        markers: the trial's, or a few frames of them.
+        skeleton: the model of the static trial.
+        trial: a few of its frames are looked at.
     """
-    skeleton, measured, errors = _complete_frames(skeleton, name, markers)
+    where, model = Where(trial=trial.name), skeleton.free(ARM_ROTATIONS)
+    frames = _complete_frames(model, trial.name, sampled(trial.markers))
+    if isinstance(frames, Finding):
+        yield frames
+        return
+    model, measured, errors = frames
     labels, plain = measured.labels, _typical(errors)
     suspects = [k for k in np.argsort(-plain)[:_MOST_SUSPECTS] if plain[k] > _SUSPECT_M]
     pairs = np.array(list(combinations(sorted(suspects), 2)), dtype=int).reshape(-1, 2)
-    trials = np.repeat(measured.positions[None], len(pairs), axis=0)
-    for trial, pair in zip(trials, pairs, strict=True):
-        trial[:, pair] = trial[:, pair[::-1]]
-    exchanged = _exchanged_errors(skeleton, labels, trials)
-    # the exchanged markers' errors under each other's names
+    versions = np.repeat(measured.positions[None], len(pairs), axis=0)
+    for version, pair in zip(versions, pairs, strict=True):
+        version[:, pair] = version[:, pair[::-1]]
+    swapped = _swapped_errors(model, labels, versions)
+    # the swapped markers' errors under each other's names
     before = np.sqrt(np.square(plain[pairs]).mean(axis=1))
-    after = np.sqrt(np.square(np.take_along_axis(exchanged, pairs, axis=1)).mean(axis=1))
-    gain = np.square(plain).sum() - np.square(exchanged).sum(axis=1)
-    cured = (after < _CURED * before) & (gain > before**2 - after**2)
-    if cured.any():
-        best = int(np.argmax(np.where(cured, gain, -np.inf)))
-        first, second = (labels[k] for k in pairs[best])
-        raise TrialError(
-            name,
-            f"the markers '{first}' and '{second}' look swapped: the model of the static trial misses them by "
-            f"{before[best] * 1e3:.0f} mm, and by {after[best] * 1e3:.0f} mm once exchanged; correct the labels",
-        )
+    after = np.sqrt(np.square(np.take_along_axis(swapped, pairs, axis=1)).mean(axis=1))
+    gain = np.square(plain).sum() - np.square(swapped).sum(axis=1)
+    resolved = (after < _RESOLVED_SHARE * before) & (gain > before**2 - after**2)
     overall = float(np.sqrt(np.square(plain).mean()))
-    if overall > _LOST_M:
-        listed = ", ".join(f"'{labels[k]}' ({plain[k] * 1e3:.0f} mm)" for k in np.argsort(-plain)[:3])
-        raise TrialError(
-            name,
-            f"the model of the static trial misses the markers by {overall * 1e3:.0f} mm RMS, most of all {listed}; "
-            f"check labels, units, and that both trials show the same person",
+    if resolved.any():
+        best = int(np.argmax(np.where(resolved, gain, -np.inf)))
+        yield finding(
+            "L212",
+            Where(trial=trial.name, markers=tuple(labels[k] for k in pairs[best])),
+            before_m=Quantity(float(before[best]), "m", limit=_SUSPECT_M),
+            after_m=Quantity(float(after[best]), "m", limit=_RESOLVED_SHARE * float(before[best])),
+            method=Quantity("model fit"),
+            reference=Quantity("static trial"),
         )
+    elif overall > _LOST_M:
+        worst = ", ".join(labels[k] for k in np.argsort(-plain)[:3])
+        yield finding("R106", where, rms_m=Quantity(overall, "m", limit=_LOST_M), worst=Quantity(worst))
 
 
-def _complete_frames(skeleton: Skeleton, name: str, markers: Markers) -> tuple[Skeleton, Markers, np.ndarray]:
+def _complete_frames(skeleton: Skeleton, name: str, markers: Markers) -> tuple[Skeleton, Markers, np.ndarray] | Finding:
     """The skeleton without coordinates that the trial never shows, a few frames of its markers, and their errors (f, m)
-    from the model that fits best.
+    from the model that fits best; R103 where no frame shows all coordinates, of the rarest one.
     """
     ik = solve_ik(skeleton, markers, name, consecutive=False, gain_tolerance_m2=_ENOUGH_M2)
     known = np.isfinite(ik.q)
@@ -83,19 +91,16 @@ def _complete_frames(skeleton: Skeleton, name: str, markers: Markers) -> tuple[S
     solved = np.flatnonzero(known.all(axis=1))
     if not solved.size:
         names = [c for c in ik.coordinates if c not in never]
-        rare = ", ".join(names[c] for c in np.argsort(known.sum(axis=0))[:3])
-        raise TrialError(
-            name,
-            f"in none of the {len(known)} frames looked at are enough markers visible for all coordinates (rarest: "
-            f"{rare}); fill the gaps of the markers or use another trial",
-        )
+        rare = names[int(np.argmin(known.sum(axis=0)))]
+        frames = Quantity(float(known.sum(axis=0).min()), "1")
+        return finding("R103", Where(trial=name, part=rare), frames=frames)
     some = solved[np.unique(np.linspace(0, len(solved) - 1, _FRAMES).round().astype(int))]
     measured = markers.select(ik.labels)
     few = Markers(measured.time[some], ik.labels, measured.positions[some])
     return skeleton.lock(dict.fromkeys(never, 0.0)), few, ik.errors_m[some]
 
 
-def _exchanged_errors(skeleton: Skeleton, labels: tuple[str, ...], measured: np.ndarray) -> np.ndarray:
+def _swapped_errors(skeleton: Skeleton, labels: tuple[str, ...], measured: np.ndarray) -> np.ndarray:
     """(h, m) m, `_typical` distance of each marker from the model that fits best, for h versions (h, f, m, 3)."""
     if not len(measured):
         return np.zeros((0, len(labels)))

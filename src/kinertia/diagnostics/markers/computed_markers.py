@@ -1,5 +1,5 @@
-"""Are there computed points among the measured markers? Programs write joint centres beside the markers that they made
-them of.
+"""M15: are there computed points among the measured markers? Programs write joint centres beside the markers that they
+made them of.
 
 A marker on the skin keeps no place to a tenth of a millimetre: a point that does, in axes through markers of another
 segment or on the line between two, was computed from them. It says nothing new, and counts as if it were measured.
@@ -7,12 +7,17 @@ segment or on the line between two, was computed from them. It says nothing new,
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from itertools import combinations, permutations
+from typing import NamedTuple
 
 import numpy as np
 
+from kinertia.diagnostics.context import RecordingContext
+from kinertia.findings.finding import Finding, finding
+from kinertia.findings.quantity import Quantity
 from kinertia.model.marker_set import MarkerSet
-from kinertia.trial.data import FloatArray, Markers
+from kinertia.trial.data import FloatArray
 
 _EXACT_M, _SKIN_M = 1e-4, 3e-4
 """Skin moves by more than the latter; where pelvis markers do not, they are computed themselves, or on one plate."""
@@ -25,21 +30,30 @@ _FLAT = 0.1
 _JOINTS = ("knee", "ankle", "elbow")
 
 
-def computed_doubts(markers: Markers, marker_set: MarkerSet) -> list[str]:
-    """Points that were computed from other markers; of a motion."""
+class _Computed(NamedTuple):
+    """Labels that a point was computed from, and by how much (m) it moves among them."""
+
+    sources: tuple[str, ...]
+    sd_m: float
+
+
+def computed_markers(context: RecordingContext) -> Iterator[Finding]:
+    """M151, one per point that was computed from other markers; of a motion."""
+    markers, marker_set = context.markers, context.marker_set
+    if marker_set is None:
+        return
     few = markers.positions[:: -(-len(markers.time) // _FRAMES)]
     place = {label: few[:, k] for k, label in enumerate(markers.labels)}
-    found = {**_in_pelvis(place, marker_set), **_between(place, marker_set)}
-    if not found:
-        return []
-    listed = ", ".join(f"{label} (from {of})" for label, of in found.items())
-    return [
-        f"computed, not measured: {listed}; it keeps its place among these to a tenth of a millimetre, which skin does "
-        "not: leave computed joint centres out of the marker set"
-    ]
+    for label, computed in sorted({**_in_pelvis(place, marker_set), **_between(place, marker_set)}.items()):
+        yield finding(
+            "M151",
+            context.at(markers=(label,)),
+            sd_m=Quantity(computed.sd_m, "m", limit=_EXACT_M),
+            sources=Quantity(", ".join(computed.sources)),
+        )
 
 
-def _in_pelvis(place: dict[str, FloatArray], marker_set: MarkerSet) -> dict[str, str]:
+def _in_pelvis(place: Mapping[str, FloatArray], marker_set: MarkerSet) -> dict[str, _Computed]:
     """Markers of other segments that are fixed in the pelvis: in axes through three of its places (markers, or the
     middle of two), or in the rigid body that fits all its markers best.
     """
@@ -65,9 +79,10 @@ def _in_pelvis(place: dict[str, FloatArray], marker_set: MarkerSet) -> dict[str,
             continue
         for origin, axes in frames:
             local = np.einsum("ntji,ntj->nti", axes[seen], own[seen, None] - origin[seen])
-            if local.std(axis=0).max(axis=1).min() < _EXACT_M:
-                found[label] = ", ".join(corners)
-    return dict(sorted(found.items()))
+            sd_m = float(local.std(axis=0).max(axis=1).min())
+            if sd_m < _EXACT_M:
+                found[label] = _Computed(tuple(corners), sd_m)
+    return found
 
 
 def _frames(points: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -94,22 +109,23 @@ def _best_fit(points: FloatArray) -> tuple[FloatArray, FloatArray]:
     return middle, (u @ vt)[:, None]
 
 
-def _between(place: dict[str, FloatArray], marker_set: MarkerSet) -> dict[str, str]:
-    """Markers that are always at the same share of the way from the outer to the inner marker of a joint."""
+def _between(place: Mapping[str, FloatArray], marker_set: MarkerSet) -> dict[str, _Computed]:
+    """Markers that are always at the same share of the way from the lateral to the medial marker of a joint."""
     found = {}
     for joint in (f"{name}_{side}" for name in _JOINTS for side in "rl"):
         head, _, side = joint.partition("_")
         ends = [marker_set.landmarks.get(f"{head}_{which}_{side}", ()) for which in ("lateral", "medial")]
         if any(len(own) != 1 or own[0] not in place for own in ends):
             continue
-        outer, inner = (place[own[0]] for own in ends)
+        lateral, medial = (place[own[0]] for own in ends)
         for label in set(marker_set.labels) & set(place) - {ends[0][0], ends[1][0]}:
-            from_outer, along = place[label] - outer, inner - outer
-            shown = np.isfinite(from_outer).all(axis=1) & np.isfinite(along).all(axis=1)
+            from_lateral, along = place[label] - lateral, medial - lateral
+            shown = np.isfinite(from_lateral).all(axis=1) & np.isfinite(along).all(axis=1)
             if shown.sum() < _FEWEST:
                 continue
-            from_outer, along = from_outer[shown], along[shown]
-            share = float((from_outer * along).sum() / np.square(along).sum())
-            if np.abs(from_outer - share * along).max() < _EXACT_M:
-                found[label] = " and ".join(own[0] for own in ends)
-    return dict(sorted(found.items()))
+            from_lateral, along = from_lateral[shown], along[shown]
+            share = float((from_lateral * along).sum() / np.square(along).sum())
+            off = from_lateral - share * along
+            if np.abs(off).max() < _EXACT_M:
+                found[label] = _Computed((ends[0][0], ends[1][0]), float(off.std(axis=0).max()))
+    return found

@@ -8,44 +8,43 @@ as fast as its markers show.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from itertools import combinations
 
 import numpy as np
 
-from kinertia.diagnostics.evidence.caused_velocity import CausedVelocity, VelocityChanges
-from kinertia.trial.data import BoolArray, FloatArray, Markers, Trial
+from kinertia.diagnostics.context import RecordingContext
+from kinertia.diagnostics.evidence.caused_velocity import VelocityChanges
+from kinertia.findings.finding import Finding, finding
+from kinertia.findings.quantity import Quantity
+from kinertia.trial.data import BoolArray, FloatArray, Markers
 
-_QUICK_HZ, _LEAST_QUICK, _LEAST_SWING_M_S = 4.0, 0.002, 1.0
-_MOST_TIMES_UP, _OF_A_RATE = 1.15, 1.8
+_QUICK_HZ, _LEAST_SHARE, _USUAL_SHARE, _LEAST_SWING_M_S = 4.0, 0.002, (0.008, 0.06), 1.0
+_MOST_RATIO, _USUAL_RATIO, _RATIO_OF_A_RATE = 1.15, (0.8, 1.05), 1.8
 _RIGID_M = 0.0115
 """Distances between markers of a shank change by up to 10 mm (median over pairs, 2 to 98 %). A filter shortens whatever
 turns quickly; a wrong rate does not."""
 _MOSTLY_SEEN = 0.9
 
 
-def over_smoothed_trouble(trial: Trial, owners: Mapping[str, str], parts: Sequence[CausedVelocity]) -> str:
-    """Markers without the quick part of the motion that the forces show; empty where they have it, or nobody steps.
-
-    Args:
-        trial: in ground axes.
-        owners: the segment that each marker is on.
-        parts: the trial's `caused_velocities`.
-    """
-    quick = _quick_share(trial.markers, owners)
-    if not parts or quick is None or quick > _LEAST_QUICK:
-        return ""
-    changes = VelocityChanges.of(parts)
-    times = [changes.times_up(shown) for shown in (changes.pelvis, changes.centre)]
-    least = min(one or 0.0 for one in times)
-    if least < _MOST_TIMES_UP or (least > _OF_A_RATE and _distances_change_m(trial.markers, owners) < _RIGID_M):
-        return ""
-    return (
-        f"the markers look smoothed far too much: {100 * quick:.2g} % of the energy of the feet's motion is above "
-        f"{_QUICK_HZ:g} Hz (0.8 % and more are usual), and the forces move the body up and down {least:.2g} times as "
-        "fast as the markers show (0.7 to 1 times is usual); export the markers unfiltered, or filtered at 6 Hz and "
-        "more: a fit smooths them itself"
-    )
+def over_smoothed(context: RecordingContext) -> Iterator[Finding]:
+    """M133: markers without the quick part of the motion that the forces show; nothing where nobody steps."""
+    trial, owners = context.trial, context.segment_of_label
+    if trial is None or not context.velocities:
+        return
+    share = _quick_share(trial.markers, owners)
+    if share is None or share > _LEAST_SHARE:
+        return
+    changes = VelocityChanges.of(context.velocities)
+    ratio = min(changes.vertical_ratio(shown) or 0.0 for shown in (changes.pelvis, changes.centre))
+    rigid = ratio > _RATIO_OF_A_RATE and _distances_change_m(trial.markers, owners) < _RIGID_M
+    if ratio >= _MOST_RATIO and not rigid:
+        yield finding(
+            "M133",
+            context.at(),
+            share=Quantity(share, "1", limit=_LEAST_SHARE, usual=_USUAL_SHARE),
+            velocity_ratio=Quantity(ratio, "1", limit=_MOST_RATIO, usual=_USUAL_RATIO),
+        )
 
 
 def _quick_share(markers: Markers, owners: Mapping[str, str]) -> float | None:

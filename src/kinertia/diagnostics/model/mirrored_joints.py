@@ -12,66 +12,60 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from kinertia.diagnostics.context import PersonContext
+from kinertia.findings.finding import Finding, with_evidence
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
 from kinertia.model.bsp import FloatArray
 from kinertia.model.neutral_joints import NeutralJoints, angle_deg, mirrored, neutral_joints
-from kinertia.model.skeleton import Skeleton
 
-AXIS_DEG = 5.0
-"""Sound models: 0.0 degrees. The left subtalar joint with the right one's frames: 13.9."""
-PLACE_M = 0.015
-"""Sound models: 0.0 mm; their segments differ in length by up to 10 mm. A talus whose offset has the other side's sign:
-18 mm."""
-
-
-def mirrored_joints_doubts(skeleton: Skeleton) -> list[str]:
-    """At most two sentences: on axes, and on places of joints, of which left and right do not mirror each other."""
-    neutral = neutral_joints(skeleton)
-    sideways = neutral.sideways
-    if sideways is None:
-        return []
-    axes = [
-        f"{first} and {second} ({angle:.0f} degrees)"
-        for pair in neutral.pairs
-        for first, second, angle in _askew(neutral, pair, sideways)
-        if angle > AXIS_DEG
-    ]
-    places = [
-        f"{right} and {left} ({off * 1e3:.0f} mm)"
-        for right, left in neutral.pairs
-        for off in [_apart_m(neutral, right, left, sideways)]
-        if off > PLACE_M
-    ]
-    sentences = []
-    if axes:
-        sentences.append(
-            f"left and right do not mirror each other in the axes of {', '.join(axes)}; most likely a joint of one "
-            f"side has the other side's frames: mirror them (a place changes the sign of z, a direction or orientation "
-            f"those of x and y); if the axes of each side were measured, they may differ"
-        )
-    if places:
-        sentences.append(
-            f"left and right do not mirror each other in the places of the joints that carry {', '.join(places)}, "
-            f"beyond what different lengths of their segments explain; most likely a joint of one side was moved, or "
-            f"has the sign of the other side: correct it, unless this person's sides differ so much"
-        )
-    return sentences
+_AXIS_RAD = float(np.radians(5.0))
+"""Fault-free models: 0.0 degrees. The left subtalar joint with the right one's frames: 13.9."""
+_POSITION_M = 0.015
+"""Fault-free models: 0.0 mm; their segments differ in length by up to 10 mm. A talus whose offset has the other side's
+sign: 18 mm."""
 
 
-def _askew(neutral: NeutralJoints, pair: tuple[str, str], sideways: int) -> Iterator[tuple[str, str, float]]:
-    """Coordinates of the right and left joint, and the angle (degrees) of one's axis from the other's mirror image."""
+def mirrored_joints(context: PersonContext) -> Iterator[Finding]:
+    """Axes (O302) and positions (O303) of joints of which left and right do not mirror each other.
+
+    A position changes the sign of z in its mirror image, a direction or orientation those of x and y.
+    """
+    neutral = None if context.model is None else neutral_joints(context.model.skeleton)
+    if neutral is None or neutral.sideways is None:
+        return
+    for pair in neutral.pairs:
+        for first, second, angle in _axis_angles(neutral, pair, neutral.sideways):
+            if angle > _AXIS_RAD:
+                angle_rad = Quantity(angle, "rad", limit=_AXIS_RAD, usual=(0.0, 0.0))
+                yield _finding("O302", first, second, angle_rad=angle_rad)
+    for right, left in neutral.pairs:
+        distance = _mismatch_m(neutral, right, left, neutral.sideways)
+        if distance > _POSITION_M:
+            distance_m = Quantity(distance, "m", limit=_POSITION_M, usual=(0.0, 0.010))
+            yield _finding("O303", right, left, distance_m=distance_m)
+
+
+def _finding(code: str, right: str, left: str, **measured: Quantity) -> Finding:
+    evidence = {**measured, "right": Quantity(right), "left": Quantity(left)}
+    return with_evidence(code, Where(part=without_side(right)), evidence)
+
+
+def _axis_angles(neutral: NeutralJoints, pair: tuple[str, str], sideways: int) -> Iterator[tuple[str, str, float]]:
+    """Coordinates of the right and left joint, and the angle (rad) of one's axis from the other's mirror image."""
     right, left = pair
-    others = {_without_side(name): name for name in neutral.turns[left]}
+    others = {without_side(name): name for name in neutral.turns[left]}
     for name, axis in neutral.turns[right].items():
-        other = others.get(_without_side(name))
+        other = others.get(without_side(name))
         if other is not None:
             angles = [
                 angle_deg(turn.T @ axis, reflection @ back.T @ neutral.turns[left][other])
                 for turn, back, reflection in _views(neutral, right, left, sideways)
             ]
-            yield name, other, min(angles)
+            yield name, other, float(np.radians(min(angles)))
 
 
-def _apart_m(neutral: NeutralJoints, right: str, left: str, sideways: int) -> float:
+def _mismatch_m(neutral: NeutralJoints, right: str, left: str, sideways: int) -> float:
     """How far (m) the right joint is from the left one's mirror image, each in its own parent."""
     parents = [neutral.joints[name].parent for name in (right, left)]
     if "ground" in parents:
@@ -120,5 +114,6 @@ def _views(
         yield turn, back, mirrored(int(np.abs(turn[sideways]).argmax()))
 
 
-def _without_side(coordinate: str) -> str:
+def without_side(coordinate: str) -> str:
+    """The name that both sides have in common."""
     return re.sub(r"_[rl](?=_|$)", "", coordinate)

@@ -12,12 +12,16 @@ as its mirror image; where left and right are exchanged at least 3 times (of pel
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from kinertia.diagnostics.context import PersonContext
+from kinertia.diagnostics.evidence.label_exchange import swapped_labels
 from kinertia.diagnostics.evidence.segment_distances import LOWER_BODY, SegmentDistances
-from kinertia.diagnostics.subject.same_body import swapped_labels, swapped_pairs
+from kinertia.findings.finding import Finding, Severity, finding
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
 from kinertia.model.anatomy import segment_of
 from kinertia.model.marker_set import MarkerSet
 from kinertia.model.skeleton import Skeleton
@@ -35,43 +39,41 @@ a fit decides. Markers in one plane fit as well as their mirror image: then the 
 _MOVED_M = 0.055
 """Calibration moves markers of the lower body by 5 to 36 mm on sound trials."""
 _FRAMES = 60
-_THERE = "the model"
 
 
-def model_on_person_trouble(places: Markers, trial: Markers, marker_set: MarkerSet) -> str:
-    """Why model and trial cannot be used together; empty where they may.
-
-    Args:
-        places: one frame, the model's markers in its default pose.
-        trial: of the person.
-        marker_set: the model's markers by segment.
+def model_and_trials(context: PersonContext) -> Iterator[Finding]:
+    """What each trial's markers speak against in the model: another unit (O401), left and right exchanged (O402),
+    labels that are swapped (L212), another scale (O404), markers that were not placed (O405).
     """
-    distances = SegmentDistances.of(places, trial, marker_set)
-    if trouble := _other_unit(distances) or _mirrored(places, trial, marker_set):
-        return trouble
-    swapped = swapped_labels(distances, _THERE) or swapped_pairs(distances, _THERE) if len(distances.pairs) else ""
-    return swapped or _other_body(distances)
+    marker_set = context.marker_set
+    if context.model is None or marker_set is None or marker_set.in_model is None:
+        return
+    for trial in context.trials:
+        where, positions = Where(trial=trial.name), marker_set.in_model
+        mirrored = _mirrored(positions, trial.markers, marker_set)
+        if mirrored is not None:
+            yield finding("O402", where, ratio=mirrored)
+        distances = SegmentDistances.of(positions, trial.markers, marker_set)
+        if len(distances.pairs):
+            yield from swapped_labels(distances, trial.name, "model")
+        if len(distances.pairs) < _FEWEST_PAIRS:
+            continue
+        ratio = distances.ratio()
+        if not 1.0 / _NOBODY < ratio < _NOBODY:
+            yield finding("O401", where, ratio=Quantity(ratio, "1", limit=_NOBODY))
+        if abs(ratio - 1.0) > _OTHER_SCALE:
+            severity = Severity.ERROR if abs(ratio - 1.0) > _OTHER_BODY else Severity.WARNING
+            limit = 1.0 + _OTHER_SCALE * float(np.sign(ratio - 1.0))
+            scale = Quantity(ratio, "1", limit=limit, usual=(0.989, 1.011))
+            yield finding("O404", where, severity, ratio=scale, worst_pair=Quantity(distances.worst_pair()))
+        rms_m = float(np.sqrt(np.square(distances.differences()).mean()))
+        if rms_m > _ELSEWHERE_M:
+            rms = Quantity(rms_m, "m", limit=_ELSEWHERE_M, usual=(0.0, 0.011))
+            yield finding("O405", where, rms_m=rms, worst_pair=Quantity(distances.worst_pair()))
 
 
-def model_on_person_doubts(places: Markers, trial: Markers, marker_set: MarkerSet) -> list[str]:
-    """What speaks against the model's scale and marker places, if `model_on_person_trouble` found nothing."""
-    distances = SegmentDistances.of(places, trial, marker_set)
-    if len(distances.pairs) < _FEWEST_PAIRS:
-        return []
-    if abs(distances.ratio() - 1.0) > _OTHER_SCALE:
-        return [_scale_sentence(distances)]
-    typical = float(np.sqrt(np.square(distances.differences()).mean()))
-    if typical <= _ELSEWHERE_M:
-        return []
-    return [
-        f"distances between markers of one segment differ from the model's by {1e3 * typical:.0f} mm (RMS of "
-        f"{len(distances.pairs)}; most of all {distances.worst_pair()}): the model's markers were not moved to where "
-        "they are on the person; let OpenSim's Scale tool place them on the static trial"
-    ]
-
-
-def moved_doubts(before: Skeleton, after: Skeleton, trials: Sequence[Markers]) -> list[str]:
-    """Markers of the lower body that calibration moved farther than a marker is ever put elsewhere.
+def moved_markers(before: Skeleton, after: Skeleton, trials: Sequence[Markers]) -> Iterator[Finding]:
+    """O407: markers of the lower body that calibration moved farther than a marker is ever put elsewhere.
 
     Args:
         before, after: the model's skeleton and the calibrated one.
@@ -79,54 +81,18 @@ def moved_doubts(before: Skeleton, after: Skeleton, trials: Sequence[Markers]) -
     """
     shown = {label for markers in trials for label in markers.labels}
     place = {marker.label: np.array(marker.position) for marker in before.markers}
-    moved = [
-        (float(np.linalg.norm(np.array(marker.position) - place[marker.label])), marker)
-        for marker in after.markers
-        if marker.label in shown and segment_of(marker.segment) in LOWER_BODY
-    ]
-    far = sorted((one for one in moved if one[0] > _MOVED_M), key=lambda one: -one[0])
-    if not far:
-        return []
-    listed = ", ".join(f"{marker.label} ({marker.segment}, {1e3 * metres:.0f} mm)" for metres, marker in far)
-    return [
-        f"calibration moved these markers far from where the model has them in their segments: {listed}; labels that "
-        "are exchanged, in the model or in the trial, or a model that is not this person's do that, and joint centres "
-        "follow them: correct the labels, or place the model's markers on the static trial with OpenSim's Scale tool"
-    ]
+    for marker in after.markers:
+        distance_m = float(np.linalg.norm(np.array(marker.position) - place[marker.label]))
+        if marker.label in shown and segment_of(marker.segment) in LOWER_BODY and distance_m > _MOVED_M:
+            distance = Quantity(distance_m, "m", limit=_MOVED_M, usual=(0.005, 0.036))
+            yield finding("O407", Where(markers=(marker.label,), part=marker.segment), distance_m=distance)
 
 
-def _other_unit(distances: SegmentDistances) -> str:
-    if len(distances.pairs) < _FEWEST_PAIRS or 1.0 / _NOBODY < distances.ratio() < _NOBODY:
-        return ""
-    return (
-        f"distances between markers of one segment are {distances.ratio():.3g} times those of the model (median of "
-        f"{len(distances.pairs)}): one of the two has another unit of length than its file says (mm, cm or m); correct "
-        "it there"
-    )
-
-
-def _other_body(distances: SegmentDistances) -> str:
-    if len(distances.pairs) < _FEWEST_PAIRS or abs(distances.ratio() - 1.0) <= _OTHER_BODY:
-        return ""
-    return _scale_sentence(distances)
-
-
-def _scale_sentence(distances: SegmentDistances) -> str:
-    share = distances.ratio() - 1.0
-    longer = "longer" if share > 0 else "shorter"
-    return (
-        f"distances between markers of one segment are {100 * abs(share):.1f} % {longer} than in the model (median of "
-        f"{len(distances.pairs)}; most of all {distances.worst_pair()}): the model was not scaled, or to another "
-        "person, or its markers were not placed, or the cameras' scale is wrong; scale it to this person's static "
-        "trial with OpenSim's Scale tool"
-    )
-
-
-def _mirrored(places: Markers, trial: Markers, marker_set: MarkerSet) -> str:
-    """The person's markers are rather arranged as the model's mirror image."""
+def _mirrored(places: Markers, trial: Markers, marker_set: MarkerSet) -> Quantity | None:
+    """How many times as badly the model fits the person's markers as its mirror image does, where that decides."""
     for names, (fewest, limit) in _ARRANGED.items():
-        worn = [marker_set.segments.get(name, ()) for name in names]
-        parts = [[label for label in own if label in trial.labels] for own in worn]
+        own = [marker_set.segments.get(name, ()) for name in names]
+        parts = [[label for label in labels if label in trial.labels] for labels in own]
         labels = [label for part in parts for label in part]
         person = trial.select(labels).positions
         whole = np.flatnonzero(np.isfinite(person).all(axis=(1, 2)))
@@ -135,14 +101,10 @@ def _mirrored(places: Markers, trial: Markers, marker_set: MarkerSet) -> str:
         model = places.select(labels).positions[0]
         ratio = _mirror_ratio(model, person[whole[:: max(len(whole) // _FRAMES, 1)]])
         if ratio > limit:
-            return (
-                f"the markers of {', '.join(names)} are arranged like a mirror image of the model's (its default pose "
-                f"fits them {ratio:.1f} times as badly as its mirror image): all left and right labels are exchanged "
-                "in one of the two, or an axis of one is mirrored; correct the labels or the axis"
-            )
+            return Quantity(ratio, "1", limit=limit, usual=(0.02, 0.3))
         if ratio < 1.0 / limit:
             break
-    return ""
+    return None
 
 
 def _mirror_ratio(model: FloatArray, person: FloatArray) -> float:

@@ -2,43 +2,40 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from kinertia.diagnostics.context import PersonContext
+from kinertia.findings.finding import Finding, finding
+from kinertia.findings.quantity import Quantity
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
 
-FARTHEST_M = 1.5
+_FARTHEST_M = 1.5
 """From a joint to what its body carries: a thigh has half a metre, the end of a barbell is 1.1 m from its middle."""
-SMALLEST_M, LARGEST_M = 0.2, 3.0
+_SMALLEST_M, _LARGEST_M = 0.2, 3.0
 """Largest distance of two joints of a whole body: a newborn's legs, and a giant's stretched arms."""
 _WHOLE = 6
 """Joints from which on a model counts as a whole body."""
 
 
-def size_trouble(skeleton: Skeleton, bsp: BodySegmentParameters) -> str:
-    """What shows that joints, mass centres or markers are not in metres; it names the farthest. Empty if nothing does.
-
-    Args:
-        skeleton, bsp: of the model.
-    """
-    lengths = _lengths(skeleton, bsp)
-    wrong = sorted(((length, what) for length, what in lengths if length > FARTHEST_M), reverse=True)
-    if wrong:
-        others = f"; {len(wrong) - 1} more lengths are beyond that" if len(wrong) > 1 else ""
-        length, what = wrong[0]
-        return (
-            f"{what} is {length:.3g} m; expected metres, at most {FARTHEST_M:g} m on a person{others}; most likely mm "
-            f"or cm in place of m: divide them by 1000 or 100, or scale the model anew"
-        )
-    extent = _extent_m(skeleton)
-    if len(skeleton.joints) < _WHOLE or SMALLEST_M <= extent <= LARGEST_M:
-        return ""
-    return (
-        f"the joints of the model are at most {extent:.3g} m apart; expected metres, {SMALLEST_M:g} to {LARGEST_M:g} m "
-        f"on a person; most likely it was scaled with lengths in another unit: scale it anew"
-    )
+def length_unit(context: PersonContext) -> Iterator[Finding]:
+    """O301: joints, centres of mass or markers that are not in metres; it names the farthest."""
+    if context.model is None:
+        return
+    skeleton = context.model.skeleton
+    lengths = _lengths(skeleton, context.model.bsp)
+    extent_m = _extent_m(skeleton)
+    extent = Quantity(extent_m, "m", usual=(_SMALLEST_M, _LARGEST_M))
+    if wrong := sorted(((length, what) for length, what in lengths if length > _FARTHEST_M), reverse=True):
+        length_m, what = wrong[0]
+        farthest = Quantity(length_m, "m", limit=_FARTHEST_M)
+        count = Quantity(len(wrong), "1")
+        yield finding("O301", length_m=farthest, extent_m=extent, count=count, what=Quantity(what))
+    elif len(skeleton.joints) >= _WHOLE and not _SMALLEST_M <= extent_m <= _LARGEST_M:
+        what = "The largest distance of two joints"
+        yield finding("O301", length_m=extent, extent_m=extent, what=Quantity(what))
 
 
 def _lengths(skeleton: Skeleton, bsp: BodySegmentParameters) -> list[tuple[float, str]]:
@@ -47,13 +44,13 @@ def _lengths(skeleton: Skeleton, bsp: BodySegmentParameters) -> list[tuple[float
     lengths = []
     for body, places in joints.items():
         apart = max(float(np.linalg.norm(place - places[0])) for place in places)
-        lengths.append((apart, f"the distance of the joints of body '{body}'"))
+        lengths.append((apart, f"The distance of the joints of body {body}"))
     for body, mass, centre in zip(bsp.segments, bsp.mass_kg, bsp.com_m, strict=True):
         off = _nearest_m(centre, joints.get(body, [])) if mass > 0 else 0.0
-        lengths.append((off, f"the distance of the mass centre of body '{body}' from its joints"))
+        lengths.append((off, f"The distance of the mass centre of body {body} from its joints"))
     for marker in skeleton.markers:
         off = _nearest_m(marker.position, joints.get(marker.segment, []))
-        lengths.append((off, f"the distance of marker '{marker.label}' from the joints of its body '{marker.segment}'"))
+        lengths.append((off, f"The distance of marker {marker.label} from the joints of its body {marker.segment}"))
     return lengths
 
 

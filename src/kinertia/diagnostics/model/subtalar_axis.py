@@ -7,39 +7,42 @@ more likely a mistake, most often an orientation that was lost.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
+from kinertia.diagnostics.context import PersonContext
+from kinertia.diagnostics.model.mirrored_joints import without_side
+from kinertia.findings.finding import Finding, finding
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
 from kinertia.model.neutral_joints import NeutralJoints, angle_deg, neutral_joints
-from kinertia.model.skeleton import Skeleton
 
-FARTHEST_DEG = 25.0
+_FARTHEST_RAD = float(np.radians(25.0))
 """Models in use: 0.0 degrees. An axis along the foot: 38."""
 _USUAL = (0.7872, 0.6047, -0.1209)
 """Forward, up, to the right: of a right foot, as gait2354 and Rajagopal have it."""
 
 
-def subtalar_axis_doubts(skeleton: Skeleton) -> list[str]:
-    """One sentence on subtalar axes far from where people have them, or none."""
-    neutral = neutral_joints(skeleton)
-    if neutral.sideways is None:
-        return []
-    odd = []
-    for body, turns in neutral.turns.items():
+def subtalar_axis(context: PersonContext) -> Iterator[Finding]:
+    """O304: a subtalar axis far from where people have it (some 40 degrees up from the sole, 10 to 20 inward)."""
+    neutral = None if context.model is None else neutral_joints(context.model.skeleton)
+    if neutral is None or neutral.sideways is None:
+        return
+    far = {}
+    for body, axes in neutral.turns.items():
         if not body.lower().startswith("calcn") or not neutral.joints[body].parent.lower().startswith("talus"):
             continue
-        if len(turns) == 1 and body.endswith(("_r", "_l")):
-            ((coordinate, axis),) = turns.items()
-            angle = angle_deg(axis, _usual(neutral, body))
-            if angle > FARTHEST_DEG:
-                odd.append(f"{coordinate} ({angle:.0f} degrees)")
-    if not odd:
-        return []
-    return [
-        f"the subtalar axis is far from where people have it (some 40 degrees up from the sole, 10 to 20 inward): "
-        f"{', '.join(odd)}; expected within {FARTHEST_DEG:g} degrees; most likely the orientation of the joint or the "
-        f"direction of its axis was lost: compare it with the model that this one was scaled from, unless it was "
-        f"measured on this person"
-    ]
+        if len(axes) == 1 and body.endswith(("_r", "_l")):
+            ((coordinate, axis),) = axes.items()
+            angle = float(np.radians(angle_deg(axis, _usual(neutral, body))))
+            if angle > _FARTHEST_RAD:
+                far[coordinate] = angle
+    if far:
+        # both sides in one: what is said of their asymmetry has the name that they share, too
+        worst = max(far, key=far.__getitem__)
+        angle_rad = Quantity(far[worst], "rad", limit=_FARTHEST_RAD, usual=(0.0, 0.21))
+        yield finding("O304", Where(part=without_side(worst)), angle_rad=angle_rad, joints=Quantity(", ".join(far)))
 
 
 def _usual(neutral: NeutralJoints, body: str) -> np.ndarray:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.labels.body_sides import walks_backwards
+from kinertia.diagnostics.labels.heading import walks_backwards
 
 _ENDS = (("heel",), ("metatarsal", "toe"))
 _LEAST_LENGTH_M = 0.08

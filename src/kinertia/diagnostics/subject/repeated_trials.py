@@ -2,40 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator
 from itertools import combinations
 
 import numpy as np
 
+from kinertia.diagnostics.context import PersonContext
+from kinertia.findings.finding import Finding, finding
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
 from kinertia.trial.data import Recording
 
 Span = tuple[float, float] | None
 
 
-def repeated_trials(recordings: Sequence[Recording], windows: Sequence[Span]) -> list[str]:
-    """Pairs of trials whose markers or forces are the same to the last digit, over times that overlap.
-
-    Args:
-        recordings: of the trials.
-        windows: what the user wants of each, if anything.
-    """
-    sentences = []
-    for (first, window), (other, other_window) in combinations(zip(recordings, windows, strict=True), 2):
-        if not _overlap(window, other_window):
+def repeated_trials(context: PersonContext) -> Iterator[Finding]:
+    """Two trials whose markers (S302) or forces (S303) are the same to the last digit, over times that overlap."""
+    for first, other in combinations(context.trials, 2):
+        if not _overlap(first.window_s, other.window_s):
             continue
-        if _same(first.markers.positions, other.markers.positions):
-            sentences.append(
-                f"the trials '{first.name}' and '{other.name}' have the same markers to the last digit: one recording "
-                "is listed twice, or its copy has another name; it counts twice, and error bars are too short: list it "
-                "once, and give the file of the other trial"
-            )
-        elif _same_forces(first, other) and _overlap(_span(first), _span(other)):
-            sentences.append(
-                f"the trials '{first.name}' and '{other.name}' have the same forces to the last digit, but not the "
-                "same markers: most likely the forces of one were given for both, and moments of the other are wrong: "
-                "give each trial the forces that were measured with its markers"
-            )
-    return sentences
+        one, two = first.recording, other.recording
+        if _same(one.markers.positions, two.markers.positions):
+            code = "S302"
+        elif _same_forces(one, two) and _overlap(_span(one), _span(two)):
+            code = "S303"
+        else:
+            continue
+        yield finding(code, Where(trial=other.name), other_trial=Quantity(first.name))
 
 
 def _same(one: np.ndarray, two: np.ndarray) -> bool:

@@ -1,38 +1,58 @@
-"""Do forces keep time with the markers? A delay that grows is a wrong rate, where a late clock delays all alike.
+"""Do forces keep time with the markers, by how they move the body up and down?
 
-The body goes up and down by its markers as the forces cause, but for a factor near one: vertical velocities tell a
-delay, and its growth, from the first and the last of a second. Two steps are enough, where single contacts are too few
-(`trial.load_times`).
+The body goes up and down by its markers as the forces cause, but for a factor near one: vertical velocities show a
+delay, and its growth, from the first and the last of a second. Two steps are enough, where single contacts are too few.
+A rate that is wrong for both enters accelerations squared, and so that factor.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator
 
 import numpy as np
 
-from kinertia.diagnostics.evidence.caused_velocity import CausedVelocity
+from kinertia.diagnostics.context import RecordingContext
+from kinertia.diagnostics.evidence.caused_velocity import VelocityChanges
 from kinertia.diagnostics.evidence.ups_and_downs import ups_and_downs_of
-from kinertia.trial.data import Trial
+from kinertia.findings.finding import Finding, Severity, finding
+from kinertia.findings.quantity import Quantity
 from kinertia.trial.sampled_time import span_s
 
-_LEAST_WINDOW_S, _LEAST_GROWTH, _MOST_LEFT = 1.0, 0.0105, 0.22
-"""By pelvis or by markers' centre the delay of 21 sound trials grows by -0.017 to 0.013 in windows of 1.03 to 1.3 s
-and by up to 0.002 in longer ones, and by both in one direction by at most 0.004."""
+_LEAST_WINDOW_S, _LEAST_GROWTH, _MOST_RESIDUAL = 1.0, 0.0105, 0.22
+"""By pelvis or by markers' centre the delay of 21 fault-free trials grows by -0.017 to 0.013 in windows of 1.03 to
+1.3 s and by up to 0.002 in longer ones, and by both in one direction by at most 0.004."""
+_LEAST_RATIO, _MOST_RATIO, _USUAL_RATIO, _TYPICAL_RATIO = 0.4, 1.8, (0.67, 0.99), 0.9
+"""On 26 fault-free trials, from squats to runs; at half the true rate it is four times as much."""
 
 
-def rate_doubts(trial: Trial, parts: Sequence[CausedVelocity]) -> list[str]:
-    """Forces that come ever later, or ever earlier, in a measured window.
+def force_rate(context: RecordingContext) -> Iterator[Finding]:
+    """T202, and T201 of forces that come ever later, or ever earlier, in a measured window."""
+    if not context.velocities:
+        return
+    changes = VelocityChanges.of(context.velocities)
+    ratio = changes.vertical_ratio(changes.pelvis)
+    if ratio is not None and not _LEAST_RATIO < ratio < _MOST_RATIO:
+        yield finding(
+            "T202",
+            context.at(),
+            # at less than the true rate forces seem to move the body faster
+            rate_factor=Quantity(float(np.sqrt(_TYPICAL_RATIO / ratio)), "1"),
+            velocity_ratio=Quantity(ratio, "1", limit=_MOST_RATIO if ratio > 1 else _LEAST_RATIO, usual=_USUAL_RATIO),
+        )
+    grows = next(_growing_delays(context), None)
+    if grows is not None:
+        yield grows
 
-    Args:
-        trial: in ground axes.
-        parts: its `caused_velocities`.
-    """
-    for part in parts:
+
+def _growing_delays(context: RecordingContext) -> Iterator[Finding]:
+    """T201, of every window."""
+    trial = context.trial
+    for part in context.velocities if trial is not None else ():
+        assert trial is not None
         if span_s(part.time) < _LEAST_WINDOW_S:
             continue
         found = ups_and_downs_of(part, growing=True)
-        if not found or max(one.left for one in found) > _MOST_LEFT:
+        if not found or max(one.left for one in found) > _MOST_RESIDUAL:
             continue
         # with another gain under one foot the body seems to be pushed ever earlier, or later, within two steps
         gains = ups_and_downs_of(part, own=part.by(trial.loads.time, trial.loads.force[:, 0, 1]))
@@ -43,10 +63,12 @@ def rate_doubts(trial: Trial, parts: Sequence[CausedVelocity]) -> list[str]:
             continue
         mean = float(growth.mean())
         begin, end = (float(delay.mean()) + mean * half * np.ptp(part.time) / 2 for half in (-1, 1))
-        return [
-            f"markers and forces do not run at the same speed, by a factor of about {1 / (1 - mean):.2f}: the body "
-            f"goes up and down {1e3 * begin:+.0f} ms later by the forces than by the markers at {part.time[0]:.2f} s, "
-            f"and {1e3 * end:+.0f} ms later at {part.time[-1]:.2f} s, where a late clock would delay both alike; "
-            "correct the frame rate of one of the files"
-        ]
-    return []
+        yield finding(
+            "T201",
+            context.at(span_s=(float(part.time[0]), float(part.time[-1]))),
+            Severity.WARNING,
+            ratio=Quantity(1.0 / (1.0 - mean), "1"),
+            delay_s=Quantity((float(begin), float(end)), "s"),
+            growth=Quantity(mean, "1", limit=_LEAST_GROWTH, usual=(-0.004, 0.004)),
+            method=Quantity("vertical velocity"),
+        )

@@ -8,6 +8,7 @@ cost alone would favour the reading that needs a faulty instrument, since that o
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +18,11 @@ from kinertia.estimation.simultaneous.linearised import Slope
 from kinertia.estimation.simultaneous.observed_trial import Observation
 from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior, log_chance
+
+_WRONG_ODDS = 0.25
+"""Of a wrong sign to a right one before anything is measured: of some ten laboratories, two had it wrong."""
+_SURE = float(np.log(0.95 / 0.05))
+"""Logarithm of the odds at which a sign counts as found: a chance of 95 %."""
 
 
 class Evidence(NamedTuple):
@@ -60,3 +66,33 @@ def log_evidence(slope: Slope, model: GaussNewton, gaussian: GaussianPrior) -> f
     lowest = cost - 0.5 * float(right @ step) - gaussian.cost(mean)
     at_none = lowest - 0.5 * float(mean @ data @ mean) + float(pulled @ mean)
     return log_chance(model.problem.instruments, data, pulled) - at_none
+
+
+@dataclass(frozen=True)
+class FreeMomentSign:
+    """What a person's trials say of the sign of the free moments.
+
+    Attributes:
+        log_odds: logarithm of how much likelier the trials are with the sign turned.
+        rms_nm: of the free moments, N m.
+
+    >>> FreeMomentSign(59.0, 2.0).wrong, FreeMomentSign(1.0, 2.0).open, FreeMomentSign(-20.0, 2.0).open
+    (True, True, False)
+    """
+
+    log_odds: float
+    rms_nm: float
+
+    @property
+    def _posterior(self) -> float:
+        return self.log_odds + float(np.log(_WRONG_ODDS))
+
+    @property
+    def wrong(self) -> bool:
+        """Whether it is wrong in the files."""
+        return self._posterior > _SURE
+
+    @property
+    def open(self) -> bool:
+        """Whether these trials leave it open."""
+        return abs(self._posterior) <= _SURE

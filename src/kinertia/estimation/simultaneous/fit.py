@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from kinertia.estimation.identifiability import BaseParameters, base_parameters
 from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.simultaneous.bandwidth import Bandwidth
-from kinertia.estimation.simultaneous.instrument_warnings import (
-    CLOCK_OF,
-    GAIN,
+from kinertia.estimation.simultaneous.evidence import FreeMomentSign
+from kinertia.estimation.simultaneous.impacts import down_weighted
+from kinertia.estimation.simultaneous.instrument_errors import (
     GAIN_IN,
-    accuses,
-    instrument_corrections,
-    instrument_warnings,
+    OTHER_SIGN,
+    InstrumentError,
+    instrument_errors,
 )
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation
 from kinertia.estimation.simultaneous.marker_noise import MarkerNoise
@@ -25,30 +24,23 @@ from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINT
 from kinertia.estimation.simultaneous.observation import Observations, observe, reading
 from kinertia.estimation.simultaneous.observed_trial import CalibrationPrior
 from kinertia.estimation.simultaneous.outcome import SimultaneousResult
-from kinertia.estimation.simultaneous.plates import PLATE_UNKNOWNS, ZERO_UNKNOWNS
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous
-from kinertia.estimation.simultaneous.supported import OTHER_SIGN, directions, with_support
 from kinertia.estimation.simultaneous.trunk_bending import BENDING_PRIOR_M
 from kinertia.estimation.simultaneous.unlike import Unlikeness, unlikeness
-from kinertia.estimation.simultaneous.which_plate import which_plate_warnings
-from kinertia.model.bsp import PARAMETERS, BodySegmentParameters
+from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.gait27 import VIRTUAL_TRUNK
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion
 from kinertia.motion.kinematics import Kinematics
 from kinertia.motion.one_thread import one_blas_thread
-from kinertia.trial.plate_names import plate_of_trial
 
 _STAYING_SD_M = 1e-4
 """At least, of markers that stay where a model has them."""
 TRUNK_PLACE_SD_M = 0.08
 """Of the virtual markers of a trunk that nobody sees: it may lean by 6 degrees all the time."""
 _VIRTUAL_TRUNK = [marker.label for marker in VIRTUAL_TRUNK]
-_DISPLACED_M = 0.03
 BENDING_IN = "trunk bending in "
 """Before the name of a trial, among what is calibrated."""
-CONTRADICTION_SD = 3.0
-"""A parameter this many prior SDs from the prior's mean contradicts the model."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,13 +51,18 @@ class Posterior:
         prior_sd, sd: (s, 10) deviations of the body segment parameters before and after, in the table's order.
         covariance: (10 s, 10 s) posterior covariance of the table rows, segment after segment.
         calibration: per quantity its value, prior and posterior deviation, and unit; of instruments what supports an
-            accusation (`instrument_warnings.Entry`).
+            accusation (`InstrumentError.entry`).
         marker_noise: per trial.
         iterations: Gauss-Newton steps.
         base: which combinations of parameters these motions show, and which none ever shows.
         instruments: what these trials say of plates and clock.
         prior_mean: of the body segment parameters; None in files of before, where it was not written.
         unlikeness: how far the estimate is from the prior; None in files of before.
+        instrument_errors: what `calibration` has of plates and synchronisation; none in files of before.
+        free_moment_sign: what was found of it; None where there was nothing to ask.
+        marker_distances_m: per trial, how far each marker is from where it is in the nearest of the other trials; of
+            those that no other trial shows nothing.
+        down_weighted: per trial, the share of its measured frames that impacts leave less weight.
 
     Examples:
         >>> fit.posterior.sd.shape, bool((fit.posterior.sd <= fit.posterior.prior_sd * 1.0001).all())
@@ -82,6 +79,15 @@ class Posterior:
     instruments: InstrumentInformation
     prior_mean: BodySegmentParameters | None = None
     unlikeness: Unlikeness | None = None
+    instrument_errors: tuple[InstrumentError, ...] = ()
+    free_moment_sign: FreeMomentSign | None = None
+    marker_distances_m: tuple[Mapping[str, float], ...] = field(default=())
+    down_weighted: tuple[float, ...] = ()
+
+    def with_errors(self, errors: tuple[InstrumentError, ...]) -> Posterior:
+        """The same with these errors of instruments."""
+        entries = {one.name: one.entry for one in errors}
+        return replace(self, calibration={**self.calibration, **entries}, instrument_errors=errors)
 
     def calibration_of(self, trial: str | None) -> dict[str, Mapping[str, float | str]]:
         """What is calibrated of a trial alone, how much its trunk bends and the whole gains of its plates; of None, all
@@ -110,7 +116,6 @@ class SimultaneousFit:
         courses: per trial, (f, c) coordinates of all frames from the first to the last of these: markers show the
             motion between measured stretches, too.
         foot_loads: per trial (w, 2, 6) at the corrected place and time, of the motion's bandwidth.
-        warnings, corrections: one sentence each.
     """
 
     result: SimultaneousResult
@@ -121,8 +126,6 @@ class SimultaneousFit:
     motions: tuple[Motion, ...]
     courses: tuple[np.ndarray, ...]
     foot_loads: tuple[np.ndarray, ...]
-    warnings: tuple[str, ...]
-    corrections: tuple[str, ...] = ()
 
 
 @one_blas_thread
@@ -163,15 +166,13 @@ def fit_simultaneous(
     courses = tuple(m.q[at[0] : at[-1] + 1] for m, at in zip(result.motions, dynamic, strict=True))
     loads = tuple(every[o.dynamic] for every, o in zip(result.foot_loads, together, strict=True))
     covariance, before = (uncertainty.whole_covariance(c) for c in (result.bsp_covariance, prior.covariance))
+    names = [each.trial.name for each in trials]
+    errors = instrument_errors(result, uncertainty.instruments, names)
     posterior = Posterior(
         np.sqrt(np.diag(before)).reshape(-1, 10),
         np.sqrt(np.diag(covariance)).reshape(-1, 10),
         covariance,
-        with_support(
-            _calibration(used, uncertainty, result, [each.trial.name for each in trials], prior.mass_kg),
-            result,
-            uncertainty.instruments,
-        ),
+        _calibration(used, uncertainty, result, names, prior.mass_kg, errors),
         seen.noise,
         result.iterations,
         base_parameters(
@@ -180,6 +181,9 @@ def fit_simultaneous(
         result.instruments,
         uncertainty.whole(prior.mean),
         unlikeness(prior, result.bsp, result.bsp_covariance),
+        errors,
+        marker_distances_m=_marker_distances(result, trials),
+        down_weighted=tuple(down_weighted(np.broadcast_to(o.impact, o.dynamic.shape)[o.dynamic]) for o in together),
     )
     return SimultaneousFit(
         result,
@@ -192,27 +196,19 @@ def fit_simultaneous(
         motions,
         courses,
         loads,
-        tuple(_warnings(prior, uncertainty, result, posterior, trials)),
-        tuple(instrument_corrections(posterior.calibration, directions([each.turned_deg for each in trials]))),
     )
 
 
-def held_against(fitted: SimultaneousFit, other: SimultaneousFit, trials: Sequence[Kinematics]) -> SimultaneousFit:
-    """The same, where another reading of the same trials is as likely: what only one of both accuses of an error is
-    corrected, and called apparent.
+def held_against(fitted: SimultaneousFit, other: SimultaneousFit) -> SimultaneousFit:
+    """The same, where another reading of the same trials is as likely: errors that only one of both supports are
+    contradicted.
     """
-    before, along = fitted.posterior.calibration, directions([each.turned_deg for each in trials])
-    said = other.posterior.calibration
-    alone = {name for name, each in before.items() if ": " in name and accuses(each) and not accuses(said[name])}
-    after = {name: {**each, "contradicted_by": OTHER_SIGN} if name in alone else each for name, each in before.items()}
-    accusing = instrument_warnings(before, along)
-    others = [sentence for sentence in fitted.warnings if sentence not in accusing]
-    return replace(
-        fitted,
-        posterior=replace(fitted.posterior, calibration=after),
-        warnings=(*instrument_warnings(after, along), *others),
-        corrections=tuple(instrument_corrections(after, along)),
+    elsewhere = {one.name: one.supported for one in other.posterior.instrument_errors}
+    errors = tuple(
+        replace(one, contradicted_by=OTHER_SIGN) if one.supported and not elsewhere[one.name] else one
+        for one in fitted.posterior.instrument_errors
     )
+    return replace(fitted, posterior=fitted.posterior.with_errors(errors))
 
 
 def used_skeleton(skeleton: Skeleton, trials: Sequence[Kinematics], uncertainty: ModelUncertainty) -> Skeleton:
@@ -254,36 +250,13 @@ def _calibration(
     result: SimultaneousResult,
     trials: Sequence[str],
     mass_kg: float,
+    errors: Sequence[InstrumentError],
 ) -> dict[str, dict[str, float | str]]:
     calibration: dict[str, dict[str, float | str]] = {}
-    known = uncertainty.instruments
     for name, (value, sd) in result.coordinates.items():
         unit = "rad" if name in uncertainty.axes else "m"
         calibration[name] = _entry(value - skeleton.locked[name], uncertainty.coordinates[name], sd, unit)
-    # whoever is turned is displaced a little, too: the cause first
-    for values, sds in list(result.plates.values())[:1]:
-        turn = _entry(values[-1], known.floor["turn"].sd, sds[-1], "rad")
-        calibration["plates: turned about the vertical by"] = turn
-    for plate, (values, sds) in result.plates.items():
-        for (unknown, unit), value, sd in zip(PLATE_UNKNOWNS.items(), values, sds, strict=False):
-            floor = known.floor[unknown].sd if unknown in known.floor else 0.0
-            expected = float(np.hypot(known.plate[unknown].sd, floor))
-            calibration[f"{_plate(plate)}: {unknown}"] = _entry(value, expected, sd, unit)
-    late_s, sd = result.clock_s
-    calibration["clock: forces late by"] = _entry(late_s, known.clock_s.sd, sd, "s")
-    for trial, (later_s, sd) in zip(trials, result.delays_s, strict=False):
-        name = f"{CLOCK_OF}{trial}: forces later than in the other trials by"
-        calibration[name] = _entry(later_s, known.delay_s.sd, sd, "s")
-    trials_of = Counter(plate for zeros in result.zeros_n for plate in zeros)
-    for trial, zeros in zip(trials, result.zeros_n, strict=True):
-        for plate, (values, sds) in zeros.items():
-            name = _plate(plate if trials_of[plate] == 1 else plate_of_trial(plate, trial))
-            for (unknown, unit), value, sd in zip(ZERO_UNKNOWNS.items(), values, sds, strict=True):
-                calibration[f"{name}: {unknown}"] = _entry(value, known.zero_n.sd, sd, unit)
-    for trial, gains in zip(trials, result.gains, strict=True):
-        for plate, (gain, sd) in gains.items():
-            expected = float(np.hypot(known.plate[GAIN].sd, known.trial_gain.sd))
-            calibration[f"{_plate(plate)}: {GAIN_IN}{trial}"] = _entry(gain, expected, sd, "1")
+    calibration |= {one.name: one.entry for one in errors}
     for trial, (kappa, sd) in zip(trials, result.trunks_kg_m, strict=False):
         calibration[f"{BENDING_IN}{trial}"] = _entry(kappa, mass_kg * BENDING_PRIOR_M.sd, sd, "kg m")
     return calibration
@@ -300,71 +273,14 @@ def _entry(value: float, prior_sd: float, sd: float, unit: str) -> dict[str, flo
     return {"value": float(value), "prior_sd": prior_sd, "sd": float(sd), "unit": unit}
 
 
-def _plate(name: str) -> str:
-    return f"plate {name.removeprefix('plate ')}"
-
-
-def _warnings(
-    prior: BspPrior,
-    uncertainty: ModelUncertainty,
-    result: SimultaneousResult,
-    posterior: Posterior,
-    trials: Sequence[Kinematics],
-) -> list[str]:
-    warnings = []
-    if not result.converged:
-        warnings.append(
-            f"the simultaneous estimate did not converge within {result.iterations} steps; the best iterate is reported"
-        )
-    along = directions([each.turned_deg for each in trials])
-    warnings += instrument_warnings(posterior.calibration, along)
-    warnings += which_plate_warnings(posterior.calibration, result.instruments, uncertainty.instruments, along)
-    for kinematics, noise in zip(trials, posterior.marker_noise, strict=True):
-        if noise.wandering:
-            listed = ", ".join(f"{label} ({noise.sd_m[label] * 1e3:.0f} mm)" for label in noise.wandering)
-            warnings.append(f"{kinematics.trial.name}: drifting markers, down-weighted: {listed}")
-    warnings += _attached_anew(result, trials)
-    return warnings + _body_warnings(prior, uncertainty, result.bsp, posterior.unlikeness)
-
-
-def _body_warnings(
-    prior: BspPrior, uncertainty: ModelUncertainty, bsp: BodySegmentParameters, whole: Unlikeness | None
-) -> list[str]:
-    """One sentence where the estimate contradicts the prior.
-
-    A side that is heavier is the body's, or something on it, even where that drives single parameters far; where single
-    parameters are far for no such reason, it is the instruments'.
-    """
-    away = (bsp.table() - prior.mean.table()) / prior.sd
-    far = [
-        f"{PARAMETERS[k]} of {bsp.segments[i]} {away[i, k]:+.1f}"
-        for i, k in np.argwhere(np.abs(away) > CONTRADICTION_SD)
-    ]
-    if whole is not None and whole.unlike and (whole.one_sided or not far):
-        return [whole.sentence()]
-    if not far:
-        return []
-    return [
-        f"the data contradict the model: {', '.join(far)} prior SDs from {uncertainty.source}; a wrong joint, "
-        f"plate or marker is more likely than an unusual body"
-    ]
-
-
-def _attached_anew(result: SimultaneousResult, trials: Sequence[Kinematics]) -> list[str]:
-    """Markers that sit farther from where they are in the other trials than skin moves."""
+def _marker_distances(result: SimultaneousResult, trials: Sequence[Kinematics]) -> tuple[dict[str, float], ...]:
+    """Per trial how far each marker is from where it is in the nearest of the other trials, m."""
     labels = result.skeleton.labels
     shown = np.array([np.isin(labels, k.ik.labels) for k in trials])
     places = np.where(shown[..., None], result.displacements_m, np.nan)
-    warnings = []
-    for k, kinematics in enumerate(trials):
+    distances = []
+    for k in range(len(trials)):
         away = np.linalg.norm(places[k] - np.delete(places, k, axis=0), axis=-1)
         closest = np.where(np.isnan(away), np.inf, away).min(axis=0, initial=np.inf)
-        far = [(label, value) for label, value in zip(labels, closest, strict=True) if _DISPLACED_M < value < np.inf]
-        if far:
-            listed = ", ".join(f"{label} ({value * 1e3:.0f} mm)" for label, value in far)
-            warnings.append(
-                f"{kinematics.trial.name}: markers sit elsewhere in their segments than in the other trials: {listed}; "
-                f"skin moves up to some {_DISPLACED_M * 1e3:.0f} mm; correct their labels, or fit the trials "
-                "before and after they were reattached separately"
-            )
-    return warnings
+        distances.append({label: float(m) for label, m in zip(labels, closest, strict=True) if np.isfinite(m)})
+    return tuple(distances)

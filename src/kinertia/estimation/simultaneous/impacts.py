@@ -23,6 +23,8 @@ there. Set here: with it the clock of two measured walks follows when their forc
 _PHASES = 4
 """Ways for the knots to lie, over which what the splines leave is averaged."""
 _FEWEST_FRAMES = 8
+_LESS_WEIGHT = 2.0
+"""Times the deviation of other frames from which on a frame counts a quarter or less."""
 
 
 def impact_factors(
@@ -57,6 +59,11 @@ def impact_factors(
         near = greatest(left, 1 + 2 * round(0.5 * spacing / step_s))
         result[own] = np.sqrt(1.0 + np.square(_BESIDE * near / force_sd))
     return result
+
+
+def down_weighted(factors: np.ndarray) -> float:
+    """Share of the frames (n,) that count a quarter or less for these factors of their deviations."""
+    return float((factors >= _LESS_WEIGHT).mean()) if len(factors) else 0.0
 
 
 def _left(time: np.ndarray, force: np.ndarray, spacing_s: float) -> np.ndarray:

@@ -44,25 +44,6 @@ class OneSided:
     times: float
     added: bool
 
-    def sentence(self) -> str:
-        """What was found, the likeliest causes first, and what to do."""
-        heavier, lighter = " and ".join(self.heavier), " and ".join(self.lighter)
-        of_segments = " or ".join(f'"{name}"' for name in self.heavier)
-        tables = " and ".join(f"[segment.{name}]" for name in self.lighter)
-        worn = (
-            f"something worn on the heavier side, such as an orthosis, a cast or an ankle weight ([[attached]] with "
-            f"segment = {of_segments})"
-        )
-        artificial = f"a prosthesis on the lighter side (prosthesis = true under {tables})"
-        first, second = (worn, artificial) if self.added else (artificial, worn)
-        return (
-            f"one side is unlike the other: {heavier} {'is' if len(self.heavier) == 1 else 'are'} "
-            f"{' and '.join(f'{kg:.2f}' for kg in self.more_kg)} kg heavier than {lighter} in an estimate that leans "
-            f"on sides that are alike ({self.times:.0f} times as much as they usually differ); likely causes: {first}; "
-            f"{second}; less likely a wrong joint, plate or marker, which moves centres of mass across the limb, too. "
-            "Declare what it is: until then masses are further off than their error bars say"
-        )
-
 
 def one_sided(prior: BspPrior, estimate: BodySegmentParameters, covariance: np.ndarray) -> OneSided | None:
     """The side that is heavier, where that is what departs most of all differences between the sides; else None.

@@ -60,31 +60,6 @@ class Unlikeness:
         """Whether this is hardly a person of the prior."""
         return self.chance < UNLIKE_CHANCE
 
-    @property
-    def people(self) -> str:
-        """Of how many people of the prior one is as far away, in a word."""
-        rounded = 10.0 ** round(np.log10(max(self.chance, 1e-9)))
-        return f"1 of {1.0 / rounded:,.0f} people"
-
-    def sentence(self) -> str:
-        """What that means, the likeliest causes first."""
-        if self.one_sided is not None:
-            return self.one_sided.sentence()
-        worn = "something that was worn or carried ([[attached]])"
-        other = "a body that the tables do not describe (age_years, population under [subject])"
-        wrong = "a wrong joint, plate or marker"
-        causes = [worn, other, wrong]
-        if self.both_sides:
-            alike = "left and right are off alike (joint widths, places of the knees' and ankles' markers)"
-            causes = [f"{wrong}, since {alike}", worn, other]
-        if limb := next((name for name in self.segments if name.endswith(("_r", "_l"))), None):
-            causes.append(f"a prosthesis (prosthesis = true under [segment.{limb}])")
-        return (
-            f"the person is unlike the prior: {self.combinations} combinations of parameters that the data show are "
-            f"together as far from it as in {self.people}, most of all "
-            f"{', '.join(self.segments)}; likely causes: {'; '.join(causes)}"
-        )
-
 
 def unlikeness(prior: BspPrior, estimate: BodySegmentParameters, covariance: np.ndarray) -> Unlikeness:
     """How far the estimate (with the posterior covariance of its table) is from the prior once the scale has spoken."""

@@ -105,11 +105,8 @@ class Frames:
             owner, path = frame.name, self._values.text(frame, "socket_parent")
         body = path.strip().split("/")[-1]
         if body not in self._bodies:
-            self._values.fail(
-                user,
-                f"{user.tag} '{user.name}' hangs on '{path.strip()}', which the file does not have; expected a body "
-                f"or a PhysicalOffsetFrame",
-            )
+            problem = f"it hangs on '{path.strip()}', which the file does not have, expected a body or a frame"
+            self._values.fail(user, problem, "O103")
         return body, (rotation, translation)
 
 
@@ -134,9 +131,7 @@ def read_joint(values: Values, element: Element, frames: Frames) -> JointElement
 def read_joint_in_body(values: Values, element: Element, child: str) -> JointElement:
     """A joint of format 3, which stands in its child's element."""
     if values.flag(element, "reverse", False):
-        values.fail(
-            element, f"joint '{element.name}' is reversed; expected parent before child, save it with OpenSim 4"
-        )
+        values.fail(element, "it is reversed, expected parent before child, as OpenSim 4 saves it")
     places = (
         frame_place(values, element, "orientation_in_parent", "location_in_parent"),
         frame_place(values, element, "orientation", "location"),
@@ -159,14 +154,10 @@ def _joint(
     elif element.tag in _AXES:
         wanted = _AXES[element.tag]
         if len(names) != len(wanted):
-            values.fail(element, f"{element.tag} '{element.name}' has {len(names)} coordinates; expected {len(wanted)}")
+            values.fail(element, f"it has {len(names)} coordinates, expected {len(wanted)}")
         axes, constants = [Axis(names[i], kind, direction) for i, kind, direction in wanted], {}
     else:
-        values.fail(
-            element,
-            f"joint '{element.name}' is a {element.tag}, which Kinertia cannot represent; it knows "
-            f"{', '.join([*_AXES, 'CustomJoint'])}",
-        )
+        values.fail(element, f"this kind of joint is unknown, expected one of {', '.join([*_AXES, 'CustomJoint'])}")
     turning = {axis.coordinate for axis in axes if axis.kind == "rotation" and axis.function is None}
     coordinates = [_coordinate(values, c, element.name, c.name in turning) for c in elements]
     return JointElement(element, *bodies, *places, offset, tuple(coordinates), tuple(axes), constants)
@@ -175,11 +166,7 @@ def _joint(
 def _coordinate(values: Values, element: Element, joint: str, angle: bool) -> OsimCoordinate:
     function = values.property(element, "prescribed_function")
     if values.flag(element, "prescribed", False) and function is not None and function.children:
-        values.fail(
-            element,
-            f"coordinate '{element.name}' is prescribed over time; expected a free or locked one: set prescribed "
-            f"to false",
-        )
+        values.fail(element, "it is prescribed over time, expected a free or locked one")
     low, high = values.numbers(element, "range", 2, [-10.0, 10.0])
     return OsimCoordinate(
         element.name,
@@ -196,17 +183,14 @@ def _custom_axes(values: Values, joint: Element, names: list[str]) -> tuple[list
     transform = joint.child("SpatialTransform")
     elements = [] if transform is None else [e for e in transform.children if e.tag == "TransformAxis"]
     if len(elements) != 6:
-        values.fail(
-            joint,
-            f"CustomJoint '{joint.name}' has {len(elements)} TransformAxis; expected 3 rotations, then 3 translations",
-        )
+        values.fail(joint, f"it has {len(elements)} TransformAxis, expected 3 rotations, then 3 translations")
     axes, constants = [], {}
     for i in (3, 4, 5, 0, 1, 2):
         element, kind = elements[i], "rotation" if i < 3 else "translation"
         direction = values.numbers(element, "axis", 3)
         length = np.linalg.norm(direction)
         if not length > 0:
-            values.fail(element, f"axis of {element.name} of joint '{joint.name}' is zero; expected a direction")
+            values.fail(element, f"its axis in the joint {joint.name} is zero, expected a direction")
         follows = values.text(element, "coordinates").replace('"', " ").split()
         function = _axis_function(values, element, joint.name)
         axis = Axis("", kind, tuple(map(float, direction / length)), function)  # type: ignore[arg-type]
@@ -218,11 +202,8 @@ def _custom_axes(values: Values, joint: Element, names: list[str]) -> tuple[list
                 axes.append(replace(axis, coordinate=name, function=None))
             continue
         if len(follows) != 1 or follows[0] not in names:
-            values.fail(
-                element,
-                f"{element.name} of joint '{joint.name}' follows {' and '.join(follows) or 'no coordinate'}; expected "
-                f"one coordinate of the joint ({', '.join(names) or 'it has none'})",
-            )
+            coordinates = f"one coordinate of the joint {joint.name} ({', '.join(names) or 'it has none'})"
+            values.fail(element, f"it follows {' and '.join(follows) or 'no coordinate'}, expected {coordinates}")
         axes.append(simplified(replace(axis, coordinate=follows[0])))
     return axes, constants
 

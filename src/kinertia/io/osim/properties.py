@@ -10,6 +10,9 @@ from typing import NoReturn
 import numpy as np
 
 from kinertia.errors import OsimError
+from kinertia.findings.finding import with_evidence
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
 from kinertia.io.osim.xml import Element
 from kinertia.model.axis_functions import (
     PiecewisePolynomial,
@@ -42,9 +45,18 @@ class Values:
     path: Path
     defaults: Mapping[str, Element]
 
-    def fail(self, element: Element, problem: str) -> NoReturn:
-        """Raise OsimError about this element."""
-        raise OsimError(self.path, problem, element.line, element.name, element.tag)
+    def fail(self, element: Element, problem: str, code: str = "O102", owner: str | None = None) -> NoReturn:
+        """Raise OsimError about this element.
+
+        Args:
+            element: where it is in the file.
+            problem: what is wrong, and what is expected.
+            code: of the rule; that of an element that is not supported unless given.
+            owner: name of what the element belongs to, if it has none itself.
+        """
+        name = element.name if owner is None else owner
+        stated = {"element": Quantity(name), "kind": Quantity(element.tag), "problem": Quantity(problem)}
+        raise OsimError.about(self.path, with_evidence(code, Where(part=name or None), stated), element.line)
 
     def property(self, element: Element, tag: str) -> Element | None:
         """The element's own property, or that of the file's defaults."""
@@ -62,7 +74,7 @@ class Values:
         """A true or false."""
         text = self.text(element, tag).lower()
         if text not in ("true", "false", ""):
-            self.fail(element, f"{tag} of '{element.name}' is '{text}'; expected true or false")
+            self.fail(element, f"{tag} is '{text}', expected true or false")
         return otherwise if text == "" else text == "true"
 
     def numbers(self, element: Element, tag: str, count: int, otherwise: list[float] | None = None) -> np.ndarray:
@@ -70,20 +82,20 @@ class Values:
         entry = self.property(element, tag)
         if entry is None:
             if otherwise is None:
-                self.fail(element, f"{element.tag} '{element.name}' has no {tag}; expected {count} number(s)")
+                self.fail(element, f"it has no {tag}, expected {count} number(s)")
             return np.array(otherwise)
         values = self._list(entry, element.name)
         if len(values) != count:
-            self.fail(entry, f"{tag} of '{element.name}' has {len(values)} numbers; expected {count}")
+            self.fail(entry, f"it has {len(values)} numbers, expected {count}", owner=element.name)
         return values
 
     def _list(self, element: Element, owner: str) -> np.ndarray:
         try:
             values = np.array([float(word) for word in element.text.split()])
         except ValueError:
-            self.fail(element, f"{element.tag} of '{owner}' is '{element.text.strip()[:60]}'; expected numbers")
+            self.fail(element, f"it is '{element.text.strip()[:60]}', expected numbers", owner=owner)
         if not np.isfinite(values).all():
-            self.fail(element, f"{element.tag} of '{owner}' is not finite; expected finite numbers")
+            self.fail(element, "expected finite numbers", owner=owner)
         return values
 
     def function(self, element: Element, owner: str) -> PiecewisePolynomial:
@@ -97,7 +109,7 @@ class Values:
             holder = element.child("function")
             inner = holder.children[0] if holder is not None and holder.children else None
             if inner is None:
-                self.fail(element, f"the MultiplierFunction of '{owner}' multiplies nothing; expected a function in it")
+                self.fail(element, "it multiplies nothing, expected a function in it", owner=owner)
             return self.function(inner, owner).scaled(self.numbers(element, "scale", 1, [1.0])[0])
         if element.tag == "Constant":
             return constant(self.numbers(element, "value", 1, [0.0])[0])
@@ -105,32 +117,25 @@ class Values:
             return self._of_coefficients(element, owner)
         if element.tag in ("SimmSpline", "PiecewiseLinearFunction"):
             return self._of_points(element, owner)
-        self.fail(
-            element,
-            f"'{owner}' moves by a {element.tag}, which Kinertia does not know; it knows {', '.join(FUNCTIONS)}: "
-            f"fit one of them to it",
-        )
+        self.fail(element, f"this function is unknown, fit one of {', '.join(FUNCTIONS)} to it", owner=owner)
 
     def _of_coefficients(self, element: Element, owner: str) -> PiecewisePolynomial:
         entry = self.property(element, "coefficients")
         values = self._list(entry, owner) if entry is not None else np.array([1.0, 0.0])
         if element.tag == "LinearFunction":
             if len(values) != 2:
-                self.fail(
-                    element,
-                    f"the LinearFunction of '{owner}' has {len(values)} coefficients; expected two (one variable)",
-                )
+                self.fail(element, f"it has {len(values)} coefficients, expected two (one variable)", owner=owner)
             return linear(*values)
         if not len(values):
-            self.fail(element, f"the PolynomialFunction of '{owner}' has no coefficients")
+            self.fail(element, "it has no coefficients", owner=owner)
         return polynomial(values)
 
     def _of_points(self, element: Element, owner: str) -> PiecewisePolynomial:
         x, y = element.child("x"), element.child("y")
         if x is None or y is None:
-            self.fail(element, f"the {element.tag} of '{owner}' has no x or no y")
+            self.fail(element, "it has no x or no y", owner=owner)
         build = simm_spline if element.tag == "SimmSpline" else piecewise_linear
         try:
             return build(self._list(x, owner), self._list(y, owner))
         except ValueError as error:
-            self.fail(element, f"the {element.tag} of '{owner}': {error}")
+            self.fail(element, str(error), owner=owner)

@@ -13,6 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from kinertia.errors import OsimError
+from kinertia.findings.finding import with_evidence
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
 from kinertia.io.number_table import expect_file
 from kinertia.io.osim.joints import Frames, JointElement, coupled, read_joint, read_joint_in_body
 from kinertia.io.osim.properties import Values
@@ -68,7 +71,7 @@ def read_osim(path: str | Path) -> OsimModel:
     skeleton = _skeleton(values, model, joints, couplings, markers)
     if not bsp.mass_kg[bsp.segments.index(skeleton.segments[0])] > 0:
         root = next(body for body in bodies if body.name == skeleton.segments[0])
-        values.fail(root, f"the root body '{root.name}' has no mass; expected a positive one (kg), as of a pelvis")
+        values.fail(root, "the root has no mass, expected a positive one (kg), as of a pelvis", "O103")
     turned = {marker.label: rotation for marker, rotation in placed}
     return OsimModel(path, content, skeleton, bsp, tuple(_kept(joint) for joint in joints), couplings, turned)
 
@@ -77,22 +80,21 @@ def _model(path: Path, content: bytes) -> tuple[Element, int]:
     try:
         document = parse(content)
     except XmlError as error:
-        raise OsimError(path, f"not XML ({error}); expected an OpenSim model, export it again", error.line) from None
+        raise _unknown(path, f"not XML ({error})", error.line) from None
     model = document.child("Model")
     if document.tag != "OpenSimDocument" or model is None:
-        raise OsimError(path, f"no Model in it (outermost element <{document.tag}>); expected an OpenSim model")
+        raise _unknown(path, f"no Model in it (outermost element <{document.tag}>)")
     stated = document.attributes.get("Version", "")
     version = int(stated) if re.fullmatch("[0-9]{1,9}", stated) else 0
     if version > NEWEST_VERSION:
-        raise OsimError(
-            path,
-            f"format {stated} is newer than {NEWEST_VERSION}, the newest known here; save it with OpenSim 4.6 or "
-            f"earlier, or update Kinertia",
-            document.line,
-        )
+        raise _unknown(path, f"{stated}, newer than {NEWEST_VERSION}, the newest known here", document.line)
     if version not in _FORMAT_3 and version not in _FORMAT_4:
-        raise OsimError(path, f"format '{stated}' is not known; open it in OpenSim 4 and save it again", document.line)
+        raise _unknown(path, f"'{stated}'", document.line)
     return model, version
+
+
+def _unknown(path: Path, version: str, line: int | None = None) -> OsimError:
+    return OsimError.found(path, "O101", line, version=Quantity(version))
 
 
 def _objects(model: Element, tag: str) -> list[Element]:
@@ -121,7 +123,7 @@ def _bsp(values: Values, bodies: Sequence[Element]) -> BodySegmentParameters:
     for body in bodies:
         mass = values.numbers(body, "mass", 1)
         if mass[0] < 0:
-            values.fail(body, f"body '{body.name}' has mass {mass[0]:g} kg; expected zero or a positive one")
+            values.fail(body, f"its mass is {mass[0]:g} kg, expected zero or a positive one", "O103")
         centre = values.numbers(body, "mass_center", 3, [0.0] * 3)
         if values.property(body, "inertia") is not None:
             inertia = values.numbers(body, "inertia", 6)
@@ -138,26 +140,21 @@ def _ordered(values: Values, joints: Sequence[JointElement], bodies: Sequence[El
     for joint in joints:
         for end in (joint.parent, joint.child):
             if end not in names and (end != "ground" or end == joint.child):
-                values.fail(
-                    joint.element,
-                    f"joint '{joint.name}' connects '{end}', which is not among the bodies; correct its name",
-                )
+                values.fail(joint.element, f"it connects '{end}', which is not among the bodies", "O103")
     placed, left, ordered = {"ground"}, list(joints), []
     while left:
         ready = next((joint for joint in left if joint.parent in placed), None)
         if ready is None:
-            values.fail(left[0].element, f"joint '{left[0].name}' is in a chain that does not reach ground")
+            values.fail(left[0].element, "it is in a chain that does not reach ground", "O103")
         if ready.child in placed:
-            values.fail(
-                ready.element,
-                f"joint '{ready.name}' closes a loop at body '{ready.child}'; expected a tree, one joint for each body",
-            )
+            loop = f"it closes a loop at body '{ready.child}', expected a tree, one joint for each body"
+            values.fail(ready.element, loop, "O103")
         left.remove(ready)
         placed.add(ready.child)
         ordered.append(ready)
     for body in bodies:
         if body.name not in placed:
-            values.fail(body, f"body '{body.name}' has no joint that connects it; add one or remove the body")
+            values.fail(body, "no joint connects it", "O103")
     return ordered
 
 
@@ -169,22 +166,15 @@ def _couplings(values: Values, model: Element, joints: Sequence[JointElement]) -
         if values.flag(element, "isDisabled", False) or not values.flag(element, "isEnforced", True):
             continue
         if element.tag != "CoordinateCouplerConstraint":
-            values.fail(
-                element,
-                f"constraint '{element.name}' is a {element.tag}, which Kinertia cannot represent; it knows "
-                f"CoordinateCouplerConstraint: set isEnforced to false or remove it",
-            )
+            values.fail(element, "of constraints only a CoordinateCouplerConstraint is, set isEnforced to false")
         leaders = values.text(element, "independent_coordinate_names").split()
         dependent = values.text(element, "dependent_coordinate_name")
         for name in (*leaders, dependent):
             if name not in names:
-                values.fail(element, f"constraint '{element.name}' names the coordinate '{name}', which no joint has")
+                values.fail(element, f"it names the coordinate '{name}', which no joint has")
         holder = element.child("coupled_coordinates_function")
         if len(leaders) != 1 or holder is None or not holder.children:
-            values.fail(
-                element,
-                f"constraint '{element.name}' has {len(leaders)} independent coordinates; expected one and a function",
-            )
+            values.fail(element, f"it has {len(leaders)} independent coordinates, expected one and a function")
         function = values.function(holder.children[0], element.name)
         scale = float(values.numbers(element, "scale_factor", 1, [1.0])[0])
         couplings.append((element, Coupling(dependent, leaders[0], function.scaled(scale))))
@@ -197,7 +187,7 @@ def _leaders_first(values: Values, couplings: Sequence[tuple[Element, Coupling]]
         following = {coupling.dependent for _, coupling in left}
         ready = next((item for item in left if item[1].independent not in following), None)
         if ready is None:
-            values.fail(left[0][0], f"constraint '{left[0][0].name}' couples coordinates in a circle")
+            values.fail(left[0][0], "it couples coordinates in a circle")
         left.remove(ready)
         ordered.append(ready[1])
     return tuple(ordered)
@@ -211,7 +201,7 @@ def _marker(
     if frames is None:
         body, rotation, origin = values.text(element, "body"), np.eye(3), np.zeros(3)
         if body not in (*bodies, "ground"):
-            values.fail(element, f"marker '{element.name}' is on '{body}', which is not among the bodies")
+            values.fail(element, f"it is on '{body}', which is not among the bodies", "O103")
     else:
         body, (rotation, origin) = frames.place(element, element.name, values.text(element, "socket_parent_frame"))
     return Marker(element.name, body, origin + rotation @ location), rotation
@@ -222,13 +212,11 @@ def _check_marker_names(values: Values, elements: Sequence[Element], bodies: Seq
     first: dict[str, str] = {}
     for element, body in zip(elements, bodies, strict=True):
         if element.name in first:
-            both = [first[element.name], body]
-            where = f"both on {body}" if both[0] == body else f"on {both[0]} and on {body}"
-            values.fail(
-                element,
-                f"two markers are named '{element.name}', {where}; expected one of each name, or nobody knows which "
-                f"of them the measured marker is; most likely one was copied: rename or delete one",
-            )
+            other = first[element.name]
+            on = Quantity(body if other == body else f"{other} and {body}")
+            stated = {"label": Quantity(element.name), "bodies": on}
+            found = with_evidence("O105", Where(markers=(element.name,)), stated)
+            raise OsimError.about(values.path, found, element.line)
         first[element.name] = body
 
 
@@ -240,16 +228,10 @@ def _skeleton(
     markers: Sequence[Marker],
 ) -> Skeleton:
     gravity = values.numbers(model, "gravity", 3, [0.0, -9.80665, 0.0])
-    if gravity[0] or gravity[2] or not gravity[1] < 0:
-        values.fail(model, f"gravity is {gravity.tolist()}; expected it along -y (Y up), turn the model")
     low, high = EARTHS_GRAVITY_M_S2
-    if not low <= -gravity[1] <= high:
-        cause = "millimetres in place of metres" if -gravity[1] > 1000 else "a value that was changed for a simulation"
-        values.fail(
-            model,
-            f"gravity is {-gravity[1]:g} m/s2; expected {low:g} to {high:g} m/s2, as anywhere on Earth; most likely "
-            f"{cause}: set gravity to 0 -9.80665 0",
-        )
+    if gravity[0] or gravity[2] or not low <= -gravity[1] <= high:
+        stated = {"gravity": Quantity(tuple(gravity.tolist()), "m/s2", usual=(-high, -low))}
+        raise OsimError.about(values.path, with_evidence("O104", Where(), stated), model.line)
     locked: dict[str, float] = {}
     following = {coupling.dependent for coupling in couplings}
     for joint in joints:
@@ -307,10 +289,8 @@ def _check_root(
     root, *others = joints
     for joint in others:
         if joint.parent == "ground":
-            values.fail(
-                joint.element,
-                f"joint '{joint.name}' puts '{joint.child}' on ground beside '{root.child}'; expected one root body",
-            )
+            beside = f"it puts '{joint.child}' on ground beside '{root.child}', expected one root body"
+            values.fail(joint.element, beside, "O103")
     names = {axis.coordinate for axis in root.axes}
     free = len(names) == 6 and not names & {*locked, *following}
     free &= [axis.kind for axis in root.axes] == ["translation"] * 3 + ["rotation"] * 3
@@ -319,8 +299,5 @@ def _check_root(
         directions = np.array([axis.direction for axis in root.axes]).reshape(2, 3, 3)
         free = bool(np.allclose(directions @ directions.transpose(0, 2, 1), np.eye(3), atol=1e-6))
     if not free:
-        values.fail(
-            root.element,
-            f"without a free root joint: '{root.name}' ({root.element.tag}) between ground and '{root.child}' must "
-            f"have three free translations and three free rotations about axes square to one another, none locked",
-        )
+        axes = "three free translations, then three free rotations about axes at right angles, none of them locked"
+        values.fail(root.element, f"between ground and '{root.child}' it must have {axes}", "O103")

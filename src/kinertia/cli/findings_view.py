@@ -1,0 +1,61 @@
+"""Findings on a terminal: the verdict, at most three findings, and all of them with `--verbose`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from kinertia.cli.terminal import out
+from kinertia.findings.finding import Finding, Severity
+from kinertia.findings.overview import Group, Overview, grouped, in_order
+
+_SHOWN = 3
+_STYLES = {
+    Severity.ERROR: "bold red",
+    Severity.WARNING: "bold yellow",
+    Severity.CORRECTED: "cyan",
+    Severity.INFO: "dim",
+}
+
+
+def show_overview(overview: Overview, verbose: bool) -> None:
+    """The verdict in one line, then at most three findings of one line each, or everything."""
+    out.print(overview.line, soft_wrap=True)
+    if verbose:
+        show_all(overview.findings)
+        return
+    groups = [group for group in grouped(overview.open) if group.first.severity > Severity.INFO]
+    for group in groups[:_SHOWN]:
+        _show_line(group)
+    hidden = len(groups) - len(groups[:_SHOWN])
+    infos = overview.count(Severity.INFO)
+    more = [f"{hidden} more" if hidden else "", f"{infos} assumptions" if infos else ""]
+    if any(more):
+        out.print(f"{' and '.join(filter(None, more))}: --verbose lists all; kinertia explain CODE", soft_wrap=True)
+
+
+def show_all(findings: Sequence[Finding]) -> None:
+    """Every finding with effect, causes and remedy, those that another explains below it."""
+    for group in grouped(in_order(one for one in findings if one.muted_by is None)):
+        _show_line(group)
+        first = group.first
+        if first.severity is Severity.INFO:
+            continue
+        lines = [first.effect, _causes(first), first.remedy]
+        out.print("\n".join(f"    {line}" for line in lines if line), soft_wrap=True)
+        codes = {one.code for one in group.findings}
+        for muted in grouped(one for one in findings if one.muted_by in codes):
+            out.print(f"    explains {muted.line}", soft_wrap=True)
+
+
+def _causes(one: Finding) -> str:
+    causes = one.causes or one.rule.causes
+    return f"Likely causes: {'; '.join(causes)}." if causes else ""
+
+
+def _show_line(group: Group) -> None:
+    from rich.text import Text
+
+    first = group.first
+    overruled = "" if first.status == "open" else f" [{first.status}]"
+    label = Text(f"{first.severity.name}{overruled}  ", style=_STYLES[first.severity])
+    out.print(label.append(group.line, style="not bold default"), soft_wrap=True)

@@ -1,0 +1,62 @@
+"""Where landmarks are, and which way feet and pelvis point: what tells a person's axes from the markers alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from kinertia.model.marker_set import MarkerSet
+from kinertia.trial.data import FloatArray, Markers
+
+CLEAR = 0.5
+"""Cosine beyond which a direction is clear: feet turn out and knees turn in by less than 60 degrees."""
+_FLAT = 0.8
+"""Cosine of 37 degrees."""
+
+
+def landmark_positions(markers: Markers, marker_set: MarkerSet) -> dict[str, FloatArray]:
+    """(n, 3) m of the landmarks whose labels are all there."""
+    return {
+        name: markers.select(labels).positions.mean(axis=1)
+        for name, labels in marker_set.landmarks.items()
+        if labels and set(labels) <= set(markers.labels)
+    }
+
+
+def headings(places: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    """(n, 3): where "foot_r", "foot_l" and "pelvis" point, each from its own back to its front, whatever its side; NaN
+    while a foot is steep: behind a runner it points down and backwards.
+    """
+    found = {}
+    for side in "rl":
+        toe = next((f"{name}_{side}" for name in ("metatarsal", "toe") if f"{name}_{side}" in places), "")
+        if toe and f"heel_{side}" in places:
+            along = places[toe] - places[f"heel_{side}"]
+            flat = np.linalg.norm(horizontal(along), axis=1) > _FLAT * np.linalg.norm(along, axis=1)
+            found[f"foot_{side}"] = np.where(flat[:, None], horizontal(along), np.nan)
+    back = [places[name] for name in ("psis_r", "psis_l", "sacrum") if name in places]
+    if back and {"asis_r", "asis_l"} <= set(places):
+        found["pelvis"] = horizontal((places["asis_r"] + places["asis_l"]) / 2 - np.mean(back, axis=0))
+    return {name: heading for name, heading in found.items() if np.isfinite(heading).all(axis=1).any()}
+
+
+def horizontal(vectors: FloatArray) -> FloatArray:
+    """Their horizontal part."""
+    result: FloatArray = vectors * np.array([1.0, 0.0, 1.0])
+    return result
+
+
+def unit(vectors: FloatArray) -> FloatArray:
+    """Vectors (..., 3) over their length; NaN of those that have none."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        result: FloatArray = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return result
+
+
+def cosine(vectors: FloatArray, others: FloatArray) -> float:
+    """Median over the frames of the cosine between the horizontal parts; 0 where nothing is seen."""
+    with np.errstate(invalid="ignore"):
+        cosines = (unit(horizontal(vectors)) * unit(horizontal(others))).sum(axis=-1)
+    seen = cosines[np.isfinite(cosines)]
+    return float(np.median(seen)) if seen.size else 0.0

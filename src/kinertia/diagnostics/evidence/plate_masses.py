@@ -1,0 +1,45 @@
+"""How heavy the body is by each plate alone, while one foot stands on it and on nothing else."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kinertia.diagnostics.context import RecordingContext
+from kinertia.diagnostics.evidence.markers_centre import markers_centre
+from kinertia.model.skeleton import GRAVITY_M_S2
+from kinertia.motion.smoothing import SmoothingError, smooth
+from kinertia.trial.data import FloatArray
+from kinertia.trial.sampled_time import nearest_samples, runs, span_s, within
+
+_CENTRE_HZ = 8.0
+_ALONE_N, _UNLOADED_N, _SHORTEST_S = 50.0, 10.0, 0.2
+
+
+def plate_masses(context: RecordingContext) -> dict[str, float]:
+    """kg, by plate, of a body that moves like the markers' centre; plates that never carry it alone are left out."""
+    plates, markers, trial = context.plates, context.all_markers, context.trial
+    place = None if plates is None or trial is None else markers_centre(context.segment_of_label, markers)
+    if plates is None or trial is None or place is None:
+        return {}
+    try:
+        centre = smooth(markers.time, place[:, 1], _CENTRE_HZ)
+    except SmoothingError:
+        return {}
+    measured = trial.measured[nearest_samples(markers.time, plates.time)]
+    measured &= within(plates.time, markers.time[0], markers.time[-1])
+    by_plate = {}
+    for p, name in enumerate(plates.names):
+        vertical: FloatArray = plates.force[:, p, 1]
+        others = np.delete(plates.force[..., 1], p, axis=1).max(axis=1, initial=0.0)
+        masses_kg = []
+        for first, last in runs((vertical > _ALONE_N) & (others < _UNLOADED_N) & measured):
+            span = span_s(plates.time, first, last)
+            if span < _SHORTEST_S:
+                continue
+            step = np.diff(plates.time[first : last + 1])
+            impulse = float(((vertical[first + 1 : last + 1] + vertical[first:last]) / 2 * step).sum())
+            velocity = centre(plates.time[[first, last]], 1)
+            masses_kg.append(impulse / (GRAVITY_M_S2 * span + float(velocity[1] - velocity[0])))
+        if masses_kg:
+            by_plate[name] = float(np.mean(masses_kg))
+    return by_plate

@@ -1,0 +1,217 @@
+"""Single trajectories that no body part makes: spikes, jumps, frozen markers, gaps filled with straight lines.
+
+A body is slow: from one frame to the next a marker goes nearly as far as it did before and will do after. By how much
+it does not, its step, is at most 12 mm on the fault-free trials at hand (60 frames a second and more, runs and jumps
+included; 28 mm where one marker was labelled again), and that of the median marker 1.5 mm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from kinertia.diagnostics.evidence.marker_precision import USUAL_HZ
+from kinertia.trial.data import BoolArray, FloatArray, Markers
+from kinertia.trial.sampled_time import runs
+
+BODY_M, SPIKE_M = 0.02, 0.06
+"""Off the middle of its neighbours: a body's accelerations account for less than the one at 60 Hz, a spike for as much
+more as the other."""
+STEP_M, USUAL_STEP_M = 0.04, (0.0, 0.012)
+STRAIGHT_M = 1.5e-4
+"""Nothing alive moves so straight, at a constant speed, for `STRAIGHT_S`; cameras err by more."""
+STRAIGHT_S = 0.15
+OFF_M = 0.015
+"""By which a marker's distances in its segment change while it is frozen or goes straight, and the segment does not."""
+_SINGLE = 1.5
+"""A single frame is off by twice as much as it makes those beside it look; one before or after a jump, by as much."""
+_FROZEN_M = 1e-3
+
+
+@dataclass(frozen=True)
+class Spikes:
+    """Single frames in which one marker is off.
+
+    Attributes:
+        distance_m: from the middle of its neighbours, the largest.
+        frames: how many.
+        far_frames: how many of them are beyond `spike_limit_m`.
+    """
+
+    label: str
+    distance_m: float
+    frames: int
+    far_frames: int
+    span_s: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Jump:
+    """A step (m) of one marker that stays."""
+
+    label: str
+    step_m: float
+    span_s: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Filled:
+    """An interval in which one marker is frozen, or goes along a straight line, while its segment (m) does not."""
+
+    label: str
+    frozen: bool
+    relative_motion_m: float
+    span_s: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class TrajectoryFaults:
+    """What is wrong with single trajectories."""
+
+    spikes: tuple[Spikes, ...] = ()
+    jumps: tuple[Jump, ...] = ()
+    filled: tuple[Filled, ...] = ()
+
+    @classmethod
+    def of(cls, markers: Markers, segments: Mapping[str, Sequence[str]], coarse: bool = False) -> TrajectoryFaults:
+        """Of all markers.
+
+        Args:
+            markers: of a motion, or of a person who stands.
+            segments: labels of the markers on each segment.
+            coarse: coordinates are rounded, or noisy, so that all markers seem to jump and to stand still: then
+                repeated large spikes count only.
+        """
+        if len(markers.time) < 3:
+            return cls()
+        off = _off_neighbours(markers.positions)
+        far = _local_peaks(off) & (off > spike_limit_m(markers.rate_hz))
+        if coarse or len(markers.time) < 5:
+            return cls(_spikes(markers, off, far, np.zeros_like(far)))
+        size = np.nan_to_num(np.linalg.norm(steps(markers.positions), axis=-1))
+        size[size <= step_limit_m(markers.rate_hz)] = 0.0
+        # a frame that is off makes a step to it, and one from it
+        step = np.pad(size > 0.0, ((1, 1), (0, 0)))
+        single = _is_single(off) & (step[1:] | step[:-1])
+        # and makes those beside them look half as large
+        near = np.pad(single, ((2, 2), (0, 0)))
+        size[near[3:-2] | near[2:-3] | near[1:-4] | near[4:-1]] = 0.0
+        return cls(_spikes(markers, off, far, single), _jumps(markers, size), _filled(markers, segments))
+
+    @property
+    def labels(self) -> frozenset[str]:
+        """Of all markers with faults."""
+        found: tuple[Spikes | Jump | Filled, ...] = (*self.spikes, *self.jumps, *self.filled)
+        return frozenset(one.label for one in found)
+
+
+MOST_SPIKES = 2
+"""More frames of one marker that are far off are no accident of labelling."""
+
+
+def spike_limit_m(rate_hz: float) -> float:
+    """Distance from the middle of the neighbours beyond which a frame is far off; 80 mm at 60 Hz and more."""
+    return SPIKE_M + BODY_M * slowness(rate_hz)
+
+
+def step_limit_m(rate_hz: float) -> float:
+    """Step beyond which a marker jumps."""
+    return STEP_M * slowness(rate_hz)
+
+
+def slowness(rate_hz: float) -> float:
+    """By how much farther accelerations take a marker from frame to frame than at 60 Hz."""
+    return max(1.0, USUAL_HZ / rate_hz) ** 2
+
+
+def steps(position: FloatArray) -> FloatArray:
+    """(n - 3, m, 3) m, by how much the way from frame i + 1 to i + 2 differs from those before and after it."""
+    way = np.diff(position, axis=0)
+    result: FloatArray = way[1:-1] - (way[:-2] + way[2:]) / 2
+    return result
+
+
+def _spikes(markers: Markers, off: FloatArray, far: BoolArray, single: BoolArray) -> tuple[Spikes, ...]:
+    """Of frames (n - 2, m) that are far off, and of those that are off alone."""
+    found = []
+    for k in range(len(markers.labels)):
+        often = np.count_nonzero(far[:, k]) > MOST_SPIKES
+        frames = np.flatnonzero(single[:, k] | far[:, k] if often else single[:, k])
+        if not frames.size:
+            continue
+        span = (float(markers.time[1 + frames[0]]), float(markers.time[1 + frames[-1]]))
+        count = int(np.count_nonzero(far[frames, k]))
+        found.append(Spikes(markers.labels[k], float(off[frames, k].max()), len(frames), count, span))
+    return tuple(found)
+
+
+def _jumps(markers: Markers, size: FloatArray) -> tuple[Jump, ...]:
+    """Of steps (n - 3, m) m; 0 where there are none. Of adjacent ones the largest is the jump."""
+    return tuple(
+        Jump(markers.labels[k], float(size[frame, k]), (float(markers.time[frame + 1]), float(markers.time[frame + 2])))
+        for k in np.flatnonzero(size.any(axis=0))
+        for frame in (first + int(np.argmax(size[first : last + 1, k])) for first, last in runs(size[:, k] > 0.0))
+    )
+
+
+def _filled(markers: Markers, segments: Mapping[str, Sequence[str]]) -> tuple[Filled, ...]:
+    count = max(4, round(STRAIGHT_S * markers.rate_hz))
+    if len(markers.time) < max(count, STRAIGHT_S * markers.rate_hz + 1):
+        return ()
+    found = []
+    straight = _straight(markers.positions, count)
+    for k, label in enumerate(markers.labels):
+        own = next((labels for labels in segments.values() if label in labels), ())
+        mates = [markers.labels.index(one) for one in own if one != label and one in markers.labels]
+        for first, last in runs(straight[:, k]):
+            inside = slice(first, last + count)
+            way = markers.positions[inside, k]
+            moved = float(np.linalg.norm(way[-1] - way[0]))
+            # against all of a body nothing can be said of a foot on the ground
+            relative = _relative_motion_m(way, markers.positions[inside][:, mates]) if mates else moved / 2
+            if relative > OFF_M:
+                span = (float(markers.time[first]), float(markers.time[last + count - 1]))
+                found.append(Filled(label, moved < _FROZEN_M, relative, span))
+    return tuple(found)
+
+
+def _relative_motion_m(way: FloatArray, others: FloatArray) -> float:
+    """By how much the distance of a way (f, 3) from one of other markers (f, m, 3) changes; 0 where it is unknown."""
+    distance = np.linalg.norm(others - way[:, None], axis=-1)
+    if not np.isfinite(distance).all(axis=0).any():
+        return 0.0
+    seen = distance[:, np.isfinite(distance).any(axis=0)]
+    return float(np.max(np.nanmax(seen, axis=0) - np.nanmin(seen, axis=0)))
+
+
+def _straight(position: FloatArray, count: int) -> BoolArray:
+    """(n - count + 1, m) where the next `count` frames of a marker are on a line, at a constant speed."""
+    first, last = position[: len(position) - count + 1], position[count - 1 :]
+    result = np.isfinite(first).all(axis=-1) & np.isfinite(last).all(axis=-1)
+    for k in range(1, count - 1):
+        between = position[k : len(position) - count + 1 + k]
+        share = k / (count - 1)
+        off = np.abs(between - (1 - share) * first - share * last).max(axis=-1)
+        result &= np.nan_to_num(off, nan=np.inf) < STRAIGHT_M
+    return np.asarray(result)
+
+
+def _off_neighbours(position: FloatArray) -> FloatArray:
+    """(n - 2, m) m, from the middle between the frames before and after; 0 where one of them is not seen."""
+    off = np.linalg.norm(position[1:-1] - (position[2:] + position[:-2]) / 2, axis=-1)
+    result: FloatArray = np.nan_to_num(off)
+    return result
+
+
+def _local_peaks(off: FloatArray) -> BoolArray:
+    """Of three frames around a spike the middle one is farthest off."""
+    beside = np.pad(off, ((1, 1), (0, 0)))
+    return np.asarray((off >= beside[2:]) & (off >= beside[:-2]))
+
+
+def _is_single(off: FloatArray) -> BoolArray:
+    """Where single frames are off: those beside them are half as far off then, and as far where a marker jumps."""
+    beside = np.pad(off, ((1, 1), (0, 0)))
+    return np.asarray(off > _SINGLE * np.maximum(beside[2:], beside[:-2]))

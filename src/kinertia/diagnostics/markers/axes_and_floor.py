@@ -1,0 +1,114 @@
+"""M14: are unit of length, vertical axis and floor right, by a person's shape and by where the feet stand?
+
+On six fault-free walks over 1.5 to 4.3 m the places where feet stand rise by up to 0.07 degrees along the walkway, and
+lie on a line within 2 mm; cameras that are tilted by 3 degrees show 2.9 to 3.1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from kinertia.diagnostics.context import RecordingContext
+from kinertia.diagnostics.evidence.landmarks import landmark_positions
+from kinertia.findings.finding import Finding, finding, with_evidence
+from kinertia.findings.quantity import Quantity
+from kinertia.trial.data import FloatArray
+from kinertia.trial.marker_quality import UPRIGHT_SHARE, extent_m
+from kinertia.trial.sampled_time import runs, span_s
+
+_SMALLEST_M, _LARGEST_M = 0.3, 2.8
+_UPRIGHT = 0.5
+"""Cosine of 60 degrees: who sits has the pelvis half beside the feet."""
+_STILL_M_S, _SHORTEST_S = 0.15, 0.08
+_LONGEST_M, _FEWEST_PLACES = 1.0, 3
+_TILTED_RAD, _STEEP_RAD, _OFF_LINE_M = np.radians(0.8), np.radians(10.0), 0.006
+"""Steeper are stairs, and jumps from a box."""
+_USUAL_RAD = (-np.radians(0.1), np.radians(0.1))
+
+
+def unit_and_vertical(context: RecordingContext) -> Iterator[Finding]:
+    """M141, or M142 by the extent of the markers or by the line from the feet to the pelvis."""
+    extent = extent_m(context.markers)
+    if np.isnan(extent).any():
+        return
+    largest = float(extent.max())
+    size = (float(extent[0]), float(extent[1]), float(extent[2]))
+    if not _SMALLEST_M <= largest <= _LARGEST_M:
+        limit = _SMALLEST_M if largest < _SMALLEST_M else _LARGEST_M
+        yield finding("M141", context.at(), extent_m=Quantity(size, "m", limit=limit, usual=(_SMALLEST_M, _LARGEST_M)))
+        return
+    line = _feet_to_pelvis_m(context)
+    lies = line is not None and line[1] <= _UPRIGHT * np.linalg.norm(line)
+    if not lies and extent[1] >= UPRIGHT_SHARE * largest:
+        return
+    upwards = line if lies and line is not None else extent
+    axis = int(np.argmax(np.abs(upwards)))
+    name = context.along(axis)["file_axis"].lstrip("-")
+    negative = context.along(axis)["file_axis"].startswith("-") != bool(upwards[axis] < 0)
+    evidence = {"extent_m": Quantity(size, "m")}
+    if line is not None:
+        evidence["feet_to_pelvis_m"] = Quantity((float(line[0]), float(line[1]), float(line[2])), "m")
+    expected = context.recording.vertical.lstrip("+")
+    evidence |= {"up": Quantity(f"-{name}" if negative else name), "expected": Quantity(expected)}
+    yield with_evidence("M142", context.at(), evidence)
+
+
+def _feet_to_pelvis_m(context: RecordingContext) -> FloatArray | None:
+    """(3,) m, median over the frames; None where it is not seen."""
+    if context.marker_set is None:
+        return None
+    places = landmark_positions(context.all_markers, context.marker_set)
+    feet = [place for name, place in places.items() if name.startswith(("heel", "ankle_lateral", "metatarsal"))]
+    if not feet or not {"asis_r", "asis_l"} <= set(places):
+        return None
+    lines = (places["asis_r"] + places["asis_l"]) / 2 - np.mean(feet, axis=0)
+    lines = lines[np.isfinite(lines).all(axis=1)]
+    return np.asarray(np.median(lines, axis=0)) if len(lines) else None
+
+
+def floor_slope(context: RecordingContext) -> Iterator[Finding]:
+    """M144: a floor that rises (positive) or falls along the walk; not asked of a treadmill."""
+    if context.feet is None or context.recording.belt is not None:
+        return
+    markers = context.all_markers
+    labels = [label for own in context.feet.values() for label in own]
+    stances = [_stances(markers.time, markers.positions[:, markers.labels.index(label)]) for label in labels]
+    of_marker = np.repeat(np.arange(len(labels)), [len(one) for one in stances])
+    if len(of_marker) < _FEWEST_PLACES + len(labels):
+        return
+    place = np.concatenate(stances)
+    level = place[:, [0, 2]] - place[:, [0, 2]].mean(axis=0)
+    way = np.linalg.svd(level, full_matrices=False)[2][0]
+    forward = np.radians(context.travel.direction_deg)
+    if way @ [np.cos(forward), -np.sin(forward)] < 0:
+        way = -way
+    along = level @ way
+    if np.ptp(along) < _LONGEST_M:
+        return
+    # every marker is as high above the floor as it is
+    terms = np.column_stack([along, *(of_marker == k for k in range(len(labels)) if (of_marker == k).any())])
+    fitted, *_ = np.linalg.lstsq(terms, place[:, 1], rcond=None)
+    residual = float(np.sqrt(np.square(place[:, 1] - terms @ fitted).mean()))
+    slope = float(np.arctan(fitted[0]))
+    if not _TILTED_RAD < abs(slope) < _STEEP_RAD or residual > _OFF_LINE_M:
+        return
+    yield finding(
+        "M144",
+        context.at(**context.along(context.axes.fore_aft)),
+        slope_rad=Quantity(slope, "rad", limit=_TILTED_RAD, usual=_USUAL_RAD),
+        residual_m=Quantity(residual, "m", limit=_OFF_LINE_M),
+        length_m=Quantity(float(np.ptp(along)), "m"),
+    )
+
+
+def _stances(time: FloatArray, position: FloatArray) -> FloatArray:
+    """(s, 3) m, where one marker stood."""
+    speed = np.linalg.norm(np.gradient(position, time, axis=0), axis=1)
+    still = [
+        position[first : last + 1].mean(axis=0)
+        for first, last in runs(np.nan_to_num(speed, nan=np.inf) < _STILL_M_S)
+        if span_s(time, first, last) >= _SHORTEST_S
+    ]
+    return np.array(still).reshape(-1, 3)

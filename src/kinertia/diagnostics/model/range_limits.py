@@ -1,0 +1,49 @@
+"""Do the model's ranges of motion keep coordinates from where the markers show them?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from kinertia.findings.finding import Finding, finding
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
+from kinertia.model.anatomy import segment_of
+from kinertia.model.skeleton import Skeleton
+from kinertia.motion.inverse_kinematics import InverseKinematics
+
+_AT_LIMIT, _BEYOND_RAD = 0.05, float(np.radians(10.0))
+"""Share of the frames, and angle, from which on a limit of a coordinate's range is worth a word."""
+_CLAMPED = 0.2
+"""Share of the frames from which on a clamped coordinate of legs or trunk is a fault of the model: on 30 fault-free
+trials with models of six makers it is 0.08 at most (knees that end straight), in one that clamps knees at 10 degrees
+0.33."""
+
+
+def range_findings(skeleton: Skeleton, ik: InverseKinematics) -> Iterator[Finding]:
+    """O311: legs and trunk that stay at a clamped limit, so that other joints make up for it; O312: whatever else stays
+    at one, or goes beyond the usual range of a joint.
+
+    Args:
+        skeleton: with its ranges.
+        ik: of one trial.
+    """
+    bounds, known = skeleton.bounds, np.isfinite(ik.q)
+    at_limit = ((ik.q <= bounds.least) | (ik.q >= bounds.most)).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
+    within = np.where(known, ik.q, bounds.clamped(np.zeros_like(ik.q)))
+    beyond = np.abs(bounds.beyond(within)).max(axis=0)
+    central = [skeleton.segments.index(foot) for foot in skeleton.feet]
+    central += [k for k, segment in enumerate(skeleton.segments) if segment_of(segment) == "torso"]
+    moves = set(skeleton.map.owner[skeleton.support[central].any(axis=0)].tolist())
+    for c, name in enumerate(ik.coordinates):
+        unit = "rad" if skeleton.rotational[c] else "m"
+        limits = Quantity((float(bounds.least[c]), float(bounds.most[c])), unit)
+        share, past = float(at_limit[c]), float(beyond[c])
+        if share > _CLAMPED and c in moves:
+            usual = (0.0, 0.08)
+            clamped = Quantity(share, "1", limit=_CLAMPED, usual=usual)
+            yield finding("O311", Where(part=name), share=clamped, range_rad=limits)
+        if share > _AT_LIMIT or (past > _BEYOND_RAD and skeleton.rotational[c]):
+            beyond_rad = Quantity(past, unit, limit=_BEYOND_RAD)
+            yield finding("O312", Where(part=name), share=Quantity(share, "1", limit=_AT_LIMIT), beyond_rad=beyond_rad)

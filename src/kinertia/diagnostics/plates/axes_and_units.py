@@ -1,0 +1,61 @@
+"""Are axes and units of the forces right, by the plates themselves?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from kinertia.diagnostics.context import RecordingContext
+from kinertia.diagnostics.evidence.loaded_plates import loaded_wrenches
+from kinertia.findings.finding import Finding, finding
+from kinertia.findings.quantity import Quantity
+from kinertia.trial.centre_of_pressure import free_moment
+from kinertia.trial.data import LOAD_THRESHOLD_N, PlateLoads
+
+_VERTICAL_SHARE = 0.7
+"""Of the largest force; a foot pushes sideways and backwards by less."""
+_WEAKEST_N = 0.3
+"""Less is no load in kN, nor in multiples of body weight."""
+_LONGEST_ARM_M, _USUAL_ARM_M, _FEWEST = 0.15, 0.04, 10
+"""Free moment over vertical force; so many samples under load, at least."""
+
+
+def axes_and_units(context: RecordingContext) -> Iterator[Finding]:
+    """P201 to P203."""
+    plates = context.plates
+    if plates is None:
+        return
+    x, y, z = (float(value) for value in np.abs(plates.force).max(axis=(0, 1), initial=0.0))
+    if y < _VERTICAL_SHARE * max(x, z):
+        yield finding(
+            "P201",
+            context.at(**context.along(0 if x > z else 2)),
+            peak_n=Quantity((x, y, z), "N"),
+            vertical=Quantity(context.recording.vertical),
+        )
+    peak = _peak_of_weak_loads(plates)
+    if peak is not None:
+        yield finding(
+            "P202",
+            context.at(),
+            peak_n=Quantity(peak, "N", limit=LOAD_THRESHOLD_N),
+            unit=Quantity("kN or multiples of body weight"),
+        )
+    for name, wrench in loaded_wrenches(plates, _FEWEST):
+        arm_m = float(np.median(np.abs(free_moment(wrench)) / wrench[:, 1]))
+        if arm_m > _LONGEST_ARM_M:
+            usual = (0.0, _USUAL_ARM_M)
+            yield finding("P203", context.at(plate=name), arm_m=Quantity(arm_m, "m", limit=_LONGEST_ARM_M, usual=usual))
+
+
+def _peak_of_weak_loads(plates: PlateLoads) -> float | None:
+    """N, where all that plates show is too little for a person, and yet comes and goes as loads do; else None.
+
+    A plate that nobody steps on has noise, at times of some newtons, a zero or a drift, too.
+    """
+    idle = plates.idle or ()
+    peak = max((one.peak_n for one in idle), default=0.0)
+    if plates.force.any() or not _WEAKEST_N < peak < LOAD_THRESHOLD_N:
+        return None
+    return peak if any(one.like_steps and one.peak_n > _WEAKEST_N for one in idle) else None

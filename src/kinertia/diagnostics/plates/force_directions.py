@@ -1,0 +1,187 @@
+"""Do the forces point the right way? Rotated forces and reversed signs compete for what the motion contradicts.
+
+The ground accelerates the body as the markers show it: forces integrated over time are the changes of the velocity of
+the centre of mass. The pelvis moves nearly as that does when walking, the markers' centre when limbs swing (running),
+but not when the trunk bends (squats). Along each horizontal axis the mean of both correlations with what the forces
+cause is 0.5 and more on fault-free walks and runs, 0.2 in squats.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kinertia.diagnostics.context import RecordingContext
+from kinertia.diagnostics.evidence.caused_velocity import LEAST_CHANGE_M_S, CausedVelocity, VelocityChanges
+from kinertia.diagnostics.evidence.velocity_residual import (
+    DISTINGUISHABLE,
+    HORIZONTAL,
+    VelocityResidual,
+    rotated_residual,
+)
+from kinertia.findings.finding import Finding, finding, with_evidence
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.rule import rule
+from kinertia.trial.data import PlateLoads, Trial
+from kinertia.trial.sampled_time import span_s
+
+_OPPOSED, _USUAL_CORRELATION = -0.4, (0.5, 1.0)
+_CLEAR, _CLEAR_ROTATION, _ROTATED_DEG = 0.7, 0.35, 60.0
+_ONE_REVERSED, _CLEARLY_BEST, _LEAST_REVERSED_M_S, _LONG_WINDOW_S = 0.65, 0.85, 0.08, 1.0
+"""Where one plate's sign is wrong, reversing it leaves 0.04 to 0.57 of the residual on five trials; on nine fault-free
+ones 0.9 (squats), 1.4 (runs) and more."""
+
+
+@dataclass(frozen=True)
+class _Hypothesis:
+    """What would be wrong, and the residual (m/s) of the velocities once it is undone."""
+
+    found: Finding
+    residual_m_s: float
+
+
+def force_directions(context: RecordingContext) -> Iterator[Finding]:
+    """P231 to P233: the hypothesis that leaves least; the others that would do are among its causes.
+
+    One about both axes is weighed against the best of each axis.
+    """
+    trial, plates, parts = context.trial, context.plates, context.velocities
+    if trial is None or plates is None or not parts:
+        return
+    residuals = {axis: _best_explained(plates, parts, axis) for axis in HORIZONTAL}
+    correlations = _correlations(VelocityChanges.of(parts))
+    against = [axis for axis in HORIZONTAL if correlations[axis] < _OPPOSED and not _one_zero_off(trial, parts, axis)]
+    best, others, both = [], [], []
+    for axis in HORIZONTAL:
+        own = [*_reversed_plate(context, plates, residuals[axis], axis)]
+        if axis in against:
+            own.append(_reversed_axis(context, residuals[axis], correlations[axis], axis))
+        own.sort(key=lambda one: one.residual_m_s)
+        best += own[:1]
+        others += own[1:]
+        both.append(own[0].residual_m_s if own else residuals[axis].as_read)
+    rotated = _rotated(context, parts, residuals, correlations, against)
+    if rotated is not None and (not best or rotated.residual_m_s <= float(np.linalg.norm(both))):
+        best, others = [rotated], [*best, *others]
+    elif rotated is not None:
+        others.append(rotated)
+    for one in best:
+        causes = one.found.causes or rule(one.found.code).causes
+        rivals = tuple(f"{other.found.code} {other.found.message}" for other in others)
+        yield replace(one.found, causes=(*causes, *rivals))
+
+
+def _rotated(
+    context: RecordingContext,
+    parts: Sequence[CausedVelocity],
+    residuals: dict[int, VelocityResidual],
+    correlations: dict[int, float],
+    against: Sequence[int],
+) -> _Hypothesis | None:
+    """P231: by 180 degrees where both axes oppose the motion, else by the angle at which the forces go with it."""
+    angle_deg, strength = _angle(VelocityChanges.of(parts))
+    # beside an axis that is opposed, one that goes with the markers says that they are not rotated
+    enough = -_OPPOSED if against else _CLEAR
+    fitting = any(one > enough for one in correlations.values())
+    if len(against) == len(HORIZONTAL):
+        angle, residual = np.pi, float(np.linalg.norm([one.all_reversed for one in residuals.values()]))
+    elif strength > _CLEAR_ROTATION and abs(angle_deg) > _ROTATED_DEG and not fitting:
+        angle = float(np.radians(90 * round(angle_deg / 90)))
+        residual = rotated_residual(parts, angle)
+    else:
+        return None
+    found = finding(
+        "P231",
+        context.at(),
+        angle_rad=Quantity(angle, "rad", limit=float(np.radians(_ROTATED_DEG))),
+        correlation=Quantity(tuple(correlations[axis] for axis in HORIZONTAL), "1", usual=_USUAL_CORRELATION),
+        correlation_undone=Quantity(strength, "1", limit=_CLEAR_ROTATION),
+    )
+    return _Hypothesis(found, residual)
+
+
+def _reversed_axis(context: RecordingContext, residual: VelocityResidual, correlation: float, axis: int) -> _Hypothesis:
+    """P232: all plates have the wrong sign."""
+    found = finding(
+        "P232",
+        context.at(**context.along(axis)),
+        correlation=Quantity(correlation, "1", limit=_OPPOSED, usual=_USUAL_CORRELATION),
+        velocity_residual_m_s=residual.once(residual.all_reversed, residual.as_read),
+    )
+    return _Hypothesis(found, residual.all_reversed)
+
+
+def _reversed_plate(
+    context: RecordingContext, plates: PlateLoads, residual: VelocityResidual, axis: int
+) -> Iterator[_Hypothesis]:
+    """P233: one plate has the wrong sign, where others have it right.
+
+    With its sign reversed, the forces must move the body much more as the markers show: more than with that of any
+    other plate, or of all, or with another zero.
+    """
+    best = int(np.argmin(residual.plate_reversed))
+    left = float(residual.plate_reversed[best])
+    rivals = [residual.all_reversed, residual.without_trend, *np.delete(residual.plate_reversed, best).tolist()]
+    limit = min(_ONE_REVERSED * residual.as_read, _CLEARLY_BEST * min(rivals))
+    zero = int(np.argmin(residual.plate_zeroed))
+    zeroed = float(residual.plate_zeroed[zero])
+    if (
+        len(plates.names) < 2
+        or left > limit
+        or residual.as_read < _LEAST_REVERSED_M_S
+        or zeroed < DISTINGUISHABLE * left
+    ):
+        return
+    evidence = {
+        "velocity_residual_m_s": residual.once(left, limit),
+        "rivals_m_s": Quantity((*rivals, zeroed), "m/s"),
+    }
+    sign, corners, _ = causes = rule("P233").causes
+    if left < DISTINGUISHABLE * zeroed:
+        causes = (sign, corners)
+    else:  # a foot that pushes to one side all the time looks the same with another zero
+        evidence |= {"zero_n": Quantity(float(residual.zero_n[zero]), "N"), "zero_of": Quantity(plates.names[zero])}
+    where = context.at(plate=plates.names[best], **context.along(axis))
+    yield _Hypothesis(with_evidence("P233", where, evidence, causes=causes), left)
+
+
+def _best_explained(plates: PlateLoads, parts: Sequence[CausedVelocity], axis: int) -> VelocityResidual:
+    """By pelvis and markers' centre, or, where that leaves less of long windows, by the centre alone: the pelvis of
+    runners sways along the way.
+    """
+    shown = [parts]
+    if max(span_s(part.time) for part in parts) >= _LONG_WINDOW_S:
+        shown.append([replace(part, pelvis=part.centre) for part in parts])
+    found = [VelocityResidual.of(plates.time, plates.force, each, axis) for each in shown]
+    return min(found, key=lambda one: min(one.as_read, float(one.plate_reversed.min())))
+
+
+def _one_zero_off(trial: Trial, parts: Sequence[CausedVelocity], axis: int) -> bool:
+    """Whether a wrong zero under one foot accounts for more than reversing the sign of all."""
+    residual = VelocityResidual.of(trial.loads.time, trial.loads.force, parts, axis)
+    return bool(residual.plate_zeroed.min() < DISTINGUISHABLE * residual.all_reversed)
+
+
+def _correlations(changes: VelocityChanges) -> dict[int, float]:
+    """Along each axis, of what the forces cause with pelvis and markers' centre, mean of both; NaN where hardly
+    anything moves.
+    """
+    result = {}
+    for axis in HORIZONTAL:
+        caused, *shown = (part[:, axis] for part in (changes.caused, changes.pelvis, changes.centre))
+        still = min(part.std() for part in (caused, *shown)) < LEAST_CHANGE_M_S
+        result[axis] = np.nan if still else float(np.mean([np.corrcoef(caused, part)[0, 1] for part in shown]))
+    return result
+
+
+def _angle(changes: VelocityChanges) -> tuple[float, float]:
+    """The angle (deg) about the vertical by which the forces' velocities are rotated from the markers', and how well
+    both correlate once it is taken back: of the mean over pelvis and markers' centre.
+    """
+    # from Z to X is a positive rotation about Y
+    caused, *shown = (part[:, 2] + 1j * part[:, 0] for part in (changes.caused, changes.pelvis, changes.centre))
+    sizes = [max(float(np.linalg.norm(caused) * np.linalg.norm(part)), 1e-12) for part in shown]
+    turn = sum(complex(np.vdot(part, caused)) / size for part, size in zip(shown, sizes, strict=True)) / len(shown)
+    return float(np.degrees(np.angle(turn))), abs(turn)

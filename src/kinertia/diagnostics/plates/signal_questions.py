@@ -1,0 +1,40 @@
+"""What is asked of the plates' signals, and of the loads once they are sorted by foot."""
+
+from __future__ import annotations
+
+from kinertia.diagnostics.context import RecordingContext
+from kinertia.diagnostics.markers.over_smoothed import over_smoothed
+from kinertia.diagnostics.plates.axes_and_units import axes_and_units
+from kinertia.diagnostics.plates.force_directions import force_directions
+from kinertia.diagnostics.plates.free_moments import free_moments
+from kinertia.diagnostics.plates.gains import gains
+from kinertia.diagnostics.plates.mains_interference import mains_interference
+from kinertia.diagnostics.plates.quantisation import quantisation
+from kinertia.diagnostics.plates.signals import signals
+from kinertia.diagnostics.plates.vertical_moment import vertical_moment
+from kinertia.diagnostics.plates.zeros import zeros
+from kinertia.diagnostics.plates.zeros_under_load import zeros_under_load
+from kinertia.diagnostics.runner import Question
+from kinertia.diagnostics.timing.force_rate import force_rate
+
+_OTHER_AXES = ("P201",)
+"""Then there is no vertical force to judge by."""
+_NO_VELOCITY = ("L20", "M12", "M14", "P10", "P20", "P24", "T201", "T211", "T212")
+"""Then markers, forces or their times are not those of one moving body."""
+
+SIGNAL_QUESTIONS: tuple[Question[RecordingContext], ...] = (
+    Question("P20", axes_and_units),
+    Question("P10", signals, unless=_OTHER_AXES),
+    Question("P10", quantisation, unless=_OTHER_AXES),
+    Question("P10", mains_interference, unless=_OTHER_AXES),
+    Question("P21", zeros, unless=_OTHER_AXES),
+    Question("P26", free_moments, unless=_OTHER_AXES),
+)
+LOADED_QUESTIONS: tuple[Question[RecordingContext], ...] = (
+    Question("M13", over_smoothed, unless=_NO_VELOCITY),
+    Question("T20", force_rate, unless=_NO_VELOCITY),
+    Question("P23", force_directions, unless=_NO_VELOCITY),
+    Question("P22", gains, unless=_NO_VELOCITY),
+    Question("P21", zeros_under_load, unless=_NO_VELOCITY),
+    Question("P26", vertical_moment, unless=_NO_VELOCITY),
+)

@@ -1,0 +1,131 @@
+"""Are the plates' signals intact? Dead channels, lost and repeated samples, amplifiers at the end of their range."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from kinertia.diagnostics.context import RecordingContext
+from kinertia.diagnostics.evidence.loaded_plates import carrying, wrenches
+from kinertia.diagnostics.plates.quantisation import quantisation_n
+from kinertia.findings.finding import Finding, Severity, finding
+from kinertia.findings.quantity import Quantity
+from kinertia.trial.centre_of_pressure import FIRM_LOAD_N
+from kinertia.trial.data import BoolArray, FloatArray, PlateLoads
+from kinertia.trial.sampled_time import runs, span_s
+
+_DEAD_N = 0.5
+"""Amplifiers have more noise than this."""
+_CARRIED_SHARE = 0.4
+"""Of what plates carry in the middle: a foot that leaves or lands takes some samples to lose or gain so much."""
+_SAME, _SATURATED_S, _FEWEST_SATURATED, _STEEP = 1e-6, 0.02, 4, 0.02
+"""At the end of a range a force stays exactly the same, and comes and goes steeply."""
+_FULL_RANGE_N, _FULL_RANGE_ACROSS_N = 200.0, 30.0
+"""Of an adult; no amplifier's range ends below that."""
+_REPEATED_S, _LONG_REPEATED_S, _FEWEST_REPEATED, _LEAP_STEPS = 0.025, 0.1, 3, 3.0
+"""Loads of 25 fault-free trials never stay the same in all channels for more than 2 ms. Long repetitions shift where
+contacts begin and end."""
+_QUANTISED, _STEPS = 4.0, 3.2
+"""A round peak that is flat for being rounded lasts at most twice as long as the next three steps on one side of it."""
+
+
+def signals(context: RecordingContext) -> Iterator[Finding]:
+    """P101 to P104, of every plate and axis."""
+    if context.plates is None:
+        return
+    for detect in (_dead_channels, _dropped_samples, _repeated_samples, _saturated):
+        yield from detect(context, context.plates)
+
+
+def _dead_channels(context: RecordingContext, plates: PlateLoads) -> Iterator[Finding]:
+    """Horizontal axes along which a plate that carries a person shows nothing at all."""
+    for name, wrench in carrying(plates, context.adult_share):
+        for axis in (0, 2):
+            largest = float(np.abs(wrench[:, axis]).max())
+            if largest < _DEAD_N:
+                yield finding(
+                    "P101",
+                    context.at(plate=name, **context.along(axis)),
+                    peak_horizontal_n=Quantity(largest, "N", limit=_DEAD_N),
+                    peak_vertical_n=Quantity(float(wrench[:, 1].max()), "N"),
+                )
+
+
+def _dropped_samples(context: RecordingContext, plates: PlateLoads) -> Iterator[Finding]:
+    """Spans in which all plates read nothing, between samples that carry a person."""
+    total = plates.force[..., 1].sum(axis=1)
+    carried = total[total > FIRM_LOAD_N]
+    much = _CARRIED_SHARE * float(np.median(carried)) if carried.size else np.inf
+    for first, last in runs(np.equal(np.abs(plates.force).sum(axis=(1, 2)), 0.0)):
+        before, after = (float(total[k]) for k in (max(first - 1, 0), min(last + 1, len(total) - 1)))
+        if min(before, after) > much:
+            yield finding(
+                "P102",
+                context.at(span_s=(float(plates.time[first]), float(plates.time[last]))),
+                before_n=Quantity(before, "N", limit=much),
+                after_n=Quantity(after, "N", limit=much),
+            )
+
+
+def _repeated_samples(context: RecordingContext, plates: PlateLoads) -> Iterator[Finding]:
+    """The longest span in which a plate that carries somebody reads exactly the same in all its channels."""
+    for name, wrench in wrenches(plates):
+        same = np.equal(np.diff(wrench, axis=0), 0.0).all(axis=1) & (wrench[1:, 1] > FIRM_LOAD_N)
+        # forces that are rounded stay, and go on by one step; before late ones a file may be filled up with the first
+        leap = _LEAP_STEPS * float(np.diff(np.unique(wrench[:, 1])).min(initial=np.inf))
+        repeated = [
+            (float(plates.time[first]), float(plates.time[last + 1]))
+            for first, last in runs(same)
+            if first > 0 and last - first + 1 >= _FEWEST_REPEATED
+            if span_s(plates.time, first, last + 1) >= _REPEATED_S
+            if last + 2 < len(wrench) and abs(wrench[last + 2, 1] - wrench[last, 1]) > leap
+        ]
+        if repeated:
+            start, end = max(repeated, key=lambda span: span[1] - span[0])
+            lasts = round(end - start, 6)
+            yield finding(
+                "P103",
+                context.at(plate=name, span_s=(start, end)),
+                Severity.ERROR if lasts >= _LONG_REPEATED_S else None,
+                span_s=Quantity(lasts, "s", limit=_REPEATED_S, usual=(0.0, 0.002)),
+            )
+
+
+def _saturated(context: RecordingContext, plates: PlateLoads) -> Iterator[Finding]:
+    """Forces that reach their largest value along an axis and stay there, where a foot's would have gone on."""
+    for name, wrench in wrenches(plates):
+        for axis, least in enumerate((_FULL_RANGE_ACROSS_N, _FULL_RANGE_N, _FULL_RANGE_ACROSS_N)):
+            # upwards a person weighs; sideways a foot pushes as hard one way as the other
+            for sign in (1.0,) if axis == 1 else (1.0, -1.0):
+                signed = sign * wrench[:, axis]
+                top = float(signed.max(initial=0.0))
+                span = _at_top(plates.time, signed, top)
+                if span is not None and top > least * context.adult_share:
+                    yield finding(
+                        "P104",
+                        context.at(plate=name, span_s=span, **context.along(axis)),
+                        level_n=Quantity(sign * top, "N"),
+                        span_s=Quantity(span[1] - span[0], "s", limit=_SATURATED_S),
+                    )
+
+
+def _at_top(time: FloatArray, values: FloatArray, top: float) -> tuple[float, float] | None:
+    """The longest span (s) in which values (k,) stay exactly at their largest, having come there steeply."""
+    flat = [
+        (first, last)
+        for first, last in runs(values >= top * (1.0 - _SAME))
+        if last - first >= _FEWEST_SATURATED and span_s(time, first, last) >= _SATURATED_S
+        if top - values[max(2 * first - last, 0)] > _STEEP * top
+    ]
+    if (step := quantisation_n(values[values != 0.0])) > 0.0:
+        near = values >= top - _STEPS * step
+        beside = [max(_as_long(near[:a][::-1]), _as_long(near[b + 1 :])) for a, b in flat]
+        flat = [(a, b) for (a, b), lasts in zip(flat, beside, strict=True) if b - a > _QUANTISED * (lasts + 1)]
+    spans = [(float(time[first]), float(time[last])) for first, last in flat]
+    return max(spans, key=lambda span: span[1] - span[0], default=None)
+
+
+def _as_long(mask: BoolArray) -> int:
+    """With how many True a mask (k,) begins."""
+    return len(mask) if mask.all() else int(np.argmin(mask))

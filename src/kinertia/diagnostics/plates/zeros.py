@@ -1,0 +1,76 @@
+"""Are the plates' zeros right, by what plates read while nobody stands on them?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from kinertia.diagnostics.context import RecordingContext
+from kinertia.findings.finding import Finding, Severity, finding
+from kinertia.findings.quantity import Quantity
+from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, IdleReading
+
+_ZERO_N, _FAR_FROM_ZERO_N, _DRIFT_N = 15.0, 40.0, 15.0
+"""Zeroed plates read a few newtons; 40 N are 5 % of an adult's weight on every plate."""
+_LEAST_N = 6.0
+"""Twice what zeroed plates read: no limit is lower, however light the person."""
+_STEP_N, _MOST_UNLOADED_N, _STEADY_N = 350.0, 150.0, 15.0
+_UNLOADED_PERCENT = (2.0, 15.0)
+"""A plate that somebody walks over is unloaded for at least so many percent of the record."""
+_UNKNOWN = IdleReading((np.nan, np.nan, np.nan), np.nan, 0.0, 0.0)
+
+
+def zeros(context: RecordingContext) -> Iterator[Finding]:
+    """P211 and P213, of every plate and axis; limits in newtons are those of adults.
+
+    Readers set samples of an unloaded plate to zero, and take nothing off those under load: a zero is still in the
+    loads.
+    """
+    plates, share = context.plates, context.adult_share
+    if plates is None:
+        return
+    for p, (name, idle) in enumerate(zip(plates.names, plates.idle or (_UNKNOWN,) * len(plates.names), strict=True)):
+        drifts = abs(idle.drift_n) > _limit_n(_DRIFT_N, share)
+        if drifts:
+            drift = Quantity(idle.drift_n, "N", limit=_limit_n(_DRIFT_N, share))
+            yield finding("P211", context.at(plate=name, **context.along(1)), drift_n=drift)
+        vertical = False
+        for axis, level_n in enumerate(idle.level_n):
+            if abs(level_n) > _limit_n(_ZERO_N, share) and not (drifts and axis == 1):
+                far = axis == 1 and abs(level_n) > _FAR_FROM_ZERO_N * share
+                vertical |= axis == 1
+                yield _zero(context, name, axis, level_n, "unloaded blocks", Severity.ERROR if far else None)
+        least_n = None if drifts or vertical else _steady_minimum(plates.force[:, p, 1], share)
+        if least_n is not None:
+            yield _zero(context, name, 1, least_n, "minimum", Severity.ERROR)
+
+
+def _limit_n(adult_n: float, share: float) -> float:
+    return max(_LEAST_N, adult_n * share)
+
+
+def _zero(
+    context: RecordingContext, name: str, axis: int, level_n: float, method: str, severity: Severity | None
+) -> Finding:
+    return finding(
+        "P213",
+        context.at(plate=name, **context.along(axis)),
+        severity,
+        level_n=Quantity(level_n, "N", limit=_limit_n(_ZERO_N, context.adult_share), usual=(-3.0, 3.0)),
+        method=Quantity(method),
+    )
+
+
+def _steady_minimum(vertical: FloatArray, share: float) -> float | None:
+    """A small steady force (N) of a plate that somebody walked over, where others show none; None without one.
+
+    It counts as a load, so that no contact on that plate begins or ends.
+    """
+    if not len(vertical):
+        return None
+    low, high = np.percentile(vertical, _UNLOADED_PERCENT)
+    small = low > LOAD_THRESHOLD_N and high < _MOST_UNLOADED_N * share
+    if vertical.max() > _STEP_N * share and small and high - low < _STEADY_N:
+        return float(low + high) / 2
+    return None

@@ -1,0 +1,114 @@
+"""Do plates show a horizontal force that does not accelerate the body?
+
+Forces integrated over time are the changes of the velocity of the centre of mass. On fault-free trials the trends of
+the pelvis' velocity and of what the forces cause agree within 8 N. A wrong zero of one plate pushes whenever that plate
+is stood on; what all plates show alike is a force that no plate measures, or the verticals differ.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from kinertia.diagnostics.context import RecordingContext
+from kinertia.diagnostics.evidence.caused_velocity import CausedVelocity
+from kinertia.diagnostics.evidence.velocity_residual import HORIZONTAL, VelocityResidual
+from kinertia.findings.finding import Finding, with_evidence
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.rule import rule
+from kinertia.model.skeleton import GRAVITY_M_S2
+from kinertia.trial.data import FloatArray, PlateLoads
+from kinertia.trial.sampled_time import span_s, within
+
+_FORCE_N, _WINDOW_S = 20.0, 1.0
+"""Mean over a window; over one that is shorter than this, pelvis and centre of mass part by as much
+velocity in less time."""
+_PLATE_ZERO_N, _LEAST_WINDOW_S, _LEAST_RESIDUAL_M_S = 12.0, 0.75, 0.05
+_ZEROED, _CLEARLY_BEST, _USUAL_RESIDUAL_M_S = 0.75, 0.85, 0.105
+"""Of 31 fault-free trials zeros of one plate are up to 9 N; a drift of 40 N over a trial makes 13 to 24 N, and without
+it the residual is as on fault-free walks and runs."""
+_AGREES = 0.5
+"""Of the force that does not accelerate the body, what the unloaded plates' levels leave at most, if they are it."""
+
+
+def zeros_under_load(context: RecordingContext) -> Iterator[Finding]:
+    """P212 and P214, along each horizontal axis.
+
+    Their limits are the same for children: of six of 25 to 60 kg who walk straight and turn, forces of up to 27 N
+    accelerate nothing by the pelvis' markers, in windows below 1 s, and zeros of one plate seem to be up to 11 N.
+    """
+    parts, plates = context.velocities, context.plates
+    if plates is None or not parts:
+        return
+    for axis in HORIZONTAL:
+        unexplained = _unexplained(context, plates, parts, axis)
+        zero = _plate_zero(context, plates, parts, axis, unexplained is not None)
+        yield from (one for one in (zero, unexplained) if one is not None)
+
+
+def _unexplained(
+    context: RecordingContext, plates: PlateLoads, parts: Sequence[CausedVelocity], axis: int
+) -> Finding | None:
+    """P214: the trend of what the forces cause beyond the pelvis, as a force; the longer windows count more."""
+    spans = np.array([np.ptp(part.time) for part in parts])
+    trends = [
+        part.mass_kg * np.polyfit(part.time - part.time.mean(), part.caused[:, axis] - part.pelvis[:, axis], 1)[0]
+        for part in parts
+    ]
+    force_n = float(np.average(trends, weights=spans**3))
+    limit_n = _FORCE_N * max(1.0, _WINDOW_S / float(spans.max()))
+    if abs(force_n) <= limit_n:
+        return None
+    weight_n = GRAVITY_M_S2 * float(np.mean([part.mass_kg for part in parts]))
+    evidence = {
+        "force_n": Quantity(force_n, "N", limit=limit_n, usual=(-8.0, 8.0)),
+        "tilt_rad": Quantity(float(np.arctan(force_n / weight_n)), "rad"),
+    }
+    levels, causes = _levels(plates, axis), rule("P214").causes
+    if levels is not None:
+        evidence["unloaded_n"] = Quantity(tuple(levels.tolist()), "N")
+        shares = [
+            (plates.force[within(plates.time, *part.time[[0, -1]]), :, 1] > 0.0).mean(axis=0) @ levels for part in parts
+        ]
+        agree = abs(force_n - float(np.average(shares, weights=spans**3))) < _AGREES * abs(force_n)
+        causes = tuple(sorted(causes, key=lambda cause: ("P213" in cause) != agree))
+    return with_evidence("P214", context.at(**context.along(axis)), evidence, causes=causes)
+
+
+def _levels(plates: PlateLoads, axis: int) -> FloatArray | None:
+    """(p,) N that plates read along an axis while nobody stands on them; None where that is not known of each."""
+    levels = np.array([idle.level_n[axis] for idle in plates.idle or ()])
+    return levels if levels.size and np.isfinite(levels).all() else None
+
+
+def _plate_zero(
+    context: RecordingContext, plates: PlateLoads, parts: Sequence[CausedVelocity], axis: int, all_plates: bool
+) -> Finding | None:
+    """P212: a force of one loaded plate that does not accelerate the body, unless all plates show it as well."""
+    long = [part for part in parts if span_s(part.time) >= _LEAST_WINDOW_S]
+    if not long:
+        return None
+    residual = VelocityResidual.of(plates.time, plates.force, long, axis)
+    best = int(np.argmin(residual.plate_zeroed))
+    zero_n, zeroed = float(residual.zero_n[best]), float(residual.plate_zeroed[best])
+    limit_m_s = min(_ZEROED * residual.as_read, _USUAL_RESIDUAL_M_S)
+    if residual.as_read < _LEAST_RESIDUAL_M_S or zeroed > limit_m_s:
+        return None
+    limit_n = _PLATE_ZERO_N * max(1.0, _WINDOW_S / max(span_s(part.time) for part in long))
+    if abs(zero_n) < limit_n or min(one.residual for one in residual.scaled) < _CLEARLY_BEST * zeroed:
+        return None
+    names = [plates.names[p] for p in np.flatnonzero(residual.plate_zeroed * _CLEARLY_BEST < zeroed)]
+    if all_plates and not (len(names) == 1 and zeroed < _CLEARLY_BEST * residual.without_trend):
+        return None
+    evidence = {
+        "offset_n": Quantity(zero_n, "N", limit=limit_n, usual=(-9.0, 9.0)),
+        "velocity_residual_m_s": residual.once(zeroed, limit_m_s),
+    }
+    levels = _levels(plates, axis)
+    if levels is not None:
+        evidence["unloaded_n"] = Quantity(float(levels[best]), "N")
+    if len(names) > 1:
+        evidence["plate"] = Quantity(" or ".join(names))
+    place = context.at(plate=names[0] if len(names) == 1 else None, **context.along(axis))
+    return with_evidence("P212", place, evidence)

@@ -1,0 +1,72 @@
+"""What questions about a result are asked of: the fit, and the person that it was made of."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+from kinertia.diagnostics.axes import Axes
+from kinertia.diagnostics.evidence.force_mass import ForceMass, force_mass
+from kinertia.diagnostics.evidence.markers_centre import owners_of
+from kinertia.estimation.prepared import Prepared
+from kinertia.estimation.result import Fit
+from kinertia.estimation.simultaneous.instrument_errors import InstrumentError
+from kinertia.findings.where import Where
+from kinertia.motion.kinematics import Kinematics
+
+_GROUND_AXES = {"x": 0, "z": 2}
+
+
+@dataclass(frozen=True, eq=False)
+class ResultContext:
+    """A fit and what it was made of.
+
+    Attributes:
+        fit: as estimated.
+        ready: as prepared, before any estimate.
+    """
+
+    fit: Fit
+    ready: Prepared
+
+    @property
+    def errors(self) -> Sequence[InstrumentError]:
+        """What the fit found of plates and synchronisation; nothing after two-level."""
+        return () if self.fit.posterior is None else self.fit.posterior.instrument_errors
+
+    @cached_property
+    def force_masses(self) -> Mapping[str, ForceMass]:
+        """Trial -> body mass by its vertical force and its markers; of trials that show it."""
+        owners = owners_of(self.ready.skeleton)
+        masses = {trial.name: force_mass(owners, trial.kinematics.trial) for trial in self.fit.trials}
+        return {name: mass for name, mass in masses.items() if mass is not None}
+
+    @cached_property
+    def _axes(self) -> Mapping[str, Axes]:
+        return {trial.name: lab_axes(trial.kinematics) for trial in self.fit.trials}
+
+    def at(self, error: InstrumentError) -> Where:
+        """Plate, trial and axis of an error of an instrument."""
+        return self.along(error.quantity[-1], error.trial, error.plate)
+
+    def along(self, axis: str, trial: str | None, plate: str | None = None) -> Where:
+        """A plate, or all, in a trial, or in all, along an axis of the laboratory: "x" or "z", else along none.
+
+        An axis that is called differently in some trials has no name.
+        """
+        if axis not in _GROUND_AXES:
+            return Where(trial=trial, plate=plate)
+        known = [axes for name, axes in self._axes.items() if trial in (None, name)]
+        named = [axes.named(_GROUND_AXES[axis]) for axes in known]
+        directions, columns = {one["axis"] for one in named}, {one["file_axis"] for one in named}
+        direction, column = (each.pop() if len(each) == 1 else None for each in (directions, columns))
+        return Where(trial=trial, plate=plate, axis=direction, file_axis=column)
+
+
+def lab_axes(kinematics: Kinematics) -> Axes:
+    """What the axes of the laboratory are called in a trial, which is turned to face +X here."""
+    trial = kinematics.trial
+    fore_aft = Axes.of(trial.vertical, trial.markers).fore_aft
+    across = round(kinematics.turned_deg / 90.0) % 2 == 1
+    return Axes(trial.vertical, 2 - fore_aft if across else fore_aft)

@@ -1,0 +1,60 @@
+"""Errors of instruments that an estimate has put right, as findings: their size, and how sure their cause is.
+
+Where an error moves joint moments beyond their error bars and nothing contradicts it, the instrument is its cause. Else
+it may as well be the model's own: soft tissue that lags looks like late forces, a trunk that bends like a displaced
+plate. Such an error is called apparent, and no instrument need be checked for it alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from kinertia.diagnostics.result.context import ResultContext
+from kinertia.estimation.simultaneous.instrument_errors import InstrumentError
+from kinertia.findings.finding import Finding, Severity, with_evidence
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
+
+_SD = 2.0
+_FEWEST = 2
+"""Equal errors of so many plates may be the error of all: of a single plate it is its own."""
+
+
+def corrected(
+    context: ResultContext,
+    code: str,
+    headline: str,
+    errors: Iterable[InstrumentError],
+    severity: Severity | None = None,
+) -> list[Finding]:
+    """A finding for each of these errors that was found."""
+    return [correction(code, headline, context.at(one), one, severity) for one in errors if one.found]
+
+
+def correction(
+    code: str, headline: str, where: Where, one: InstrumentError, severity: Severity | None = None
+) -> Finding:
+    """The finding of an error, with this name of its headline; what is not supported is not raised to `severity`."""
+    unsure = not one.supported
+    evidence = {
+        headline: Quantity(one.error, one.unit, _SD * one.prior_sd, (-one.prior_sd, one.prior_sd), one.sd),
+        "moved": Quantity(one.moved, "1", limit=1.0),
+        "kind": Quantity("an apparent" if unsure else "a clear"),
+        "condition": Quantity(" if other people's trials show it, too" if unsure else ""),
+    }
+    since = f", since {one.contradicted_by} contradicts it" if one.contradicted_by else ""
+    causes = (f"soft tissue or the model{since}", "the instrument") if unsure else ("the instrument",)
+    return with_evidence(code, where, evidence, None if unsure else severity, causes)
+
+
+def equal(errors: Sequence[InstrumentError]) -> bool:
+    """Whether errors of the same quantity of several plates have all been found, and differ no more than errors of
+    single plates do.
+    """
+    if len(errors) < _FEWEST or not all(one.found for one in errors):
+        return False
+    values = [one.value for one in errors]
+    usual = _SD * np.sqrt(2) * min(one.prior_sd for one in errors)
+    return min(values) * max(values) > 0.0 and max(values) - min(values) <= usual

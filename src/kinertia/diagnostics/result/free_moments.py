@@ -1,0 +1,66 @@
+"""P26, are the free moments right? Their sign, and errors that the estimate found of them.
+
+In some measured walks the motion needs other free moments than the plates measure, by 3 to 6 N m/kN, to one side under
+the right foot and to the other under the left; in single stance the vertical moment is off by 1 to 3 N m before the
+estimate, too, likewise. Where reversing their sign does not explain it, two plates have no reason to err like that. The
+body has: it is what legs, trunk and arms that turn against one another would need if their angular momentum were wrong
+by some tenths of a kg m2/s, as a trunk that bends, or skin over pelvis and shoulders, may make it. A wrong plate shows
+under one foot, or under both to the same side, as does the mean over whole strides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from kinertia.diagnostics.result.context import ResultContext
+from kinertia.diagnostics.result.corrections import corrected
+from kinertia.estimation.free_moment_sign import VERTICAL, left_moments_nm
+from kinertia.estimation.result import TrialFit
+from kinertia.estimation.simultaneous.instrument_errors import FREE_MOMENT, InstrumentError
+from kinertia.findings.finding import Finding, finding, with_evidence
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
+
+_LESS = 0.8
+"""Share of the residual as measured, below which the residual with the sign reversed speaks against the sign."""
+_ONE_SIDED = 0.5
+"""Share of the errors' sizes above which their sum is not that of mirror images."""
+
+
+def free_moments(context: ResultContext) -> Iterator[Finding]:
+    """The sign of the free moments, and what is left of them once it is right."""
+    posterior = context.fit.posterior
+    if posterior is None:
+        for trial in context.fit.trials:
+            yield from reversed_sign(trial)
+        return
+    if sign := posterior.free_moment_sign:
+        evidence = {"log_odds": Quantity(sign.log_odds, "1"), "rms_nm": Quantity(sign.rms_nm, "N m")}
+        if sign.wrong:
+            yield with_evidence("P269", Where(), evidence)
+        elif sign.open:
+            yield with_evidence("P260", Where(), evidence)
+    errors = [one for one in context.errors if one.quantity == FREE_MOMENT]
+    yield from corrected(context, "P267", "error_nm_n", errors)
+    if mirrored(errors):
+        values = tuple(one.error for one in errors)
+        plates = Quantity(", ".join(str(one.plate) for one in errors))
+        yield finding("P268", error_nm_n=Quantity(values, "N m/N", 2.0 * errors[0].prior_sd), plates=plates)
+
+
+def mirrored(errors: Sequence[InstrumentError]) -> bool:
+    """Whether errors under the feet were found that go to both sides alike."""
+    off = [one.error for one in errors if one.found]
+    if not off or not min(off) < 0.0 < max(off):
+        return False
+    return abs(sum(one.error for one in errors)) <= _ONE_SIDED * sum(abs(one.error) for one in errors)
+
+
+def reversed_sign(trial: TrialFit) -> Iterator[Finding]:
+    """P265 of a trial whose free moments go with the measured motion once their sign is reversed: for an estimate that
+    has no evidence.
+    """
+    as_is, reversed_nm = left_moments_nm(trial.residuals["literature"][:, VERTICAL], trial.kinematics.foot_loads)
+    if reversed_nm < _LESS * as_is:
+        evidence = {"rms_nm": Quantity(as_is, "N m"), "reversed": Quantity(reversed_nm, "N m", limit=_LESS * as_is)}
+        yield with_evidence("P265", Where(trial=trial.name), evidence)

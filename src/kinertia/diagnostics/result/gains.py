@@ -1,0 +1,48 @@
+"""P22, are the plates' gains right? What the estimate found of them against the stated mass.
+
+The estimate knows a gain by the stated mass alone: plates that read a tenth more may read too much, or carry a tenth
+more. Two plates have two amplifiers and two calibrations, and a person has one mass, so that what both lack alike is
+the mass's, or what was carried, before it is the plates'.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from kinertia.diagnostics.result.context import ResultContext
+from kinertia.diagnostics.result.corrections import corrected, equal
+from kinertia.estimation.simultaneous.instrument_errors import GAIN, InstrumentError
+from kinertia.findings.finding import Finding, with_evidence
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
+
+_AMPLIFIER = "a calibration, amplifier or unit that all plates have in common"
+_MORE = ("something worn or carried that the stated mass leaves out", "a wrong stated mass", _AMPLIFIER)
+_LESS = ("a wrong stated mass", "support that no plate measures (handrail, walker, crutches, harness)", _AMPLIFIER)
+
+
+def gains(context: ResultContext) -> Iterator[Finding]:
+    """Gains that were corrected, and one that all plates have alike."""
+    of_all = [one for one in context.errors if one.quantity == GAIN]
+    yield from corrected(context, "P223", "gain_error", _certain(of_all))
+    lasting = [one for one in of_all if one.trial is None]
+    if not equal(lasting):
+        return
+    total = context.ready.carried
+    sd = max(one.sd for one in lasting)
+    evidence = {"gain_error": Quantity(tuple(one.error for one in lasting), "1", 2.0 * lasting[0].prior_sd, sd=sd)}
+    if masses := tuple(mass.mass_kg for mass in context.force_masses.values()):
+        evidence["mass_by_force_kg"] = Quantity(masses, "kg")
+    evidence["stated_kg"] = Quantity(total.total_kg, "kg", sd=total.sd_kg)
+    evidence["plates"] = Quantity(", ".join(str(one.plate) for one in lasting))
+    yield with_evidence("P224", Where(), evidence, causes=_MORE if lasting[0].error > 0.0 else _LESS)
+
+
+def _certain(errors: Sequence[InstrumentError]) -> Iterator[InstrumentError]:
+    """The gain of a plate in all trials where it is certain; else what the plate has in each."""
+    lasting = {one.plate: one for one in errors if one.trial is None}
+    of_trials = {one.plate for one in errors if one.trial is not None}
+    for one in errors:
+        whole = one.plate not in of_trials or lasting[one.plate].supported
+        if whole == (one.trial is None):
+            yield one

@@ -1,0 +1,46 @@
+"""M16 and M17, do markers stay where they were put? Markers that drift or moved, and joints that trials corrected."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from kinertia.diagnostics.result.context import ResultContext
+from kinertia.findings.finding import Finding, finding
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
+
+_MOVED_M = 0.03
+"""Skin moves markers up to some 30 mm."""
+_DRIFTING = 3.0
+"""Times the usual SD, as in `marker_noise`."""
+_BACKWARDS_RAD = 0.5
+_TORSO_RAD = 0.25
+_SIDES = {"r": "right elbow", "l": "left elbow"}
+
+
+def moved_markers(context: ResultContext) -> Iterator[Finding]:
+    """Markers that drift in a trial, and those that sit elsewhere in it than in every other trial."""
+    posterior = context.fit.posterior
+    if posterior is None:
+        return
+    for trial, noise in zip(context.fit.trials, posterior.marker_noise, strict=True):
+        usual_m = float(np.median(list(noise.sd_m.values())))
+        for label in noise.wandering:
+            sd = Quantity(noise.sd_m[label], "m", limit=_DRIFTING * usual_m)
+            yield finding("M163", Where(trial=trial.name, markers=(label,)), sd_m=sd, usual_sd_m=Quantity(usual_m, "m"))
+    for trial, distances in zip(context.fit.trials, posterior.marker_distances_m, strict=False):
+        for label, away_m in distances.items():
+            if away_m > _MOVED_M:
+                away = Quantity(away_m, "m", limit=_MOVED_M)
+                yield finding("M162", Where(trial=trial.name, markers=(label,)), difference_m=away)
+
+
+def corrected_joints(context: ResultContext) -> Iterator[Finding]:
+    """Elbows that the static trial would bend backwards, and a torso that arms would turn under its markers."""
+    for side, rotation_rad in context.ready.elbow_rotations_rad.items():
+        rotation = Quantity(rotation_rad, "rad", limit=_BACKWARDS_RAD)
+        yield finding("M171", Where(part=_SIDES[side]), rotation_rad=rotation)
+    if (torso_rad := context.ready.torso_rotation_rad) is not None:
+        yield finding("M172", Where(part="torso"), rotation_rad=Quantity(torso_rad, "rad", limit=_TORSO_RAD))

@@ -1,0 +1,45 @@
+"""What is asked of an estimate, and of a result."""
+
+from __future__ import annotations
+
+from kinertia.diagnostics.result.basis import basis, filters
+from kinertia.diagnostics.result.context import ResultContext
+from kinertia.diagnostics.result.delays import delays
+from kinertia.diagnostics.result.free_moments import free_moments
+from kinertia.diagnostics.result.gains import gains
+from kinertia.diagnostics.result.joint_angles import joint_angles
+from kinertia.diagnostics.result.marker_errors import corrected_joints, moved_markers
+from kinertia.diagnostics.result.masses import attached_items, forces_of_the_motion, total_mass
+from kinertia.diagnostics.result.plate_positions import plate_positions
+from kinertia.diagnostics.result.residuals import residuals
+from kinertia.diagnostics.result.rotation import plate_rotation
+from kinertia.diagnostics.result.soundness import soundness
+from kinertia.diagnostics.result.zero_offsets import zero_offsets
+from kinertia.diagnostics.runner import Question, asked
+from kinertia.findings.finding import Finding
+
+ESTIMATE_QUESTIONS: tuple[Question[ResultContext], ...] = (
+    Question("R10", forces_of_the_motion),
+    Question("R20", soundness),
+    Question("P21", zero_offsets),
+    Question("P22", gains),
+    Question("P23", plate_rotation),
+    Question("P24", plate_positions),
+    Question("P26", free_moments),
+    Question("T21", delays),
+    Question("M16", moved_markers),
+    Question("M17", corrected_joints),
+    Question("S11", total_mass),
+    Question("S40", attached_items),
+    Question("R11", filters),
+)
+RESULT_QUESTIONS: tuple[Question[ResultContext], ...] = (
+    Question("R30", residuals),
+    Question("R30", joint_angles),
+    Question("R40", basis),
+)
+
+
+def judged(context: ResultContext) -> list[Finding]:
+    """All findings about an estimate, not yet explained by one another or by those of earlier stages."""
+    return asked((*ESTIMATE_QUESTIONS, *RESULT_QUESTIONS), context)

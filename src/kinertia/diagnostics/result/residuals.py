@@ -1,0 +1,111 @@
+"""R30, may the result be used? Residuals and markers by OpenSim's guideline; these thresholds stand nowhere else.
+
+The guideline for residual reduction ("Simulation with OpenSim - Best Practices" and Hicks et al. 2015, J Biomech Eng
+137:020905) also wants the peak force below 5 % of the largest external force. OpenSim judges each axis on its own; here
+it is the length of the vector, as in `fit.json`, which is stricter. Judged are residuals with forces at the motion's
+bandwidth: what is faster no motion of the model can follow. Those with forces at full bandwidth, which OpenSim's tools
+find, stand beside them; where only they are beyond the guideline, that is information.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from kinertia.diagnostics.result.context import ResultContext
+from kinertia.estimation.result import TrialFit
+from kinertia.findings.finding import Finding, Severity, finding, with_evidence
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
+from kinertia.model.centre_offsets import centre_offsets
+from kinertia.trial.rms import rms
+
+
+class Guideline(NamedTuple):
+    """OpenSim's limits of RMS and peak: beyond `good` a WARNING, beyond `acceptable` an ERROR."""
+
+    code: str
+    unit: str
+    good: tuple[float, float]
+    acceptable: tuple[float, float]
+
+
+FORCE = Guideline("R301", "N", (5.0, 10.0), (10.0, 25.0))
+MOMENT = Guideline("R302", "N m", (30.0, 50.0), (50.0, 75.0))
+PEAK_FORCE_SHARE = 0.05
+"""Largest share of the peak external force that the peak residual force may have."""
+GOOD_MARKERS_M, ACCEPTABLE_MARKERS_M = 0.012, 0.020
+"""RMS distance of the markers: OpenSim's guideline for inverse kinematics is 20 mm."""
+_WRONG_MODEL_M = 0.045
+"""Farther apart are markers of a fault-free model on nobody, wherever they sit."""
+
+
+def residuals(context: ResultContext) -> Iterator[Finding]:
+    """Residual force and moment of every trial, and the distance of its markers."""
+    for trial in context.fit.trials:
+        yield from residuals_of(trial)
+        yield from _markers(context, trial)
+
+
+def residuals_of(trial: TrialFit) -> Iterator[Finding]:
+    """R301, R302 and R303 of one trial."""
+    narrow, full = (_lengths(each["estimate"]) for each in (trial.residuals, trial.full_residuals))
+    for guideline, judged, whole in zip((FORCE, MOMENT), narrow, full, strict=True):
+        yield from _by_guideline(trial, guideline, judged, whole)
+    external_n = float(np.linalg.norm(trial.kinematics.foot_loads[:, :, :3].sum(axis=1), axis=1).max())
+    share = float(narrow[0].max()) / external_n
+    if share > PEAK_FORCE_SHARE:
+        evidence = Quantity(share, "1", limit=PEAK_FORCE_SHARE), Quantity(external_n, "N")
+        yield finding("R303", Where(trial=trial.name), share=evidence[0], external_n=evidence[1])
+
+
+def _lengths(residual: np.ndarray) -> list[np.ndarray]:
+    """Lengths (w,) of force and moment of a residual (w, 6)."""
+    return [np.linalg.norm(part, axis=1) for part in np.hsplit(residual, 2)]
+
+
+def _by_guideline(trial: TrialFit, guideline: Guideline, judged: np.ndarray, whole: np.ndarray) -> Iterator[Finding]:
+    """Of vector lengths (w,) at the motion's and at the forces' bandwidth."""
+    code, unit, good, acceptable = guideline
+    typical, peak = rms(judged), float(judged.max())
+    suffix = unit.replace(" ", "").lower()
+    evidence = {
+        f"rms_{suffix}": Quantity(typical, unit, limit=good[0]),
+        f"peak_{suffix}": Quantity(peak, unit, limit=good[1]),
+        f"full_rms_{suffix}": Quantity(rms(whole), unit),
+        f"full_peak_{suffix}": Quantity(float(whole.max()), unit),
+        "motion_hz": Quantity(trial.motion_hz, "Hz"),
+    }
+
+    def beyond(limits: tuple[float, float], typical: float = typical, peak: float = peak) -> bool:
+        return typical > limits[0] or peak > limits[1]
+
+    if beyond(acceptable):
+        severity = Severity.ERROR
+    elif beyond(good):
+        severity = Severity.WARNING
+    elif beyond(good, rms(whole), float(whole.max())):
+        severity = Severity.INFO
+    else:
+        return
+    yield with_evidence(code, Where(trial=trial.name), evidence, severity)
+
+
+def _markers(context: ResultContext, trial: TrialFit) -> Iterator[Finding]:
+    """R304; what moves hides what is grossly wrong, and helps no more where it has moved."""
+    apart_m = rms(trial.marker_errors_m["final"])
+    if apart_m <= GOOD_MARKERS_M:
+        return
+    wrong = apart_m > _WRONG_MODEL_M or bool(centre_offsets(context.fit.skeleton))
+    calibrate = context.fit.file is not None and not wrong
+    check = "check that the model was scaled to this person, and all labels"
+    advice = "let markers and joint centres move (--calibrate)" if calibrate else check
+    yield finding(
+        "R304",
+        Where(trial=trial.name),
+        Severity.ERROR if apart_m > ACCEPTABLE_MARKERS_M else None,
+        rms_m=Quantity(apart_m, "m", limit=GOOD_MARKERS_M),
+        advice=Quantity(advice[0].upper() + advice[1:]),
+    )

@@ -1,0 +1,146 @@
+"""R20, is the estimate sound? Convergence, bodies that can exist, and distance from what was expected.
+
+A side that is heavier is the body's, or something on it, even where that drives single parameters far; where single
+parameters are far for no such reason, a wrong joint, plate or marker is likelier than an unusual body.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from kinertia.diagnostics.result.context import ResultContext
+from kinertia.estimation.result import Fit
+from kinertia.estimation.simultaneous.one_sided import OneSided
+from kinertia.estimation.simultaneous.unlike import UNLIKE_CHANCE, Unlikeness
+from kinertia.findings.display import first_few
+from kinertia.findings.finding import Finding, Severity, finding
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
+from kinertia.model.bsp import PARAMETERS, impossible_segments
+
+CONTRADICTION_SD = 3.0
+"""Prior SDs from which on a parameter contradicts what was expected."""
+PLAIN_CONTRADICTION_SD = 4.0
+"""A parameter this many prior SDs off is wrong by itself: chance brings it about in one of 16 000."""
+MOST_DOUBTED_SEGMENTS = 2
+"""Segments with a parameter beyond CONTRADICTION_SD that are taken with care; more contradict the whole model."""
+CONTRADICTING_COM_M = 0.1
+"""A centre of mass this far from the literature contradicts it, if no prior says how far people's are: a trunk's is off
+by 34 mm (SD)."""
+_ONE_SIDED_SD = 4.0
+"""As in `one_sided`."""
+_WRONG = "a misplaced marker or joint centre, or an error of a plate"
+_WORN = "something worn or carried that was not declared ([[attached]])"
+_OTHER = "a body that the tables do not describe (age_years, population under [subject])"
+
+
+def soundness(context: ResultContext) -> Iterator[Finding]:
+    """What speaks against the estimate as a whole, or against single parameters."""
+    fit = context.fit
+    if not fit.converged:
+        steps = fit.evaluations if fit.posterior is None else fit.posterior.iterations
+        yield finding("R201", iterations=Quantity(steps, "1"))
+    yield from _impossible(fit)
+    yield from _far_centres(fit) if fit.posterior is None else _far_parameters(fit)
+    whole = None if fit.posterior is None else fit.posterior.unlikeness
+    if whole is not None and whole.unlike:
+        yield _unlike(whole) if whole.one_sided is None else _side_heavier(whole.one_sided)
+
+
+def _impossible(fit: Fit) -> Iterator[Finding]:
+    """R202; light bodies that a model has and that were kept as they are condemn nothing."""
+    impossible = impossible_segments(fit.estimate)
+    fixed = set()
+    if fit.posterior is not None:
+        kept = np.flatnonzero(~fit.posterior.prior_sd.any(axis=1))
+        fixed = {fit.estimate.segments[i] for i in kept}
+    estimated = [name for name in impossible if name not in fixed]
+    if impossible:
+        named = Quantity(first_few(estimated or impossible)), Quantity(len(estimated or impossible), "1")
+        yield finding("R202", None, None if estimated else Severity.INFO, segments=named[0], count=named[1])
+
+
+def expected_source(fit: Fit) -> str:
+    """Where what the estimate was expected to be near is from."""
+    if fit.more_known:
+        return "the prior"
+    return "the literature" if fit.file is None else "the model's own values"
+
+
+def away_from_expected(fit: Fit) -> np.ndarray:
+    """(s, 10) how far parameters are from where they were expected, in prior SDs; zero where they were kept."""
+    assert fit.posterior is not None
+    scale = np.where(fit.posterior.prior_sd > 0, fit.posterior.prior_sd, np.inf)
+    result: np.ndarray = (fit.estimate.table() - fit.expected.table()) / scale
+    return result
+
+
+def _far_parameters(fit: Fit) -> Iterator[Finding]:
+    """R203 of every parameter beyond CONTRADICTION_SD."""
+    away = away_from_expected(fit)
+    beyond = np.abs(away) > CONTRADICTION_SD
+    whole = beyond.any(axis=1).sum() > MOST_DOUBTED_SEGMENTS
+    for row, column in np.argwhere(beyond):
+        distance = float(away[row, column])
+        plain = whole or abs(distance) > PLAIN_CONTRADICTION_SD
+        yield finding(
+            "R203",
+            _parameter(fit, row, PARAMETERS[column]),
+            Severity.ERROR if plain else None,
+            distance_sd=Quantity(distance, "1", limit=CONTRADICTION_SD),
+            distance=Quantity(f"{distance:+.1f} SD"),
+            parameter=Quantity(PARAMETERS[column]),
+            source=Quantity(expected_source(fit)),
+        )
+
+
+def _parameter(fit: Fit, row: int, parameter: str) -> Where:
+    return Where(part=f"{parameter} of {fit.estimate.segments[row]}")
+
+
+def _far_centres(fit: Fit) -> Iterator[Finding]:
+    """R203 of every centre of mass that two-level has moved too far."""
+    moved_m = np.linalg.norm(fit.estimate.com_m - fit.literature.com_m, axis=1)
+    for row in np.flatnonzero(moved_m > CONTRADICTING_COM_M):
+        yield finding(
+            "R203",
+            _parameter(fit, int(row), "com"),
+            Severity.ERROR,
+            distance_m=Quantity(float(moved_m[row]), "m", limit=CONTRADICTING_COM_M),
+            distance=Quantity(f"{1e3 * moved_m[row]:.0f} mm"),
+            parameter=Quantity("com"),
+            source=Quantity(expected_source(fit)),
+        )
+
+
+def _unlike(whole: Unlikeness) -> Finding:
+    """R204, the likeliest causes first: joints that are found wrongly are off on both sides alike, a prosthesis is
+    not."""
+    wrong_first = (f"{_WRONG}: left and right are off alike", _WORN, _OTHER)
+    causes = wrong_first if whole.both_sides else (_WORN, _OTHER, _WRONG)
+    limb = next((name for name in whole.segments if name.endswith(("_r", "_l"))), None)
+    return finding(
+        "R204",
+        causes=causes if limb is None else (*causes, f"a prosthesis (prosthesis = true under [segment.{limb}])"),
+        chance=Quantity(whole.chance, "1", limit=UNLIKE_CHANCE),
+        combinations=Quantity(whole.combinations, "1"),
+        segments=Quantity(", ".join(whole.segments)),
+    )
+
+
+def _side_heavier(side: OneSided) -> Finding:
+    """R205: what is worn where the heavier side is the one that is unlike the prior, else a prosthesis first."""
+    of_segments = " or ".join(f'"{name}"' for name in side.heavier)
+    tables = " and ".join(f"[segment.{name}]" for name in side.lighter)
+    worn = f"an orthosis, cast or weight on the heavier side ([[attached]] with segment = {of_segments})"
+    artificial = f"a prosthesis on the lighter side (prosthesis = true under {tables})"
+    return finding(
+        "R205",
+        causes=(worn, artificial, _WRONG) if side.added else (artificial, worn, _WRONG),
+        difference_kg=Quantity(side.more_kg if len(side.more_kg) > 1 else side.more_kg[0], "kg"),
+        distance_sd=Quantity(side.times, "1", limit=_ONE_SIDED_SD),
+        heavier=Quantity(" and ".join(side.heavier)),
+        lighter=Quantity(" and ".join(side.lighter)),
+    )

@@ -1,0 +1,194 @@
+"""What a result may be used for: a line per output, with its reason and a number.
+
+Findings judge the estimate as a whole; here follows from them what that means for each of the things that people take
+from it: an ERROR that affects it bars its use, a WARNING makes it one with care.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from kinertia.diagnostics.result.soundness import expected_source
+from kinertia.estimation.identifiability import INFORMED, MEASURED
+from kinertia.estimation.result import Fit
+from kinertia.findings.finding import Finding, Severity
+from kinertia.trial.rms import rms, rms_length
+
+Use = Literal["use", "use with care", "do not use"]
+_ORDER: tuple[Use, ...] = ("use", "use with care", "do not use")
+SHOWN_SHARE = 0.5
+"""Share of parameters that the data inform from which a table of them is this person's."""
+_BAND_SD = 1.96
+
+
+class Group(NamedTuple):
+    """Parameters of one kind.
+
+    Attributes:
+        nouns: what they are called.
+        columns: in the table of body segment parameters.
+        start: of the parameters' names.
+    """
+
+    nouns: str
+    columns: slice
+    start: str
+
+
+GROUPS: Mapping[str, Group] = {
+    "masses": Group("masses", slice(0, 1), "mass"),
+    "centres_of_mass": Group("coordinates of centres of mass", slice(1, 4), "com"),
+    "inertias": Group("moments of inertia", slice(4, 7), "i"),
+}
+"""By their name among the outputs that rules affect."""
+_TITLES = {
+    "moments": "joint moments",
+    "masses": "segment masses",
+    "centres_of_mass": "centres of mass",
+    "inertias": "moments of inertia",
+    "motion": "motion",
+}
+
+
+@dataclass(frozen=True)
+class Suitability:
+    """Whether an output may be used, and why.
+
+    Attributes:
+        output: "joint moments", "segment masses", "centres of mass", "moments of inertia" or "motion".
+        use: "use", "use with care" or "do not use".
+        reason: with a number.
+        codes: of the findings that lower it.
+    """
+
+    output: str
+    use: Use
+    reason: str
+    codes: tuple[str, ...] = ()
+
+
+class Informed(NamedTuple):
+    """How many of a group of estimated parameters the data inform, and how many of them well."""
+
+    total: int
+    informed: int
+    measured: int
+
+
+def suitability(fit: Fit, findings: Iterable[Finding], left_out: Sequence[str] = ()) -> tuple[Suitability, ...]:
+    """What each output may be used for.
+
+    Args:
+        fit: as estimated.
+        findings: of all stages, explained and overruled.
+        left_out: trials that were blocked and are not in the fit: then nothing is used without care.
+    """
+    known = list(findings)
+    return tuple(_output(fit, name, known, left_out) for name in _TITLES)
+
+
+def informed(fit: Fit, output: str) -> Informed | None:
+    """Of the parameters of an output; None where nobody knows, after two-level, or where none was estimated."""
+    if fit.posterior is None:
+        return None
+    columns = GROUPS[output].columns
+    estimated = fit.posterior.prior_sd[:, columns] > 0
+    information = fit.posterior.information[:, columns][estimated]
+    if not information.size:
+        return None
+    return Informed(information.size, int((information > INFORMED).sum()), int((information > MEASURED).sum()))
+
+
+def _output(fit: Fit, name: str, findings: Sequence[Finding], left_out: Sequence[str]) -> Suitability:
+    lowering = [(one, level) for one in findings if (level := _lowers(one, name))]
+    levels, reasons = [level for _, level in lowering], []
+    if name in GROUPS:
+        level, reason = _of_parameters(fit, name)
+        levels.append(level)
+    else:
+        reason = _REASONS[name](fit)
+    reasons.append(reason if fit.converged else "the estimate did not converge")
+    if not fit.converged:
+        levels.append(2)
+    if left_out:
+        levels.append(1)
+        reasons.append(f"{len(left_out)} of {len(fit.trials) + len(left_out)} trials left out")
+    codes = tuple(dict.fromkeys(one.code for one, _ in sorted(lowering, key=lambda each: -each[1])))
+    if codes:
+        reasons.append(f"see {', '.join(codes)}")
+    return Suitability(_TITLES[name], _ORDER[max(levels, default=0)], "; ".join(reasons), codes)
+
+
+def _lowers(one: Finding, output: str) -> int:
+    """By how many steps of _ORDER a finding lowers an output."""
+    if output not in one.rule.affects or not _concerns(one, output):
+        return 0
+    # the person as a whole is unlike the prior whatever single parameters are
+    explained = one.muted_by is not None and one.code != "R204"
+    if one.status == "ignored" or explained or one.severity < Severity.WARNING:
+        return 0
+    return 2 if one.severity is Severity.ERROR and one.status == "open" else 1
+
+
+def _concerns(one: Finding, output: str) -> bool:
+    """Whether an implausible parameter is one of the output's."""
+    parameter = one.evidence.get("parameter")
+    return parameter is None or output not in GROUPS or str(parameter.value).startswith(GROUPS[output].start)
+
+
+def _of_parameters(fit: Fit, name: str) -> tuple[int, str]:
+    """Level and reason by what the data say of these parameters."""
+    shown, nouns = informed(fit, name), GROUPS[name].nouns
+    if fit.posterior is None:
+        return 1, "no error bars (two-level): nobody knows which of them this recording informs"
+    if shown is None:
+        return 1, f"no {nouns} were estimated"
+    source = expected_source(fit)
+    values = source if source.endswith("values") else f"{source.removeprefix('the ')} values"
+    well = f" ({shown.measured} of them well)" if shown.measured else ""
+    if not shown.informed:
+        return 2, f"none of {shown.total} {nouns} is informed by this recording: they remain {values}"
+    if shown.informed == shown.total:
+        return 0, f"all {shown.total} {nouns} are informed by this recording{well}"
+    verb = "is" if shown.informed == 1 else "are"
+    reason = (
+        f"{shown.informed} of {shown.total} {nouns} {verb} partly informed by this recording{well}; the other "
+        f"{shown.total - shown.informed} remain {values}"
+    )
+    return int(shown.informed < SHOWN_SHARE * shown.total), reason
+
+
+def _moments(fit: Fit) -> str:
+    force, moment = (
+        max(rms_length(trial.residuals["estimate"][:, part]) for trial in fit.trials)
+        for part in (slice(0, 3), slice(3, 6))
+    )
+    reason = f"residual at most {force:.1f} N and {moment:.1f} N m (RMS)"
+    sds = [trial.deviations.moments[:, 6:] for trial in fit.trials if trial.deviations is not None]
+    half = _half_interval(fit, sds)
+    if half is None:
+        return reason
+    return f"{reason}; typical 95 % interval of a joint moment: ± {half / fit.mass_kg:.2f} N m/kg"
+
+
+def _motion(fit: Fit) -> str:
+    apart = 1e3 * max(rms(trial.marker_errors_m["final"]) for trial in fit.trials)
+    reason = f"model and measured markers are at most {apart:.1f} mm apart (RMS)"
+    sds = [trial.deviations.coordinates[:, 6:] for trial in fit.trials if trial.deviations is not None]
+    half = _half_interval(fit, sds)
+    if half is None:
+        return reason
+    return f"{reason}; typical 95 % interval of a joint angle: ± {np.degrees(half):.1f} degrees"
+
+
+def _half_interval(fit: Fit, sds: Sequence[np.ndarray]) -> float | None:
+    """Half a 95 % interval of rotations, typical of SDs (w, c - 6) of the coordinates after the pelvis'."""
+    turns = fit.skeleton.rotational[6:]
+    return _BAND_SD * rms(np.concatenate(sds)[:, turns]) if sds and turns.any() else None
+
+
+_REASONS: Mapping[str, Callable[[Fit], str]] = {"moments": _moments, "motion": _motion}

@@ -1,0 +1,51 @@
+"""Do stated mass and stature agree with the files? Which population is assumed, and which markers are not there?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from kinertia.diagnostics.context import PersonContext
+from kinertia.estimation.population import population_of
+from kinertia.findings.finding import Finding, finding
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
+
+_SAME = 0.01
+_QUANTITIES = {"mass_kg": ("mass", "kg"), "height_m": ("stature", "m")}
+
+
+def stated_and_filed(context: PersonContext) -> Iterator[Finding]:
+    """S103: mass or stature of a file that differs from the one that is used."""
+    for recording in (*context.standing, *context.trials):
+        for name, (quantity, unit) in _QUANTITIES.items():
+            stated, filed = getattr(context.subject, name), getattr(recording.recording, name)
+            if stated is not None and filed is not None and abs(filed - stated) > _SAME * stated:
+                yield finding(
+                    "S103",
+                    Where(trial=recording.name, part=quantity),
+                    stated=Quantity(stated, unit),
+                    filed=Quantity(filed, unit, limit=stated * (1.0 + (_SAME if filed > stated else -_SAME))),
+                    quantity=Quantity(quantity),
+                )
+
+
+def population(context: PersonContext) -> Iterator[Finding]:
+    """S401: a population that the tables do not describe."""
+    body_kg = None if context.total_mass is None else context.total_mass.body_kg
+    assumed = population_of(context.subject, body_kg).finding(context.subject)
+    if assumed is not None:
+        yield assumed
+
+
+def absent_markers(context: PersonContext) -> Iterator[Finding]:
+    """M105: markers of the static trial, or else of the model, that a trial lacks."""
+    if context.marker_set is None:
+        return
+    reference = [label for own in context.marker_set.segments.values() for label in own]
+    if context.model is None:
+        shown = {label for one in context.standing[:1] for label in one.all_markers.labels}
+        reference = [label for label in reference if label in shown]
+    for trial in context.trials:
+        absent = tuple(label for label in reference if label not in trial.all_markers.labels)
+        if absent:
+            yield finding("M105", Where(trial=trial.name, markers=absent), count=Quantity(len(absent), "1"))

@@ -1,0 +1,24 @@
+"""Two recordings disagree: which of them is the odd one, by all others?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TypeVar
+
+T = TypeVar("T")
+
+
+def odd_ones(first: T, other: T, witnesses: Iterable[tuple[float, float]]) -> tuple[T, ...]:
+    """The one that more of the others are farther from; both where there are no others, or as many for either.
+
+    Args:
+        first, other: the two that disagree.
+        witnesses: of every further recording, how far it is from the first and from the other.
+
+    >>> odd_ones("walk 1", "walk 2", [(0.001, 0.02), (0.002, 0.015)])
+    ('walk 2',)
+    >>> odd_ones("walk 1", "walk 2", [])
+    ('walk 1', 'walk 2')
+    """
+    votes = sum((to_first > to_other) - (to_first < to_other) for to_first, to_other in witnesses)
+    return (first, other) if votes == 0 else (first,) if votes > 0 else (other,)

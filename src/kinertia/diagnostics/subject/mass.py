@@ -1,0 +1,185 @@
+"""Is the stated mass the one that the plates carry?
+
+Every occasion on which all of the person is on the plates is compared: each trial, by whole strides where it holds
+them, and those in which the person stands. What is wrong, the mass or the plates, shows where they differ: a wrong
+mass is wrong by all plates and in all trials, and so is a load that was not declared, while of two plates with
+different gains only one contradicts it.
+
+Of fault-free trials two plates agree on the mass within 2 %. A support of 50 N that is there all the time and a gain of
+7 % differ by 10 N in walking, less than the markers' centre shows: they look the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from kinertia.diagnostics.context import PersonContext
+from kinertia.diagnostics.evidence.force_mass import MISSING, ForceMass
+from kinertia.diagnostics.evidence.plate_masses import plate_masses
+from kinertia.diagnostics.subject.majority import odd_ones
+from kinertia.estimation.carried_mass import CarriedMass
+from kinertia.findings.finding import Finding, Severity, finding
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
+from kinertia.model.skeleton import GRAVITY_M_S2
+
+WARNING_SHARE, ERROR_SHARE = 0.02, 0.10
+"""Stated mass and vertical force may differ by this share and twice the SD of the difference."""
+_SAME_KG = 0.04
+"""Share by which two plates may differ in the mass of the body and still agree: usual are 2 %."""
+_LOAD_KG = 2.0
+"""From which on a surplus may be something that was worn or carried."""
+_POUND, _UNIT_OFF = 0.45359, 0.1
+"""A ratio of force to stated mass within this share of a ratio of units is likelier that of units than of people."""
+_FORCE_UNITS = {"kilograms-force": 1.0 / GRAVITY_M_S2, "pounds-force": 0.2248, "kN": 0.001}
+
+_STATED, _STATED_OVER_POUND = "a wrong stated mass", "a stated mass in kg that was divided by 2.2 once more"
+_LOAD = "a load that was worn or carried and not declared as [[attached]]"
+_SUPPORT = "support that no plate measures, like a handrail, a chair, a walker or a foot beside the plates"
+_PLATES = "gain or zero of the plates"
+
+
+@dataclass(frozen=True)
+class _Occasion:
+    """A mass by force, and the trial that it is of; None of all trials together."""
+
+    trial: str | None
+    mass_kg: float
+    sd_kg: float
+    over: str
+
+    def allowed_kg(self, total: CarriedMass, share: float) -> float:
+        """By which the stated mass may differ."""
+        return share * total.total_kg + 2.0 * float(np.hypot(self.sd_kg, total.sd_kg))
+
+    def differs(self, total: CarriedMass, share: float) -> bool:
+        """Whether it does by more."""
+        return abs(self.mass_kg - total.total_kg) > self.allowed_kg(total, share)
+
+
+def stated_mass(context: PersonContext) -> Iterator[Finding]:
+    """S111 and S112 where the stated mass is not the plates', P281 where a part of the weight is elsewhere for a
+    while.
+    """
+    total = context.total_mass
+    if total is None:
+        return
+    known = {one.name: mass for one in context.trials if (mass := one.force_mass) is not None}
+    apart = {name: found for name, mass in known.items() if (found := mass.unmeasured(total.total_kg)) is not None}
+    for name, found in apart.items():
+        missing, complete = Quantity(found.missing, "1", limit=MISSING), Quantity(found.complete, "1")
+        yield finding("P281", Where(trial=name, span_s=found.span_s), missing=missing, complete=complete)
+    standing = [mass for one in context.standing if (mass := one.force_mass) is not None]
+    whole = [_occasion(name, mass) for name, mass in known.items() if name not in apart]
+    partly = [_occasion(name, mass) for name, mass in known.items() if name in apart]
+    for one in [*_together(whole), *partly]:
+        if one.differs(total, WARNING_SHARE):
+            yield from _contradiction(context, one, total, standing)
+    if not known and context.standing and standing:
+        alone = _occasion(context.standing[0].name, standing[0])
+        if alone.differs(total, WARNING_SHARE):
+            # nothing is computed from the forces of a person who stands
+            for found_ in _contradiction(context, alone, total, []):
+                yield found_.at(min(found_.severity, Severity.WARNING))
+
+
+def masses_of_trials(context: PersonContext) -> Iterator[Finding]:
+    """S306: two trials whose forces carry different masses, of the one that the others speak against."""
+    known = {one.name: one.force_mass for one in context.trials if one.force_mass is not None}
+    standing = [mass.mass_kg for one in context.standing if (mass := one.force_mass) is not None]
+    for (first, own), (other, others) in combinations(known.items(), 2):
+        lighter_kg = min(own.mass_kg, others.mass_kg)
+        allowed = ERROR_SHARE * lighter_kg + 2.0 * float(np.hypot(own.sd_kg, others.sd_kg))
+        if abs(own.mass_kg - others.mass_kg) <= allowed:
+            continue
+        further = [mass.mass_kg for name, mass in known.items() if name not in (first, other)]
+        witnesses = [(abs(kg - own.mass_kg), abs(kg - others.mass_kg)) for kg in (*standing, *further)]
+        for odd in odd_ones(first, other, witnesses):
+            peer = other if odd == first else first
+            yield finding(
+                "S306",
+                Where(trial=odd),
+                mass_by_force_kg=Quantity(known[odd].mass_kg, "kg", sd=known[odd].sd_kg),
+                other_kg=Quantity(known[peer].mass_kg, "kg", sd=known[peer].sd_kg),
+                other_trial=Quantity(peer),
+            )
+
+
+def _occasion(name: str | None, mass: ForceMass) -> _Occasion:
+    return _Occasion(name, mass.mass_kg, mass.sd_kg, mass.over)
+
+
+def _together(occasions: Sequence[_Occasion]) -> list[_Occasion]:
+    """One for all trials where they agree, else each by itself."""
+    if len(occasions) < 2:
+        return list(occasions)
+    weights = np.array([one.sd_kg**-2 for one in occasions])
+    mass_kg = float(weights @ [one.mass_kg for one in occasions] / weights.sum())
+    sd_kg = float(weights.sum() ** -0.5)
+    for one in occasions:
+        if abs(one.mass_kg - mass_kg) > WARNING_SHARE * mass_kg + 2.0 * float(np.hypot(one.sd_kg, sd_kg)):
+            return list(occasions)
+    return [_Occasion(None, mass_kg, sd_kg, " and ".join(dict.fromkeys(one.over for one in occasions)))]
+
+
+def _contradiction(
+    context: PersonContext, one: _Occasion, total: CarriedMass, standing: Sequence[ForceMass]
+) -> Iterator[Finding]:
+    """S111 with the causes that the evidence speaks for, and the unit that explains it."""
+    where, ratio = Where(trial=one.trial), one.mass_kg / total.total_kg
+    if _near(ratio, _POUND):
+        yield finding("S112", where, ratio=Quantity(ratio, "1"))
+    for unit, factor in _FORCE_UNITS.items():
+        if _near(ratio, factor):
+            yield finding("P202", where, unit=Quantity(unit), ratio=Quantity(ratio, "1"))
+    by_plate: dict[str, float] = {}
+    for trial in context.trials:
+        by_plate |= plate_masses(trial) if one.trial in (None, trial.name) else {}
+    causes, action = _causes(one.mass_kg, total.total_kg, by_plate, [mass.mass_kg for mass in standing])
+    heavier = one.mass_kg > total.total_kg
+    limit = total.total_kg + (1.0 if heavier else -1.0) * one.allowed_kg(total, WARNING_SHARE)
+    evidence = {
+        "mass_by_force_kg": Quantity(one.mass_kg, "kg", limit=limit, sd=one.sd_kg),
+        "stated_kg": Quantity(total.total_kg, "kg", sd=total.sd_kg),
+        "attached_kg": Quantity(total.total_kg - total.body_kg, "kg"),
+        "method": Quantity(f"markers' centre of mass over {one.over}"),
+        "action": Quantity(action),
+    }
+    if standing:
+        evidence["static_kg"] = Quantity(standing[0].mass_kg, "kg", sd=standing[0].sd_kg)
+    if len(by_plate) > 1:
+        evidence["plates_kg"] = Quantity(tuple(by_plate.values()), "kg")
+    severity = Severity.ERROR if one.differs(total, ERROR_SHARE) else Severity.WARNING
+    yield finding("S111", where, severity, causes, **evidence)
+
+
+def _causes(
+    by_force_kg: float, stated_kg: float, by_plate: Mapping[str, float], standing_kg: Sequence[float]
+) -> tuple[tuple[str, ...], str]:
+    """Likeliest first, and what to do about the first."""
+    heavier = by_force_kg > stated_kg
+    others = (_LOAD if heavier else _SUPPORT,)
+    heavy, light = (pick(by_plate, key=by_plate.__getitem__, default="") for pick in (max, min))
+    if by_plate and by_plate[heavy] > (1.0 + _SAME_KG) * by_plate[light]:
+        plate = heavy if heavier else light
+        return (f"gain or zero of {plate}", *others, _STATED), f"Check {plate} with a known weight"
+    if _near(by_force_kg / stated_kg, 1.0 / _POUND):
+        return (_STATED_OVER_POUND, _STATED), "Give the mass in kg"
+    nearer = [abs(kg - by_force_kg) < abs(kg - stated_kg) for kg in standing_kg]
+    if nearer and not any(nearer):
+        return (*others, _PLATES), (
+            "Declare what was worn or carried as [[attached]]" if heavier else "Look for support that no plate measures"
+        )
+    if not nearer and len(by_plate) < 2:
+        if heavier and by_force_kg - stated_kg > _LOAD_KG:
+            return (*others, _STATED, _PLATES), "Declare what was worn or carried as [[attached]], or correct the mass"
+        return (_STATED, _PLATES, *others), "Check the mass, and gain and zero of the plates"
+    return (_STATED, *others, _PLATES), "Correct the mass"
+
+
+def _near(ratio: float, wanted: float) -> bool:
+    return abs(ratio / wanted - 1.0) <= _UNIT_OFF

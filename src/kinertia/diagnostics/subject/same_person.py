@@ -1,0 +1,220 @@
+"""Are static trial and trials of one person, in one session? Distances between markers of one segment show it.
+
+Compared are pelvis, legs and feet: medians over the frames. The upper body is left out, whose skin moves with the arms.
+On ten fault-free pairs of a static trial and a trial, measured in five laboratories, distances differ by 4.6 mm RMS at
+most, and single ones by 17 mm; their ratio is within 1.2 %.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kinertia.diagnostics.context import PersonContext, RecordingContext
+from kinertia.diagnostics.evidence.label_exchange import swapped_labels
+from kinertia.diagnostics.evidence.segment_distances import SegmentDistances
+from kinertia.diagnostics.subject.camera_scale import AGAINST_STANDING, camera_scale
+from kinertia.diagnostics.subject.majority import odd_ones
+from kinertia.findings.finding import Finding, finding
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
+from kinertia.model.marker_set import MarkerSet
+
+_OTHER_PERSON = 0.05
+"""Median share by which the distances may differ."""
+_FEWEST_PAIRS = 6
+_MOVED_M, _MOVED_BETWEEN_M, _MOVED_SHARE = 0.03, 0.04, 0.15
+"""By which a distance differs where a marker was moved: against a static trial; between trials, where soft thighs
+change shape, a length and a share."""
+_MOST_MOVED = 3
+"""Where more markers were moved, all of them may have been."""
+_SAME_SESSION_M = 0.009
+"""RMS difference of the distances: re-applied markers are 5 to 10 mm off along each axis, which makes 7 to 14."""
+
+
+def static_and_trials(context: PersonContext) -> Iterator[Finding]:
+    """Swapped labels (L212), another person (S203), another camera scale (S205), moved (M161) or re-applied markers
+    (S204) in trials, against the static trial.
+
+    Of several recordings in which the person stands each is compared; the one that a trial contradicts while it agrees
+    with another is the odd one itself.
+    """
+    marker_set = context.marker_set
+    if marker_set is None:
+        return
+    # labels that are swapped in a static trial put its distances wrong
+    references = [one for one in context.standing if not context.has_error(one.name, "L20")]
+    for trial in context.trials:
+        found = [
+            list(_against(reference, trial, marker_set, trial.name, _called(context, reference), AGAINST_STANDING))
+            for reference in references
+        ]
+        if all(found):
+            yield from _joined(found)
+            continue
+        for reference, own in zip(references, found, strict=True):
+            if own:
+                yield from _against(
+                    trial, reference, marker_set, reference.name, f"trial {trial.name}", -AGAINST_STANDING
+                )
+
+
+def trials_of_one_person(context: PersonContext) -> Iterator[Finding]:
+    """Two trials of different people (S305), or with a marker that was moved in between (M161); of the two the one that
+    static trial and other trials contradict, both where neither.
+    """
+    marker_set = context.marker_set
+    if marker_set is None:
+        return
+    for first, other in combinations(context.trials, 2):
+        distances = SegmentDistances.of(first.all_markers, other.all_markers, marker_set)
+        if not len(distances.pairs):
+            continue
+        ratio = distances.ratio()
+        moved = _moved_markers(distances, _MOVED_BETWEEN_M, _MOVED_SHARE)
+        if not moved and (len(distances.pairs) < _FEWEST_PAIRS or abs(ratio - 1.0) <= _OTHER_PERSON):
+            continue
+        further = [one for one in (*context.standing, *context.trials) if one not in (first, other)]
+        for odd in odd_ones(first, other, _witnesses(first, other, further, marker_set, moved)):
+            peer = other if odd is first else first
+            yield from _moved_findings(moved, odd.name, f"trial {peer.name}")
+            if not moved:
+                share = ratio if odd is other else 1.0 / ratio
+                yield finding(
+                    "S305",
+                    Where(trial=odd.name),
+                    ratio=Quantity(share, "1", limit=1.0 + _OTHER_PERSON * np.sign(share - 1.0)),
+                    pairs=Quantity(len(distances.pairs), "1"),
+                    other_trial=Quantity(peer.name),
+                )
+
+
+def _against(
+    reference: RecordingContext, trial: RecordingContext, marker_set: MarkerSet, at: str, called: str, usual: float
+) -> Iterator[Finding]:
+    """What a recording differs in from a reference, found in the recording `at`."""
+    distances = SegmentDistances.of(reference.all_markers, trial.all_markers, marker_set)
+    if not len(distances.pairs):
+        return
+    yield from swapped_labels(distances, at, called)
+    off, ratio, count = distances.differences(), distances.ratio(), len(distances.pairs)
+    worst = int(np.argmax(np.abs(off)))
+    if count >= _FEWEST_PAIRS and abs(ratio - 1.0) > _OTHER_PERSON:
+        yield finding(
+            "S203",
+            Where(trial=at),
+            ratio=Quantity(ratio, "1", limit=1.0 + _OTHER_PERSON * float(np.sign(ratio - 1.0)), usual=(0.988, 1.012)),
+            pairs=Quantity(count, "1"),
+            worst_m=Quantity(float(off[worst]), "m"),
+            reference=Quantity(called),
+        )
+    if (scale := camera_scale(distances, usual)) is not None:
+        yield scale.finding(at, called)
+    yield from _moved_findings(_moved_markers(distances, _MOVED_M, 0.0), at, called)
+    rms_m = float(np.sqrt(np.square(off).mean()))
+    if count >= _FEWEST_PAIRS and rms_m > _SAME_SESSION_M:
+        yield finding(
+            "S204",
+            Where(trial=at),
+            rms_m=Quantity(rms_m, "m", limit=_SAME_SESSION_M, usual=(0.0, 0.0046)),
+            worst_pair=Quantity(" to ".join(distances.labels[k] for k in distances.pairs[worst])),
+            reference=Quantity(called),
+        )
+
+
+@dataclass(frozen=True)
+class _Moved:
+    """A marker that was moved: its label, or both where only their distance shows it; by how much, to which other."""
+
+    labels: tuple[str, ...]
+    difference_m: float
+    to_marker: str
+
+
+def _moved_markers(distances: SegmentDistances, least_m: float, least_share: float) -> tuple[_Moved, ...]:
+    """The few markers without which all distances agree; none where distances differ without them, too."""
+    off = distances.differences()
+    before, after = distances.lengths()
+    far = (np.abs(off) > least_m) & (np.abs(off) > least_share * np.minimum(before, after))
+    moved: list[_Moved] = []
+    kept = np.ones(len(off), bool)
+    while (far & kept).any() and len(moved) < _MOST_MOVED:
+        # one marker that moved takes all of its distances along
+        about = [np.abs(off[kept & _with(distances, k)]) for k in range(len(distances.labels))]
+        k = int(np.argmax([np.median(one) if len(one) else 0.0 for one in about]))
+        mates = distances.pairs[far & kept & _with(distances, k)]
+        if not len(mates):
+            return ()
+        mate = distances.labels[int(mates[0][0] if mates[0][1] == k else mates[0][1])]
+        label = distances.labels[k]
+        labels = (label,) if _with(distances, k).sum() > 1 else (label, mate)
+        moved.append(_Moved(labels, float(about[k].max()), mate))
+        kept &= ~_with(distances, k)
+    rest = off[kept]
+    agree = not (far & kept).any() and np.sqrt(np.square(rest).mean() if len(rest) else 0.0) <= _SAME_SESSION_M
+    return tuple(moved) if agree else ()
+
+
+def _with(distances: SegmentDistances, k: int) -> NDArray[np.bool_]:
+    """(p,) which pairs are with this marker."""
+    result: NDArray[np.bool_] = (distances.pairs == k).any(axis=1)
+    return result
+
+
+def _moved_findings(moved: Sequence[_Moved], at: str, called: str) -> Iterator[Finding]:
+    for one in moved:
+        yield finding(
+            "M161",
+            Where(trial=at, markers=one.labels),
+            difference_m=Quantity(one.difference_m, "m", limit=_MOVED_M, usual=(0.0, 0.017)),
+            to_marker=Quantity(one.to_marker),
+            reference=Quantity(called),
+        )
+
+
+class _Witness(NamedTuple):
+    """How far a further recording is from the two that disagree."""
+
+    to_first: float
+    to_other: float
+
+
+def _witnesses(
+    first: RecordingContext,
+    other: RecordingContext,
+    further: Sequence[RecordingContext],
+    marker_set: MarkerSet,
+    moved: Sequence[_Moved],
+) -> list[_Witness]:
+    """Distances of the markers that were moved, else all, in further recordings: how far (m, or log of a ratio)."""
+    about = {label for one in moved for label in one.labels}
+
+    def apart(one: RecordingContext, two: RecordingContext) -> float:
+        distances = SegmentDistances.of(one.all_markers, two.all_markers, marker_set)
+        if not moved:
+            return abs(float(np.log(distances.ratio()))) if len(distances.pairs) else np.nan
+        own = np.isin(distances.pairs, [k for k, label in enumerate(distances.labels) if label in about]).any(axis=1)
+        return float(np.abs(distances.differences()[own]).max()) if own.any() else np.nan
+
+    return [_Witness(apart(one, first), apart(one, other)) for one in further]
+
+
+def _called(context: PersonContext, reference: RecordingContext) -> str:
+    return "static trial" if reference is context.static else f"standing trial {reference.name}"
+
+
+def _joined(found: Sequence[Sequence[Finding]]) -> Iterator[Finding]:
+    """The same finding against several references once, with all their names."""
+    together: dict[tuple[str, Where], Finding] = {}
+    for one in (each for own in found for each in own):
+        key = one.code, one.where
+        if key in together:
+            names = Quantity(f"{together[key].evidence['reference'].value} and {one.evidence['reference'].value}")
+            one = replace(together[key], evidence={**together[key].evidence, "reference": names})
+        together[key] = one
+    yield from together.values()

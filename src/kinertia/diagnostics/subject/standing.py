@@ -1,0 +1,69 @@
+"""Does the static trial show a person who stands on the floor with both feet flat, and can a model be built from it?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from kinertia.diagnostics.context import RecordingContext
+from kinertia.findings.finding import Finding, finding
+from kinertia.findings.quantity import Quantity
+
+_LOWEST_M = (0.008, 0.050)
+"""A marker's own radius is 5 mm and more; soles are under both feet, and markers on the side of a foot are low."""
+_USUAL_LOWEST_M = (0.023, 0.044)
+"""Of fourteen people of eight laboratories, with bare feet and in running shoes."""
+_FLAT_M = 0.04
+"""Heels, and metatarsals, of seven people who stand are up to 12 mm higher on one side than on the other."""
+_WALK_M = 0.5
+
+
+def standing(context: RecordingContext) -> Iterator[Finding]:
+    """S201: a person who walks in the static trial."""
+    if context.travel.kind == "walks":
+        distance = Quantity(context.travel.distance_m, "m", limit=_WALK_M, usual=(0.0, 0.03))
+        yield finding("S201", context.at(), distance_m=distance)
+
+
+def floor(context: RecordingContext) -> Iterator[Finding]:
+    """M143: feet that stand above the floor or below it, by the lowest marker of toes, metatarsals and heels."""
+    if context.marker_set is None:
+        return
+    names = [f"{name}_{side}" for name in ("heel", "metatarsal", "toe") for side in "rl"]
+    of_landmark = [context.marker_set.landmarks.get(name, ()) for name in names]
+    present = context.all_markers.labels
+    labels = [label for own in of_landmark for label in own if label in present]
+    heights = context.all_markers.select(labels).positions[..., 1]
+    shown = np.isfinite(heights).any(axis=0)
+    if not all(of_landmark[:4]) or not shown.any():
+        return
+    lowest = int(np.argmin(np.where(shown, np.nanmedian(np.where(shown, heights, 0.0), axis=0), np.inf)))
+    height_m = float(np.nanmedian(heights[:, lowest]))
+    low, high = _LOWEST_M
+    if not low <= height_m <= high:
+        height = Quantity(height_m, "m", limit=low if height_m < low else high, usual=_USUAL_LOWEST_M)
+        yield finding("M143", context.at(markers=(labels[lowest],)), height_m=height)
+
+
+def flat_feet(context: RecordingContext) -> Iterator[Finding]:
+    """S202: a foot that is not on the floor as the other is; a foot's axes are those of one that stands flat."""
+    if context.marker_set is None:
+        return
+    apart = {}
+    for name in ("heel", "metatarsal"):
+        labels = (context.marker_set.landmarks.get(f"{name}_{side}", ())[:1] for side in "rl")
+        heights = [context.all_markers.arranged(own)[..., 1] for own in labels]
+        if all(np.isfinite(each).any() for each in heights):
+            right_m, left_m = (float(np.nanmedian(each)) for each in heights)
+            apart[name] = right_m - left_m
+    if not apart:
+        return
+    landmark, higher_m = max(apart.items(), key=lambda one: abs(one[1]))
+    if abs(higher_m) >= _FLAT_M:
+        yield finding(
+            "S202",
+            context.at(part="right foot" if higher_m > 0 else "left foot"),
+            difference_m=Quantity(abs(higher_m), "m", limit=_FLAT_M, usual=(0.0, 0.012)),
+            landmark=Quantity(landmark),
+        )

@@ -1,0 +1,25 @@
+"""Which bodies of an OpenSim model are estimated; all others keep the model's own parameters."""
+
+from __future__ import annotations
+
+from kinertia.model.bsp import BodySegmentParameters
+from kinertia.model.skeleton import Skeleton
+
+LIGHT_KG = 0.5
+"""Bodies that weigh less together than this move with their joints, but are not estimated."""
+
+
+def estimated_bodies(skeleton: Skeleton, own: BodySegmentParameters) -> set[str]:
+    """Of every group of bodies that move as one the heaviest is estimated; none of a group that is light altogether.
+
+    Args:
+        skeleton: with the coordinates locked that no marker shows.
+        own: the model's own parameters, at the mass of the person.
+    """
+    mass = dict(zip(own.segments, own.mass_kg, strict=True))
+    groups: dict[int, list[str]] = {}
+    carrier_of = dict(zip(skeleton.segments, skeleton.tree.carrier.tolist(), strict=True))
+    for name in own.segments:
+        groups.setdefault(carrier_of[name], []).append(name)
+    heavy = [names for names in groups.values() if sum(mass[name] for name in names) >= LIGHT_KG]
+    return {max(names, key=mass.__getitem__) for names in heavy}

@@ -1,0 +1,118 @@
+"""Many findings at a glance: the verdict in a line, what is open in order of importance, equal findings as one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from kinertia.findings.display import first_few
+from kinertia.findings.finding import Finding, Severity
+from kinertia.findings.rule import STAGES
+
+USE, WITH_CARE, DO_NOT_USE = "use", "use with care", "do not use"
+
+
+@dataclass(frozen=True)
+class Overview:
+    """What findings come to.
+
+    Attributes:
+        findings: all of them, muted and overruled ones included.
+        rules: how many rules were asked.
+        trials: how many trials there are.
+        left_out: names of the trials that were not used.
+
+    Examples:
+        >>> from kinertia.findings.overview import Overview
+        >>> Overview((), 61, 2).line
+        'use: nothing found; 61 rules, 2 of 2 trials'
+    """
+
+    findings: Sequence[Finding]
+    rules: int
+    trials: int
+    left_out: tuple[str, ...] = ()
+
+    @property
+    def open(self) -> list[Finding]:
+        """Those that are neither explained nor overruled, the most important first."""
+        return in_order(one for one in self.findings if one.is_open)
+
+    def count(self, severity: Severity) -> int:
+        """How many open ones of this severity."""
+        return sum(one.severity is severity for one in self.open)
+
+    @property
+    def waived(self) -> list[Finding]:
+        """ERRORs that the user overrules."""
+        return [one for one in self.findings if one.status == "waived" and one.muted_by is None]
+
+    @property
+    def severity(self) -> Severity:
+        """The worst of the open ones; a waived ERROR and a trial left out count as a WARNING."""
+        worst = max((one.severity for one in self.open), default=Severity.INFO)
+        return max(worst, Severity.WARNING) if self.waived or self.left_out else worst
+
+    @property
+    def verdict(self) -> str:
+        """ "use", "use with care" or "do not use"."""
+        return {Severity.ERROR: DO_NOT_USE, Severity.WARNING: WITH_CARE}.get(self.severity, USE)
+
+    @property
+    def line(self) -> str:
+        """The verdict and what it rests on."""
+        counts = [
+            (self.count(Severity.ERROR), "error", "errors"),
+            (self.count(Severity.WARNING), "warning", "warnings"),
+            (self.count(Severity.CORRECTED), "corrected", "corrected"),
+            (len(self.waived), "waived", "waived"),
+        ]
+        found = ", ".join(f"{count} {one if count == 1 else many}" for count, one, many in counts if count)
+        used = self.trials - len(self.left_out)
+        return f"{self.verdict}: {found or 'nothing found'}; {self.rules} rules, {used} of {self.trials} trials"
+
+
+def in_order(findings: Iterable[Finding]) -> list[Finding]:
+    """The worst first, of equals those of the earliest stage."""
+    return sorted(findings, key=lambda one: (-one.severity, STAGES.index(one.rule.stage), one.code))
+
+
+@dataclass(frozen=True)
+class Group:
+    """Findings of one code in one trial, of which the first stands for all."""
+
+    findings: tuple[Finding, ...]
+
+    @property
+    def first(self) -> Finding:
+        """The one whose message is shown."""
+        return self.findings[0]
+
+    @property
+    def message(self) -> str:
+        """Its message, and in how many places there is the same."""
+        if len(self.findings) == 1:
+            return self.first.message
+        places = [_place(one) for one in self.findings[1:]]
+        named = [place for place in places if place]
+        also = f"also {first_few(named, 3)}" if named else f"{len(places)} more"
+        return f"{self.first.message.rstrip('.')} ({also})."
+
+    @property
+    def line(self) -> str:
+        """Trial, code and message on one line."""
+        trial = f"{self.first.where.trial}  " if self.first.where.trial else ""
+        return f"{trial}{self.first.code} {self.message}"
+
+
+def grouped(findings: Iterable[Finding]) -> list[Group]:
+    """Findings of the same code, trial and severity together, in their order."""
+    groups: dict[tuple[object, ...], list[Finding]] = {}
+    for one in findings:
+        groups.setdefault((one.code, one.where.trial, one.severity, one.status, one.muted_by), []).append(one)
+    return [Group(tuple(each)) for each in groups.values()]
+
+
+def _place(one: Finding) -> str:
+    where = one.where
+    return where.plate or (where.markers[0] if where.markers else None) or where.part or ""

@@ -1,0 +1,209 @@
+"""Findings as pages show them: what to do next, by severity with their evidence, corrections in a table, explanations.
+
+One view for the report, for check.html and for the page in the browser, so that each says the same of a finding.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from kinertia.findings.display import axis_text, first_few, outlined, shown
+from kinertia.findings.finding import Finding, Severity
+from kinertia.findings.overview import DO_NOT_USE, USE, WITH_CARE, Group, Overview, grouped, in_order
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.rule import Rule, questions, rule
+from kinertia.findings.where import Where
+
+LOOKS = {USE: "info", WITH_CARE: "warning", DO_NOT_USE: "error"}
+"""Class of the style sheet for each word of a verdict; that of a finding is its severity."""
+MOST_STEPS = 3
+_TITLES = {Severity.ERROR: "Errors", Severity.WARNING: "Warnings"}
+_NOTHING = "Nothing needs to be done."
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Evidence of one finding: where it is, and each quantity in words."""
+
+    place: str
+    quantities: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Correction:
+    """A row of the table of corrections: where, what, size with its deviation, what it does."""
+
+    finding: Finding
+    where: str
+    what: str
+    size: str
+    muted: tuple[Group, ...]
+
+
+@dataclass(frozen=True)
+class Card:
+    """Findings of one code in one trial, with those that they explain."""
+
+    group: Group
+    muted: tuple[Group, ...]
+
+    @property
+    def first(self) -> Finding:
+        """The one whose words are shown."""
+        return self.group.first
+
+    @property
+    def causes(self) -> tuple[str, ...]:
+        """Likeliest first."""
+        return self.first.causes or self.first.rule.causes
+
+    @property
+    def measured(self) -> list[Measured]:
+        """Evidence, an entry for each finding that has any."""
+        each = [Measured(place_text(one.where), tuple(evidence_texts(one))) for one in self.group.findings]
+        return [one for one in each if one.quantities]
+
+
+@dataclass(frozen=True)
+class FindingView:
+    """What a page shows of the findings of one or several overviews."""
+
+    overviews: Sequence[Overview]
+
+    @cached_property
+    def findings(self) -> list[Finding]:
+        """All of them, the worst first."""
+        return in_order(one for overview in self.overviews for one in overview.findings)
+
+    def _cards(self, severity: Severity) -> list[Card]:
+        top = [one for one in self.findings if one.muted_by is None and one.status != "ignored"]
+        groups = grouped(one for one in top if one.severity is severity)
+        return [Card(group, tuple(grouped(self._explained(group.findings)))) for group in groups]
+
+    def _explained(self, causes: Sequence[Finding]) -> list[Finding]:
+        """What these explain, and what that explains in its turn."""
+        found: list[Finding] = []
+        waiting = list(causes)
+        while waiting:
+            cause = waiting.pop()
+            for one in self.findings:
+                if one.muted_by == cause.code and cause.where.overlaps(one.where) and one not in found:
+                    found.append(one)
+                    waiting.append(one)
+        return in_order(found)
+
+    @cached_property
+    def sections(self) -> list[tuple[str, list[Card]]]:
+        """Errors and warnings, waived ones among them, under their headings; none that is empty."""
+        cards = [(title, self._cards(severity)) for severity, title in _TITLES.items()]
+        return [(title, some) for title, some in cards if some]
+
+    @cached_property
+    def corrections(self) -> list[Correction]:
+        """Apparent errors that a reader or the estimate has corrected."""
+        return [_correction(one, self._explained([one])) for one in self._top(Severity.CORRECTED)]
+
+    @cached_property
+    def notes(self) -> list[Group]:
+        """Assumptions and advice."""
+        return grouped(self._top(Severity.INFO))
+
+    def _top(self, severity: Severity) -> list[Finding]:
+        return [one for one in self.findings if one.severity is severity and one.is_open]
+
+    @cached_property
+    def ignored(self) -> str:
+        """Codes that the user does not want to see, and how often they were found; empty where there are none."""
+        codes = [one.code for one in self.findings if one.status == "ignored" and one.muted_by is None]
+        return ", ".join(f"{code} ({codes.count(code)})" for code in dict.fromkeys(codes))
+
+    @cached_property
+    def steps(self) -> list[Card]:
+        """The findings whose remedies come first: at most three, each remedy once."""
+        cards = {card.first.remedy: card for _, some in reversed(self.sections) for card in reversed(some)}
+        return [card for _, some in self.sections for card in some if cards[card.first.remedy] is card][:MOST_STEPS]
+
+    @cached_property
+    def rules(self) -> list[Rule]:
+        """The rules of all codes that are on the page, to be explained there."""
+        shown_ = [one for one in self.findings if one.status != "ignored"]
+        return [rule(code) for code in sorted({one.code for one in shown_})]
+
+
+def _correction(one: Finding, explained: Sequence[Finding]) -> Correction:
+    what = one.name.removesuffix("-corrected").replace("-", " ")
+    size = next((evidence_text(one, name, signed=True) for name in one.evidence), "")
+    return Correction(
+        one, place_text(one.where, with_trial=True) or "all trials", what, size, tuple(grouped(explained))
+    )
+
+
+def place_text(where: Where, with_trial: bool = False) -> str:
+    """Where something is, in words: "walk: plate 1, fore-aft (X)"."""
+    span = "" if where.span_s is None else f"{where.span_s[0]:.2f} to {where.span_s[1]:.2f} s"
+    axis = axis_text(where) if where.axis or where.file_axis else ""
+    place = ", ".join(filter(None, [where.plate, where.part, axis, first_few(where.markers), span]))
+    trial = (where.trial or where.file or "") if with_trial else ""
+    return f"{trial}: {place}" if trial and place else trial or place
+
+
+def evidence_texts(one: Finding) -> list[str]:
+    """Every quantity of a finding with its name: "level -23 N (limit 15 N)"."""
+    return [f"{outlined('{' + name + '}', '{}')} {evidence_text(one, name)}" for name in one.evidence]
+
+
+def evidence_text(one: Finding, name: str, signed: bool = False) -> str:
+    """A quantity as the message has it, with its deviation, limit and usual range."""
+    quantity, style = one.evidence[name], _style(one.rule.message, name)
+    plain = style.replace("+", "")
+
+    def read(value: float) -> str:
+        return shown(Quantity(value, quantity.unit), plain)
+
+    text = shown(quantity, f"{plain}+" if signed and isinstance(quantity.value, float) else style)
+    more = [] if quantity.limit is None else [f"limit {read(quantity.limit)}"]
+    if quantity.usual is not None:
+        low, high = quantity.usual
+        more.append(f"usual within {read(high)}" if low == -high else f"usual {read(low)} to {read(high)}")
+    deviation = "" if quantity.sd is None else f" ± {read(quantity.sd)} (SD)"
+    return text + deviation + (f" ({'; '.join(more)})" if more else "")
+
+
+def _style(template: str, name: str) -> str:
+    field = re.search(rf"\{{{name}:([+%#]*)\}}", template)
+    return "" if field is None else field.group(1)
+
+
+def asks(one: Rule) -> str:
+    """The question that a rule is an answer to."""
+    return questions(one.code[0])[one.question]
+
+
+def lines(findings: Iterable[Finding], least: Severity = Severity.CORRECTED) -> list[str]:
+    """Open findings from this severity on, one line each, equal ones together."""
+    return [group.line for group in grouped(in_order(one for one in findings if one.is_open and one.severity >= least))]
+
+
+def digest(overview: Overview) -> dict[str, Any]:
+    """Verdict and findings for the page in the browser: one entry for equal findings, assumptions left out."""
+    shown_ = [one for one in overview.findings if one.severity > Severity.INFO and one.muted_by is None]
+    groups = grouped(in_order(one for one in shown_ if one.status != "ignored"))
+    return {
+        "verdict": overview.verdict,
+        "line": overview.line,
+        "findings": [
+            {
+                "code": group.first.code,
+                "severity": group.first.severity.name,
+                "status": group.first.status,
+                "trial": group.first.where.trial,
+                "message": group.message,
+                "remedy": group.first.remedy,
+            }
+            for group in groups
+        ],
+    }

@@ -1,0 +1,117 @@
+"""What `kinertia check` finds: of a person's recordings up to inverse kinematics, or of OpenSim models alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from kinertia.diagnostics.context import PersonContext
+from kinertia.diagnostics.model import questions as model_questions
+from kinertia.diagnostics.model.model_check import ModelCheck, check_model
+from kinertia.diagnostics.runner import asked, explained, overruled
+from kinertia.findings.finding import Finding
+from kinertia.findings.overview import Overview
+from kinertia.findings.rule import matching
+from kinertia.model.imported import OsimModel
+from kinertia.model.marker_set import MarkerSet
+from kinertia.settings import Overrule, Subject
+from kinertia.trial.data import Recording
+from kinertia.trial.trial_input import TrialInput
+from kinertia.workflow.person import Person
+from kinertia.workflow.recording import RecordingCheck
+from kinertia.workflow.screening import Screened, screen
+
+
+@dataclass(frozen=True, eq=False)
+class PersonCheck:
+    """Everything that was found of a person's recordings, and what is in them.
+
+    Attributes:
+        screened: the person with all findings.
+        recordings: what is in each, the static trial first.
+    """
+
+    screened: Screened
+    recordings: tuple[RecordingCheck, ...]
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """All of them."""
+        return self.screened.findings
+
+    @property
+    def overview(self) -> Overview:
+        """What they come to."""
+        trials = len(self.screened.person.trials) + len(
+            {one.where.trial for one in self.screened.person.unread if one.where.trial}
+        )
+        return Overview(self.findings, self.screened.rules, trials, self.screened.left_out)
+
+
+def check_person(person: Person) -> PersonCheck:
+    """Screen a person's recordings as a fit does, up to inverse kinematics.
+
+    Args:
+        person: as `read_person` or `read_files` makes it.
+    """
+    screened = screen(person)
+    contexts = (*screened.context.standing, *screened.context.trials)
+    return PersonCheck(screened, tuple(RecordingCheck.of(one, screened.findings) for one in contexts))
+
+
+def check_recording(
+    recording: Recording,
+    marker_set: MarkerSet | None = None,
+    mass_kg: float | None = None,
+    window_s: tuple[float, float] | None = None,
+    static: Recording | None = None,
+    height_m: float | None = None,
+    is_static: bool = False,
+) -> RecordingCheck:
+    """Look at one recording as a fit would, up to inverse kinematics.
+
+    Args:
+        recording: markers, and forces where there are any.
+        marker_set: the laboratory's, or the markers of an OpenSim model; found among the presets if None.
+        mass_kg: as stated; the file's own if None.
+        window_s: the window that the user vouches for.
+        static: the static trial that goes with it, if there is one.
+        height_m: stature; the file's own if None.
+        is_static: it is the static trial.
+
+    Examples:
+        >>> walk = kinertia.read_recording("lab/walk.trc", "lab/walk_grf.mot")
+        >>> check = kinertia.check_recording(walk, mass_kg=72.6)
+        >>> check.marker_set.name, [one.code for one in check.findings if one.severity >= kinertia.Severity.WARNING]
+        ('Cleveland Clinic', [])
+    """
+    subject = Subject(name="person", mass_kg=mass_kg, height_m=height_m)
+    if is_static:
+        person = Person(subject, (), recording, marker_set=marker_set)
+    else:
+        person = Person(subject, (TrialInput(recording, window_s),), static, marker_set=marker_set)
+    checked = check_person(person)
+    return next(one for one in checked.recordings if one.context.name == recording.name)
+
+
+@dataclass(frozen=True, eq=False)
+class ModelOverview:
+    """An OpenSim model by its file's name: what is in it, and what was found."""
+
+    name: str
+    facts: ModelCheck
+    overview: Overview
+
+
+def check_osim(model: OsimModel, subject: Subject, overrule: Overrule | None = None) -> ModelOverview:
+    """What is found of an OpenSim model by itself.
+
+    Args:
+        model: as read.
+        subject: mass, stature and sex where they are known.
+        overrule: what the user overrules.
+    """
+    found = asked(model_questions.PERSON_QUESTIONS, PersonContext(subject, (), model=model))
+    findings = overruled(explained(found), overrule or Overrule())
+    rules = {code for one in model_questions.PERSON_QUESTIONS for code in matching(one.code)}
+    facts = check_model(model.skeleton, model.bsp, subject.mass_kg, subject.height_m, subject.sex)
+    return ModelOverview(model.path.name, facts, Overview(findings, len(rules), 0))

@@ -1,0 +1,85 @@
+"""Inverse kinematics of all trials; a trial that cannot be solved is left out, unless none remains."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from kinertia.diagnostics.context import RecordingContext
+from kinertia.errors import TrialError
+from kinertia.estimation.prepared import Progress
+from kinertia.findings.finding import Finding
+from kinertia.model.skeleton import Skeleton
+from kinertia.motion.kinematics import Kinematics, solve_kinematics
+from kinertia.trial.data import Trial
+
+
+@dataclass(frozen=True)
+class Turned:
+    """A trial in the axes in which it is solved.
+
+    Attributes:
+        trial: facing +X with the built-in model, as recorded with an OpenSim model.
+        angle_deg: by which it was turned about the vertical.
+        read_seconds: that reading it took.
+    """
+
+    trial: Trial
+    angle_deg: float = 0.0
+    read_seconds: float = 0.0
+
+
+def seen_markers(context: RecordingContext) -> Trial:
+    """The trial of a recording that can be used, without markers that no frame shows."""
+    trial = context.trial
+    assert trial is not None
+    seen = trial.markers.seen
+    labels = [label for column, label in enumerate(trial.markers.labels) if seen[:, column].any()]
+    return replace(trial, markers=trial.markers.select(labels))
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """Kinematics of the trials that could be solved, seconds by stage, and why the others could not."""
+
+    kinematics: tuple[Kinematics, ...]
+    seconds: tuple[Mapping[str, float], ...]
+    findings: tuple[Finding, ...]
+
+
+def solved_trials(
+    skeleton: Skeleton,
+    trials: Sequence[Turned],
+    smoothing: float | Literal["gcv"],
+    calibration_s: float,
+    progress: Progress,
+) -> Solved:
+    """Smoothed coordinates of all trials.
+
+    Args:
+        skeleton: calibrated.
+        trials: in the axes in which they are solved.
+        smoothing: cutoff in Hz, or "gcv".
+        calibration_s: seconds per trial that calibration took.
+        progress: called as the work goes on.
+
+    Raises:
+        TrialError: no trial can be solved.
+    """
+    kinematics, seconds, failed = [], [], []
+    for k, one in enumerate(trials):
+        progress("inverse kinematics", k / len(trials))
+        started = time.perf_counter()
+        try:
+            kinematics.append(solve_kinematics(skeleton, one.trial, one.angle_deg, smoothing))
+        except TrialError as error:
+            failed.append(error)
+            continue
+        ik_s = time.perf_counter() - started
+        seconds.append({"read": one.read_seconds, "calibration": calibration_s, "ik": ik_s})
+    findings = tuple(error.finding for error in failed if error.finding is not None)
+    if failed and (not kinematics or len(findings) < len(failed)):
+        raise failed[0]
+    return Solved(tuple(kinematics), tuple(seconds), findings)

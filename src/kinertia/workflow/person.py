@@ -1,0 +1,137 @@
+"""What is given of one person: recordings, marker set or model, what is stated, and what the user overrules."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+from typing import TypeVar
+
+from kinertia.errors import BlockedError, KinertiaError, MarkerSetError
+from kinertia.findings.finding import Finding
+from kinertia.io.marker_set_file import choose_marker_set, read_marker_set
+from kinertia.io.osim.reader import read_osim
+from kinertia.io.person_recordings import read_static, read_trial
+from kinertia.io.subject_file import SubjectFile
+from kinertia.model.imported import OsimModel
+from kinertia.model.marker_set import MarkerSet, check_marker_set
+from kinertia.model.model_markers import markers_of_model
+from kinertia.settings import Attached, Overrule, Subject
+from kinertia.trial.data import Recording
+from kinertia.trial.trial_input import TrialInput
+
+Progress = Callable[[str, float], None]
+Read = TypeVar("Read")
+
+
+@dataclass(frozen=True, eq=False)
+class Person:
+    """One person as given, before any question is asked.
+
+    Attributes:
+        subject: what is stated.
+        trials: recordings of motions, in the order given.
+        static: the static trial.
+        more_statics: further recordings in which the person stands, of which none is the static trial.
+        marker_set: the laboratory's; found among the presets if None.
+        model: the OpenSim model, in place of the static trial.
+        calibrate: markers and joint centres of the model are to move.
+        attached: what the person wore or carried.
+        overrule: what the user overrules, for all trials.
+        overrule_of: the same of single trials, by their names.
+        unread: findings of files that could not be read.
+    """
+
+    subject: Subject
+    trials: Sequence[TrialInput]
+    static: Recording | None = None
+    more_statics: Sequence[Recording] = ()
+    marker_set: MarkerSet | None = None
+    model: OsimModel | None = None
+    calibrate: bool = False
+    attached: Sequence[Attached] = ()
+    overrule: Overrule = field(default_factory=Overrule)
+    overrule_of: Mapping[str, Overrule] = field(default_factory=dict)
+    unread: Sequence[Finding] = ()
+
+    @property
+    def recordings(self) -> list[Recording]:
+        """Of the motions."""
+        return [item.recording for item in self.trials]
+
+    def with_overrule(self, overrule: Overrule) -> Person:
+        """The same where the user overrules more."""
+        return replace(self, overrule=self.overrule + overrule)
+
+    @cached_property
+    def labels(self) -> MarkerSet | MarkerSetError:
+        """Which marker is on which segment, by the model or a marker set; the error where none fits."""
+        if self.model is not None:
+            return markers_of_model(self.model)
+        labels = (self.static or self.recordings[0]).markers.labels
+        try:
+            if self.marker_set is None:
+                return choose_marker_set(labels)
+            if self.static is not None:
+                check_marker_set(self.marker_set, labels)
+        except MarkerSetError as error:
+            return error
+        return self.marker_set
+
+
+def read_person(wanted: SubjectFile, progress: Progress = lambda stage, share: None) -> Person:
+    """Everything that a subject file names; recordings that cannot be read become findings, the others are read.
+
+    Raises:
+        KinertiaError: the marker set or the model cannot be read, or no trial can.
+    """
+    marker_set = None if wanted.model.markers is None else read_marker_set(wanted.model.markers)
+    model = None if wanted.model.osim is None else read_osim(wanted.model.osim)
+    unread = Unread()
+    static = None if wanted.model.static is None else unread.tried(lambda: read_static(wanted), None)
+    trials = []
+    for k, files in enumerate(wanted.trials):
+        progress("reading", k / len(wanted.trials))
+        trial = unread.tried(partial(read_trial, wanted, files), files.name)
+        trials += [] if trial is None else [trial]
+    unread.expect_any(trials)
+    return Person(
+        subject=wanted.subject,
+        trials=trials,
+        static=static,
+        marker_set=marker_set,
+        model=model,
+        calibrate=wanted.model.calibrate,
+        attached=wanted.attached,
+        overrule=wanted.diagnostics.overrule,
+        overrule_of={files.name: files.diagnostics.overrule for files in wanted.trials},
+        unread=tuple(unread.findings),
+    )
+
+
+@dataclass
+class Unread:
+    """Collects the findings of files that cannot be read."""
+
+    findings: list[Finding] = field(default_factory=list)
+    errors: list[KinertiaError] = field(default_factory=list)
+
+    def tried(self, read: Callable[[], Read], trial: str | None) -> Read | None:
+        """What could be read; None where it could not, which is then among the findings.
+
+        Raises:
+            KinertiaError: one that is no finding.
+        """
+        try:
+            return read()
+        except KinertiaError as error:
+            if error.finding is None:
+                raise
+            self.errors.append(error)
+            self.findings.append(error.finding if trial is None else error.finding.in_trial(trial))
+            return None
+
+    def expect_any(self, trials: Sequence[object]) -> None:
+        """Raise the error of a single trial that cannot be read, as it is; of several, all of them at once."""
+        if self.errors and not trials:
+            raise self.errors[0] if len(self.errors) == 1 else BlockedError(self.findings, self.findings)

@@ -1,0 +1,185 @@
+"""Every question of the stages before inverse kinematics, asked of all recordings of a person at once.
+
+`check` ends here and `fit` goes on from here, so that both ask the same questions. A trial with an open ERROR is left
+out; one of the person, or of the static trial, stops everything.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+from kinertia.diagnostics.context import PersonContext, RecordingContext
+from kinertia.diagnostics.labels import questions as labels
+from kinertia.diagnostics.markers import questions as markers
+from kinertia.diagnostics.model import questions as model
+from kinertia.diagnostics.plates.place_questions import PLACE_QUESTIONS
+from kinertia.diagnostics.plates.signal_questions import LOADED_QUESTIONS, SIGNAL_QUESTIONS
+from kinertia.diagnostics.runner import Question, asked, blocking, explained, overruled
+from kinertia.diagnostics.subject import questions as subject
+from kinertia.diagnostics.timing import questions as timing
+from kinertia.errors import BlockedError, KinertiaError, MarkerSetError
+from kinertia.estimation.carried_mass import CarriedMass
+from kinertia.estimation.input_checks import complete_subject
+from kinertia.findings.finding import Finding
+from kinertia.findings.rule import matching
+from kinertia.model.marker_set import MarkerSet
+from kinertia.settings import Subject
+from kinertia.trial.data import Recording
+from kinertia.workflow.joint_widths import with_widths
+from kinertia.workflow.person import Person
+
+STATIC_QUESTIONS: tuple[Question[RecordingContext], ...] = (
+    *markers.STATIC_QUESTIONS,
+    *labels.STATIC_QUESTIONS,
+    *subject.STATIC_QUESTIONS,
+)
+MOTION_QUESTIONS: tuple[Question[RecordingContext], ...] = (
+    *markers.MOTION_QUESTIONS,
+    *labels.MOTION_QUESTIONS,
+    *SIGNAL_QUESTIONS,
+    *timing.QUESTIONS,
+    *PLACE_QUESTIONS,
+    *LOADED_QUESTIONS,
+)
+PERSON_QUESTIONS: tuple[Question[PersonContext], ...] = (
+    *subject.PERSON_QUESTIONS,
+    *model.PERSON_QUESTIONS,
+    *timing.PERSON_QUESTIONS,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Screened:
+    """A person whose recordings have been screened.
+
+    Attributes:
+        person: as given.
+        context: what the questions were asked of: every recording, also those that are left out.
+        findings: all of them, with what explains and what overrules them.
+    """
+
+    person: Person
+    context: PersonContext
+    findings: tuple[Finding, ...]
+
+    @property
+    def rules(self) -> int:
+        """How many rules were asked."""
+        of_static = STATIC_QUESTIONS if self.context.standing else ()
+        return len(
+            {code for one in (*MOTION_QUESTIONS, *of_static) for code in matching(one.code)}
+            | {code for one in PERSON_QUESTIONS for code in matching(one.code)}
+        )
+
+    @cached_property
+    def stops(self) -> list[Finding]:
+        """Open ERRORs that stop everything: of the person, the model or the static trial."""
+        names = {one.name for one in self.context.trials}
+        return [one for one in blocking(self.findings) if one.where.trial not in names]
+
+    @cached_property
+    def left_out(self) -> tuple[str, ...]:
+        """Names of the trials that cannot be used."""
+        return self.left_out_by(self.findings)
+
+    def left_out_by(self, findings: Sequence[Finding]) -> tuple[str, ...]:
+        """The same by these findings."""
+        names = {one.where.trial for one in blocking(findings)}
+        unread = {one.where.trial for one in self.person.unread if one.where.trial is not None}
+        return tuple(dict.fromkeys([*sorted(unread), *(one.name for one in self.context.trials if one.name in names)]))
+
+    def overruled(self, findings: Sequence[Finding]) -> list[Finding]:
+        """Findings, those here or more of them, with what explains and what overrules each."""
+        return overruled(explained(findings), self.person.overrule, self.person.overrule_of)
+
+    @cached_property
+    def usable(self) -> list[RecordingContext]:
+        """The trials that can be used.
+
+        Raises:
+            BlockedError: none can, or something stops everything.
+        """
+        trials = [one for one in self.context.trials if one.name not in self.left_out]
+        if self.stops or not trials:
+            raise BlockedError(self.findings, blocking(self.findings))
+        return trials
+
+
+def screen(person: Person) -> Screened:
+    """Ask everything that can be asked before inverse kinematics."""
+    context = person_context(person)
+    found = list(person.unread)
+    by_label = person.labels
+    if isinstance(by_label, MarkerSetError) and by_label.finding is not None:
+        found.append(by_label.finding)
+    for static in context.standing:
+        found += _of_recording(static, STATIC_QUESTIONS)
+    for trial in context.trials:
+        found += _of_recording(trial, MOTION_QUESTIONS)
+    found += _of_person(context, found)
+    findings = overruled(explained(found), person.overrule, person.overrule_of)
+    return Screened(person, context, tuple(findings))
+
+
+def person_context(person: Person) -> PersonContext:
+    """What questions are asked of, before any is."""
+    label_set, stated = _label_set(person), _completed(person)
+    static = None if person.static is None else _static_context(person, person.static)
+    trials = [
+        RecordingContext(item.recording, label_set, static, False, item.window_s, stated.height_m, stated.mass_kg)
+        for item in person.trials
+    ]
+    total = None if stated.mass_kg is None else _total(stated.mass_kg, person)
+    return PersonContext(
+        stated,
+        trials,
+        static,
+        label_set,
+        person.model,
+        person.calibrate,
+        total,
+        more_statics=[_static_context(person, one) for one in person.more_statics],
+    )
+
+
+def _label_set(person: Person) -> MarkerSet | None:
+    return None if isinstance(person.labels, MarkerSetError) else person.labels
+
+
+def _static_context(person: Person, recording: Recording) -> RecordingContext:
+    """Of a recording in which the person stands, with the widths of joints that are known."""
+    label_set, stated = _label_set(person), _completed(person)
+    if label_set is not None and person.model is None:
+        recording, label_set, _ = with_widths(recording, person.recordings, label_set, person.subject)
+    return RecordingContext(recording, label_set, is_static=True, height_m=stated.height_m, mass_kg=stated.mass_kg)
+
+
+def _completed(person: Person) -> Subject:
+    """What is stated, with what files add; as stated where it is incomplete."""
+    recordings = [*([] if person.static is None else [person.static]), *person.recordings]
+    try:
+        return complete_subject(person.subject, recordings, mass_only=True)
+    except KinertiaError:
+        return person.subject
+
+
+def _total(mass_kg: float, person: Person) -> CarriedMass | None:
+    try:
+        return CarriedMass.of(mass_kg, person.attached)
+    except KinertiaError:
+        return None
+
+
+def _of_recording(context: RecordingContext, questions: Sequence[Question[RecordingContext]]) -> list[Finding]:
+    read = [one if one.where.trial is not None else one.in_trial(context.name) for one in context.recording.findings]
+    return [*read, *asked(questions, context, read, context.name)]
+
+
+def _of_person(context: PersonContext, found: Sequence[Finding]) -> list[Finding]:
+    """Of the person with the trials that are not blocked themselves: another's forces would accuse the mass."""
+    blocked = {one.where.trial for one in blocking(explained(found))}
+    sound = replace(context, trials=[one for one in context.trials if one.name not in blocked], found=tuple(found))
+    of_person = [one for one in found if one.where.trial is None]
+    return asked(PERSON_QUESTIONS, sound, of_person)

@@ -1,0 +1,193 @@
+"""Forces with wrong axes, directions and signs are found; fault-free ones never are."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from kinertia.diagnostics.context import RecordingContext
+from kinertia.diagnostics.evidence.caused_velocity import caused_velocities
+from kinertia.diagnostics.plates.force_directions import force_directions
+from kinertia.io.marker_set_file import choose_marker_set, read_marker_set
+from kinertia.trial.data import PlateLoads
+from plate_findings import codes, context_of, found_in, with_force
+from recordings import RUNS, SQUATS, WALKS
+
+
+@pytest.fixture(params=WALKS)
+def walk(request, recording_of):
+    return recording_of(*WALKS[request.param])
+
+
+@pytest.fixture(params=[name for name in RUNS if name != "hamner"])
+def run(request, recording_of):
+    """Limbs swing so much that the pelvis does not move as the centre of mass."""
+    return recording_of(*RUNS[request.param])
+
+
+def loaded(walk, marker_set=None):
+    """What is found of its loads, P22 to P23 and P212, P214, T20: the vertical moment has tests of its own."""
+    own = ("P21", "P22", "P23", "T20", "M13", "P20")
+    return [one for one in found_in(context_of(walk, marker_set)) if one.code.startswith(own)]
+
+
+def test_fault_free_walks(walk):
+    assert loaded(walk) == []
+
+
+@pytest.mark.parametrize("axis", [0, 2])
+@pytest.mark.parametrize("plate", [0, 1])
+def test_the_sign_of_one_plate(walk, axis, plate):
+    signs = np.ones((2, 3))
+    signs[plate, axis] = -1.0
+    wrong = context_of(with_force(walk, lambda force: force * signs))
+    (found,) = [*force_directions(wrong)]
+    assert found.code == "P233"
+    assert found.where == wrong.at(plate=walk.plates.names[plate], **wrong.along(axis))
+    before, after = found.evidence["velocity_residual_m_s"].value
+    assert after < min(0.65 * before, 0.85 * min(found.evidence["rivals_m_s"].value[:-1]))
+    everywhere = [*force_directions(context_of(with_force(walk, lambda force: force * np.prod(signs, axis=0))))]
+    assert [one.code for one in everywhere] == ["P232"]
+
+
+@pytest.mark.parametrize("axis", [0, 2])
+@pytest.mark.parametrize("plate", [0, 1])
+def test_the_sign_of_one_plate_in_a_run(run, plate, axis):
+    assert [*force_directions(context_of(run))] == []
+    signs = np.ones((2, 3))
+    signs[plate, axis] = -1.0
+    wrong = context_of(with_force(run, lambda force: force * signs))
+    (found,) = [*force_directions(wrong)]
+    assert (found.code, found.where) == ("P233", wrong.at(plate=run.plates.names[plate], **wrong.along(axis)))
+
+
+@pytest.mark.parametrize("plate", [0, 1])
+def test_both_signs_of_one_plate(walk, plate):
+    """As of a plate whose corners are in the wrong order: one finding for each axis."""
+    signs = np.ones((2, 3))
+    signs[plate, [0, 2]] = -1.0
+    found = [*force_directions(context_of(with_force(walk, lambda force: force * signs)))]
+    assert [(one.code, one.where.plate) for one in found] == [("P233", walk.plates.names[plate])] * 2
+
+
+@pytest.mark.parametrize(
+    ("plates", "axis", "newton"),
+    [([0], 2, 50.0), ([0], 2, -50.0), ([1], 2, 50.0), ([1], 2, -50.0), ([0, 1], 2, 50.0), ([0, 1], 0, -50.0)],
+)
+def test_a_wrong_zero_is_not_called_a_wrong_sign(walk, newton, plates, axis):
+    """Across the walk a foot pushes to one side all the time: reversed, it is nearly another zero, the runner-up; so
+    is a gain of that axis.
+    """
+    zero = np.zeros((2, 3))
+    zero[plates, axis] = newton
+    wrong = context_of(with_force(walk, lambda force: force + zero * (force[..., 1:2] > 0.0)))
+    along = [one for one in loaded(wrong.recording) if one.where.axis == wrong.along(axis)["axis"] and one.is_open]
+    assert len(along) == 1
+    assert along[0].code in ("P212", "P214", "P222", "P233")
+    if along[0].code in ("P222", "P233"):
+        assert len(plates) == 1
+    if along[0].code == "P233":
+        assert along[0].where.plate == walk.plates.names[plates[0]]
+        assert along[0].evidence["zero_n"].value == pytest.approx(newton, abs=10)
+        assert "the zero of the plate" in along[0].causes
+
+
+def test_signs_over_two_windows(walk):
+    """Each window has its own trend, and the number of samples that it has."""
+    context = context_of(walk)
+    trial = context.trial
+    (start, end), *_ = trial.windows()
+    cut = np.abs(trial.markers.time - (start + 0.45 * (end - start))) < 1.5 / trial.markers.rate_hz
+    parted = replace(trial, measured=trial.measured & ~cut)
+    assert len([one for one in parted.windows() if one[1] <= end]) == 2
+    context.__dict__["velocities"] = caused_velocities(parted, context.segment_of_label)
+    assert [*force_directions(context)] == []
+
+
+def on_one_belt(walk):
+    """The walk as a treadmill with one belt would have measured it."""
+    plates = walk.plates
+    force, moment = (part.sum(axis=1, keepdims=True) for part in (plates.force, plates.moment))
+    return replace(walk, plates=PlateLoads(plates.time, ("belt",), force, moment, (None,)))
+
+
+def test_fault_free_walks_on_one_belt(walk):
+    """Of both feet only the sum is known, which is all that moves the body."""
+    belt = context_of(on_one_belt(walk)).trial
+    assert max(b - a for a, b in belt.windows()) < 0.7
+    assert belt.carried_windows()[0] == pytest.approx(context_of(walk).trial.windows()[0], abs=0.25)
+    assert loaded(on_one_belt(walk)) == []
+
+
+@pytest.mark.parametrize("axis", [0, 2])
+def test_signs_on_one_belt(walk, axis):
+    wrong = context_of(with_force(on_one_belt(walk), lambda force: force * (1.0 - 2.0 * np.eye(3)[axis])))
+    (found,) = [*force_directions(wrong)]
+    assert (found.code, found.where) == ("P232", wrong.at(**wrong.along(axis)))
+    assert found.evidence["correlation"].value < -0.4
+
+
+SIGNS = [([-1, 1, 1], "P232", 0), ([1, 1, -1], "P232", 2), ([-1, 1, -1], "P231", None)]
+
+
+@pytest.mark.parametrize(("signs", "code", "axis"), SIGNS)
+def test_signs(walk, signs, code, axis):
+    wrong = with_force(walk, lambda force: force * signs)
+    context = context_of(wrong)
+    (found,) = [*force_directions(context)]
+    assert (found.code, found.where) == (code, context.at(**({} if axis is None else context.along(axis))))
+    # what it explains is not said twice
+    assert codes(loaded(wrong)) == [code]
+    if code == "P231":
+        assert found.evidence["angle_rad"].value == pytest.approx(np.pi)
+        assert sum("P232" in cause for cause in found.causes) == 2
+
+
+@pytest.mark.parametrize(("signs", "code", "axis"), SIGNS)
+def test_signs_in_a_run(run, signs, code, axis):
+    context = context_of(with_force(run, lambda force: force * signs))
+    (found,) = [*force_directions(context)]
+    assert (found.code, found.where) == (code, context.at(**({} if axis is None else context.along(axis))))
+
+
+@pytest.mark.parametrize("angle", [90, -90])
+def test_rotated_forces(walk, angle):
+    turn = Rotation.from_euler("y", angle, degrees=True).as_matrix()
+    (found,) = [*force_directions(context_of(with_force(walk, lambda force: force @ turn.T)))]
+    assert found.code == "P231"
+    assert np.degrees(found.evidence["angle_rad"].value) == pytest.approx(angle)
+
+
+def test_forces_with_another_axis_up(walk):
+    turn = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+    plates = walk.plates
+    up = replace(walk, plates=replace(plates, force=plates.force @ turn.T, moment=plates.moment @ turn.T))
+    context = context_of(up)
+    (found,) = [one for one in found_in(context) if one.is_open]
+    assert (found.code, found.where) == ("P201", context.at(**context.along(2)))
+    assert found.evidence["peak_n"].value[2] == np.abs(plates.force[..., 1]).max()
+
+
+def test_torques_in_newton_millimetres(walk):
+    wrong = found_in(context_of(with_force(walk, lambda force: force, torque=1000.0)))
+    found = [one for one in wrong if one.code == "P203"]
+    assert {one.where.plate for one in found} == set(walk.plates.names)
+    assert min(one.evidence["arm_m"].value for one in found) > 0.15
+
+
+@pytest.mark.parametrize("name", SQUATS)
+def test_fault_free_squats(recording_of, name):
+    """The markers' centre goes back where the centre of mass does not: the trunk bends."""
+    own = read_marker_set(Path(__file__).parents[2] / "subject4.toml") if name == "subject4" else None
+    assert loaded(recording_of(*SQUATS[name]), own) == []
+
+
+def test_loads_that_no_foot_carries_are_not_judged(recording_of):
+    """Without labels of feet there is no trial."""
+    walk = recording_of(*WALKS["synthetic"])
+    wrong = with_force(walk, lambda force: force * [-1, 1, -1])
+    assert [*force_directions(RecordingContext(wrong))] == []
+    marker_set = choose_marker_set(walk.markers.labels)
+    assert [*force_directions(RecordingContext(replace(wrong, plates=None), marker_set))] == []

@@ -1,0 +1,78 @@
+"""A plate with a wrong gain is shown by what other plates say of the same body."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kinertia.diagnostics.plates.gains import gains
+from kinertia.trial.centre_of_pressure import centre_of_pressure
+from plate_findings import context_of, with_force
+from recordings import LONG_WALKS, WALKS
+
+LONG = ("synthetic", "synthetic c3d", "gait2354", "rajagopal", "plug-in gait b")
+SOUND = {name: WALKS[name] for name in LONG if name in WALKS} | {"synthetic, long": LONG_WALKS["synthetic"]}
+
+
+@pytest.fixture(params=SOUND)
+def walk(request, recording_of):
+    return recording_of(*SOUND[request.param])
+
+
+def test_fault_free_plates(walk):
+    assert [*gains(context_of(walk))] == []
+
+
+@pytest.mark.parametrize("gain", [0.87, 1.15])
+def test_a_wrong_gain(walk, gain):
+    factors = np.array([1.0, gain])[:, None]
+    plates = walk.plates
+    wrong = replace(plates, force=plates.force * factors, moment=plates.moment * factors)
+    (found,) = gains(context_of(replace(walk, plates=wrong)))
+    assert (found.code, found.where.axis) == ("P221", "vertical")
+    apart = found.evidence["mass_kg"].value / found.evidence["other_kg"].value
+    assert found.evidence["gain"].value == pytest.approx(apart - 1)
+    assert apart == pytest.approx(max(gain, 1 / gain), abs=0.04)
+    heavy, light = (found.evidence[name].value for name in ("plate", "other"))
+    assert (heavy, light) == (plates.names if gain < 1 else plates.names[::-1])
+
+
+@pytest.mark.parametrize("gain", [0.96, 1.05])
+def test_a_gain_that_the_vertical_velocity_shows(recording_of, gain):
+    walk = recording_of(*LONG_WALKS["synthetic"])
+    factors = np.array([1.0, gain])[:, None]
+    plates = walk.plates
+    wrong = replace(plates, force=plates.force * factors, moment=plates.moment * factors)
+    (found,) = gains(context_of(replace(walk, plates=wrong)))
+    assert (found.code, found.evidence["method"].value) == ("P221", "vertical velocity")
+    apart = found.evidence["mass_kg"].value / found.evidence["other_kg"].value
+    assert apart == pytest.approx(max(gain, 1 / gain), abs=0.02)
+    heavy = plates.names[0] if gain < 1 else plates.names[1]
+    assert found.evidence["plate"].value == heavy
+
+
+@pytest.mark.parametrize("foot", [0, 1])
+def test_a_crutch_beside_one_foot_looks_like_a_light_plate(walk, foot):
+    """It carries a tenth of the weight whenever that foot stands: no plate tells it from a gain."""
+    plates = walk.plates
+    loaded = (plates.force[:, foot, 1] > 0.0)[:, None]
+    support = np.zeros_like(plates.force)
+    support[:, foot] = 0.1 * float(plates.force[..., 1].max()) * loaded * np.array([0.0, 1.0, 0.0])
+    support[:, foot] = np.minimum(support[:, foot], np.maximum(plates.force[:, foot], 0.0))
+    point = centre_of_pressure(plates.wrench)
+    moment = plates.moment - np.cross(point, support)
+    (found,) = gains(context_of(replace(walk, plates=replace(plates, force=plates.force - support, moment=moment))))
+    assert (found.code, found.evidence["other"].value) == ("P221", plates.names[foot])
+
+
+@pytest.mark.parametrize("plate", [0, 1])
+def test_one_axis_of_one_plate_that_reads_twice(recording_of, plate):
+    walk = recording_of(*LONG_WALKS["synthetic"])
+    factors = np.ones((2, 3))
+    factors[plate, 0] = 2.0
+    context = context_of(with_force(walk, lambda force: force * factors))
+    (found,) = gains(context)
+    assert found.code == "P222"
+    assert found.where.axis == context.along(0)["axis"]
+    assert found.where.plate == walk.plates.names[plate]
+    assert found.evidence["factor"].value == pytest.approx(2.0, abs=0.3)

@@ -1,0 +1,232 @@
+"""What plates show by themselves: lost samples, saturation, zeros and drift; loads too small for a person."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kinertia.diagnostics.plates.signal_questions import SIGNAL_QUESTIONS
+from kinertia.diagnostics.runner import asked, explained
+from kinertia.findings.finding import Severity
+from kinertia.trial.data import PlateLoads
+from kinertia.trial.idle_plate import without_idle
+from plate_findings import codes, plates_alone
+
+TIME = np.arange(3000) / 1000
+
+
+def plates(offset=(0.0, 0.0, 0.0), drift_n=0.0, factor=1.0, weight_n=700.0):
+    """A plate that is stood on from 1 to 1.6 s, with noise, as the readers leave it."""
+    vertical = np.where((TIME > 1) & (TIME < 1.6), weight_n * np.sin(np.pi * (TIME - 1) / 0.6), 0.0)
+    force = np.outer(vertical, [0.0, 1.0, 0.0]) + np.array(offset) + np.outer(TIME / TIME[-1], [0.0, drift_n, 0.0])
+    force = factor * (force + np.random.default_rng(3).normal(0.0, 1.0, (len(TIME), 3)))
+    load = without_idle(TIME, force, np.zeros_like(force))
+    twist = np.outer(0.01 * load.force[:, 1], [0.0, 1.0, 0.0])
+    each = (load.force[:, None], (load.moment + twist)[:, None])
+    return PlateLoads(TIME, ("plate 1",), *each, declared_feet=(None,), idle=(load.idle,))
+
+
+def found(plates, **stated):
+    return explained(asked(SIGNAL_QUESTIONS, plates_alone(plates, **stated)))
+
+
+def only(plates, **stated):
+    (one,) = found(plates, **stated)
+    return one
+
+
+def test_a_fault_free_plate():
+    plate = plates()
+    assert found(plate) == []
+    assert plate.idle[0].peak_n == pytest.approx(700, abs=5)
+
+
+@pytest.mark.parametrize(
+    ("axis", "level_n", "severity"),
+    [(0, 25.0, "WARNING"), (1, 25.0, "WARNING"), (2, -25.0, "WARNING"), (1, 50.0, "ERROR"), (0, 50.0, "WARNING")],
+)
+def test_zeros(axis, level_n, severity):
+    zero = only(plates(offset=level_n * np.eye(3)[axis]))
+    assert (zero.code, zero.severity.name) == ("P213", severity)
+    assert zero.where == plates_alone(plates()).at(plate="plate 1", **plates_alone(plates()).along(axis))
+    assert zero.evidence["level_n"].value == pytest.approx(level_n, abs=0.5)
+
+
+def test_all_zeros_that_are_wrong_are_found():
+    """D22: of every axis."""
+    zeros = found(plates(offset=(30.0, 60.0, -30.0)))
+    assert [(one.code, one.where.axis) for one in zeros] == [
+        ("P213", axis) for axis in ("fore-aft", "vertical", "mediolateral")
+    ]
+    assert [one.severity for one in zeros] == [Severity.WARNING, Severity.ERROR, Severity.WARNING]
+
+
+@pytest.mark.parametrize("level_n", [30.0, 50.0, 100.0])
+def test_a_plate_that_is_never_unloaded(level_n):
+    plate = plates()
+    zero = only(replace(plate, force=plate.force + level_n * np.eye(3)[1], idle=None))
+    assert (zero.code, zero.severity) == ("P213", Severity.ERROR)
+    assert (zero.evidence["level_n"].value, zero.evidence["method"].value) == (pytest.approx(level_n), "minimum")
+
+
+@pytest.mark.parametrize("drift_n", [-40.0, 25.0, 60.0])
+def test_drift(drift_n):
+    drift = only(plates(drift_n=drift_n))
+    assert drift.code == "P211"
+    assert drift.evidence["drift_n"].value == pytest.approx(drift_n, rel=0.1)
+
+
+def test_forces_in_kilonewtons():
+    unit = only(plates(factor=1e-3))
+    assert (unit.code, unit.severity) == ("P202", Severity.ERROR)
+
+
+def test_feet_that_stay_in_kilonewtons():
+    """As in squats, or on a belt: the plate is never unloaded."""
+    vertical = 0.35 + 0.06 * np.sin(2 * np.pi * TIME)
+    noise = np.random.default_rng(100).normal(0.0, 0.001, (len(TIME), 3))
+    load = without_idle(TIME, np.outer(vertical, [0.0, 1.0, 0.0]) + noise, np.zeros((len(TIME), 3)))
+    each = (load.force[:, None], load.moment[:, None])
+    assert only(PlateLoads(TIME, ("plate 1",), *each, declared_feet=(None,), idle=(load.idle,))).code == "P202"
+
+
+def test_a_plate_that_nobody_stands_on():
+    assert found(plates(factor=1e-9)) == []
+
+
+@pytest.mark.parametrize("noise_n", [0.5, 1.5, 3.0])
+@pytest.mark.parametrize(
+    "extra",
+    [
+        0.0 * TIME,
+        4.0 + 0.0 * TIME,
+        5.0 * TIME / TIME[-1],
+        3.0 * np.sin(2 * np.pi * 50 * TIME),
+        5.0 * np.sin(np.pi * TIME),
+    ],
+    ids=["noise", "zero", "drift", "hum", "wander"],
+)
+def test_an_unloaded_plate_is_not_in_kilonewtons(noise_n, extra):
+    """D4: noise, a zero, a drift or a hum reach some newtons, and do not come and go as loads do."""
+    for steps in (1, 50):
+        noise = np.random.default_rng(100).normal(0.0, noise_n, (len(TIME) // steps + 1, 3))
+        force = np.repeat(noise, steps, axis=0)[: len(TIME)] + np.outer(extra, [0.0, 1.0, 0.0])
+        load = without_idle(TIME, force, np.zeros_like(force))
+        assert 0.3 < load.idle.peak_n < 20.0
+        each = (load.force[:, None], load.moment[:, None])
+        assert found(PlateLoads(TIME, ("plate 1",), *each, declared_feet=(None,), idle=(load.idle,))) == []
+
+
+@pytest.mark.parametrize("mass_kg", [None, 20.0])
+def test_a_child_is_examined_like_an_adult(mass_kg):
+    """D14: limits are shares of body weight, stated or by the plates."""
+    child = plates(weight_n=210.0)
+    assert found(child, mass_kg=mass_kg) == []
+    for axis in (0, 1):
+        zero = only(plates(weight_n=210.0, offset=8.0 * np.eye(3)[axis]), mass_kg=mass_kg)
+        assert (zero.code, zero.where.axis) == ("P213", ("fore-aft", "vertical")[axis])
+    assert only(plates(weight_n=210.0, offset=(0.0, 14.0, 0.0)), mass_kg=mass_kg).severity == Severity.ERROR
+    dead = replace(child, force=child.force * [0.0, 1.0, 1.0])
+    assert only(dead, mass_kg=mass_kg).code == "P101"
+    assert only(replace(child, moment=np.cross([0.4, 0.02, -0.3], child.force)), mass_kg=mass_kg).code == "P264"
+    # the same is noise on an adult's plates
+    assert found(plates(offset=(8.0, 8.0, 8.0))) == []
+
+
+@pytest.mark.parametrize(("top_n", "lost"), [(600.0, True), (690.0, True), (900.0, False)])
+def test_an_amplifier_at_the_end_of_its_range(top_n, lost):
+    plate = plates()
+    force = plate.force.copy()
+    force[..., 1] = np.minimum(force[..., 1], top_n)
+    cut = found(replace(plate, force=force))
+    assert [one.code for one in cut] == ["P104"] * lost
+    assert [one.evidence["level_n"].value for one in cut] == [top_n] * lost
+
+
+def test_each_plate_is_judged_by_itself():
+    """Rounding of plate 1 does not hide the saturation of plate 2."""
+    plate = plates()
+    force = np.concatenate([plate.force, plate.force], axis=1)
+    force[:, 0] = np.round(force[:, 0] / 20.0) * 20.0
+    force[:, 1, 1] = np.minimum(force[:, 1, 1], 600.0)
+    moment = np.concatenate([plate.moment, plate.moment], axis=1)
+    both = found(PlateLoads(TIME, ("plate 1", "plate 2"), force, moment, (None, None)))
+    own = [(one.code, one.where.plate) for one in both if one.is_open and one.code in ("P104", "P105")]
+    assert own == [("P104", "plate 2"), ("P105", "plate 1")]
+
+
+@pytest.mark.parametrize("digits", [0, -1])
+def test_rounded_forces_are_not_cut(digits):
+    vertical = np.where((TIME > 1) & (TIME < 1.6), 700.0 * np.sin(np.pi * (TIME - 1) / 0.6), 0.0).round(digits)
+    force = np.outer(vertical, [0.1, 1.0, 0.02])[:, None]
+    assert "P104" not in codes(found(PlateLoads(TIME, ("plate 1",), force, 0.01 * force, (None,))))
+
+
+@pytest.mark.parametrize("axis", [0, 2])
+def test_a_dead_channel(axis):
+    plate = plates()
+    force = plate.force.copy()
+    force[..., axis] = 0.0
+    dead, context = only(replace(plate, force=force)), plates_alone(plate)
+    assert (dead.code, dead.where) == ("P101", context.at(plate="plate 1", **context.along(axis)))
+
+
+def test_torques_that_were_not_exported():
+    """At any place on the plate, which gives a moment about the origin, but none about the centre of pressure."""
+    plate = plates()
+    moment = np.cross([0.4, 0.02, -0.3], plate.force)
+    absent = only(replace(plate, moment=moment))
+    assert (absent.code, absent.where.plate) == ("P264", "plate 1")
+    moment[..., 1] += 0.002 * plate.force[..., 1]
+    assert found(replace(plate, moment=moment)) == []
+
+
+def test_zeros_in_mid_stance():
+    """All of them."""
+    plate = plates()
+    force = plate.force.copy()
+    force[1200:1300] = force[1400:1420] = 0.0
+    lost = [one for one in found(replace(plate, force=force)) if one.code == "P102"]
+    assert [one.where.span_s for one in lost] == [pytest.approx((1.2, 1.299)), pytest.approx((1.4, 1.419))]
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_horizontal_amplifier_at_the_end_of_its_range(sign):
+    plate = plates()
+    force = plate.force.copy()
+    loaded = force[:, 0, 1] > 0
+    push = sign * 150.0 * np.sin(2 * np.pi * (TIME - 1) / 0.6)
+    force[loaded, 0, 0] = push[loaded]
+    assert found(replace(plate, force=force)) == []
+    force[..., 0] = sign * np.minimum(sign * force[..., 0], 90.0)
+    cut = only(replace(plate, force=force))
+    assert (cut.code, cut.where.axis, cut.evidence["level_n"].value) == ("P104", "fore-aft", sign * 90.0)
+
+
+@pytest.mark.parametrize(("samples", "severity"), [(10, None), (60, Severity.WARNING), (200, Severity.ERROR)])
+def test_repeated_samples(samples, severity):
+    plate = plates()
+    force, moment = plate.force.copy(), plate.moment.copy()
+    for values in (force, moment):
+        values[1200 : 1200 + samples] = values[1200]
+    repeated = [one for one in found(replace(plate, force=force, moment=moment)) if one.is_open]
+    assert [(one.code, one.severity) for one in repeated] == ([] if severity is None else [("P103", severity)])
+    for one in repeated:
+        assert one.where.span_s == pytest.approx((1.2, 1.199 + samples / 1000))
+
+
+def test_late_forces_that_begin_with_copies_of_the_first_are_not_repeated():
+    plate, rows = plates(), slice(1200, 1500)
+    force, moment = (values[rows][np.maximum(np.arange(300) - 100, 0)] for values in (plate.force, plate.moment))
+    assert found(replace(plate, time=plate.time[rows], force=force, moment=moment)) == []
+
+
+def test_a_child_who_stands_on_two_plates_is_no_zero():
+    """Each carries 98 N, as steadily as an unloaded plate."""
+    vertical = 98.0 + 20.0 * np.sin(np.pi * TIME) ** 2
+    noise = np.random.default_rng(100).normal(0.0, 1.0, (len(TIME), 3))
+    load = without_idle(TIME, np.outer(vertical, [0.0, 1.0, 0.0]) + noise, np.zeros((len(TIME), 3)))
+    force = np.repeat(load.force[:, None], 2, axis=1)
+    moment = 0.01 * force * [0.0, 1.0, 0.0]
+    plate = PlateLoads(TIME, ("plate 1", "plate 2"), force, moment, (None, None), idle=(load.idle,) * 2)
+    assert found(plate, mass_kg=20.0) == []

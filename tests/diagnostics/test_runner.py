@@ -1,0 +1,88 @@
+"""Questions are asked, causes explain consequences, and users overrule: nothing else hides a finding."""
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from kinertia.diagnostics.runner import Question, asked, blocking, explained, overruled, unknown_codes
+from kinertia.findings.finding import Severity, finding
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.rule import all_rules
+from kinertia.findings.where import Where
+from kinertia.settings import Overrule
+
+DRIFT = finding("P211", Where(trial="walk", plate="left"), drift_n=Quantity(30.0, "N"))
+ZERO = finding("P213", Where(trial="walk", plate="left"), Severity.ERROR, level_n=Quantity(50.0, "N"))
+OTHER_ZERO = finding("P213", Where(trial="walk", plate="right"), level_n=Quantity(20.0, "N"))
+
+
+def test_a_cause_mutes_its_consequence_and_takes_over_its_severity():
+    drift, zero, other = explained([DRIFT, ZERO, OTHER_ZERO])
+    assert (drift.severity, drift.muted_by) == (Severity.ERROR, None)
+    assert zero.muted_by == "P211"
+    assert (other.muted_by, other.severity) == (None, Severity.WARNING)
+    assert blocking([drift, zero, other]) == [drift]
+
+
+def test_the_order_of_findings_does_not_matter():
+    for order in ([ZERO, DRIFT], [DRIFT, ZERO]):
+        assert {one.code: one.muted_by for one in explained(order)} == {"P211": None, "P213": "P211"}
+
+
+def test_a_finding_twice_is_one():
+    assert len(explained([DRIFT, DRIFT])) == 1
+
+
+def test_a_waived_cause_unblocks_what_it_explains():
+    findings = overruled(explained([DRIFT, ZERO]), Overrule(waive=("P211",)))
+    assert blocking(findings) == []
+    assert [one.status for one in findings] == ["waived", "open"]
+
+
+def test_what_is_ignored_still_explains():
+    weak = finding("P213", Where(trial="walk", plate="left"), level_n=Quantity(20.0, "N"))
+    drift, zero = overruled(explained([DRIFT, weak]), Overrule(ignore=("P21",)))
+    assert (drift.status, zero.muted_by) == ("ignored", "P211")
+
+
+def test_errors_are_not_ignored_and_hard_ones_not_waived():
+    hard = finding("P278", Where(trial="walk"))
+    assert overruled([ZERO, hard], Overrule(("P278",), ("P213",))) == [ZERO, hard]
+    assert unknown_codes(Overrule(("P278", "P244", "X1"), ("P21", "P999"))) == ["X1", "P999", "P278"]
+
+
+def test_a_correction_resolves_the_warning_about_the_same_plate():
+    warning = finding("P213", Where(trial="walk", plate="left"), level_n=Quantity(20.0, "N"))
+    resolving = next(one for one in all_rules().values() if "P213" in one.resolves or "P212" in one.resolves)
+    code = next(one for one in resolving.resolves if one in ("P212", "P213"))
+    warned = finding(code, warning.where, level_n=Quantity(20.0, "N"))
+    corrected = finding(resolving.code, Where(trial="walk", plate="left"), zero_n=Quantity(6.0, "N"))
+    result = {one.code: one for one in explained([warned, corrected])}
+    assert (result[code].severity, result[code].muted_by) == (Severity.CORRECTED, resolving.code)
+
+
+def test_a_question_without_meaning_is_not_asked():
+    calls = []
+
+    def ask(context: str):
+        calls.append(context)
+        return [OTHER_ZERO]
+
+    wrong_axis = finding("P201", Where(trial="walk"))
+    assert asked([Question("P21", ask, unless=("P20",))], "walk", [wrong_axis]) == []
+    assert asked([Question("P21", ask, unless=("P24",))], "walk", [wrong_axis]) == [OTHER_ZERO]
+    assert calls == ["walk"]
+
+
+def test_findings_without_a_trial_are_of_the_one_asked():
+    (found,) = asked([Question("P21", lambda _: [finding("P211", drift_n=Quantity(1.0, "N"))])], None, (), "walk")
+    assert found.where.trial == "walk"
+
+
+@given(st.lists(st.sampled_from(sorted(all_rules())), max_size=8), st.booleans())
+def test_no_finding_is_lost_and_one_of_the_worst_stays_open(codes: list[str], same_trial: bool):
+    findings = [finding(code, Where(trial="walk" if same_trial else f"walk {k}")) for k, code in enumerate(codes)]
+    result = explained(findings)
+    assert {(one.code, one.where) for one in result} == {(one.code, one.where) for one in findings}
+    if findings and max(one.severity for one in findings) is Severity.ERROR:
+        assert blocking(result)
+    assert all(one.muted_by in {other.code for other in result} for one in result if one.muted_by)

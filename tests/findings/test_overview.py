@@ -1,0 +1,48 @@
+"""Many findings at a glance."""
+
+from dataclasses import replace
+
+from kinertia.findings.finding import Severity, finding
+from kinertia.findings.overview import DO_NOT_USE, USE, WITH_CARE, Overview, grouped
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
+
+FROZEN = [finding("M113", Where(trial="walk", markers=(label,))) for label in ("RKNE", "LKNE", "RANK")]
+SPIKES = finding("M111", Where(trial="walk", markers=("RTOE",)), Severity.ERROR, distance_m=Quantity(0.3, "m"))
+DELAY = finding("T214", Where(), delay_s=Quantity(0.007, "s"))
+
+
+def test_the_worst_open_finding_decides():
+    assert Overview((), 10, 1).verdict == USE
+    assert Overview((DELAY,), 10, 1).verdict == USE
+    assert Overview((*FROZEN, DELAY), 10, 1).verdict == WITH_CARE
+    assert Overview((*FROZEN, SPIKES), 10, 1).verdict == DO_NOT_USE
+
+
+def test_what_is_waived_or_left_out_calls_for_care():
+    waived = replace(SPIKES, status="waived")
+    assert Overview((waived,), 10, 1).verdict == WITH_CARE
+    assert Overview((), 10, 3, ("walk 2",)).verdict == WITH_CARE
+    assert Overview((SPIKES.muted("M121"),), 10, 1).verdict == USE
+
+
+def test_the_line_counts():
+    overview = Overview((*FROZEN, DELAY), 61, 3, ("walk 2",))
+    assert overview.line == "use with care: 3 warnings, 1 corrected; 61 rules, 2 of 3 trials"
+
+
+def test_the_worst_comes_first():
+    assert [one.code for one in Overview((DELAY, *FROZEN, SPIKES), 1, 1).open] == [
+        "M111",
+        "M113",
+        "M113",
+        "M113",
+        "T214",
+    ]
+
+
+def test_equal_findings_are_one_line():
+    (group,) = grouped(FROZEN)
+    assert len(group.findings) == 3
+    assert "LKNE, RANK" in group.line
+    assert group.line.startswith("walk  M113 ")

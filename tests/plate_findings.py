@@ -1,0 +1,43 @@
+"""Findings about plates, and walks with other forces, in tests."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from kinertia.diagnostics.context import RecordingContext
+from kinertia.diagnostics.plates.signal_questions import LOADED_QUESTIONS, SIGNAL_QUESTIONS
+from kinertia.diagnostics.runner import asked, explained
+from kinertia.io.marker_set_file import choose_marker_set
+from kinertia.trial.centre_of_pressure import centre_of_pressure
+from kinertia.trial.data import Markers, Recording
+
+MARKERS = Markers(np.arange(2) / 100, ("A", "B"), np.zeros((2, 2, 3)))
+
+
+def context_of(recording, marker_set=None, **stated):
+    """A recording with the markers of a preset, unless others are given."""
+    return RecordingContext(recording, marker_set or choose_marker_set(recording.markers.labels), **stated)
+
+
+def plates_alone(plates, **stated):
+    """Plates without feet."""
+    return RecordingContext(Recording("walk", MARKERS, plates), **stated)
+
+
+def found_in(context):
+    """All that is found of a recording's plates, with what explains what."""
+    return explained(asked((*SIGNAL_QUESTIONS, *LOADED_QUESTIONS), context))
+
+
+def codes(findings):
+    """Of findings that no other explains."""
+    return [one.code for one in findings if one.is_open]
+
+
+def with_force(walk, change, torque=1.0):
+    """The walk with other forces at the same centres of pressure, and torques times a factor."""
+    plates = walk.plates
+    point = centre_of_pressure(plates.wrench)
+    free = torque * (plates.moment - np.cross(point, plates.force)) * [0, 1, 0]
+    force = change(plates.force)
+    return replace(walk, plates=replace(plates, force=force, moment=np.cross(point, force) + free))

@@ -1,0 +1,110 @@
+"""What pages show of findings: next steps, cards with what they explain, corrections, explanations."""
+
+from dataclasses import replace
+
+import pytest
+
+from found import ASSUMED, CORRECTED, FAULT_FREE, FAULTY, FROZEN, IGNORED, RESIDUAL, UNEXPLAINED, UNUSABLE, WAIVED, ZERO
+from kinertia.findings.finding import finding
+from kinertia.findings.overview import Overview
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
+from kinertia.report.finding_view import FindingView, digest, evidence_text, lines, place_text
+
+
+def view(*findings):
+    return FindingView([Overview(findings, 61, 1)])
+
+
+def codes(cards):
+    return [card.first.code for card in cards]
+
+
+def test_steps_are_the_three_worst_and_waived_errors_are_among_them():
+    assert codes(view(*UNUSABLE).steps) == ["P244", "R301", "M113"]
+    assert view(*FAULT_FREE).steps == []
+
+
+def test_a_remedy_is_one_step():
+    elsewhere = replace(ZERO, where=Where(trial="run", plate="plate 2"))
+    assert codes(view(ZERO, elsewhere).steps) == ["P213"]
+
+
+def test_errors_and_warnings_have_sections_of_their_own():
+    sections = {title: codes(cards) for title, cards in view(*UNUSABLE).sections}
+    assert sections == {"Errors": ["P244", "R301"], "Warnings": ["M113", "P213"]}
+    assert view(*FAULT_FREE).sections == []
+
+
+def test_what_a_finding_explains_is_folded_below_it_to_the_last_consequence():
+    last = finding("P246", Where(trial="walk", plate="plate 1")).muted("P214")
+    ((_, (card,)),) = view(ZERO, UNEXPLAINED, last).sections
+    assert {group.first.code for group in card.muted} == {"P214", "P246"}
+    elsewhere = replace(UNEXPLAINED, where=Where(trial="run", plate="plate 1"))
+    ((_, (card,)),) = view(ZERO, elsewhere).sections
+    assert card.muted == ()
+
+
+def test_equal_findings_are_one_card_with_the_evidence_of_each():
+    ((_, (card,)),) = view(*FROZEN).sections
+    assert [one.place for one in card.measured] == ["LANK, 1.20 to 1.70 s", "LTOE, 1.20 to 1.70 s"]
+
+
+def test_corrections_have_place_size_and_deviation():
+    zero, delay = view(*CORRECTED).corrections
+    assert (zero.where, delay.where) == ("walk: plate 1, mediolateral (Z)", "all trials")
+    assert zero.size == "+6.5 N ± 0.9 N (SD) (usual within 2.4 N)"
+    assert delay.size == "+7.1 ms ± 0.6 ms (SD)"
+
+
+def test_a_warning_that_a_correction_resolves_is_folded_below_the_correction():
+    resolved = finding("P214", Where(trial="walk", plate="plate 1")).muted("P215")
+    (zero,) = view(CORRECTED[0], resolved).corrections
+    assert [group.first.code for group in zero.muted] == ["P214"]
+
+
+def test_ignored_findings_are_counted_and_nowhere_else():
+    shown = view(*FAULTY, replace(IGNORED, where=Where(trial="run")))
+    assert shown.ignored == "M102 (2)"
+    assert "M102" not in [one.code for one in shown.rules]
+    assert [group.first.code for group in shown.notes] == [ASSUMED.code]
+
+
+def test_every_code_on_the_page_is_explained_there():
+    assert [one.code for one in view(*UNUSABLE).rules] == [
+        "M113", "P213", "P214", "P215", "P244", "R111", "R301", "T214",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("quantity", "text"),
+    [
+        (Quantity(-23.1, "N", limit=15.0, usual=(-3.0, 3.0)), "-23 N (limit 15 N; usual within 3.0 N)"),
+        (Quantity(-23.1, "N", usual=(-1.0, 3.0)), "-23 N (usual -1.0 N to 3.0 N)"),
+        (Quantity("heel", ""), "heel"),
+        (Quantity((0.25, 0.31), "m"), "250, 310 mm"),
+    ],
+)
+def test_evidence_is_read_with_limit_and_usual_range(quantity, text):
+    assert evidence_text(finding("P213", level_n=quantity), "level_n") == text
+
+
+def test_places_are_named_as_far_as_they_are_known():
+    assert place_text(Where()) == ""
+    assert place_text(Where(trial="walk"), with_trial=True) == "walk"
+    assert place_text(Where(file="scaled.osim", part="tibia_r"), with_trial=True) == "scaled.osim: tibia_r"
+
+
+def test_the_page_in_the_browser_gets_verdict_and_open_findings():
+    told = digest(Overview(UNUSABLE, 61, 1))
+    assert told["verdict"] == "do not use"
+    assert [(one["code"], one["severity"], one["status"]) for one in told["findings"]] == [
+        (WAIVED.code, "ERROR", "waived"),
+        (RESIDUAL.code, "ERROR", "open"),
+        ("M113", "WARNING", "open"),
+        ("P213", "WARNING", "open"),
+        ("P215", "CORRECTED", "open"),
+        ("T214", "CORRECTED", "open"),
+    ]
+    for code, line in zip(("M113", "P213", "P215", "T214"), lines(FAULTY), strict=True):
+        assert code in line
