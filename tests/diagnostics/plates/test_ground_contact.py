@@ -122,7 +122,8 @@ def test_a_landing_from_a_box_has_no_other_rate(recording_of, name):
 
 @pytest.mark.parametrize("name", here([f"field/unipd/walking{k}.c3d" for k in (1, 3, 5)]))
 def test_feet_that_are_hidden_for_a_while_are_not_displaced(recording_of, name):
-    assert errors_and_warnings(of_field(recording_of(name), ["CA", "VMH"], heel="CA", metatarsal="VMH")) == []
+    codes = errors_and_warnings(of_field(recording_of(name), ["CA", "VMH"], heel="CA", metatarsal="VMH"))
+    assert set(codes) <= {"M104"}
 
 
 BESIDE = {
