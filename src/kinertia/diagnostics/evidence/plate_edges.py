@@ -19,7 +19,6 @@ _LOW_M = 0.03
 """A marker so near to where it is lowest during a contact is on the ground, not landing or lifted."""
 
 
-
 class Overhang(NamedTuple):
     """A foot that stands on a plate and reaches beyond it.
 
