@@ -62,7 +62,9 @@ def test_fit_json_keeps_its_contract(saved):
     }
     assert fit_summary["findings"] == [one.to_dict() for one in fit.findings]
     assert (fit_summary["verdict"], fit_summary["rules_run"]) == (fit.overview.verdict, fit.rules)
-    assert [one["output"] for one in fit_summary["suitability"]] == [one.output for one in suitability(fit)]
+    assert [one["output"] for one in fit_summary["suitability"]] == [
+        one.output for one in suitability(fit, fit.findings)
+    ]
     assert (fit_summary["warnings"], fit_summary["corrections"]) == (list(fit.warnings), list(fit.corrections))
     assert fit_summary["notes"] == list(fit.notes)
     assert fit_summary["converged"] == fit.converged

@@ -9,7 +9,7 @@ from kinertia.findings.finding import finding
 from kinertia.findings.overview import Overview
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
-from kinertia.report.finding_view import FindingView, digest, evidence_text, lines, place_text
+from kinertia.report.finding_view import FindingView, digest, evidence_text, evidence_texts, lines, linked, place_text
 
 
 def view(*findings):
@@ -63,11 +63,25 @@ def test_a_warning_that_a_correction_resolves_is_folded_below_the_correction():
     assert [group.first.code for group in zero.muted] == ["P214"]
 
 
+def test_an_assumption_about_several_trials_is_said_once():
+    ((_, trials),) = view(ASSUMED, ASSUMED.in_trial("run")).notes
+    assert trials == "walk, run"
+
+
+def test_words_that_the_message_has_are_no_evidence_again():
+    overhang = finding("P282", Where(plate="plate 1"), overhang_m=Quantity(0.045, "m"), foot=Quantity("right"))
+    assert evidence_texts(overhang) == ["overhang 45 mm"]
+    assert evidence_texts(finding("P213", level_n=Quantity(-23.0, "N"), other=Quantity("x"))) == [
+        "level -23 N",
+        "other x",
+    ]
+
+
 def test_ignored_findings_are_counted_and_nowhere_else():
     shown = view(*FAULTY, replace(IGNORED, where=Where(trial="run")))
     assert shown.ignored == "M102 (2)"
     assert "M102" not in [one.code for one in shown.rules]
-    assert [group.first.code for group in shown.notes] == [ASSUMED.code]
+    assert [(group.first.code, trials) for group, trials in shown.notes] == [(ASSUMED.code, "walk")]
 
 
 def test_every_code_on_the_page_is_explained_there():
@@ -87,6 +101,11 @@ def test_every_code_on_the_page_is_explained_there():
 )
 def test_evidence_is_read_with_limit_and_usual_range(quantity, text):
     assert evidence_text(finding("P213", level_n=quantity), "level_n") == text
+
+
+def test_codes_in_sentences_lead_to_their_explanation_and_nothing_else_does():
+    html = linked("<b>; see P213, Z999")
+    assert html == '&lt;b&gt;; see <a class="code" href="#explain-P213">P213</a>, Z999'
 
 
 def test_places_are_named_as_far_as_they_are_known():

@@ -15,10 +15,12 @@ from command_line import run
 from found import FAULT_FREE, UNUSABLE
 from kinertia.diagnostics.result.suitability import Suitability
 from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
+from kinertia.findings.finding import Severity
 from kinertia.io.provenance import provenance_of
 from kinertia.io.subject_file import read_subject
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.motion.dynamics import Motion
+from kinertia.report.finding_view import FindingView
 from kinertia.report.headline import purposes, words
 from kinertia.report.page import MOST_TRIALS, bsp_rows, render
 from kinertia.report.plotly_script import packed_script
@@ -46,15 +48,16 @@ PARTS = [
 def test_purposes_follow_the_outputs(segments, together):
     names = ("segment masses", "centres of mass", "moments of inertia")
     outputs = [
-        Suitability("joint moments", "use with care", "why", ("P213",)),
+        Suitability("joint moments", "use with care", "3 N; see P213", ("P213",)),
         *(Suitability(name, use, "why") for name, use in zip(names, segments, strict=True)),
         Suitability("motion", "use", "why"),
     ]
     moments, parameters, opensim = purposes(outputs, no_body=False)
     assert (moments.use, parameters.use, opensim.use) == ("use with care", together, "use with care")
-    assert moments.codes == opensim.codes == ("P213",)
+    assert moments.reason == opensim.reason == "3 N; see P213"
     *_, opensim = purposes(outputs, no_body=True)
-    assert (opensim.use, opensim.codes) == ("do not use", ("R202",))
+    assert opensim.use == "do not use"
+    assert "R202" in opensim.reason
 
 
 def test_estimates_far_from_the_literature_are_named(fit):
@@ -258,9 +261,10 @@ def test_report_shows_findings_notes_and_settings(fit):
     open_ones = [one for one in UNUSABLE if one.status != "ignored"]
     for text in ("the dog bites", "simultaneous", "hip_centre", "numpy", fit.subject.name, "walk 2"):
         assert text in elements.text
+    assert all(row.size in elements.text for row in FindingView([shown.overview]).corrections)
     for one in open_ones:
-        assert one.message in elements.text
-        assert one.remedy in elements.text or one.muted_by or one.severity.name in ("CORRECTED", "INFO")
+        assert one.message.rstrip(".") in elements.text or one.severity is Severity.CORRECTED
+        assert one.remedy in elements.text or one.muted_by is not None or one.severity < Severity.WARNING
     for name in fit.posterior.calibration:
         assert name in elements.text
     explained = {attrs["id"] for attrs in elements.named("h3") if attrs.get("id", "").startswith("explain-")}

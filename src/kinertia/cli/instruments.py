@@ -28,11 +28,11 @@ def instruments(
     output: Annotated[Path, typer.Option("--output", "-o", help="The file to write.")] = Path("instruments.toml"),
     quiet: Quiet = False,
 ) -> Outcome:
-    """Read force plates and clock of a session from all its trials, for use in all its fits.
+    """Estimate plate and synchronisation errors of a session from all its trials, for use in all its fits.
 
     Writes a file for session = "..." under \\[instruments] in the subject files
-    of the session: what one person's walks leave open of a plate's place, those
-    of the others tell. A fit leaves out what its own trials have said.
+    of the session: what one person's walks leave open of a plate's position,
+    those of the others show. A fit leaves out what its own trials contributed.
 
     [bold]Example[/]
 

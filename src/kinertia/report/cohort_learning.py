@@ -211,7 +211,7 @@ def _teach_instruments(folder: Path, people: Sequence[_Known], notes: list[str])
             continue
         said = [one.instruments for one in _others((), of_day) if one.instruments is not None]
         session = session_instruments(said, of_day[0].wanted.instruments)
-        notes += [f"{day}: {sentence}" for sentence in session.contradictions]
+        notes += [f"{day}: {one.line()} {one.remedy}" for one in session.contradictions]
         path = folder / f"{day}-{k + 1}.toml"
         write_then_rename(path, session_text(VERSION, session.values, session.people))
         for one in sharing:

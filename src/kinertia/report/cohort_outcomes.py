@@ -15,6 +15,7 @@ from kinertia.findings.finding import Severity
 from kinertia.findings.overview import DO_NOT_USE, USE, WITH_CARE
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.rule import matching, rule
+from kinertia.report.finding_view import linked
 from kinertia.report.result_page import Part
 from kinertia.report.row_figures import bar_figure
 
@@ -52,7 +53,7 @@ def outcome_parts(people: pd.DataFrame, findings: pd.DataFrame) -> Iterator[Part
         "people",
     )
     without = people[people["verdict"] == ""]
-    rows = [(name, _with_links(text)) for name, text in zip(without["person"], without["sentence"], strict=True)]
+    rows = [(name, linked(text)) for name, text in zip(without["person"], without["sentence"], strict=True)]
     more = (f"{len(rows)} people; the others are in people.csv.",) if len(rows) > _MOST_PEOPLE else ()
     yield Part("Verdicts", figure=bars)
     if rows:
@@ -81,8 +82,8 @@ def _by_code(findings: pd.DataFrame, fitted: set[str]) -> list[tuple[str, ...]]:
             int(muted.sum()),
             int(overruled.sum()),
         ]
-        names = Markup(", ").join(linked(name) if name in fitted else escape(name) for name in people[:_MOST_NAMES])
-        cells = (_link(str(code)), severity.name, rule(str(code)).name.replace("-", " "), *map(str, counts))
+        names = Markup(", ").join(report_of(name) if name in fitted else escape(name) for name in people[:_MOST_NAMES])
+        cells = (linked(str(code)), severity.name, rule(str(code)).name.replace("-", " "), *map(str, counts))
         more = names + (", ..." if len(people) > _MOST_NAMES else "")
         rows.append(((-severity, -len(people), str(code)), (*cells, _median(of), more)))
     return [cells for _, cells in sorted(rows, key=lambda row: row[0])]
@@ -109,16 +110,6 @@ def _meaning(code: str) -> tuple[str, ...]:
     return anchor, one.detects, outlined(one.effect), outlined(one.remedy)
 
 
-def _link(code: str) -> Markup:
-    return Markup('<a class="code" href="#explain-{}">{}</a>').format(code, code)
-
-
-def _with_links(sentence: str) -> Markup:
-    """A sentence whose codes lead to what they mean."""
-    words = (_link(word) if len(word) == 4 and matching(word) == (word,) else escape(word) for word in sentence.split())
-    return Markup(" ").join(words)
-
-
-def linked(person: str) -> Markup:
+def report_of(person: str) -> Markup:
     """The name, which leads to the person's report."""
     return Markup('<a href="people/{}/report.html">{}</a>').format(quote(person), person)

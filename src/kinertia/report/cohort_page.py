@@ -19,7 +19,7 @@ from kinertia.motion.gait_cycle import PERCENT
 from kinertia.report import style
 from kinertia.report.bsp_figures import NAMES, segment_name
 from kinertia.report.cohort_instruments import COLUMNS, drift
-from kinertia.report.cohort_outcomes import FINDINGS, PEOPLE, lead, linked, outcome_parts
+from kinertia.report.cohort_outcomes import FINDINGS, PEOPLE, lead, outcome_parts, report_of
 from kinertia.report.cycle_figures import band, mean_line
 from kinertia.report.figure import Figure
 from kinertia.report.panels import Panel, small_multiples
@@ -110,7 +110,7 @@ def _outliers(bsp: pd.DataFrame) -> Part:
     rows = zip(score[worst.index], *(worst[name].astype(str) for name in worst), strict=True)
     far = sorted((row for row in rows if row[0] > _FAR), reverse=True)
     listed = [
-        linked(person)
+        report_of(person)
         + f": {NAMES[PARAMETERS.index(name)]} of {segment_name(segment)}, {value:.1f} spreads from the others"
         for value, person, segment, name in far[:_MOST_OUTLIERS]
     ]

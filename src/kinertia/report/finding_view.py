@@ -11,18 +11,20 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+from markupsafe import Markup, escape
+
 from kinertia.findings.display import axis_text, first_few, outlined, shown
 from kinertia.findings.finding import Finding, Severity
 from kinertia.findings.overview import DO_NOT_USE, USE, WITH_CARE, Group, Overview, grouped, in_order
 from kinertia.findings.quantity import Quantity
-from kinertia.findings.rule import Rule, questions, rule
+from kinertia.findings.rule import Rule, matching, questions, rule
 from kinertia.findings.where import Where
 
 LOOKS = {USE: "info", WITH_CARE: "warning", DO_NOT_USE: "error"}
 """Class of the style sheet for each word of a verdict; that of a finding is its severity."""
 MOST_STEPS = 3
 _TITLES = {Severity.ERROR: "Errors", Severity.WARNING: "Warnings"}
-_NOTHING = "Nothing needs to be done."
+_CODE = re.compile(r"\b([A-Z]\d{3})\b")
 
 
 @dataclass(frozen=True)
@@ -108,9 +110,13 @@ class FindingView:
         return [_correction(one, self._explained([one])) for one in self._top(Severity.CORRECTED)]
 
     @cached_property
-    def notes(self) -> list[Group]:
-        """Assumptions and advice."""
-        return grouped(self._top(Severity.INFO))
+    def notes(self) -> list[tuple[Group, str]]:
+        """Assumptions and advice, once for each code, and the trials that they are of."""
+        by_code: dict[str, list[Group]] = {}
+        for group in grouped(self._top(Severity.INFO)):
+            by_code.setdefault(group.first.code, []).append(group)
+        trials = (list(filter(None, (each.first.where.trial for each in groups))) for groups in by_code.values())
+        return [(groups[0], first_few(names)) for groups, names in zip(by_code.values(), trials, strict=True)]
 
     def _top(self, severity: Severity) -> list[Finding]:
         return [one for one in self.findings if one.severity is severity and one.is_open]
@@ -152,8 +158,13 @@ def place_text(where: Where, with_trial: bool = False) -> str:
 
 
 def evidence_texts(one: Finding) -> list[str]:
-    """Every quantity of a finding with its name: "level -23 N (limit 15 N)"."""
-    return [f"{outlined('{' + name + '}', '{}')} {evidence_text(one, name)}" for name in one.evidence]
+    """Every quantity of a finding with its name, "level -23 N (limit 15 N)"; words only if the message lacks them."""
+    named = [name for name, each in one.evidence.items() if not _is_said(one, each)]
+    return [f"{outlined('{' + name + '}', '{}')} {evidence_text(one, name)}" for name in named]
+
+
+def _is_said(one: Finding, quantity: Quantity) -> bool:
+    return isinstance(quantity.value, str) and quantity.value in one.message
 
 
 def evidence_text(one: Finding, name: str, signed: bool = False) -> str:
@@ -176,6 +187,15 @@ def evidence_text(one: Finding, name: str, signed: bool = False) -> str:
 def _style(template: str, name: str) -> str:
     field = re.search(rf"\{{{name}:([+%#]*)\}}", template)
     return "" if field is None else field.group(1)
+
+
+def linked(sentence: str) -> Markup:
+    """A sentence whose codes lead to their explanation on the same page."""
+    link = Markup('<a class="code" href="#explain-{0}">{0}</a>')
+    parts = _CODE.split(sentence)
+    return Markup("").join(
+        link.format(part) if k % 2 and matching(part) else escape(part) for k, part in enumerate(parts)
+    )
 
 
 def asks(one: Rule) -> str:

@@ -35,19 +35,11 @@ _WORST_FIRST = (DO_NOT_USE, WITH_CARE, USE)
 
 
 class Purpose(NamedTuple):
-    """What people do with a result, whether they may with this one, why, and codes of what stands against it.
-
-    Attributes:
-        name: of the purpose.
-        use: "use", "use with care" or "do not use".
-        reason: with a number.
-        codes: of the findings that lower it.
-    """
+    """What people do with a result, whether they may with this one ("use", "use with care", "do not use"), and why."""
 
     name: str
     use: str
     reason: str
-    codes: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -92,17 +84,16 @@ def purposes(outputs: Sequence[Suitability], no_body: bool) -> tuple[Purpose, ..
         for use in (USE, WITH_CARE, DO_NOT_USE)
         if use in uses
     ]
-    reason = segments[0].reason if len(uses) == 1 else "; ".join(by_use)
-    codes = tuple(dict.fromkeys(code for one in segments for code in one.codes))
-    together = uses.pop() if len(uses) == 1 else WITH_CARE
+    codes = dict.fromkeys(code for one in segments for code in one.codes)
+    by_use += [f"see {', '.join(codes)}"] if codes else []
+    parameters = segments[0] if len(uses) == 1 else Suitability("", WITH_CARE, "; ".join(by_use))
     worse = min((moments, motion), key=lambda one: _WORST_FIRST.index(one.use))
-    both = tuple(dict.fromkeys((*moments.codes, *motion.codes)))
-    opensim = Purpose("Next OpenSim step (RRA, CMC)", worse.use, worse.reason, both)
+    opensim = Purpose("Next OpenSim step (RRA, CMC)", worse.use, worse.reason)
     if no_body:
-        opensim = opensim._replace(use=DO_NOT_USE, reason="a segment is physically impossible", codes=(IMPOSSIBLE,))
+        opensim = opensim._replace(use=DO_NOT_USE, reason=f"a segment is physically impossible; see {IMPOSSIBLE}")
     return (
-        Purpose("Joint moments for clinical use", moments.use, moments.reason, moments.codes),
-        Purpose("Segment parameters in a paper", together, reason, codes),
+        Purpose("Joint moments for clinical use", moments.use, moments.reason),
+        Purpose("Segment parameters in a paper", parameters.use, parameters.reason),
         opensim,
     )
 
