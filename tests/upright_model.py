@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from kinertia.model.anthropometry import BodyGeometry, literature_bsp, reference_lengths
-from kinertia.model.bsp import BodySegmentParameters
+from kinertia.model.bsp import PARAMETERS, BodySegmentParameters
 from kinertia.model.joint_centres import lumbar_in_pelvis
 from kinertia.model.skeleton import Axis, Joint, Marker, Skeleton
 
@@ -68,3 +68,18 @@ def bsp(arms: bool = True) -> BodySegmentParameters:
     bare = [f"{body}_{side}" for body in (["toes", "hand"] if arms else ["toes"]) for side in "rl"]
     table = np.vstack([whole.table()[kept], np.zeros((len(bare), 10))])
     return BodySegmentParameters.from_table(tuple([*(names[k] for k in kept), *bare]), table)
+
+
+def changed(body: str, **values: float) -> BodySegmentParameters:
+    """The upright model with some parameters of one body replaced."""
+    own = bsp()
+    table = own.table()
+    for name, value in values.items():
+        table[own.segments.index(body), PARAMETERS.index(name)] = value
+    return BodySegmentParameters.from_table(own.segments, table)
+
+
+def with_moments(body: str, *moments: float, mass: float | None = None) -> BodySegmentParameters:
+    """The upright model with another inertia of one body, and perhaps another mass."""
+    values = dict(zip(("ixx", "iyy", "izz"), moments, strict=True)) | {"ixy": 0.0, "ixz": 0.0, "iyz": 0.0}
+    return changed(body, **values, **({} if mass is None else {"mass": mass}))

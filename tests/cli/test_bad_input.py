@@ -18,10 +18,10 @@ from spoilt_lab import COMMAND, changed_markers, complaint, edit_cell, expect, r
 @pytest.mark.parametrize(
     ("changes", "where", "advice"),
     [
-        ({"walk": "walc.trc"}, r"no such file in .*lab", "did you mean 'walk.trc'"),
-        ({"forces": "walc.mot"}, r"no such file in .*lab", "did you mean 'walk.mot'"),
-        ({"loads": "walc.xml"}, r"no such file in .*lab", "did you mean 'walk.xml'"),
-        ({"static": "statik.trc"}, r"no such file in .*lab", "did you mean 'static.trc'"),
+        ({"walk": "walc.trc"}, r"F101 .* in .*lab", "nearest.*walk.trc"),
+        ({"forces": "walc.mot"}, r"F101 .* in .*lab", "nearest.*walk.mot"),
+        ({"loads": "walc.xml"}, r"F101 .* in .*lab", "nearest.*walk.xml"),
+        ({"static": "statik.trc"}, r"F101 .* in .*lab", "nearest.*static.trc"),
         ({"walk": "../lab"}, "holds no subject file", "kinertia init"),
     ],
 )
@@ -30,7 +30,7 @@ def test_missing_file(lab, changes, where, advice):
 
 
 def test_missing_subject_file(lab):
-    expect(complaint(lab, lab / "subject.toml"), r"subject\.toml: no such file", "expected a subject file")
+    expect(complaint(lab, lab / "subject.toml"), r"subject\.toml: F101 ", "expected a subject file")
 
 
 @pytest.mark.parametrize("name", ["walk.trc", "walk.mot", "walk.xml", "static.trc", "walk.c3d", "static.c3d"])
@@ -77,7 +77,7 @@ def test_xml_that_explains_no_loads(lab):
 @pytest.mark.parametrize(
     ("change", "line", "what"),
     [
-        (edit_cell(4, 5, ""), ", line 4", r"marker labels, expected \d\d as NumMarkers says"),
+        (edit_cell(4, 5, ""), ", line 4", r"F112 .*\d\d labels for \d+ columns"),
         (edit_cell(3, 3, "many"), ", line 3", "many"),
         (edit_cell(3, 4, "furlong"), ", line 3", "furlong.*expected.*mm"),
         (
@@ -92,7 +92,7 @@ def test_xml_that_explains_no_loads(lab):
 )
 def test_spoiled_trc(lab, name, change, line, what):
     spoil(lab / name, change)
-    expect(refused(lab), re.escape(str(lab / name)) + line, what, "expected|correct|export|repair")
+    expect(refused(lab), re.escape(str(lab / name)) + line, what, "(?i)expected|correct|export|repair")
 
 
 def test_unknown_unit_in_c3d(lab):
@@ -117,7 +117,7 @@ def test_forces_without_overlap(lab):
     table = read_sto(lab / "walk.mot")
     table.index += 100.0
     write_sto(lab / "walk.mot", table, False, "late")
-    expect(refused(lab), r"100\.0", r"2\.690", "do not overlap", "same trial")
+    expect(refused(lab), r"100\.0", r"2\.690", "do not overlap", "one trial")
 
 
 def test_not_a_number_in_forces(lab):
@@ -148,7 +148,7 @@ def test_implausible_or_missing_option(lab, changes, parts):
 def test_implausible_subject_file_names_the_line(lab):
     text = '[subject]\nsex = "male"\nmass_kg = 72600.0\nheight_m = 1.803\n[model]\nstatic = "static.trc"\n'
     (lab / "subject.toml").write_text(text + '[[trial]]\nmarkers = "walk.trc"\nforces = "walk.mot"\n')
-    expect(complaint(lab, lab / "subject.toml"), r"subject\.toml, line 3: mass_kg", "72600")
+    expect(complaint(lab, lab / "subject.toml"), r"subject\.toml, line 3: ", "72600")
 
 
 def test_options_beside_a_subject_file(lab):

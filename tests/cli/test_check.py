@@ -104,7 +104,7 @@ def test_a_verdict_against_is_status_1(lab, options, words):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["no.trc"], "no.trc: no such file"),
+        (["no.trc"], "no.trc: F101 "),
         (["walk_grf.mot"], "holds forces only"),
         (["walk.trc", "static.trc", "walk_grf.mot", "more_grf.mot"], "goes with none of the marker files"),
         (["walk.trc", "--mass", "-5"], "mass_kg = -5"),
@@ -117,10 +117,10 @@ def test_a_verdict_against_is_status_1(lab, options, words):
         ([".."], "is a folder"),
         (["walk.trc", "static.trc", "--loads", "loads.xml"], "but 2 are given"),
         (["model.osim", "--loads", "loads.xml"], "but 0 are given"),
-        (["walk.trc", "--markers", "nobodys"], "no such marker set"),
+        (["walk.trc", "--markers", "nobodys"], "nobodys: F101 "),
         (["model.osim"], "model.osim, line 1: not XML"),
-        (["empty.c3d"], "the file is empty"),
-        (["no.osim"], "no.osim: no such file"),
+        (["empty.c3d"], "empty.c3d: F104 "),
+        (["no.osim"], "no.osim: F101 "),
         (["walk.trc", "--height", "170"], "that looks like centimetres"),
     ],
 )

@@ -71,7 +71,7 @@ def test_results_with_letters_that_it_lacks(encoding, done, folder):
 def test_errors_with_letters_that_it_lacks(done):
     assert done[2].returncode == 2
     assert done[2].stderr.splitlines()[-1].startswith("error: ")
-    assert "no such file" in done[2].stderr
+    assert "F101 " in done[2].stderr
     assert "Traceback" not in done[2].stderr
 
 

@@ -4,7 +4,7 @@ import pytest
 from generic_static import generic_model, smooth_motion
 from kinertia.errors import TrialError
 from kinertia.estimation import calibration
-from kinertia.estimation.arm_branch import with_elbows_that_bend_forwards
+from kinertia.estimation.arm_branch import elbow_rotations, with_elbows_that_bend_forwards
 from kinertia.estimation.calibration import first_poses, sampled, turn_about
 from kinertia.model.gait27 import ARM_COORDINATES, ARM_ROTATIONS, SHOULDER_OFFSETS
 from kinertia.model.skeleton import Marker
@@ -170,7 +170,9 @@ def test_an_elbow_that_the_static_trial_has_backwards_bends_forwards(skeleton, s
     np.testing.assert_allclose(np.median(poses[0].q[:, elbow]), 1.3, atol=0.1)
     other = f"arm_rot_{'l' if side == 'r' else 'r'}"
     assert mended.locked[other] == skeleton.locked[other]
+    assert elbow_rotations(spoilt, mended) == {side: pytest.approx(-0.8 * np.pi, abs=0.05)}
     assert with_elbows_that_bend_forwards(skeleton, [walk], poses) == (skeleton, poses)
+    assert elbow_rotations(skeleton, skeleton) == {}
 
 
 def test_markers_that_may_not_turn_as_a_whole_move_one_by_one(skeleton):

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinertia.estimation.free_moment_sign import VERTICAL, free_moment_sign_warnings, left_moments_nm
+from kinertia.diagnostics.result.free_moments import reversed_sign
+from kinertia.estimation.free_moment_sign import VERTICAL, left_moments_nm
 from kinertia.motion.dynamics import residual
 from kinertia.trial.centre_of_pressure import held_centre_of_pressure
 
@@ -37,15 +38,15 @@ def of_walk(request, fit):
 def test_a_sound_sign_is_not_doubted(of_walk):
     as_is, otherwise = left_by(of_walk.trials[0])
     assert otherwise > 1.1 * as_is
-    assert not list(free_moment_sign_warnings(of_walk.trials))
+    assert not list(reversed_sign(of_walk.trials[0]))
 
 
 def test_a_wrong_sign_is_named(of_walk):
     trial = turned(of_walk)
-    (sentence,) = free_moment_sign_warnings([trial])
-    assert sentence.startswith(f"{trial.name}: the plates' free moments")
-    assert "seem to have the wrong sign" in sentence
+    (found,) = reversed_sign(trial)
+    assert (found.code, found.where.trial) == ("P265", trial.name)
     as_is, otherwise = left_by(trial)
+    assert (found.evidence["rms_nm"].value, found.evidence["reversed"].value) == (as_is, otherwise)
     # not the same to the letter: below FIRM_LOAD_N free moments do not count
     assert otherwise == pytest.approx(left_by(of_walk.trials[0])[0], rel=0.2)
     assert as_is > otherwise

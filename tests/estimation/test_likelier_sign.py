@@ -10,9 +10,9 @@ from threadpoolctl import threadpool_limits
 
 from command_line import fitted
 from kinertia.estimation import free_moment_sign
-from kinertia.estimation.free_moment_sign import FreeMomentSign, with_likelier_sign
+from kinertia.estimation.free_moment_sign import with_likelier_sign
 from kinertia.estimation.prior import literature_prior
-from kinertia.estimation.simultaneous.evidence import Evidence
+from kinertia.estimation.simultaneous.evidence import Evidence, FreeMomentSign
 from kinertia.estimation.simultaneous.fit import fit_simultaneous
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
@@ -51,6 +51,26 @@ def person(trial, *factors, offset=0.0, noise_m=0.003):
     return Person(trial.skeleton, walking_subject().literature, tuple(kinematics))
 
 
+@dataclass(frozen=True)
+class Posterior:
+    """What of it has to do with the sign."""
+
+    free_moment_sign: FreeMomentSign | None = None
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """An estimate with its evidence alone."""
+
+    result: SimpleNamespace
+    posterior: Posterior = Posterior()
+
+
+def sign_of(outcome):
+    """What was found of the sign."""
+    return outcome.fitted.posterior.free_moment_sign
+
+
 def signed(ready):
     """The outcome, and how many estimates it took."""
     fits = []
@@ -70,16 +90,15 @@ def test_a_right_sign_stays_and_takes_one_estimate(trial, offset):
     outcome, fits = signed(ready)
     assert fits == 1
     assert outcome.ready is ready
-    assert outcome.sign is None or not (outcome.sign.wrong or outcome.sign.open)
+    sign = sign_of(outcome)
+    assert sign is None or not (sign.wrong or sign.open)
 
 
 @pytest.mark.parametrize("offset", [0.0, 0.006, -0.006])
 def test_a_wrong_sign_is_turned(trial, offset):
     ready = person(trial, -1.0, offset=offset)
     outcome, _ = signed(ready)
-    assert outcome.sign.wrong
-    assert outcome.sign.correction
-    assert not outcome.sign.note
+    assert sign_of(outcome).wrong
     (given,), (used,) = ready.kinematics, outcome.ready.kinematics
     free, turned = (free_moment(k.trial.loads.wrench) for k in (given, used))
     carried = given.trial.loads.force[..., 1] >= 20.0
@@ -90,7 +109,7 @@ def test_a_wrong_sign_is_turned(trial, offset):
 
 
 def test_trials_say_it_together(trial):
-    alone, together = signed(person(trial, -1.0))[0].sign, signed(person(trial, -1.0, -1.0))[0].sign
+    alone, together = (sign_of(signed(person(trial, *factors))[0]) for factors in ((-1.0,), (-1.0, -1.0)))
     assert together.wrong
     assert together.log_odds > alone.log_odds
 
@@ -99,27 +118,26 @@ def test_trials_say_it_together(trial):
 def test_without_free_moments_nothing_is_asked(trial, factor):
     outcome, fits = signed(person(trial, factor))
     assert fits == 1
-    assert outcome.sign is None
+    assert sign_of(outcome) is None
 
 
 @pytest.mark.parametrize("found", [1.0, -1.0])
 def test_trials_that_cannot_tell_leave_it_open(trial, found, monkeypatch):
     """Estimates with hardly any difference between the signs, whatever was predicted; the turned one comes first."""
-    monkeypatch.setattr(free_moment_sign, "held_against", lambda fitted, other, trials: fitted)
+    monkeypatch.setattr(free_moment_sign, "held_against", lambda fitted, other: fitted)
     ready, evidence = person(trial, -1.0), iter([Evidence(0.0, 30.0), Evidence(found, None)])
-    outcome = with_likelier_sign(ready, lambda *_: SimpleNamespace(result=SimpleNamespace(evidence=next(evidence))))
+    outcome = with_likelier_sign(ready, lambda *_: Fitted(SimpleNamespace(evidence=next(evidence))))
     assert outcome.ready is ready
     assert outcome.fitted.result.evidence.found == found
-    assert outcome.sign.log_odds == -found
-    assert outcome.sign.note
-    assert not outcome.sign.correction
+    assert sign_of(outcome).log_odds == -found
+    assert sign_of(outcome).open
 
 
 @pytest.mark.parametrize("found", [30.0, -30.0])
 def test_where_the_first_estimate_leaves_it_open_the_second_decides(trial, found):
     ready, evidence = person(trial, -1.0), iter([Evidence(0.0, 1.0), Evidence(found, None)])
-    outcome = with_likelier_sign(ready, lambda *_: SimpleNamespace(result=SimpleNamespace(evidence=next(evidence))))
-    assert outcome.sign.wrong is (found < 0.0)
+    outcome = with_likelier_sign(ready, lambda *_: Fitted(SimpleNamespace(evidence=next(evidence))))
+    assert sign_of(outcome).wrong is (found < 0.0)
     assert (outcome.ready is ready) is (found > 0.0)
 
 
@@ -137,9 +155,9 @@ def test_files_whose_sign_is_wrong(measured_folder, tmp_path, name, corrected):
     }
     options = [word for option, file in files.items() for word in (f"--{option}", lab / file)]
     fit = fitted(tmp_path / "out", lab / f"{name}.trc", *options, "--calibrate", "--mass", "62.6").summary
-    said = [sentence for sentence in fit["corrections"] if "wrong sign" in sentence]
-    assert len(said) == int(corrected)
-    assert not any("wrong sign" in sentence for sentence in fit["warnings"])
+    codes = [one["code"] for one in fit["findings"]]
+    assert codes.count("P269") == int(corrected)
+    assert "P265" not in codes
     free = [entry["value"] for key, entry in fit["calibration"].items() if key.endswith("free moment")]
     assert np.abs(free).max() < 0.003
 
@@ -150,7 +168,7 @@ def test_files_whose_sign_is_right(measured_folder, tmp_path, name):
     lab = measured_folder / "field" / "hamner_treadmill_run"
     options = ["--forces", lab / f"{name}_grf.mot", "--model", lab / "final.osim", "--mass", "72.84", "--calibrate"]
     fit = fitted(tmp_path / "out", lab / f"{name}.trc", *options).summary
-    assert not any("wrong sign" in sentence for sentence in fit["corrections"])
+    assert "P269" not in [one["code"] for one in fit["findings"]]
 
 
 @pytest.mark.parametrize(
@@ -160,4 +178,3 @@ def test_files_whose_sign_is_right(measured_folder, tmp_path, name):
 def test_how_sure_one_must_be(log_odds, wrong, left_open):
     sign = FreeMomentSign(log_odds, 2.0)
     assert (sign.wrong, sign.open) == (wrong, left_open)
-    assert (bool(sign.correction), bool(sign.note)) == (wrong, left_open)

@@ -279,7 +279,7 @@ def test_force_that_points_down(write):
 def test_uneven_time(write, tmp_path):
     path = write(named("A"))
     path.write_text(path.read_text().replace("\n0.050000000000000003\t", "\n0.04\t"))
-    with refused("T101", None, before=0.049, after=0.04, usual_s=0.001):
+    with refused("T101", None, time_s=0.049, after="0.04 s", usual_s=0.001):
         read_forces(path)
     lines = write(named("A")).read_text().replace("nRows=100", "nRows=90").split("\n")
     path.write_text("\n".join(lines[:50] + lines[60:]))
@@ -324,7 +324,7 @@ def test_samples_lost_and_repeated_though_times_are_rounded(tmp_path, rate_hz, d
 
 
 def test_times_that_do_not_go_on(tmp_path):
-    with refused("T101", None, before=0.0, after=0.0):
+    with refused("T101", None, time_s=0.0, after="0 s"):
         read_forces(forces_at(tmp_path / "grf.mot", np.zeros(100)))
     with refused("T101", None):  # whole seconds are too coarse to tell the rate
         read_forces(forces_at(tmp_path / "grf.mot", (np.arange(3000) / 1000).round()))

@@ -14,6 +14,7 @@ from kinertia.io.sto import write_sto
 from kinertia.io.trc import write_trc
 from kinertia.trial.data import Markers
 from kinertia.trial.marker_quality import axes_trouble, extent_m
+from kinertia.trial.plate_names import with_plates_of_trial
 from refusals import codes, only, refused
 
 
@@ -164,4 +165,4 @@ def test_notes_are_what_was_assumed_and_corrected(files):
     recording = replace(read_recording(files / "walk.trc"), findings=(whole, lost))
     assert [note.startswith("walk.c3d: ") for note in recording.notes] == [True]
     assert len(recording.left_out) == 1
-    assert [one.where.plate for one in recording.with_plates_of("one").findings] == [None, "plate 1 (one)"]
+    assert [one.where.plate for one in with_plates_of_trial(recording).findings] == [None, "plate 1 (walk)"]

@@ -160,8 +160,8 @@ BROKEN = {
                       {"marker": "L Heel"}),
     "infinite": (HEADER + ROWS.replace("3\t0.02\t1", "3\t0.02\tinf"), 8, "F105", {"column": 3}),
     "no time": (HEADER + ROWS.replace("2\t0.01", "2\t"), 7, "F105", {"found": "without a time"}),
-    "time goes back": (HEADER + ROWS.replace("0.02", "0.01"), 8, "T101", {"after": 0.01, "step_s": 0.0}),
-    "uneven": (HEADER + ROWS.replace("0.01", "0.013"), 7, "T101", {"after": 0.013, "usual_s": 0.01}),
+    "time goes back": (HEADER + ROWS.replace("0.02", "0.01"), 8, "T101", {"after": "0.01 s", "step_s": 0.0}),
+    "uneven": (HEADER + ROWS.replace("0.01", "0.013"), 7, "T101", {"after": "0.013 s", "usual_s": 0.01}),
     "wrong rate": (HEADER.replace("100\t100\t3", "60\t60\t3") + ROWS, 3, "T103", {"header_hz": 60, "column_hz": 100}),
     "rate nan": (HEADER.replace("100\t100\t3", "nan\t100\t3") + ROWS, 3, "F114", {"key": "DataRate", "value": "nan"}),
     "count nan": (HEADER.replace("\t3\t2\t", "\tnan\t2\t") + ROWS, 3, "F114", {"key": "NumFrames", "value": "nan"}),
@@ -197,7 +197,7 @@ def test_the_subjects_name_before_the_labels_is_taken_off(write):
 
 def test_lost_frame_in_the_middle(write):
     rows = "".join(f"{k}\t{0.01 * (k + (k > 50)):.2f}\t1\t2\t3\t4\t5\t6\n" for k in range(100))
-    with refused("T101", 57, before=0.5, after=0.52, usual_s=0.01):
+    with refused("T101", 57, time_s=0.5, after="0.52 s", usual_s=0.01):
         read_trc(write(HEADER.replace("\t3\t2\t", "\t100\t2\t") + rows))
 
 

@@ -138,8 +138,9 @@ NEEDED = {
 def test_a_missing_landmark_names_the_joint_and_the_nearest_label(label, joint):
     positions = standing_positions()
     positions[label.replace(".", "")] = positions.pop(label)
-    with pytest.raises(MarkerSetError, match=joint) as caught:
+    with pytest.raises(MarkerSetError) as caught:
         built(positions)
+    assert (caught.value.finding.code, caught.value.finding.where.part) == ("L105", joint)
     assert caught.value.missing
     if joint.split("_")[0] not in ("knee", "ankle") or label.endswith("Lat"):
         assert label.replace(".", "") in str(caught.value)
@@ -148,8 +149,9 @@ def test_a_missing_landmark_names_the_joint_and_the_nearest_label(label, joint):
 def test_landmarks_on_one_point_are_an_error_that_names_the_segment():
     positions = standing_positions()
     positions["R.Knee.Med"] = positions["R.Knee.Lat"]
-    with pytest.raises(MarkerSetError, match=r"no frame for the thigh_r|no frame for the shank_r"):
+    with pytest.raises(MarkerSetError) as caught:
         built(positions)
+    assert (caught.value.finding.code, caught.value.finding.where.part) == ("S206", "shank_r or thigh_r")
 
 
 def test_an_arm_without_markers_hangs_with_lengths_by_stature():

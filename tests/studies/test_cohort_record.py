@@ -93,7 +93,7 @@ def test_results_that_stay_of_other_files_are_told(subject, tmp_path):
     assert not before.due
     outcome = before.outcome(None, tmp_path)
     assert (outcome.status, outcome.fitted) == (2, False)
-    assert "did you mean 'mass_kg'" in outcome.sentence
+    assert "F191 " in outcome.sentence
     assert outcome.sentence.endswith("(results of other files are in people/Anna)")
 
 

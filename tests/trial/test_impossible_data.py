@@ -22,9 +22,9 @@ def changed(array, place, value):
 @pytest.mark.parametrize(
     ("markers", "code", "evidence"),
     [
-        ({"time": changed(TIME, 3, np.nan)}, "T101", {"before": 0.02, "after": "no number"}),
-        ({"time": changed(TIME, 3, 0.02)}, "T101", {"before": 0.02, "after": 0.02, "step_s": 0.0, "usual_s": 0.01}),
-        ({"time": np.where(TIME < 0.045, TIME, TIME + 0.05)}, "T101", {"before": 0.04, "step_s": 0.06}),
+        ({"time": changed(TIME, 3, np.nan)}, "T101", {"time_s": 0.02, "after": "no number"}),
+        ({"time": changed(TIME, 3, 0.02)}, "T101", {"time_s": 0.02, "after": "0.02 s", "step_s": 0.0, "usual_s": 0.01}),
+        ({"time": np.where(TIME < 0.045, TIME, TIME + 0.05)}, "T101", {"time_s": 0.04, "step_s": 0.06}),
         (
             {"positions": changed(MARKERS.positions, (4, 1, 2), -np.inf)},
             "F171",
@@ -42,7 +42,7 @@ def test_markers_that_no_camera_saw(markers, code, evidence):
 @pytest.mark.parametrize(
     ("plates", "code", "plate", "evidence"),
     [
-        ({"time": TIME[::-1]}, "T101", None, {"before": 0.09, "after": 0.08}),
+        ({"time": TIME[::-1]}, "T101", None, {"time_s": 0.09, "after": "0.08 s"}),
         ({"names": ("one", "one")}, "F173", None, {"names": "one, one"}),
         ({"declared_feet": ("right", "l")}, "F173", "one", {"problem": "'right'"}),
         ({"force": changed(PLATES.force, (7, 1, 0), np.nan)}, "F172", "two", {"time_s": 0.07}),

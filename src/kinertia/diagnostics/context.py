@@ -15,7 +15,7 @@ from kinertia.diagnostics.evidence.force_mass import ForceMass, force_mass
 from kinertia.diagnostics.evidence.loaded_plates import adult_share
 from kinertia.diagnostics.evidence.marker_precision import MarkerPrecision
 from kinertia.diagnostics.evidence.plate_contacts import PlateContact, contacts_of
-from kinertia.diagnostics.evidence.plate_edges import Overhang, overhangs, without
+from kinertia.diagnostics.evidence.plate_edges import Overhang, overhangs
 from kinertia.diagnostics.evidence.trajectory_faults import TrajectoryFaults
 from kinertia.errors import KinertiaError
 from kinertia.estimation.carried_mass import CarriedMass
@@ -138,12 +138,6 @@ class RecordingContext:
         landmarks = {} if self.marker_set is None else self.marker_set.landmarks
         toes = {label for side in "rl" for label in landmarks.get(f"toe_{side}", ())}
         return overhangs(self.plates, self.contacts, self.all_markers, self.feet, toes)
-
-    @cached_property
-    def whole_loads(self) -> PlateLoads | None:
-        """The plates without loads of feet that reach beyond them: these begin late, or end early."""
-        cut = [one.contact for one in self.overhangs if not one.only_toe]
-        return self.plates if self.plates is None or not cut else without(self.plates, cut)
 
     @cached_property
     def loaded(self) -> Trial | KinertiaError | None:

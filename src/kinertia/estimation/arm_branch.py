@@ -48,7 +48,7 @@ def elbow_rotations(before: Skeleton, after: Skeleton) -> dict[str, float]:
     """
     names = {side: f"arm_rot_{side}" for side in "rl"}
     rotations = {side: after.locked.get(name, 0.0) - before.locked.get(name, 0.0) for side, name in names.items()}
-    return {side: float(rotation) for side, rotation in rotations.items() if rotation != 0.0}
+    return {side: float(np.angle(np.exp(1j * each))) for side, each in rotations.items() if each != 0.0}
 
 
 def _bends_backwards(skeleton: Skeleton, poses: Sequence[InverseKinematics], elbow: str) -> bool:

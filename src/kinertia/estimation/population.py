@@ -91,21 +91,21 @@ def population_prior(prior: BspPrior, subject: Subject, body_kg: float | None = 
 def population_of(subject: Subject, body_kg: float | None = None) -> Population:
     """As stated, or by age, body-mass index and stature; arguments as of `population_prior`."""
     if subject.population is not None:
-        return Population(subject.population, "as stated", True)
+        return Population(subject.population, "the stated population", True)
     return Population(*_by_age_and_build(subject, body_kg or subject.mass_kg), False)
 
 
 def _by_age_and_build(subject: Subject, mass_kg: float | None) -> tuple[str, str]:
     age, height_m = subject.age_years, subject.height_m
     if age is not None and age < GROWN_UP_YEARS:
-        return "child", f"{age:g} years"
+        return "child", f"an age of {age:g} years"
     if mass_kg and height_m and mass_kg / height_m**2 >= OBESE_KG_M2:
-        return "obese", f"body-mass index {mass_kg / height_m**2:.1f} kg/m2"
+        return "obese", f"a body-mass index of {mass_kg / height_m**2:.1f} kg/m2"
     if age is None and height_m is not None and height_m < _SHORT_M:
-        return "child", f"height {height_m:g} m; if not, give age_years or population under [subject]"
+        return "child", f"a height of {height_m:g} m and no stated age"
     if age is not None and age >= OLD_YEARS:
-        return "elderly", f"{age:g} years"
-    return "adult", "nothing speaks against it"
+        return "elderly", f"an age of {age:g} years"
+    return "adult", "no evidence of another"
 
 
 def _with_masses(prior: BspPrior, shares: dict[str, float]) -> BspPrior:

@@ -41,8 +41,8 @@ def trouble_as_folders(trials: Sequence[str]) -> tuple[int, str] | None:
     for index, name in enumerate(trials if len(trials) > 1 else ()):
         if not fits_everywhere(name):
             return index, (
-                'a folder on every system has none of < > : " / \\ | ? *, no dot or blank at the end, and is no device '
-                "of Windows (CON, NUL, COM1, ...)"
+                'it must be a name that a folder can have on every system: none of < > : " / \\ | ? *, no dot or '
+                "blank at the end, no device of Windows (CON, NUL, COM1, ...)"
             )
         if taken := next((file for file in RESULT_FILES if same_folder(file, name)), None):
             return index, f"the results have a file {taken}, not a folder"
@@ -83,7 +83,7 @@ def missing_file(path: Path, written: str, expected: str = "") -> dict[str, Quan
     """
     folder = path.parent.absolute()
     exists = os.path.isdir(folder)
-    names = sorted(entry.name for entry in folder.iterdir()) if exists else []
+    names = sorted(one.name for one in folder.iterdir() if one.name[0] != ".") if exists else []
     nearest = get_close_matches(path.name, names, n=3, cutoff=0.4)
     hint = "nothing there has a name like it" if exists else "that folder does not exist"
     if nearest:

@@ -149,4 +149,15 @@ def _expect_overlap(recording: Recording) -> None:
     markers, forces = recording.markers.time, recording.plates.time
     if forces[0] > markers[-1] or forces[-1] < markers[0]:
         forces_s, markers_s = (Quantity((float(time[0]), float(time[-1])), "s") for time in (forces, markers))
-        raise TrialError.found(recording.name, "T111", forces_s=forces_s, markers_s=markers_s)
+        raise TrialError.found(
+            recording.name,
+            "T111",
+            forces_s=forces_s,
+            markers_s=markers_s,
+            forces=_span(forces),
+            frames=_span(markers),
+        )
+
+
+def _span(time: FloatArray) -> Quantity:
+    return Quantity(f"{time[0]:.3f} to {time[-1]:.3f} s")

@@ -12,6 +12,7 @@ this model does not move but which differ between a T-pose and walking.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -117,21 +118,27 @@ def _built(marks: jc.Landmarks, height_m: float, sex: str, hip_centre: str) -> G
     at = origin + pelvis @ lumbar
     torso, lengths["torso"], shoulders = jc.torso_frame(marks, at, height_m, sex)
     frames["torso"] = (torso, at)
+    _expect_axes(marks, [*joints, Joint("pelvis", "torso", torso, at, ())])
     locked = dict.fromkeys((*SHOULDER_OFFSETS, *HIP_OFFSETS, *LUMBAR_OFFSETS, *AXIS_TILTS), 0.0)
     for side in "rl":
         joints += _arm(marks, frames, lengths, locked, shoulders[side], height_m, sex, side)
     mid_hip = (hips["r"] + hips["l"]) / 2
+    _expect_axes(marks, joints)
+    worn = _markers(marks, frames)
+    if not any(marker.segment == "torso" for marker in worn):
+        worn = (*worn, *VIRTUAL_TRUNK)
+    skeleton = Skeleton("gait27", tuple(joints), worn, locked, ranges=_usual_ranges(joints))
+    return Gait27(skeleton, BodyGeometry(_triple(lumbar), _triple(mid_hip), lengths))
+
+
+def _expect_axes(marks: jc.Landmarks, joints: Sequence[Joint]) -> None:
+    """Raise S206 where landmarks coincide or lie in line, so that they make no frame."""
     for joint in joints:
         directions = [axis.direction for axis in joint.axes]
         if not all(np.isfinite(part).all() for part in (joint.rotation, joint.translation, directions)):
             parts = joint.child if joint.parent == "ground" else f"{joint.child} or {joint.parent}"
             found = finding("S206", Where(part=parts), landmarks=Quantity(_landmarks_of(marks, joint)))
             raise MarkerSetError(problem_of(found)).with_finding(found)
-    worn = _markers(marks, frames)
-    if not any(marker.segment == "torso" for marker in worn):
-        worn = (*worn, *VIRTUAL_TRUNK)
-    skeleton = Skeleton("gait27", tuple(joints), worn, locked, ranges=_usual_ranges(joints))
-    return Gait27(skeleton, BodyGeometry(_triple(lumbar), _triple(mid_hip), lengths))
 
 
 def _landmarks_of(marks: jc.Landmarks, joint: Joint) -> str:

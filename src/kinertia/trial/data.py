@@ -25,7 +25,6 @@ from kinertia.findings.where import Where
 from kinertia.trial import display
 from kinertia.trial.belt import Belt
 from kinertia.trial.impossible_data import impossible_markers, impossible_plates
-from kinertia.trial.plate_names import plate_of_trial
 from kinertia.trial.sampled_time import nearest_samples, windows, within
 
 FloatArray = npt.NDArray[np.float64]
@@ -260,18 +259,6 @@ class Recording:
     def left_out(self) -> tuple[str, ...]:
         """Of plates that the file has and that cannot be used, why."""
         return tuple(one.message for one in self.findings if one.code == "F151")
-
-    def with_plates_of(self, trial: str) -> Recording:
-        """The same with plates that are called as those of this trial, in its findings, too."""
-        findings = tuple(
-            one if one.where.plate is None
-            else replace(one, where=replace(one.where, plate=plate_of_trial(one.where.plate, trial)))
-            for one in self.findings
-        )  # fmt: skip
-        if self.plates is None:
-            return replace(self, findings=findings)
-        names = tuple(plate_of_trial(name, trial) for name in self.plates.names)
-        return replace(self, plates=replace(self.plates, names=names), findings=findings)
 
     def without_empty_markers(self) -> Recording:
         """The same without markers that no frame shows, and findings that name them (M101)."""

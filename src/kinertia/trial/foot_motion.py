@@ -52,9 +52,12 @@ class FootMotion:
         return planted | np.isnan(self.height).any(axis=1)
 
     def over(self, first: int, last: int) -> FootMotion:
-        """The same with heights over where the markers are in these frames."""
-        level = np.nanmedian(self.height[first : last + 1], axis=0)
-        return FootMotion(self.height - level, self.velocity, self.still)
+        """The same with heights over where the markers are in these frames, of markers that are seen in them."""
+        seen = np.isfinite(self.height[first : last + 1]).any(axis=0)
+        if not seen.any():
+            return self
+        level = np.nanmedian(self.height[first : last + 1, seen], axis=0)
+        return FootMotion(self.height[:, seen] - level, self.velocity[:, seen], self.still)
 
 
 def foot_motions(feet: Sequence[Markers], loaded: BoolArray, belt: Belt | None = None) -> list[FootMotion]:

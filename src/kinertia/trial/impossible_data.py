@@ -59,23 +59,29 @@ def impossible_plates(
 def impossible_position(label: str, position_m: float, time_s: float, limit_m: float | None = None) -> Finding:
     """That a marker is somewhere where no laboratory is."""
     where = Where(markers=(label,), span_s=(time_s, time_s))
-    return finding("F171", where, position_m=Quantity(position_m, "m", limit=limit_m), time_s=Quantity(time_s, "s"))
+    position = Quantity(position_m, "m", limit=limit_m)
+    return with_evidence("F171", where, {"position_m": position, **_at(time_s)})
 
 
 def impossible_load(plate: str, what: str, time_s: float, **size: Quantity) -> Finding:
     """That a force or moment of a plate is no number, or of a size that no plate measures."""
     found = Quantity("no number" if not size else "more than any plate measures")
     where = Where(plate=plate, span_s=(time_s, time_s))
-    words = {"time_s": Quantity(time_s, "s"), "what": Quantity(what), "found": found}
-    return with_evidence("F172", where, {**size, **words})
+    return with_evidence("F172", where, {**size, **_at(time_s), "what": Quantity(what), "found": found})
+
+
+def _at(time_s: float) -> dict[str, Quantity]:
+    """A time as a number, and so exactly that its row is found."""
+    return {"time_s": Quantity(time_s, "s"), "time": Quantity(f"{time_s:.6g} s")}
 
 
 def step_evidence(before: float, after: float, usual: float) -> dict[str, Quantity]:
-    """Evidence of T101: the step between two times, which ones, and the usual step, s."""
-    seconds = {"step_s": after - before, "usual_s": usual, "before": before, "after": after}
-    return {
-        name: Quantity(float(value), "s") if np.isfinite(value) else Quantity("no number")
-        for name, value in seconds.items()
+    """Evidence of T101: the step between two times and the usual one, s, and the times so that their rows are found."""
+    steps = {"step_s": after - before, "usual_s": usual, "time_s": before}
+    known = {name: Quantity(float(value), "s") for name, value in steps.items() if np.isfinite(value)}
+    times = {"before": before, "after": after, "usual": usual}
+    return known | {
+        name: Quantity(f"{value:.6g} s" if np.isfinite(value) else "no number") for name, value in times.items()
     }
 
 

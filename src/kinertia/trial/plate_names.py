@@ -7,11 +7,28 @@ rather than plates: those of each trial are plates of their own, until somebody 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+
+from kinertia.trial.data import Recording
 
 
 def plate_of_trial(column: str, trial: str) -> str:
     """The name of a column of the force file of this trial."""
     return f"{column} ({trial})"
+
+
+def with_plates_of_trial(recording: Recording) -> Recording:
+    """The same with plates that are called as those of this trial alone, in its findings, too."""
+    findings = tuple(
+        replace(one, where=replace(one.where, plate=plate_of_trial(one.where.plate, recording.name)))
+        if one.where.plate is not None
+        else one
+        for one in recording.findings
+    )
+    plates = recording.plates
+    if plates is not None:
+        plates = replace(plates, names=tuple(plate_of_trial(name, recording.name) for name in plates.names))
+    return replace(recording, plates=plates, findings=findings)
 
 
 def columns_of_several_trials(plates: Sequence[str]) -> tuple[tuple[int, ...], ...]:

@@ -5,10 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinertia.diagnostics.model.model_on_person import model_on_person_doubts, model_on_person_trouble, moved_doubts
+from kinertia.diagnostics.context import PersonContext, RecordingContext
+from kinertia.diagnostics.model.model_on_person import model_and_trials, moved_markers
+from kinertia.diagnostics.runner import explained
+from kinertia.findings.finding import Severity
 from kinertia.io.osim.reader import read_osim
 from kinertia.model.model_markers import markers_of_model
+from kinertia.settings import Subject
 from kinertia.trial.data import Markers
+from people import codes, only_markers
 from recordings import here
 
 LAI_ARNOLD = "LaiArnoldModified2017_poly_withArms_weldHand_scaled.osim"
@@ -29,89 +34,94 @@ SOUND = here(KNOWN)
 
 
 @pytest.fixture(params=SOUND, ids=[walk for _, walk in SOUND])
-def person(request, file_of, recording_of):
-    """Places of a model's markers, a trial's, and which are on which segment."""
-    model, trial = request.param
-    marker_set = markers_of_model(read_osim(file_of(model)))
+def someone(request, file_of, recording_of):
+    """A model, markers of a trial, and which are on which segment."""
+    file, trial = request.param
+    model = read_osim(file_of(file))
+    marker_set = markers_of_model(model)
     markers = recording_of(trial).without_empty_markers().markers
-    return marker_set.in_model, markers.select([x for x in marker_set.labels if x in markers.labels]), marker_set
+    return model, markers.select([x for x in marker_set.labels if x in markers.labels]), marker_set
+
+
+def found(model, walk, marker_set, positions=None):
+    """Findings about a model, perhaps with other positions of its markers, that no other one explains."""
+    own = marker_set if positions is None else replace(marker_set, in_model=positions)
+    trial = RecordingContext(only_markers("walk", walk), own)
+    context = PersonContext(Subject(name="person"), [trial], None, own, model)
+    return [one for one in explained(model_and_trials(context)) if one.is_open]
 
 
 def relabelled(markers, exchanged):
     return Markers(markers.time, tuple(exchanged.get(label, label) for label in markers.labels), markers.positions)
 
 
-def test_the_own_model(person):
-    assert model_on_person_trouble(*person) == ""
-    assert model_on_person_doubts(*person) == []
+def test_the_own_model(someone):
+    assert found(*someone) == []
 
 
 @pytest.mark.parametrize("size", [0.92, 0.95, 1.05, 1.08])
-def test_the_model_of_a_person_of_another_size(person, size):
-    places, walk, marker_set = person
-    other = Markers(places.time, places.labels, size * places.positions)
-    told = model_on_person_trouble(other, walk, marker_set) or model_on_person_doubts(other, walk, marker_set)[0]
-    assert ("longer" if size < 1 else "shorter") in told
-    assert "not scaled" in told
-    assert model_on_person_trouble(other, walk, marker_set) or abs(size - 1) < 0.06
+def test_the_model_of_a_person_of_another_size(someone, size):
+    places = someone[2].in_model
+    (one,) = found(*someone, Markers(places.time, places.labels, size * places.positions))
+    assert one.code == "O404"
+    assert one.evidence["ratio"].value == pytest.approx(1.0 / size, abs=0.02)
+    assert one.severity is Severity.ERROR or abs(size - 1) < 0.06
 
 
 @pytest.mark.parametrize("factor", [1000.0, 0.001])
-def test_another_unit_of_length(person, factor):
-    places, walk, marker_set = person
-    other = Markers(places.time, places.labels, factor * places.positions)
-    assert "another unit of length" in model_on_person_trouble(other, walk, marker_set)
+def test_another_unit_of_length(someone, factor):
+    places = someone[2].in_model
+    (one,) = found(*someone, Markers(places.time, places.labels, factor * places.positions))
+    assert one.code == "O401"
 
 
-def test_left_and_right_exchanged_in_all_labels(person):
+def test_left_and_right_exchanged_in_all_labels(someone):
     """Distances are those of the mirror image, which differ by little."""
-    places, walk, marker_set = person
+    model, walk, marker_set = someone
+    places = marker_set.in_model
     right = [label for label in places.labels if label[0] in "Rr"]
     pairs = {one: {"R": "L", "r": "L" if f"L{one[1:]}" in places.labels else "l"}[one[0]] + one[1:] for one in right}
     pairs = {one: other for one, other in pairs.items() if other in places.labels}
-    exchanged = pairs | {other: one for one, other in pairs.items()}
-    trouble = model_on_person_trouble(places, relabelled(walk, exchanged), marker_set)
-    assert "pelvis, torso are arranged like a mirror image" in trouble
-    assert "left and right labels" in trouble
-    legs = marker_set.segments | {"torso": ()}
-    assert model_on_person_trouble(places, walk, replace(marker_set, segments=legs)) == ""
-    assert "mirror image" in model_on_person_trouble(
-        places, relabelled(walk, exchanged), replace(marker_set, segments=legs)
-    )
+    exchanged = relabelled(walk, pairs | {other: one for one, other in pairs.items()})
+    assert "O402" in codes(found(model, exchanged, marker_set))
+    legs = replace(marker_set, segments=marker_set.segments | {"torso": ()})
+    assert found(model, walk, legs) == []
+    assert "O402" in codes(found(model, exchanged, legs))
 
 
 @pytest.mark.parametrize("seed", range(10))
-def test_markers_in_one_plane_do_not_tell_left_from_right(person, seed):
+def test_markers_in_one_plane_do_not_tell_left_from_right(someone, seed):
     """Such as those of hips and shoulders alone: where they were put decides which of the two fits better."""
-    places, walk, marker_set = person
+    model, walk, marker_set = someone
+    places = marker_set.in_model
     trunk = [label for name in ("pelvis", "torso") for label in marker_set.segments[name] if label in walk.labels][:5]
     flat = Markers(places.time, places.labels, places.positions * [0.1, 1.0, 1.0])
     elsewhere = np.random.default_rng(seed).normal(0.0, 0.015, (1, len(trunk), 3))
     seen = Markers(np.zeros(1), tuple(trunk), flat.select(trunk).positions + elsewhere)
-    segments = {"pelvis": tuple(trunk[:3]), "torso": tuple(trunk[3:])}
-    assert "mirror" not in model_on_person_trouble(flat, seen, replace(marker_set, segments=segments))
+    few = replace(marker_set, segments={"pelvis": tuple(trunk[:3]), "torso": tuple(trunk[3:])})
+    assert "O402" not in codes(found(model, seen, few, flat))
 
 
-def test_heel_and_another_marker_of_the_foot_exchanged(person):
-    places, walk, marker_set = person
+def test_heel_and_another_marker_of_the_foot_exchanged(someone):
+    model, walk, marker_set = someone
     foot = [label for label in marker_set.segments["foot_r"] if label in walk.labels]
-    at = places.positions[0]
+    at = marker_set.in_model
     one, other = max(
         ((a, b) for a in foot for b in foot if a < b),
-        key=lambda pair: np.linalg.norm(np.subtract(*[at[places.labels.index(label)] for label in pair])),
+        key=lambda pair: np.linalg.norm(np.subtract(*at.select(pair).positions[0])),
     )
-    trouble = model_on_person_trouble(places, relabelled(walk, {one: other, other: one}), marker_set)
+    swapped = [each for each in found(model, relabelled(walk, {one: other, other: one}), marker_set)]
     if len(foot) > 2:
-        assert "look swapped, here or in the model" in trouble
-        assert one in trouble or other in trouble
+        (swap,) = swapped
+        assert (swap.code, swap.evidence["reference"].value) == ("L212", "model")
+        assert {one, other} & set(swap.where.markers)
 
 
-def test_markers_that_were_never_placed(person):
-    places, walk, marker_set = person
+def test_markers_that_were_never_placed(someone):
+    places = someone[2].in_model
     away = np.random.default_rng(1).normal(0.0, 0.02, places.positions.shape)
     generic = Markers(places.time, places.labels, places.positions + away)
-    told = [model_on_person_trouble(generic, walk, marker_set), *model_on_person_doubts(generic, walk, marker_set)]
-    assert any("not moved to where" in one or "not placed" in one for one in told)
+    assert {"O404", "O405"} & set(codes(found(*someone, generic)))
 
 
 def test_markers_that_calibration_moved_far(file_of):
@@ -124,8 +134,7 @@ def test_markers_that_calibration_moved_far(file_of):
             for marker in before.markers
         ]
     )
-    (doubt,) = moved_doubts(before, after, [trial])
-    assert "R.Heel (foot_r, 80 mm)" in doubt
-    assert "Toe" not in doubt
-    assert "Head" not in doubt
-    assert moved_doubts(before, before, [trial]) == []
+    (one,) = moved_markers(before, after, [trial])
+    assert (one.code, one.where.markers, one.where.part) == ("O407", ("R.Heel",), "foot_r")
+    assert one.evidence["distance_m"].value == pytest.approx(0.08)
+    assert list(moved_markers(before, before, [trial])) == []

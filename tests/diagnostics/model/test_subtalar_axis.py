@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 import upright_model as upright
-from kinertia.diagnostics.model.subtalar_axis import subtalar_axis_doubts
+from kinertia.diagnostics.model.subtalar_axis import subtalar_axis
 from kinertia.io.osim.reader import read_osim
 from kinertia.model.skeleton import Skeleton
+from people import with_model
 from sound_models import MODELS
 
 
@@ -38,17 +39,18 @@ def isman_and_inman(up_deg: float, inward_deg: float) -> tuple[float, float, flo
 def test_people(heading, sign, up, inward):
     """The model's, the mean, and one deviation from it to all sides."""
     axis = sign * np.array(isman_and_inman(up, inward))
-    told = subtalar_axis_doubts(with_axes(axis, heading))
-    assert told == []
+    assert list(subtalar_axis(with_model(with_axes(axis, heading), upright.bsp()))) == []
 
 
 @pytest.mark.parametrize("heading", [1.0, -1.0])
 @pytest.mark.parametrize(("axis", "degrees"), [((1, 0, 0), 38), ((0, 1, 0), 53), ((0.79, 0.6, 0.7), 42)])
 def test_an_axis_that_was_lost(heading, axis, degrees):
-    (sentence,) = subtalar_axis_doubts(with_axes(axis, heading))
-    assert f"talus_r_toes_r ({degrees} degrees), talus_l_toes_l ({degrees} degrees)" in sentence
+    (one,) = subtalar_axis(with_model(with_axes(axis, heading), upright.bsp()))
+    assert (one.code, one.evidence["joints"].value) == ("O304", "talus_r_toes_r, talus_l_toes_l")
+    assert np.degrees(one.evidence["angle_rad"].value) == pytest.approx(degrees, abs=0.6)
 
 
 @pytest.mark.parametrize("name", MODELS)
 def test_models_in_use(file_of, name):
-    assert subtalar_axis_doubts(read_osim(file_of(name)).skeleton) == []
+    model = read_osim(file_of(name))
+    assert list(subtalar_axis(with_model(model.skeleton, model.bsp))) == []

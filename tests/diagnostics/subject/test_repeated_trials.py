@@ -1,4 +1,4 @@
-"""One recording that is listed as two trials is told, and so are its forces; two windows of one recording are not."""
+"""One recording that is listed as two trials is found, and so are its forces; two windows of one recording are not."""
 
 from dataclasses import replace
 
@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 
 from kinertia.diagnostics.subject.repeated_trials import repeated_trials
-from kinertia.settings import Subject
-from kinertia.trial.trial_input import TrialInput
-from kinertia.workflow.prepare import prepare
+from people import person
 from recordings import WALKS
 
 
@@ -17,15 +15,23 @@ def walk(recording_of):
     return recording_of(*WALKS["synthetic c3d"])
 
 
+def found(first, other, windows=(None, None)):
+    """Code, trial and the other trial of each finding."""
+    context = person([first, other])
+    trials = [replace(one, window_s=window) for one, window in zip(context.trials, windows, strict=True)]
+    return [
+        (one.code, one.where.trial, one.evidence["other_trial"].value)
+        for one in repeated_trials(replace(context, trials=trials))
+    ]
+
+
 def test_a_recording_that_is_listed_twice(walk):
-    again = replace(walk, name="walk 2")
-    (warning,) = repeated_trials([walk, again], [None, None])
-    assert f"'{walk.name}' and 'walk 2' have the same markers" in warning
+    assert found(walk, replace(walk, name="walk 2")) == [("S302", "walk 2", walk.name)]
 
 
 def test_two_windows_of_a_recording(walk):
-    assert repeated_trials([walk, walk], [(1.2, 1.5), (1.5, 1.9)]) == []
-    assert len(repeated_trials([walk, walk], [(1.2, 1.6), (1.5, 1.9)])) == 1
+    assert found(walk, walk, ((1.2, 1.5), (1.5, 1.9))) == []
+    assert len(found(walk, walk, ((1.2, 1.6), (1.5, 1.9)))) == 1
 
 
 def other_markers(walk):
@@ -35,17 +41,16 @@ def other_markers(walk):
 def test_two_recordings(walk):
     other = other_markers(walk)
     plates = replace(other.plates, force=np.round(other.plates.force, 1))
-    assert repeated_trials([walk, replace(other, plates=plates)], [None, None]) == []
-    assert repeated_trials([replace(walk, plates=None), replace(other, plates=None)], [None, None]) == []
-    idle = replace(walk.plates, force=np.zeros_like(walk.plates.force))
-    assert repeated_trials([replace(walk, plates=idle), replace(other, plates=idle)], [None, None]) == []
+    assert found(walk, replace(other, plates=plates)) == []
+    assert found(replace(walk, plates=None), replace(other, plates=None)) == []
+    unloaded = replace(walk.plates, force=np.zeros_like(walk.plates.force))
+    assert found(replace(walk, plates=unloaded), replace(other, plates=unloaded)) == []
 
 
 def test_forces_of_the_other_trial(walk):
     other = other_markers(walk)
-    (warning,) = repeated_trials([walk, other], [None, None])
-    assert f"'{walk.name}' and 'walk 2' have the same forces to the last digit, but not the same markers" in warning
-    assert repeated_trials([walk, other], [(1.2, 1.5), (1.5, 1.9)]) == []
+    assert found(walk, other) == [("S303", "walk 2", walk.name)]
+    assert found(walk, other, ((1.2, 1.5), (1.5, 1.9))) == []
 
 
 def test_pieces_of_a_recording_may_have_the_forces_of_the_whole(walk):
@@ -54,11 +59,4 @@ def test_pieces_of_a_recording_may_have_the_forces_of_the_whole(walk):
         replace(walk, markers=replace(walk.markers, time=walk.markers.time[k], positions=walk.markers.positions[k]))
         for k in (slice(None, middle), slice(middle, None))
     ]
-    assert repeated_trials(pieces, [None, None]) == []
-
-
-def test_the_fit_says_so(walk, recording_of):
-    static = recording_of("synthetic/static.c3d")
-    subject = Subject(name="A", sex="male", mass_kg=72.6, height_m=1.803)
-    ready = prepare(subject, static, [TrialInput(walk), TrialInput(replace(walk, name="walk 2"))])
-    assert any("have the same markers to the last digit" in warning for warning in ready.warnings)
+    assert found(*pieces) == []

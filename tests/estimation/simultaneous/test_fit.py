@@ -7,12 +7,12 @@ from threadpoolctl import threadpool_limits
 
 from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.simultaneous.fit import fit_simultaneous, held_against
-from kinertia.estimation.simultaneous.instrument_warnings import accuses
 from kinertia.estimation.simultaneous.instruments import CLOCK_PRIOR_S, FLOOR_PRIOR, PLATE_PRIOR
 from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINTY, JOINT_CENTRE_SD_M
 from kinertia.synthetic.noise import camera_noise
 from kinertia.synthetic.walk import SyntheticTrial, walk, walking_subject
 from kinertia.trial.centre_of_pressure import centre_of_pressure
+from results import codes, of_estimate
 from synthetic_walks import kinematics_of
 
 
@@ -37,8 +37,8 @@ def plain(trial):
     return fitted(trial)
 
 
-def test_a_person_like_the_literature_raises_no_warning(plain):
-    assert plain.warnings == ()
+def test_a_person_like_the_literature_has_no_finding(plain):
+    assert of_estimate(plain) == []
     assert plain.result.converged
     assert plain.result.bsp.physically_consistent().all()
 
@@ -94,7 +94,7 @@ def test_stretches_are_used_together_and_forces_between_them_say_nothing(trial, 
         (motion,) = outcome.motions
         assert len(motion.q) == len(outcome.foot_loads[0]) == 50
         assert outcome.result.converged
-        assert outcome.warnings == ()
+        assert of_estimate(outcome) == []
         # the walker's products of inertia are zero, which the prior does not expect, and so short a walk does not show
         within = np.abs(outcome.bsp.table() - trial.bsp.table()) < 3.0 * outcome.posterior.sd
         assert within[:, :7].all()
@@ -149,8 +149,9 @@ def test_a_displaced_plate_is_named(trial):
         loads[:, 0, 3:] += np.cross([0.0, 0.0, 0.03], loads[:, 0, :3])
 
     outcome = fitted(trial, disturb=shift)
-    (said,) = [w for w in outcome.warnings if "Check where the plate stands" in w]
-    assert said.startswith("Plate right foot: displaced mediolaterally, corrected by -")
+    (found,) = [one for one in of_estimate(outcome) if one.code == "P246"]
+    assert (found.where.plate, found.where.axis, found.causes) == ("right foot", "mediolateral", ("the instrument",))
+    assert found.evidence["offset_m"].value > 0.0
 
 
 @pytest.mark.slow
@@ -159,9 +160,10 @@ def test_a_wandering_marker_is_named(trial):
         at = trial.markers.labels.index("R.Bicep")
         positions[:, at] += np.random.default_rng(1).normal(0.0, 0.05, positions[:, at].shape)
 
-    assert any(
-        "drifting markers, down-weighted" in w and "R.Bicep (" in w for w in fitted(trial, disturb=wander).warnings
-    )
+    drifting = [one for one in of_estimate(fitted(trial, disturb=wander)) if one.code == "M163"]
+    (found,) = [one for one in drifting if one.where.markers == ("R.Bicep",)]
+    assert found.where.trial == "walk"
+    assert found.evidence["sd_m"].value > 3.0 * found.evidence["usual_sd_m"].value
 
 
 @pytest.mark.slow
@@ -173,11 +175,11 @@ def test_a_marker_attached_anew_between_trials_is_named(trial):
     kinematics = [kinematics_of(trial, replace(trial.markers, positions=each), trial.foot_loads) for each in positions]
     with threadpool_limits(1, user_api="blas"):
         outcome = fit_simultaneous(trial.skeleton, literature_prior(walking_subject().literature), kinematics)
-    assert len(outcome.warnings) == 2, outcome.warnings  # of two trials, either may be the odd one
-    for said in outcome.warnings:
-        assert "reattached" in said
-        assert "R.Thigh.Front (" in said
-        assert said.count(" mm)") == 1, said
+    found = of_estimate(outcome, "one", "two")
+    assert codes(found) == ["M162", "M162"]  # of two trials, either may be the odd one
+    assert [one.where.trial for one in found] == ["one", "two"]
+    assert {one.where.markers for one in found} == {("R.Thigh.Front",)}
+    assert found[0].evidence["difference_m"].value == pytest.approx(0.05, abs=0.01)
     places = [skeleton.markers[skeleton.labels.index("R.Thigh.Front")].position[1] for skeleton in outcome.skeletons]
     assert places[1] - places[0] == pytest.approx(-0.05, abs=0.01)
 
@@ -197,7 +199,7 @@ def test_markers_that_stay_do_so_in_every_trial(trial):
         np.testing.assert_array_equal(skeleton.marker_locals, wrong.skeleton.marker_locals)
     # and the body need not make up for them
     assert outcome.result.converged
-    assert not [warning for warning in outcome.warnings if "contradict" in warning]
+    assert "R203" not in codes(of_estimate(outcome, "one", "two"))
     away = (outcome.bsp.table() - walking_subject().literature.table()) / prior.sd
     assert np.abs(away).max() < 2.0
 
@@ -206,8 +208,10 @@ def test_a_model_that_is_contradicted_is_called_so(trial):
     literature = walking_subject().literature
     com = literature.com_m.copy()
     com[literature.segments.index("torso"), 0] += 0.15
-    said = [w for w in fitted(trial, replace(literature, com_m=com)).warnings if "contradict the model" in w]
-    assert any("com_x of torso -" in w for w in said)
+    wrong = replace(literature, com_m=com)
+    found = of_estimate(fitted(trial, wrong), literature=wrong)
+    far = {one.where.part: one.evidence["distance_sd"].value for one in found if one.code == "R203"}
+    assert far["com_x of torso"] < -3.0
 
 
 def test_a_wrong_gain_is_named(trial, plain):
@@ -215,19 +219,19 @@ def test_a_wrong_gain_is_named(trial, plain):
         loads[:, 0] *= 0.9
 
     outcome = fitted(trial, disturb=weaken)
-    assert any(w.startswith("Plate right foot: gain error") for w in outcome.warnings)
+    (found,) = [one for one in of_estimate(outcome) if one.code == "P223"]
+    assert (found.where.plate, found.where.trial) == ("right foot", "walk")
+    assert found.evidence["gain_error"].value == pytest.approx(-0.1, abs=0.03)
     (name,) = [name for name in outcome.posterior.calibration_of("walk") if name.startswith("plate right foot: gain")]
     entry = outcome.posterior.calibration[name]
     assert entry["value"] == pytest.approx(1.0 / 0.9 - 1.0, abs=3.0 * entry["sd"])
     assert entry["sd"] < 0.015
     assert name not in outcome.posterior.calibration_of(None)
 
-    again = held_against(outcome, outcome, ())
-    assert again.warnings == outcome.warnings
-    assert again.corrections == outcome.corrections
-    alone = held_against(outcome, plain, ())
-    assert len(alone.warnings) == len(outcome.warnings) - 1
-    assert len(alone.corrections) == len(outcome.corrections) + 1
+    assert held_against(outcome, outcome).posterior.instrument_errors == outcome.posterior.instrument_errors
+    alone = held_against(outcome, plain)
+    assert [one.name for one in outcome.posterior.instrument_errors if one.supported] == [name]
+    assert not any(one.supported for one in alone.posterior.instrument_errors)
     assert alone.posterior.calibration[name]["contradicted_by"]
     assert not outcome.posterior.calibration[name]["contradicted_by"]
     assert outcome.result.bsp.total_mass_kg == pytest.approx(walking_subject().literature.total_mass_kg, rel=0.02)
@@ -247,9 +251,9 @@ def test_a_horizontal_zero_is_named_and_put_right(trial, plain, axis):
     entry = outcome.posterior.calibration[f"plate left foot: zero {'xyz'[axis]}"]
     assert entry["value"] == pytest.approx(8.0, abs=3.0 * entry["sd"])
     assert entry["sd"] < 1.5
-    said = [*outcome.warnings, *outcome.corrections]
-    assert len(said) == 1
-    assert "offset of the horizontal force" in said[0]
+    (found,) = of_estimate(outcome)
+    assert (found.code, found.where.trial, found.where.plate) == ("P215", "walk", "left foot")
+    assert found.evidence["zero_n"].value == entry["value"]
     expected, found = (fit.foot_loads[0][10:-10, 1, axis] for fit in (plain, outcome))
     assert np.abs(found.mean() - expected.mean()) < 2.0
 
@@ -268,10 +272,9 @@ def test_instruments_that_are_really_off_are_accused(trial, disturb, quantity):
     """By a warning that says to check them, and by no other; sound ones are not even corrected."""
     outcome = fitted(trial, disturb=lambda positions, loads: disturb(loads))
     calibration = outcome.posterior.calibration
-    assert accuses(calibration[quantity])
     assert calibration[quantity]["moved"] > 1.0
-    assert [name for name, entry in calibration.items() if "moved" in entry and accuses(entry)] == [quantity]
-    assert sum("error bars. Check" in warning for warning in outcome.warnings) == 1
+    assert [one.name for one in outcome.posterior.instrument_errors if one.supported] == [quantity]
+    assert sum(one.causes == ("the instrument",) for one in of_estimate(outcome)) == 1
 
 
 def test_of_plates_along_the_way_one_is_accused_if_not_which(trial):
@@ -280,9 +283,9 @@ def test_of_plates_along_the_way_one_is_accused_if_not_which(trial):
     def shift(positions, loads):
         loads[:, 0, 3:] += np.cross([0.02, 0.0, 0.0], loads[:, 0, :3])
 
-    (said,) = [w for w in fitted(trial, disturb=shift).warnings if "plate" in w]
-    assert said.startswith("one of the plates is displaced fore-aft, by about ")
-    assert int(said.split("about ")[1].split(" mm")[0]) == pytest.approx(20, abs=4)
+    (found,) = [one for one in of_estimate(fitted(trial, disturb=shift)) if one.code == "P247"]
+    assert found.where.axis == "fore-aft"
+    assert 1e3 * found.evidence["difference_m"].value == pytest.approx(20.0, abs=4.5)  # as "16 mm" was before
 
 
 @pytest.mark.slow
@@ -299,13 +302,13 @@ def test_a_plate_that_is_off_in_one_trial_of_three_is_not_accused(trial):
             kinematics.append(replace(one, trial=replace(one.trial, name=f"walk {seed}")))
         with threadpool_limits(1, user_api="blas"):
             fit = fit_simultaneous(trial.skeleton, literature_prior(walking_subject().literature), kinematics)
-        return fit.posterior.calibration["plate right foot: z"]
+        return next(one for one in fit.posterior.instrument_errors if one.name == "plate right foot: z")
 
     together, apart = fit_of(0.03, 0.03, 0.03), fit_of(0.09, 0.0, 0.0)
-    assert together["contradicted_by"] == ""
-    assert accuses(together)
-    assert apart["contradicted_by"] == "another trial"
-    assert not accuses(apart)
+    assert together.contradicted_by == ""
+    assert together.supported
+    assert apart.contradicted_by == "another trial"
+    assert not apart.supported
 
 
 def test_zeros_of_a_plate_that_two_trials_share_are_each_trial_s_own(trial):
@@ -336,7 +339,9 @@ def test_a_free_moment_that_is_not_there_is_named(trial):
     outcome = fitted(trial, disturb=crosstalk)
     entry = outcome.posterior.calibration["plate left foot: free moment"]
     assert entry["value"] == pytest.approx(-0.008, abs=2.0 * PLATE_PRIOR["free moment"].sd)
-    assert any(w.startswith("Plate left foot: vertical-moment error, corrected by -") for w in outcome.warnings)
+    (found,) = [one for one in of_estimate(outcome) if one.code == "P267"]
+    assert found.where.plate == "left foot"
+    assert found.evidence["error_nm_n"].value == pytest.approx(0.008, abs=2.0 * PLATE_PRIOR["free moment"].sd)
 
 
 def test_plates_turned_against_the_cameras_are_named_and_put_right(trial, plain):
@@ -356,15 +361,17 @@ def test_plates_turned_against_the_cameras_are_named_and_put_right(trial, plain)
     entry = outcome.posterior.calibration["plates: turned about the vertical by"]
     assert np.degrees(entry["value"]) == pytest.approx(3.0, abs=0.8)
     assert abs(entry["value"] - np.radians(3.0)) < 3.0 * entry["sd"]
-    assert outcome.warnings[0].startswith("Plates: turned about the vertical by +")
-    assert len(outcome.warnings) == 1
+    (found,) = of_estimate(outcome)
+    assert found.code == "P234"
+    assert found.evidence["rotation_rad"].value == entry["value"]  # counter-clockwise seen from above
     sound = plain.posterior.calibration["plates: turned about the vertical by"]
     assert abs(sound["value"]) < sound["prior_sd"]
 
 
 def test_an_unfinished_estimate_is_called_so(trial, monkeypatch):
     monkeypatch.setattr("kinertia.estimation.simultaneous.solver._MAX_ITERATIONS", 1)
-    assert any("did not converge within 1 steps" in w for w in fitted(trial).warnings)
+    (found,) = [one for one in of_estimate(fitted(trial)) if one.code == "R201"]
+    assert found.evidence["iterations"].value == 1
 
 
 def test_forces_of_one_of_two_trials_are_late(trial):
@@ -388,9 +395,10 @@ def test_forces_of_one_of_two_trials_are_late(trial):
         assert second == pytest.approx(expected, abs=3.0 * second_sd)
         assert second_sd < 0.001
         assert fit.result.clock_s[0] == pytest.approx(0.0, abs=0.0005)
-    assert sound.warnings == ()
-    (warning,) = late.warnings
-    assert "lag the markers more than in the other trials by +" in warning
+    assert of_estimate(sound, "one", "two") == []
+    (found,) = of_estimate(late, "one", "two")
+    assert found.code == "T215"
+    assert found.evidence["delay_s"].value == pytest.approx(frame_s, abs=0.003)
     # and others of the session are told of the clock, which is on time
     ours, theirs = (fit.result.instruments for fit in (sound, late))
     assert ours.information.shape == theirs.information.shape == (12, 12)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline
 
-from kinertia.estimation.simultaneous.impacts import impact_factors
+from kinertia.estimation.simultaneous.impacts import down_weighted, impact_factors
 from kinertia.settings import Subject
 from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow.estimate import estimate
@@ -35,6 +35,11 @@ def test_an_impact_counts_alike_wherever_it_lies_between_two_knots(at_s):
     assert 4.5 < factors.max() < 6.0
     assert factors[np.abs(TIME - at_s) < 0.015].min() > 4.0
     assert factors[np.abs(TIME - at_s) > 0.2].max() < 1.05
+
+
+def test_frames_that_count_a_quarter_or_less():
+    assert down_weighted(np.array([1.0, 1.9, 2.0, 9.0])) == 0.5
+    assert down_weighted(np.empty(0)) == 0.0
 
 
 def test_stretches_count_by_themselves_and_short_ones_not():

@@ -1,4 +1,3 @@
-import re
 from pathlib import Path
 
 import numpy as np
@@ -247,76 +246,77 @@ WELDED_ROOT = joint("WeldJoint", "root", "/ground", "pelvis", ())
 TWO_ROOTS = custom_root() + joint("PinJoint", "between", "/ground", "leg", "a")
 SPIN = transform([("a", "0 0 1", "<GCVSpline />")] + [("", axis, ZERO) for axis in ("0 1 0", "1 0 0") + ("1 0 0",) * 3])
 BAD = {
-    "without a free root joint": (model(WELDED_ROOT + PIN), "without a free root joint: 'root' (WeldJoint)"),
+    "without a free root joint": (model(WELDED_ROOT + PIN), "O103"),
     "a locked root": (
         SOUND.replace(coordinate("tz"), coordinate("tz", "<locked>true</locked>")),
-        "without a free root joint",
+        "O103",
     ),
-    "two roots": (model(TWO_ROOTS), "expected one root body"),
-    "zero-mass root": (model(custom_root() + PIN, pelvis_mass=0.0), "root body 'pelvis' has no mass"),
-    "unknown joint type": (SOUND.replace("PinJoint", "EllipsoidJoint"), "joint 'between' is a EllipsoidJoint"),
+    "two roots": (model(TWO_ROOTS), "O103"),
+    "zero-mass root": (model(custom_root() + PIN, pelvis_mass=0.0), "O103"),
+    "unknown joint type": (SOUND.replace("PinJoint", "EllipsoidJoint"), "O102"),
     "unknown function type": (
         model(custom_root() + joint("CustomJoint", "between", "/bodyset/pelvis", "leg", "a", SPIN)),
-        "'between' moves by a GCVSpline",
+        "O102",
     ),
-    "not XML": (SOUND.replace("</BodySet>", "</BodyST>"), "not XML"),
-    "another kind of XML": ("<html><body/></html>", "no Model in it"),
-    "a newer format": (SOUND.replace("40000", "40700"), "format 40700 is newer than 40600"),
-    "an ancient format": (SOUND.replace("40000", "10904"), "open it in OpenSim 4 and save it again"),
-    "a joint to nowhere": (SOUND.replace("/bodyset/leg</socket", "/bodyset/arm</socket", 1), "hangs on '/bodyset/arm'"),
+    "not XML": (SOUND.replace("</BodySet>", "</BodyST>"), "O101"),
+    "another kind of XML": ("<html><body/></html>", "O101"),
+    "a newer format": (SOUND.replace("40000", "40700"), "O101"),
+    "an ancient format": (SOUND.replace("40000", "10904"), "O101"),
+    "a joint to nowhere": (SOUND.replace("/bodyset/leg</socket", "/bodyset/arm</socket", 1), "O103"),
     "a marker on nothing": (
         SOUND.replace(">/bodyset/leg</socket_parent_frame>", ">/bodyset/arm</socket_parent_frame>"),
-        "Marker 'L1' hangs on '/bodyset/arm'",
+        "O103",
     ),
     "two markers of one name": (
         SOUND.replace('name="P2"', 'name="L1"'),
-        "two markers are named 'L1', on pelvis and on leg; expected one of each name",
+        "O105",
     ),
     "a marker twice in one place": (
         SOUND.replace('name="L2"', 'name="L1"').replace("-0.05 -0.1 0.07", "0.05 -0.2 0.02"),
-        "two markers are named 'L1', both on leg",
+        "O105",
     ),
     "a loop": (
         SOUND.replace(
             "</objects><groups /></JointSet>",
             joint("WeldJoint", "again", "/bodyset/pelvis", "leg", ()) + "</objects><groups /></JointSet>",
         ),
-        "closes a loop at body 'leg'",
+        "O103",
     ),
     "a loose body": (
         SOUND.replace('<BodySet name="bodyset"><objects>', '<BodySet name="bodyset"><objects>' + body("arm", 1.0)),
-        "body 'arm' has no joint",
+        "O103",
     ),
     "another constraint": (
         model(custom_root() + PIN, '<PointConstraint name="p"><isEnforced>true</isEnforced></PointConstraint>'),
-        "constraint 'p' is a PointConstraint",
+        "O102",
     ),
-    "letters for numbers": (SOUND.replace("<mass>3.0</mass>", "<mass>heavy</mass>"), "mass of 'leg' is 'heavy'"),
-    "too few numbers": (SOUND.replace("-0.01 -0.2 0.02", "-0.01 -0.2"), "mass_center of 'leg' has 2 numbers"),
-    "a negative mass": (SOUND.replace("<mass>3.0</mass>", "<mass>-3</mass>"), "body 'leg' has mass -3 kg"),
-    "gravity sideways": (SOUND.replace("0 -9.8066 0", "0 0 -9.8066"), "expected it along -y"),
-    "gravity of the moon": (SOUND.replace("-9.8066", "-1.62"), "gravity is 1.62 m/s2; expected 9.76 to 9.84 m/s2"),
-    "gravity not quite": (SOUND.replace("-9.8066", "-9.5"), "gravity is 9.5 m/s2; expected 9.76 to 9.84 m/s2"),
+    "letters for numbers": (SOUND.replace("<mass>3.0</mass>", "<mass>heavy</mass>"), "O102"),
+    "too few numbers": (SOUND.replace("-0.01 -0.2 0.02", "-0.01 -0.2"), "O102"),
+    "a negative mass": (SOUND.replace("<mass>3.0</mass>", "<mass>-3</mass>"), "O103"),
+    "gravity sideways": (SOUND.replace("0 -9.8066 0", "0 0 -9.8066"), "O104"),
+    "gravity of the moon": (SOUND.replace("-9.8066", "-1.62"), "O104"),
+    "gravity not quite": (SOUND.replace("-9.8066", "-9.5"), "O104"),
     "gravity in mm": (
         SOUND.replace("-9.8066", "-9806.65"),
-        "gravity is 9806.65 m/s2; expected 9.76 to 9.84 m/s2, as anywhere on Earth; most likely millimetres",
+        "O104",
     ),
     "a coupling in a circle": (
         model(
             custom_root() + joint("UniversalJoint", "between", "/bodyset/pelvis", "leg", "ab"),
             coupler(LINEAR, "a", "b") + coupler(LINEAR, "b", "a"),
         ),
-        "couples coordinates in a circle",
+        "O102",
     ),
-    "a coupling of strangers": (model(custom_root() + PIN, coupler(LINEAR, "z", "a")), "the coordinate 'z'"),
+    "a coupling of strangers": (model(custom_root() + PIN, coupler(LINEAR, "z", "a")), "O102"),
 }
 
 
 @pytest.mark.parametrize("name", BAD)
 def test_bad_models_are_refused_in_one_line(written, name):
-    text, message = BAD[name]
-    with pytest.raises(OsimError, match=re.escape(message)) as error:
+    text, code = BAD[name]
+    with pytest.raises(OsimError) as error:
         written(text)
+    assert error.value.finding.code == code
     assert "\n" not in str(error.value)
     assert "small.osim" in str(error.value)
 
@@ -330,5 +330,5 @@ def test_errors_carry_the_element_and_its_line(written):
 
 
 def test_a_missing_file():
-    with pytest.raises(FileError, match="no such file"):
+    with pytest.raises(FileError, match="F101"):
         read_osim("nowhere.osim")

@@ -12,7 +12,10 @@ from kinertia.cli.web.library import Person
 _CHOOSE = "choose one in the table above, or add its file"
 _PLAIN = (
     (re.compile(r"\[model\] lacks 'static'"), f"No file is used as the static trial: {_CHOOSE}."),
-    (re.compile(r"no heading \[\[trial\]\]|\[trial\] lacks 'markers'"), f"No file is used as a walk: {_CHOOSE}."),
+    (
+        re.compile(r"\[\[trial\]\](: there is no such heading| lacks 'markers')"),
+        f"No file is used as a walk: {_CHOOSE}.",
+    ),
 )
 _MISSING = re.compile(r"\[subject\] lacks '(\w+)'")
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -20,10 +19,6 @@ _LOW_M = 0.03
 """A marker so near to where it is lowest during a contact is on the ground, not landing or lifted."""
 
 
-_RISE_S = 0.1
-"""A load is reliable no later than so long after it begins, and until so long before it ends."""
-
-
 class Overhang(NamedTuple):
     """A foot that stands on a plate and reaches beyond it.
 
@@ -32,7 +27,6 @@ class Overhang(NamedTuple):
         overhang_m: of the marker that is farthest out.
         span_s: first and last time at which a marker is out while it is on the ground.
         only_toe: whether nothing but a toe is out.
-        contact: the load.
     """
 
     plate: int
@@ -40,7 +34,6 @@ class Overhang(NamedTuple):
     overhang_m: float
     span_s: tuple[float, float]
     only_toe: bool
-    contact: PlateContact
 
 
 def beyond_edges(corners: FloatArray, place: FloatArray) -> FloatArray:
@@ -94,14 +87,5 @@ def overhangs(
         time = markers.time[inside][rows]
         span_s = (float(time[0]), float(time[-1]))
         farthest = float(usual.max())
-        found.append(Overhang(contact.plate, contact.foot, farthest, span_s, not bool(more.any()), contact))
+        found.append(Overhang(contact.plate, contact.foot, farthest, span_s, not bool(more.any())))
     return found
-
-
-def without(plates: PlateLoads, contacts: Sequence[PlateContact]) -> PlateLoads:
-    """The plates without these loads."""
-    force, moment = plates.force.copy(), plates.moment.copy()
-    for contact in contacts:
-        loaded = within(plates.time, contact.time[0] - _RISE_S, contact.time[-1] + _RISE_S)
-        force[loaded, contact.plate] = moment[loaded, contact.plate] = 0.0
-    return replace(plates, force=force, moment=moment)

@@ -35,8 +35,8 @@ class ModelCheck:
     Examples:
         >>> subject = kinertia.walking_subject()
         >>> check = kinertia.check_model(subject.skeleton, subject.literature, 72.6, 1.803, "male")
-        >>> check.symmetric, tuple(check.literature)
-        (True, ('de Leva', 'Dumas'))
+        >>> tuple(check.literature)
+        ('de Leva', 'Dumas')
     """
 
     name: str

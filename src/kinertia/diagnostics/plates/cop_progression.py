@@ -11,12 +11,13 @@ from collections.abc import Iterator
 import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
+from kinertia.diagnostics.evidence.contact_fit import Feet
 from kinertia.diagnostics.evidence.foot_trajectories import FootTrajectory
 from kinertia.diagnostics.evidence.plate_contacts import PlateContact, cop_horizontal
 from kinertia.diagnostics.plates.heel_landing import lands_on_heels
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
-from kinertia.trial.data import FloatArray
+from kinertia.trial.data import FloatArray, PlateLoads
 
 _BACKWARDS_M, _FORWARDS_M, _FIXED_M = -0.08, 0.05, 0.002
 _USUAL_M = (0.043, 0.148)
@@ -27,8 +28,14 @@ def cop_progression(context: RecordingContext) -> Iterator[Finding]:
     while on another it goes from heel to toe.
     """
     plates, feet = context.plates, context.foot_trajectories
-    if plates is None or feet is None or context.is_static or not lands_on_heels(context):
+    if plates is None or feet is None or context.is_static:
         return
+    found = list(_wrong(context, plates, feet))
+    if found and lands_on_heels(context):
+        yield from found
+
+
+def _wrong(context: RecordingContext, plates: PlateLoads, feet: Feet) -> Iterator[Finding]:
     point = cop_horizontal(plates)
     steps = [(one, point[np.searchsorted(plates.time, one.time), one.plate]) for one in context.contacts if one.is_step]
     progression: dict[int, float] = {}

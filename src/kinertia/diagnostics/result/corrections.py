@@ -49,12 +49,12 @@ def correction(
     return with_evidence(code, where, evidence, None if unsure else severity, causes)
 
 
-def equal(errors: Sequence[InstrumentError]) -> bool:
+def equal(errors: Sequence[InstrumentError], usual_sd: float = np.inf) -> bool:
     """Whether errors of the same quantity of several plates have all been found, and differ no more than errors of
-    single plates do.
+    single plates do: by their prior SD, or this one if it is smaller.
     """
     if len(errors) < _FEWEST or not all(one.found for one in errors):
         return False
     values = [one.value for one in errors]
-    usual = _SD * np.sqrt(2) * min(one.prior_sd for one in errors)
+    usual = _SD * np.sqrt(2) * min(usual_sd, *(one.prior_sd for one in errors))
     return min(values) * max(values) > 0.0 and max(values) - min(values) <= usual

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+import numpy as np
+
 from kinertia.diagnostics.result.context import ResultContext
 from kinertia.diagnostics.result.corrections import corrected, equal
 from kinertia.estimation.simultaneous.instrument_errors import GAIN, InstrumentError
@@ -22,20 +24,31 @@ _LESS = ("a wrong stated mass", "support that no plate measures (handrail, walke
 
 
 def gains(context: ResultContext) -> Iterator[Finding]:
-    """Gains that were corrected, and one that all plates have alike."""
-    of_all = [one for one in context.errors if one.quantity == GAIN]
-    yield from corrected(context, "P223", "gain_error", _certain(of_all))
-    lasting = [one for one in of_all if one.trial is None]
-    if not equal(lasting):
+    """Gains that were corrected, and one that all plates have alike, in all trials or in one."""
+    errors = [one for one in context.errors if one.quantity == GAIN]
+    yield from corrected(context, "P223", "gain_error", _certain(errors))
+    lasting = [one for one in errors if one.trial is None]
+    if equal(lasting):
+        yield _of_all(context, lasting)
         return
-    total = context.ready.carried
-    sd = max(one.sd for one in lasting)
-    evidence = {"gain_error": Quantity(tuple(one.error for one in lasting), "1", 2.0 * lasting[0].prior_sd, sd=sd)}
-    if masses := tuple(mass.mass_kg for mass in context.force_masses.values()):
+    usual = min((one.prior_sd for one in lasting), default=np.inf)
+    for trial in dict.fromkeys(one.trial for one in errors if one.trial is not None):
+        own = [one for one in errors if one.trial == trial]
+        if equal(own, usual):
+            yield _of_all(context, own)
+
+
+def _of_all(context: ResultContext, gains: Sequence[InstrumentError]) -> Finding:
+    """P224, with the masses that the forces of the trials correspond to."""
+    trial, total = gains[0].trial, context.ready.carried
+    sd, limit = max(one.sd for one in gains), 2.0 * gains[0].prior_sd
+    evidence = {"gain_error": Quantity(tuple(one.error for one in gains), "1", limit, sd=sd)}
+    masses = tuple(float(mass.mass_kg) for name, mass in context.force_masses.items() if trial in (None, name))
+    if masses:
         evidence["mass_by_force_kg"] = Quantity(masses, "kg")
     evidence["stated_kg"] = Quantity(total.total_kg, "kg", sd=total.sd_kg)
-    evidence["plates"] = Quantity(", ".join(str(one.plate) for one in lasting))
-    yield with_evidence("P224", Where(), evidence, causes=_MORE if lasting[0].error > 0.0 else _LESS)
+    evidence["plates"] = Quantity(", ".join(str(one.plate) for one in gains))
+    return with_evidence("P224", Where(trial=trial), evidence, causes=_MORE if gains[0].error > 0.0 else _LESS)
 
 
 def _certain(errors: Sequence[InstrumentError]) -> Iterator[InstrumentError]:

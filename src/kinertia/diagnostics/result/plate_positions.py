@@ -45,9 +45,10 @@ def plate_positions(context: ResultContext) -> Iterator[Finding]:
 
 
 def _ambiguous(context: ResultContext, axis: str, errors: Sequence[InstrumentError]) -> list[Finding]:
-    """P247, where a plate is found off and another may be as well."""
+    """P247, where a plate seems off and another may be as well: how uncertain each is does not count, since that is
+    what is ambiguous, but plates must differ for certain."""
     prior, posterior = context.ready.uncertainty.instruments, context.fit.posterior
-    off = [one for one in errors if one.found and not one.contradicted_by]
+    off = [one for one in errors if one.notable and not one.contradicted_by]
     if posterior is None or prior.plate[axis].faulty_share == 0.0 or not off:
         return []
     apart_m, each_m = position_deviations(posterior.instruments, prior, axis)

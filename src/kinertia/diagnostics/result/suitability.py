@@ -147,8 +147,7 @@ def _of_parameters(fit: Fit, name: str) -> tuple[int, str]:
         return 1, "no error bars (two-level): nobody knows which of them this recording informs"
     if shown is None:
         return 1, f"no {nouns} were estimated"
-    source = expected_source(fit)
-    values = source if source.endswith("values") else f"{source.removeprefix('the ')} values"
+    values = prior_values(fit)
     well = f" ({shown.measured} of them well)" if shown.measured else ""
     if not shown.informed:
         return 2, f"none of {shown.total} {nouns} is informed by this recording: they remain {values}"
@@ -160,6 +159,12 @@ def _of_parameters(fit: Fit, name: str) -> tuple[int, str]:
         f"{shown.total - shown.informed} remain {values}"
     )
     return int(shown.informed < SHOWN_SHARE * shown.total), reason
+
+
+def prior_values(fit: Fit) -> str:
+    """What parameters remain that the data do not inform: literature, prior or the model's own values."""
+    source = expected_source(fit)
+    return source if source.endswith("values") else f"{source.removeprefix('the ')} values"
 
 
 def _moments(fit: Fit) -> str:

@@ -29,8 +29,10 @@ from kinertia.model.skeleton import GRAVITY_M_S2
 
 WARNING_SHARE, ERROR_SHARE = 0.02, 0.10
 """Stated mass and vertical force may differ by this share and twice the SD of the difference."""
-_SAME_KG = 0.04
-"""Share by which two plates may differ in the mass of the body and still agree: usual are 2 %."""
+_SAME = 0.04
+"""Share by which two plates, or a plate and the stated mass, may differ and still agree: usual are 2 %."""
+_REPEATED = 0.005
+"""By which a mass by the same plates differs from one occasion to another, SD as a share."""
 _LOAD_KG = 2.0
 """From which on a surplus may be something that was worn or carried."""
 _POUND, _UNIT_OFF = 0.45359, 0.1
@@ -51,6 +53,7 @@ class _Occasion:
     mass_kg: float
     sd_kg: float
     over: str
+    standing: bool = False
 
     def allowed_kg(self, total: CarriedMass, share: float) -> float:
         """By which the stated mass may differ."""
@@ -73,22 +76,22 @@ def stated_mass(context: PersonContext) -> Iterator[Finding]:
     for name, found in apart.items():
         missing, complete = Quantity(found.missing, "1", limit=MISSING), Quantity(found.complete, "1")
         yield finding("P281", Where(trial=name, span_s=found.span_s), missing=missing, complete=complete)
-    standing = [mass for one in context.standing if (mass := one.force_mass) is not None]
+    standing = [_occasion(one.name, mass, True) for one in context.standing if (mass := one.force_mass) is not None]
     whole = [_occasion(name, mass) for name, mass in known.items() if name not in apart]
     partly = [_occasion(name, mass) for name, mass in known.items() if name in apart]
-    for one in [*_together(whole), *partly]:
+    for one in [*_together([*whole, *standing]), *partly]:
         if one.differs(total, WARNING_SHARE):
-            yield from _contradiction(context, one, total, standing)
-    if not known and context.standing and standing:
-        alone = _occasion(context.standing[0].name, standing[0])
-        if alone.differs(total, WARNING_SHARE):
             # nothing is computed from the forces of a person who stands
-            for found_ in _contradiction(context, alone, total, []):
-                yield found_.at(min(found_.severity, Severity.WARNING))
+            most = Severity.ERROR if not one.standing else Severity.INFO if known else Severity.WARNING
+            witnesses = standing or [other for other in whole if other.trial != one.trial]
+            for each in _contradiction(context, one, total, witnesses):
+                yield each.at(min(each.severity, most))
 
 
 def masses_of_trials(context: PersonContext) -> Iterator[Finding]:
-    """S306: two trials whose forces carry different masses, of the one that the others speak against."""
+    """S306: two trials whose forces carry different masses, of the one that static trial, other trials and stated mass
+    speak against.
+    """
     known = {one.name: one.force_mass for one in context.trials if one.force_mass is not None}
     standing = [mass.mass_kg for one in context.standing if (mass := one.force_mass) is not None]
     for (first, own), (other, others) in combinations(known.items(), 2):
@@ -97,7 +100,8 @@ def masses_of_trials(context: PersonContext) -> Iterator[Finding]:
         if abs(own.mass_kg - others.mass_kg) <= allowed:
             continue
         further = [mass.mass_kg for name, mass in known.items() if name not in (first, other)]
-        witnesses = [(abs(kg - own.mass_kg), abs(kg - others.mass_kg)) for kg in (*standing, *further)]
+        stated = [] if context.total_mass is None else [context.total_mass.total_kg]
+        witnesses = [(abs(kg - own.mass_kg), abs(kg - others.mass_kg)) for kg in (*standing, *further, *stated)]
         for odd in odd_ones(first, other, witnesses):
             peer = other if odd == first else first
             yield finding(
@@ -109,25 +113,25 @@ def masses_of_trials(context: PersonContext) -> Iterator[Finding]:
             )
 
 
-def _occasion(name: str | None, mass: ForceMass) -> _Occasion:
-    return _Occasion(name, mass.mass_kg, mass.sd_kg, mass.over)
+def _occasion(name: str | None, mass: ForceMass, standing: bool = False) -> _Occasion:
+    return _Occasion(name, mass.mass_kg, float(np.hypot(mass.sd_kg, _REPEATED * mass.mass_kg)), mass.over, standing)
 
 
 def _together(occasions: Sequence[_Occasion]) -> list[_Occasion]:
-    """One for all trials where they agree, else each by itself."""
+    """One for all where they agree, else each by itself."""
     if len(occasions) < 2:
         return list(occasions)
     weights = np.array([one.sd_kg**-2 for one in occasions])
     mass_kg = float(weights @ [one.mass_kg for one in occasions] / weights.sum())
     sd_kg = float(weights.sum() ** -0.5)
-    for one in occasions:
-        if abs(one.mass_kg - mass_kg) > WARNING_SHARE * mass_kg + 2.0 * float(np.hypot(one.sd_kg, sd_kg)):
+    for one, two in combinations(occasions, 2):
+        if abs(one.mass_kg - two.mass_kg) > WARNING_SHARE * mass_kg + 2.0 * float(np.hypot(one.sd_kg, two.sd_kg)):
             return list(occasions)
     return [_Occasion(None, mass_kg, sd_kg, " and ".join(dict.fromkeys(one.over for one in occasions)))]
 
 
 def _contradiction(
-    context: PersonContext, one: _Occasion, total: CarriedMass, standing: Sequence[ForceMass]
+    context: PersonContext, one: _Occasion, total: CarriedMass, witnesses: Sequence[_Occasion]
 ) -> Iterator[Finding]:
     """S111 with the causes that the evidence speaks for, and the unit that explains it."""
     where, ratio = Where(trial=one.trial), one.mass_kg / total.total_kg
@@ -139,7 +143,7 @@ def _contradiction(
     by_plate: dict[str, float] = {}
     for trial in context.trials:
         by_plate |= plate_masses(trial) if one.trial in (None, trial.name) else {}
-    causes, action = _causes(one.mass_kg, total.total_kg, by_plate, [mass.mass_kg for mass in standing])
+    causes, action = _causes(one, total.total_kg, by_plate, witnesses)
     heavier = one.mass_kg > total.total_kg
     limit = total.total_kg + (1.0 if heavier else -1.0) * one.allowed_kg(total, WARNING_SHARE)
     evidence = {
@@ -149,8 +153,8 @@ def _contradiction(
         "method": Quantity(f"markers' centre of mass over {one.over}"),
         "action": Quantity(action),
     }
-    if standing:
-        evidence["static_kg"] = Quantity(standing[0].mass_kg, "kg", sd=standing[0].sd_kg)
+    for standing in [each for each in witnesses if each.standing][:1]:
+        evidence["static_kg"] = Quantity(standing.mass_kg, "kg", sd=standing.sd_kg)
     if len(by_plate) > 1:
         evidence["plates_kg"] = Quantity(tuple(by_plate.values()), "kg")
     severity = Severity.ERROR if one.differs(total, ERROR_SHARE) else Severity.WARNING
@@ -158,27 +162,27 @@ def _contradiction(
 
 
 def _causes(
-    by_force_kg: float, stated_kg: float, by_plate: Mapping[str, float], standing_kg: Sequence[float]
+    one: _Occasion, stated_kg: float, by_plate: Mapping[str, float], witnesses: Sequence[_Occasion]
 ) -> tuple[tuple[str, ...], str]:
     """Likeliest first, and what to do about the first."""
-    heavier = by_force_kg > stated_kg
-    others = (_LOAD if heavier else _SUPPORT,)
-    heavy, light = (pick(by_plate, key=by_plate.__getitem__, default="") for pick in (max, min))
-    if by_plate and by_plate[heavy] > (1.0 + _SAME_KG) * by_plate[light]:
-        plate = heavy if heavier else light
-        return (f"gain or zero of {plate}", *others, _STATED), f"Check {plate} with a known weight"
-    if _near(by_force_kg / stated_kg, 1.0 / _POUND):
+    heavier = one.mass_kg > stated_kg
+    other = _LOAD if heavier else _SUPPORT
+    if _near(one.mass_kg / stated_kg, 1.0 / _POUND):
         return (_STATED_OVER_POUND, _STATED), "Give the mass in kg"
-    nearer = [abs(kg - by_force_kg) < abs(kg - stated_kg) for kg in standing_kg]
-    if nearer and not any(nearer):
-        return (*others, _PLATES), (
-            "Declare what was worn or carried as [[attached]]" if heavier else "Look for support that no plate measures"
-        )
+    light, *_, heavy = sorted(by_plate, key=by_plate.__getitem__) if len(by_plate) > 1 else ("", "")
+    if light and by_plate[heavy] > (1.0 + _SAME) * by_plate[light]:
+        plate, right = (heavy, light) if heavier else (light, heavy)
+        if abs(by_plate[right] / stated_kg - 1.0) <= _SAME:
+            return (f"gain or zero of {plate}", other, _STATED), f"Check {plate} with a known weight"
+    nearer = [abs(each.mass_kg - one.mass_kg) < abs(each.mass_kg - stated_kg) for each in witnesses]
+    if nearer and 2 * sum(nearer) < len(nearer):
+        action = "Check the plates with a known weight, unless something was carried"
+        return (_PLATES, other), action if heavier else "Check the plates with a known weight"
     if not nearer and len(by_plate) < 2:
-        if heavier and by_force_kg - stated_kg > _LOAD_KG:
-            return (*others, _STATED, _PLATES), "Declare what was worn or carried as [[attached]], or correct the mass"
-        return (_STATED, _PLATES, *others), "Check the mass, and gain and zero of the plates"
-    return (_STATED, *others, _PLATES), "Correct the mass"
+        if heavier and one.mass_kg - stated_kg > _LOAD_KG:
+            return (other, _STATED, _PLATES), "Declare what was worn or carried as [[attached]], or correct the mass"
+        return (_STATED, _PLATES, other), "Check the mass, and gain and zero of the plates"
+    return (_STATED, other, _PLATES), "Correct the mass"
 
 
 def _near(ratio: float, wanted: float) -> bool:

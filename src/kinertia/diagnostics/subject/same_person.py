@@ -7,7 +7,7 @@ most, and single ones by 17 mm; their ratio is within 1.2 %.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import NamedTuple
@@ -101,7 +101,8 @@ def _against(
     distances = SegmentDistances.of(reference.all_markers, trial.all_markers, marker_set)
     if not len(distances.pairs):
         return
-    yield from swapped_labels(distances, at, called)
+    swapped = list(swapped_labels(distances, at, called))
+    yield from swapped
     off, ratio, count = distances.differences(), distances.ratio(), len(distances.pairs)
     worst = int(np.argmax(np.abs(off)))
     if count >= _FEWEST_PAIRS and abs(ratio - 1.0) > _OTHER_PERSON:
@@ -115,7 +116,8 @@ def _against(
         )
     if (scale := camera_scale(distances, usual)) is not None:
         yield scale.finding(at, called)
-    yield from _moved_findings(_moved_markers(distances, _MOVED_M, 0.0), at, called)
+    exchanged = {label for one in swapped for label in one.where.markers}
+    yield from _moved_findings(_moved_markers(distances, _MOVED_M, 0.0, exchanged), at, called)
     rms_m = float(np.sqrt(np.square(off).mean()))
     if count >= _FEWEST_PAIRS and rms_m > _SAME_SESSION_M:
         yield finding(
@@ -136,13 +138,17 @@ class _Moved:
     to_marker: str
 
 
-def _moved_markers(distances: SegmentDistances, least_m: float, least_share: float) -> tuple[_Moved, ...]:
-    """The few markers without which all distances agree; none where distances differ without them, too."""
+def _moved_markers(
+    distances: SegmentDistances, least_m: float, least_share: float, exchanged: Collection[str] = ()
+) -> tuple[_Moved, ...]:
+    """The few markers without which all distances agree, but for those of exchanged labels; none where distances differ
+    without them, too.
+    """
     off = distances.differences()
     before, after = distances.lengths()
     far = (np.abs(off) > least_m) & (np.abs(off) > least_share * np.minimum(before, after))
     moved: list[_Moved] = []
-    kept = np.ones(len(off), bool)
+    kept = ~np.isin(distances.pairs, [k for k, one in enumerate(distances.labels) if one in exchanged]).any(axis=1)
     while (far & kept).any() and len(moved) < _MOST_MOVED:
         # one marker that moved takes all of its distances along
         about = [np.abs(off[kept & _with(distances, k)]) for k in range(len(distances.labels))]

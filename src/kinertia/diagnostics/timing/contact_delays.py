@@ -39,10 +39,10 @@ _DELAY_SD_S, _LEAP_S = 0.010, 0.06
 
 def stance_durations(context: RecordingContext) -> Iterator[Hypothesis]:
     """T201: feet stand half or twice as long by the markers as by the plates."""
-    plates, feet = context.whole_loads, context.foot_trajectories
+    plates, feet = context.plates, context.foot_trajectories
     if plates is None or feet is None:
         return
-    contacts = contacts_of(plates, feet)
+    contacts = context.contacts
     last_row, walked = len(plates.time) - 1, [one for one in contacts if _several_steps(one, plates)]
     loaded = [
         float(plates.time[last] - plates.time[first])
@@ -95,10 +95,10 @@ def contact_delays(context: RecordingContext) -> Iterator[Hypothesis]:
     """Loads that begin and end earlier or later than foot contact and foot off: ever more so (T201), or by the same
     (T211; T212 where nobody's clock is so late, or loads are under no foot even then).
     """
-    plates, feet = context.whole_loads, context.foot_trajectories
+    plates, feet = context.plates, context.foot_trajectories
     if plates is None or feet is None:
         return
-    delays = ContactDelays.of(contacts_of(plates, feet), feet)
+    delays = ContactDelays.of(context.contacts, feet)
     if delays is None:
         return
     if delays.grows():

@@ -37,20 +37,18 @@ def fitted_rate_or_delay(context: RecordingContext) -> Iterator[Hypothesis]:
     """T201 where loads fit the feet at another rate and at no delay; T211 where they are under no foot until a delay
     is undone (a belt takes late loads along).
     """
-    plates, feet = context.whole_loads, context.foot_trajectories
-    if plates is None or feet is None or not (contacts := contacts_of(plates, feet)):
+    plates, feet, contacts = context.plates, context.foot_trajectories, context.contacts
+    if plates is None or feet is None or not contacts:
         return
     read = ContactFit.of(contacts, feet)
     if read.delay_rms_s <= _WRONG_S and read.far_m < FITS_M:
         return
-    delays = np.linspace(-_LONGEST_DELAY_S, _LONGEST_DELAY_S, 2 * round(_LONGEST_DELAY_S / _DELAY_STEP_S) + 1)
-    delay = _best(plates, feet, delays, lambda time, late: time - late)
     start = max(float(plates.time[0]), float(feet[0].time[0]))
     if all(foot.stance_spans for foot in feet):
         rates = np.exp(np.arange(-np.log(_MOST_RATE), np.log(_MOST_RATE) + _RATE_STEP, _RATE_STEP))
         rates = rates[np.abs(np.log(rates)) >= np.log(_LEAST_RATE)]
         rate = _best(plates, feet, rates, lambda time, factor: start + (time - start) / factor)
-        if rate.fit.fits and rate.fit.delay_rms_s <= _CLEARLY_BEST * delay.fit.delay_rms_s:
+        if rate.fit.fits and rate.fit.delay_rms_s <= _CLEARLY_BEST * _best_delay(plates, feet).fit.delay_rms_s:
             found = finding(
                 "T201",
                 context.at(),
@@ -60,7 +58,10 @@ def fitted_rate_or_delay(context: RecordingContext) -> Iterator[Hypothesis]:
                 method=Quantity("rate that fits all contacts"),
             )
             yield Hypothesis(found, replace(plates, time=start + (plates.time - start) / rate.value))
-    if read.far_m >= FAR_M and delay.fit.fits and abs(delay.value) > _WRONG_S:
+    if read.far_m < FAR_M:
+        return
+    delay = _best_delay(plates, feet)
+    if delay.fit.fits and abs(delay.value) > _WRONG_S:
         found = finding(
             "T211",
             context.at(),
@@ -70,6 +71,11 @@ def fitted_rate_or_delay(context: RecordingContext) -> Iterator[Hypothesis]:
             contacts=Quantity(len(contacts), "1"),
         )
         yield Hypothesis(found, replace(plates, time=plates.time - delay.value))
+
+
+def _best_delay(plates: PlateLoads, feet: Feet) -> _Best:
+    delays = np.linspace(-_LONGEST_DELAY_S, _LONGEST_DELAY_S, 2 * round(_LONGEST_DELAY_S / _DELAY_STEP_S) + 1)
+    return _best(plates, feet, delays, lambda time, late: time - late)
 
 
 def _best(

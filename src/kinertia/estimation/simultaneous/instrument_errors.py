@@ -80,9 +80,14 @@ class InstrumentError:
         return -self.value if self.quantity in PLATE_UNKNOWNS else self.value
 
     @property
+    def notable(self) -> bool:
+        """Whether it is more than an instrument is usually off."""
+        return abs(self.value) > _NOTABLE * self.prior_sd
+
+    @property
     def found(self) -> bool:
-        """Whether it is more than an instrument is usually off, and certain."""
-        return abs(self.value) > _NOTABLE * max(self.prior_sd, self.sd)
+        """Whether it is also certain."""
+        return self.notable and abs(self.value) > _NOTABLE * self.sd
 
     @property
     def supported(self) -> bool:

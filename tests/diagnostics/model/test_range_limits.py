@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from kinertia.diagnostics.model.range_limits import range_findings
 from kinertia.model.coordinate_range import Range
-from kinertia.motion.range_ends import clamped_doubts, range_notes
 from kinertia.synthetic.walk import walk, walking_subject
 
 
@@ -30,13 +30,14 @@ def clamped(trial, name, low, high):
 )
 def test_legs_and_trunk_that_the_model_holds_back(trial, name, low, high):
     skeleton, ik = clamped(trial, name, low, high)
-    (doubt,) = clamped_doubts(skeleton, ik)
-    assert f"{name}, {low:.3g} to {high:.3g} degrees: " in doubt
-    assert name in range_notes(skeleton, ik)[0]
+    found = list(range_findings(skeleton, ik))
+    assert [(one.code, one.where.part) for one in found[:2]] == [("O311", name), ("O312", name)]
+    assert found[0].evidence["range_rad"].value == pytest.approx(np.radians((low, high)))
+    assert found[0].evidence["share"].value > 0.2
 
 
 def test_sound_ranges_and_arms_are_not_doubted(trial):
     straight = np.degrees(np.quantile(trial.motion.q[:, trial.skeleton.coordinates.index("knee_angle_r")], 0.08))
     for name, low, high in (("knee_angle_r", -10.0, 120.0), ("knee_angle_r", straight, 120.0), ("arm_add_l", 5.0, 6.0)):
         skeleton, ik = clamped(trial, name, low, high)
-        assert clamped_doubts(skeleton, ik) == []
+        assert [one for one in range_findings(skeleton, ik) if one.code == "O311"] == []

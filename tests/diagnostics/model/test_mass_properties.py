@@ -1,0 +1,107 @@
+"""Masses and inertias that no body can have are found, alone and with trials; those of models in use are not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import upright_model as upright
+from kinertia.diagnostics.model.questions import PERSON_QUESTIONS
+from kinertia.diagnostics.runner import asked, explained
+from kinertia.findings.finding import Severity
+from kinertia.io.osim.reader import read_osim
+from kinertia.model.bsp import PARAMETERS
+from people import UNMOVED, with_model
+from sound_models import MODELS
+from upright_model import changed, with_moments
+
+
+def found(bsp, trials=()):
+    """Code, body and severity of what speaks against mass properties and is not explained by another."""
+    context = replace(with_model(upright.skeleton(), bsp), trials=trials)
+    questions = [one for one in PERSON_QUESTIONS if one.code == "O20"]
+    return {(one.code, one.where.part, one.severity) for one in explained(asked(questions, context)) if one.is_open}
+
+
+def ball(mass_kg, density_kg_m3):
+    """The upright model with a femur that is a ball."""
+    radius = (mass_kg / (4.0 / 3.0 * np.pi * density_kg_m3)) ** (1.0 / 3.0)
+    return with_moments("femur_r", *[0.4 * mass_kg * radius**2] * 3, mass=mass_kg)
+
+
+def test_a_possible_model():
+    assert found(upright.bsp()) == set()
+    assert found(upright.bsp(), [UNMOVED]) == set()
+
+
+@pytest.mark.parametrize(
+    ("change", "condition"),
+    [
+        ({"ixx": 0.5}, "triangle inequality iyy + izz > ixx violated by"),
+        ({"iyy": -0.01}, "iyy is -0.01 kg m2, not positive"),
+        ({"ixy": 0.15}, "ixy, ixz, iyz are too large"),
+        ({"mass": 0.0}, "mass is 0 kg, not positive"),
+    ],
+)
+def test_what_no_distribution_of_mass_has(change, condition):
+    """With trials, too: it was a warning in a fit, and nothing in a check of all files."""
+    bsp = changed("femur_r", **change)
+    assert ("O201", "femur_r", Severity.ERROR) in found(bsp)
+    context = with_model(upright.skeleton(), bsp)
+    (one,) = (each for each in asked(PERSON_QUESTIONS, context) if each.code == "O201")
+    assert condition in one.evidence["condition"].value
+    if "mass" not in change:
+        assert ("O201", "femur_r", Severity.ERROR) in found(bsp, [UNMOVED])
+
+
+def test_bodies_that_a_fit_does_not_estimate():
+    """Toes of 0.1 kg keep what the model has."""
+    light = with_moments("toes_r", 0.001, 0.0001, 0.0001, mass=0.1)
+    assert found(light) == {("O201", "toes_r", Severity.ERROR)}
+    assert found(light, [UNMOVED]) == {("O201", "toes_r", Severity.INFO)}
+
+
+@pytest.mark.parametrize(("density", "codes"), [(1000.0, set()), (4990.0, set()), (8000.0, {"O203"})])
+def test_a_ball_is_as_dense_as_it_is(density, codes):
+    assert {code for code, _, _ in found(ball(5.0, density))} == codes
+    (one, *_) = [
+        each
+        for each in asked(PERSON_QUESTIONS, with_model(upright.skeleton(), ball(5.0, 8000.0)))
+        if each.code == "O203"
+    ]
+    assert one.evidence["density_kg_m3"].value == pytest.approx(8000.0)
+
+
+def test_light_bodies_are_not_dense():
+    assert found(ball(0.1, 8000.0)) == set()
+
+
+def test_mass_in_a_point(recwarn):
+    """No ratio is made of two zeros."""
+    none = dict.fromkeys(PARAMETERS[4:], 0.0)
+    assert found(changed("femur_r", **none)) == {("O202", "femur_r", Severity.ERROR)}
+    assert found(changed("femur_r", **none), [UNMOVED]) == {("O202", "femur_r", Severity.ERROR)}
+    assert found(changed("talus_r", mass=0.1, **none)) == {("O202", "talus_r", Severity.WARNING)}
+    assert found(changed("talus_r", mass=0.0, **none)) == set()
+    assert not recwarn.list
+
+
+@pytest.mark.parametrize(("mass", "severity"), [(1.0, Severity.ERROR), (0.05, Severity.WARNING)])
+def test_a_unit_inertia(mass, severity):
+    assert found(with_moments("talus_l", 1.0, 1.0, 1.0, mass=mass)) == {("O204", "talus_l", severity)}
+
+
+def test_without_thickness():
+    """In a fit it is advice: the model is where the estimate starts from."""
+    thin = with_moments("talus_r", 0.001, 0.002, 0.001)
+    assert found(thin) == {("O205", "talus_r", Severity.WARNING)}
+    assert found(thin, [UNMOVED]) == {("O205", "talus_r", Severity.INFO)}
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_models_in_use(file_of, name):
+    """With trials none has a fault of bodies that are estimated."""
+    model = read_osim(file_of(name))
+    context = replace(with_model(model.skeleton, model.bsp), trials=[UNMOVED])
+    questions = [one for one in PERSON_QUESTIONS if one.code in ("O20", "O21", "O30")]
+    assert [one for one in asked(questions, context) if one.severity > Severity.INFO] == []

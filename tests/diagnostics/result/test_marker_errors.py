@@ -1,0 +1,36 @@
+"""Markers that drift or moved, and joints that the trials corrected."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from kinertia.diagnostics.result.marker_errors import corrected_joints, moved_markers
+from kinertia.estimation.simultaneous.marker_noise import MarkerNoise
+from results import codes, context, walking
+
+TWO = {"walk": walking(), "run": walking()}
+
+
+def test_a_drifting_marker_is_named_with_what_is_usual():
+    noise = MarkerNoise({"A": 0.002, "B": 0.003, "C": 0.012}, 0.2, ("C",))
+    (found,) = moved_markers(context(marker_noise=(noise,)))
+    assert (found.code, found.where.trial, found.where.markers) == ("M163", "walk", ("C",))
+    assert [found.evidence[name].value for name in ("sd_m", "usual_sd_m")] == [0.012, 0.003]
+
+
+@pytest.mark.parametrize(("away_m", "expected"), [(0.029, []), (0.031, ["M162"])])
+def test_a_marker_that_sits_elsewhere_than_in_every_other_trial(away_m, expected):
+    quiet = MarkerNoise({"A": 0.002}, 0.2, ())
+    distances = ({"A": 0.001}, {"A": away_m})
+    found = list(moved_markers(context(trials=TWO, marker_noise=(quiet, quiet), marker_distances_m=distances)))
+    assert codes(found) == expected
+    assert [one.where.trial for one in found] == ["run"] * len(expected)
+
+
+def test_what_calibration_corrected_is_not_silent():
+    nothing = SimpleNamespace(elbow_rotations_rad={}, torso_rotation_rad=None)
+    assert list(corrected_joints(SimpleNamespace(ready=nothing))) == []
+    ready = SimpleNamespace(elbow_rotations_rad={"l": -2.1}, torso_rotation_rad=0.6)
+    elbow, torso = corrected_joints(SimpleNamespace(ready=ready))
+    assert (elbow.code, elbow.where.part, elbow.evidence["rotation_rad"].value) == ("M171", "left elbow", -2.1)
+    assert (torso.code, torso.evidence["rotation_rad"].value) == ("M172", 0.6)

@@ -1,0 +1,129 @@
+"""Residuals and markers set to what OpenSim's guideline names, and joint angles to what joints do."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from kinertia.diagnostics.result.context import ResultContext
+from kinertia.diagnostics.result.joint_angles import joint_angles
+from kinertia.diagnostics.result.residuals import residuals
+from kinertia.model.coordinate_range import Range
+
+FRAMES = 50
+
+
+def found(force_n=0.0, moment_nm=0.0, external_n=800.0, markers_m=0.008, full=1.0, **changes):
+    """Code -> finding of a fit whose residual has this length throughout; a pair is RMS-filling base and one frame's
+    peak."""
+    residual = np.zeros((FRAMES, 6))
+    for column, size in ((0, force_n), (4, moment_nm)):
+        base, peak = size if isinstance(size, tuple) else (size, size)
+        residual[:, column] = base
+        residual[7, column] = -peak
+    loads = np.zeros((FRAMES, 2, 6))
+    loads[:, :, 1] = external_n / 2
+    trial = SimpleNamespace(
+        name="walk",
+        motion_hz=12.0,
+        residuals={"estimate": residual},
+        full_residuals={"estimate": full * residual},
+        kinematics=SimpleNamespace(foot_loads=loads),
+        marker_errors_m={"final": np.full((FRAMES, 3), markers_m)},
+    )
+    fit = SimpleNamespace(**{"trials": (trial,), "file": None, "skeleton": SimpleNamespace(locked={}), **changes})
+    answers = list(residuals(ResultContext(fit, None)))
+    assert {one.where.trial for one in answers} <= {"walk"}
+    return {one.code: one for one in answers}
+
+
+def levels(answers):
+    return {code: one.severity.name for code, one in answers.items()}
+
+
+def test_a_good_fit_has_no_finding():
+    assert found(4.0, 20.0) == {}
+
+
+@pytest.mark.parametrize(
+    ("force", "expected"),
+    [(5.0, None), (5.1, "WARNING"), (10.0, "WARNING"), (10.1, "ERROR"), ((3.0, 9.9), None), ((3.0, 10.1), "WARNING"),
+     ((3.0, 25.0), "WARNING"), ((3.0, 25.1), "ERROR")],
+)  # fmt: skip
+def test_force_by_the_guideline(force, expected):
+    assert levels(found(force)).get("R301") == expected
+
+
+@pytest.mark.parametrize(
+    ("moment", "expected"),
+    [(30.0, None), (30.1, "WARNING"), (50.0, "WARNING"), (50.1, "ERROR"), ((9.0, 50.1), "WARNING"),
+     ((9.0, 75.1), "ERROR")],
+)  # fmt: skip
+def test_moment_by_the_guideline(moment, expected):
+    assert levels(found(0.0, moment)).get("R302") == expected
+
+
+def test_residuals_are_judged_at_the_motions_bandwidth_and_those_at_full_bandwidth_are_information():
+    """Three times as much at full bandwidth bars nothing, and is not kept silent."""
+    answers = found(4.0, 20.0, full=3.0)
+    assert levels(answers) == {"R301": "INFO", "R302": "INFO"}
+    force, moment = (answers[code].evidence for code in ("R301", "R302"))
+    assert [force[name].value for name in ("rms_n", "peak_n", "full_rms_n", "full_peak_n")] == [4.0, 4.0, 12.0, 12.0]
+    assert [moment[name].value for name in ("rms_nm", "full_peak_nm")] == [20.0, 60.0]
+    assert force["motion_hz"].value == 12.0
+    assert levels(found((3.0, 9.0), full=1.2)) == {"R301": "INFO"}  # its peak alone
+
+
+def test_five_percent_of_the_external_force():
+    """A child of 20 kg: 12 N are within OpenSim's newtons, and too much for 200 N."""
+    answers = found((3.0, 12.0), external_n=200.0)
+    assert levels(answers) == {"R301": "WARNING", "R303": "ERROR"}
+    assert answers["R303"].evidence["share"].value == pytest.approx(0.06)
+
+
+@pytest.mark.parametrize(("markers_m", "expected"), [(0.012, None), (0.013, "WARNING"), (0.021, "ERROR")])
+def test_markers_by_the_guideline(markers_m, expected):
+    assert levels(found(markers_m=markers_m)).get("R304") == expected
+    of_model = found(markers_m=markers_m, file=object())
+    assert levels(of_model).get("R304") == expected
+    assert expected is None or "--calibrate" in of_model["R304"].remedy
+
+
+def test_nobody_is_advised_to_let_move_what_moves_already_or_is_grossly_wrong():
+    """What moves hides a model that is another person's."""
+    moved = {f"hip_r/offset_{axis}": 0.01 for axis in "xyz"}
+    for given in ({"markers_m": 0.05}, {"markers_m": 0.03, "skeleton": SimpleNamespace(locked=moved)}):
+        assert "--calibrate" not in found(file=object(), **given)["R304"].remedy
+
+
+def angles(coordinate, degrees, own=(0.0, 140.0)):
+    ranges = {coordinate: Range(*np.radians(own), clamped=False)}
+    trial = SimpleNamespace(
+        name="walk",
+        skeleton=SimpleNamespace(ranges=ranges),
+        kinematics=SimpleNamespace(ik=SimpleNamespace(coordinates=("pelvis_tilt", coordinate))),
+        motion=SimpleNamespace(q=np.radians([[200.0, 10.0], [0.0, degrees]])),
+    )
+    return list(joint_angles(ResultContext(SimpleNamespace(trials=(trial,)), None)))
+
+
+@pytest.mark.parametrize(
+    ("coordinate", "degrees", "own"),
+    [("subtalar_angle_r", -41.0, (-35.0, 35.0)), ("elbow_flex_l", -20.0, (0.0, 150.0)),
+     ("knee_angle_r", -18.0, (0.0, 140.0)), ("knee_angle_l", 18.0, (-160.0, 10.0))],
+)  # fmt: skip
+def test_angles_that_no_joint_has(coordinate, degrees, own):
+    (one,) = angles(coordinate, degrees, own)
+    assert (one.code, one.where.trial, one.where.part) == ("R305", "walk", coordinate)
+    assert np.degrees(one.evidence["angle_rad"].value) == pytest.approx(degrees)
+    low, high = one.evidence["range_rad"].value
+    assert not low <= np.radians(degrees) <= high
+
+
+@pytest.mark.parametrize(
+    ("coordinate", "degrees", "own"),
+    [("subtalar_angle_r", -30.0, (-35.0, 35.0)), ("knee_angle_r", -12.0, (0.0, 140.0)),
+     ("knee_angle_l", -110.0, (-160.0, 10.0)), ("hip_flexion_r", 130.0, (-30.0, 120.0)), ("toe_r", 90.0, (0.0, 1.0))],
+)  # fmt: skip
+def test_angles_that_joints_have_and_coordinates_of_unknown_meaning(coordinate, degrees, own):
+    assert angles(coordinate, degrees, own) == []

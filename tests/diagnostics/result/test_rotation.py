@@ -1,0 +1,57 @@
+"""Trials that do not distinguish rotated plates from fault-free ones say so; session mates that do, help."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kinertia.diagnostics.result.rotation import plate_rotation, smallest_detectable_rad
+from kinertia.estimation.simultaneous.instruments import FLOOR_PRIOR, InstrumentInformation, InstrumentPrior
+from results import codes, context, error
+
+TURN = 4 + 2
+"""Place of the rotation among the unknowns of one plate, the floor and the delay."""
+
+
+def shown(turn_sd_deg, shared_with_x=0.0):
+    """What trials say that know the rotation to this deviation, if the plate's position is known."""
+    information = np.diag([1e6, 1e6, 1e4, 1e6, 1e6, 1e6, 1.0 / np.radians(turn_sd_deg) ** 2, 1e8])
+    both = shared_with_x * np.sqrt(information[0, 0] * information[TURN, TURN])
+    information[0, TURN] = information[TURN, 0] = both
+    return InstrumentInformation(("left",), information, np.zeros(8))
+
+
+@pytest.mark.parametrize("sd_deg", [0.3, 1.0, 1.6])
+def test_from_there_on_rotated_plates_are_likelier(sd_deg):
+    """Bayes' factor of the data's own value, by simulation of neither: two normal densities."""
+    prior = FLOOR_PRIOR["turn"]
+    least = np.degrees(smallest_detectable_rad(shown(sd_deg), InstrumentPrior()))
+
+    def odds(value):
+        wide, narrow = (np.hypot(sd_deg, np.degrees(own)) for own in (prior.faulty_sd, prior.sound_sd))
+        density = [np.exp(-0.5 * (value / sd) ** 2) / sd for sd in (wide, narrow)]
+        return prior.faulty_share * density[0] / ((1 - prior.faulty_share) * density[1])
+
+    assert odds(0.99 * least) < 1.0 < odds(1.01 * least)
+
+
+def test_what_is_shared_with_the_position_of_a_plate_is_not_known_of_the_rotation():
+    alone, shared = (smallest_detectable_rad(shown(0.5, share), InstrumentPrior()) for share in (0.0, 0.99))
+    assert shared > 1.05 * alone
+
+
+def test_it_is_reported_where_it_matters_only():
+    assert list(plate_rotation(context(shown=shown(0.2)))) == []
+    (one,) = plate_rotation(context(shown=shown(1.6)))
+    assert one.code == "P235"
+    assert np.degrees(one.evidence["detectable_rad"].value) == pytest.approx(5.4, abs=0.05)
+    mates = replace(InstrumentPrior(), session=(shown(0.2),))
+    assert list(plate_rotation(context(shown=shown(1.6), prior=mates))) == []
+
+
+def test_a_rotation_is_an_error_of_all_plates():
+    rotated = error("rotation", 0.05, 0.008, 0.004, "rad", plate=None)
+    (one,) = plate_rotation(context(rotated, shown=shown(0.2)))
+    assert (one.code, one.where.plate, one.where.axis) == ("P234", None, None)
+    assert one.evidence["rotation_rad"].value == 0.05
+    assert codes(plate_rotation(context(replace(rotated, sd=0.03), shown=shown(0.2)))) == []

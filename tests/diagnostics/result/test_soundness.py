@@ -1,0 +1,147 @@
+"""Estimates that did not converge, that cannot exist, or that are far from what was expected."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from kinertia.diagnostics.result.context import ResultContext
+from kinertia.diagnostics.result.soundness import soundness
+from kinertia.diagnostics.runner import explained
+from kinertia.estimation.simultaneous.one_sided import OneSided
+from kinertia.estimation.simultaneous.unlike import Unlikeness
+from kinertia.model.bsp import BodySegmentParameters
+from results import codes
+
+BODY = BodySegmentParameters(
+    ("pelvis", "thigh_r"), [10.0, 8.0], [[0, 0, 0], [0, -0.2, 0]], [np.eye(3) * 0.1, np.diag([0.15, 0.04, 0.15])]
+)
+
+
+def found(posterior=None, **changes):
+    """Of a fit that is fine in all but these."""
+    given = {
+        "converged": True,
+        "estimate": BODY,
+        "literature": BODY,
+        "posterior": None
+        if posterior is None
+        else SimpleNamespace(**{"unlikeness": None, "iterations": 7, **posterior}),
+        "file": None,
+        "expected": changes.get("literature", BODY),
+        "more_known": False,
+        "evaluations": 400,
+    }
+    return list(soundness(ResultContext(SimpleNamespace(**{**given, **changes}), None)))
+
+
+def levels(answers):
+    return [(one.code, one.severity.name) for one in answers]
+
+
+def test_a_good_fit_has_no_finding():
+    assert found() == found(posterior={"prior_sd": np.ones((2, 10))}) == []
+
+
+@pytest.mark.parametrize(("posterior", "steps"), [(None, 400), ({"prior_sd": np.ones((2, 10))}, 7)])
+def test_not_converged(posterior, steps):
+    (one,) = found(posterior, converged=False)
+    assert (one.code, one.severity.name, one.evidence["iterations"].value) == ("R201", "ERROR", steps)
+
+
+def test_impossible_segments_are_named_and_bodies_without_mass_are_not():
+    table = BODY.table()
+    table[1, 4:7] = 0.1, 0.5, 0.1
+    wrong = BodySegmentParameters.from_table((*BODY.segments, "patella_r"), np.vstack([table, np.zeros(10)]))
+    (one,) = found(estimate=wrong, literature=wrong)
+    assert levels([one]) == [("R202", "ERROR")]
+    assert (one.evidence["segments"].value, one.evidence["count"].value) == ("thigh_r", 1)
+
+
+def test_light_bodies_that_were_kept_as_a_model_has_them_condemn_nothing():
+    """The toes of LaiArnold's model, 0.2 kg, have moments of inertia that no body has."""
+    toes = np.array([[0.2, 0.03, 0.0, 0.0, 1e-4, 1e-3, 1e-5, 0, 0, 0]])
+    body = BodySegmentParameters.from_table((*BODY.segments, "toes_r"), np.vstack([BODY.table(), toes]))
+    deviations = np.vstack([np.ones_like(BODY.table()), np.zeros(10)])
+    (one,) = found({"prior_sd": deviations}, estimate=body, literature=body, expected=body)
+    assert levels([one]) == [("R202", "INFO")]
+    assert one.evidence["segments"].value == "toes_r"
+
+
+def test_a_body_without_thickness_is_let_pass():
+    """The toes of OpenSim's gait2354: 0.0001 + 0.0001 = 0.0002, but not in binary."""
+    toes = np.array([[0.2166, 0.0346, 0.006, -0.0175, 0.0001, 0.0002, 0.0001, 0, 0, 0]])
+    flat = BodySegmentParameters.from_table((*BODY.segments, "toes_r"), np.vstack([BODY.table(), toes]))
+    assert not flat.physically_consistent().all()
+    assert found(estimate=flat, literature=flat) == []
+
+
+def test_centre_of_mass_far_from_the_literature_where_there_is_no_prior():
+    moved = replace(BODY, com_m=BODY.com_m + np.array([[0.0], [0.12]]) * [0, 1, 0])
+    (one,) = found(estimate=moved)
+    assert levels([one]) == [("R203", "ERROR")]
+    assert one.where.part == "com of thigh_r"
+    assert one.evidence["distance_m"].value == pytest.approx(0.12)
+    assert found(estimate=replace(BODY, com_m=BODY.com_m + np.array([[0.0], [0.09]]) * [0, 1, 0])) == []
+
+
+@pytest.mark.parametrize(("away", "expected"), [(2.9, None), (-3.1, "WARNING"), (3.9, "WARNING"), (-4.1, "ERROR")])
+def test_parameters_by_prior_deviations(away, expected):
+    estimate = BodySegmentParameters.from_table(BODY.segments, BODY.table() + np.eye(2, 10) * away * 0.01)
+    answers = found({"prior_sd": np.full((2, 10), 0.01)}, estimate=estimate)
+    assert levels(answers) == ([] if expected is None else [("R203", expected)] * 2)
+    parts = [one.where.part for one in answers]
+    assert parts == ([] if expected is None else ["mass of pelvis", "com_x of thigh_r"])
+    assert all(one.evidence["distance_sd"].value == pytest.approx(away) for one in answers)
+
+
+def test_who_is_as_was_stated_is_not_far_from_the_prior_for_being_unlike_the_literature():
+    measured = BodySegmentParameters.from_table(BODY.segments, BODY.table() + 0.05 * np.eye(2, 10))
+    posterior = {"prior_sd": np.full((2, 10), 0.01)}
+    assert found(posterior, estimate=measured, expected=measured, more_known=True) == []
+    (one,) = found(posterior, estimate=BODY, expected=measured, more_known=True)[:1]
+    assert one.evidence["source"].value == "the prior"
+
+
+@pytest.mark.parametrize(("doubted", "expected"), [(1, "WARNING"), (2, "WARNING"), (3, "ERROR")])
+def test_more_than_two_doubted_segments_contradict_the_model(doubted, expected):
+    """Several parameters of one segment go together and count once."""
+    segments = ("pelvis", "thigh_r", "thigh_l", "torso")
+    table = np.tile(BODY.table()[:1], (4, 1))
+    away = table.copy()
+    away[:doubted, :3] += 0.031
+    before, after = (BodySegmentParameters.from_table(segments, one) for one in (table, away))
+    answers = found({"prior_sd": np.full((4, 10), 0.01)}, literature=before, estimate=after)
+    assert levels(answers) == [("R203", expected)] * 3 * doubted
+
+
+def unlike(both_sides=False, one_sided=None, away=0.0):
+    """Findings of a person unlike the prior, and those that no other explains."""
+    whole = Unlikeness(60.0, 12, 1e-9, ("tibia_l", "torso"), both_sides, one_sided)
+    estimate = BodySegmentParameters.from_table(BODY.segments, BODY.table() + away * 0.01 * np.eye(2, 10))
+    answers = explained(found({"prior_sd": np.full((2, 10), 0.01), "unlikeness": whole}, estimate=estimate))
+    return [one for one in answers if one.is_open]
+
+
+def test_a_person_unlike_the_prior():
+    (one,) = unlike()
+    assert levels([one]) == [("R204", "WARNING")]
+    assert (one.evidence["chance"].value, one.evidence["combinations"].value) == (1e-9, 12)
+    assert one.causes[0].startswith("something worn or carried")
+    assert one.causes[-1] == "a prosthesis (prosthesis = true under [segment.tibia_l])"
+    assert "joint centre" in unlike(both_sides=True)[0].causes[0]
+    assert set(codes(unlike(away=3.5))) == {"R203"}
+
+
+@pytest.mark.parametrize("added", [True, False])
+def test_a_heavier_side_explains_single_parameters_and_the_whole(added):
+    side = OneSided(("tibia_r", "calcn_r"), ("tibia_l", "calcn_l"), (0.9, 0.4), 6.2, added)
+    (one,) = unlike(one_sided=side, away=4.5)
+    assert one.code == "R205"
+    assert one.evidence["difference_kg"].value == (0.9, 0.4)
+    worn = next(
+        k for k, cause in enumerate(one.causes) if '[[attached]] with segment = "tibia_r" or "calcn_r"' in cause
+    )
+    artificial = next(k for k, cause in enumerate(one.causes) if "[segment.tibia_l] and [segment.calcn_l]" in cause)
+    assert (worn < artificial) == added

@@ -1,0 +1,102 @@
+"""A line per output: findings that affect it lower it, and so does what the data do not inform."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kinertia.diagnostics.result.suitability import informed, suitability
+from kinertia.findings.finding import Severity, finding
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
+
+OUTPUTS = ["joint moments", "segment masses", "centres of mass", "moments of inertia", "motion"]
+
+
+def with_information(fit, share, columns):
+    """The fit with this information on these columns of so large a share of the segments."""
+    sd = fit.posterior.prior_sd.copy()
+    rows = round(share * len(sd))
+    sd[:rows, columns] *= np.sqrt(1 - 0.5)
+    return replace(fit, posterior=replace(fit.posterior, sd=sd))
+
+
+@pytest.fixture
+def clear(fit):
+    """A fit of which everything is informed."""
+    return with_information(fit, 1.0, slice(0, 10))
+
+
+def uses(fit, *findings, left_out=()):
+    return {one.output: one.use for one in suitability(fit, findings, left_out)}
+
+
+def only(**lower):
+    """All outputs "use", but for these."""
+    names = {"moments": 0, "masses": 1, "centres": 2, "inertias": 3, "motion": 4}
+    return dict.fromkeys(OUTPUTS, "use") | {OUTPUTS[names[name]]: use for name, use in lower.items()}
+
+
+def test_every_output_has_a_line_with_a_number(fit, two_level):
+    lines = suitability(fit, ())
+    assert [one.output for one in lines] == OUTPUTS
+    assert all(any(letter.isdigit() for letter in one.reason) for one in lines)
+    assert set(list(uses(two_level).values())[1:4]) == {"use with care"}
+
+
+@pytest.mark.parametrize(("share", "expected"), [(0.0, "do not use"), (0.25, "use with care"), (1.0, "use")])
+def test_segments_by_what_the_data_inform(fit, share, expected):
+    made = with_information(fit, share, slice(0, 1))
+    found = uses(made)
+    assert found["segment masses"] == expected
+    assert found["centres of mass"] == found["moments of inertia"] == "do not use"
+    assert informed(made, "masses")[:2] == (12, round(12 * share))
+
+
+@pytest.mark.parametrize(("severity", "use"), [("ERROR", "do not use"), ("WARNING", "use with care"), ("INFO", "use")])
+def test_findings_lower_what_they_affect(clear, severity, use):
+    residual = finding("R301", Where(trial="walk"), Severity[severity])
+    assert uses(clear, residual) == only(moments=use)
+    moments = suitability(clear, [residual])[0]
+    assert moments.codes == (("R301",) if use != "use" else ())
+
+
+def test_what_is_explained_or_ignored_lowers_nothing_and_a_waived_error_bars_nothing(clear):
+    error = finding("R301", None, Severity.ERROR)
+    assert uses(clear, error.muted("P243")) == only()
+    assert uses(clear, replace(finding("R301"), status="ignored")) == only()
+    assert uses(clear, replace(error, status="waived")) == only(moments="use with care")
+
+
+def test_a_correction_lowers_nothing(clear):
+    assert uses(clear, finding("P246")) == only()
+
+
+@pytest.mark.parametrize(
+    ("parameter", "lower"),
+    [
+        ("mass", {"masses": "use with care"}),
+        ("com_y", {"centres": "use with care"}),
+        ("ixy", {"inertias": "use with care"}),
+    ],
+)
+def test_an_implausible_parameter_lowers_its_own_output(clear, parameter, lower):
+    far = finding("R203", Where(part=f"{parameter} of shank_l"), parameter=Quantity(parameter))
+    assert uses(clear, far) == only(**lower)
+
+
+def test_of_a_person_unlike_the_prior_nothing_is_used_without_care(clear):
+    """Though no single parameter is far: an ankle weight's masses were to be used, 8 error bars from the truth."""
+    care = only(masses="use with care", centres="use with care", inertias="use with care")
+    assert uses(clear, finding("R204")) == care
+    far = finding("R203", Where(part="com_y of shank_l"), parameter=Quantity("com_y"))
+    assert uses(clear, far, finding("R204").muted("R203")) == care
+
+
+def test_nothing_is_used_that_did_not_converge(fit):
+    assert set(uses(replace(fit, converged=False)).values()) == {"do not use"}
+
+
+def test_with_a_trial_left_out_everything_needs_care(clear):
+    assert set(uses(clear, left_out=["run"]).values()) == {"use with care"}
+    assert all("1 of 2 trials" in one.reason for one in suitability(clear, (), ["run"]))

@@ -1,0 +1,238 @@
+"""A person whose mass is known walks (synthetic): what do forces and markers alone show of it?"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kinertia.diagnostics.context import RecordingContext
+from kinertia.diagnostics.evidence.force_mass import force_mass
+from kinertia.diagnostics.evidence.markers_centre import owners_of
+from kinertia.diagnostics.runner import explained
+from kinertia.diagnostics.subject.mass import masses_of_trials, stated_mass
+from kinertia.findings.finding import Severity
+from kinertia.io.marker_set_file import choose_marker_set
+from kinertia.settings import Attached
+from kinertia.synthetic.walk import walk, walking_subject
+from kinertia.trial.data import FootLoads, Trial
+from people import codes, person
+from recordings import LONG_WALKS, RUNS, SQUATS, WALKS
+
+MASS_KG = {"synthetic": 72.6, "synthetic c3d": 72.6, "gait2354": 72.6, "rajagopal": 85.0}
+POUND = 0.45359
+
+
+@pytest.fixture(scope="module")
+def made():
+    return walk(walking_subject(), 1.2)
+
+
+def trial(made, force=lambda time, force: force, name="walk") -> Trial:
+    loads = np.array(made.foot_loads)
+    loads[..., :3] = force(made.time[:, None, None], loads[..., :3])
+    return Trial(
+        name, made.markers, FootLoads(made.time, loads[..., :3], loads[..., 3:]), np.ones(len(made.time), bool)
+    )
+
+
+def mass_of(made, one):
+    return force_mass(owners_of(made.skeleton), one)
+
+
+def test_it_is_the_mass_of_the_body(made):
+    mass = mass_of(made, trial(made))
+    assert mass.mass_kg == pytest.approx(made.bsp.total_mass_kg, abs=2 * mass.sd_kg)
+    assert 0.002 < mass.sd_kg / mass.mass_kg < 0.03
+    np.testing.assert_allclose(mass.supported_kg, mass.mass_kg, rtol=0.15)
+
+
+def test_no_motion_of_ours_is_asked(made):
+    """Markers of which no pose makes sense say the same as long as their centre moves as it does."""
+    turned = replace(made.markers, positions=made.markers.positions[:, :, [2, 1, 0]])
+    fine, odd = (mass_of(made, replace(trial(made), markers=one)) for one in (made.markers, turned))
+    assert odd.mass_kg == pytest.approx(fine.mass_kg, rel=1e-9)
+
+
+def test_gaps_change_little(made):
+    positions = made.markers.positions.copy()
+    positions[::7] = np.nan
+    mass = mass_of(made, replace(trial(made), markers=replace(made.markers, positions=positions)))
+    assert mass.mass_kg == pytest.approx(mass_of(made, trial(made)).mass_kg, rel=0.01)
+
+
+def test_too_short_a_window_shows_nothing(made):
+    short = replace(trial(made), measured=np.arange(len(made.time)) < 8)
+    assert mass_of(made, short) is None
+
+
+def test_a_chair_is_found_though_the_mean_force_hardly_shows_it(made):
+    total_kg, middle = made.bsp.total_mass_kg, made.time[0] + np.ptp(made.time) / 2
+
+    def sitting(for_s):
+        seat = np.clip(1.5 * for_s / 2 - np.abs(made.time - middle), 0, for_s / 2) / (for_s / 2)
+        return trial(made, lambda time, force: force * (1.0 - 0.6 * seat[:, None, None]))
+
+    begins, ends = mass_of(made, sitting(0.35)).unmeasured(total_kg).span_s
+    assert begins < middle < ends
+    assert ends - begins == pytest.approx(0.35, abs=0.15)
+    assert mass_of(made, trial(made)).unmeasured(total_kg) is None
+    gain = trial(made, lambda time, force: 0.7 * force)
+    assert mass_of(made, gain).unmeasured(total_kg) is None, "all the time is not for a while"
+
+
+@pytest.mark.parametrize(
+    ("files", "mass_kg"),
+    [(WALKS[name], mass_kg) for name, mass_kg in MASS_KG.items() if name in WALKS]
+    + [(LONG_WALKS["synthetic"], 72.6), (RUNS["synthetic"], 72.6), (SQUATS["synthetic"], 72.6)],
+)
+def test_recordings_of_people_who_were_weighed(recording_of, files, mass_kg):
+    recording = recording_of(*files)
+    marker_set = choose_marker_set(recording.markers.labels)
+    assert list(stated_mass(person([recording], marker_set=marker_set, mass_kg=mass_kg))) == []
+
+
+@pytest.fixture
+def lab(recording_of):
+    """A walk, a static trial that was recorded without plates, and the marker set."""
+    walked = recording_of(*WALKS["synthetic"])
+    static = recording_of("synthetic/static.trc")
+    return walked, static, choose_marker_set(static.markers.labels)
+
+
+def by_plate(recording, *factors):
+    """The recording with each plate's forces times a factor."""
+    plates, factor = recording.plates, np.array(factors)[:, None]
+    return replace(recording, plates=replace(plates, force=factor * plates.force, moment=factor * plates.moment))
+
+
+def standing_on_plates(static, walked, mass_kg):
+    """The static trial, with plates that carry this mass, half of it each, under the feet."""
+    time, middle = static.markers.time, np.nanmean(static.markers.positions, axis=(0, 1))
+    feet = [
+        np.nanmean(static.markers.arranged(labels), axis=(0, 1))
+        for labels in choose_marker_set(static.markers.labels).foot_labels().values()
+    ]
+    force = np.zeros((len(time), 2, 3))
+    force[..., 1] = mass_kg * 9.80665 / 2
+    point = np.array([[foot[0], 0.0, foot[2]] for foot in feet]) if len(feet) == 2 else middle
+    plates = replace(
+        walked.plates,
+        time=time,
+        force=force,
+        moment=np.cross(np.broadcast_to(point, force.shape), force),
+        corners=None,
+        noise_n=None,
+        idle=None,
+        torques=None,
+    )
+    return replace(static, plates=plates)
+
+
+@pytest.mark.parametrize(
+    ("stated_kg", "found"),
+    [
+        (72.6, []),
+        (72.6 * 1.02, []),
+        (72.6 + 5.0, [("S111", Severity.WARNING)]),
+        (72.6 - 5.0, [("S111", Severity.WARNING)]),
+        (90.0, [("S111", Severity.ERROR)]),
+        (60.0, [("S111", Severity.ERROR)]),
+    ],
+)
+def test_a_stated_mass_that_the_forces_contradict(lab, stated_kg, found):
+    walked, _, marker_set = lab
+    findings = list(stated_mass(person([walked], marker_set=marker_set, mass_kg=stated_kg)))
+    assert [(one.code, one.severity) for one in findings] == found
+    for one in findings:
+        assert one.evidence["mass_by_force_kg"].value == pytest.approx(72.6, abs=1.5)
+        assert one.evidence["stated_kg"].value == stated_kg
+
+
+def test_a_declared_rucksack_is_not_accused(lab):
+    """D6: it was, by the method of `check`."""
+    walked, _, marker_set = lab
+    pack = Attached(name="rucksack", segment="torso", mass_kg="8 +- 0.2", com_mm=[-200, 300, 0], on_scale=False)
+    stated = {"marker_set": marker_set, "mass_kg": 64.6}
+    assert codes(stated_mass(person([walked], **stated))) == ["S111"]
+    assert codes(stated_mass(person([walked], attached=[pack], **stated))) == []
+
+
+def test_mass_in_pounds_and_forces_in_other_units(lab):
+    walked, _, marker_set = lab
+    pounds = explained(stated_mass(person([walked], marker_set=marker_set, mass_kg=72.6 / POUND)))
+    assert [one.code for one in pounds if one.is_open] == ["S112"]
+    kilograms = explained(
+        stated_mass(person([by_plate(walked, 0.10197, 0.10197)], marker_set=marker_set, mass_kg=72.6))
+    )
+    open_ = [(one.code, one.severity) for one in kilograms if one.is_open]
+    assert open_ in ([], [("P202", Severity.ERROR)]), "hardly a load is left in some"
+
+
+def causes_of(found):
+    return found.causes[0], found.remedy
+
+
+def test_a_wrong_mass_comes_first_where_plates_and_static_trial_agree(lab):
+    """Whoever corrects it makes things better."""
+    walked, static, marker_set = lab
+    stood = standing_on_plates(static, walked, 72.6)
+    (found,) = stated_mass(person([walked], stood, marker_set, mass_kg=79.0))
+    assert found.where.trial is None, "of all occasions together"
+    assert found.evidence["static_kg"].value == pytest.approx(72.6, abs=0.2)
+    assert causes_of(found) == ("a wrong stated mass", "Correct the mass.")
+
+
+def test_the_light_plate_comes_first_where_plates_differ(lab):
+    """Whoever corrects the mass makes things worse."""
+    walked, _, marker_set = lab
+    for factors, name in (((1.0, 0.85), 1), ((0.85, 1.0), 0), ((1.15, 1.0), 0)):
+        spoilt = by_plate(walked, *factors)
+        (found,) = stated_mass(person([spoilt], marker_set=marker_set, mass_kg=72.6))
+        plate = spoilt.plates.names[name]
+        assert causes_of(found) == (f"gain or zero of {plate}", f"Check {plate} with a known weight.")
+
+
+@pytest.mark.parametrize("factor", [0.93, 1.07])
+def test_the_plates_come_first_where_the_static_trial_has_the_stated_mass(lab, factor):
+    walked, static, marker_set = lab
+    stood = standing_on_plates(static, walked, 72.6)
+    (found,) = stated_mass(person([by_plate(walked, factor, factor)], stood, marker_set, mass_kg=72.6))
+    assert found.where.trial == walked.name
+    assert found.causes[0] == "gain or zero of the plates"
+    assert "orrect the mass" not in found.remedy
+
+
+def test_a_handrail_for_a_while(lab):
+    """It explains why the mass is too small."""
+    walked, _, marker_set = lab
+    start, end = RecordingContext(walked, marker_set).trial.carried_windows()[0]
+    time, third = walked.plates.time, (end - start) / 3
+    held = np.where((time > start + third) & (time < end - third), 0.4, 1.0)[:, None, None]
+    plates = replace(walked.plates, force=held * walked.plates.force, moment=held * walked.plates.moment)
+    found = explained(stated_mass(person([replace(walked, plates=plates)], marker_set=marker_set, mass_kg=72.6)))
+    assert [one.code for one in found if one.is_open] == ["P281"]
+    assert found[0].evidence["missing"].value == pytest.approx(0.6, abs=0.2)
+
+
+def test_a_static_trial_on_plates_is_weighed(lab):
+    """Nothing is computed from its forces."""
+    walked, static, marker_set = lab
+    stood = standing_on_plates(static, walked, 60.0)
+    (alone,) = stated_mass(person([], stood, marker_set, mass_kg=72.6))
+    assert (alone.code, alone.severity, alone.where.trial) == ("S111", Severity.WARNING, static.name)
+    (beside,) = stated_mass(person([walked], stood, marker_set, mass_kg=72.6))
+    assert (beside.severity, beside.where.trial) == (Severity.INFO, static.name)
+
+
+def test_trials_of_different_masses(lab):
+    """D11: the one that the others contradict, not the heavier one; both where nothing else is known."""
+    walked, _, marker_set = lab
+    light, heavy = by_plate(walked, 0.85, 0.85), replace(by_plate(walked, 1.02, 1.02), name="heavy")
+    found = list(masses_of_trials(person([light, heavy], marker_set=marker_set)))
+    assert [(one.code, one.where.trial) for one in found] == [("S306", light.name), ("S306", "heavy")]
+    for third in (replace(walked, name="third"), None):
+        trials = [light, heavy, third] if third else [light, heavy]
+        stated = {} if third else {"mass_kg": 72.6}
+        found = list(masses_of_trials(person(trials, marker_set=marker_set, **stated)))
+        assert {one.where.trial for one in found} == {light.name}
+    assert list(masses_of_trials(person([walked, heavy], marker_set=marker_set))) == []

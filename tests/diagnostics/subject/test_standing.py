@@ -1,0 +1,98 @@
+"""A static trial that does not show the person standing on the floor, as tall as stated, is found."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kinertia.diagnostics.context import RecordingContext
+from kinertia.diagnostics.runner import asked
+from kinertia.diagnostics.subject.questions import STATIC_QUESTIONS
+from kinertia.diagnostics.subject.standing import flat_feet, floor, model_of_static
+from kinertia.diagnostics.subject.stature import stature
+from kinertia.io.marker_set_file import choose_marker_set
+from kinertia.trial.data import Markers
+from people import codes, with_markers
+from recordings import is_here
+
+STATURES_M = {
+    "synthetic/static.trc": 1.803,
+    "synthetic/static.c3d": 1.803,
+    "synthetic/clusters_static.trc": 1.803,
+    "gait2354/subject01_static.trc": 1.803,
+    "rajagopal_walk/static_walk_1.trc": 1.83,
+    "pig_c3d/subject_a_static.c3d": 1.61,
+    "pig_c3d/subject_b_static.c3d": 1.505,
+}
+PEOPLE = {name: height_m for name, height_m in STATURES_M.items() if is_here(name)}
+
+
+@pytest.fixture(params=PEOPLE.items(), ids=list(PEOPLE))
+def standing(request, recording_of):
+    """Somebody's static trial."""
+    name, height_m = request.param
+    static = recording_of(name)
+    return RecordingContext(static, choose_marker_set(static.markers.labels), is_static=True, height_m=height_m)
+
+
+def moved(context, positions):
+    markers = context.recording.markers
+    changed = Markers(markers.time, markers.labels, positions)
+    return replace(context, recording=with_markers(context.recording, changed))
+
+
+def test_the_own_stature_and_floor(standing):
+    assert asked(STATIC_QUESTIONS, standing) == []
+
+
+@pytest.mark.parametrize("off_m", [-0.2, 0.2])
+def test_another_stature(standing, off_m):
+    (found,) = stature(replace(standing, height_m=standing.height_m + off_m))
+    assert found.code == "S104"
+    assert found.evidence["implied_m"].value == pytest.approx(standing.height_m, abs=0.08)
+
+
+@pytest.mark.parametrize("rise_m", [-0.06, 0.06])
+def test_another_floor(standing, rise_m):
+    positions = standing.recording.markers.positions
+    (found,) = floor(moved(standing, positions + np.array([0.0, rise_m, 0.0])))
+    assert found.code == "M143"
+    assert found.evidence["height_m"].value == pytest.approx(0.033 + rise_m, abs=0.015)
+
+
+def test_feet_that_are_not_marked_enough(standing):
+    marks = {name: own for name, own in standing.marker_set.landmarks.items() if "heel" not in name}
+    assert list(floor(replace(standing, marker_set=replace(standing.marker_set, landmarks=marks)))) == []
+
+
+@pytest.mark.parametrize(("landmark", "rise_m"), [("heel_r", 0.06), ("metatarsal_l", 0.06), ("heel_l", 0.02)])
+def test_a_foot_that_does_not_stand_flat(standing, landmark, rise_m):
+    markers = standing.recording.markers
+    positions = markers.positions.copy()
+    positions[:, markers.labels.index(standing.marker_set.landmarks[landmark][0]), 1] += rise_m
+    found = list(flat_feet(moved(standing, positions)))
+    name, side = landmark.split("_")
+    where = [(name, "right foot" if side == "r" else "left foot")] if rise_m > 0.04 else []
+    assert [(one.evidence["landmark"].value, one.where.part) for one in found] == where
+    assert codes(found) == ["S202"] * len(where)
+
+
+def test_a_walk_that_was_given_as_the_static_trial(recording_of):
+    walk = recording_of("synthetic/walk.trc")
+    marker_set = choose_marker_set(recording_of("synthetic/static.trc").markers.labels)
+    found = asked(STATIC_QUESTIONS, RecordingContext(walk, marker_set, is_static=True))
+    assert found[0].code == "S201"
+    assert found[0].evidence["distance_m"].value > 1.0
+
+
+def test_a_static_trial_from_which_no_model_can_be_built(standing):
+    """A landmark that is not there, and a thigh without length."""
+    markers, marks = standing.recording.markers, standing.marker_set.landmarks
+    without = markers.select([label for label in markers.labels if label not in marks["asis_r"]])
+    (found,) = model_of_static(replace(standing, recording=with_markers(standing.recording, without)))
+    assert (found.code, found.where.part) == ("L105", "pelvis")
+    positions = markers.positions.copy()
+    at = [markers.labels.index(marks[f"asis_{side}"][0]) for side in "rl"]
+    positions[:, at[1]] = positions[:, at[0]]
+    (found,) = model_of_static(moved(standing, positions))
+    assert found.code == "S206"
