@@ -25,7 +25,7 @@ from kinertia.findings.where import Where
 from kinertia.model import joint_centres as jc
 from kinertia.model.anthropometry import BodyGeometry
 from kinertia.model.coordinate_range import Range
-from kinertia.model.marker_set import MarkerSet, in_words
+from kinertia.model.marker_set import MarkerSet
 from kinertia.model.skeleton import Axis, Joint, Marker, Skeleton
 from kinertia.trial.data import Recording
 
@@ -124,13 +124,20 @@ def _built(marks: jc.Landmarks, height_m: float, sex: str, hip_centre: str) -> G
     for joint in joints:
         directions = [axis.direction for axis in joint.axes]
         if not all(np.isfinite(part).all() for part in (joint.rotation, joint.translation, directions)):
-            found = finding("S206", Where(part=in_words(joint.child)), parent=Quantity(joint.parent))
+            parts = joint.child if joint.parent == "ground" else f"{joint.child} or {joint.parent}"
+            found = finding("S206", Where(part=parts), landmarks=Quantity(_landmarks_of(marks, joint)))
             raise MarkerSetError(problem_of(found)).with_finding(found)
     worn = _markers(marks, frames)
     if not any(marker.segment == "torso" for marker in worn):
         worn = (*worn, *VIRTUAL_TRUNK)
     skeleton = Skeleton("gait27", tuple(joints), worn, locked, ranges=_usual_ranges(joints))
     return Gait27(skeleton, BodyGeometry(_triple(lumbar), _triple(mid_hip), lengths))
+
+
+def _landmarks_of(marks: jc.Landmarks, joint: Joint) -> str:
+    """The landmarks whose labels are on the two segments of a joint."""
+    labels = {label for name in (joint.parent, joint.child) for label in marks.marker_set.segments.get(name, ())}
+    return ", ".join(name for name, own in marks.marker_set.landmarks.items() if labels & set(own))
 
 
 def _usual_ranges(joints: list[Joint]) -> dict[str, Range]:

@@ -19,7 +19,7 @@ from kinertia.findings.finding import finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.model.anthropometry import reference_lengths
-from kinertia.model.marker_set import MarkerSet, in_words, nearest_labels, with_nearest
+from kinertia.model.marker_set import MarkerSet, nearest_labels
 from kinertia.trial.data import Recording
 
 _MARKER_RADIUS_M = 0.007
@@ -65,16 +65,17 @@ class Landmarks:
             return
         wanted = [label for name in missing for label in self.marker_set.landmarks.get(name, ())]
         near = nearest_labels(wanted, list(self.markers))
-        labels = with_nearest(near) if near else "not in the marker set"
-        raise _lacking(joint, f"{', '.join(missing)} ({labels})", missing, near)
+        hints = [f"{label} (nearest: {' or '.join(n)})" if n else label for label, n in near.items()]
+        labels = f"labels {', '.join(hints)}" if hints else "not named in the marker set"
+        raise _missing(joint, f"{', '.join(missing)} ({labels})", missing, near)
 
 
-def _lacking(
-    joint: str, what: str, missing: Sequence[str], nearest: dict[str, list[str]] | None = None
+def _missing(
+    joint: str, landmark: str, missing: Sequence[str], nearest: Mapping[str, list[str]] | None = None
 ) -> MarkerSetError:
-    """The error that a joint cannot be placed for want of a landmark (L105)."""
-    found = finding("L105", Where(part=in_words(joint)), landmark=Quantity(what))
-    return MarkerSetError(problem_of(found), missing, nearest).with_finding(found)
+    """L105: what the static trial lacks for a joint."""
+    found = finding("L105", Where(part=joint), landmark=Quantity(landmark))
+    return MarkerSetError(problem_of(found), missing, dict(nearest or {})).with_finding(found)
 
 
 def find_landmarks(static: Recording, marker_set: MarkerSet) -> Landmarks:
@@ -176,7 +177,7 @@ def _hinge(marks: Landmarks, joint: str, proximal: np.ndarray, wand: str, side: 
     if joint not in marks.widths or wand not in marks:
         marks.require(joint, lateral, medial) if wand not in marks else marks.require(joint, lateral)
         width = f"{joint.rpartition('_')[0]}_width_mm under [subject]"
-        raise _lacking(joint, f"a medial marker or its width ({width})", [medial])
+        raise _missing(joint, f"a medial marker ({medial}) or its width ({width}, or in the C3D file)", [medial])
     marks.require(joint, lateral, wand)
     half = marks.widths[joint] / 2 + _MARKER_RADIUS_M
     centre = _chord(proximal, marks[lateral], marks[wand], half)

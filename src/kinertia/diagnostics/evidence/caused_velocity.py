@@ -55,7 +55,7 @@ class VelocityChanges:
         )
         return cls(pelvis, centre, caused)
 
-    def times_up(self, shown: FloatArray) -> float | None:
+    def vertical_ratio(self, shown: FloatArray) -> float | None:
         """How many times as fast the forces move the body up and down as these velocities (n, 3) show; None where they
         do not follow the forces.
         """

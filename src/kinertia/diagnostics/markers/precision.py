@@ -48,7 +48,7 @@ def oversmoothed(context: RecordingContext) -> Iterator[Finding]:
     if quick is None or quick > _LEAST_QUICK:
         return
     changes = VelocityChanges.of(context.velocities)
-    ratio = min(changes.times_up(shown) or 0.0 for shown in (changes.pelvis, changes.centre))
+    ratio = min(changes.vertical_ratio(shown) or 0.0 for shown in (changes.pelvis, changes.centre))
     if ratio < _MOST_TIMES_UP or (ratio > _OF_A_RATE and _distances_change_m(trial.markers, owners) < _RIGID_M):
         return
     yield finding(
