@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Final, Literal
 
 from kinertia.findings.display import first_few
 from kinertia.findings.finding import Finding, Severity
 from kinertia.findings.rule import STAGES
 
-USE, WITH_CARE, DO_NOT_USE = "use", "use with care", "do not use"
+Use = Literal["use", "use with care", "do not use"]
+USE: Final = "use"
+WITH_CARE: Final = "use with care"
+DO_NOT_USE: Final = "do not use"
 
 
 @dataclass(frozen=True)
@@ -54,9 +58,11 @@ class Overview:
         return max(worst, Severity.WARNING) if self.waived or self.left_out else worst
 
     @property
-    def verdict(self) -> str:
+    def verdict(self) -> Use:
         """ "use", "use with care" or "do not use"."""
-        return {Severity.ERROR: DO_NOT_USE, Severity.WARNING: WITH_CARE}.get(self.severity, USE)
+        if self.severity is Severity.ERROR:
+            return DO_NOT_USE
+        return WITH_CARE if self.severity is Severity.WARNING else USE
 
     @property
     def line(self) -> str:

@@ -131,7 +131,7 @@ def share_worn(marker_set: MarkerSet, labels: Sequence[str]) -> float:
 def is_worn(marker_set: MarkerSet, labels: Sequence[str]) -> bool:
     """Whether these labels are the set's, hardly one of them missing: its own, or those of its pelvis, legs and feet.
 
-    Without trunk and arms a set still makes a model (`diagnostics.subject.unobserved_segments`), without legs it does not.
+    Without trunk and arms a set still makes a model, without legs it does not.
     """
     return max(share_worn(marker_set, labels), _legs_worn(marker_set, labels)) >= ENOUGH_LABELS
 
