@@ -116,12 +116,9 @@ def screen(person: Person) -> Screened:
     for trial in context.trials:
         found += _of_recording(trial, MOTION_QUESTIONS)
     by_label = person.labels
-    if (
-        isinstance(by_label, MarkerSetError)
-        and by_label.finding is not None
-        and all(one.code != "L101" for one in found)
-    ):
-        found.append(by_label.finding)
+    unmatched = by_label.finding if isinstance(by_label, MarkerSetError) else None
+    if unmatched is not None and unmatched.code not in {one.code for one in found}:
+        found.append(unmatched)
     found += _of_person(context, found)
     findings = overruled(explained(found), person.overrule, person.overrule_of)
     return Screened(person, context, tuple(findings))
