@@ -111,13 +111,17 @@ def screen(person: Person) -> Screened:
     """Ask everything that can be asked before inverse kinematics."""
     context = person_context(person)
     found = list(person.unread)
-    by_label = person.labels
-    if isinstance(by_label, MarkerSetError) and by_label.finding is not None:
-        found.append(by_label.finding)
     for static in context.standing:
         found += _of_recording(static, STATIC_QUESTIONS)
     for trial in context.trials:
         found += _of_recording(trial, MOTION_QUESTIONS)
+    by_label = person.labels
+    if (
+        isinstance(by_label, MarkerSetError)
+        and by_label.finding is not None
+        and all(one.code != "L101" for one in found)
+    ):
+        found.append(by_label.finding)
     found += _of_person(context, found)
     findings = overruled(explained(found), person.overrule, person.overrule_of)
     return Screened(person, context, tuple(findings))
