@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 
 from kinertia.errors import FileError
+from kinertia.findings.quantity import Quantity
 from kinertia.io.qualisys import is_plate_file
 from kinertia.io.recording import FORCE_FILES, MARKER_FILES, read_recording
 from kinertia.io.subject_draft import STATIC_NAME, matched_by_name
