@@ -49,7 +49,11 @@ def test_an_unknown_name_is_an_attribute_error():
 
 def test_the_house_has_few_rooms():
     """Fourteen since findings and the road to a result have rooms of their own."""
-    rooms = {path.stem for path in PACKAGE.iterdir() if path.suffix in ("", ".py")} - {"__init__", "__main__", "__pycache__"}
+    rooms = {path.stem for path in PACKAGE.iterdir() if path.suffix in ("", ".py")} - {
+        "__init__",
+        "__main__",
+        "__pycache__",
+    }
     assert len(rooms) <= 14
 
 

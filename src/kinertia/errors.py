@@ -104,7 +104,7 @@ class FileError(KinertiaError):
     @classmethod
     def of(cls, path: str | Path, found: Finding, line: int | None = None) -> Self:
         """The error of a finding, in this file and line."""
-        where = replace(found.where, file=Path(path).name, line=line)
+        where = replace(found.where, file=Path(path).name or str(path), line=line)
         placed = replace(found, where=where, severity=Severity.ERROR)
         return cls(path, problem_of(placed), line).with_finding(placed)
 

@@ -158,5 +158,7 @@ def test_the_house_is_drawn_from_the_contract():
 
 def test_modules_named_on_the_page_about_architecture_exist():
     package = ROOT / "src" / "kinertia"
-    for name in re.findall(rf"`((?:{'|'.join(sum(house.layers(), []))})/[\w/]+)`", house.PAGE.read_text(encoding="utf-8")):
+    for name in re.findall(
+        rf"`((?:{'|'.join(sum(house.layers(), []))})/[\w/]+)`", house.PAGE.read_text(encoding="utf-8")
+    ):
         assert (package / name).is_dir() or (package / f"{name}.py").is_file(), name
