@@ -40,6 +40,11 @@ class Person:
         overrule: what the user overrules, for all trials.
         overrule_of: the same of single trials, by their names.
         unread: findings of files that could not be read.
+
+    Examples:
+        >>> person = kinertia.read_person(kinertia.read_subject("lab/subject.toml"))  # the files of `kinertia demo`
+        >>> person.static is None, [one.recording.name for one in person.trials]
+        (False, ['walk'])
     """
 
     subject: Subject

@@ -152,7 +152,7 @@ def _static_context(person: Person, recording: Recording) -> RecordingContext:
     """Of a recording in which the person stands, with the widths of joints that are known."""
     label_set, stated = _label_set(person), _completed(person)
     if label_set is not None and person.model is None:
-        recording, label_set, _ = with_widths(recording, person.recordings, label_set, person.subject)
+        recording, label_set = with_widths(recording, person.recordings, label_set, person.subject)
     return RecordingContext(recording, label_set, is_static=True, height_m=stated.height_m, mass_kg=stated.mass_kg)
 
 
