@@ -31,9 +31,7 @@ class Refusal:
     def blocking(self):
         """Open errors that nothing else explains."""
         return [
-            one
-            for one in self.findings
-            if (one["severity"], one["status"], one["muted_by"]) == ("ERROR", "open", None)
+            one for one in self.findings if (one["severity"], one["status"], one["muted_by"]) == ("ERROR", "open", None)
         ]
 
     @property

@@ -50,7 +50,9 @@ def makers(code):
 
 def evidence_needed(code):
     """What its sentences need besides the place."""
-    names = chain.from_iterable(names_in(text) for text in (RULES[code].message, RULES[code].effect, RULES[code].remedy))
+    names = chain.from_iterable(
+        names_in(text) for text in (RULES[code].message, RULES[code].effect, RULES[code].remedy)
+    )
     return {name for name in names if "{" in filled("{" + name + "}", Where(), {})}
 
 
@@ -60,14 +62,18 @@ def test_every_code_is_made():
 
 def test_every_code_that_is_made_is_in_the_catalogue():
     package = ROOT / "src" / "kinertia"
-    named = {text for path in package.rglob("*.py") for text in constants(path) if re.fullmatch(r"[FMLPTSOR]\d{3}", text)}
+    named = {
+        text for path in package.rglob("*.py") for text in constants(path) if re.fullmatch(r"[FMLPTSOR]\d{3}", text)
+    }
     assert named <= RULES.keys()
 
 
 def test_every_code_is_asserted_by_a_test():
     tests = ROOT / "tests"
     paths = (path for path in tests.rglob("test_*.py") if path.relative_to(tests).parts[0] not in ABOUT_CODES)
-    asserted = {code for path in paths if path != Path(__file__) for text in constants(path) for code in _codes_in(text)}
+    asserted = {
+        code for path in paths if path != Path(__file__) for text in constants(path) for code in _codes_in(text)
+    }
     assert [code for code in RULES if code not in asserted] == sorted(NOT_ASSERTED)
 
 
