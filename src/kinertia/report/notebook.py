@@ -49,7 +49,7 @@ def trial_fit_html(trial: TrialFit) -> str:
 
 
 def recording_html(recording: Recording) -> str:
-    """Frames, markers and their gaps, plates and the largest vertical force on each, what is known of the person, findings."""
+    """Frames, markers and their gaps, plates and the largest force on each, what is known of the person, findings."""
     plates = recording.plates
     peaks = [] if plates is None else plates.force[:, :, 1].max(axis=0, initial=0.0)
     return rendered(
