@@ -11,6 +11,7 @@ from kinertia.findings.finding import Severity
 from kinertia.findings.rule import STAGES
 from kinertia.io.sto import read_sto, write_sto
 from kinertia.io.subject_file import read_subject
+from kinertia.settings import Overrule
 from kinertia.workflow.check import check_person
 from kinertia.workflow.from_files import prepare_subject
 from kinertia.workflow.person import read_person
@@ -124,3 +125,14 @@ def test_what_blocks_a_fit_is_what_check_found(tmp_path, synthetic_lab):
         prepare_subject(wanted)
     assert screened(blocked.value.findings) == screened(checked.findings)
     assert [(one.code, one.where.trial) for one in blocked.value.blocking] == [("P202", "walk"), ("P202", "other")]
+
+
+def test_an_error_stops_unless_it_is_waived(tmp_path, synthetic_lab):
+    wanted = laboratory(tmp_path, synthetic_lab, ["walk"])
+    wanted = wanted.model_copy(update={"subject": wanted.subject.model_copy(update={"mass_kg": 90.0})})
+    with pytest.raises(BlockedError) as blocked:
+        prepare_subject(wanted)
+    (found,) = blocked.value.blocking
+    assert (found.code, found.where.trial) == ("S111", "walk")
+    ready = prepare_subject(wanted, overrule=Overrule(waive=("S111",)))
+    assert [(one.code, one.status) for one in ready.findings if one.severity is Severity.ERROR] == [("S111", "waived")]
