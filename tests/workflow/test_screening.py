@@ -17,6 +17,7 @@ from kinertia.workflow.from_files import prepare_subject
 from kinertia.workflow.person import read_person
 from measured_data import data_folder
 from recordings import FITTED, is_here
+from refusals import expect_filled
 from synthetic_lab import WITH_MODEL, synthetic_arguments
 from walks import fit_arguments
 
@@ -79,6 +80,8 @@ def test_check_and_fit_find_the_same(subject):
     assert checked.overview.left_out == ready.left_out == ()
     assert ready.rules == checked.overview.rules
     assert not [one for one in ready.findings if one.severity is Severity.ERROR]
+    for one in ready.findings:
+        expect_filled(one)
 
 
 def laboratory(folder, lab, trials, static="static"):
@@ -136,3 +139,15 @@ def test_an_error_stops_unless_it_is_waived(tmp_path, synthetic_lab):
     assert (found.code, found.where.trial) == ("S111", "walk")
     ready = prepare_subject(wanted, overrule=Overrule(waive=("S111",)))
     assert [(one.code, one.status) for one in ready.findings if one.severity is Severity.ERROR] == [("S111", "waived")]
+
+
+def test_a_static_trial_that_cannot_be_read_stops_everything(tmp_path, synthetic_lab):
+    wanted = laboratory(tmp_path, synthetic_lab, ["walk"])
+    (tmp_path / "static.trc").write_text("PathFileType 4\n", encoding="utf-8")
+    checked = check_person(read_person(wanted))
+    with pytest.raises(BlockedError) as blocked:
+        prepare_subject(wanted)
+    assert screened(blocked.value.findings) == screened(checked.findings)
+    (found,) = blocked.value.blocking
+    assert (found.code, found.where.file, found.where.line, found.where.trial) == ("F104", "static.trc", 2, None)
+    assert checked.overview.left_out == ()
