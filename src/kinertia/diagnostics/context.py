@@ -211,6 +211,11 @@ class PersonContext:
         """The static trial, or every recording that may be it."""
         return self.more_statics if self.static is None else (self.static, *self.more_statics)
 
+    @property
+    def has_trials(self) -> bool:
+        """Whether trials were given, blocked ones included: a model is not looked at alone."""
+        return bool(self.trials or self.found)
+
     def has_error(self, trial: str, *codes: str) -> bool:
         """Whether an ERROR of one of these codes, questions or families was found in a trial."""
         return any(

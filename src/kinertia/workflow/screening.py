@@ -195,4 +195,11 @@ def _of_person(context: PersonContext, found: Sequence[Finding]) -> list[Finding
     blocked = {one.where.trial for one in blocking(explained(found))}
     sound = replace(context, trials=[one for one in context.trials if one.name not in blocked], found=tuple(found))
     of_person = [one for one in found if one.where.trial is None]
-    return asked(PERSON_QUESTIONS, sound, of_person)
+    return [_in_model(one, context) for one in asked(PERSON_QUESTIONS, sound, of_person)]
+
+
+def _in_model(one: Finding, context: PersonContext) -> Finding:
+    """A finding about the OpenSim model itself with the name of its file."""
+    if context.model is None or one.where.trial is not None or not one.code.startswith("O"):
+        return one
+    return one.in_file(context.model.path.name)
