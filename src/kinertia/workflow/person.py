@@ -73,7 +73,8 @@ class Person:
         """Which marker is on which segment, by the model or a marker set; the error where none fits."""
         if self.model is not None:
             return markers_of_model(self.model)
-        labels = (self.static or self.recordings[0]).markers.labels
+        given = [*([] if self.static is None else [self.static]), *self.recordings, *self.more_statics]
+        labels = given[0].markers.labels
         try:
             if self.marker_set is None:
                 return choose_marker_set(labels)
