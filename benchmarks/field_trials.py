@@ -171,8 +171,7 @@ def document(runs: dict[str, dict[str, Any]]) -> str:
 
 def conclusion(said: str) -> str:
     """What stands against a file by the words of `kinertia check`, on one line."""
-    findings = re.split(r"\s(?=(?:pass|fail|caution|assumed|error): )", " ".join(said.split()))
-    against = [one for one in findings if one.startswith(("fail:", "error:"))]
+    against = [" ".join(line.split()) for line in said.splitlines() if line.startswith(("ERROR ", "error: "))]
     return "; ".join(against).replace("|", "\\|") or "nothing stands against it"
 
 
@@ -182,7 +181,7 @@ What Kinertia says of recordings from other laboratories: walks, runs, a drop ju
 static trials, files as they were published. This page is written by `python benchmarks/field_trials.py FOLDER`; do not
 edit it by hand.
 
-Exit status 0: every check passed; 1: there is an estimate, and a check of it failed; 2: refused. *Before*: the model's
+Exit status 0: an estimate to use, perhaps with care; 1: an estimate not to be used; 2: refused. *Before*: the model's
 or the literature's body segment parameters on the measured motion, both smoothed at the cutoff in the table, as a
 colleague would compute them. *After*: motion, parameters and calibration together. RMS over the frames used. Seconds
 are this machine's.
