@@ -1,6 +1,11 @@
 """Spoiling the files of a laboratory, and what `kinertia fit` must say of it."""
 
+import json
 import re
+from dataclasses import dataclass
+from typing import Any
+
+import pytest
 
 from command_line import run
 from kinertia.io.trc import read_trc, write_trc
@@ -15,8 +20,28 @@ COMMAND = {
 }
 
 
+@dataclass(frozen=True)
+class Refusal:
+    """What `kinertia fit` says where it fails: its error lines, and the findings that it gives to scripts."""
+
+    message: str
+    findings: list[dict[str, Any]]
+
+    @property
+    def blocking(self):
+        """Open errors that nothing else explains."""
+        return [
+            one for one in self.findings if (one["severity"], one["status"], one["muted_by"]) == ("ERROR", "open", None)
+        ]
+
+    @property
+    def codes(self):
+        """Their codes, each once."""
+        return list(dict.fromkeys(one["code"] for one in self.blocking))
+
+
 def refused(lab, walk="walk.trc", **changes):
-    """Run `kinertia fit` where it must fail; the message. The folder beside the results must stay as it was."""
+    """Run `kinertia fit` where it must fail. The folder beside the results must stay as it was."""
     options = {**(COMMAND if walk.endswith(".trc") else {"static": "static.c3d", "sex": "male"}), **changes}
     arguments = [walk if walk.startswith("/") else lab / walk]
     for name, value in options.items():
@@ -26,19 +51,43 @@ def refused(lab, walk="walk.trc", **changes):
 
 
 def complaint(lab, *arguments):
-    outcome = run("fit", *arguments, "-o", lab.parent / "results" / "out")
+    outcome = run("fit", *arguments, "-o", lab.parent / "results" / "out", "--json")
     assert outcome.status == 2, outcome
-    assert outcome.out == ""
-    *before, last = outcome.err.splitlines()
-    assert set(before) <= {"reading", "calibration", "inverse kinematics"}
-    assert last.startswith("error: ")
+    told = json.loads(outcome.out)
+    errors = [line for line in outcome.err.splitlines() if line not in ("reading", "calibration", "inverse kinematics")]
+    assert all(line.startswith("error: ") for line in errors), outcome.err
     assert [path.name for path in lab.parent.iterdir()] == ["lab"]
-    return last
+    refusal = Refusal("\n".join(errors), told["findings"])
+    assert len(errors) == max(1, len(refusal.blocking))
+    return refusal
 
 
-def expect(message, *parts):
+def expect(refusal, *parts):
+    """The message of something without a code has these parts."""
+    assert not refusal.findings, refusal
     for part in parts:
-        assert re.search(part, message), f"{part!r} is not in {message!r}"
+        assert re.search(part, refusal.message), f"{part!r} is not in {refusal.message!r}"
+
+
+def expect_found(refusal, code, /, where=None, **evidence):
+    """It is refused by findings of this code alone, in this place, with this evidence; texts contain what is given."""
+    assert refusal.codes == [code], refusal.message
+    for found in refusal.blocking:
+        place = {name: found["where"].get(name) for name in where or {}}
+        assert place == (where or {}), found
+        expect_evidence(found, evidence)
+        assert found["message"] in refusal.message
+        assert found["remedy"] in refusal.message
+
+
+def expect_evidence(found, evidence):
+    """Numbers of the evidence are these, texts contain these."""
+    for name, expected in evidence.items():
+        value = found["evidence"][name]["value"]
+        if isinstance(expected, str):
+            assert re.search(expected, str(value)), (name, value)
+        else:
+            assert value == pytest.approx(expected, rel=0.01), (name, value)
 
 
 def spoil(path, change):

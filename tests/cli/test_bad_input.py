@@ -1,5 +1,6 @@
-"""Every kind of bad input through the command line: one line that says what, where and what to do; status 2."""
+"""Every kind of bad input through the command line: its code, place and evidence; status 2."""
 
+import json
 import re
 import shutil
 
@@ -12,41 +13,66 @@ from kinertia.io.c3d import read_c3d
 from kinertia.io.sto import read_sto, write_sto
 from kinertia.io.trc import read_trc, write_trc
 from recordings import named_here
-from spoilt_lab import COMMAND, changed_markers, complaint, edit_cell, expect, refused, replace_in, spoil
+from spoilt_lab import (
+    COMMAND,
+    changed_markers,
+    complaint,
+    edit_cell,
+    expect,
+    expect_evidence,
+    expect_found,
+    refused,
+    replace_in,
+    spoil,
+)
 
 
 @pytest.mark.parametrize(
-    ("changes", "where", "advice"),
+    ("key", "name", "nearest"),
     [
-        ({"walk": "walc.trc"}, r"F101 .* in .*lab", "nearest.*walk.trc"),
-        ({"forces": "walc.mot"}, r"F101 .* in .*lab", "nearest.*walk.mot"),
-        ({"loads": "walc.xml"}, r"F101 .* in .*lab", "nearest.*walk.xml"),
-        ({"static": "statik.trc"}, r"F101 .* in .*lab", "nearest.*static.trc"),
-        ({"walk": "../lab"}, "holds no subject file", "kinertia init"),
+        ("walk", "walc.trc", "^walk.trc"),
+        ("forces", "walc.mot", "^walk.mot"),
+        ("loads", "walc.xml", "^walk.xml"),
+        ("static", "statik.trc", "^static.trc"),
     ],
 )
-def test_missing_file(lab, changes, where, advice):
-    expect(refused(lab, **{"walk": "walk.trc", **COMMAND, **changes}), where, advice)
+def test_missing_file(lab, key, name, nearest):
+    refusal = refused(lab, **{"walk": "walk.trc", **COMMAND, key: name})
+    expect_found(refusal, "F101", file=name, folder="lab$", nearest=nearest)
+
+
+def test_folder_without_a_subject_file(lab):
+    expect_found(refused(lab, "../lab", **COMMAND), "F108", {"file": "lab"}, problem="kinertia init")
 
 
 def test_missing_subject_file(lab):
-    expect(complaint(lab, lab / "subject.toml"), r"subject\.toml: F101 ", "expected a subject file")
+    refusal = complaint(lab, lab / "subject.toml")
+    expect_found(refusal, "F101", {"file": "subject.toml"}, hint="expected a subject file")
 
 
-@pytest.mark.parametrize("name", ["walk.trc", "walk.mot", "walk.xml", "static.trc", "walk.c3d", "static.c3d"])
+FILES = ["walk.trc", "walk.mot", "walk.xml", "static.trc", "walk.c3d", "static.c3d"]
+
+
+@pytest.mark.parametrize("name", FILES)
 def test_empty_file(lab, name):
     (lab / name).write_bytes(b"")
-    walk = "walk.c3d" if name.endswith(".c3d") else "walk.trc"
-    expect(refused(lab, walk), re.escape(str(lab / name)), "empty|no element", "export|give")
+    refusal = refused(lab, "walk.c3d" if name.endswith(".c3d") else "walk.trc")
+    expect_found(refusal, "F103" if name.endswith(".xml") else "F104", {"file": name}, found="empty|no element")
 
 
-@pytest.mark.parametrize("name", ["walk.trc", "walk.mot", "walk.xml", "static.trc", "walk.c3d", "static.c3d"])
+INCOMPLETE = {".xml": "F103", ".mot": "F105"}
+"""A force file does not say how many rows it has: its last row is too short."""
+
+
+@pytest.mark.parametrize("name", FILES)
 @pytest.mark.parametrize("share", [0.02, 0.3, 0.7])
 def test_truncated_file(lab, name, share):
     content = (lab / name).read_bytes()
     (lab / name).write_bytes(content[: int(share * len(content))])
-    walk = "walk.c3d" if name.endswith(".c3d") else "walk.trc"
-    expect(refused(lab, walk), re.escape(str(lab / name)), "export|repair|give|check")
+    refusal = refused(lab, "walk.c3d" if name.endswith(".c3d") else "walk.trc")
+    expect_found(refusal, INCOMPLETE.get(name[-4:], "F104"), {"file": name})
+    if name.endswith(".c3d"):
+        expect_evidence(refusal.blocking[0], {"bytes": int(share * len(content))})
 
 
 @pytest.mark.parametrize(
@@ -64,35 +90,42 @@ def test_truncated_file(lab, name, share):
 )
 def test_wrong_type(lab, source, name, changes):
     shutil.copyfile(lab / source, lab / name)
-    expect(refused(lab, **changes), re.escape(str(lab / name)), "expected|not a")
+    code = "F102" if name == "forces.csv" else "F103"
+    expect_found(refused(lab, **changes), code, {"file": name}, expected=".")
 
 
 def test_xml_that_explains_no_loads(lab):
     tool = "<InverseKinematicsTool><time_range>0 1</time_range></InverseKinematicsTool>"
     (lab / "walk.xml").write_text(f"<OpenSimDocument>{tool}</OpenSimDocument>", encoding="utf-8")
-    expect(refused(lab), r"walk\.xml", "ExternalLoads|ExternalForce")
+    expect_found(refused(lab), "F103", {"file": "walk.xml"}, found="ExternalForce")
 
 
 @pytest.mark.parametrize("name", ["walk.trc", "static.trc"])
 @pytest.mark.parametrize(
-    ("change", "line", "what"),
+    ("change", "code", "line", "evidence"),
     [
-        (edit_cell(4, 5, ""), ", line 4", r"F112 .*\d\d labels for \d+ columns"),
-        (edit_cell(3, 3, "many"), ", line 3", "many"),
-        (edit_cell(3, 4, "furlong"), ", line 3", "furlong.*expected.*mm"),
+        (edit_cell(4, 5, ""), "F112", 4, {}),
+        (edit_cell(3, 3, "many"), "F114", 3, {"value": "many"}),
+        (edit_cell(3, 4, "furlong"), "F121", 3, {"unit": "furlong", "expected": "mm"}),
         (
             lambda lines: lines.__setitem__(19, lines[19].rsplit("\t", 60)[0] + "\t1.0"),
-            ", line 20",
-            "values|coordinates",
+            "F105",
+            20,
+            {"found": "coordinates"},
         ),
-        (edit_cell(20, 5, "1o3.2"), ", line 20", "1o3.2.*number"),
-        (edit_cell(20, 1, "0.9"), r", line 2\d", "time"),
+        (edit_cell(20, 5, "1o3.2"), "F105", 20, {"cell": "1o3.2", "column": 6}),
+        (edit_cell(20, 1, "0.9"), "T101", 21, {"step_s": -0.76, "usual_s": 0.01}),
     ],
     ids=["markers", "not a count", "unit", "short row", "not a number", "time"],
 )
-def test_spoiled_trc(lab, name, change, line, what):
+def test_spoiled_trc(lab, name, change, code, line, evidence):
     spoil(lab / name, change)
-    expect(refused(lab), re.escape(str(lab / name)) + line, what, "(?i)expected|correct|export|repair")
+    refusal = refused(lab)
+    expect_found(refusal, code, {"file": name, "line": line}, **evidence)
+    assert f"{name}, line {line}" in refusal.message
+    if code == "F112":
+        labels = {"walk.trc": 41, "static.trc": 49}[name]
+        expect_found(refusal, code, labels=labels - 1, announced=labels, columns=3 * labels + 2)
 
 
 def test_unknown_unit_in_c3d(lab):
@@ -100,55 +133,65 @@ def test_unknown_unit_in_c3d(lab):
     at = content.index(b"UNITS") + 5
     at = content.index(b"mm", at)
     (lab / "walk.c3d").write_bytes(content[:at] + b"qq" + content[at + 2 :])
-    expect(refused(lab, "walk.c3d"), r"walk\.c3d", "qq", "expected.*mm")
+    expect_found(refused(lab, "walk.c3d"), "F121", {"file": "walk.c3d"}, unit="qq", expected="mm")
 
 
 def test_forces_without_the_columns_that_the_loads_file_names(lab):
     replace_in(lab / "walk.mot", "\t1_ground_force_vx\t1_ground_force_vy", "\tfx\tfy")
-    expect(refused(lab), r"walk\.mot", "1_ground_force_v", r"walk\.xml", "columns")
+    refusal = refused(lab)
+    expect_found(refusal, "F143", {"file": "walk.mot"}, load=r"walk\.xml", identifier="1_ground_force_v")
 
 
 def test_loads_file_that_names_other_columns(lab):
     replace_in(lab / "walk.xml", "1_ground_force_v", "plate1_force_v")
-    expect(refused(lab), "plate1_force_v", r"walk\.mot", r"walk\.xml", "1_ground_force_vx")
+    expected = {"load": r"walk\.xml", "identifier": "plate1_force_v", "found": "1_ground_force_vx"}
+    expect_found(refused(lab), "F143", {"file": "walk.mot"}, **expected)
 
 
 def test_forces_without_overlap(lab):
     table = read_sto(lab / "walk.mot")
     table.index += 100.0
     write_sto(lab / "walk.mot", table, False, "late")
-    expect(refused(lab), r"100\.0", r"2\.690", "do not overlap", "one trial")
+    expect_found(refused(lab), "T111", {"trial": "walk"}, forces_s=[100.0, 102.699], markers_s=[0.0, 2.69])
 
 
 def test_not_a_number_in_forces(lab):
     spoil(lab / "walk.mot", edit_cell(1507, 2, "nan"))
-    expect(refused(lab), r"walk\.mot", "1_ground_force_vy", r"1\.499", "no number", "fill")
+    expect_found(refused(lab), "F172", {"file": "walk.mot", "plate": "right"}, time_s=1.499, what="1_ground_force_vy")
 
 
 @pytest.mark.parametrize(
-    ("changes", "parts"),
+    ("changes", "code", "evidence"),
     [
-        ({"mass": "72600"}, ("mass_kg = 72600", "grams", "in kilograms")),
-        ({"mass": "-72.6"}, ("mass_kg", "kg")),
-        ({"mass": "nan"}, ("mass_kg = nan",)),
-        ({"height": "180.3"}, ("height_m = 180.3", "centimetres", "in metres")),
-        ({"height": "1803"}, ("height_m = 1803", "millimetres", "in metres")),
-        ({"mass": None}, ("mass_kg", "--mass")),
-        ({"height": None}, ("height_m", "--height")),
-        ({"sex": None}, ("--sex",)),
-        ({"static": None}, ("--static",)),
-        ({"method": "three-level"}, ("method", "two-level")),
-        ({"markers": "cleveland"}, ("cleveland", "cleveland-clinic", "plug-in-gait", "rajagopal", "rajagopal-run")),
+        ({"mass": "72600"}, "S102", {"quantity": "mass", "value": 72600.0, "unit": "grams"}),
+        ({"mass": "-72.6"}, "S102", {"quantity": "mass", "value": -72.6}),
+        ({"mass": "nan"}, "S102", {"quantity": "mass"}),
+        ({"height": "180.3"}, "S102", {"quantity": "stature", "value": 180.3, "unit": "centimetres"}),
+        ({"height": "1803"}, "S102", {"quantity": "stature", "value": 1803.0, "unit": "millimetres"}),
+        ({"mass": None}, "S101", {"quantity": "mass"}),
+        ({"height": None}, "S101", {"quantity": "stature"}),
+        ({"method": "three-level"}, "F191", {"value": "three-level", "expected": "two-level"}),
+        ({"markers": "cleveland"}, "F101", {"hint": "cleveland-clinic, .*plug-in-gait, .*rajagopal, rajagopal-run"}),
     ],
 )
-def test_implausible_or_missing_option(lab, changes, parts):
-    expect(refused(lab, **changes), *parts)
+def test_implausible_or_missing_option(lab, changes, code, evidence):
+    refusal = refused(lab, **changes)
+    expect_found(refusal, code, **evidence)
+    if code == "S101":
+        assert f"--{next(iter(changes))}" in refusal.message
+
+
+@pytest.mark.parametrize("option", ["sex", "static"])
+def test_missing_option(lab, option):
+    expect(refused(lab, **{option: None}), f"--{option}")
 
 
 def test_implausible_subject_file_names_the_line(lab):
     text = '[subject]\nsex = "male"\nmass_kg = 72600.0\nheight_m = 1.803\n[model]\nstatic = "static.trc"\n'
     (lab / "subject.toml").write_text(text + '[[trial]]\nmarkers = "walk.trc"\nforces = "walk.mot"\n')
-    expect(complaint(lab, lab / "subject.toml"), r"subject\.toml, line 3: ", "72600")
+    refusal = complaint(lab, lab / "subject.toml")
+    expect_found(refusal, "S102", {"file": "subject.toml", "line": 3}, value=72600.0, unit="grams")
+    assert "subject.toml, line 3: " in refusal.message
 
 
 def test_options_beside_a_subject_file(lab):
@@ -163,29 +206,40 @@ def without(path, *labels):
 
 
 @pytest.mark.parametrize(
-    ("label", "joint"),
-    [("R.ASIS", "hip|pelvis"), ("L.Knee.Med", "knee"), ("R.Ankle.Lat", "ankle"), ("R.Elbow", "elbow")],
+    ("label", "joint", "landmark"),
+    [
+        ("L.Knee.Med", "knee_l", "knee_medial_l"),
+        ("R.Ankle.Lat", "ankle_r", "ankle_lateral_r"),
+        ("R.Elbow", "elbow_r", "elbow_lateral_r"),
+    ],
 )
-def test_static_trial_without_landmark(lab, label, joint):
+def test_static_trial_without_landmark(lab, label, joint, landmark):
     without(lab / "static.trc", label)
-    expect(refused(lab, markers="cleveland-clinic"), re.escape(label), joint)
+    refusal = refused(lab, markers="cleveland-clinic")
+    expect_found(refusal, "L105", {"trial": "static", "part": joint}, landmark=f"{landmark} .*{re.escape(label)}")
+
+
+def test_static_trial_without_a_spine(lab):
+    without(lab / "static.trc", "R.ASIS")
+    refusal = refused(lab, markers="cleveland-clinic")
+    expect_found(refusal, "L106", {"trial": "static", "markers": ["R.ASIS", "L.ASIS"]}, absent=1)
 
 
 def test_static_trial_of_another_marker_set(lab):
-    message = refused(lab, "walk.trc", markers="plug-in-gait")
-    expect(message, "plug-in-gait|Plug-in Gait", "RASI", r"R\.ASIS")
+    refusal = refused(lab, "walk.trc", markers="plug-in-gait")
+    expect_found(refusal, "L101", labels_found=0, labels=33, name="Plug-in Gait", missing=r"RASI \(R\.ASIS")
 
 
 def test_no_fully_measured_frame(lab):
     """After 2.35 s of the walk no foot stands on a plate."""
     write_trc(lab / "late.trc", read_trc(lab / "walk.trc").cut(2.35, 2.65))
-    expect(refused(lab, "late.trc"), "trial 'late'", "measured|plate", "left|right")
+    expect_found(refused(lab, "late.trc"), "P278", {"trial": "late"}, shared=0.0)
 
 
 def test_unloaded_plates(lab):
     table = read_sto(lab / "walk.mot")
     write_sto(lab / "walk.mot", table * 0.0, False, "nothing")
-    expect(refused(lab), "trial 'walk'", "load|force|plate")
+    expect_found(refused(lab), "P278", {"trial": "walk"}, shared=0.0)
 
 
 def hide(path, label):
@@ -206,36 +260,36 @@ def test_marker_missing_for_the_whole_trial(lab):
     hide(lab / "walk.trc", "R.Heel")
     files = {name: lab / COMMAND[name] if name in ("forces", "loads", "static") else COMMAND[name] for name in COMMAND}
     options = [word for name, value in files.items() for word in (f"--{name}", value)]
-    outcome = run("fit", lab / "walk.trc", *options, "-o", lab / "out", "-v")
+    outcome = run("fit", lab / "walk.trc", *options, "-o", lab / "out", "--json")
     assert outcome.status in (0, 1), outcome.err
-    noted = " ".join(outcome.out.split())
-    assert "walk: visible in no frame, left out: R.Heel" in noted
+    (found,) = [one for one in json.loads(outcome.out)["findings"] if one["code"] == "M101"]
+    assert (found["severity"], found["where"]) == ("INFO", {"trial": "walk", "markers": ["R.Heel"]})
 
 
 def test_segment_without_markers(lab):
     without(lab / "walk.trc", *(label for label in read_trc(lab / "walk.trc").labels if label.startswith("R.Shank")))
-    expect(refused(lab), "trial 'walk'", "shank_r", r"R\.Shank\.Front", "use|give")
+    expect_found(refused(lab), "M104", {"trial": "walk", "part": "right shank"}, labels=r"R\.Shank\.Front")
 
 
 def test_no_marker_of_a_foot(lab):
     foot = ("R.Heel", "R.Toe", "R.Midfoot")
     without(lab / "walk.trc", *(label for label in read_trc(lab / "walk.trc").labels if label.startswith(foot)))
-    expect(refused(lab), "trial 'walk'", "right foot")
+    expect_found(refused(lab), "M104", {"trial": "walk", "part": "right foot"}, labels=r"R\.Heel")
 
 
 def test_trial_without_forces(lab):
-    expect(refused(lab, forces=None, loads=None), "walk", "force", "--forces|give")
+    expect_found(refused(lab, forces=None, loads=None), "P271", {"trial": "walk"})
 
 
 UNUSABLE = {
-    "other labels": ("marker",),
-    "labels twice": ("marker",),
-    "plates alone": ("no points", "marker"),
-    "rotations_only": ("marker",),
-    "plates_kistler_type3": ("no points", "marker"),
-    "plates_type1": ("marker",),
-    "bts": ("marker",),
-    "duplicate_labels": ("marker",),
+    "other labels": ["L101"],
+    "labels twice": ["L101"],
+    "plates alone": ["F164"],
+    "rotations_only": ["L101", "P271"],
+    "plates_kistler_type3": ["F164"],
+    "plates_type1": ["L101"],
+    "bts": ["L101"],
+    "duplicate_labels": ["M121", "L101", "P271"],
 }
 """C3D files: those of which the name has a blank are written, the others are measured."""
 LARGE = ("plates_kistler_type3", "bts")
@@ -261,7 +315,9 @@ def test_c3d_that_cannot_be_used(lab, file_of, name):
         write_unusable(lab / f"{name}.c3d", read_c3d(lab / "walk.c3d").markers)
     else:
         shutil.copyfile(file_of(AT_HAND[name]), lab / f"{name}.c3d")
-    expect(refused(lab, f"{name}.c3d", mass="60", height="1.7"), name, *UNUSABLE[name])
+    refusal = refused(lab, f"{name}.c3d", mass="60", height="1.7")
+    assert sorted(refusal.codes) == sorted(UNUSABLE[name]), refusal.message
+    assert refusal.message.count(name) >= len(refusal.codes)
 
 
 def test_c3d_without_plates(lab):
@@ -271,20 +327,22 @@ def test_c3d_without_plates(lab):
     used = content.index(b"USED", at) + 4
     # after the name: offset (2), type (1), number of dimensions (1), value
     (lab / "walk.c3d").write_bytes(content[: used + 4] + b"\0\0" + content[used + 6 :])
-    expect(refused(lab, "walk.c3d"), "walk", "plate|force", "--forces|give|use")
+    expect_found(refused(lab, "walk.c3d"), "P271", {"trial": "walk"})
 
 
 def test_output_that_is_a_file(lab):
     (lab / "taken").write_text("mine")
     outcome = run("fit", lab / "walk.c3d", "--static", lab / "static.c3d", "--sex", "male", "-o", lab / "taken")
     assert outcome.status == 2
-    expect(outcome.err, "taken: is a file", "give a folder")
+    assert "taken: is a file" in outcome.err
     assert (lab / "taken").read_text() == "mine"
 
 
 def test_names_with_brackets_are_printed_as_they_are(lab):
     (lab / "walk[bold]x[red].trc").write_bytes(b"")
-    expect(refused(lab, "walk[bold]x[red].trc", **COMMAND), re.escape("walk[bold]x[red].trc: "))
+    refusal = refused(lab, "walk[bold]x[red].trc", **COMMAND)
+    expect_found(refusal, "F104", {"file": "walk[bold]x[red].trc"})
+    assert "walk[bold]x[red].trc: " in refusal.message
 
 
 @pytest.mark.parametrize(

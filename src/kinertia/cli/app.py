@@ -14,8 +14,8 @@ import typer
 
 from kinertia.cli.failure import STATUS, show_failure
 from kinertia.cli.outcome import add_command
-from kinertia.cli.terminal import out, show_error
-from kinertia.errors import BlockedError, KinertiaError
+from kinertia.cli.terminal import out, show_error, show_problem
+from kinertia.errors import KinertiaError
 from kinertia.io.output_folder import INTERRUPTIONS
 from kinertia.io.provenance import VERSION
 
@@ -131,11 +131,8 @@ def run(app: typer.Typer, given: Sequence[str]) -> None:
     try:
         with _ended_in_order():
             app(args=given, prog_name="kinertia")
-    except BlockedError as error:
-        for line in str(error).split("\n"):
-            show_error(line)
     except KinertiaError as error:
-        show_error(str(error))
+        show_problem(error)
     except OSError as error:
         where = "" if error.filename is None else f"{error.filename}: "
         show_error(f"{where}{error.strerror or error}; check the path, its permissions and the space on the disk")

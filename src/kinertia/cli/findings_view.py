@@ -28,7 +28,7 @@ def show_overview(overview: Overview, verbose: bool) -> None:
         _show_line(group)
     hidden = len(groups) - len(groups[:_SHOWN])
     infos = overview.count(Severity.INFO)
-    more = [f"{hidden} more" if hidden else "", f"{infos} assumptions" if infos else ""]
+    more = [f"{hidden} more" if hidden else "", f"{infos} assumption{'s' * (infos > 1)}" if infos else ""]
     if any(more):
         out.print(f"{' and '.join(filter(None, more))}: --verbose lists all; kinertia explain CODE", soft_wrap=True)
 

@@ -14,7 +14,7 @@ from kinertia.cli.findings_view import show_overview
 from kinertia.cli.fit_report import report_tables
 from kinertia.cli.options import Force, Output, Quiet, Sex, Verbose, Waive, number, overrule_of, results_folder
 from kinertia.cli.outcome import Outcome, of_error
-from kinertia.cli.terminal import out, show_error, shown_progress
+from kinertia.cli.terminal import out, show_problem, shown_progress
 from kinertia.errors import FileError, KinertiaError
 from kinertia.estimation.result import Fit
 from kinertia.findings.finding import Severity
@@ -117,7 +117,7 @@ def fit(
         except KinertiaError as error:
             if len(runs) == 1:
                 raise
-            show_error(f"{one.given}: {error}")
+            show_problem(error, f"{one.given}: ")
             summaries.append({"folder": None, "file": str(one.given), **of_error(error)})
             status = 2
             continue

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from kinertia.cli.compiling import compile_once
+from kinertia.errors import BlockedError, KinertiaError
 
 if TYPE_CHECKING:
     from rich.console import Capture, Console
@@ -79,6 +80,12 @@ def show_error(message: str) -> None:
 
     text = Text("error: ", style="bold red").append(" ".join(message.split("\n")), style="not bold default")
     err.print(text, soft_wrap=True)
+
+
+def show_problem(error: KinertiaError, of: str = "") -> None:
+    """One line for every finding that stopped something, or for the error; `of` says whose it is, where several are."""
+    for line in str(error).split("\n") if isinstance(error, BlockedError) else [str(error)]:
+        show_error(f"{of}{line}")
 
 
 @contextmanager

@@ -114,9 +114,18 @@ class Finding:
         """The same, found in that file."""
         return replace(self, where=replace(self.where, file=file))
 
+    @property
+    def place(self) -> str:
+        """File and line where they are known, else the trial, else the file that the message does not name."""
+        where = self.where
+        if where.file is not None and where.line is not None:
+            return f"{where.file}, line {where.line}"
+        file = "" if where.file is None or where.file in self.message else where.file
+        return where.trial or file
+
     def line(self) -> str:
         """Where and what on one line: `walk  P213 The zero of plate 1 is off ...`."""
-        return f"{self.where.trial}  {self.code} {self.message}" if self.where.trial else f"{self.code} {self.message}"
+        return f"{self.place}  {self.code} {self.message}" if self.place else f"{self.code} {self.message}"
 
     def to_dict(self) -> dict[str, Any]:
         """For JSON, numbers in SI units."""

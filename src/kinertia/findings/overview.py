@@ -106,9 +106,9 @@ class Group:
 
     @property
     def line(self) -> str:
-        """Trial, code and message on one line."""
-        trial = f"{self.first.where.trial}  " if self.first.where.trial else ""
-        return f"{trial}{self.first.code} {self.message}"
+        """Place, code and message on one line."""
+        place = f"{self.first.place}  " if self.first.place else ""
+        return f"{place}{self.first.code} {self.message}"
 
 
 def grouped(findings: Iterable[Finding]) -> list[Group]:

@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 
 from kinertia.errors import FileError
+from kinertia.findings.quantity import Quantity
 from kinertia.io.qualisys import is_plate_file
 from kinertia.io.recording import FORCE_FILES, MARKER_FILES, read_recording
 from kinertia.io.subject_draft import STATIC_NAME, matched_by_name
@@ -35,7 +36,7 @@ def files_by_name(files: Sequence[Path], loads: Path | None = None) -> tuple[Rec
     """
     for path in files:
         if path.is_dir():
-            raise FileError(path, "is a folder; give the files in it, or its subject file (kinertia init drafts one)")
+            raise _unpaired(path, "is a folder", "Give the files in it, or a subject file (kinertia init drafts one)")
         if path.suffix.lower() not in (*MARKER_FILES, *FORCE_FILES):
             raise unknown_kind(path)
     marked = [path for path in files if path.suffix.lower() in MARKER_FILES and not is_plate_file(path)]
@@ -44,16 +45,19 @@ def files_by_name(files: Sequence[Path], loads: Path | None = None) -> tuple[Rec
     alone = [path for path in forces if path not in pairs.values()]
     if alone:
         goes = "goes with none of the marker files by its name" if marked else "holds forces only"
-        raise FileError(alone[0], f"{goes}; check it together with its markers ({', '.join(MARKER_FILES)})")
+        raise _unpaired(alone[0], goes, f"Check it together with its markers ({', '.join(MARKER_FILES)})")
     wanted = [RecordingFiles(path, pairs.get(path)) for path in marked]
     if loads is not None:
         having = [k for k, one in enumerate(wanted) if one.forces is not None] or list(range(len(wanted)))
         if len(having) != 1:
-            raise FileError(
-                loads, f"explains one trial's forces, but {len(having)} are given; check one trial at a time"
-            )
+            problem = f"explains one trial's forces, but {len(having)} are given"
+            raise _unpaired(loads, problem, "Check one trial at a time")
         wanted[having[0]] = replace(wanted[having[0]], loads=loads)
     return tuple(wanted)
+
+
+def _unpaired(path: Path, problem: str, action: str) -> FileError:
+    return FileError.found(path, "F108", problem=Quantity(problem), action=Quantity(action))
 
 
 def unknown_kind(path: Path) -> FileError:

@@ -6,7 +6,7 @@ out; one of the person, or of the static trial, stops everything.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -19,7 +19,7 @@ from kinertia.diagnostics.plates.signal_questions import LOADED_QUESTIONS, SIGNA
 from kinertia.diagnostics.runner import Question, asked, blocking, explained, overruled
 from kinertia.diagnostics.subject import questions as subject
 from kinertia.diagnostics.timing import questions as timing
-from kinertia.errors import BlockedError, KinertiaError, MarkerSetError
+from kinertia.errors import BlockedError, KinertiaError, MarkerSetError, SubjectError
 from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.estimation.input_checks import complete_subject
 from kinertia.findings.finding import Finding
@@ -110,18 +110,14 @@ class Screened:
 def screen(person: Person) -> Screened:
     """Ask everything that can be asked before inverse kinematics."""
     context = person_context(person)
-    found = list(person.unread)
+    found = [*person.unread, *_implausible(person)]
     for static in context.standing:
         found += _of_recording(static, STATIC_QUESTIONS)
     for trial in context.trials:
         found += _of_recording(trial, MOTION_QUESTIONS)
-    by_label = person.labels
-    if (
-        isinstance(by_label, MarkerSetError)
-        and by_label.finding is not None
-        and all(one.code != "L101" for one in found)
-    ):
-        found.append(by_label.finding)
+    unmatched = person.labels.finding if isinstance(person.labels, MarkerSetError) else None
+    if unmatched is not None and unmatched.code not in {one.code for one in found}:
+        found.append(unmatched)
     found += _of_person(context, found)
     findings = overruled(explained(found), person.overrule, person.overrule_of)
     return Screened(person, context, tuple(findings))
@@ -156,17 +152,30 @@ def _static_context(person: Person, recording: Recording) -> RecordingContext:
     """Of a recording in which the person stands, with the widths of joints that are known."""
     label_set, stated = _label_set(person), _completed(person)
     if label_set is not None and person.model is None:
-        recording, label_set, _ = with_widths(recording, person.recordings, label_set, person.subject)
+        recording, label_set = with_widths(recording, person.recordings, label_set, person.subject)
     return RecordingContext(recording, label_set, is_static=True, height_m=stated.height_m, mass_kg=stated.mass_kg)
 
 
 def _completed(person: Person) -> Subject:
-    """What is stated, with what files add; as stated where it is incomplete."""
-    recordings = [*([] if person.static is None else [person.static]), *person.recordings]
+    """What is stated, with what files add; as stated where it is incomplete, without what cannot be true."""
     try:
-        return complete_subject(person.subject, recordings, mass_only=True)
-    except KinertiaError:
-        return person.subject
+        return _complete(person)
+    except SubjectError as error:
+        return person.subject.model_copy(update={error.field: None})
+
+
+def _implausible(person: Person) -> Iterator[Finding]:
+    """S102: a mass, stature or sex, stated or of a file, that cannot be true."""
+    try:
+        _complete(person)
+    except SubjectError as error:
+        if error.finding is not None and error.finding.code == "S102":
+            yield error.finding
+
+
+def _complete(person: Person) -> Subject:
+    recordings = [*([] if person.static is None else [person.static]), *person.recordings]
+    return complete_subject(person.subject, recordings, mass_only=True)
 
 
 def _total(mass_kg: float, person: Person) -> CarriedMass | None:
@@ -186,4 +195,11 @@ def _of_person(context: PersonContext, found: Sequence[Finding]) -> list[Finding
     blocked = {one.where.trial for one in blocking(explained(found))}
     sound = replace(context, trials=[one for one in context.trials if one.name not in blocked], found=tuple(found))
     of_person = [one for one in found if one.where.trial is None]
-    return asked(PERSON_QUESTIONS, sound, of_person)
+    return [_in_model(one, context) for one in asked(PERSON_QUESTIONS, sound, of_person)]
+
+
+def _in_model(one: Finding, context: PersonContext) -> Finding:
+    """A finding about the OpenSim model itself with the name of its file."""
+    if context.model is None or one.where.trial is not None or not one.code.startswith("O"):
+        return one
+    return one.in_file(context.model.path.name)

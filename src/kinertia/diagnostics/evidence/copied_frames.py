@@ -94,6 +94,8 @@ def _amid_motion(distance: FloatArray, repeated: BoolArray) -> bool:
 
     Coordinates that are rounded repeat as well, where a person hardly moves.
     """
+    if not repeated.any():
+        return False
     hidden = ~np.isfinite(distance).any(axis=1, keepdims=True)
     distance = np.where(hidden, 0.0, distance)
     moving = float(np.nanmedian(distance[~repeated])) if (~repeated).any() else np.inf
