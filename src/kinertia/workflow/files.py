@@ -103,9 +103,7 @@ def read_files(
         recording = unread.tried(partial(read_recording, one.markers, one.forces, one.loads), name)
         if recording is not None:
             recordings.append(replace(recording, name=name))
-            stands.append(
-                travel(recording.markers).kind == "stands still" if static is None else one.markers == static
-            )
+            stands.append(travel(recording.markers).kind == "stands still" if static is None else one.markers == static)
     unread.expect_any(recordings)
     statics = [one for one, is_static in zip(recordings, stands, strict=True) if is_static]
     moving = [one for one, is_static in zip(recordings, stands, strict=True) if not is_static]
