@@ -36,7 +36,8 @@ def main(folder: Path, window_s: tuple[float, float] | None = None) -> kinertia.
     # 2. Look at it before estimating from it: which marker is what, which foot is on which plate, are the loads sound?
     marker_set = kinertia.choose_marker_set(static.markers.labels)
     check = kinertia.check_recording(walk, marker_set, mass_kg=72.6)
-    print(*(f"{verdict.level}: {verdict.sentence}" for verdict in check.verdicts), sep="\n")
+    print(*(f"{name}: {fact}" for name, fact in check.facts()), sep="\n")
+    print(*(found.line() for found in check.findings if found.is_open), sep="\n")
 
     # 3. Prepare: joint centres and axes from the static trial, inverse kinematics, smoothing, the literature's BSPs.
     subject = kinertia.Subject(name="subject01", sex="male", mass_kg=72.6, height_m=1.803)
@@ -63,7 +64,9 @@ def main(folder: Path, window_s: tuple[float, float] | None = None) -> kinertia.
     show("... with the estimated motion and BSPs", fit.trials[0].residuals["estimate"])
 
     # 6. Look at it before believing it.
-    print(*(f"{verdict.level}: {verdict.sentence}" for verdict in kinertia.verdicts(fit)), sep="\n")
+    print(fit.overview.line)
+    print(*(found.line() for found in fit.overview.open), sep="\n")
+    print(*(f"{one.output}: {one.use}; {one.reason}" for one in kinertia.suitability(fit, fit.findings)), sep="\n")
     print(fit.bsp[fit.bsp.parameter == "mass"][["segment", "literature", "estimate", "sd", "evidence"]].to_string())
     knee_moment = fit.trials[0].moments["estimate"]["knee_angle_r"]
     print(f"right knee moment from {knee_moment.min():.0f} to {knee_moment.max():.0f} N m")

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from kinertia.findings.finding import Severity, finding
+from kinertia.findings.finding import Severity, finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 
@@ -17,11 +17,14 @@ FROZEN = [
     finding("M113", Where(trial="walk", markers=(label,), span_s=(1.2, 1.7)), longest_s=Quantity(0.5, "s", limit=0.2))
     for label in ("LANK", "LTOE")
 ]
+CLEAR = {"moved": Quantity(2.3, "1", limit=1.0), "kind": Quantity("a clear"), "condition": Quantity("")}
 CORRECTED = [
-    finding(
-        "P215", Where(trial="walk", plate="plate 1", **ALONG_Z), zero_n=Quantity(6.5, "N", usual=(-2.4, 2.4), sd=0.9)
+    with_evidence(
+        "P215",
+        Where(trial="walk", plate="plate 1", **ALONG_Z),
+        {"zero_n": Quantity(6.5, "N", usual=(-2.4, 2.4), sd=0.9), **CLEAR},
     ),
-    finding("T214", delay_s=Quantity(0.0071, "s", sd=0.0006)),
+    with_evidence("T214", Where(), {"delay_s": Quantity(0.0071, "s", sd=0.0006), **CLEAR}),
 ]
 ASSUMED = finding("R111", Where(trial="walk"), cutoff_hz=Quantity(6.0, "Hz"))
 WAIVED = replace(
@@ -34,6 +37,8 @@ RESIDUAL = finding(
     Severity.ERROR,
     rms_n=Quantity(12.3, "N", limit=10.0),
     peak_n=Quantity(41.0, "N", limit=25.0),
+    full_rms_n=Quantity(20.1, "N"),
+    full_peak_n=Quantity(80.0, "N"),
 )
 FAULT_FREE = (*CORRECTED, ASSUMED)
 FAULTY = (*FAULT_FREE, ZERO, UNEXPLAINED, *FROZEN, WAIVED, IGNORED)

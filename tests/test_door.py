@@ -48,7 +48,13 @@ def test_an_unknown_name_is_an_attribute_error():
 
 
 def test_the_house_has_few_rooms():
-    assert len([path for path in PACKAGE.iterdir() if not path.name.startswith("__")]) <= 13
+    """Fourteen since findings and the road to a result have rooms of their own."""
+    rooms = {path.stem for path in PACKAGE.iterdir() if path.suffix in ("", ".py")} - {
+        "__init__",
+        "__main__",
+        "__pycache__",
+    }
+    assert len(rooms) <= 14
 
 
 @pytest.fixture

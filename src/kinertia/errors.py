@@ -11,7 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Self
 
-from kinertia.findings.finding import Finding, Severity, with_evidence
+from kinertia.findings.finding import Finding, Severity, finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 
@@ -104,7 +104,7 @@ class FileError(KinertiaError):
     @classmethod
     def of(cls, path: str | Path, found: Finding, line: int | None = None) -> Self:
         """The error of a finding, in this file and line."""
-        where = replace(found.where, file=Path(path).name, line=line)
+        where = replace(found.where, file=Path(path).name or str(path), line=line)
         placed = replace(found, where=where, severity=Severity.ERROR)
         return cls(path, problem_of(placed), line).with_finding(placed)
 
@@ -201,12 +201,16 @@ class SettingsError(KinertiaError):
 
 
 class SessionError(KinertiaError):
-    """What trials say of plates and clock cannot be put together with what others say.
+    """What trials say of plates and clock cannot be put together with what others say: S502.
 
     Examples:
-        >>> isinstance(kinertia.SessionError("plates are told by their names"), kinertia.KinertiaError)
-        True
+        >>> kinertia.SessionError("plates are told by their names").finding.code
+        'S502'
     """
+
+    def __init__(self, problem: str) -> None:
+        super().__init__(f"S502 {problem}")
+        self.finding = finding("S502", problem=Quantity(problem))
 
 
 class OsimError(FileError):
@@ -250,7 +254,17 @@ class BlockedError(KinertiaError):
         self.findings = tuple(findings)
         self.blocking = tuple(blocking)
         self.finding = self.blocking[0] if self.blocking else None
-        super().__init__("\n".join(f"{one.line()} {one.remedy}" for one in self.blocking))
+        super().__init__("\n".join(f"{_placed(one)} {one.remedy}" for one in self.blocking))
+
+
+def _placed(found: Finding) -> str:
+    """Where and what: the trial, and of a file its name and line."""
+    where = found.where
+    if where.file is None:
+        return found.line()
+    trial = f"{where.trial}  " if where.trial else ""
+    line = "" if where.line is None else f", line {where.line}"
+    return f"{trial}{where.file}{line}: {found.code} {found.message}"
 
 
 def findings_of(error: KinertiaError) -> tuple[Finding, ...]:

@@ -58,8 +58,9 @@ def test_a_fit_leaves_out_what_it_has_said_itself(session, c3d_lab, tmp_path):
     (information,) = helped.uncertainty.instruments.session
     np.testing.assert_array_equal(information.information, person.information)
     (tmp_path / "elsewhere.toml").write_text(text.replace('"plate 1", "plate 2"', '"left", "right"'), encoding="utf-8")
-    with pytest.raises(SessionError, match="none of the session's plates"):
+    with pytest.raises(SessionError, match="none of the session's plates") as caught:
         prepare_subject(subject_with(tmp_path, c3d_lab, 'session = "elsewhere.toml"'))
+    assert caught.value.finding.code == "S502"
 
 
 def test_what_the_laboratory_states_is_used_and_checked(c3d_lab, tmp_path):

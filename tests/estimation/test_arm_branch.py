@@ -30,6 +30,8 @@ def test_elbows_bend_forwards_and_the_trunk_faces_where_its_markers_do(measured_
     path.write_text(SUBJECT.format(folder=(measured_folder / "field" / "hamner_run").as_posix()), encoding="utf-8")
     ready = kinertia.prepare_subject(path)
     (kinematics,) = ready.kinematics
+    assert ready.elbow_rotations_rad
+    assert ready.torso_rotation_rad > 0.25
     names, q = ready.skeleton.coordinates, kinematics.motion.q
     for side in "rl":
         assert np.median(q[:, names.index(f"elbow_flex_{side}")]) > np.radians(60)

@@ -83,7 +83,7 @@ def test_osim_of_a_version_that_is_no_number(small, version):
     _damage(small / "model.osim", 'Version="40000"', f'Version="{version}"')
     outcome = run("check", small / "model.osim")
     assert outcome.status == 2
-    assert "line 2: format" in outcome.err
+    assert "model.osim, line 2: O101 " in outcome.err
 
 
 @pytest.mark.parametrize("model", here(["synthetic/scaled.osim", "rajagopal_walk/scaled.osim"]))
@@ -118,7 +118,7 @@ def test_file_names_that_are_not_utf8(small):
     odd = os.fsdecode(os.fsencode(small) + b"/w\xe4lk.trc")
     shutil.copyfile(small / "walk.trc", odd)
     assert run("check", odd, "-o", small / "out").status in (0, 1)
-    assert "w?lk.trc" in (small / "out" / "check.html").read_text(encoding="utf-8")
+    assert "w?lk: " in (small / "out" / "check.html").read_text(encoding="utf-8")
     (small / "subject.toml").unlink()
     outcome = run("init", small)
     assert outcome.status == 2

@@ -5,6 +5,8 @@ import pandas as pd
 import pytest
 
 from c3d_writer import write_c3d
+from kinertia.diagnostics.context import RecordingContext
+from kinertia.diagnostics.markers.axes_and_floor import unit_and_vertical
 from kinertia.errors import TrialError
 from kinertia.findings.finding import finding
 from kinertia.findings.quantity import Quantity
@@ -13,9 +15,8 @@ from kinertia.io.recording import read_recording
 from kinertia.io.sto import write_sto
 from kinertia.io.trc import write_trc
 from kinertia.trial.data import Markers
-from kinertia.trial.marker_quality import axes_trouble, extent_m
 from kinertia.trial.plate_names import with_plates_of_trial
-from refusals import codes, only, refused
+from refusals import codes, expect_evidence, only, refused
 
 
 @pytest.fixture
@@ -91,7 +92,9 @@ def test_whoever_may_lie_is_not_turned(tmp_path, upright, shift):
     write_trc(tmp_path / "walk.trc", Markers(upright.time, upright.labels, lying))
     recording = read_recording(tmp_path / "walk.trc")
     assert recording.findings == ()
-    assert "which should be up" in axes_trouble(extent_m(recording.markers))
+    (found,) = unit_and_vertical(RecordingContext(recording))
+    assert (found.code, found.severity.name) == ("M142", "ERROR")
+    expect_evidence(found, up="Z", expected="Y")
 
 
 def test_statics_need_no_forces(files):

@@ -245,8 +245,9 @@ def test_turning_round_twice_gives_a_continuous_angle(skeleton):
 
 def test_too_few_pelvis_markers_name_the_trial(skeleton):
     markers = markers_of(skeleton, random_coordinates(skeleton, 3))
-    with pytest.raises(TrialError, match=r"trial 'walk3': no frame shows three markers of the pelvis"):
+    with pytest.raises(TrialError, match=r"trial 'walk3'") as caught:
         solve_ik(skeleton, without(markers, ["R.ASIS"]), "walk3")
+    assert caught.value.finding.code == "R101"
     keep = [label for label in markers.labels if label != "R.ASIS"]
     with pytest.raises(MarkerSetError, match=r"trial 'walk3' has 2 of the markers on the pelvis"):
         solve_ik(skeleton, markers.select(keep), "walk3")

@@ -1,4 +1,5 @@
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -7,6 +8,7 @@ from scipy.spatial.transform import Rotation
 from generic_static import generic_model, smooth_motion
 from kinertia.errors import MarkerSetError, TrialError
 from kinertia.io.marker_set_file import read_marker_set
+from kinertia.motion.inverse_kinematics import solve_ik
 from kinertia.motion.kinematics import _bridged, facing, solve_kinematics
 from kinertia.trial.data import FootLoads, Markers, Trial
 
@@ -83,6 +85,13 @@ def test_smoothed_coordinates_and_derivatives_are_near_the_truth(skeleton, trial
     assert "smoothed at 6.0 Hz, where the search" in kinematics.notes[1]
     assert len(kinematics.notes) == 2
     assert kinematics.ik.converged.all()
+
+
+def test_frames_at_the_limit_of_steps_are_counted(skeleton, trial, monkeypatch):
+    monkeypatch.setattr("kinertia.motion.kinematics.solve_ik", partial(solve_ik, most_steps=1))
+    kinematics = solve_kinematics(skeleton, trial, 0.0, 10.0)
+    (found,) = [one for one in kinematics.findings if one.code == "R105"]
+    assert found.evidence["frames"].value == (~kinematics.ik.converged).sum() > 0
 
 
 def test_the_window_keeps_off_the_ends_by_half_a_period(skeleton, trial):

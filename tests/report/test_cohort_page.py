@@ -28,7 +28,7 @@ def test_the_page_says_who_passed_and_who_is_far(cohort):
     page = (cohort / PAGE).read_text(encoding="utf-8")
     assert "10 people: 6 use, 1 use with care, 1 do not use, 2 not fitted." in page
     text = re.sub(r"<[^>]+>", " ", page)
-    assert re.search(r"lost0 w0 P271", " ".join(text.split()))
+    assert re.search(r"lost0: w0 P271", " ".join(text.split()))
     assert re.search(r"P271\s+ERROR\s+no forces\s+2\s+2\s+0\s+0\s+lost0 *, *lost1", " ".join(text.split()))
     assert re.search(r"P244\s+ERROR\s+cop not under feet\s+2\s+0\s+0\s+2\s+62 mm\s+Ben", " ".join(text.split()))
     assert "T301: 1 people" in text
@@ -75,7 +75,7 @@ def test_people_are_counted_by_verdict(people):
     assert [trace["name"] for trace in verdicts.figure.data] == [
         "use (1)", "use with care (1)", "do not use (1)", "not fitted (1)",
     ]  # fmt: skip
-    assert not_fitted.rows == [("lost", '<a class="code" href="#explain-P278">P278</a> no window')]
+    assert not_fitted.listed == ['lost: <a class="code" href="#explain-P278">P278</a> no window']
 
 
 def test_findings_are_counted_by_code_the_worst_first(people):

@@ -71,9 +71,9 @@ def test_an_assumption_about_several_trials_is_said_once():
 def test_words_that_the_message_has_are_no_evidence_again():
     overhang = finding("P282", Where(plate="plate 1"), overhang_m=Quantity(0.045, "m"), foot=Quantity("right"))
     assert evidence_texts(overhang) == ["overhang 45 mm"]
-    assert evidence_texts(finding("P213", level_n=Quantity(-23.0, "N"), other=Quantity("x"))) == [
+    assert evidence_texts(finding("P213", level_n=Quantity(-23.0, "N"), other=Quantity("heel"))) == [
         "level -23 N",
-        "other x",
+        "other heel",
     ]
 
 

@@ -23,9 +23,9 @@ def test_residuals_are_told_at_both_bandwidths(fit, two_level):
 
 def test_report_says_which_forces_the_moments_are_from(fit, two_level):
     trial = fit.trials[0]
-    (note,) = [note for note in fit.notes if "joint moments are from" in note]
-    assert note.startswith(f"{trial.name}: ")
-    assert note.partition("ground reactions ")[2] in Elements(render(fit)).text
+    (used,) = [one for one in fit.findings if one.code == "R402"]
+    assert used.where.trial == trial.name
+    assert used.evidence["which"].value in Elements(render(fit)).text
     struck = np.zeros_like(trial.reactions.impact)
     struck[:, 0, 1] = 20.0
     hit = replace(fit, trials=(replace(trial, reactions=replace(trial.reactions, impact=struck)),))

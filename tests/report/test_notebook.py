@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from found import FAULTY, ZERO
+from found import ASSUMED, FAULTY, ZERO
 from kinertia.trial.data import Markers, PlateLoads, Recording
 from report_page import Elements
 
@@ -41,8 +41,8 @@ def test_recording_shows_itself():
     force = np.zeros((4, 1, 3))
     force[2, 0, 1] = 812.0
     plates = PlateLoads(time, ("FP1",), force, np.zeros((4, 1, 3)), (None,))
-    shown = Elements(Recording("walk", markers, plates, mass_kg=72.6, notes=("beware",))._repr_html_()).text
-    for text in ("walk", "4 frames at 100 Hz", "2 markers", "72.6 kg", "FP1 812 N", "<B> (seen 75 %)", "beware"):
+    shown = Elements(Recording("walk", markers, plates, mass_kg=72.6, findings=(ASSUMED,))._repr_html_()).text
+    for text in ("walk", "4 frames at 100 Hz", "2 markers", "72.6 kg", "FP1 812 N", "<B> (seen 75 %)", ASSUMED.message):
         assert text in shown
     still = Elements(Recording("static", markers.cut(0.0, 0.0))._repr_html_()).text
     assert "1 frames" not in still

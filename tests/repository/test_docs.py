@@ -154,3 +154,11 @@ def test_results_page_names_every_file_and_column(fit_of):
 def test_the_house_is_drawn_from_the_contract():
     assert house.PICTURE.read_text(encoding="utf-8") == house.drawn()
     assert house.PAGE.read_text(encoding="utf-8") == house.filled(house.PAGE.read_text(encoding="utf-8"))
+
+
+def test_modules_named_on_the_page_about_architecture_exist():
+    package = ROOT / "src" / "kinertia"
+    for name in re.findall(
+        rf"`((?:{'|'.join(sum(house.layers(), []))})/[\w/]+)`", house.PAGE.read_text(encoding="utf-8")
+    ):
+        assert (package / name).is_dir() or (package / f"{name}.py").is_file(), name

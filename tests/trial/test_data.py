@@ -45,6 +45,7 @@ def test_select_names_nearest_labels():
         markers(labels=("RHEE", "LTOE")).select(["RHEEL"])
     assert caught.value.missing == ("RHEEL",)
     assert caught.value.nearest["RHEEL"] == ["RHEE"]
+    assert (caught.value.finding.code, caught.value.finding.where.markers) == ("L104", ("RHEEL",))
 
 
 def test_shapes_and_labels_are_checked():

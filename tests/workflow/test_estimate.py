@@ -92,14 +92,14 @@ def test_an_impossible_body_is_warned_about(fit_of, name):
     moments = {p: table["estimate"][table["parameter"] == p] for p in ("ixx", "iyy", "izz")}
     largest = np.maximum.reduce(list(moments.values()))
     impossible = int((2 * largest > sum(moments.values())).sum())
-    warned = any("physically impossible" in warning for warning in fit.summary["warnings"])
-    assert warned == (impossible > 0)
+    found = [one["evidence"]["count"]["value"] for one in fit.summary["findings"] if one["code"] == "R202"]
+    assert found == ([impossible] if impossible else [])
 
 
 def test_mass_and_height_come_from_the_c3d_file(short_fit):
     assert short_fit.subject.mass_kg == pytest.approx(72.6, abs=0.1)
     assert short_fit.subject.height_m == pytest.approx(1.803, abs=0.001)
-    assert not any("is taken as" in warning for warning in short_fit.warnings)
+    assert "S103" not in [one.code for one in short_fit.findings]
 
 
 def test_several_trials_share_one_body(short_fit):
@@ -150,8 +150,12 @@ def test_settings_and_subject_reach_the_result(c3d_lab, short_fit):
         progress=lambda stage, share: shares.append((stage, share)),
     )
     assert fit.literature.total_mass_kg == pytest.approx(77.0)
-    said = [warning for warning in fit.warnings if "is taken as" in warning]
-    assert said == [f"mass_kg is taken as 77, but the file of '{name}' says 72.6" for name in ("static", "walk")]
+    found = [one for one in fit.findings if one.code == "S103"]
+    assert [one.where.trial for one in found] == ["static", "walk"]
+    for one in found:
+        assert one.severity.name == "WARNING"
+        values = [one.evidence[name].value for name in ("quantity", "stated", "filed")]
+        assert values == ["mass", 77.0, pytest.approx(72.6, abs=0.1)]
     assert fit.trials[0].kinematics.cutoff_hz == pytest.approx(6.0)
     thighs = [fit.estimate.mass_kg[fit.estimate.segments.index(f"thigh_{side}")] for side in "rl"]
     assert abs(thighs[0] - thighs[1]) > 1e-3

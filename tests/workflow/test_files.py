@@ -1,19 +1,12 @@
 """A file is judged by what it is given as."""
 
-from dataclasses import replace
-
 import pytest
 
-from kinertia.diagnostics.doubts import static_doubts
-from kinertia.diagnostics.doubts import trial_doubts as doubts_of_trial
-from kinertia.io.marker_set_file import read_marker_set
-from kinertia.workflow.files import PersonFiles, RecordingFiles, check_files
+from kinertia.findings.finding import Severity
+from kinertia.settings import Subject
+from kinertia.workflow.check import check_person
+from kinertia.workflow.files import RecordingFiles, read_files
 from recordings import named_here
-
-
-def cautions(check):
-    return [verdict.sentence for verdict in check.verdicts if verdict.level == "caution"]
-
 
 WALKS = named_here(
     {
@@ -22,25 +15,36 @@ WALKS = named_here(
         "b": ("pig_c3d/subject_b_walk.c3d", "pig_c3d/subject_b_static.c3d"),
     }
 )
-FAR_M = {"synthetic": 3.0, "b": 3.6}
+FAR_M = {"synthetic": 3.0, "a": 4.0, "b": 3.6}
 """How far they walk."""
 
 
-@pytest.mark.parametrize("name", [name for name in FAR_M if name in WALKS])
-def test_a_walk_given_as_the_static_trial(file_of, name):
-    walk, static = (RecordingFiles(file_of(one)) for one in WALKS[name])
-    (_, right), _ = check_files(PersonFiles((static, walk), None, static=static))[0]
-    assert not any("walks in the static trial" in one for one in cautions(right))
-    wrong = replace(walk)
-    (_, check), _ = check_files(PersonFiles((wrong, walk), None, static=wrong))[0]
-    assert f"the person walks in the static trial, by {FAR_M[name]} m" in cautions(check)[0]
+@pytest.fixture(params=WALKS)
+def given(request, file_of):
+    """Name, and what is found of its files, where one of them may be given as the static trial."""
+
+    def check(static=None):
+        wanted = [RecordingFiles(file_of(one)) for one in WALKS[request.param]]
+        chosen = None if static is None else wanted[static].markers
+        return check_person(read_files(wanted, Subject(name="A"), static=chosen))
+
+    return request.param, check
 
 
-@pytest.mark.parametrize("name", WALKS)
-def test_the_fit_says_so_too(recording_of, name):
-    marker_set = read_marker_set("plug-in-gait")
-    walk, static = (recording_of(one, None) for one in WALKS[name])
-    assert any("walks in the static trial" in one.sentence for one in static_doubts(walk, marker_set))
-    assert not any("walks in" in one.sentence for one in static_doubts(static, marker_set))
-    # the same distances in both: nothing to be divided by
-    assert not any(one.refused for one in doubts_of_trial(walk, marker_set, walk, None))
+def test_who_stands_still_is_the_static_trial(given):
+    name, check = given
+    found = check()
+    assert [one.context.is_static for one in found.recordings] == [True, False]
+    assert [one.context.name for one in found.recordings] == [WALKS[name][k].split("/")[1][:-4] for k in (1, 0)]
+    assert "S201" not in [one.code for one in found.findings]
+    assert not [one for one in found.findings if one.severity is Severity.ERROR]
+
+
+def test_a_walk_given_as_the_static_trial(given):
+    name, check = given
+    found = check(static=0)
+    (walks,) = [one for one in found.findings if one.code == "S201"]
+    assert walks.severity is Severity.WARNING
+    assert walks.where.trial == WALKS[name][0].split("/")[1][:-4]
+    assert walks.evidence["distance_m"].value == pytest.approx(FAR_M[name], abs=0.05)
+    assert found.recordings[0].context.name == walks.where.trial

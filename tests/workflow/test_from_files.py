@@ -1,10 +1,11 @@
 import pytest
 
 from kinertia.errors import SettingsError
-from kinertia.io.person_recordings import read_inputs, read_trials
+from kinertia.io.person_recordings import read_inputs
 from kinertia.io.subject_file import read_subject, with_settings
 from kinertia.settings import KnownSegment
 from kinertia.workflow.from_files import prepare_subject
+from kinertia.workflow.person import read_person
 
 SUBJECT = """
 [subject]
@@ -29,13 +30,13 @@ def subject(synthetic_lab, tmp_path):
 
 def test_columns_of_two_force_files_are_plates_of_their_own(subject):
     """One column may hold two steps in two places (subject4's walks): it is a foot's, not a plate's."""
-    walk, other = (item.recording.plates.names for item in read_trials(subject))
+    walk, other = (item.recording.plates.names for item in read_person(subject).trials)
     assert walk == ("1_ground_force (walk)", "2_ground_force (walk)")
     assert not set(walk) & set(other)
 
 
 def test_one_trial_keeps_its_names(subject):
-    (item,) = read_trials(subject.model_copy(update={"trials": subject.trials[:1]}))
+    (item,) = read_person(subject.model_copy(update={"trials": subject.trials[:1]})).trials
     assert item.recording.plates.names == ("1_ground_force", "2_ground_force")
 
 
@@ -50,4 +51,5 @@ def test_a_prosthesis_is_no_mirror_image(c3d_lab):
     with pytest.raises(SettingsError, match=r"shank_l: a prosthesis is no mirror image .* symmetry = false"):
         prepare_subject(with_settings(wanted, method="two-level"))
     two_level = prepare_subject(with_settings(wanted, method="two-level", symmetry=False))
-    assert any("[segment] are not used" in note for note in two_level.notes)
+    (unused,) = [one for one in two_level.findings if one.code == "F194"]
+    assert "[segment]" in unused.evidence["entry"].value

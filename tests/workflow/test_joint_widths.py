@@ -18,26 +18,26 @@ def recording(name, **measurements):
 
 
 def widths(static, trials, **given):
-    static_with_widths, marker_set, notes = with_widths(static, trials, SET, Subject(name="A", **given))
+    static_with_widths, marker_set = with_widths(static, trials, SET, Subject(name="A", **given))
     known = {joint: static_with_widths.measurements.get(name) for joint, name in marker_set.widths.items()}
-    return {joint: value for joint, value in known.items() if value}, notes
+    borrowed = [(one.code, one.where.part, one.where.file) for one in static_with_widths.findings]
+    return {joint: value for joint, value in known.items() if value}, borrowed
 
 
 def test_the_static_trial_goes_before_others_and_the_subject_file_before_both():
     static = recording("static", RKneeWidth=0.10)
     walk = recording("walk", RKneeWidth=0.2, LKneeWidth=0.11, LAnkleWidth=0.07)
-    by_joint, notes = widths(static, [recording("empty"), walk])
+    by_joint, borrowed = widths(static, [recording("empty"), walk])
     assert by_joint == {"knee_r": 0.10, "knee_l": 0.11, "ankle_l": 0.07}
-    assert notes[0] == "LKneeWidth is from walk, 110 mm: static does not have it"
-    assert len(notes) == 2
-    by_joint, notes = widths(static, [walk], knee_width_mm=95.0)
+    assert borrowed == [("S105", "left knee", "walk"), ("S105", "left ankle", "walk")]
+    by_joint, borrowed = widths(static, [walk], knee_width_mm=95.0)
     assert by_joint == {"knee_r": 0.095, "knee_l": 0.095, "ankle_l": 0.07}
-    assert len(notes) == 1
+    assert borrowed == [("S105", "left ankle", "walk")]
 
 
 def test_a_set_that_names_no_widths_takes_those_of_the_subject_file():
     unnamed = replace(SET, widths={})
-    static, marker_set, _ = with_widths(recording("static"), [], unnamed, Subject(name="A", ankle_width_mm=70.0))
+    static, marker_set = with_widths(recording("static"), [], unnamed, Subject(name="A", ankle_width_mm=70.0))
     assert {joint: static.measurements[name] for joint, name in marker_set.widths.items()} == pytest.approx(
         {"ankle_r": 0.07, "ankle_l": 0.07}
     )

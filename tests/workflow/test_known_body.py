@@ -27,6 +27,11 @@ def ready():
     return Prepared(None, None, None, literature, prior, None, None, (), (), (), ())
 
 
+def sources(ready):
+    """What the prior also uses."""
+    return [one.evidence["source"].value for one in ready.findings if one.code == "S408"]
+
+
 def informed(ready, settings=None, earlier=None, **segments):
     return with_known_body(ready, settings or PriorSettings(), earlier, segments)
 
@@ -47,8 +52,10 @@ def test_a_measured_mass_weighs_by_how_well_it_is_known(ready):
     after = informed(ready, thigh_r=KnownSegment(mass_kg=f"{expected + own} +- {own}", source="DXA"))
     assert after.prior.mean.mass_kg[row] == pytest.approx(expected + own / 2)
     assert after.prior.sd[row, 0] == pytest.approx(own / np.sqrt(2.0))
-    assert "DXA" in after.notes[0]
-    assert not after.warnings
+    (source,) = sources(after)
+    assert "thigh_r mass" in source
+    assert "DXA" in source
+    assert [one.code for one in after.findings] == ["S408"]
     left = before.mean.segments.index("thigh_l")
     moved = after.prior.mean.mass_kg[left] - before.mean.mass_kg[left]
     assert moved == pytest.approx(0.9 * own / 2)
@@ -76,7 +83,11 @@ def test_several_measurements_are_those_of_the_information_form(ready):
 def test_a_value_far_from_the_tables_is_warned_about(ready):
     """Grams for kilograms."""
     after = informed(ready, foot_r=KnownSegment(mass_kg="900 +- 10"))
-    assert "is its unit right" in after.warnings[0]
+    (found,) = [one for one in after.findings if one.code == "S402"]
+    assert (found.severity.name, found.where.part, found.evidence["stated"].value) == ("WARNING", "foot_r mass", 900.0)
+    expected = ready.prior.mean.mass_kg[ready.prior.mean.segments.index("foot_r")]
+    assert found.evidence["expected"].value == pytest.approx(expected)
+    assert found.evidence["distance_sd"].value > 80.0
 
 
 def test_an_earlier_estimate_takes_the_place_of_the_literature(ready):

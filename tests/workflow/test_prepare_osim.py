@@ -1,13 +1,16 @@
+from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from kinertia.errors import OsimError, SubjectError, TrialError
+from kinertia.errors import BlockedError, OsimError, SubjectError
 from kinertia.estimation.prior import MASS_SD, OTHER_MASS_SD
+from kinertia.findings.finding import Severity
 from kinertia.io.osim.exporter import export_osim
 from kinertia.io.osim.reader import read_osim
 from kinertia.io.trc import read_trc
+from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.centre_offsets import centre_offsets
 from kinertia.model.imported import OsimModel
 from kinertia.motion.inverse_kinematics import solve_ik
@@ -15,6 +18,7 @@ from kinertia.settings import Settings, Subject
 from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow.prepare_osim import at_mass, kind_of, parted, prepare_osim, with_centre_offsets
 from recordings import here
+from refusals import expect_evidence, expect_filled, refused
 from users_model import WITHOUT
 
 SUBJECT = Subject(name="A", mass_kg=72.6)
@@ -48,14 +52,28 @@ def without(recording, labels):
     return replace(recording, markers=recording.markers.select(kept))
 
 
-def noted(notes, start: str) -> str:
-    (note,) = [note for note in notes if note.startswith(start)]
-    return note
+def of_code(ready, code):
+    return [one for one in ready.findings if one.code == code]
+
+
+@contextmanager
+def blocked(code):
+    """Preparing stops with one finding, of this code; yields it once it has."""
+    caught = []
+    with pytest.raises(BlockedError) as stopped:
+        yield caught
+    (found,) = stopped.value.blocking
+    assert (found.code, found.severity) == (code, Severity.ERROR)
+    expect_filled(found)
+    caught.append(found)
 
 
 def test_what_no_marker_shows_is_locked_at_its_default_and_said(prepared, model):
     assert prepared.skeleton.locked == {"mtp_angle_r": 0.0, "mtp_angle_l": 0.0}
-    assert "mtp_angle_r (0 deg), mtp_angle_l (0 deg)" in noted(prepared.notes, "no marker shows")
+    found = of_code(prepared, "O412")
+    assert [(one.where.part, one.evidence["value"].value) for one in found] == [("mtp_angle_r", 0), ("mtp_angle_l", 0)]
+    for one in found:
+        expect_filled(one)
 
 
 def test_a_default_other_than_zero_is_kept(model, walk):
@@ -67,10 +85,10 @@ def test_a_default_other_than_zero_is_kept(model, walk):
 
 
 def test_markers_of_either_side_only_are_listed(prepared):
-    left_out = noted(prepared.notes, "walk: markers that the model does not have")
-    assert WITHOUT in left_out
-    absent = noted(prepared.notes, "walk: markers of the model that it does not have")
-    assert "R.Knee.Med" in absent
+    (left_out,), (absent,) = (of_code(prepared, code) for code in ("O414", "M105"))
+    assert left_out.where.trial == absent.where.trial == "walk"
+    assert WITHOUT in left_out.where.markers
+    assert "R.Knee.Med" in absent.where.markers
 
 
 def test_the_trial_is_not_turned_and_markers_stay(prepared, model, walk):
@@ -90,9 +108,13 @@ def test_light_bodies_are_held_and_all_are_kept(prepared, model):
     light = [f"{kind}_{side}" for side in "rl" for kind in ("patella", "talus", "toes")]
     assert prepared.uncertainty.held.segments == (*light, "hand_r", "hand_l")
     assert set(prepared.prior.mean.segments) | set(prepared.uncertainty.held.segments) == set(model.bsp.segments)
-    assert "talus_r (tibia_r), toes_r (calcn_r), patella_l (tibia_l)" in noted(
-        prepared.notes, "bodies that weigh less than 0.5 kg"
-    )
+    found = of_code(prepared, "O413")
+    assert tuple(one.where.part for one in found) == prepared.uncertainty.held.segments
+    masses = [one.evidence["mass_kg"].value for one in found]
+    assert masses == pytest.approx(prepared.uncertainty.held.mass_kg)
+    assert max(masses) < 0.5
+    for one in found:
+        expect_filled(one)
     assert prepared.prior.mass_kg + prepared.uncertainty.held_kg == pytest.approx(72.6)
 
 
@@ -131,7 +153,8 @@ def test_masses_are_those_of_the_person(model, walk):
     np.testing.assert_allclose(scaled.inertia_kgm2, model.bsp.inertia_kgm2 * factor)
     np.testing.assert_array_equal(scaled.com_m, model.bsp.com_m)
     ready = prepare_osim(SUBJECT.model_copy(update={"mass_kg": 75.0}), model, [TrialInput(walk)], Settings(), False)
-    assert "multiplied by 1.033" in noted(ready.notes, "the model weighs 72.6 kg, the person 75.0 kg")
+    (found,) = of_code(ready, "O411")
+    expect_evidence(found, factor=75.0 / 72.6, model_kg=72.6, stated_kg=75.0)
     assert ready.literature.total_mass_kg == pytest.approx(75.0)
 
 
@@ -185,34 +208,44 @@ def test_arms_do_not_turn_over(file_of, file, trial):
 
 def test_a_model_without_markers(model, walk, tmp_path):
     export_osim(tmp_path / "bare.osim", replace(model.skeleton, markers=()), model.bsp)
-    with pytest.raises(OsimError, match="no markers in it; scale the model") as error:
+    with refused("O106", error=OsimError) as caught:
         prepare_osim(SUBJECT, read_osim(tmp_path / "bare.osim"), [TrialInput(walk)], Settings(), False)
-    assert "bare.osim" in str(error.value)
+    assert caught.value.finding.where.file == "bare.osim"
 
 
 def test_a_model_without_feet(model, walk):
-    joints = tuple(j for j in model.skeleton.joints if not j.child.startswith(("talus", "calcn", "toes")))
-    markers = tuple(m for m in model.skeleton.markers if not m.segment.startswith("calcn"))
-    footless = replace(model, skeleton=replace(model.skeleton, joints=joints, markers=markers))
-    with pytest.raises(OsimError, match="no body of the right foot; expected one named calcn_r"):
+    feet = ("talus", "calcn", "toes")
+    joints = tuple(j for j in model.skeleton.joints if not j.child.startswith(feet))
+    markers = tuple(m for m in model.skeleton.markers if not m.segment.startswith(feet))
+    rows = [k for k, name in enumerate(model.bsp.segments) if not name.startswith(feet)]
+    names = tuple(model.bsp.segments[k] for k in rows)
+    bsp = BodySegmentParameters.from_table(names, model.bsp.table()[rows])
+    footless = replace(model, skeleton=replace(model.skeleton, joints=joints, markers=markers), bsp=bsp)
+    with pytest.raises(BlockedError) as stopped:
         prepare_osim(SUBJECT, footless, [TrialInput(walk)], Settings(), False)
+    found = stopped.value.blocking
+    assert [(one.code, one.where.part) for one in found] == [("O107", "right foot"), ("O107", "left foot")]
+    expect_evidence(found[0], expected="calcn_r")
+    assert found[0].where.file == "users.osim"
 
 
 def test_a_trial_without_markers_of_a_foot(model, walk):
     left = [m.label for m in model.skeleton.markers if m.segment == "calcn_l"]
-    with pytest.raises(TrialError, match="no marker of the left foot is in the file"):
+    with blocked("M104") as found:
         prepare_osim(SUBJECT, model, [TrialInput(without(walk, left))], Settings(), False)
+    assert (found[0].where.trial, found[0].where.part) == ("walk", "left foot")
 
 
 def test_mass_is_needed_and_nothing_else(model, walk):
-    with pytest.raises(SubjectError, match="--mass"):
+    with pytest.raises(SubjectError) as caught:
         prepare_osim(Subject(name="A"), model, [TrialInput(walk)], Settings(), False)
+    assert (caught.value.field, caught.value.finding.code) == ("mass_kg", "S101")
 
 
 def test_somebody_old_is_warned_of_with_a_model_too(model, walk):
     old = SUBJECT.model_copy(update={"age_years": 72.0})
-    warnings = prepare_osim(old, model, [TrialInput(walk)], Settings(), False).warnings
-    assert any(one.startswith("population: elderly (72 years)") for one in warnings)
+    (found,) = of_code(prepare_osim(old, model, [TrialInput(walk)], Settings(), False), "S401")
+    assert (found.severity, found.evidence["population"].value) == (Severity.WARNING, "elderly")
 
 
 @pytest.mark.parametrize("factor", [0.0, -1.0])
@@ -221,32 +254,40 @@ def test_mass_without_inertia_is_refused(model, walk, factor):
     bsp = model.bsp
     inertia = np.where((np.array(bsp.segments) == "femur_r")[:, None, None], factor, 1.0) * bsp.inertia_kgm2
     bad = replace(model, bsp=replace(bsp, inertia_kgm2=inertia))
-    with pytest.raises(OsimError, match=r"inertia of zero or less for bodies that have mass: femur_r \([0-9.]+ kg\)"):
+    with blocked("O202") as found:
         prepare_osim(SUBJECT, bad, [TrialInput(walk)], Settings(), False)
+    assert found[0].where.part == "femur_r"
+    expect_evidence(found[0], mass_kg=bsp.mass_kg[bsp.segments.index("femur_r")])
 
 
 def test_inertias_too_small_for_the_mass_are_said(model, walk, prepared):
-    assert not any("denser" in warning for warning in prepared.warnings)
+    assert not of_code(prepared, "O203")
     small = replace(model, bsp=replace(model.bsp, inertia_kgm2=0.1 * model.bsp.inertia_kgm2))
-    warnings = prepare_osim(SUBJECT, small, [TrialInput(walk)], Settings(), False).warnings
-    assert any("users.osim: moments of inertia too small for the mass" in one for one in warnings)
+    found = of_code(prepare_osim(SUBJECT, small, [TrialInput(walk)], Settings(), False), "O203")
+    assert "femur_r" in [one.where.part for one in found]
+    for one in found:
+        assert one.severity is Severity.WARNING
+        assert one.evidence["density_kg_m3"].value > one.evidence["density_kg_m3"].limit
 
 
 def test_joints_that_do_not_mirror_each_other_are_said(model, walk, prepared):
-    assert not any("mirror" in warning for warning in prepared.warnings)
+    assert not [one for one in prepared.findings if one.code.startswith("O30")]
     joints = tuple(
         replace(j, translation=j.translation + np.array([0.03, 0.0, 0.0])) if j.child == "talus_r" else j
         for j in model.skeleton.joints
     )
     moved = replace(model, skeleton=replace(model.skeleton, joints=joints))
-    warnings = prepare_osim(SUBJECT, moved, [TrialInput(walk)], Settings(), False).warnings
-    (warning,) = [one for one in warnings if "mirror" in one]
-    assert warning.startswith("users.osim: left and right do not mirror each other in the places")
-    assert "talus_r and talus_l (30 mm)" in warning
+    ready = prepare_osim(SUBJECT, moved, [TrialInput(walk)], Settings(), False)
+    (found,) = [one for one in ready.findings if one.code.startswith("O30")]
+    assert (found.code, found.severity) == ("O303", Severity.WARNING)
+    assert (found.evidence["right"].value, found.evidence["left"].value) == ("talus_r", "talus_l")
+    assert found.evidence["distance_m"].value == pytest.approx(0.03, abs=0.001)
 
 
 def test_markers_in_millimetres_are_refused(model, walk):
     skeleton = model.skeleton.with_places(1000.0 * model.skeleton.marker_locals)
     m = 1000.0 * np.linalg.norm(model.skeleton.marker_locals[model.skeleton.labels.index("Top.Head")])
-    with pytest.raises(OsimError, match=rf"users\.osim: the distance of marker 'Top\.Head' .* is {m:.0f} m; exp"):
+    with blocked("O301") as found:
         prepare_osim(SUBJECT, replace(model, skeleton=skeleton), [TrialInput(walk)], Settings(), False)
+    expect_evidence(found[0], what="marker Top.Head")
+    assert found[0].evidence["length_m"].value == pytest.approx(m, abs=0.5)

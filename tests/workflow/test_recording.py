@@ -7,10 +7,9 @@ from pathlib import Path
 import ezc3d
 import numpy as np
 import pytest
-
-from kinertia.diagnostics.labels.marker_set_match import common_marker_set
 from kinertia.diagnostics.result.verdict import stands_against
-from kinertia.io.marker_set_file import read_marker_set
+
+from kinertia.io.marker_set_file import choose_marker_set, read_marker_set
 from kinertia.io.recording import read_recording
 from kinertia.synthetic.laboratory import LabNoise, record
 from kinertia.synthetic.walk import walk, walking_subject
@@ -29,7 +28,7 @@ def lab():
 
 @pytest.fixture(scope="module")
 def marker_set(lab):
-    return common_marker_set([lab.static, lab.walk])
+    return choose_marker_set(lab.static.markers.labels)
 
 
 def sentences(check, level):
@@ -244,7 +243,7 @@ def test_sound_trials(recording_of, name):
     forces, mass_kg, level, window = WALKS[name]
     recording = recording_of(name, forces)
     own = Path(__file__).parents[1] / "subject4.toml"
-    marker_set = read_marker_set(own) if "subject4" in name else common_marker_set([recording])
+    marker_set = read_marker_set(own) if "subject4" in name else choose_marker_set(recording.markers.labels)
     check = check_recording(recording, marker_set, mass_kg)
     assert not stands_against(check.verdicts)
     assert check.windows[0] == pytest.approx(window, abs=0.03)

@@ -125,9 +125,7 @@ def check(
         else:
             marker_set = None if markers is None else read_marker_set(markers)
             named = files_by_name(measured if static is None else [*measured, static], loads)
-            read = {
-                name: _names(one.markers, one.forces) for name, one in zip(trial_names(named), named, strict=True)
-            }
+            read = {name: _names(one.markers, one.forces) for name, one in zip(trial_names(named), named, strict=True)}
             person = (
                 read_files(named, who, marker_set, overrule, static, lambda share: progress("reading", share))
                 if named

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -23,11 +23,13 @@ from kinertia.findings.finding import Finding, Severity
 from kinertia.findings.where import Where
 from kinertia.model.imported import OsimModel
 from kinertia.model.marker_set import MarkerSet
+from kinertia.motion.kinematics import FEWEST_FRAMES
 from kinertia.settings import Subject
 from kinertia.trial.data import Markers, PlateLoads, Recording, Trial
 from kinertia.trial.ground_contact import FootMarkers
 from kinertia.trial.marker_quality import Travel, travel
 from kinertia.trial.plate_assignment import build_trial
+from kinertia.trial.sampled_time import within
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,13 +143,21 @@ class RecordingContext:
 
     @cached_property
     def loaded(self) -> Trial | KinertiaError | None:
-        """The trial with its loads sorted by foot, the error where that is impossible, None without plates or feet."""
+        """The trial with its loads sorted by foot, the error where that is impossible, None without plates or feet.
+
+        Frames in which more than a toe is beyond its plate are not measured, unless the user vouches for a window, or
+        hardly any others are left.
+        """
         if self.plates is None or self.feet is None:
             return None
         try:
-            return build_trial(self.recording, self.feet, self.window_s)
+            trial = build_trial(self.recording, self.feet, self.window_s)
         except KinertiaError as error:
             return error
+        whole = trial.measured.copy()
+        for one in self.overhangs if self.window_s is None else ():
+            whole &= one.only_toe | ~within(trial.markers.time, *one.span_s)
+        return replace(trial, measured=whole) if whole.sum() >= FEWEST_FRAMES else trial
 
     @property
     def trial(self) -> Trial | None:
@@ -210,6 +220,11 @@ class PersonContext:
     def standing(self) -> Sequence[RecordingContext]:
         """The static trial, or every recording that may be it."""
         return self.more_statics if self.static is None else (self.static, *self.more_statics)
+
+    @property
+    def has_trials(self) -> bool:
+        """Whether trials were given, blocked ones included: a model is not looked at alone."""
+        return bool(self.trials or self.found)
 
     def has_error(self, trial: str, *codes: str) -> bool:
         """Whether an ERROR of one of these codes, questions or families was found in a trial."""

@@ -101,7 +101,7 @@ def _places(where: Where) -> dict[str, Callable[[], str]]:
         "file": lambda: where.file or "the file",
         "line": lambda: str(where.line or "?"),
         "trial": lambda: where.trial or "the trial",
-        "plate": lambda: where.plate or "all plates",
+        "plate": lambda: plate_text(where.plate),
         "axis": lambda: axis_text(where),
         "marker": lambda: where.markers[0] if where.markers else "a marker",
         "other": lambda: where.markers[1] if len(where.markers) > 1 else "another marker",
@@ -110,6 +110,13 @@ def _places(where: Where) -> dict[str, Callable[[], str]]:
         "start": lambda: f"{span[0]:.2f} s",
         "end": lambda: f"{span[1]:.2f} s",
     }
+
+
+def plate_text(name: str | None) -> str:
+    """A plate by its name, which need not say that it is one: "plate left"."""
+    if name is None:
+        return "all plates"
+    return name if re.search("plate|force|belt|platform", name, re.IGNORECASE) else f"plate {name}"
 
 
 def axis_text(where: Where) -> str:

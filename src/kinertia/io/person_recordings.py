@@ -13,7 +13,7 @@ from kinertia.io.recording import read_recording
 from kinertia.io.subject_file import SubjectFile, TrialFiles
 from kinertia.model.marker_set import MarkerSet
 from kinertia.trial.data import Recording
-from kinertia.trial.plate_names import plate_of_trial
+from kinertia.trial.plate_names import with_plates_of_trial
 from kinertia.trial.trial_input import TrialInput
 
 Progress = Callable[[str, float], None]
@@ -60,9 +60,6 @@ def read_trial(wanted: SubjectFile, files: TrialFiles) -> TrialInput:
     started = time.perf_counter()
     recording = read_recording(files.markers, files.forces, files.loads, files.length_unit)
     seconds = time.perf_counter() - started
-    plates = recording.plates
+    recording = replace(recording, name=files.name, belt=read_belt(files.belt_speed_m_s))
     apart = files.forces is not None and len(wanted.trials) > 1 and not wanted.instruments.same_plates
-    if plates is not None and apart:
-        plates = replace(plates, names=tuple(plate_of_trial(name, files.name) for name in plates.names))
-    recording = replace(recording, name=files.name, plates=plates, belt=read_belt(files.belt_speed_m_s))
-    return TrialInput(recording, files.window_s, seconds)
+    return TrialInput(with_plates_of_trial(recording) if apart else recording, files.window_s, seconds)

@@ -111,7 +111,8 @@ def _expect_files(folder: Path) -> list[Path]:
         elif inside:
             listed = ", ".join(_relative(one, folder) for one in inside[:_LISTED]) + (", ..." * (len(inside) > _LISTED))
             problem += f", but its folders {listed} do; give one person's, with the static trial in it"
-        raise FileError.found(folder, "F108", problem=Quantity(problem))
+        action = Quantity("Give a folder with the recordings of one person")
+        raise FileError.found(folder, "F108", problem=Quantity(problem), action=action)
     return files
 
 

@@ -193,11 +193,11 @@ def subject_file_in(folder: Path) -> Path:
     if len(named) == 1:
         return named[0]
     if not named:
-        problem = Quantity(f"holds no subject file; draft one with: kinertia init {folder}")
-        raise FileError.found(folder, "F108", problem=problem)
+        problem, action = Quantity("holds no subject file"), Quantity(f"Draft one: kinertia init {folder}")
+        raise FileError.found(folder, "F108", problem=problem, action=action)
     listed = ", ".join(path.name for path in named)
     problem = Quantity(f"holds several .toml files ({listed}), none of them subject.toml")
-    raise FileError.found(folder, "F108", problem=problem)
+    raise FileError.found(folder, "F108", problem=problem, action=Quantity("Name the subject file itself"))
 
 
 def read_subject(path: str | Path) -> SubjectFile:

@@ -91,7 +91,7 @@ def solve_ik(
 
     Raises:
         MarkerSetError: fewer than three root markers of the skeleton are in the trial.
-        TrialError: no frame has three visible root markers.
+        TrialError: R101, no frame has three visible root markers.
     """
     used = [m for m in skeleton.markers if m.label in markers.labels]
     model = skeleton.with_markers(used)
@@ -99,10 +99,7 @@ def solve_ik(
     q = np.tile([model.start.get(name, 0.0) for name in model.coordinates], (len(measured), 1))
     q[:, :6], placed = _place_root(model, measured, name)
     if not placed.any():
-        raise TrialError(
-            name,
-            "no frame shows three markers of the pelvis; check the labels and the gaps of the pelvis markers",
-        )
+        raise TrialError.found(name, "R101")
     fine, equal = np.flatnonzero(placed), EqualAngles.of(model)
     stop = Stop(gain_tolerance_m2, most_steps)
     choosing = replace(stop, beyond_m2=BEYOND_M2)

@@ -53,11 +53,13 @@ def outcome_parts(people: pd.DataFrame, findings: pd.DataFrame) -> Iterator[Part
         "people",
     )
     without = people[people["verdict"] == ""]
-    rows = [(name, linked(text)) for name, text in zip(without["person"], without["sentence"], strict=True)]
-    more = (f"{len(rows)} people; the others are in people.csv.",) if len(rows) > _MOST_PEOPLE else ()
+    why = [
+        Markup("{}: {}").format(*row) for row in zip(without["person"], map(linked, without["sentence"]), strict=True)
+    ]
+    more = (f"{len(why)} people; the others are in people.csv.",) if len(why) > _MOST_PEOPLE else ()
     yield Part("Verdicts", figure=bars)
-    if rows:
-        yield Part("Not fitted", more, headings=("person", "why"), rows=rows[:_MOST_PEOPLE])
+    if why:
+        yield Part("Not fitted", more, listed=why[:_MOST_PEOPLE])
     if len(findings):
         fitted = set(people["person"][people["verdict"] != ""])
         text = "Every finding: findings.parquet. Open: neither explained by another finding nor overruled."
@@ -65,8 +67,7 @@ def outcome_parts(people: pd.DataFrame, findings: pd.DataFrame) -> Iterator[Part
     if vain := overruled_in_vain(people, findings):
         yield Part("Overruled, but never found", listed=vain)
     if len(findings):
-        meanings = [_meaning(code) for code in sorted(findings["code"].unique())]
-        yield Part("What the codes mean", headings=("code", "detects", "effect", "remedy"), rows=meanings)
+        yield Part("What the codes mean", listed=[_meaning(code) for code in sorted(findings["code"].unique())])
 
 
 def _by_code(findings: pd.DataFrame, fitted: set[str]) -> list[tuple[str, ...]]:
@@ -104,10 +105,10 @@ def overruled_in_vain(people: pd.DataFrame, findings: pd.DataFrame) -> list[str]
     return [f"{code}: {count} people" for code, count in said.most_common() if not found & set(matching(code))]
 
 
-def _meaning(code: str) -> tuple[str, ...]:
+def _meaning(code: str) -> Markup:
     one = rule(code)
-    anchor = Markup('<span id="explain-{}">{}</span>').format(code, code)
-    return anchor, one.detects, outlined(one.effect), outlined(one.remedy)
+    told = (code, code, one.name.replace("-", " "), one.detects, outlined(one.effect), outlined(one.remedy))
+    return Markup('<strong id="explain-{}">{} {}</strong>: {} {} {}').format(*told)
 
 
 def report_of(person: str) -> Markup:

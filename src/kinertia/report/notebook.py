@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from kinertia.estimation.result import Fit, TrialFit
+from kinertia.findings.finding import Severity
 from kinertia.report.finding_view import lines
 from kinertia.report.page import bsp_rows, residual_rows
 from kinertia.report.rendering import rendered
@@ -25,11 +26,12 @@ def fit_html(fit: Fit) -> str:
 
 
 def trial_html(trial: Trial) -> str:
-    """Frames, markers and their gaps, measured windows, peak vertical force under each foot, notes."""
+    """Frames, markers and their gaps, measured windows, peak vertical force under each foot, findings."""
     peaks = trial.loads.force[:, :, 1].max(axis=0, initial=0.0)
     return rendered(
         "notebook_trial.html.j2",
         trial=trial,
+        found=lines(trial.findings, Severity.INFO),
         gappy=_gappy(trial.markers),
         peaks=[float(peak) if peak > LOAD_THRESHOLD_N else None for peak in peaks],
     )
@@ -47,12 +49,13 @@ def trial_fit_html(trial: TrialFit) -> str:
 
 
 def recording_html(recording: Recording) -> str:
-    """Frames, markers and their gaps, plates and the largest vertical force on each, what is known of the person."""
+    """Frames, markers and their gaps, plates and the largest force on each, what is known of the person, findings."""
     plates = recording.plates
     peaks = [] if plates is None else plates.force[:, :, 1].max(axis=0, initial=0.0)
     return rendered(
         "notebook_recording.html.j2",
         recording=recording,
+        found=lines(recording.findings, Severity.INFO),
         gappy=_gappy(recording.markers),
         peaks=[] if plates is None else [(name, float(peak)) for name, peak in zip(plates.names, peaks, strict=True)],
     )

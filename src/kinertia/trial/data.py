@@ -89,17 +89,16 @@ class Markers:
         """These markers only, in this order.
 
         Raises:
-            MarkerSetError: a label is not among the markers; names the ones that look most like it.
+            MarkerSetError: L104, a label is not among the markers; names the ones that look most like it.
         """
         missing = [label for label in labels if label not in self.labels]
         if missing:
             nearest = {label: get_close_matches(label, self.labels, n=3) for label in missing}
             hints = "; ".join(f"'{label}' (nearest: {', '.join(near) or 'none'})" for label, near in nearest.items())
-            raise MarkerSetError(
-                f"the trial has no marker {hints}; give labels that are among its {len(self.labels)} markers",
-                missing,
-                nearest,
-            )
+            likely = Quantity(", ".join(nearest[missing[0]]) or "none")
+            found = finding("L104", Where(markers=tuple(missing)), label=Quantity(missing[0]), nearest=likely)
+            problem = f"the trial has no marker {hints}; give labels that are among its {len(self.labels)} markers"
+            raise MarkerSetError(problem, missing, nearest).with_finding(found)
         columns = [self.labels.index(label) for label in labels]
         return Markers(self.time, tuple(labels), self.positions[:, columns])
 

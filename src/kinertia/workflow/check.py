@@ -28,6 +28,11 @@ class PersonCheck:
     Attributes:
         screened: the person with all findings.
         recordings: what is in each, the static trial first.
+
+    Examples:
+        >>> check = kinertia.check_person(kinertia.read_person(kinertia.read_subject("lab/subject.toml")))
+        >>> check.overview.verdict, [one.context.name for one in check.recordings]
+        ('use', ['static', 'walk'])
     """
 
     screened: Screened

@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path
 
 from kinertia.errors import FileError
+from kinertia.findings.quantity import Quantity
 from kinertia.io.qualisys import is_plate_file
 from kinertia.io.recording import FORCE_FILES, MARKER_FILES, read_recording
 from kinertia.io.subject_draft import STATIC_NAME, matched_by_name
@@ -36,7 +37,7 @@ def files_by_name(files: Sequence[Path], loads: Path | None = None) -> tuple[Rec
     """
     for path in files:
         if path.is_dir():
-            raise FileError(path, "is a folder; give the files in it, or its subject file (kinertia init drafts one)")
+            raise _unpaired(path, "is a folder", "Give the files in it, or a subject file (kinertia init drafts one)")
         if path.suffix.lower() not in (*MARKER_FILES, *FORCE_FILES):
             raise unknown_kind(path)
     marked = [path for path in files if path.suffix.lower() in MARKER_FILES and not is_plate_file(path)]
@@ -45,14 +46,13 @@ def files_by_name(files: Sequence[Path], loads: Path | None = None) -> tuple[Rec
     alone = [path for path in forces if path not in pairs.values()]
     if alone:
         goes = "goes with none of the marker files by its name" if marked else "holds forces only"
-        raise FileError(alone[0], f"{goes}; check it together with its markers ({', '.join(MARKER_FILES)})")
+        raise _unpaired(alone[0], goes, f"Check it together with its markers ({', '.join(MARKER_FILES)})")
     wanted = [RecordingFiles(path, pairs.get(path)) for path in marked]
     if loads is not None:
         having = [k for k, one in enumerate(wanted) if one.forces is not None] or list(range(len(wanted)))
         if len(having) != 1:
-            raise FileError(
-                loads, f"explains one trial's forces, but {len(having)} are given; check one trial at a time"
-            )
+            problem = f"explains one trial's forces, but {len(having)} are given"
+            raise _unpaired(loads, problem, "Check one trial at a time")
         wanted[having[0]] = replace(wanted[having[0]], loads=loads)
     return tuple(wanted)
 
@@ -63,6 +63,10 @@ def trial_names(wanted: Sequence[RecordingFiles]) -> list[str]:
     names = [[path.stem, path.name, str(path)] for path in paths]
     times = [Counter(level) for level in zip(*names, strict=True)]
     return [next((name for k, name in enumerate(each) if times[k][name] == 1), each[-1]) for each in names]
+
+
+def _unpaired(path: Path, problem: str, action: str) -> FileError:
+    return FileError.found(path, "F108", problem=Quantity(problem), action=Quantity(action))
 
 
 def unknown_kind(path: Path) -> FileError:
@@ -99,9 +103,7 @@ def read_files(
         recording = unread.tried(partial(read_recording, one.markers, one.forces, one.loads), name)
         if recording is not None:
             recordings.append(replace(recording, name=name))
-            stands.append(
-                travel(recording.markers).kind == "stands still" if static is None else one.markers == static
-            )
+            stands.append(travel(recording.markers).kind == "stands still" if static is None else one.markers == static)
     unread.expect_any(recordings)
     statics = [one for one, is_static in zip(recordings, stands, strict=True) if is_static]
     moving = [one for one, is_static in zip(recordings, stands, strict=True) if not is_static]

@@ -5,19 +5,24 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from kinertia.findings.finding import finding
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
 from kinertia.model.marker_set import WIDTHS, MarkerSet
 from kinertia.settings import Subject
 from kinertia.trial.data import Recording
 
+_SIDES = {"r": "right", "l": "left"}
+
 
 def with_widths(
     static: Recording, trials: Sequence[Recording], marker_set: MarkerSet, subject: Subject
-) -> tuple[Recording, MarkerSet, list[str]]:
-    """The static trial with all widths that are known, the marker set that names them, and notes.
+) -> tuple[Recording, MarkerSet]:
+    """The static trial with all widths that are known, S105 for each from another file, and the set that names them.
 
     What the subject file says goes before the static trial, and that before the other trials.
     """
-    names, widths_m, notes = dict(marker_set.widths), dict(static.measurements), []
+    names, widths_m, borrowed = dict(marker_set.widths), dict(static.measurements), []
     for joint in WIDTHS:
         key = f"{joint.rpartition('_')[0]}_width_mm"
         given = getattr(subject, key)
@@ -30,5 +35,7 @@ def with_widths(
         other = next((trial for trial in trials if trial.measurements.get(name, 0.0) > 0.0), None)
         if other is not None:
             widths_m[name] = other.measurements[name]
-            notes.append(f"{name} is from {other.name}, {1e3 * widths_m[name]:.0f} mm: {static.name} does not have it")
-    return replace(static, measurements=widths_m), replace(marker_set, widths=names), notes
+            where = Where(file=other.name, part=f"{_SIDES[joint[-1]]} {joint.rpartition('_')[0]}")
+            borrowed.append(finding("S105", where, width_m=Quantity(widths_m[name], "m")))
+    found = (*static.findings, *borrowed)
+    return replace(static, measurements=widths_m, findings=found), replace(marker_set, widths=names)

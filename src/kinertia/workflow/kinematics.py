@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from kinertia.diagnostics.context import RecordingContext
+from kinertia.diagnostics.evidence.copied_frames import without_copied_frames
 from kinertia.errors import TrialError
 from kinertia.estimation.prepared import Progress
 from kinertia.findings.finding import Finding
@@ -32,12 +33,12 @@ class Turned:
 
 
 def seen_markers(context: RecordingContext) -> Trial:
-    """The trial of a recording that can be used, without markers that no frame shows."""
+    """The trial of a recording that can be used, without markers that no frame shows, and without copied frames."""
     trial = context.trial
     assert trial is not None
     seen = trial.markers.seen
     labels = [label for column, label in enumerate(trial.markers.labels) if seen[:, column].any()]
-    return replace(trial, markers=trial.markers.select(labels))
+    return replace(trial, markers=without_copied_frames(trial.markers.select(labels)))
 
 
 @dataclass(frozen=True, eq=False)

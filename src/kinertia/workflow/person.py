@@ -40,6 +40,11 @@ class Person:
         overrule: what the user overrules, for all trials.
         overrule_of: the same of single trials, by their names.
         unread: findings of files that could not be read.
+
+    Examples:
+        >>> person = kinertia.read_person(kinertia.read_subject("lab/subject.toml"))  # the files of `kinertia demo`
+        >>> person.static is None, [one.recording.name for one in person.trials]
+        (False, ['walk'])
     """
 
     subject: Subject
@@ -68,7 +73,8 @@ class Person:
         """Which marker is on which segment, by the model or a marker set; the error where none fits."""
         if self.model is not None:
             return markers_of_model(self.model)
-        labels = (self.static or self.recordings[0]).markers.labels
+        given = [*([] if self.static is None else [self.static]), *self.recordings, *self.more_statics]
+        labels = given[0].markers.labels
         try:
             if self.marker_set is None:
                 return choose_marker_set(labels)

@@ -14,7 +14,6 @@ import numpy as np
 
 from kinertia.diagnostics.model.model_on_person import moved_markers
 from kinertia.diagnostics.model.range_limits import range_findings
-from kinertia.errors import OsimError
 from kinertia.estimation.calibration import adapt, first_poses, hold_uninformed
 from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.estimation.input_checks import check_trials, complete_subject, known
@@ -85,8 +84,7 @@ def prepared_osim(screened: Screened, settings: Settings, progress: Progress = l
     turned = [Turned(seen_markers(one), 0.0, read_s[one.name]) for one in usable]
     trials = [one.trial for one in turned]
     may_hold = {c.name: c.default for c in model.coordinates if c.name not in model.skeleton.coordinates[:6]}
-    feet = _feet(model)
-    skeleton = replace(model.skeleton, feet=(feet["r"][0], feet["l"][0]))
+    skeleton = replace(model.skeleton, feet=_feet(model))
     total = CarriedMass.of(known(subject.mass_kg), person.attached)
     poses = first_poses(skeleton, trials)
     skeleton, idle = hold_uninformed(skeleton, trials, poses, may_hold)
@@ -126,20 +124,12 @@ def prepared_osim(screened: Screened, settings: Settings, progress: Progress = l
     )
 
 
-def _feet(model: OsimModel) -> dict[str, list[str]]:
-    """The bodies of each foot by their names, the heaviest first: it carries the ground reactions.
-
-    Raises:
-        OsimError: there is none.
-    """
+def _feet(model: OsimModel) -> tuple[str, str]:
+    """The heaviest body of each foot by their names, which carries the ground reactions; there is one (O107)."""
     mass = dict(zip(model.bsp.segments, model.bsp.mass_kg.tolist(), strict=True))
-    feet = {}
-    for side, name in zip("rl", ("right", "left"), strict=True):
-        bodies = [body for body in model.skeleton.segments if segment_of(body) == f"foot_{side}"]
-        if not bodies:
-            raise OsimError.found(model.path, "O107", side=Quantity(name))
-        feet[side] = sorted(bodies, key=lambda body: -mass[body])
-    return feet
+    bodies = ([body for body in model.skeleton.segments if segment_of(body) == f"foot_{side}"] for side in "rl")
+    right, left = (max(own, key=mass.__getitem__) for own in bodies)
+    return right, left
 
 
 def _assumed(

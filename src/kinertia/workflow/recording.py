@@ -27,6 +27,11 @@ class RecordingCheck:
         plates: one entry per plate; empty without forces.
         windows: in which every foot on the ground stands on a plate, longest first.
         findings: of this recording, with what explains and what overrules them.
+
+    Examples:
+        >>> check = kinertia.check_recording(kinertia.read_recording("lab/walk.trc", "lab/walk_grf.mot"))
+        >>> check.travel.kind, [plate.name for plate in check.plates], len(check.windows)
+        ('walks', ['1', '2'], 1)
     """
 
     context: RecordingContext

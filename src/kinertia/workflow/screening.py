@@ -111,13 +111,13 @@ def screen(person: Person) -> Screened:
     """Ask everything that can be asked before inverse kinematics."""
     context = person_context(person)
     found = [*person.unread, *_implausible(person)]
-    by_label = person.labels
-    if isinstance(by_label, MarkerSetError) and by_label.finding is not None:
-        found.append(by_label.finding)
     for static in context.standing:
         found += _of_recording(static, STATIC_QUESTIONS)
     for trial in context.trials:
         found += _of_recording(trial, MOTION_QUESTIONS)
+    unmatched = person.labels.finding if isinstance(person.labels, MarkerSetError) else None
+    if unmatched is not None and unmatched.code not in {one.code for one in found}:
+        found.append(unmatched)
     found += _of_person(context, found)
     findings = overruled(explained(found), person.overrule, person.overrule_of)
     return Screened(person, context, tuple(findings))
@@ -152,7 +152,7 @@ def _static_context(person: Person, recording: Recording) -> RecordingContext:
     """Of a recording in which the person stands, with the widths of joints that are known."""
     label_set, stated = _label_set(person), _completed(person)
     if label_set is not None and person.model is None:
-        recording, label_set, _ = with_widths(recording, person.recordings, label_set, person.subject)
+        recording, label_set = with_widths(recording, person.recordings, label_set, person.subject)
     return RecordingContext(recording, label_set, is_static=True, height_m=stated.height_m, mass_kg=stated.mass_kg)
 
 
@@ -195,4 +195,11 @@ def _of_person(context: PersonContext, found: Sequence[Finding]) -> list[Finding
     blocked = {one.where.trial for one in blocking(explained(found))}
     sound = replace(context, trials=[one for one in context.trials if one.name not in blocked], found=tuple(found))
     of_person = [one for one in found if one.where.trial is None]
-    return asked(PERSON_QUESTIONS, sound, of_person)
+    return [_in_model(one, context) for one in asked(PERSON_QUESTIONS, sound, of_person)]
+
+
+def _in_model(one: Finding, context: PersonContext) -> Finding:
+    """A finding about the OpenSim model itself with the name of its file."""
+    if context.model is None or one.where.trial is not None or not one.code.startswith("O"):
+        return one
+    return one.in_file(context.model.path.name)

@@ -185,12 +185,12 @@ def test_two_files_for_one_use_are_an_error(person, c3d_lab):
     assert person.subject.read_text(encoding="utf-8") == before
 
 
-@pytest.mark.parametrize(("mass", "sentence"), [("4150", "mass_kg = 4150"), ("-3", "mass_kg = -3")])
-def test_an_impossible_mass_has_the_command_lines_message(person, c3d_lab, mass, sentence):
+@pytest.mark.parametrize("mass", ["4150", "-3"])
+def test_an_impossible_mass_has_the_command_lines_message(person, c3d_lab, mass):
     put(person, c3d_lab, "static.c3d", "walk.c3d")
     recognise(person)
     write_form(person, {"sex": "male", "mass_kg": mass})
-    assert sentence in trouble(person)
+    assert "S102" in trouble(person)
     assert trouble(person) in " ".join(run("check", person.subject).err.split())
 
 

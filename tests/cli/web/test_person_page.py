@@ -20,7 +20,7 @@ WHOLE = f"[subject]\nsex = 'male'\nmass_kg = 70\nheight_m = 1.8\n[model]\n{STATI
         (STATIC, "", "No file is used as the static trial", "[model] lacks 'static'"),
         (WALK, "", "No file is used as a walk", "[[trial]]: there is no such heading"),
         (WALK, "[[trial]]\n", "No file is used as a walk", "[[trial]] lacks 'markers'"),
-        ("mass_kg = 70\n", "mass_kg = 7000\n", "", "mass_kg = 7000"),
+        ("mass_kg = 70\n", "mass_kg = 7000\n", "", "S102"),
     ],
 )
 def test_what_is_missing_is_said_in_the_words_of_the_form(tmp_path, written, instead, plain, as_the_command_line):

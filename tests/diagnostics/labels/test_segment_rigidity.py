@@ -40,7 +40,7 @@ SOFT_M = {"synthetic/clusters_walk.trc": 0.11, "rajagopal_walk/motion_capture_wa
 WANDS = here(["synthetic/walk.c3d", "pig_c3d/subject_a_walk.c3d"])
 EXCHANGED = [
     *[(name, [(f"R.SH{k}", f"L.SH{k}") for k in (1, 2, 3, 4)], "shank") for name in CLUSTERS],
-    *[(name, [(f"R.TH{k}", f"R.SH{k}") for k in (1, 2, 3)], "shank_r") for name in CLUSTERS],
+    *[(name, [(f"R.TH{k}", f"R.SH{k}") for k in (1, 2, 3)], "right shank") for name in CLUSTERS],
     *[(name, [("R.Heel", "L.Heel"), ("R.Toe", "L.Toe"), ("R.MT5", "L.MT5")], "ankle") for name in CLUSTERS],
     *[(name, [("RTIB", "LTIB")], "shank") for name in WANDS],
     *[(name, [("RTHI", "LTHI")], "thigh") for name in [LOW_WANDS, *here(["pig_c3d/subject_b_walk.c3d"])]],
@@ -159,8 +159,8 @@ def test_what_a_marker_goes_with_instead(name, recording_of):
     markers, marker_set = read(recording_of, name)
     torn = found(relabelled(markers, ("RTIB", "LTIB")), marker_set)
     better = {one.where.markers[0]: one.evidence["better_segment"].value for one in torn if one.code == "L213"}
-    assert better["RTIB"] in ("thigh_l", "shank_l")
-    assert better["LTIB"] in ("thigh_r", "shank_r")
+    assert better["RTIB"] in ("left thigh", "left shank")
+    assert better["LTIB"] in ("right thigh", "right shank")
 
 
 @pytest.mark.parametrize(("name", "segment"), CROSSED)

@@ -4,13 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.signal import butter, sosfiltfilt
 
 from kinertia.diagnostics.evidence.copied_frames import without_copied_frames
 from kinertia.diagnostics.markers.frames import frames
-from kinertia.diagnostics.markers.precision import oversmoothed, precision
+from kinertia.diagnostics.markers.precision import precision
 from kinertia.findings.finding import Severity
-from kinertia.io.marker_set_file import choose_marker_set
 from marker_contexts import context_of
 from recordings import RUNS, WALKS, named_here
 
@@ -129,20 +127,3 @@ def test_noise(walk, sd_m, count):
     noisy = found(replace(walk, positions=walk.positions + noise), precision)
     assert [one.code for one in noisy] == ["M132"] * count
     assert [one.evidence["noise_m"].value for one in noisy] == pytest.approx([sd_m] * count, rel=0.2)
-
-
-@pytest.mark.parametrize("cutoff_hz", [None, 6.0, 2.0])
-@pytest.mark.parametrize("name", WALKS)
-def test_markers_that_were_smoothed(name, cutoff_hz, recording_of):
-    """By 2 Hz the motion that the forces need is gone, by 6 Hz it is not."""
-    walk = recording_of(*WALKS[name])
-    marker_set = choose_marker_set(walk.markers.labels)
-    if cutoff_hz is not None:
-        seen = walk.markers.seen.all(axis=0)
-        positions = walk.markers.positions.copy()
-        low_pass = butter(2, cutoff_hz, output="sos", fs=walk.markers.rate_hz)
-        positions[:, seen] = sosfiltfilt(low_pass, positions[:, seen], axis=0)
-        walk = replace(walk, markers=replace(walk.markers, positions=positions))
-    found = list(oversmoothed(context_of(walk, marker_set)))
-    assert [one.code for one in found] == (["M133"] if cutoff_hz == 2.0 else [])
-    assert all(one.severity is Severity.ERROR and one.evidence["share"].value < 0.002 for one in found)

@@ -41,3 +41,17 @@ def test_sound_ranges_and_arms_are_not_doubted(trial):
     for name, low, high in (("knee_angle_r", -10.0, 120.0), ("knee_angle_r", straight, 120.0), ("arm_add_l", 5.0, 6.0)):
         skeleton, ik = clamped(trial, name, low, high)
         assert [one for one in range_findings(skeleton, ik) if one.code == "O311"] == []
+
+
+def test_a_coordinate_beyond_its_usual_range(trial):
+    """Of a joint that nothing clamps."""
+    knee = trial.motion.q[:, trial.skeleton.coordinates.index("knee_angle_r")]
+    most = float(knee.max() - np.radians(20.0))
+    usual = Range(float(knee.min() - 0.1), most, clamped=False)
+    skeleton = replace(trial.skeleton, ranges={**trial.skeleton.ranges, "knee_angle_r": usual})
+    found = [
+        one for one in range_findings(skeleton, SimpleNamespace(q=trial.motion.q, coordinates=skeleton.coordinates))
+    ]
+    (one,) = (each for each in found if each.where.part == "knee_angle_r")
+    assert one.code == "O312"
+    assert np.degrees(one.evidence["beyond_rad"].value) == pytest.approx(20.0, abs=0.1)

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from kinertia.diagnostics.context import RecordingContext
+from kinertia.diagnostics.labels.landmarks import landmarks
 from kinertia.diagnostics.runner import asked
 from kinertia.diagnostics.subject.questions import STATIC_QUESTIONS
-from kinertia.diagnostics.subject.standing import flat_feet, floor, model_of_static
+from kinertia.diagnostics.subject.standing import flat_feet, floor
 from kinertia.diagnostics.subject.stature import stature
 from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.trial.data import Markers
@@ -89,10 +90,10 @@ def test_a_static_trial_from_which_no_model_can_be_built(standing):
     """A landmark that is not there, and a thigh without length."""
     markers, marks = standing.recording.markers, standing.marker_set.landmarks
     without = markers.select([label for label in markers.labels if label not in marks["asis_r"]])
-    (found,) = model_of_static(replace(standing, recording=with_markers(standing.recording, without)))
+    (found,) = landmarks(replace(standing, recording=with_markers(standing.recording, without)))
     assert (found.code, found.where.part) == ("L105", "pelvis")
     positions = markers.positions.copy()
     at = [markers.labels.index(marks[f"asis_{side}"][0]) for side in "rl"]
     positions[:, at[1]] = positions[:, at[0]]
-    (found,) = model_of_static(moved(standing, positions))
+    (found,) = landmarks(moved(standing, positions))
     assert found.code == "S206"

@@ -30,7 +30,6 @@ def heading(context: RecordingContext) -> Iterator[Finding]:
         "L106",
         context.at(markers=labels),
         absent=Quantity(float(len(absent)), "1"),
-        labels=Quantity(" and ".join(labels)),
     )
 
 

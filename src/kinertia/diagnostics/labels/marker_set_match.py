@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.errors import MarkerSetError
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
-from kinertia.io.marker_set_file import choose_marker_set, nearest_preset
+from kinertia.io.marker_set_file import nearest_preset
 from kinertia.model.marker_set import MarkerSet, is_worn, nearest_labels, no_marker_set, with_nearest
-from kinertia.trial.data import Recording
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,14 +31,6 @@ class MarkerSetMatch:
     n_labels: int
     others: tuple[str, ...]
     of_model: bool
-
-
-def common_marker_set(recordings: Sequence[Recording]) -> MarkerSet | None:
-    """The preset that a fit would choose for one of these recordings of one person; None if for none."""
-    for recording in recordings:
-        with suppress(MarkerSetError):
-            return choose_marker_set(recording.markers.labels)
-    return None
 
 
 def match_labels(labels: Sequence[str], marker_set: MarkerSet | None) -> tuple[MarkerSetMatch, MarkerSet | None]:

@@ -20,7 +20,7 @@ import numpy as np
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.findings.finding import Finding, finding, with_evidence
 from kinertia.findings.quantity import Quantity
-from kinertia.model.marker_set import MarkerSet
+from kinertia.model.marker_set import MarkerSet, in_words
 from kinertia.trial.data import FloatArray, Markers
 
 _SEGMENT_M, _JOINT_M, _USUAL_M = 0.06, 0.10, (0.0, 0.04)
@@ -87,7 +87,7 @@ def _not_rigid(context: RecordingContext, markers: Markers, marker_set: MarkerSe
             continue
         evidence = {
             "change_m": Quantity(worst.change_m, "m", limit=worst.limit_m, usual=_USUAL_M),
-            "segment": Quantity(worst.joined),
+            "segment": Quantity(in_words(worst.joined)),
         }
         better = _better(markers, marker_set, odd, worst.change_m)
         yield with_evidence("L213", context.at(markers=involved), evidence | better)
@@ -114,7 +114,7 @@ def _better(markers: Markers, marker_set: MarkerSet, odd: str, change_m: float) 
     if best < 0 or changes[best] > min(_TOGETHER_M, _MUCH_BETTER * change_m):
         return {}
     return {
-        "better_segment": Quantity(owners[mates[best]]),
+        "better_segment": Quantity(in_words(owners[mates[best]])),
         "better_marker": Quantity(mates[best]),
         "better_change_m": Quantity(float(changes[best]), "m"),
     }

@@ -51,7 +51,7 @@ def missing_inertia(context: PersonContext) -> Iterator[Finding]:
     bsp, estimated = context.model.bsp, _estimated(context)
     for name, mass_kg, radius_m in _radii(bsp):
         if mass_kg > 0 and not radius_m > _NO_EXTENT_M:
-            light = mass_kg < HEAVY_KG and (not context.trials or name not in estimated)
+            light = mass_kg < HEAVY_KG and (not context.has_trials or name not in estimated)
             severity = of_body(context, name, Severity.WARNING if light else Severity.ERROR)
             radius = Quantity(max(radius_m, 0.0), "m", limit=_NO_EXTENT_M)
             yield finding("O202", Where(part=name), severity, mass_kg=Quantity(mass_kg, "kg"), radius_m=radius)
@@ -96,14 +96,14 @@ def of_body(context: PersonContext, name: str, severity: Severity) -> Severity:
 
 def advice(context: PersonContext) -> Severity:
     """A fit takes the model's parameters as a prior only, a simulation takes them as they are."""
-    return Severity.INFO if context.trials else Severity.WARNING
+    return Severity.INFO if context.has_trials else Severity.WARNING
 
 
 def _estimated(context: PersonContext) -> set[str]:
     """Bodies whose parameters a fit would estimate; all of a model that is looked at alone."""
     assert context.model is not None
     model = context.model
-    return estimated_bodies(model.skeleton, model.bsp) if context.trials else set(model.bsp.segments)
+    return estimated_bodies(model.skeleton, model.bsp) if context.has_trials else set(model.bsp.segments)
 
 
 def _radii(bsp: BodySegmentParameters) -> list[tuple[str, float, float]]:

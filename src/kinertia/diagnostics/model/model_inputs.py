@@ -17,9 +17,9 @@ def markers_and_feet(context: PersonContext) -> Iterator[Finding]:
     if model is None:
         return
     if not model.skeleton.markers:
-        yield finding("O106", None, Severity.ERROR if context.trials else Severity.INFO, count=Quantity(0, "1"))
+        yield finding("O106", None, Severity.ERROR if context.has_trials else Severity.INFO, count=Quantity(0, "1"))
     for side, foot in (("r", "right foot"), ("l", "left foot")):
-        if context.trials and not any(segment_of(body) == f"foot_{side}" for body in model.skeleton.segments):
+        if context.has_trials and not any(segment_of(body) == f"foot_{side}" for body in model.skeleton.segments):
             yield finding("O107", Where(part=foot), expected=Quantity(f"calcn_{side} or foot_{side}"))
 
 

@@ -86,9 +86,9 @@ def model_mass(context: PersonContext) -> Iterator[Finding]:
         return
     model_kg = context.model.bsp.total_mass_kg
     off = abs(model_kg / stated_kg - 1.0)
-    if off <= (ERROR_SHARE if context.trials else WARNING_SHARE):
+    if off <= (ERROR_SHARE if context.has_trials else WARNING_SHARE):
         return
-    severity = Severity.ERROR if off > ERROR_SHARE and not context.trials else Severity.WARNING
+    severity = Severity.ERROR if off > ERROR_SHARE and not context.has_trials else Severity.WARNING
     limit = stated_kg * (1.0 + (WARNING_SHARE if model_kg > stated_kg else -WARNING_SHARE))
     yield finding(
         "O213", None, severity, model_kg=Quantity(model_kg, "kg", limit=limit), stated_kg=Quantity(stated_kg, "kg")
@@ -133,7 +133,7 @@ def arms_in_torso(context: PersonContext) -> Iterator[Finding]:
 
 def compared_with_tables(context: PersonContext) -> Iterator[Finding]:
     """O415: what of a model that is looked at alone was not compared, and why."""
-    if context.model is None or context.trials:
+    if context.model is None or context.has_trials:
         return
     subject = context.subject
     stated = (("mass_kg", "mass"), ("height_m", "stature"), ("sex", "sex"))
@@ -156,7 +156,7 @@ def _checked(context: PersonContext) -> ModelCheck | None:
     if model is None or subject.height_m is None or subject.sex is None:
         return None
     bsp, mass_kg = model.bsp, subject.mass_kg if context.total_mass is None else context.total_mass.body_kg
-    if context.trials and mass_kg is not None:
+    if context.has_trials and mass_kg is not None:
         factor = mass_kg / bsp.total_mass_kg
         bsp = BodySegmentParameters(bsp.segments, factor * bsp.mass_kg, bsp.com_m, factor * bsp.inertia_kgm2)
     return check_model(model.skeleton, bsp, mass_kg, subject.height_m, subject.sex)

@@ -98,8 +98,3 @@ def plate_edges(context: RecordingContext) -> Iterator[Finding]:
             overhang_m=Quantity(one.overhang_m, "m", limit=OVERHANG_M),
             foot=Quantity(FOOT_NAMES[one.foot]),
         )
-
-
-def partly_unmeasured(context: RecordingContext) -> list[tuple[float, float]]:
-    """First and last time (s) of what a preparation leaves out: more than a toe of a loaded foot is off its plate."""
-    return [one.span_s for one in context.overhangs if not one.only_toe]

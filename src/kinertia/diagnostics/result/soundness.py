@@ -97,7 +97,10 @@ def _far_parameters(fit: Fit) -> Iterator[Finding]:
 
 
 def _parameter(fit: Fit, row: int, parameter: str) -> Where:
-    return Where(part=f"{parameter} of {fit.estimate.segments[row]}")
+    kind, _, axis = parameter.partition("_")
+    words = {"mass": "mass", "com": "centre of mass"}.get(kind, f"moment of inertia {parameter}")
+    along = f" along {axis}" if axis else ""
+    return Where(part=f"{words}{along} of {fit.estimate.segments[row]}")
 
 
 def _far_centres(fit: Fit) -> Iterator[Finding]:

@@ -63,6 +63,15 @@ class Suitability:
         use: "use", "use with care" or "do not use".
         reason: with a number.
         codes: of the findings that lower it.
+
+    Examples:
+        >>> for one in kinertia.suitability(fit, fit.findings):
+        ...     print(one.output)
+        joint moments
+        segment masses
+        centres of mass
+        moments of inertia
+        motion
     """
 
     output: str

@@ -1,4 +1,4 @@
-"""Does the static trial show a person who stands on the floor with both feet flat, and can a model be built from it?"""
+"""Does the static trial show a person who stands on the floor with both feet flat?"""
 
 from __future__ import annotations
 
