@@ -91,7 +91,7 @@ def test_numbers_and_sex_as_people_write_them(subjects, tmp_path):
     wrong = subjects / "ben.toml"
     wrong.write_text(wrong.read_text().replace("72.6", "72,6"))
     outcome = run("fit", wrong, "-o", tmp_path / "out")
-    assert "a number has a decimal point, not a comma: 72.6" in outcome.err
+    assert "a decimal point, not a comma: 72.6" in outcome.err
 
 
 def test_check_tells_scripts_what_it_tells_people(subjects):
