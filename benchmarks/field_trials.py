@@ -22,7 +22,7 @@ import pandas as pd
 
 from kinertia.cli.app import main as kinertia
 from kinertia.diagnostics.result.soundness import CONTRADICTION_SD
-from measured_trials import farthest, table
+from measured_trials import farthest, table, told
 from walks import WALKS, fit_arguments
 
 DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "field-trials.md"
@@ -161,7 +161,7 @@ def document(runs: dict[str, dict[str, Any]]) -> str:
                 f"{outcome['seconds']:.0f}",
             ]
         )
-        warnings += [f"- {title}: {warning}." for warning in fit["warnings"]]
+        warnings += [f"- {title}: {each}" for each in told(fit)]
     heads = ["trial", "exit status", "cutoff before (Hz)"]
     heads += [f"{unit}, {stage}" for unit in ("N", "N m") for stage in ("before", "after")]
     heads += ["markers, before / after (mm)", "converged, parameters beyond 3 sd (farthest)", "s"]

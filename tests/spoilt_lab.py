@@ -30,14 +30,22 @@ class Refusal:
     @property
     def blocking(self):
         """Open errors that nothing else explains."""
-        return [
-            one for one in self.findings if (one["severity"], one["status"], one["muted_by"]) == ("ERROR", "open", None)
-        ]
+        return blocking(self.findings)
 
     @property
     def codes(self):
         """Their codes, each once."""
-        return list(dict.fromkeys(one["code"] for one in self.blocking))
+        return blocking_codes(self.findings)
+
+
+def blocking(findings):
+    """Open errors, in findings as scripts get them, that nothing else explains."""
+    return [one for one in findings if (one["severity"], one["status"], one["muted_by"]) == ("ERROR", "open", None)]
+
+
+def blocking_codes(findings):
+    """Their codes, each once."""
+    return list(dict.fromkeys(one["code"] for one in blocking(findings)))
 
 
 def refused(lab, walk="walk.trc", **changes):

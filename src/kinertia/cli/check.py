@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -25,17 +25,23 @@ from kinertia.model.anthropometry import check_subject
 from kinertia.report.check_page import save_check_page
 from kinertia.settings import Subject
 from kinertia.workflow.check import ModelOverview, PersonCheck, check_osim, check_person
-from kinertia.workflow.files import files_by_name, read_files
+from kinertia.workflow.files import files_by_name, read_files, trial_names
 from kinertia.workflow.person import Person, read_person
 from kinertia.workflow.recording import RecordingCheck
 
 
 @dataclass(frozen=True, eq=False)
 class _Checked:
-    """Everything that was asked for."""
+    """Everything that was asked for, and which files each recording is from."""
 
     person: PersonCheck | None
-    models: Sequence[ModelOverview] = field(default=())
+    models: Sequence[ModelOverview]
+    files: Mapping[str, str]
+
+    def facts(self, recording: RecordingCheck) -> list[tuple[str, str]]:
+        """Which files it is from, and what is in them."""
+        files = self.files.get(recording.context.name)
+        return [*([] if files is None else [("files", files)]), *recording.facts()]
 
     @property
     def overviews(self) -> list[Overview]:
@@ -113,16 +119,22 @@ def check(
         if subjects:
             wanted = read_subject(subjects[0])
             person: Person | None = read_person(wanted, progress).with_overrule(overrule)
+            read = {one.name: _names(one.markers, one.forces) for one in wanted.trials}
+            if wanted.model.static is not None:
+                read[wanted.model.static.stem] = wanted.model.static.name
         else:
             marker_set = None if markers is None else read_marker_set(markers)
             named = files_by_name(measured if static is None else [*measured, static], loads)
+            read = {name: _names(one.markers, one.forces) for name, one in zip(trial_names(named), named, strict=True)}
             person = (
                 read_files(named, who, marker_set, overrule, static, lambda share: progress("reading", share))
                 if named
                 else None
             )
         checked = _Checked(
-            None if person is None else check_person(person), [check_osim(one, who, overrule) for one in osim]
+            None if person is None else check_person(person),
+            [check_osim(one, who, overrule) for one in osim],
+            read,
         )
     recordings = () if checked.person is None else checked.person.recordings
     page = None if output is None else save_check_page(checked.overviews, recordings, checked.models, output)
@@ -135,6 +147,10 @@ def _holds_subject_file(path: Path) -> bool:
     return path.is_dir() and any(each.suffix.lower() == ".toml" for each in path.iterdir())
 
 
+def _names(markers: Path, forces: Path | None) -> str:
+    return markers.name if forces is None else f"{markers.name}, {forces.name}"
+
+
 def _for_scripts(checked: _Checked) -> dict[str, Any]:
     """The same for scripts."""
     findings = [one.to_dict() for overview in checked.overviews for one in overview.findings]
@@ -143,7 +159,7 @@ def _for_scripts(checked: _Checked) -> dict[str, Any]:
         "verdict": [one.verdict for one in checked.overviews],
         "rules_run": sum(one.rules for one in checked.overviews),
         "findings": findings,
-        "recordings": [{"name": one.context.name, "facts": dict(one.facts())} for one in recordings],
+        "recordings": [{"name": one.context.name, "facts": dict(checked.facts(one))} for one in recordings],
         "models": [{"name": one.name, "facts": dict(one.facts.facts())} for one in checked.models],
     }
 
@@ -152,7 +168,7 @@ def _show(checked: _Checked, page: Path | None, verbose: bool) -> None:
     """The verdict, at most three findings, and with `verbose` everything that is in the files."""
     if verbose and checked.person is not None:
         for recording in checked.person.recordings:
-            _show_recording(recording)
+            _show_recording(recording, checked.facts(recording))
     for model in checked.models if verbose else ():
         _show_model(model)
     for overview in checked.overviews:
@@ -177,8 +193,8 @@ def _show_model(model: ModelOverview) -> None:
     out.print(table)
 
 
-def _show_recording(recording: RecordingCheck) -> None:
-    _show_facts(recording.context.name, recording.facts())
+def _show_recording(recording: RecordingCheck, facts: Sequence[tuple[str, str]]) -> None:
+    _show_facts(recording.context.name, facts)
     shown = [one for one in recording.markers if one.share < 1.0]
     if shown:
         gaps = plain_table("marker", "seen\n(%)", "longest gap\n(s)")

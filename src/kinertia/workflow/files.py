@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -60,6 +61,14 @@ def _unpaired(path: Path, problem: str, action: str) -> FileError:
     return FileError.found(path, "F108", problem=Quantity(problem), action=Quantity(action))
 
 
+def trial_names(wanted: Sequence[RecordingFiles]) -> list[str]:
+    """What the recordings are called: as their marker files, with as much of the path as tells them apart."""
+    paths = [one.markers for one in wanted]
+    names = [[path.stem, path.name, str(path)] for path in paths]
+    times = [Counter(level) for level in zip(*names, strict=True)]
+    return [next((name for k, name in enumerate(each) if times[k][name] == 1), each[-1]) for each in names]
+
+
 def unknown_kind(path: Path) -> FileError:
     """The error of a file that is none of those that can be checked."""
     known = ", ".join(dict.fromkeys((*MARKER_FILES, *FORCE_FILES, ".toml", ".osim")))
@@ -88,16 +97,14 @@ def read_files(
     Raises:
         KinertiaError: no recording can be read.
     """
-    unread, recordings = Unread(), []
-    for k, one in enumerate(wanted):
+    unread, recordings, stands = Unread(), [], []
+    for k, (name, one) in enumerate(zip(trial_names(wanted), wanted, strict=True)):
         progress(k / len(wanted))
-        recording = unread.tried(partial(read_recording, one.markers, one.forces, one.loads), one.markers.stem)
-        recordings += [] if recording is None else [recording]
+        recording = unread.tried(partial(read_recording, one.markers, one.forces, one.loads), name)
+        if recording is not None:
+            recordings.append(replace(recording, name=name))
+            stands.append(travel(recording.markers).kind == "stands still" if static is None else one.markers == static)
     unread.expect_any(recordings)
-    if static is None:
-        stands = [travel(one.markers).kind == "stands still" for one in recordings]
-    else:
-        stands = [one.name == static.stem for one in recordings]
     statics = [one for one, is_static in zip(recordings, stands, strict=True) if is_static]
     moving = [one for one, is_static in zip(recordings, stands, strict=True) if not is_static]
     return Person(

@@ -182,7 +182,8 @@ def _causes(
         if heavier and one.mass_kg - stated_kg > _LOAD_KG:
             return (other, _STATED, _PLATES), "Declare what was worn or carried as [[attached]], or correct the mass"
         return (_STATED, _PLATES, other), "Check the mass, and gain and zero of the plates"
-    return (_STATED, other, _PLATES), "Correct the mass"
+    carried = ", or declare what was worn or carried as [[attached]]" if heavier else ""
+    return (_STATED, other, _PLATES), f"Correct the mass{carried}"
 
 
 def _near(ratio: float, wanted: float) -> bool:
