@@ -1,14 +1,12 @@
 """A synthetic laboratory's files, which stand in for measured ones in tests where these are not there.
 
 One person, symmetric, with the markers of the Cleveland Clinic: `static.trc`, `walk.trc` with `walk_grf.mot` and the
-ExternalLoads file `walk_grf.xml`, a scaled model `scaled.osim`. Other trials, as `.trc` and `_grf.mot`: `other` (a
+ExternalLoads file `walk_grf.xml`, a scaled model `scaled.osim`, and the same as users have theirs, `users.osim`
+(`users_model`). Other trials, as `.trc` and `_grf.mot`: `other` (a
 faster walk), `alike` (one that is nearly as fast), and with all ground contact measured (`synthetic_motions`) `long` (a
 walk), `run` and `squats`. In C3D, with the markers of Plug-in Gait and the widths of knees and ankles: `static.c3d`
 and `walk.c3d`. And without forces, with clusters of markers (`synthetic_clusters`): `clusters_static.trc` and
 `clusters_walk.trc`.
-ExternalLoads file `walk_grf.xml`, a second walk `other.trc` with `other_grf.mot`, a scaled model `scaled.osim`, and
-the same as users have theirs, `users.osim` (`users_model`). And in
-C3D, with the markers of Plug-in Gait and the widths of knees and ankles: `static.c3d` and `walk.c3d`.
 """
 
 from __future__ import annotations
