@@ -23,7 +23,7 @@ LONGEST_WINDOW_S = {
     "pig_a": (2.70, 3.75),
     "pig_b": (2.88, 3.70),
 }
-"""Outside these times a foot is on the ground and on no plate (gait2354: the trial ends), or beyond its edge (pig_b)."""
+"""Outside these times a foot is on the ground and on no plate (gait2354: the trial ends), or beyond one (pig_b)."""
 
 
 @walks
