@@ -17,8 +17,11 @@ from rich.console import Console
 
 from command_line import fitted, run
 from kinertia.cli import terminal
-from kinertia.cli.fit_report import report_fit
-from kinertia.diagnostics.result.verdict import CAUTION_FORCE_N, CAUTION_MOMENT_NM, PEAK_FORCE_SHARE, Verdict
+from kinertia.cli.fit_report import report_tables
+from kinertia.diagnostics.result.residuals import FORCE, MOMENT, PEAK_FORCE_SHARE
+from kinertia.findings.finding import Severity, finding
+from kinertia.findings.quantity import Quantity
+from kinertia.report.files import summary
 from synthetic_lab import synthetic_arguments
 
 
@@ -38,13 +41,14 @@ def test_help_reads_like_a_manual():
     assert steps == sorted(steps)
     for status in (
         "0 done",
-        "1 done, but a check failed",
-        "2 an error in files or options, reported in one line",
+        "1 done, but an ERROR was found",
+        "2 nothing could be computed: errors in files or options, one line each",
         "70 Kinertia itself failed",
         "130 interrupted",
     ):
         assert status in text
-    for limit in (*CAUTION_FORCE_N, *CAUTION_MOMENT_NM, 100 * PEAK_FORCE_SHARE):  # the manual says what the verdicts do
+    # the manual says what the rules do
+    for limit in (*FORCE.acceptable, *MOMENT.acceptable, 100 * PEAK_FORCE_SHARE):
         assert f" {limit:g} " in text
     assert "no such option" in run("fit", "--nonsense").err.lower()
 
@@ -63,34 +67,50 @@ def test_installed_command():
     done = subprocess.run([sys.executable, "-c", "from kinertia.cli.app import main; main()", "fit", "no.toml"],
                           capture_output=True, text=True, check=False)  # fmt: skip
     assert done.returncode == 2
-    assert re.fullmatch(r"error: .*no\.toml: no such file; .*\n", done.stderr)
+    assert re.fullmatch(r"error: .*no\.toml: F101 .*\n", done.stderr)
 
 
 @pytest.mark.slow
-def test_final_print_is_short_readable_and_says_what_was_used(fit_of):
+def test_final_print_is_verdict_three_findings_and_where_the_results_are(fit_of):
     fit = fit_of("synthetic")
-    lines = fit.outcome.out.splitlines()
-    assert max(len(line) for line in lines if not line.startswith("results in ")) <= 80
-    assert len(lines) < 80
-    text = " ".join(fit.outcome.out.split())
-    trial, mass = fit.trial, fit.summary["total_mass_kg"]
-    assert "72.6 kg, 1.803 m, male; method simultaneous; marker set: Cleveland Clinic" in text
-    assert f"{trial['n_dynamic_frames']} of {trial['n_frames']} frames" in text
-    for unit, kind in (("N", "force"), ("Nm", "moment")):
-        rms, top = trial[f"residual_{kind}_rms_{unit}"], trial[f"residual_{kind}_max_{unit}"]
-        shown = " ".join(f"{rms[s]:.1f} ({top[s]:.1f})" for s in ("literature", "corrected", "estimate"))
-        assert shown in text
-        rms, top = (trial[f"full_residual_{kind}_{size}_{unit}"]["estimate"] for size in ("rms", "max"))
-        assert f" {rms:.1f} ({top:.1f}) {'N m' if unit == 'Nm' else 'N'}" in text.partition("full bandwidth")[2]
-    assert f"{trial['cutoff_hz']:.3g} Hz {trial['cutoff_hz']:.3g} Hz {trial['motion_hz']:.3g} Hz" in text
-    assert (
-        f"stated {mass['measured']:.1f}, literature {mass['literature']:.1f}, estimate {mass['estimate']:.1f}" in text
-    )
-    assert "…" not in text
-    for warning in fit.summary["warnings"]:
-        assert f"warning: {warning}" in text
-    for segment in ("pelvis", "torso", "thigh_r", "upper_arm_r"):
-        assert re.search(rf"{segment} literature [\d.]+ -?\d+ ", text)
+    first, *found, last = fit.outcome.out.splitlines()
+    severities = [
+        one["severity"] for one in fit.summary["findings"] if (one["status"], one["muted_by"]) == ("open", None)
+    ]
+    assert first.startswith(f"{fit.summary['verdict']}: ")
+    assert f"{fit.summary['rules_run']} rules, 1 of 1 trials" in first
+    assert len([line for line in found if line.startswith(("ERROR", "WARNING", "CORRECTED"))]) <= 3
+    assert all(not line.startswith("INFO") for line in found)
+    assert f"{severities.count('INFO')} assumption" in " ".join(found)
+    assert last == f"results in {fit.folder}"
+
+
+def test_tables_are_short_readable_and_say_what_was_used(fit, two_level):
+    for one in (fit, two_level):
+        with terminal.out.capture() as captured:
+            report_tables(one)
+        lines = captured.get().splitlines()
+        assert max(len(line) for line in lines if not line.startswith("assumed: ")) <= 80
+        assert len(lines) < 90
+        text = " ".join(captured.get().split())
+        told = summary(one)
+        (trial,), mass = told["trials"], told["total_mass_kg"]
+        assert f"72.6 kg, 1.803 m, male; method {one.settings.method}; marker set: Cleveland Clinic" in text
+        assert f"{trial['n_dynamic_frames']} of {trial['n_frames']} frames" in text
+        for unit, kind in (("N", "force"), ("Nm", "moment")):
+            rms, top = trial[f"residual_{kind}_rms_{unit}"], trial[f"residual_{kind}_max_{unit}"]
+            assert " ".join(f"{rms[s]:.1f} ({top[s]:.1f})" for s in ("literature", "corrected", "estimate")) in text
+            rms, top = (trial[f"full_residual_{kind}_{size}_{unit}"]["estimate"] for size in ("rms", "max"))
+            assert f" {rms:.1f} ({top:.1f}) {'N m' if unit == 'Nm' else 'N'}" in text.partition("full bandwidth")[2]
+        assert f"{trial['cutoff_hz']:.3g} Hz {trial['cutoff_hz']:.3g} Hz {trial['motion_hz']:.3g} Hz" in text
+        shown = [f"{name} {mass[source]:.1f}" for name, source in MASSES.items()]
+        assert ", ".join(shown) in text
+        assert "…" not in text
+        for segment in ("pelvis", "torso", "thigh_r", "upper_arm_r"):
+            assert re.search(rf"{segment} literature [\d.]+ -?\d+ ", text)
+
+
+MASSES = {"stated": "measured", "literature": "literature", "estimate": "estimate"}
 
 
 @pytest.mark.slow
@@ -142,7 +162,7 @@ def test_init_then_fill_in_then_fit(person):
     assert f"wrote {path}" in drafted.out
     refusal = run("fit", path, "-o", person / "out")
     assert refusal.status == 2
-    assert "[subject] lacks 'sex'" in refusal.err
+    assert re.search(r"subject\.toml, line \d+: F191 .*\[subject\] lacks 'sex'", refusal.err)
     text = path.read_text()
     assert text.count("# sex = ") == 1
     text = re.sub(r'# sex = "\w+"', 'sex = "male"', text).replace("[[trial]]", "[[trial]]\nwindow_s = [1.2, 1.45]")
@@ -151,8 +171,10 @@ def test_init_then_fill_in_then_fit(person):
     assert fit.summary["subject"]["name"] == "anna [b]"
     assert fit.summary["subject"]["mass_kg"] == pytest.approx(72.6, abs=0.1)
     assert fit.trial["window_s"] == pytest.approx([1.2, 1.45])
-    assert "anna [b]: 72.6 kg" in fit.outcome.out
-    assert "walk: 1.200 to 1.450 s used" in " ".join(fit.outcome.out.split())
+    assert f"results in {fit.folder}" in fit.outcome.out
+
+
+NOT_CONVERGED = finding("R201", iterations=Quantity(30, "1"))
 
 
 @pytest.fixture
@@ -160,9 +182,9 @@ def fit_at_once(monkeypatch, short_fit, person):
     """`kinertia fit` with these options on a fit that is there already and did not converge; counts its runs."""
     done = []
 
-    def run_fit(wanted, progress):
+    def run_fit(wanted, progress, overrule):
         done.append(1)
-        return replace(short_fit, converged=False)
+        return replace(short_fit, converged=False, findings=fit.findings)
 
     monkeypatch.setattr("kinertia.cli.fit.fit_subject", run_fit)
 
@@ -170,27 +192,31 @@ def fit_at_once(monkeypatch, short_fit, person):
         return run("fit", person / "walk.c3d", "--static", person / "static.c3d", "--sex", "male", *options)
 
     fit.runs = done
+    sound = [one for one in short_fit.findings if one.severity is not Severity.ERROR]
+    fit.findings = (*sound, NOT_CONVERGED)
     return fit
 
 
-def test_a_failed_check_is_status_1_and_the_results_are_there(fit_at_once, tmp_path):
+def test_an_error_of_the_result_is_status_1_and_the_results_are_there(fit_at_once, tmp_path):
     outcome = fit_at_once("-o", tmp_path / "out")
     assert outcome.status == 1
-    assert "fail: the estimate did not converge" in outcome.out
-    assert json.loads((tmp_path / "out" / "fit.json").read_text())["converged"] is False
-    assert "assumed: " not in outcome.out
+    assert outcome.out.startswith("do not use: 1 error; ")
+    assert "\nERROR  R201 " in outcome.out
+    told = json.loads((tmp_path / "out" / "fit.json").read_text())
+    assert (told["converged"], told["verdict"]) == (False, "do not use")
+    assert [one["code"] for one in told["findings"] if one["severity"] == "ERROR"] == ["R201"]
+    assert "INFO  " not in outcome.out
     loud = fit_at_once("-o", tmp_path / "out", "--verbose")
     assert "assumed: marker set: Plug-in Gait" in loud.out
     assert "early: seconds: read 0.2" in " ".join(loud.out.split())
-    assert loud.out.count("pass: ") > outcome.out.count("pass: ")
+    assert loud.out.count("INFO  ") > 0
 
 
-def test_no_failed_check_is_status_0(fit_at_once, tmp_path, monkeypatch):
-    monkeypatch.setattr("kinertia.cli.fit.verdicts", lambda fit: [Verdict("caution", "so so"), Verdict("pass", "fine")])
+def test_warnings_are_status_0(fit_at_once, tmp_path):
+    fit_at_once.findings = (*fit_at_once.findings[:-1], NOT_CONVERGED.at(Severity.WARNING))
     outcome = fit_at_once("-o", tmp_path / "out")
     assert outcome.status == 0
-    assert "caution: so so" in outcome.out
-    assert "pass: 1 of 2 checks" in outcome.out
+    assert outcome.out.startswith("use with care: ")
 
 
 def test_a_fit_with_a_model_says_model_and_what_is_kept(fit):
@@ -198,7 +224,7 @@ def test_a_fit_with_a_model_says_model_and_what_is_kept(fit):
     prior_sd[-1] = sd[-1] = 0.0
     posterior = replace(fit.posterior, prior_sd=prior_sd, sd=sd)
     with terminal.out.capture() as captured:
-        report_fit(replace(fit, posterior=posterior, file=SimpleNamespace(bsp=fit.estimate)))
+        report_tables(replace(fit, posterior=posterior, file=SimpleNamespace(bsp=fit.estimate)))
     shown = captured.get()
     assert "literature" not in shown.replace("from the literature", "")
     assert re.search(r"RMS \(max\), +model +corrected +estimate", shown)
@@ -366,7 +392,7 @@ def test_trouble_with_the_disk_is_one_line(person, monkeypatch):
     def denied(*_, **__):
         raise PermissionError(13, "Permission denied", "/somewhere")
 
-    monkeypatch.setattr("kinertia.workflow.from_files.read_recording", denied)
+    monkeypatch.setattr("kinertia.io.person_recordings.read_recording", denied)
     outcome = run("fit", person / "walk.c3d", "--static", person / "static.c3d", "--sex", "male", "-o", person / "out")
     assert outcome.status == 2
     assert outcome.err.splitlines()[-1].startswith("error: /somewhere: Permission denied; check")

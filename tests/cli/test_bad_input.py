@@ -42,7 +42,9 @@ def test_missing_file(lab, key, name, nearest):
 
 
 def test_folder_without_a_subject_file(lab):
-    expect_found(refused(lab, "../lab", **COMMAND), "F108", {"file": "lab"}, problem="kinertia init")
+    expect_found(
+        refused(lab, "../lab", **COMMAND), "F108", {"file": "lab"}, problem="no subject file", action="kinertia init"
+    )
 
 
 def test_missing_subject_file(lab):

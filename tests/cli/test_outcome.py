@@ -51,12 +51,14 @@ def test_markers_says_which_preset_is_recognised(c3d_lab, tmp_path):
 
 def test_check_says_what_it_shows_and_fails_as_without(c3d_lab, tmp_path):
     content = told("check", c3d_lab / "walk.c3d")
-    assert content["recordings"][0]["name"] == "walk.c3d"
+    assert content["recordings"][0]["name"] == "walk"
+    assert (content["verdict"], content["rules_run"] > 100) == (["use"], True)
     content = told("check", c3d_lab / "walk.c3d", "--mass", 90, status=1)
-    assert "fail" in {verdict["level"] for verdict in content["recordings"][0]["verdicts"]}
+    (found,) = [one for one in content["findings"] if one["severity"] == "ERROR"]
+    assert (found["code"], found["status"], found["evidence"]["stated_kg"]["value"]) == ("S111", "open", 90)
     (tmp_path / "broken.c3d").write_bytes(b"no motion" * 100)
     content = told("check", tmp_path / "broken.c3d", status=2)
-    assert len(content["errors"]) == 1
+    assert [one["code"] for one in content["findings"]] == ["F103"]
 
 
 def test_demo_sets_the_estimate_beside_the_truth(demo_run, tmp_path, monkeypatch):
@@ -88,7 +90,7 @@ def test_fit_has_the_rows_of_its_table(demo_run, tmp_path):
 
 
 def test_instruments_says_what_its_file_holds(measured_demo, c3d_lab, tmp_path, monkeypatch):
-    monkeypatch.setattr(instruments_module, "fit_subject", lambda wanted, progress: measured_demo.fit)
+    monkeypatch.setattr(instruments_module, "fit_subject", lambda wanted, *_: measured_demo.fit)
     content = told("instruments", c3d_lab / "subject.toml", "-o", tmp_path / "instruments.toml")
     (person,) = read_session(Path(content["file"]))
     assert content["people"] == [person.name]
@@ -127,10 +129,12 @@ def test_app_prints_its_address_first(monkeypatch, tmp_path):
     assert content["library"] == str(tmp_path)
 
 
-def test_an_error_is_no_result(tmp_path):
+def test_an_error_is_json_and_a_line(tmp_path):
     outcome = run("init", tmp_path, "--json")
-    assert (outcome.status, outcome.out) == (2, "")
-    assert "holds no file of markers" in outcome.err
+    content = json.loads(outcome.out)
+    assert (outcome.status, outcome.err) == (2, f"error: {content['error']}\n")
+    (found,) = content["findings"]
+    assert (found["code"], found["where"]) == ("F108", {"file": tmp_path.name})
 
 
 def test_words_come_back_after_a_command_for_scripts(c3d_lab):

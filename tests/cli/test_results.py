@@ -96,7 +96,7 @@ def test_a_folder_without_results_is_told(tmp_path, monkeypatch, command):
 def test_fit_takes_a_folder_with_a_subject_file(tmp_path):
     outcome = run("fit", tmp_path, "-o", tmp_path / "out")
     assert outcome.status == 2
-    assert "holds no subject file; draft one with: kinertia init" in " ".join(outcome.err.split())
+    assert "holds no subject file. Draft one: kinertia init" in " ".join(outcome.err.split())
     (tmp_path / "subject.toml").write_text("[subject]\nmas_kg = 60.0\n")
     outcome = run("fit", tmp_path, "-o", tmp_path / "out")
     assert "subject.toml, line 2" in outcome.err

@@ -278,7 +278,7 @@ WALKS = {
     "gait2354/subject01_walk1.trc": ("gait2354/subject01_walk1_grf.mot", 72.6, (0.0, 2.5)),
     "rajagopal_walk/motion_capture_walk.trc": ("rajagopal_walk/grf_walk.mot", 84.0, (0.48, 1.95)),
     "pig_c3d/subject_a_walk.c3d": (None, 41.5, (2.76, 3.58)),
-    "pig_c3d/subject_b_walk.c3d": (None, 47.5, (2.64, 3.52)),
+    "pig_c3d/subject_b_walk.c3d": (None, 47.5, (2.89, 3.52)),
     "subject4/squats1.trc": ("subject4/squats1_grf.mot", 60.0, (0.0, 13.45)),
 }
 

@@ -56,13 +56,13 @@ Or, with fit --model, your scaled OpenSim model (.osim), trials and body mass.
 [bold]Exit status[/]
 
   0  done
-  1  done, but do not use it: an ERROR is open. In fit: not converged; physically
-     impossible segments; segments unlike the literature; markers or residuals
+  1  done, but an ERROR was found. In fit: not converged; physically impossible
+     segments; segments that contradict the literature; markers or residuals
      beyond OpenSim's guideline (markers 20 mm RMS; force 10 N RMS, 25 N peak,
-     5 % of the largest external force; moment 50 N m RMS, 75 N m peak).
-     In check: something that a fit or a simulation cannot rest on.
+     5 % of the largest external force; moment 50 N m RMS, 75 N m peak); or a
+     trial was left out. In check: a recording or a model cannot be used.
      In cohort: any of these for somebody, or somebody could not be fitted.
-  2  an error in files or options, or ERRORs that leave no trial: a line each
+  2  nothing could be computed: errors in files or options, one line each
  70  Kinertia itself failed; the line says where its log file is
 130  interrupted; nothing half-written is left
 
