@@ -26,7 +26,6 @@ from threadpoolctl import threadpool_limits
 from command_speed import command_section
 from core_speed import core_section
 from estimate_speed import speed_section, timed
-from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.estimation.input_checks import known
 from kinertia.estimation.study_parameters import ParameterVector
 from kinertia.estimation.two_level import TwoLevelProblem, Window, stretches
@@ -126,8 +125,9 @@ def ours(one: Walk, runs: int) -> tuple[dict[str, float], int]:
     feet = foot_labels(marker_set, recording.markers)
     span = (float(recording.markers.time[0]), float(recording.markers.time[-1]))
     trial = build_trial(recording, feet, span)
-    model, carried = _model(static, marker_set, one.subject), CarriedMass.of(one.mass_kg, [])
-    seconds["calibration"], (skeleton, _) = best(min(runs, 2), lambda: calibrate(model, [trial], carried))
+    model = _model(static, marker_set, one.subject)
+    seconds["calibration"], calibrated = best(min(runs, 2), lambda: calibrate(model, [trial]))
+    skeleton = calibrated.skeleton
     seconds["inverse kinematics"], ik = best(runs, lambda: solve_ik(skeleton, trial.markers))
     seconds["smoothing"], spline = best(runs, lambda: smooth(ik.time, ik.q, "gcv"))
     motion = Motion(*(spline(ik.time, order) for order in range(3)))
@@ -177,8 +177,7 @@ def both_ik(name: str, runs: int) -> tuple[float, float]:
     recording, static = read_recording(one.markers, one.forces, one.loads), read_recording(one.static)
     marker_set = choose_marker_set(static.markers.labels)
     feet = foot_labels(marker_set, recording.markers)
-    carried = CarriedMass.of(one.mass_kg, [])
-    skeleton, _ = calibrate(_model(static, marker_set, one.subject), [build_trial(recording, feet)], carried)
+    skeleton = calibrate(_model(static, marker_set, one.subject), [build_trial(recording, feet)]).skeleton
     mine, theirs = [], []
     for _ in range(runs):
         theirs.append(opensim_ik(name))

@@ -18,7 +18,6 @@ import numpy as np
 import pandas as pd
 from scipy.optimize import minimize_scalar
 
-from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.io.marker_set_file import read_marker_set
 from kinertia.io.recording import read_recording
 from kinertia.model.gait27 import build_gait27
@@ -57,7 +56,7 @@ def main(shared: Path) -> None:
     trial = build_trial(walk, present)
     subject = Subject(name="walker", sex="male", mass_kg=72.6, height_m=1.803)
     model = build_gait27(static, marker_set, subject.height_m, subject.sex)
-    skeleton, _ = calibrate(model, [trial], CarriedMass.of(subject.mass_kg, []))
+    skeleton = calibrate(model, [trial]).skeleton
     kinematics = solve_kinematics(skeleton, trial, 0.0, 8.0)
     write_standing(skeleton, static)
     write_walk(kinematics, trial)
