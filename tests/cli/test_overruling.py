@@ -1,4 +1,4 @@
-"""What users overrule: errors that they waive, warnings that they ignore, trials that are left out; and what is said."""
+"""What users overrule: errors that they waive, warnings that they ignore, trials left out; and what is said of it."""
 
 import json
 import re

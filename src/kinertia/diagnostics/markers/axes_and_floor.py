@@ -73,6 +73,8 @@ def floor_slope(context: RecordingContext) -> Iterator[Finding]:
     if context.feet is None or context.recording.belt is not None:
         return
     markers = context.all_markers
+    if len(markers.time) < 2:
+        return
     labels = [label for own in context.feet.values() for label in own]
     stances = [_stances(markers.time, markers.positions[:, markers.labels.index(label)]) for label in labels]
     of_marker = np.repeat(np.arange(len(labels)), [len(one) for one in stances])
