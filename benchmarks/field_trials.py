@@ -22,7 +22,7 @@ import pandas as pd
 
 from kinertia.cli.app import main as kinertia
 from kinertia.diagnostics.result.soundness import CONTRADICTION_SD
-from measured_trials import farthest, table
+from measured_trials import farthest, table, told
 from walks import WALKS, fit_arguments
 
 DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "field-trials.md"
@@ -161,7 +161,7 @@ def document(runs: dict[str, dict[str, Any]]) -> str:
                 f"{outcome['seconds']:.0f}",
             ]
         )
-        warnings += [f"- {title}: {warning}." for warning in fit["warnings"]]
+        warnings += [f"- {title}: {each}" for each in told(fit)]
     heads = ["trial", "exit status", "cutoff before (Hz)"]
     heads += [f"{unit}, {stage}" for unit in ("N", "N m") for stage in ("before", "after")]
     heads += ["markers, before / after (mm)", "converged, parameters beyond 3 sd (farthest)", "s"]
@@ -171,8 +171,7 @@ def document(runs: dict[str, dict[str, Any]]) -> str:
 
 def conclusion(said: str) -> str:
     """What stands against a file by the words of `kinertia check`, on one line."""
-    findings = re.split(r"\s(?=(?:pass|fail|caution|assumed|error): )", " ".join(said.split()))
-    against = [one for one in findings if one.startswith(("fail:", "error:"))]
+    against = [" ".join(line.split()) for line in said.splitlines() if line.startswith(("ERROR ", "error: "))]
     return "; ".join(against).replace("|", "\\|") or "nothing stands against it"
 
 
@@ -182,7 +181,7 @@ What Kinertia says of recordings from other laboratories: walks, runs, a drop ju
 static trials, files as they were published. This page is written by `python benchmarks/field_trials.py FOLDER`; do not
 edit it by hand.
 
-Exit status 0: every check passed; 1: there is an estimate, and a check of it failed; 2: refused. *Before*: the model's
+Exit status 0: an estimate to use, perhaps with care; 1: an estimate not to be used; 2: refused. *Before*: the model's
 or the literature's body segment parameters on the measured motion, both smoothed at the cutoff in the table, as a
 colleague would compute them. *After*: motion, parameters and calibration together. RMS over the frames used. Seconds
 are this machine's.

@@ -32,6 +32,12 @@ def results(name: str, folder: Path, *more: str) -> dict[str, Any]:
     return {**json.loads((folder / "fit.json").read_text()), "bsp": pd.read_csv(folder / "bsp.csv")}
 
 
+def told(run: dict[str, Any]) -> list[str]:
+    """Code and message of what lowers a verdict, from fit.json."""
+    severe = [one for one in run["findings"] if one["severity"] in ("WARNING", "ERROR")]
+    return [f"{one['code']} {one['message']}" for one in severe if one["status"] == "open" and one["muted_by"] is None]
+
+
 def farthest(bsp: pd.DataFrame) -> str:
     """The parameter that is farthest from the literature's, in prior SDs."""
     away = (bsp["estimate"] - bsp["literature"]) / bsp["prior_sd"]
@@ -85,7 +91,7 @@ def document(runs: dict[str, dict[str, Any]]) -> str:
         ["walk", *times],
         ([WALKS[name], *(f"{t['seconds'][stage]:.2f}" for stage in times)] for name, t in trials.items()),
     )
-    warnings = "\n".join(f"- {WALKS[name]}: {warning}." for name, run in runs.items() for warning in run["warnings"])
+    warnings = "\n".join(f"- {WALKS[name]}: {each}" for name, run in runs.items() for each in told(run))
     return f"""# Measured trials
 
 What `kinertia fit` gives on four measured walks, one trial each, with its default settings. This page is written by

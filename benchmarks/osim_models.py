@@ -17,7 +17,7 @@ import pandas as pd
 
 from kinertia.cli.app import main as kinertia
 from measured_data import data_folder
-from measured_trials import STAGES, farthest, table
+from measured_trials import STAGES, farthest, table, told
 
 DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "osim-models.md"
 
@@ -86,7 +86,7 @@ def document(runs: dict[tuple[str, bool], dict[str, Any]]) -> str:
         title = f"{PEOPLE[name].title}, {'calibrated' if calibrate else 'as it is'}"
         rows += [_trial_row(title, trial) for trial in run["trials"]]
         bodies.append(_body_row(title, run))
-        warnings += [f"- {title}: {warning}." for warning in run["warnings"]]
+        warnings += [f"- {title}: {each}" for each in told(run)]
     residuals = table(
         ["model, trial", "frames", "markers, IK (mm)", "markers, estimate (mm)"]
         + [f"{unit}, {stage}" for unit in ("N", "N m") for stage in ("model", *STAGES[1:])],

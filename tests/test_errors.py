@@ -46,7 +46,7 @@ def test_errors_come_back_from_other_processes(error):
 def test_what_blocks_names_its_file_and_line():
     unread = FileError.found("walk.trc", "F104", 3, found=Quantity("it is empty")).finding.in_trial("walk")
     lines = str(BlockedError([], [unread, TWICE])).split("\n")
-    assert lines[0].startswith("walk  walk.trc, line 3: F104 ")
+    assert lines[0].startswith("walk.trc, line 3  F104 ")
     assert lines[1].startswith(TWICE.line())
 
 

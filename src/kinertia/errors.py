@@ -254,17 +254,7 @@ class BlockedError(KinertiaError):
         self.findings = tuple(findings)
         self.blocking = tuple(blocking)
         self.finding = self.blocking[0] if self.blocking else None
-        super().__init__("\n".join(f"{_placed(one)} {one.remedy}" for one in self.blocking))
-
-
-def _placed(found: Finding) -> str:
-    """Where and what: the trial, and of a file its name and line."""
-    where = found.where
-    if where.file is None:
-        return found.line()
-    trial = f"{where.trial}  " if where.trial else ""
-    line = "" if where.line is None else f", line {where.line}"
-    return f"{trial}{where.file}{line}: {found.code} {found.message}"
+        super().__init__("\n".join(f"{one.line()} {one.remedy}" for one in self.blocking))
 
 
 def findings_of(error: KinertiaError) -> tuple[Finding, ...]:

@@ -9,10 +9,12 @@ from kinertia.errors import PriorError
 from kinertia.estimation import body_measures
 from kinertia.estimation.body_measures import expected_measures, measured_body, with_measures
 from kinertia.estimation.prior import literature_prior
-from kinertia.io.measures_file import measures_sheet
+from kinertia.io.measures_file import BodyMeasures, measures_sheet
+from kinertia.io.subject_file import PriorFiles
 from kinertia.model.measures import measures
 from kinertia.synthetic.walk import HEIGHT_M, MASS_KG, walking_subject
 from kinertia.workflow.from_files import prepare_subject
+from kinertia.workflow.known_body import with_known_body
 from stadium_people import stadium_people
 from usual_build import stadium_mass_kg, stature_m
 
@@ -154,6 +156,13 @@ def test_a_filled_in_sheet_is_part_of_the_prior_and_of_the_notes(c3d_lab, tmp_pa
     sources = [one.evidence["source"].value for one in ready.findings if one.code == "S408"]
     assert any("2 of 58" in source and "measures.csv" in source for source in sources)
     assert [one.where.part for one in ready.findings if one.code == "S403"] == ["leg_calf_girth"]
+    assert "S404" not in {one.code for one in ready.findings}
+    of_another = with_known_body(
+        replace(ready, findings=()), PriorFiles(), None, {}, measures=BodyMeasures("dan.csv", stated(factor=1.1))
+    )
+    (found,) = [one for one in of_another.findings if one.code == "S404"]
+    assert (found.where.file, found.evidence["stated_kg"].value) == ("dan.csv", ready.carried.body_kg)
+    assert found.evidence["yeadon_kg"].value > 1.2 * ready.carried.body_kg
 
 
 def test_what_is_a_prosthesis_on_both_sides_says_nothing_of_the_others():

@@ -15,6 +15,7 @@ from kinertia.io.osim.exporter import export_osim
 from kinertia.io.osim.reader import read_osim
 from kinertia.io.sto import read_sto
 from kinertia.io.trc import read_trc
+from measured_trials import told
 from recordings import FITTED
 
 CASES = [
@@ -101,9 +102,9 @@ def assert_targets(folder: Path) -> None:
         assert trial["marker_rms_m"]["final"] <= 0.012
     bsp = pd.read_csv(folder / "bsp.csv").query("prior_sd > 0")
     far = bsp[(bsp["estimate"] - bsp["literature"]).abs() > 3 * bsp["prior_sd"]]
-    for _, row in far.iterrows():
-        named = f"{row['parameter']} of {row['segment']} "
-        assert any("contradict" in warning and named in warning for warning in summary["warnings"]), named
+    found = [one for one in summary["findings"] if one["code"] == "R203"]
+    named = {(one["evidence"]["parameter"]["value"], one["where"]["part"].split()[-1]) for one in found}
+    assert named == set(zip(far["parameter"], far["segment"], strict=True))
 
 
 @pytest.mark.slow
@@ -122,7 +123,10 @@ def test_walks_and_squats_pooled(measured_folder, tmp_path):
     assert_targets(folder)
     summary = json.loads((folder / "fit.json").read_text())
     assert [trial["name"] for trial in summary["trials"]] == ["walking1", "walking2", "squats1"]
-    assert any("ForcePlate2" in note and "left foot" in note for note in summary["notes"])
+    corrected = [one for one in summary["findings"] if one["code"] == "P277"]
+    assert ("ForcePlate2", "left") in [
+        (one["where"]["plate"][:11], one["evidence"]["foot"]["value"]) for one in corrected
+    ]
     assert (folder / "walking2" / "kinematics.mot").is_file()
 
 
@@ -140,8 +144,8 @@ def test_page_of_the_benchmark(fit_with_model):
         residual = trial["residual_force_rms_N"]["estimate"], trial["residual_moment_rms_Nm"]["estimate"]
         cells = rf"\| {trial['marker_rms_m']['final'] * 1e3:.1f} \|.*\| {residual[0]:.1f} \|.*\| {residual[1]:.1f} \|"
         assert re.search(rf"\| {title}: subject01_walk1 .*{cells}", page)
-        for warning in summary["warnings"]:
-            assert f"- {title}: {warning}." in page
+        for each in told(summary):
+            assert f"- {title}: {each}" in page
 
 
 @pytest.mark.slow
@@ -163,11 +167,11 @@ def options(lab: Path, **more: object) -> list[object]:
 
 
 BAD = {
-    "no model": ({"model": "nowhere.osim"}, "no such file"),
+    "no model": ({"model": "nowhere.osim"}, "F101 There is no file nowhere.osim"),
     "a model that is none": ({"model": "walk_grf.xml"}, "no Model in it"),
-    "a model without markers": ({"model": "bare.osim"}, "no markers in it"),
+    "a model without markers": ({"model": "bare.osim"}, "bare.osim: O106 "),
     "the study's method": ({"method": "two-level"}, "works on the built-in model only"),
-    "a static trial as well": ({"static": "static.trc"}, "both osim and static"),
+    "a static trial as well": ({"static": "static.trc"}, "F193 osim and static"),
 }
 
 
@@ -189,4 +193,4 @@ def test_calibrate_goes_with_a_model(synthetic_lab, tmp_path):
     words = [*options(synthetic_lab)[:1], "--static", static, "--sex", "male", "--height", 1.8, "--mass", 72.6]
     outcome = run("fit", *words, "--calibrate", "-o", tmp_path / "out")
     assert outcome.status == 2
-    assert "calibrate goes with osim" in " ".join(outcome.err.split())
+    assert "F193 calibrate in [model] and a static trial" in " ".join(outcome.err.split())

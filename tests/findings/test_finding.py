@@ -81,7 +81,7 @@ def test_sentences_are_the_rules_filled_in():
     assert ZERO.effect == rule("P213").effect
     assert ZERO.remedy == rule("P213").remedy
     assert ZERO.name == "plate-zero-offset"
-    assert ZERO.line() == f"P213 {ZERO.message}"
+    assert ZERO.line() == f"walk.c3d  P213 {ZERO.message}"
     assert ZERO.in_trial("walk").line() == f"walk  P213 {ZERO.message}"
 
 

@@ -392,7 +392,7 @@ def test_a_folder_has_one_subject_file(folder):
     with refused("F108", problem="several .toml files (my.toml, other.toml)"):
         (folder / "other.toml").touch()
         subject_file_in(folder)
-    with refused("F108", problem="kinertia init"):
+    with refused("F108", problem="holds no subject file", action="kinertia init"):
         subject_file_in(folder / "data")
     (folder / "subject.toml").touch()
     assert subject_file_in(folder) == folder / "subject.toml"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from kinertia.errors import KinertiaError, PriorError, SettingsError
+from kinertia.errors import BlockedError, PriorError, SettingsError
 from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.estimation.prepared import Prepared
 from kinertia.estimation.prior import literature_prior
@@ -15,6 +15,7 @@ from kinertia.estimation.simultaneous.fit import calibration_prior
 from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINTY
 from kinertia.estimation.simultaneous.observation import observe
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous
+from kinertia.findings.finding import Severity
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.motion.dynamics import inverse_dynamics, residual
 from kinertia.settings import Attached, KnownSegment, PriorSettings, Settings, Subject
@@ -174,10 +175,13 @@ def test_a_rucksack_that_nobody_declared_is_named(tmp_path):
         tmp_path / "lab",
         record(person, walk(person, 2.5, trapezoid=False), LabNoise(), np.random.default_rng(0)),
     )
-    with pytest.raises(
-        KinertiaError, match=r"stated mass 72\.6 kg: if something was worn or carried that the scale did"
-    ):
+    with pytest.raises(BlockedError) as stopped:
         fit_subject(tmp_path / "lab" / "subject.toml")
+    (found,) = stopped.value.blocking
+    assert (found.code, found.severity) == ("S111", Severity.ERROR)
+    assert found.evidence["stated_kg"].value == MASS_KG
+    assert found.evidence["mass_by_force_kg"].value == pytest.approx(MASS_KG + 10.0, rel=0.02)
+    assert any("worn or carried" in cause for cause in found.causes)
 
 
 @pytest.mark.parametrize(

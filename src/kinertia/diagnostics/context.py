@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -23,13 +23,11 @@ from kinertia.findings.finding import Finding, Severity
 from kinertia.findings.where import Where
 from kinertia.model.imported import OsimModel
 from kinertia.model.marker_set import MarkerSet
-from kinertia.motion.kinematics import FEWEST_FRAMES
 from kinertia.settings import Subject
 from kinertia.trial.data import Markers, PlateLoads, Recording, Trial
 from kinertia.trial.ground_contact import FootMarkers
 from kinertia.trial.marker_quality import Travel, travel
 from kinertia.trial.plate_assignment import build_trial
-from kinertia.trial.sampled_time import within
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,21 +141,13 @@ class RecordingContext:
 
     @cached_property
     def loaded(self) -> Trial | KinertiaError | None:
-        """The trial with its loads sorted by foot, the error where that is impossible, None without plates or feet.
-
-        Frames in which more than a toe is beyond its plate are not measured, unless the user vouches for a window, or
-        hardly any others are left.
-        """
+        """The trial with its loads sorted by foot, the error where that is impossible, None without plates or feet."""
         if self.plates is None or self.feet is None:
             return None
         try:
-            trial = build_trial(self.recording, self.feet, self.window_s)
+            return build_trial(self.recording, self.feet, self.window_s)
         except KinertiaError as error:
             return error
-        whole = trial.measured.copy()
-        for one in self.overhangs if self.window_s is None else ():
-            whole &= one.only_toe | ~within(trial.markers.time, *one.span_s)
-        return replace(trial, measured=whole) if whole.sum() >= FEWEST_FRAMES else trial
 
     @property
     def trial(self) -> Trial | None:

@@ -106,8 +106,8 @@ class Finding:
         """The same with another severity."""
         return replace(self, severity=severity)
 
-    def in_trial(self, trial: str) -> Finding:
-        """The same, found in that trial."""
+    def in_trial(self, trial: str | None) -> Finding:
+        """The same, found in that trial; of None, in none of them."""
         return replace(self, where=replace(self.where, trial=trial))
 
     def in_file(self, file: str) -> Finding:

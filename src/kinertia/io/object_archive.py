@@ -137,7 +137,9 @@ def _names(thing: Any) -> Sequence[str]:
 
 
 def _below(place: str, name: object) -> str:
-    return f"{place}.{name}" if place else str(name)
+    # names of members of an archive end at a zero
+    word = repr(name) if "\0" in str(name) else str(name)
+    return f"{place}.{word}" if place else word
 
 
 class _Reader:

@@ -48,11 +48,17 @@ def render_parts(title: str, lead: str, parts: Sequence[Part]) -> str:
         {
             "part": part,
             "figure": None if part.figure is None else written(part.figure),
+            "numeric": [all(map(_is_number, column)) for column in zip(*part.rows, strict=True)],
             "picture": Markup(part.picture[max(part.picture.find("<svg"), 0) :]),
         }
         for part in parts
     ]
     return rendered("result.html.j2", title=title, lead=lead, parts=drawn)
+
+
+def _is_number(cell: str) -> bool:
+    """Whether a cell is read as a number: those of text are to the left."""
+    return not cell or cell[0] in "0123456789+-−–.<±"
 
 
 def drawing(picture: Picture) -> str:

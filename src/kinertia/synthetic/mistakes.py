@@ -103,7 +103,7 @@ MISTAKES = (
         markers.exchanged(("knee_lateral_r", "ankle_lateral_r"), where="static"),
         _codes("L206", "L207", "L212"),
     ),
-    Mistake("thigh and shank markers swapped in the walk", markers.wands_exchanged, _codes("L206", "L212")),
+    Mistake("thigh and shank markers swapped in the walk", markers.wands_exchanged, _codes("L206", "L212", "L213")),
     # whose body
     Mistake("static trial of another person, 10 % taller", markers.scaled(1.10, "static"), _codes("S203")),
     Mistake("static trial of another session, markers 10 mm elsewhere", markers.placed_anew(0.010), _codes("S204")),
@@ -114,7 +114,7 @@ MISTAKES = (
     ),
     Mistake("computed joint centres listed as markers", markers.virtual_markers, _codes("M151")),
     # axes, units, places
-    Mistake("Z up in the markers, Y up in the forces", markers.z_up, _codes("M142")),
+    Mistake("Z up in the markers, Y up in the forces", markers.z_up, _codes("M142", "P201")),
     Mistake("an axis of the laboratory mirrored", markers.mirrored, _codes("L201")),
     Mistake("lengths in cm called mm", markers.scaled(0.1, "both"), _codes("M141")),
     Mistake("floor of the cameras 30 mm too low", markers.moved((0.0, 0.03, 0.0), "both"), _codes("M143")),

@@ -57,16 +57,16 @@ def files_by_name(files: Sequence[Path], loads: Path | None = None) -> tuple[Rec
     return tuple(wanted)
 
 
+def _unpaired(path: Path, problem: str, action: str) -> FileError:
+    return FileError.found(path, "F108", problem=Quantity(problem), action=Quantity(action))
+
+
 def trial_names(wanted: Sequence[RecordingFiles]) -> list[str]:
     """What the recordings are called: as their marker files, with as much of the path as tells them apart."""
     paths = [one.markers for one in wanted]
     names = [[path.stem, path.name, str(path)] for path in paths]
     times = [Counter(level) for level in zip(*names, strict=True)]
     return [next((name for k, name in enumerate(each) if times[k][name] == 1), each[-1]) for each in names]
-
-
-def _unpaired(path: Path, problem: str, action: str) -> FileError:
-    return FileError.found(path, "F108", problem=Quantity(problem), action=Quantity(action))
 
 
 def unknown_kind(path: Path) -> FileError:

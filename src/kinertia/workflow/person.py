@@ -123,7 +123,7 @@ class Unread:
     errors: list[KinertiaError] = field(default_factory=list)
 
     def tried(self, read: Callable[[], Read], trial: str | None) -> Read | None:
-        """What could be read; None where it could not, which is then among the findings.
+        """What could be read; None where it could not, which is then among the findings (`trial` None: of no trial).
 
         Raises:
             KinertiaError: one that is no finding.
@@ -134,7 +134,7 @@ class Unread:
             if error.finding is None:
                 raise
             self.errors.append(error)
-            self.findings.append(error.finding if trial is None else error.finding.in_trial(trial))
+            self.findings.append(error.finding.in_trial(trial))
             return None
 
     def expect_any(self, trials: Sequence[object]) -> None:

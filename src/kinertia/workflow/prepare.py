@@ -39,7 +39,7 @@ from kinertia.motion.upright_trunk import with_upright_trunk
 from kinertia.settings import Attached, Overrule, Settings, Subject
 from kinertia.trial.data import Recording, Trial
 from kinertia.trial.trial_input import TrialInput
-from kinertia.workflow.kinematics import Turned, seen_markers, solved_trials
+from kinertia.workflow.kinematics import Turned, solved_trials, usable_trial
 from kinertia.workflow.person import Person
 from kinertia.workflow.screening import Screened, screen
 
@@ -187,7 +187,7 @@ def _unblocked(trials: Sequence[Turned], findings: Sequence[Finding]) -> list[Tu
 
 def _turned(context: RecordingContext, read_seconds: float) -> Turned:
     """The trial facing +X, without markers that no frame shows."""
-    trial, marker_set = seen_markers(context), context.marker_set
+    trial, marker_set = usable_trial(context), context.marker_set
     assert marker_set is not None
     try:
         rotation, angle = facing(trial.markers, marker_set)

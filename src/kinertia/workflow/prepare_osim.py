@@ -31,7 +31,7 @@ from kinertia.model.skeleton import Axis, Skeleton
 from kinertia.motion.one_thread import one_blas_thread
 from kinertia.settings import Attached, Overrule, Settings, Subject
 from kinertia.trial.trial_input import TrialInput
-from kinertia.workflow.kinematics import Turned, seen_markers, solved_trials
+from kinertia.workflow.kinematics import Turned, solved_trials, usable_trial
 from kinertia.workflow.person import Person
 from kinertia.workflow.prepare import LOWER_BODY_SD_M, UPPER_BODY_SD_M
 from kinertia.workflow.screening import Screened, screen
@@ -81,7 +81,7 @@ def prepared_osim(screened: Screened, settings: Settings, progress: Progress = l
     progress("calibration", 0.0)
     started = time.perf_counter()
     read_s = {item.recording.name: item.read_seconds for item in person.trials}
-    turned = [Turned(seen_markers(one), 0.0, read_s[one.name]) for one in usable]
+    turned = [Turned(usable_trial(one), 0.0, read_s[one.name]) for one in usable]
     trials = [one.trial for one in turned]
     may_hold = {c.name: c.default for c in model.coordinates if c.name not in model.skeleton.coordinates[:6]}
     skeleton = replace(model.skeleton, feet=_feet(model))

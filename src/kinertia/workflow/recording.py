@@ -30,8 +30,8 @@ class RecordingCheck:
 
     Examples:
         >>> check = kinertia.check_recording(kinertia.read_recording("lab/walk.trc", "lab/walk_grf.mot"))
-        >>> check.travel.kind, [plate.name for plate in check.plates], len(check.windows)
-        ('walks', ['1', '2'], 1)
+        >>> check.travel.kind, len(check.plates), len(check.windows)
+        ('walks', 2, 1)
     """
 
     context: RecordingContext

@@ -76,8 +76,13 @@ class Screened:
     @cached_property
     def stops(self) -> list[Finding]:
         """Open ERRORs that stop everything: of the person, the model or the static trial."""
-        names = {one.name for one in self.context.trials}
+        names = {one.name for one in self.context.trials} | self._unread
         return [one for one in blocking(self.findings) if one.where.trial not in names]
+
+    @property
+    def _unread(self) -> set[str]:
+        """Names of the trials that could not be read."""
+        return {one.where.trial for one in self.person.unread if one.where.trial is not None}
 
     @cached_property
     def left_out(self) -> tuple[str, ...]:
@@ -87,8 +92,9 @@ class Screened:
     def left_out_by(self, findings: Sequence[Finding]) -> tuple[str, ...]:
         """The same by these findings."""
         names = {one.where.trial for one in blocking(findings)}
-        unread = {one.where.trial for one in self.person.unread if one.where.trial is not None}
-        return tuple(dict.fromkeys([*sorted(unread), *(one.name for one in self.context.trials if one.name in names)]))
+        return tuple(
+            dict.fromkeys([*sorted(self._unread), *(one.name for one in self.context.trials if one.name in names)])
+        )
 
     def overruled(self, findings: Sequence[Finding]) -> list[Finding]:
         """Findings, those here or more of them, with what explains and what overrules each."""

@@ -74,7 +74,7 @@ def test_a_fit_that_ends_repeats_no_form(browser, app, monkeypatch, tmp_path, c3
     page.get_by_text("Single files, or into a folder").click()
     page.get_by_label("Folder on this computer").fill(str(tmp_path / "mine"))
     page.get_by_role("button", name="Write the results there").click()
-    playwright.expect(page.locator(".message.pass")).to_contain_text("The results are in")
+    playwright.expect(page.locator(".message.info")).to_contain_text("The results are in")
     playwright.expect(page).to_have_url(f"{app.address}people/{person.name}")
     go.touch()
     playwright.expect(page.locator("[data-progress]")).to_have_count(0, timeout=PATIENCE_MS)

@@ -81,7 +81,7 @@ def test_centre_of_mass_far_from_the_literature_where_there_is_no_prior():
     moved = replace(BODY, com_m=BODY.com_m + np.array([[0.0], [0.12]]) * [0, 1, 0])
     (one,) = found(estimate=moved)
     assert levels([one]) == [("R203", "ERROR")]
-    assert one.where.part == "com of thigh_r"
+    assert one.where.part == "centre of mass of thigh_r"
     assert one.evidence["distance_m"].value == pytest.approx(0.12)
     assert found(estimate=replace(BODY, com_m=BODY.com_m + np.array([[0.0], [0.09]]) * [0, 1, 0])) == []
 
@@ -92,7 +92,7 @@ def test_parameters_by_prior_deviations(away, expected):
     answers = found({"prior_sd": np.full((2, 10), 0.01)}, estimate=estimate)
     assert levels(answers) == ([] if expected is None else [("R203", expected)] * 2)
     parts = [one.where.part for one in answers]
-    assert parts == ([] if expected is None else ["mass of pelvis", "com_x of thigh_r"])
+    assert parts == ([] if expected is None else ["mass of pelvis", "centre of mass along x of thigh_r"])
     assert all(one.evidence["distance_sd"].value == pytest.approx(away) for one in answers)
 
 

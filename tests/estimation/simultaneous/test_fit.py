@@ -211,7 +211,7 @@ def test_a_model_that_is_contradicted_is_called_so(trial):
     wrong = replace(literature, com_m=com)
     found = of_estimate(fitted(trial, wrong), literature=wrong)
     far = {one.where.part: one.evidence["distance_sd"].value for one in found if one.code == "R203"}
-    assert far["com_x of torso"] < -3.0
+    assert far["centre of mass along x of torso"] < -3.0
 
 
 def test_a_wrong_gain_is_named(trial, plain):

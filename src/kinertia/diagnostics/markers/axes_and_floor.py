@@ -76,6 +76,8 @@ def floor_slope(context: RecordingContext) -> Iterator[Finding]:
     if len(markers.time) < 2:
         return
     labels = [label for own in context.feet.values() for label in own]
+    if len(markers.time) < 2:
+        return
     stances = [_stances(markers.time, markers.positions[:, markers.labels.index(label)]) for label in labels]
     of_marker = np.repeat(np.arange(len(labels)), [len(one) for one in stances])
     if len(of_marker) < _FEWEST_PLACES + len(labels):

@@ -96,7 +96,7 @@ def suitability(fit: Fit, findings: Iterable[Finding], left_out: Sequence[str] =
         findings: of all stages, explained and overruled.
         left_out: trials that were blocked and are not in the fit: then nothing is used without care.
     """
-    known = list(findings)
+    known = [one for one in findings if one.where.trial not in left_out]
     return tuple(_output(fit, name, known, left_out) for name in _TITLES)
 
 

@@ -1,0 +1,153 @@
+"""`kinertia check` and `kinertia fit` find the same in the same recordings, and no ERROR in fault-free ones."""
+
+import shutil
+from dataclasses import replace
+
+import pytest
+
+import osim_models
+from kinertia.errors import BlockedError
+from kinertia.findings.finding import Severity
+from kinertia.findings.rule import STAGES
+from kinertia.io.sto import read_sto, write_sto
+from kinertia.io.subject_file import read_subject
+from kinertia.settings import Overrule
+from kinertia.workflow.check import check_person
+from kinertia.workflow.from_files import prepare_subject
+from kinertia.workflow.person import read_person
+from measured_data import data_folder
+from recordings import FITTED, is_here
+from refusals import expect_filled
+from synthetic_lab import WITH_MODEL, synthetic_arguments
+from walks import fit_arguments
+
+SCREENED = STAGES[: STAGES.index("person") + 1]
+PREPARED = ("R106", "R401", "O407", "O411", "O412", "O413", "S408")
+"""What calibrating the model and the prior show as well."""
+_SUBJECT4 = "subject4/walking1"
+PEOPLE = [*FITTED, "synthetic with model", *(["subject4"] if is_here(f"{_SUBJECT4}.trc") else [])]
+"""Names of `walks.WALKS`, the synthetic laboratory's, and two with their own OpenSim models."""
+
+
+def written(arguments):
+    """The subject file of a command."""
+    given = dict(zip(arguments[1::2], arguments[2::2], strict=True))
+    trial = {"markers": arguments[0], "forces": given.get("--forces"), "loads": given.get("--loads")}
+    tables = {
+        "[subject]": {"mass_kg": given.get("--mass"), "height_m": given.get("--height"), "sex": given.get("--sex")},
+        "[model]": {"static": given.get("--static")},
+        "[[trial]]": trial,
+    }
+    lines = []
+    for head, entries in tables.items():
+        stated = {key: value for key, value in entries.items() if value is not None}
+        lines += [
+            head,
+            *(f"{key} = {value if key.endswith(('_kg', '_m')) else repr(value)}" for key, value in stated.items()),
+        ]
+    return "\n".join(lines)
+
+
+@pytest.fixture(params=PEOPLE)
+def subject(request, tmp_path, synthetic_lab):
+    """One person's subject file, read."""
+    name = request.param
+    if name == "synthetic":
+        text = written(synthetic_arguments(synthetic_lab))
+    elif name == "synthetic with model":
+        text = osim_models.subject_file(synthetic_lab, WITH_MODEL, False)
+    elif name == "subject4":
+        person = osim_models.PEOPLE[name]
+        one = {_SUBJECT4: person.trials[_SUBJECT4]}
+        text = osim_models.subject_file(data_folder(), replace(person, trials=one), False)
+    else:
+        text = written(fit_arguments(data_folder(), name))
+    path = tmp_path / "subject.toml"
+    path.write_text(text, encoding="utf-8")
+    return read_subject(path)
+
+
+def screened(findings):
+    """Code, severity and place of what is found before inverse kinematics."""
+    return [(one.code, one.severity, one.where) for one in findings if one.rule.stage in SCREENED]
+
+
+def test_check_and_fit_find_the_same(subject):
+    checked, ready = check_person(read_person(subject)), prepare_subject(subject)
+    found = screened(checked.findings)
+    assert found
+    assert [one for one in screened(ready.findings) if one[0] not in PREPARED] == found
+    assert checked.overview.left_out == ready.left_out == ()
+    assert ready.rules == checked.overview.rules
+    assert not [one for one in ready.findings if one.severity is Severity.ERROR]
+    for one in ready.findings:
+        expect_filled(one)
+
+
+def laboratory(folder, lab, trials, static="static"):
+    """A subject file for trials of the synthetic laboratory."""
+    lines = ["[subject]", "mass_kg = 72.6", "height_m = 1.803", "sex = 'male'", "[model]", f"static = '{static}.trc'"]
+    for trial in trials:
+        lines += ["[[trial]]", f"markers = '{trial}.trc'", f"forces = '{trial}_grf.mot'"]
+        for name in (f"{trial}.trc", f"{trial}_grf.mot"):
+            if (lab / name).exists() and not (folder / name).exists():
+                shutil.copyfile(lab / name, folder / name)
+    shutil.copyfile(lab / "static.trc", folder / "static.trc")
+    (folder / "subject.toml").write_text("\n".join(lines), encoding="utf-8")
+    return read_subject(folder / "subject.toml")
+
+
+def spoil_forces(path):
+    """Forces in kN."""
+    table = read_sto(path)
+    forces = [name for name in table.columns if "_force_v" in name or "torque" in name]
+    table[forces] /= 1000.0
+    write_sto(path, table, False, path.stem)
+
+
+def test_a_trial_that_is_left_out_is_so_by_both(tmp_path, synthetic_lab):
+    wanted = laboratory(tmp_path, synthetic_lab, ["walk", "other", "alike"])
+    spoil_forces(tmp_path / "other_grf.mot")
+    (tmp_path / "alike.trc").write_text("PathFileType 4\n", encoding="utf-8")
+    checked, ready = check_person(read_person(wanted)), prepare_subject(wanted)
+    assert checked.overview.left_out == ready.left_out == ("alike", "other")
+    assert [one for one in screened(ready.findings) if one[0] not in PREPARED] == screened(checked.findings)
+    errors = [(one.code, one.where.trial) for one in ready.findings if one.severity is Severity.ERROR and one.is_open]
+    assert errors[1:] == [("P202", "other")]
+    assert errors[0][0].startswith("F")
+    assert errors[0][1] == "alike"
+    assert [k.trial.name for k in ready.kinematics] == ["walk"]
+
+
+def test_what_blocks_a_fit_is_what_check_found(tmp_path, synthetic_lab):
+    wanted = laboratory(tmp_path, synthetic_lab, ["walk", "other"])
+    for name in ("walk", "other"):
+        spoil_forces(tmp_path / f"{name}_grf.mot")
+    checked = check_person(read_person(wanted))
+    with pytest.raises(BlockedError) as blocked:
+        prepare_subject(wanted)
+    assert screened(blocked.value.findings) == screened(checked.findings)
+    assert [(one.code, one.where.trial) for one in blocked.value.blocking] == [("P202", "walk"), ("P202", "other")]
+
+
+def test_an_error_stops_unless_it_is_waived(tmp_path, synthetic_lab):
+    wanted = laboratory(tmp_path, synthetic_lab, ["walk"])
+    wanted = wanted.model_copy(update={"subject": wanted.subject.model_copy(update={"mass_kg": 90.0})})
+    with pytest.raises(BlockedError) as blocked:
+        prepare_subject(wanted)
+    (found,) = blocked.value.blocking
+    assert (found.code, found.where.trial) == ("S111", "walk")
+    ready = prepare_subject(wanted, overrule=Overrule(waive=("S111",)))
+    assert [(one.code, one.status) for one in ready.findings if one.severity is Severity.ERROR] == [("S111", "waived")]
+
+
+def test_a_static_trial_that_cannot_be_read_stops_everything(tmp_path, synthetic_lab):
+    wanted = laboratory(tmp_path, synthetic_lab, ["walk"])
+    (tmp_path / "static.trc").write_text("PathFileType 4\n", encoding="utf-8")
+    checked = check_person(read_person(wanted))
+    with pytest.raises(BlockedError) as blocked:
+        prepare_subject(wanted)
+    assert screened(blocked.value.findings) == screened(checked.findings)
+    (found,) = blocked.value.blocking
+    assert (found.code, found.where.file, found.where.line, found.where.trial) == ("F104", "static.trc", 2, None)
+    assert checked.overview.left_out == ()
