@@ -82,6 +82,8 @@ def test_sentences_are_the_rules_filled_in():
     assert ZERO.remedy == rule("P213").remedy
     assert ZERO.name == "plate-zero-offset"
     assert ZERO.line() == f"walk.c3d  P213 {ZERO.message}"
+    assert replace(ZERO, where=Where("walk.c3d", 7)).line().startswith("walk.c3d, line 7  P213 ")
+    assert replace(ZERO, where=Where()).line().startswith("P213 ")
     assert ZERO.in_trial("walk").line() == f"walk  P213 {ZERO.message}"
 
 

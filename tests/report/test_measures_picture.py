@@ -45,4 +45,4 @@ def test_the_command_writes_sheet_and_picture_and_overwrites_neither(tmp_path):
     again = run("init", tmp_path, "--measures")
     assert again.status != 0
     assert "exists already and is left alone" in again.err
-    assert "F101 " in run("init", tmp_path / "elsewhere", "--measures").err
+    assert " F101 " in run("init", tmp_path / "elsewhere", "--measures").err
