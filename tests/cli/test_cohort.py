@@ -134,7 +134,7 @@ def test_a_cohort_whose_workers_are_killed_is_finished_and_a_rerun_fits_nobody(s
                 worker.kill()
         printed, errors = process.communicate()
     assert process.returncode == 1, errors
-    assert "not fitted: Clara: trial 'walk': the window 90.000 to 91" in printed
+    assert "not fitted: Clara: walk P278 In no frame from 90.000 to 91.000 s" in " ".join(printed.split())
     people = pd.read_csv(out / "people.csv").set_index("person")
     assert people.status["Clara"] == 2
     assert set(people.status[["Anna", "Ben"]]) <= {0, 1}
@@ -166,11 +166,11 @@ def test_a_scheduler_that_runs_already_is_used(study, tmp_path):
     with LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None) as cluster:
         outcome = run("cohort", study, "-o", tmp_path / "out", "--scheduler", cluster.scheduler_address)
     assert outcome.status == 1, outcome.err
-    assert "not fitted: Clara: trial 'walk': the window 90.000 to 91" in outcome.out
+    assert "not fitted: Clara: walk P278 In no frame from 90.000 to 91.000 s" in " ".join(outcome.out.split())
     assert (tmp_path / "out" / "failed" / "Clara.json").is_file()
     assert "note: " not in outcome.out
     planned = run("cohort", study, "-o", tmp_path / "out", "--dry-run")
-    assert "as before: trial 'walk': the window 90.000 to 91" in " ".join(planned.out.split())
+    assert "as before: walk P278 In no frame from 90.000 to 91.000 s" in " ".join(planned.out.split())
 
 
 @pytest.mark.slow

@@ -7,7 +7,10 @@ from dataclasses import replace
 import pytest
 
 from command_line import run, run_apart
-from kinertia.errors import FileError
+from kinertia.errors import BlockedError, FileError
+from kinertia.findings.finding import finding
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
 
 
 @pytest.fixture
@@ -54,6 +57,28 @@ def test_an_error_of_one_person_does_not_keep_the_others_from_being_fitted(subje
     assert "anna.toml" in outcome.err
     assert "is of somebody else" in outcome.err
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"ben"}
+
+
+def test_every_finding_that_blocks_one_of_several_people_is_a_line(subjects, tmp_path, monkeypatch, fit):
+    found = [finding("P271", Where(trial=trial), left_out=Quantity("none")) for trial in ("early", "late")]
+
+    def fitted_or_not(wanted, progress, overrule):
+        if wanted.subject.mass_kg == 60.0:
+            raise BlockedError(found, found)
+        return fit
+
+    monkeypatch.setattr("kinertia.cli.fit.fit_subject", fitted_or_not)
+    anna, text = subjects / "anna.toml", (subjects / "anna.toml").read_text()
+    anna.write_text(text.replace("72.6", "60.0"))
+    outcome = run("fit", anna, subjects / "ben.toml", "-o", tmp_path / "out", "--json")
+    assert outcome.status == 2
+    lines = [line for line in outcome.err.splitlines() if line.startswith("error: ")]
+    assert [line.startswith(f"error: {anna}: {one.line()}") for line, one in zip(lines, found, strict=True)] == [
+        True
+    ] * 2
+    blocked, ben = json.loads(outcome.out)
+    assert ([one["code"] for one in blocked["findings"]], blocked["folder"]) == (["P271", "P271"], None)
+    assert ben["folder"] == str(tmp_path / "out" / "ben")
 
 
 def test_several_people_need_subject_files_of_different_names(subjects, tmp_path):

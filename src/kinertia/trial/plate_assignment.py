@@ -256,7 +256,8 @@ def _nothing_measured(
     time, where = recording.markers.time, Where(trial=recording.name, span_s=window_s)
     left_out = {"left_out": Quantity("; ".join(recording.left_out))} if recording.left_out else {}
     if window_s is not None:
-        forces = {"forces": Quantity(_spans(time, contact.inside)), **left_out}
+        during = Quantity(f"from {window_s[0]:.3f} to {window_s[1]:.3f} s")
+        forces = {"forces": Quantity(_spans(time, contact.inside)), "during": during, **left_out}
         return with_evidence("P278", where, forces, causes=("a window in which there are no forces",))
     both = contact.ground.all(axis=1) & (contact.loaded.sum(axis=1) == 1)
     shared = float(both.mean()) if loads.together is not None else 0.0
@@ -265,7 +266,9 @@ def _nothing_measured(
         evidence[f"{name}_ground"] = Quantity(_spans(time, contact.ground[:, foot]))
         evidence[f"{name}_plate"] = Quantity(_spans(time, contact.loaded[:, foot]))
     one_plate = ["both feet on one plate, which measures their sum only"] if shared > _MOSTLY_SHARED else []
-    return with_evidence("P278", where, evidence | left_out, causes=tuple(one_plate))
+    return with_evidence(
+        "P278", where, evidence | left_out | {"during": Quantity("of the trial")}, causes=tuple(one_plate)
+    )
 
 
 def _error(found: Finding) -> TrialError:

@@ -73,6 +73,8 @@ def floor_slope(context: RecordingContext) -> Iterator[Finding]:
     if context.feet is None or context.recording.belt is not None:
         return
     markers = context.all_markers
+    if len(markers.time) < 2:
+        return
     labels = [label for own in context.feet.values() for label in own]
     if len(markers.time) < 2:
         return
