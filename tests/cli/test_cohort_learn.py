@@ -88,8 +88,9 @@ def test_everybody_is_fitted_again_with_what_the_others_teach(study, quick, tmp_
     assert sessions["A"] == sessions["B"] != sessions["D"]
     assert sessions["F"] is None
     ready = prepare_subject(read_subject(out / "learnt" / "subjects" / "A.toml"))
-    assert any("learnt from 5 people" in note for note in ready.notes)
-    assert any("known from 2 people (B, C)" in note for note in ready.notes)
+    sources = [str(one.evidence["source"].value) for one in ready.findings if one.code == "S408"]
+    assert any("learnt from 5 people" in source for source in sources)
+    assert any("known from 2 people (B, C)" in source for source in sources)
 
     with mock.patch("kinertia.report.cohort_learning.read_saved", side_effect=AssertionError("nothing is new")):
         again = run("cohort", study, "-o", out, "--learn")

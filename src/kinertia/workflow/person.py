@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
+from pathlib import Path
 from typing import TypeVar
 
 from kinertia.errors import BlockedError, KinertiaError, MarkerSetError
 from kinertia.findings.finding import Finding
 from kinertia.io.marker_set_file import choose_marker_set, read_marker_set
-from kinertia.io.osim.reader import read_osim
 from kinertia.io.person_recordings import read_static, read_trial
 from kinertia.io.subject_file import SubjectFile
 from kinertia.model.imported import OsimModel
@@ -92,7 +92,7 @@ def read_person(wanted: SubjectFile, progress: Progress = lambda stage, share: N
         KinertiaError: the marker set or the model cannot be read, or no trial can.
     """
     marker_set = None if wanted.model.markers is None else read_marker_set(wanted.model.markers)
-    model = None if wanted.model.osim is None else read_osim(wanted.model.osim)
+    model = None if wanted.model.osim is None else _read_model(wanted.model.osim)
     unread = Unread()
     static = None if wanted.model.static is None else unread.tried(lambda: read_static(wanted), None)
     trials = []
@@ -113,6 +113,12 @@ def read_person(wanted: SubjectFile, progress: Progress = lambda stage, share: N
         overrule_of={files.name: files.diagnostics.overrule for files in wanted.trials},
         unread=tuple(unread.findings),
     )
+
+
+def _read_model(path: Path) -> OsimModel:
+    from kinertia.io.osim.reader import read_osim  # which few subject files need
+
+    return read_osim(path)
 
 
 @dataclass
