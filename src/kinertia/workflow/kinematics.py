@@ -9,6 +9,7 @@ from typing import Literal
 
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.copied_frames import without_copied_frames
+from kinertia.diagnostics.model.range_limits import range_findings
 from kinertia.errors import TrialError
 from kinertia.estimation.prepared import Progress
 from kinertia.findings.finding import Finding
@@ -52,7 +53,7 @@ def usable_trial(context: RecordingContext) -> Trial:
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """Kinematics of the trials that could be solved, seconds by stage, and why the others could not."""
+    """Kinematics of the trials that could be solved, seconds by stage, and what was found of them and of the others."""
 
     kinematics: tuple[Kinematics, ...]
     seconds: tuple[Mapping[str, float], ...]
@@ -89,7 +90,12 @@ def solved_trials(
             continue
         ik_s = time.perf_counter() - started
         seconds.append({"read": one.read_seconds, "calibration": calibration_s, "ik": ik_s})
-    findings = tuple(error.finding for error in failed if error.finding is not None)
-    if failed and (not kinematics or len(findings) < len(failed)):
+    unsolved = [error.finding for error in failed if error.finding is not None]
+    if failed and (not kinematics or len(unsolved) < len(failed)):
         raise failed[0]
-    return Solved(tuple(kinematics), tuple(seconds), findings)
+    found = [
+        one
+        for k in kinematics
+        for one in (*k.findings, *(each.in_trial(k.trial.name) for each in range_findings(skeleton, k.ik)))
+    ]
+    return Solved(tuple(kinematics), tuple(seconds), (*unsolved, *found))

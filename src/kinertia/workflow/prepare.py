@@ -5,7 +5,7 @@ smoothed kinematics.
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from kinertia.diagnostics.context import RecordingContext
@@ -21,7 +21,9 @@ from kinertia.estimation.population import population_prior
 from kinertia.estimation.prepared import Prepared, Progress
 from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINTY
-from kinertia.findings.finding import Finding
+from kinertia.findings.finding import Finding, finding
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
 from kinertia.model.anthropometry import literature_bsp
 from kinertia.model.gait27 import (
     ARM_COORDINATES,
@@ -46,6 +48,7 @@ from kinertia.workflow.screening import Screened, screen
 LOWER_BODY_SD_M = 0.01
 UPPER_BODY_SD_M = 0.04
 """How far markers may sit from where the model has them."""
+_FAR_M = 0.03
 _ARM_ROTATION_SD_RAD = 1.0
 _TURNED_RAD = 0.25
 """The skin turns the markers about the torso by 2 to 6 degrees; shoulders without a third axis, in a run, by 38."""
@@ -58,12 +61,14 @@ class Calibrated:
     Attributes:
         skeleton: adapted to the trials.
         findings: labels that contradict the static trial's model.
+        moved_m: per marker label, how far it sits from its position in the static trial.
         elbow_rotations_rad: side -> by how much an elbow axis was turned, where it was.
         torso_rotation_rad: by how much the torso would have turned under its markers, which were kept from it.
     """
 
     skeleton: Skeleton
     findings: list[Finding]
+    moved_m: Mapping[str, float]
     elbow_rotations_rad: Mapping[str, float]
     torso_rotation_rad: float | None
 
@@ -91,7 +96,7 @@ def calibrate(model: Gait27, trials: Sequence[Trial]) -> Calibrated:
         adapted = adapt(skeleton, trials, poses, marker_sd, coordinate_sd, unturned=("pelvis", "torso"))
     else:
         torso_rad = None
-    return Calibrated(adapted.skeleton, found, elbows, torso_rad)
+    return Calibrated(adapted.skeleton, found, adapted.moved_m, elbows, torso_rad)
 
 
 @one_blas_thread
@@ -141,14 +146,18 @@ def prepared(screened: Screened, settings: Settings, progress: Progress = lambda
     if VIRTUAL_TRUNK[0] in model.skeleton.markers:
         turned = [replace(one, trial=with_upright_trunk(model.skeleton, one.trial)) for one in turned]
     calibrated = calibrate(model, [one.trial for one in turned])
-    skeleton, found = calibrated.skeleton, [*screened.findings, *calibrated.findings]
-    turned = _unblocked(turned, screened.overruled(found))
+    found = [*screened.findings, *calibrated.findings]
+    left = _unblocked(turned, screened.overruled(found))
+    if len(left) < len(turned):  # the skeleton is adapted to those that are used
+        calibrated = calibrate(model, [one.trial for one in left])
+    turned, skeleton = left, calibrated.skeleton
     total = CarriedMass.of(known(subject.mass_kg), person.attached)
     literature = literature_bsp(total.body_kg, height_m, sex, model.geometry, settings.bsp)
     expected = population_prior(literature_prior(literature), subject, total.body_kg)
     calibration_s = (time.perf_counter() - started) / len(turned)
     solved = solved_trials(skeleton, turned, settings.cutoff_hz, calibration_s, progress)
-    findings = screened.overruled([*found, *unobserved_segments(skeleton), *solved.findings])
+    found += [*_adapted(calibrated.moved_m), *unobserved_segments(skeleton), *solved.findings]
+    findings = screened.overruled(found)
     return Prepared(
         subject=subject,
         settings=settings,
@@ -169,6 +178,13 @@ def prepared(screened: Screened, settings: Settings, progress: Progress = lambda
         elbow_rotations_rad=calibrated.elbow_rotations_rad,
         torso_rotation_rad=calibrated.torso_rotation_rad,
     )
+
+
+def _adapted(moved_m: Mapping[str, float]) -> Iterator[Finding]:
+    """M173 of markers that sit far from their positions in the static trial."""
+    for label, distance_m in moved_m.items():
+        if distance_m > _FAR_M:
+            yield finding("M173", Where(markers=(label,)), distance_m=Quantity(distance_m, "m", limit=_FAR_M))
 
 
 def _unblocked(trials: Sequence[Turned], findings: Sequence[Finding]) -> list[Turned]:

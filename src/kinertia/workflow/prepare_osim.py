@@ -13,7 +13,6 @@ from dataclasses import replace
 import numpy as np
 
 from kinertia.diagnostics.model.model_on_person import moved_markers
-from kinertia.diagnostics.model.range_limits import range_findings
 from kinertia.estimation.calibration import adapt, first_poses, hold_uninformed
 from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.estimation.input_checks import check_trials, complete_subject, known
@@ -100,8 +99,6 @@ def prepared_osim(screened: Screened, settings: Settings, progress: Progress = l
     centres = {name: JOINT_CENTRE_SD_M for name in skeleton.locked if "/offset_" in name}
     uncertainty = ModelUncertainty(centres, MARKER_SD_M if person.calibrate else None, held, "the model's own values")
     solved = solved_trials(skeleton, turned, settings.cutoff_hz, calibration_s, progress)
-    for k in solved.kinematics:
-        found += [one.in_trial(k.trial.name) for one in range_findings(skeleton, k.ik)]
     found += [*solved.findings, *_assumed(model, factor, own, idle, held)]
     findings = screened.overruled([*screened.findings, *found])
     return Prepared(
