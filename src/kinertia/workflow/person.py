@@ -8,7 +8,8 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import TypeVar
 
-from kinertia.errors import BlockedError, KinertiaError, MarkerSetError
+from kinertia.errors import BlockedError, KinertiaError, MarkerSetError, SubjectError
+from kinertia.estimation.input_checks import complete_subject
 from kinertia.findings.finding import Finding
 from kinertia.io.marker_set_file import choose_marker_set, read_marker_set
 from kinertia.io.person_recordings import read_static, read_trial
@@ -67,6 +68,15 @@ class Person:
     def with_overrule(self, overrule: Overrule) -> Person:
         """The same where the user overrules more."""
         return replace(self, overrule=self.overrule + overrule)
+
+    @cached_property
+    def completed(self) -> Subject | SubjectError:
+        """What is stated, with what files add; the error where that is incomplete or cannot be true."""
+        recordings = [*([] if self.static is None else [self.static]), *self.recordings]
+        try:
+            return complete_subject(self.subject, recordings, mass_only=True)
+        except SubjectError as error:
+            return error
 
     @cached_property
     def labels(self) -> MarkerSet | MarkerSetError:

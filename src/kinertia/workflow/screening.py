@@ -6,7 +6,7 @@ out; one of the person, or of the static trial, stops everything.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -21,10 +21,8 @@ from kinertia.diagnostics.subject import questions as subject
 from kinertia.diagnostics.timing import questions as timing
 from kinertia.errors import BlockedError, KinertiaError, MarkerSetError, SubjectError
 from kinertia.estimation.carried_mass import CarriedMass
-from kinertia.estimation.input_checks import complete_subject
 from kinertia.findings.finding import Finding
 from kinertia.findings.rule import matching
-from kinertia.model.marker_set import MarkerSet
 from kinertia.settings import Subject
 from kinertia.trial.data import Recording
 from kinertia.workflow.joint_widths import with_widths
@@ -116,7 +114,9 @@ class Screened:
 def screen(person: Person) -> Screened:
     """Ask everything that can be asked before inverse kinematics."""
     context = person_context(person)
-    found = [*person.unread, *_implausible(person)]
+    found = [*person.unread]
+    if isinstance(person.completed, SubjectError) and person.completed.finding is not None:
+        found += [person.completed.finding] if person.completed.finding.code == "S102" else []
     for static in context.standing:
         found += _of_recording(static, STATIC_QUESTIONS)
     for trial in context.trials:
@@ -131,57 +131,33 @@ def screen(person: Person) -> Screened:
 
 def person_context(person: Person) -> PersonContext:
     """What questions are asked of, before any is."""
-    label_set, stated = _label_set(person), _completed(person)
-    static = None if person.static is None else _static_context(person, person.static)
+    label_set = None if isinstance(person.labels, MarkerSetError) else person.labels
+    stated = _stated(person)
+
+    def standing(recording: Recording) -> RecordingContext:
+        """With the widths of joints that are known."""
+        own_set = label_set
+        if own_set is not None and person.model is None:
+            recording, own_set = with_widths(recording, person.recordings, own_set, person.subject)
+        return RecordingContext(recording, own_set, is_static=True, height_m=stated.height_m, mass_kg=stated.mass_kg)
+
+    static = None if person.static is None else standing(person.static)
     trials = [
         RecordingContext(item.recording, label_set, static, False, item.window_s, stated.height_m, stated.mass_kg)
         for item in person.trials
     ]
     total = None if stated.mass_kg is None else _total(stated.mass_kg, person)
+    more_statics = [standing(one) for one in person.more_statics]
     return PersonContext(
-        stated,
-        trials,
-        static,
-        label_set,
-        person.model,
-        person.calibrate,
-        total,
-        more_statics=[_static_context(person, one) for one in person.more_statics],
+        stated, trials, static, label_set, person.model, person.calibrate, total, more_statics=more_statics
     )
 
 
-def _label_set(person: Person) -> MarkerSet | None:
-    return None if isinstance(person.labels, MarkerSetError) else person.labels
-
-
-def _static_context(person: Person, recording: Recording) -> RecordingContext:
-    """Of a recording in which the person stands, with the widths of joints that are known."""
-    label_set, stated = _label_set(person), _completed(person)
-    if label_set is not None and person.model is None:
-        recording, label_set = with_widths(recording, person.recordings, label_set, person.subject)
-    return RecordingContext(recording, label_set, is_static=True, height_m=stated.height_m, mass_kg=stated.mass_kg)
-
-
-def _completed(person: Person) -> Subject:
+def _stated(person: Person) -> Subject:
     """What is stated, with what files add; as stated where it is incomplete, without what cannot be true."""
-    try:
-        return _complete(person)
-    except SubjectError as error:
-        return person.subject.model_copy(update={error.field: None})
-
-
-def _implausible(person: Person) -> Iterator[Finding]:
-    """S102: a mass, stature or sex, stated or of a file, that cannot be true."""
-    try:
-        _complete(person)
-    except SubjectError as error:
-        if error.finding is not None and error.finding.code == "S102":
-            yield error.finding
-
-
-def _complete(person: Person) -> Subject:
-    recordings = [*([] if person.static is None else [person.static]), *person.recordings]
-    return complete_subject(person.subject, recordings, mass_only=True)
+    if isinstance(person.completed, SubjectError):
+        return person.subject.model_copy(update={person.completed.field: None})
+    return person.completed
 
 
 def _total(mass_kg: float, person: Person) -> CarriedMass | None:
