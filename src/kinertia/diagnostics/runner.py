@@ -12,6 +12,7 @@ from typing import Generic, TypeVar
 
 from kinertia.findings.finding import Finding, Severity
 from kinertia.findings.rule import matching, rule
+from kinertia.findings.where import Where
 from kinertia.settings import Overrule
 
 Context = TypeVar("Context")
@@ -58,7 +59,10 @@ def explained(findings: Iterable[Finding]) -> list[Finding]:
 
     A correction of the estimate that resolves an earlier warning mutes it, and leaves it a correction.
     """
-    result = list({(one.code, one.where): one for one in reversed(list(findings))}.values())[::-1]
+    unique: dict[tuple[str, Where], Finding] = {}
+    for one in findings:
+        unique.setdefault((one.code, one.where), one)
+    result = list(unique.values())
     muted_by: dict[int, int] = {}
     for k, cause in enumerate(result):
         consequences = {code for each in cause.rule.supersedes for code in matching(each)}
