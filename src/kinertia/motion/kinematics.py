@@ -55,7 +55,7 @@ class Kinematics:
         windows_s: first and last time of every stretch in which all ground contact is measured and all coordinates are
             known, with accelerations; in order.
         notes: assumptions made on the way.
-        findings: which frames are used, and where inverse kinematics did not converge.
+        findings: which frames are used, and where inverse kinematics did not converge; those of the trial are its own.
     """
 
     trial: Trial
@@ -185,9 +185,7 @@ def solve_kinematics(
     if stuck:
         findings.append(finding("R105", Where(trial=trial.name), frames=Quantity(stuck, "1")))
     remarks = [f"{trial.name}: {cutoff.sentence}"] if cutoff.sentence else []
-    return Kinematics(
-        trial, turned_deg, ik, spline, cutoff.hz, windows, (*trial.notes, *remarks), (*trial.findings, *findings)
-    )
+    return Kinematics(trial, turned_deg, ik, spline, cutoff.hz, windows, (*trial.notes, *remarks), tuple(findings))
 
 
 def _bridged(known: np.ndarray, time: np.ndarray) -> np.ndarray:

@@ -52,7 +52,9 @@ def usable_trial(context: RecordingContext) -> Trial:
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """Kinematics of the trials that could be solved, seconds by stage, and why the others could not."""
+    """Kinematics of the trials that could be solved, seconds by stage; what was found of them, and why the others could
+    not be solved.
+    """
 
     kinematics: tuple[Kinematics, ...]
     seconds: tuple[Mapping[str, float], ...]
@@ -89,7 +91,8 @@ def solved_trials(
             continue
         ik_s = time.perf_counter() - started
         seconds.append({"read": one.read_seconds, "calibration": calibration_s, "ik": ik_s})
-    findings = tuple(error.finding for error in failed if error.finding is not None)
-    if failed and (not kinematics or len(findings) < len(failed)):
+    reasons = [error.finding for error in failed if error.finding is not None]
+    if failed and (not kinematics or len(reasons) < len(failed)):
         raise failed[0]
-    return Solved(tuple(kinematics), tuple(seconds), findings)
+    of_solved = [found for one in kinematics for found in one.findings]
+    return Solved(tuple(kinematics), tuple(seconds), (*of_solved, *reasons))
