@@ -6,7 +6,7 @@ attributes. The command line prints the message as one line and exits with statu
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Self
@@ -80,9 +80,8 @@ class FileError(KinertiaError):
         path: str | Path,
         code: str,
         line: int | None = None,
-        known: Mapping[str, Quantity] | None = None,
-        *,
         at: Where | None = None,
+        /,
         **evidence: Quantity,
     ) -> Self:
         """The error of a rule of the catalogue, with its evidence.
@@ -91,15 +90,15 @@ class FileError(KinertiaError):
             path: the file.
             code: of the rule.
             line: one-based.
-            known, evidence: what was measured, the headline first.
             at: plate, markers or time that it is about.
+            evidence: what was measured, the headline first.
 
         Examples:
             >>> from kinertia import FileError, Quantity
             >>> FileError.found("walk.mot", "F142", force=Quantity("ground_force_v")).finding.code
             'F142'
         """
-        return cls.of(path, with_evidence(code, at or Where(), {**(known or {}), **evidence}), line)
+        return cls.of(path, with_evidence(code, at or Where(), evidence), line)
 
     @classmethod
     def of(cls, path: str | Path, found: Finding, line: int | None = None) -> Self:
@@ -148,7 +147,7 @@ class TrialError(KinertiaError):
         super().__init__(f"trial '{trial}': {problem}")
 
     @classmethod
-    def found(cls, trial: str, code: str, *, at: Where | None = None, **evidence: Quantity) -> Self:
+    def found(cls, trial: str, code: str, at: Where | None = None, /, **evidence: Quantity) -> Self:
         """The error of a rule of the catalogue, with its evidence.
 
         Args:
@@ -157,8 +156,13 @@ class TrialError(KinertiaError):
             at: plate, markers or time that it is about.
             evidence: what was measured, the headline first.
         """
-        made = with_evidence(code, replace(at or Where(), trial=trial), evidence, Severity.ERROR)
-        return cls(trial, problem_of(made)).with_finding(made)
+        return cls.of(trial, with_evidence(code, at or Where(), evidence))
+
+    @classmethod
+    def of(cls, trial: str, found: Finding) -> Self:
+        """The error of a finding, in this trial."""
+        placed = found.in_trial(trial).at(Severity.ERROR)
+        return cls(trial, problem_of(placed)).with_finding(placed)
 
 
 class SubjectError(KinertiaError):

@@ -10,7 +10,6 @@ from kinertia.findings.where import Where
 from kinertia.settings import Subject
 from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow import prepare as module
-from kinertia.workflow.kinematics import Turned, solved_trials
 from kinertia.workflow.prepare import prepare
 
 
@@ -38,16 +37,6 @@ def test_a_trial_that_its_labels_block_does_not_move_the_model(recordings, monke
     both = prepared_from(static, TrialInput(walk, (1.2, 1.8)), TrialInput(other, (1.2, 1.8)))
     assert both.left_out == ("other",)
     np.testing.assert_array_equal(both.skeleton.marker_locals, alone.skeleton.marker_locals)
-
-
-def test_findings_of_kinematics_are_not_lost(recordings):
-    static, walk = recordings
-    ready = prepared_from(static, TrialInput(walk, (1.2, 1.9)))
-    trial = ready.kinematics[0].trial
-    measured = trial.measured & (np.abs(trial.markers.time - 1.55) > 0.05)
-    solved = solved_trials(ready.skeleton, [Turned(replace(trial, measured=measured))], 6.0, 0.0, lambda *_: None)
-    assert "P270" in {one.code for one in solved.findings}
-    assert {one.code for one in ready.kinematics[0].findings} <= {one.code for one in ready.findings}
 
 
 def test_markers_that_calibration_moves_far_are_reported(recordings):

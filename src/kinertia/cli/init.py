@@ -52,9 +52,7 @@ def init(
 def _measures(folder: Path) -> Outcome:
     sheet, picture = folder / "measures.csv", folder / "measures.svg"
     if not folder.is_dir():
-        raise FileError.found(
-            folder, "F101", None, missing_file(folder, str(folder), "the folder of the person's files")
-        )
+        raise FileError.found(folder, "F101", **missing_file(folder, str(folder), "the folder of the person's files"))
     if sheet.exists():
         raise FileError(sheet, "exists already and is left alone; remove it to write a new one")
     write_then_rename(picture, measures_picture())

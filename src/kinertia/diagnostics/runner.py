@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from kinertia.findings.finding import Finding, Severity
 from kinertia.findings.rule import matching, rule
@@ -52,6 +52,11 @@ def asked(
         for one in question.ask(context):
             result.append(one if trial is None or one.where.trial is not None else one.in_trial(trial))
     return result
+
+
+def rules_of(*questions: Question[Any]) -> int:
+    """How many rules questions stand for."""
+    return len({code for one in questions for code in matching(one.code)})
 
 
 def explained(findings: Iterable[Finding]) -> list[Finding]:

@@ -22,11 +22,6 @@ class ForcesUsed(NamedTuple):
     which: str
     why: str
 
-    @property
-    def sentence(self) -> str:
-        """Both, without a full stop."""
-        return f"the joint moments are from the ground reactions {self.which}{self.why}"
-
 
 def forces_used(reactions: GroundReactions, settings: Settings, motion_hz: float) -> ForcesUsed:
     """What was done to the ground reactions of a trial before they went into joint moments.

@@ -67,4 +67,4 @@ def read_bsp(path: Path) -> BspTable:
 
 def _wrong(path: Path, line: int | None, segment: str, parameter: str, problem: str) -> FileError:
     words = {"parameter": Quantity(parameter), "problem": Quantity(problem)}
-    return FileError.found(path, "F183", line, words, at=Where(part=segment))
+    return FileError.found(path, "F183", line, Where(part=segment), **words)

@@ -102,7 +102,7 @@ def doubts_about(path: Path) -> str:
 
 def _too_short(path: Path, size: int, needed: int) -> FileError:
     counts = {"bytes": Quantity(size, "1"), "announced": Quantity(needed, "1")}
-    return FileError.found(path, "F104", None, counts, found=Quantity(f"it has {size} of at least {needed} bytes"))
+    return FileError.found(path, "F104", **counts, found=Quantity(f"it has {size} of at least {needed} bytes"))
 
 
 def trial_date(path: Path) -> tuple[int, ...]:
@@ -212,7 +212,7 @@ def _parameters(path: Path, section: bytes, order: str) -> tuple[_Parameters, st
 
     def broken(what: str) -> FileError:
         place = {"byte": Quantity(at, "1")}
-        return FileError.found(path, "F106", None, place, what=Quantity(f"{what}, at byte {at} of its parameters"))
+        return FileError.found(path, "F106", **place, what=Quantity(f"{what}, at byte {at} of its parameters"))
 
     while at + 2 <= len(section) and section[at]:
         length, group = struct.unpack_from("bb", section, at)

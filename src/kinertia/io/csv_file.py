@@ -127,4 +127,4 @@ def read_csv(path: Path, columns: Sequence[str], expected: str) -> Iterator[Row]
     if empty:
         rows = {"rows": Quantity(0, "1")}
         found = Quantity(f"it has a heading and no rows, and is no {expected}")
-        raise FileError.found(path, "F104", first + 1, rows, found=found)
+        raise FileError.found(path, "F104", first + 1, **rows, found=found)

@@ -61,7 +61,7 @@ def even_times(path: Path, time: FloatArray) -> tuple[FloatArray, tuple[Finding,
 
 def uneven(path: Path, line: int | None, before: float, after: float, usual: float) -> FileError:
     """The error of two times (s) whose step is not the usual one."""
-    return FileError.found(path, "T101", line, step_evidence(before, after, usual))
+    return FileError.found(path, "T101", line, **step_evidence(before, after, usual))
 
 
 def times_rounded(path: Path, rounding: float, rate_hz: float) -> Finding:

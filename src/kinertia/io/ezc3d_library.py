@@ -51,7 +51,7 @@ def expect_ezc3d(path: Path) -> None:
     if ezc3d is None:
         how = "conda install -c conda-forge ezc3d; pip has none for Linux on ARM"
         kinds = {"kind": Quantity("C3D files"), "others": Quantity("export TRC and MOT files")}
-        raise FileError.found(path, "F107", None, kinds, package=Quantity("ezc3d"), how=Quantity(how))
+        raise FileError.found(path, "F107", **kinds, package=Quantity("ezc3d"), how=Quantity(how))
 
 
 def read_content(path: Path) -> C3dContent:

@@ -111,10 +111,10 @@ def _wrench(path: Path, table: TimeTable, group: _Columns, turn: FloatArray) -> 
             "vertical": Quantity("XYZ"[up]),
             "column": Quantity(f"{group.force}y"),
         }
-        raise FileError.found(path, "P201", None, axes, at=Where(plate=group.name))
+        raise FileError.found(path, "P201", None, Where(plate=group.name), **axes)
     if force[np.argmax(np.abs(force[:, 1])), 1] < -LOAD_THRESHOLD_N:
         down = {"force_n": Quantity(float(force[:, 1].min()), "N"), "column": Quantity(f"{group.force}{'xyz'[up]}")}
-        raise FileError.found(path, "F157", None, down, at=Where(plate=group.name))
+        raise FileError.found(path, "F157", None, Where(plate=group.name), **down)
     loaded = force[:, 1] >= LOAD_THRESHOLD_N
     _expect_numbers(path, table, group, group.point, loaded)
     moment = np.cross(_triple(table, group.point) @ turn.T, force)
@@ -194,7 +194,7 @@ def _datafile(root: ElementTree.Element, loads_path: Path) -> tuple[Path, tuple[
     """
     name = (root.findtext(".//datafile") or "").strip()
     if not name or name.lower() == "unassigned":
-        raise FileError.found(loads_path, "F148", None, _relocated("''", "it names no MOT or STO file"))
+        raise FileError.found(loads_path, "F148", **_relocated("''", "it names no MOT or STO file"))
     path = path_from(loads_path.parent, name)
     if path.is_file():
         return path, ()
@@ -203,7 +203,7 @@ def _datafile(root: ElementTree.Element, loads_path: Path) -> tuple[Path, tuple[
     if named.root and beside.is_file():
         read = _relocated(name, f"it does not exist, and {beside.name} beside the file was read")
         return beside, (with_evidence("F148", Where(loads_path.name), read),)
-    raise FileError.found(loads_path, "F148", None, _relocated(name, f"there is no file {path.absolute()}"))
+    raise FileError.found(loads_path, "F148", **_relocated(name, f"there is no file {path.absolute()}"))
 
 
 def _relocated(path: str, outcome: str) -> dict[str, Quantity]:
@@ -220,7 +220,7 @@ def _groups_by_identifier(root: ElementTree.Element, path: Path) -> tuple[list[_
         for tag in ("force_expressed_in_body", "point_expressed_in_body"):
             body = _text(element, tag) or "ground"
             if body.rsplit("/", 1)[-1] != "ground":
-                raise FileError.found(path, "F146", at=Where(part=body), load=Quantity(name), entry=Quantity(tag))
+                raise FileError.found(path, "F146", None, Where(part=body), load=Quantity(name), entry=Quantity(tag))
         force, point = _text(element, "force_identifier"), _text(element, "point_identifier")
         for tag, identifier in (("force_identifier", force), ("point_identifier", point)):
             if not identifier:
@@ -248,13 +248,13 @@ def _expect_own_columns(groups: Sequence[_Columns], path: Path) -> None:
             if taken.setdefault(identifier, mine) != mine or identifier == group.torque:
                 other = f"the torque of {group.name}" if identifier == group.torque else taken[identifier]
                 both = {"load": Quantity(mine), "other": Quantity(other), "identifier": Quantity(identifier)}
-                raise FileError.found(path, "F144", None, both)
+                raise FileError.found(path, "F144", **both)
     for group in groups:
         for what, named in (("point", group.point), ("torque", group.torque or "")):
             owner = forces.get(_plate_name(named), group.force)
             if owner != group.force and _plate_name(owner) != _plate_name(group.force):
                 mixed = {"load": Quantity(group.name), "what": Quantity(what), "identifier": Quantity(named)}
-                raise FileError.found(path, "F145", None, mixed, force=Quantity(group.force), owner=Quantity(owner))
+                raise FileError.found(path, "F145", **mixed, force=Quantity(group.force), owner=Quantity(owner))
 
 
 def _plate_name(identifier: str) -> tuple[str, ...]:
@@ -275,4 +275,4 @@ def _expect_columns(groups: Sequence[_Columns], table: TimeTable, path: Path, lo
             if missing:
                 needed = Quantity(f"columns {', '.join(missing)} by its identifier '{identifier}'")
                 names = {"load": Quantity(f"{group.name} ({loads_path.name})"), "identifier": needed}
-                raise FileError.found(path, "F143", None, names, found=Quantity(_listed(table.labels)))
+                raise FileError.found(path, "F143", **names, found=Quantity(_listed(table.labels)))

@@ -88,4 +88,4 @@ def _length_m(path: Path, line: int, measure: Measure, value_cm: float) -> float
 
 def _wrong(path: Path, line: int | None, measure: str, problem: str, **evidence: Quantity) -> FileError:
     words = {"measure": Quantity(measure), "problem": Quantity(problem)}
-    return FileError.found(path, "F182", line, evidence | words)
+    return FileError.found(path, "F182", line, **(evidence | words))

@@ -67,7 +67,7 @@ def _expect_sound(row: Row, percent: float, sd: float) -> None:
 
 
 def _wrong(path: Path, line: int | None, problem: str, **evidence: Quantity) -> FileError:
-    return FileError.found(path, "F187", line, evidence, problem=Quantity(problem))
+    return FileError.found(path, "F187", line, **evidence, problem=Quantity(problem))
 
 
 def _norm(curve: Mapping[float, Sequence[float]]) -> Norm:

@@ -39,7 +39,7 @@ def expect_file(path: Path, expected: str = "a file") -> None:
         return
     if os.path.isdir(path):
         raise wrong_kind(path, "A folder", "be read here", expected)
-    raise FileError.found(path, "F101", None, missing_file(path, str(path), expected))
+    raise FileError.found(path, "F101", **missing_file(path, str(path), expected))
 
 
 def wrong_kind(path: Path, given: str, what: str, expected: str, line: int | None = None) -> FileError:
@@ -54,7 +54,7 @@ def mismatch(path: Path, kind: str, found: str, expected: str, line: int | None 
 
 def malformed(path: Path, line: int | None, found: str, expected: str, **known: Quantity) -> FileError:
     """The error of a cell or row: "found {found}; expected {expected}"; `cell` and `column` where it is one cell."""
-    return FileError.found(path, "F105", line, known, found=Quantity(found), expected=Quantity(expected))
+    return FileError.found(path, "F105", line, **known, found=Quantity(found), expected=Quantity(expected))
 
 
 def read_rows(

@@ -75,7 +75,7 @@ def read_population(path: Path) -> PopulationFile:
         place = ".".join(map(str, first["loc"])) or "its numbers"
         line = document.line(first["loc"]) or document.last_line
         evidence = {"entry": Quantity(place), "problem": Quantity(f"{place}: {first['msg']}")}
-        raise FileError.found(path, "F185", line, evidence) from None
+        raise FileError.found(path, "F185", line, **evidence) from None
 
 
 def population_text(population: PopulationFile) -> str:

@@ -159,7 +159,7 @@ def _plate(path: Path) -> _Plate:
     names = next(([key, *values] for key, values in header.items() if "Force_X" in (key, *values)), None)
     if names is None or any(column not in names for column in _COLUMNS):
         lacking = ", ".join(column for column in _COLUMNS if column not in (names or ()))
-        raise FileError.found(path, "F156", at=Where(plate=path.stem), columns=Quantity(f"the columns {lacking}"))
+        raise FileError.found(path, "F156", None, Where(plate=path.stem), columns=Quantity(f"the columns {lacking}"))
     values, _ = read_rows(path, [line.replace("NULL", "") for line in lines], first, len(names), may_be_short=True)
     force, moment, point = (
         values[:, [names.index(f"{what}_{axis}") for axis in "XYZ"]] for what in ("Force", "Moment", "COP")
@@ -191,4 +191,4 @@ def _expect_alike(files: Sequence[Path], plates: Sequence[_Plate]) -> None:
         if plate.rate_hz != plates[0].rate_hz or len(plate.force) != len(plates[0].force):
             counts = {"samples": Quantity(len(plate.force), "1"), "rate_hz": Quantity(plate.rate_hz, "Hz")}
             other = f"{files[0].name} has {len(plates[0].force)} at {plates[0].rate_hz:g} Hz"
-            raise FileError.found(file, "F155", None, counts, other=Quantity(other))
+            raise FileError.found(file, "F155", **counts, other=Quantity(other))

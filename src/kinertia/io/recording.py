@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from kinertia.errors import FileError, TrialError, problem_of
+from kinertia.errors import FileError, TrialError
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
@@ -140,7 +140,7 @@ def _expect_laboratory(path: Path, recording: Recording) -> None:
         name, value = "force_n" if axis < 3 else "moment_nm", float(plates.wrench[frame, plate, axis])
         size = {name: Quantity(value, unit, limit=limit)} if np.isfinite(value) else {}
         load = impossible_load(plates.names[plate], what, float(plates.time[frame]), **size)
-        raise TrialError(recording.name, problem_of(load)).with_finding(load.in_trial(recording.name))
+        raise TrialError.of(recording.name, load)
 
 
 def _expect_overlap(recording: Recording) -> None:

@@ -82,7 +82,7 @@ def read_session(path: Path) -> tuple[PersonInstruments, ...]:
         place = ".".join(map(str, first["loc"])) or "its numbers"
         line = document.line(first["loc"]) or document.last_line
         evidence = {"entry": Quantity(place), "problem": Quantity(f"{place}: {first['msg']}")}
-        raise FileError.found(path, "F184", line, evidence) from None
+        raise FileError.found(path, "F184", line, **evidence) from None
 
 
 def session_text(

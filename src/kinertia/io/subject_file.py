@@ -227,7 +227,7 @@ def read_subject(path: str | Path) -> SubjectFile:
     if trouble := trouble_as_folders([trial.name for trial in result.trials]):
         index, problem = trouble
         words = {"name": Quantity(shown(result.trials[index].name)), "problem": Quantity(problem)}
-        raise FileError.found(path, "F192", document.line(("trial", index, "name")), words)
+        raise FileError.found(path, "F192", document.line(("trial", index, "name")), **words)
     return result.model_copy(update={"diagnostics": _of_study(path.parent) + result.diagnostics})
 
 

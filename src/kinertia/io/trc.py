@@ -76,7 +76,7 @@ def unknown_unit(
 ) -> FileError:
     """The error that the unit of {what} is {unit}, expected {expected}."""
     words = {"unit": Quantity(unit), "what": Quantity(what), "expected": Quantity(expected)}
-    return FileError.found(path, "F121", line, {**(known or {}), **words})
+    return FileError.found(path, "F121", line, **(known or {}), **words)
 
 
 def write_trc(path: str | Path, markers: Markers) -> None:
@@ -124,7 +124,7 @@ def _header(path: Path, lines: list[str]) -> dict[str, str]:
     if len(lines) < _FIRST_ROW_LINE:
         counted = {"lines": Quantity(len(lines), "1")}
         found = Quantity(f"it ends within its header, after {len(lines)} lines")
-        raise FileError.found(path, "F104", len(lines), counted, found=found)
+        raise FileError.found(path, "F104", len(lines), **counted, found=found)
     names, values = lines[1].split(), lines[2].split()
     missing = [key for key in _HEADER_KEYS if key not in names]
     if missing:
@@ -171,7 +171,7 @@ def _expect_whole(path: Path, lines: list[str], rows: int, frames: int, line: in
     if rows:
         found = f"it ends within a row, and {found.removeprefix('it ')}"
     counts = {"rows": Quantity(rows, "1"), "announced": Quantity(frames, "1")}
-    raise FileError.found(path, "F104", line, counts, found=Quantity(found))
+    raise FileError.found(path, "F104", line, **counts, found=Quantity(found))
 
 
 def _other_markers(path: Path, lines: list[str], labels: tuple[str, ...], count: int) -> list[Finding]:
@@ -186,7 +186,7 @@ def _other_markers(path: Path, lines: list[str], labels: tuple[str, ...], count:
     columns = max((len(_cells(row.rstrip())) for row in rows), default=0)
     if columns != 2 + 3 * len(labels):
         counts = {"labels": Quantity(len(labels), "1"), "columns": Quantity(columns, "1")}
-        raise FileError.found(path, "F112", 4, counts, announced=Quantity(count, "1"))
+        raise FileError.found(path, "F112", 4, **counts, announced=Quantity(count, "1"))
     return [other_count(path, 3, count, len(labels), "markers")]
 
 
@@ -207,7 +207,7 @@ def _uniform_time(
     # three frames at 60 Hz, told to the millisecond, run at 60.6 Hz by their ends
     if abs(rate_hz * step - 1) > 0.01 and np.abs(time - at_rate).max() > rounding_s(time):
         rates = {"header_hz": Quantity(rate_hz, "Hz"), "column_hz": Quantity(float(1 / step), "Hz")}
-        raise FileError.found(path, "T103", 3, rates)
+        raise FileError.found(path, "T103", 3, **rates)
     frames = np.arange(len(time))
     uniform = time[0] + frames / rate_hz
     if np.abs(time - uniform).max() > _TIME_TOLERANCE_FRAMES * step:

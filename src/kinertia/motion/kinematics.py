@@ -55,7 +55,7 @@ class Kinematics:
         windows_s: first and last time of every stretch in which all ground contact is measured and all coordinates are
             known, with accelerations; in order.
         notes: assumptions made on the way.
-        findings: which frames are used, and where inverse kinematics did not converge.
+        findings: which frames are used, and where inverse kinematics did not converge; those of the trial are its own.
     """
 
     trial: Trial
@@ -174,7 +174,7 @@ def solve_kinematics(
     except SmoothingError as error:
         part = Where(part=ik.coordinates[error.column])
         code = "R102" if error.n_visible else "R103"
-        raise TrialError.found(trial.name, code, at=part, frames=Quantity(error.n_visible, "1")) from error
+        raise TrialError.found(trial.name, code, part, frames=Quantity(error.n_visible, "1")) from error
     known = np.all(_bridged(np.isfinite(ik.q), ik.time), axis=1)
     known &= (
         np.abs(ik.time - ik.time[shown].mean())
@@ -185,9 +185,7 @@ def solve_kinematics(
     if stuck:
         findings.append(finding("R105", Where(trial=trial.name), frames=Quantity(stuck, "1")))
     remarks = [f"{trial.name}: {cutoff.sentence}"] if cutoff.sentence else []
-    return Kinematics(
-        trial, turned_deg, ik, spline, cutoff.hz, windows, (*trial.notes, *remarks), (*trial.findings, *findings)
-    )
+    return Kinematics(trial, turned_deg, ik, spline, cutoff.hz, windows, (*trial.notes, *remarks), tuple(findings))
 
 
 def _bridged(known: np.ndarray, time: np.ndarray) -> np.ndarray:
@@ -217,7 +215,7 @@ def _long_enough(
         first, last = max(windows, key=lambda run: run[1] - run[0])
         longest = Where(span_s=(float(time[first]), float(time[last])))
         few = Quantity(last - first + 1, "1", limit=FEWEST_FRAMES)
-        raise TrialError.found(trial.name, "P279", at=longest, frames=few)
+        raise TrialError.found(trial.name, "P279", longest, frames=few)
     frames = sum(last - first + 1 for first, last in used)
     left_out = sum(last - first + 1 for first, last in windows) - frames
     found = []

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from kinertia.errors import MarkerSetError, TrialError, problem_of
+from kinertia.errors import MarkerSetError, TrialError
 from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
@@ -246,7 +246,7 @@ class Recording:
         if wrong is None and plates is not None:
             wrong = impossible_plates(plates.time, plates.names, plates.declared_feet, plates.wrench)
         if wrong is not None:
-            raise TrialError(self.name, problem_of(wrong)).with_finding(wrong.in_trial(self.name))
+            raise TrialError.of(self.name, wrong)
 
     @property
     def notes(self) -> tuple[str, ...]:

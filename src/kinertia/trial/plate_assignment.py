@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from kinertia.errors import TrialError, problem_of
+from kinertia.errors import TrialError
 from kinertia.findings.finding import Finding, finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
@@ -68,7 +68,7 @@ def build_trial(recording: Recording, feet: FootMarkers, window_s: tuple[float, 
     complete = contact.measured(time)
     measured = complete if window_s is None else contact.inside & within(time, *window_s)
     if not measured.any():
-        raise _error(_nothing_measured(recording, loads, contact, window_s))
+        raise TrialError.of(recording.name, _nothing_measured(recording, loads, contact, window_s))
     if window_s is not None:
         stated = Quantity(f"{window_s[0]:.3f} to {window_s[1]:.3f} s")
         spans = Quantity(_spans(time, complete))
@@ -111,7 +111,7 @@ def assign_plates(recording: Recording, feet: FootMarkers) -> tuple[FootLoads, t
     """
     plates = recording.plates
     if plates is None:
-        raise _error(no_forces(recording))
+        raise TrialError.of(recording.name, no_forces(recording))
     centres = [_centre(recording.markers.select(feet[foot]), plates.time) for foot in FEET]
     covered = (plates.time >= recording.markers.time[0]) & (plates.time <= recording.markers.time[-1])
     force = np.zeros((len(plates.time), 2, 3))
@@ -269,7 +269,3 @@ def _nothing_measured(
     return with_evidence(
         "P278", where, evidence | left_out | {"during": Quantity("of the trial")}, causes=tuple(one_plate)
     )
-
-
-def _error(found: Finding) -> TrialError:
-    return TrialError(found.where.trial or "", problem_of(found)).with_finding(found)

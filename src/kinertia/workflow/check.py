@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from kinertia.diagnostics.context import PersonContext
 from kinertia.diagnostics.model import questions as model_questions
 from kinertia.diagnostics.model.model_check import ModelCheck, check_model
-from kinertia.diagnostics.runner import asked, explained, overruled
+from kinertia.diagnostics.runner import asked, explained, overruled, rules_of
 from kinertia.findings.finding import Finding
 from kinertia.findings.overview import Overview
-from kinertia.findings.rule import matching
 from kinertia.model.imported import OsimModel
 from kinertia.model.marker_set import MarkerSet
 from kinertia.settings import Overrule, Subject
@@ -117,6 +116,5 @@ def check_osim(model: OsimModel, subject: Subject, overrule: Overrule | None = N
     """
     found = asked(model_questions.PERSON_QUESTIONS, PersonContext(subject, (), model=model))
     findings = overruled(explained(found), overrule or Overrule())
-    rules = {code for one in model_questions.PERSON_QUESTIONS for code in matching(one.code)}
     facts = check_model(model.skeleton, model.bsp, subject.mass_kg, subject.height_m, subject.sex)
-    return ModelOverview(model.path.name, facts, Overview(findings, len(rules), 0))
+    return ModelOverview(model.path.name, facts, Overview(findings, rules_of(*model_questions.PERSON_QUESTIONS), 0))

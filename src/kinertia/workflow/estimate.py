@@ -10,7 +10,7 @@ import numpy as np
 
 from kinertia.diagnostics.result.context import ResultContext
 from kinertia.diagnostics.result.questions import ESTIMATE_QUESTIONS, RESULT_QUESTIONS, judged
-from kinertia.diagnostics.runner import explained, overruled
+from kinertia.diagnostics.runner import explained, overruled, rules_of
 from kinertia.estimation.free_moment_sign import with_likelier_sign
 from kinertia.estimation.prepared import Prepared, Progress
 from kinertia.estimation.prior import BspPrior
@@ -20,7 +20,6 @@ from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
 from kinertia.estimation.simultaneous.fit import Posterior, SimultaneousFit, fit_simultaneous
 from kinertia.estimation.simultaneous.model_uncertainty import ModelUncertainty
 from kinertia.estimation.two_level import Window, correct_pelvis, estimate_two_level, stretches
-from kinertia.findings.rule import matching
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.gait27 import VIRTUAL_TRUNK
 from kinertia.model.imported import OsimModel
@@ -36,9 +35,6 @@ from kinertia.trial.data import Recording
 from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow.attached import with_attached
 from kinertia.workflow.prepare import prepare
-
-_RULES = len({code for one in (*ESTIMATE_QUESTIONS, *RESULT_QUESTIONS) for code in matching(one.code)})
-"""How many rules are asked of an estimate."""
 
 
 @one_blas_thread
@@ -132,7 +128,7 @@ def estimate(ready: Prepared, progress: Progress = lambda stage, share: None) ->
         notes=ready.notes,
         file=ready.file,
         left_out=ready.left_out,
-        rules=ready.rules + _RULES,
+        rules=ready.rules + rules_of(*ESTIMATE_QUESTIONS, *RESULT_QUESTIONS),
         evaluations=outcome.evaluations,
     )
     found = explained([*ready.findings, *judged(ResultContext(fit, ready))])

@@ -53,7 +53,9 @@ def usable_trial(context: RecordingContext) -> Trial:
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """Kinematics of the trials that could be solved, seconds by stage, and what was found of them and of the others."""
+    """Kinematics of the trials that could be solved, seconds by stage; what was found of them, and why the others could
+    not be solved.
+    """
 
     kinematics: tuple[Kinematics, ...]
     seconds: tuple[Mapping[str, float], ...]
@@ -90,12 +92,10 @@ def solved_trials(
             continue
         ik_s = time.perf_counter() - started
         seconds.append({"read": one.read_seconds, "calibration": calibration_s, "ik": ik_s})
-    unsolved = [error.finding for error in failed if error.finding is not None]
-    if failed and (not kinematics or len(unsolved) < len(failed)):
+    reasons = [error.finding for error in failed if error.finding is not None]
+    if failed and (not kinematics or len(reasons) < len(failed)):
         raise failed[0]
-    found = [
-        one
-        for k in kinematics
-        for one in (*k.findings, *(each.in_trial(k.trial.name) for each in range_findings(skeleton, k.ik)))
-    ]
-    return Solved(tuple(kinematics), tuple(seconds), (*unsolved, *found))
+    found = []
+    for one in kinematics:
+        found += [*one.findings, *(limit.in_trial(one.trial.name) for limit in range_findings(skeleton, one.ik))]
+    return Solved(tuple(kinematics), tuple(seconds), (*found, *reasons))

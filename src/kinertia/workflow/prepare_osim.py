@@ -15,6 +15,7 @@ import numpy as np
 from kinertia.diagnostics.model.model_on_person import moved_markers
 from kinertia.estimation.calibration import adapt, first_poses, hold_uninformed
 from kinertia.estimation.carried_mass import CarriedMass
+from kinertia.estimation.estimated_bodies import estimated_bodies
 from kinertia.estimation.input_checks import check_trials, complete_subject, known
 from kinertia.estimation.population import population_prior
 from kinertia.estimation.prepared import Prepared, Progress
@@ -35,8 +36,6 @@ from kinertia.workflow.person import Person
 from kinertia.workflow.prepare import LOWER_BODY_SD_M, UPPER_BODY_SD_M
 from kinertia.workflow.screening import Screened, screen
 
-LIGHT_KG = 0.5
-"""Bodies that weigh less together than this move with their joints, but are not estimated."""
 _MASS_TOLERANCE = 0.002
 
 
@@ -207,17 +206,8 @@ def parted(skeleton: Skeleton, own: BodySegmentParameters) -> tuple[BspPrior, Bo
 
 
 def _split(skeleton: Skeleton, own: BodySegmentParameters) -> tuple[BodySegmentParameters, BodySegmentParameters]:
-    """The bodies to be estimated, and all others.
-
-    Of every group of bodies that move as one the heaviest is estimated; none of a group that is light altogether.
-    """
-    mass = dict(zip(own.segments, own.mass_kg, strict=True))
-    groups: dict[int, list[str]] = {}
-    carrier_of = dict(zip(skeleton.segments, skeleton.tree.carrier.tolist(), strict=True))
-    for name in own.segments:
-        groups.setdefault(carrier_of[name], []).append(name)
-    heavy = [names for names in groups.values() if sum(mass[name] for name in names) >= LIGHT_KG]
-    chosen = {max(names, key=mass.__getitem__) for names in heavy}
+    """The bodies to be estimated, and all others."""
+    chosen = estimated_bodies(skeleton, own)
     estimated, rest = (_part(own, [n for n in own.segments if (n in chosen) == taken]) for taken in (True, False))
     return estimated, rest
 

@@ -16,13 +16,12 @@ from kinertia.diagnostics.markers import questions as markers
 from kinertia.diagnostics.model import questions as model
 from kinertia.diagnostics.plates.place_questions import PLACE_QUESTIONS
 from kinertia.diagnostics.plates.signal_questions import LOADED_QUESTIONS, SIGNAL_QUESTIONS
-from kinertia.diagnostics.runner import Question, asked, blocking, explained, overruled
+from kinertia.diagnostics.runner import Question, asked, blocking, explained, overruled, rules_of
 from kinertia.diagnostics.subject import questions as subject
 from kinertia.diagnostics.timing import questions as timing
 from kinertia.errors import BlockedError, KinertiaError, MarkerSetError, SubjectError
 from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.findings.finding import Finding
-from kinertia.findings.rule import matching
 from kinertia.settings import Subject
 from kinertia.trial.data import Recording
 from kinertia.workflow.joint_widths import with_widths
@@ -66,10 +65,7 @@ class Screened:
     def rules(self) -> int:
         """How many rules were asked."""
         of_static = STATIC_QUESTIONS if self.context.standing else ()
-        return len(
-            {code for one in (*MOTION_QUESTIONS, *of_static) for code in matching(one.code)}
-            | {code for one in PERSON_QUESTIONS for code in matching(one.code)}
-        )
+        return rules_of(*MOTION_QUESTIONS, *of_static, *PERSON_QUESTIONS)
 
     @cached_property
     def stops(self) -> list[Finding]:
