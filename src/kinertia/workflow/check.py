@@ -93,8 +93,7 @@ def check_recording(
         person = Person(subject, (), recording, marker_set=marker_set)
     else:
         person = Person(subject, (TrialInput(recording, window_s),), static, marker_set=marker_set)
-    checked = check_person(person)
-    return next(one for one in checked.recordings if one.context.name == recording.name)
+    return check_person(person).recordings[-1]
 
 
 @dataclass(frozen=True, eq=False)

@@ -82,8 +82,8 @@ def solved_trials(
         TrialError: no trial can be solved.
     """
     kinematics, seconds, failed = [], [], []
-    for k, one in enumerate(trials):
-        progress("inverse kinematics", k / len(trials))
+    for done, one in enumerate(trials):
+        progress("inverse kinematics", done / len(trials))
         started = time.perf_counter()
         try:
             kinematics.append(solve_kinematics(skeleton, one.trial, one.angle_deg, smoothing))
@@ -95,7 +95,7 @@ def solved_trials(
     reasons = [error.finding for error in failed if error.finding is not None]
     if failed and (not kinematics or len(reasons) < len(failed)):
         raise failed[0]
-    found = []
-    for one in kinematics:
-        found += [*one.findings, *(limit.in_trial(one.trial.name) for limit in range_findings(skeleton, one.ik))]
+    found: list[Finding] = []
+    for k in kinematics:
+        found += [*k.findings, *(limit.in_trial(k.trial.name) for limit in range_findings(skeleton, k.ik))]
     return Solved(tuple(kinematics), tuple(seconds), (*found, *reasons))
