@@ -40,11 +40,16 @@ class Overview:
     @property
     def open(self) -> list[Finding]:
         """Those that are neither explained nor overruled, the most important first."""
-        return in_order(one for one in self.findings if one.is_open)
+        return reported(self.findings, Severity.INFO)
 
     def count(self, severity: Severity) -> int:
         """How many open ones of this severity."""
         return sum(one.severity is severity for one in self.open)
+
+    @property
+    def failed(self) -> bool:
+        """Whether an ERROR is open, or a trial was not used."""
+        return bool(self.left_out) or self.count(Severity.ERROR) > 0
 
     @property
     def waived(self) -> list[Finding]:
@@ -87,6 +92,24 @@ class Overview:
 def in_order(findings: Iterable[Finding]) -> list[Finding]:
     """The worst first, of equals those of the earliest stage."""
     return sorted(findings, key=lambda one: (-one.severity, STAGES.index(one.rule.stage), one.code))
+
+
+def reported(findings: Iterable[Finding], least: Severity = Severity.CORRECTED) -> list[Finding]:
+    """Open findings from this severity on, in order; assumptions and advice are left out unless asked for."""
+    return in_order(one for one in findings if one.is_open and one.severity >= least)
+
+
+def consequences(findings: Sequence[Finding], causes: Iterable[Finding]) -> list[Finding]:
+    """What these causes explain, and what that explains in its turn."""
+    found: list[Finding] = []
+    waiting = list(causes)
+    while waiting:
+        cause = waiting.pop()
+        for one in findings:
+            if one.muted_by == cause.code and cause.where.overlaps(one.where) and one not in found:
+                found.append(one)
+                waiting.append(one)
+    return in_order(found)
 
 
 @dataclass(frozen=True)

@@ -15,9 +15,19 @@ from markupsafe import Markup, escape
 
 from kinertia.findings.display import axis_text, first_few, outlined, shown
 from kinertia.findings.finding import Finding, Severity
-from kinertia.findings.overview import DO_NOT_USE, USE, WITH_CARE, Group, Overview, grouped, in_order
+from kinertia.findings.overview import (
+    DO_NOT_USE,
+    USE,
+    WITH_CARE,
+    Group,
+    Overview,
+    consequences,
+    grouped,
+    in_order,
+    reported,
+)
 from kinertia.findings.quantity import Quantity
-from kinertia.findings.rule import Rule, matching, questions, rule
+from kinertia.findings.rule import Rule, matching, rule
 from kinertia.findings.where import Where
 
 LOOKS = {USE: "info", WITH_CARE: "warning", DO_NOT_USE: "error"}
@@ -59,11 +69,6 @@ class Card:
         return self.group.first
 
     @property
-    def causes(self) -> tuple[str, ...]:
-        """Likeliest first."""
-        return self.first.causes or self.first.rule.causes
-
-    @property
     def measured(self) -> list[Measured]:
         """Evidence, an entry for each finding that has any."""
         each = [Measured(place_text(one.where), tuple(evidence_texts(one))) for one in self.group.findings]
@@ -84,19 +89,7 @@ class FindingView:
     def _cards(self, severity: Severity) -> list[Card]:
         top = [one for one in self.findings if one.muted_by is None and one.status != "ignored"]
         groups = grouped(one for one in top if one.severity is severity)
-        return [Card(group, tuple(grouped(self._explained(group.findings)))) for group in groups]
-
-    def _explained(self, causes: Sequence[Finding]) -> list[Finding]:
-        """What these explain, and what that explains in its turn."""
-        found: list[Finding] = []
-        waiting = list(causes)
-        while waiting:
-            cause = waiting.pop()
-            for one in self.findings:
-                if one.muted_by == cause.code and cause.where.overlaps(one.where) and one not in found:
-                    found.append(one)
-                    waiting.append(one)
-        return in_order(found)
+        return [Card(group, tuple(grouped(consequences(self.findings, group.findings)))) for group in groups]
 
     @cached_property
     def sections(self) -> list[tuple[str, list[Card]]]:
@@ -107,7 +100,7 @@ class FindingView:
     @cached_property
     def corrections(self) -> list[Correction]:
         """Apparent errors that a reader or the estimate has corrected."""
-        return [_correction(one, self._explained([one])) for one in self._top(Severity.CORRECTED)]
+        return [_correction(one, consequences(self.findings, [one])) for one in self._top(Severity.CORRECTED)]
 
     @cached_property
     def notes(self) -> list[tuple[Group, str]]:
@@ -198,14 +191,9 @@ def linked(sentence: str) -> Markup:
     )
 
 
-def asks(one: Rule) -> str:
-    """The question that a rule is an answer to."""
-    return questions(one.code[0])[one.question]
-
-
 def lines(findings: Iterable[Finding], least: Severity = Severity.CORRECTED) -> list[str]:
     """Open findings from this severity on, one line each, equal ones together."""
-    return [group.line for group in grouped(in_order(one for one in findings if one.is_open and one.severity >= least))]
+    return [group.line for group in grouped(reported(findings, least))]
 
 
 def digest(overview: Overview) -> dict[str, Any]:
