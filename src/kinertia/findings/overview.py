@@ -114,7 +114,7 @@ def consequences(findings: Sequence[Finding], causes: Iterable[Finding]) -> list
 
 @dataclass(frozen=True)
 class Group:
-    """Findings of one code in one trial, of which the first stands for all."""
+    """Findings of one code in one trial or file, of which the first stands for all."""
 
     findings: tuple[Finding, ...]
 
@@ -141,10 +141,12 @@ class Group:
 
 
 def grouped(findings: Iterable[Finding]) -> list[Group]:
-    """Findings of the same code, trial and severity together, in their order."""
+    """Findings of the same code, file, trial and severity together, in their order."""
     groups: dict[tuple[object, ...], list[Finding]] = {}
     for one in findings:
-        groups.setdefault((one.code, one.where.trial, one.severity, one.status, one.muted_by), []).append(one)
+        groups.setdefault(
+            (one.code, one.where.file, one.where.trial, one.severity, one.status, one.muted_by), []
+        ).append(one)
     return [Group(tuple(each)) for each in groups.values()]
 
 

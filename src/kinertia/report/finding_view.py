@@ -58,7 +58,7 @@ class Correction:
 
 @dataclass(frozen=True)
 class Card:
-    """Findings of one code in one trial, with those that they explain."""
+    """Findings of one code in one trial or file, with those that they explain."""
 
     group: Group
     muted: tuple[Group, ...]
@@ -89,7 +89,12 @@ class FindingView:
     def _cards(self, severity: Severity) -> list[Card]:
         top = [one for one in self.findings if one.muted_by is None and one.status != "ignored"]
         groups = grouped(one for one in top if one.severity is severity)
-        return [Card(group, tuple(grouped(consequences(self.findings, group.findings)))) for group in groups]
+        return [Card(group, self._explained(group.findings)) for group in groups]
+
+    def _explained(self, causes: Sequence[Finding]) -> tuple[Group, ...]:
+        """What equal findings explain of what was found with them: each of several models explains its own."""
+        own = next(overview.findings for overview in self.overviews if causes[0] in overview.findings)
+        return tuple(grouped(consequences(own, causes)))
 
     @cached_property
     def sections(self) -> list[tuple[str, list[Card]]]:
@@ -100,16 +105,16 @@ class FindingView:
     @cached_property
     def corrections(self) -> list[Correction]:
         """Apparent errors that a reader or the estimate has corrected."""
-        return [_correction(one, consequences(self.findings, [one])) for one in self._top(Severity.CORRECTED)]
+        return [_correction(one, self._explained([one])) for one in self._top(Severity.CORRECTED)]
 
     @cached_property
     def notes(self) -> list[tuple[Group, str]]:
-        """Assumptions and advice, once for each code, and the trials that they are of."""
+        """Assumptions and advice, once for each code, and the trials or files that they are of."""
         by_code: dict[str, list[Group]] = {}
         for group in grouped(self._top(Severity.INFO)):
             by_code.setdefault(group.first.code, []).append(group)
-        trials = (list(filter(None, (each.first.where.trial for each in groups))) for groups in by_code.values())
-        return [(groups[0], first_few(names)) for groups, names in zip(by_code.values(), trials, strict=True)]
+        places = (list(filter(None, (each.first.place for each in groups))) for groups in by_code.values())
+        return [(groups[0], first_few(names)) for groups, names in zip(by_code.values(), places, strict=True)]
 
     def _top(self, severity: Severity) -> list[Finding]:
         return [one for one in self.findings if one.severity is severity and one.is_open]
@@ -133,12 +138,10 @@ class FindingView:
         return [rule(code) for code in sorted({one.code for one in shown_})]
 
 
-def _correction(one: Finding, explained: Sequence[Finding]) -> Correction:
+def _correction(one: Finding, explained: tuple[Group, ...]) -> Correction:
     what = one.name.removesuffix("-corrected").replace("-", " ")
     size = next((evidence_text(one, name, signed=True) for name in one.evidence), "")
-    return Correction(
-        one, place_text(one.where, with_trial=True) or "all trials", what, size, tuple(grouped(explained))
-    )
+    return Correction(one, place_text(one.where, with_trial=True) or "all trials", what, size, explained)
 
 
 def place_text(where: Where, with_trial: bool = False) -> str:
@@ -208,7 +211,7 @@ def digest(overview: Overview) -> dict[str, Any]:
                 "code": group.first.code,
                 "severity": group.first.severity.name,
                 "status": group.first.status,
-                "trial": group.first.where.trial,
+                "place": group.first.place,
                 "message": group.message,
                 "remedy": group.first.remedy,
             }
