@@ -14,6 +14,8 @@ Use = Literal["use", "use with care", "do not use"]
 USE: Final = "use"
 WITH_CARE: Final = "use with care"
 DO_NOT_USE: Final = "do not use"
+USES: Final = (USE, WITH_CARE, DO_NOT_USE)
+"""The best first."""
 
 
 @dataclass(frozen=True)
@@ -144,9 +146,8 @@ def grouped(findings: Iterable[Finding]) -> list[Group]:
     """Findings of the same code, file, trial and severity together, in their order."""
     groups: dict[tuple[object, ...], list[Finding]] = {}
     for one in findings:
-        groups.setdefault(
-            (one.code, one.where.file, one.where.trial, one.severity, one.status, one.muted_by), []
-        ).append(one)
+        alike = (one.code, one.where.file, one.where.trial, one.severity, one.status, one.muted_by)
+        groups.setdefault(alike, []).append(one)
     return [Group(tuple(each)) for each in groups.values()]
 
 
