@@ -26,6 +26,12 @@ def test_what_is_waived_or_left_out_calls_for_care():
     assert Overview((SPIKES.muted("M121"),), 10, 1).verdict == USE
 
 
+def test_an_open_error_or_a_trial_left_out_fails():
+    assert Overview((SPIKES,), 10, 1).failed
+    assert Overview((), 10, 3, ("walk 2",)).failed
+    assert not Overview((*FROZEN, replace(SPIKES, status="waived"), SPIKES.muted("M121")), 10, 1).failed
+
+
 def test_the_line_counts():
     overview = Overview((*FROZEN, DELAY), 61, 3, ("walk 2",))
     assert overview.line == "use with care: 3 warnings, 1 corrected; 61 rules, 2 of 3 trials"

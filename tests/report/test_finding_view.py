@@ -50,6 +50,16 @@ def test_equal_findings_are_one_card_with_the_evidence_of_each():
     assert [one.place for one in card.measured] == ["LANK, 1.20 to 1.70 s", "LTOE, 1.20 to 1.70 s"]
 
 
+def test_findings_of_several_models_are_told_apart_by_their_files_and_each_explains_its_own():
+    models = [
+        Overview([one.in_file(file) for one in (cause, finding("O302", Where(part="knee")).muted("O301"))], 61, 1)
+        for file, cause in (("a.osim", finding("O301")), ("b.osim", finding("O301")))
+    ]
+    ((_, cards),) = FindingView(models).sections
+    assert [card.first.place for card in cards] == ["a.osim", "b.osim"]
+    assert [[group.first.where.file for group in card.muted] for card in cards] == [["a.osim"], ["b.osim"]]
+
+
 def test_corrections_have_place_size_and_deviation():
     zero, delay = view(*CORRECTED).corrections
     assert (zero.where, delay.where) == ("walk: plate 1, mediolateral (Z)", "all trials")

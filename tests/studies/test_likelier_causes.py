@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.signal import butter, filtfilt
 
-from kinertia.studies.faults import checked, reported, synthetic_walk
+from kinertia.findings.overview import reported
+from kinertia.studies.faults import checked, synthetic_walk
 from kinertia.synthetic.measured_person import acting, loads_of, read_person, write_person
 
 

@@ -16,7 +16,6 @@ from kinertia.cli.options import Force, Quiet, Sex, Verbose, Waive, number, over
 from kinertia.cli.outcome import Outcome
 from kinertia.cli.terminal import out, plain_table, shown_progress
 from kinertia.errors import FileError
-from kinertia.findings.finding import Severity
 from kinertia.findings.overview import Overview
 from kinertia.io.marker_set_file import read_marker_set
 from kinertia.io.osim.reader import read_osim
@@ -51,7 +50,7 @@ class _Checked:
     @property
     def status(self) -> int:
         """1 where an ERROR is open."""
-        return int(any(one.severity >= Severity.ERROR for overview in self.overviews for one in overview.open))
+        return int(any(one.failed for one in self.overviews))
 
 
 def check(

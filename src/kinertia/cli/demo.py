@@ -14,7 +14,6 @@ from kinertia.cli.options import Force, Output, Quiet, results_folder
 from kinertia.cli.outcome import Outcome
 from kinertia.cli.synthetic_demo import Demo, run_demo
 from kinertia.cli.terminal import out, plain_table, shown_progress
-from kinertia.findings.finding import Severity
 from kinertia.report.files import summary
 from kinertia.trial.rms import rms_length
 
@@ -65,7 +64,7 @@ def _measured_demo(folder: Path) -> Outcome:
         f"to see what the files are like: kinertia check {lab / 'subject.toml'}",
         soft_wrap=True,
     )
-    return Outcome({"folder": str(folder), **summary(fit)}, int(fit.overview.severity is Severity.ERROR))
+    return Outcome({"folder": str(folder), **summary(fit)}, int(fit.overview.failed))
 
 
 def _against_truth(result: Demo) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from kinertia.cli.outcome import Outcome
 from kinertia.cli.terminal import out
 from kinertia.errors import SettingsError
 from kinertia.findings.display import outlined
-from kinertia.findings.rule import Rule, all_rules, family_title, matching, nearest, page, questions, rule
+from kinertia.findings.rule import Rule, all_rules, family_title, matching, nearest, page, rule
 
 _INDENT = 13
 _NARROWEST = 40
@@ -59,7 +59,7 @@ def _show_questions(rules: Sequence[Rule]) -> None:
     for one in rules:
         if one.question != asked:
             asked = one.question
-            out.print(f"\n{asked}  {questions(family)[asked]}", style="bold", soft_wrap=True)
+            out.print(f"\n{asked}  {one.asks}", style="bold", soft_wrap=True)
         out.print(f"  {one.code}  {one.severity.lower():<9}  {one.name}", soft_wrap=True)
     out.print(f"\nmore of one: kinertia explain {rules[0].code}")
 
@@ -73,7 +73,7 @@ def _show_rule(one: Rule) -> None:
 def _lines(one: Rule) -> Iterator[tuple[str, str]]:
     """Headings and sentences about a rule."""
     yield "severity", severity_text(one)
-    yield "question", f"{one.question}  {questions(one.code[0])[one.question]}"
+    yield "question", f"{one.question}  {one.asks}"
     yield "message", outlined(one.message)
     yield "detects", one.detects
     yield "effect", outlined(one.effect)
@@ -118,5 +118,4 @@ def overruling(one: Rule) -> str:
 
 
 def _content(one: Rule) -> dict[str, Any]:
-    asks = questions(one.code[0])[one.question]
-    return asdict(one) | {"question": one.question, "asks": asks, "page": page(one.code)}
+    return asdict(one) | {"question": one.question, "asks": one.asks, "page": page(one.code)}

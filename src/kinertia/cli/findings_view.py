@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from kinertia.cli.terminal import out
 from kinertia.findings.finding import Finding, Severity
-from kinertia.findings.overview import Group, Overview, grouped, in_order
+from kinertia.findings.overview import Group, Overview, consequences, grouped, in_order, reported
 
 _SHOWN = 3
 _STYLES = {
@@ -23,7 +23,7 @@ def show_overview(overview: Overview, verbose: bool) -> None:
     if verbose:
         show_all(overview.findings)
         return
-    groups = [group for group in grouped(overview.open) if group.first.severity > Severity.INFO]
+    groups = grouped(reported(overview.findings))
     for group in groups[:_SHOWN]:
         _show_line(group)
     hidden = len(groups) - len(groups[:_SHOWN])
@@ -42,14 +42,12 @@ def show_all(findings: Sequence[Finding]) -> None:
             continue
         lines = [first.effect, _causes(first), first.remedy]
         out.print("\n".join(f"    {line}" for line in lines if line), soft_wrap=True)
-        codes = {one.code for one in group.findings}
-        for muted in grouped(one for one in findings if one.muted_by in codes):
+        for muted in grouped(consequences(findings, group.findings)):
             out.print(f"    explains {muted.line}", soft_wrap=True)
 
 
 def _causes(one: Finding) -> str:
-    causes = one.causes or one.rule.causes
-    return f"Likely causes: {'; '.join(causes)}." if causes else ""
+    return f"Likely causes: {'; '.join(one.likely_causes)}." if one.likely_causes else ""
 
 
 def _show_line(group: Group) -> None:

@@ -17,7 +17,6 @@ from kinertia.cli.outcome import Outcome, of_error
 from kinertia.cli.terminal import out, show_problem, shown_progress
 from kinertia.errors import FileError, KinertiaError
 from kinertia.estimation.result import Fit
-from kinertia.findings.finding import Severity
 from kinertia.io.file_names import same_folder
 from kinertia.io.provenance import command_line, provenance_of
 from kinertia.io.subject_file import SubjectFile, read_subject, subject_file_in, subject_from_options, with_settings
@@ -122,7 +121,7 @@ def fit(
             status = 2
             continue
         overview = result.overview
-        status = max(status, int(overview.severity is Severity.ERROR or bool(overview.left_out)))
+        status = max(status, int(overview.failed))
         summaries.append({"folder": str(one.folder), **summary(result), "bsp": _bsp_rows(result)})
         if not quiet:
             if verbose or shown_table:

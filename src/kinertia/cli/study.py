@@ -13,6 +13,7 @@ import typer
 from kinertia.cli.options import Force, Output, Quiet, results_folder
 from kinertia.cli.outcome import Outcome, add_command
 from kinertia.cli.terminal import out, plain_table, shown_progress
+from kinertia.findings.overview import reported
 from kinertia.io.subject_file import read_subject
 from kinertia.report.accuracy import (
     HEADINGS,
@@ -39,7 +40,7 @@ from kinertia.report.table1 import save_table1, table1_rows, table1_summary
 from kinertia.report.table1_variants import HEADINGS as VARIANT_HEADINGS
 from kinertia.report.table1_variants import save_variants, variants_frame, variants_rows
 from kinertia.studies.accuracy import SCENARIOS, run_accuracy
-from kinertia.studies.faults import reported, run_faults, run_sound, sound_laboratories, synthetic_walk
+from kinertia.studies.faults import run_faults, run_sound, sound_laboratories, synthetic_walk
 from kinertia.studies.populations import run_populations
 from kinertia.studies.sensitivity import KINDS, run_sensitivity
 from kinertia.studies.table1 import CONDITIONS, Table1, measured_trial, run_table1, study_trial

@@ -94,6 +94,16 @@ class Finding:
         return self._said(self.rule.remedy)
 
     @property
+    def likely_causes(self) -> tuple[str, ...]:
+        """Its own, or the rule's; likeliest first."""
+        return self.causes or self.rule.causes
+
+    @property
+    def headline(self) -> Quantity | None:
+        """The first of the evidence that is a number."""
+        return next((one for one in self.evidence.values() if isinstance(one.value, float | int)), None)
+
+    @property
     def is_open(self) -> bool:
         """Whether it is neither explained by another nor overruled."""
         return self.status == "open" and self.muted_by is None
@@ -139,7 +149,7 @@ class Finding:
             "evidence": {name: quantity.to_dict() for name, quantity in self.evidence.items()},
             "message": self.message,
             "effect": self.effect,
-            "causes": list(self.causes or self.rule.causes),
+            "causes": list(self.likely_causes),
             "remedy": self.remedy,
         }
 

@@ -14,6 +14,8 @@ Use = Literal["use", "use with care", "do not use"]
 USE: Final = "use"
 WITH_CARE: Final = "use with care"
 DO_NOT_USE: Final = "do not use"
+USES: Final = (USE, WITH_CARE, DO_NOT_USE)
+"""The best first."""
 
 
 @dataclass(frozen=True)
@@ -40,11 +42,16 @@ class Overview:
     @property
     def open(self) -> list[Finding]:
         """Those that are neither explained nor overruled, the most important first."""
-        return in_order(one for one in self.findings if one.is_open)
+        return reported(self.findings, Severity.INFO)
 
     def count(self, severity: Severity) -> int:
         """How many open ones of this severity."""
         return sum(one.severity is severity for one in self.open)
+
+    @property
+    def failed(self) -> bool:
+        """Whether an ERROR is open, or a trial was not used."""
+        return bool(self.left_out) or self.count(Severity.ERROR) > 0
 
     @property
     def waived(self) -> list[Finding]:
@@ -89,9 +96,27 @@ def in_order(findings: Iterable[Finding]) -> list[Finding]:
     return sorted(findings, key=lambda one: (-one.severity, STAGES.index(one.rule.stage), one.code))
 
 
+def reported(findings: Iterable[Finding], least: Severity = Severity.CORRECTED) -> list[Finding]:
+    """Open findings from this severity on, in order; assumptions and advice are left out unless asked for."""
+    return in_order(one for one in findings if one.is_open and one.severity >= least)
+
+
+def consequences(findings: Sequence[Finding], causes: Iterable[Finding]) -> list[Finding]:
+    """What these causes explain, and what that explains in its turn."""
+    found: list[Finding] = []
+    waiting = list(causes)
+    while waiting:
+        cause = waiting.pop()
+        for one in findings:
+            if one.muted_by == cause.code and cause.where.overlaps(one.where) and one not in found:
+                found.append(one)
+                waiting.append(one)
+    return in_order(found)
+
+
 @dataclass(frozen=True)
 class Group:
-    """Findings of one code in one trial, of which the first stands for all."""
+    """Findings of one code in one trial or file, of which the first stands for all."""
 
     findings: tuple[Finding, ...]
 
@@ -118,10 +143,11 @@ class Group:
 
 
 def grouped(findings: Iterable[Finding]) -> list[Group]:
-    """Findings of the same code, trial and severity together, in their order."""
+    """Findings of the same code, file, trial and severity together, in their order."""
     groups: dict[tuple[object, ...], list[Finding]] = {}
     for one in findings:
-        groups.setdefault((one.code, one.where.trial, one.severity, one.status, one.muted_by), []).append(one)
+        alike = (one.code, one.where.file, one.where.trial, one.severity, one.status, one.muted_by)
+        groups.setdefault(alike, []).append(one)
     return [Group(tuple(each)) for each in groups.values()]
 
 

@@ -56,6 +56,11 @@ class Rule:
         """The first three characters: all codes of a question are answers to it."""
         return self.code[:3]
 
+    @property
+    def asks(self) -> str:
+        """The question in words."""
+        return questions(self.code[0])[self.question]
+
 
 def rule(code: str) -> Rule:
     """The rule of a code.

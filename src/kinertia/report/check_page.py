@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from kinertia.findings.finding import Finding, Severity
-from kinertia.findings.overview import Overview
+from kinertia.findings.finding import Finding
+from kinertia.findings.overview import Overview, reported
 from kinertia.io.output_folder import complete_folder
 from kinertia.report.check_figures import MOST_CONTACTS, force_figure, pressure_figure
 from kinertia.report.figure import Figure, written
@@ -98,9 +98,8 @@ def _recording(one: RecordingCheck, anchor: str, left_out: set[str]) -> Checked:
 
 
 def _checked(name: str, anchor: str, findings: Sequence[Finding]) -> Checked:
-    overview = Overview(findings, 0, 1)
-    found = [one.code for one in overview.open if one.severity > Severity.INFO]
-    return Checked(name, anchor, overview.verdict, tuple(dict.fromkeys(found)))
+    found = dict.fromkeys(one.code for one in reported(findings))
+    return Checked(name, anchor, Overview(findings, 0, 1).verdict, tuple(found))
 
 
 def check_figures(check: RecordingCheck) -> dict[str, Any]:

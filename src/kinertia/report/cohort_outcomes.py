@@ -12,7 +12,7 @@ from markupsafe import Markup, escape
 
 from kinertia.findings.display import outlined, shown
 from kinertia.findings.finding import Severity
-from kinertia.findings.overview import DO_NOT_USE, USE, WITH_CARE
+from kinertia.findings.overview import USES
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.rule import matching, rule
 from kinertia.report.finding_view import linked
@@ -26,7 +26,6 @@ PEOPLE = ("person", "status", "sentence", "verdict", "overruled")
 FINDINGS = ("person", "code", "severity", "status", "muted_by", "value", "unit")
 """Columns that are read of the two tables."""
 NOT_FITTED = "not fitted"
-_WORDS = (USE, WITH_CARE, DO_NOT_USE, NOT_FITTED)
 _MOST_NAMES, _MOST_PEOPLE = 5, 20
 _HEADINGS = ("code", "severity", "finding", "people", "open", "explained by another", "overruled", "median size", "who")
 
@@ -40,7 +39,7 @@ def lead(people: pd.DataFrame) -> str:
 
 def _counts(people: pd.DataFrame) -> dict[str, int]:
     counted = Counter(people["verdict"])
-    return {word: counted[word if word in (USE, WITH_CARE, DO_NOT_USE) else ""] for word in _WORDS}
+    return {word: counted[word] for word in USES} | {NOT_FITTED: counted[""]}
 
 
 def outcome_parts(people: pd.DataFrame, findings: pd.DataFrame) -> Iterator[Part]:

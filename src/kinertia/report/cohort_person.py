@@ -61,7 +61,7 @@ def _fitted(job: Job, started: float) -> Record:
     overview = fit.overview
     against = [one.line() for one in overview.open if one.severity is Severity.ERROR]
     against += [f"{name} left out" for name in overview.left_out]
-    record = job.record(AGAINST if against else PASSED, "; ".join(against), True, time.perf_counter() - started)
+    record = job.record(AGAINST if overview.failed else PASSED, "; ".join(against), True, time.perf_counter() - started)
     record = replace(record, verdict=overview.verdict, overruled=overruled)
     _save(fit, wanted, job, record)
     return record

@@ -206,9 +206,7 @@ def _trials(fit: Fit) -> dict[str, Any]:
 
 def _findings(found: Sequence[Finding]) -> dict[str, Any]:
     """A row for each finding, muted and overruled ones included, with the headline's value."""
-    heads = [
-        next((one for one in each.evidence.values() if isinstance(one.value, float | int)), None) for each in found
-    ]
+    heads = [one.headline for one in found]
     return {
         "trial": [one.where.trial for one in found],
         "plate": [one.where.plate for one in found],

@@ -12,12 +12,13 @@ from typing import Any
 import numpy as np
 
 from kinertia.findings.finding import Severity
+from kinertia.findings.overview import reported
 from kinertia.findings.rule import rule
 from kinertia.io.output_folder import complete_folder
 from kinertia.io.provenance import VERSION
 from kinertia.report.result_page import Part, render_parts
 from kinertia.report.row_figures import bar_figure
-from kinertia.studies.faults import FaultOutcome, SoundWalk, reported
+from kinertia.studies.faults import FaultOutcome, SoundWalk
 
 _CODE_HEADINGS = ("code", "finding", "named", "warned", "fault-free walks")
 _BARS = ("named", "warned", "harmless", "silent")

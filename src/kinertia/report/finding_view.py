@@ -15,9 +15,19 @@ from markupsafe import Markup, escape
 
 from kinertia.findings.display import axis_text, first_few, outlined, shown
 from kinertia.findings.finding import Finding, Severity
-from kinertia.findings.overview import DO_NOT_USE, USE, WITH_CARE, Group, Overview, grouped, in_order
+from kinertia.findings.overview import (
+    DO_NOT_USE,
+    USE,
+    WITH_CARE,
+    Group,
+    Overview,
+    consequences,
+    grouped,
+    in_order,
+    reported,
+)
 from kinertia.findings.quantity import Quantity
-from kinertia.findings.rule import Rule, matching, questions, rule
+from kinertia.findings.rule import Rule, matching, rule
 from kinertia.findings.where import Where
 
 LOOKS = {USE: "info", WITH_CARE: "warning", DO_NOT_USE: "error"}
@@ -48,7 +58,7 @@ class Correction:
 
 @dataclass(frozen=True)
 class Card:
-    """Findings of one code in one trial, with those that they explain."""
+    """Findings of one code in one trial or file, with those that they explain."""
 
     group: Group
     muted: tuple[Group, ...]
@@ -57,11 +67,6 @@ class Card:
     def first(self) -> Finding:
         """The one whose words are shown."""
         return self.group.first
-
-    @property
-    def causes(self) -> tuple[str, ...]:
-        """Likeliest first."""
-        return self.first.causes or self.first.rule.causes
 
     @property
     def measured(self) -> list[Measured]:
@@ -84,19 +89,12 @@ class FindingView:
     def _cards(self, severity: Severity) -> list[Card]:
         top = [one for one in self.findings if one.muted_by is None and one.status != "ignored"]
         groups = grouped(one for one in top if one.severity is severity)
-        return [Card(group, tuple(grouped(self._explained(group.findings)))) for group in groups]
+        return [Card(group, self._explained(group.findings)) for group in groups]
 
-    def _explained(self, causes: Sequence[Finding]) -> list[Finding]:
-        """What these explain, and what that explains in its turn."""
-        found: list[Finding] = []
-        waiting = list(causes)
-        while waiting:
-            cause = waiting.pop()
-            for one in self.findings:
-                if one.muted_by == cause.code and cause.where.overlaps(one.where) and one not in found:
-                    found.append(one)
-                    waiting.append(one)
-        return in_order(found)
+    def _explained(self, causes: Sequence[Finding]) -> tuple[Group, ...]:
+        """What equal findings explain of what was found with them: each of several models explains its own."""
+        own = next(overview.findings for overview in self.overviews if causes[0] in overview.findings)
+        return tuple(grouped(consequences(own, causes)))
 
     @cached_property
     def sections(self) -> list[tuple[str, list[Card]]]:
@@ -111,12 +109,12 @@ class FindingView:
 
     @cached_property
     def notes(self) -> list[tuple[Group, str]]:
-        """Assumptions and advice, once for each code, and the trials that they are of."""
+        """Assumptions and advice, once for each code, and the trials or files that they are of."""
         by_code: dict[str, list[Group]] = {}
         for group in grouped(self._top(Severity.INFO)):
             by_code.setdefault(group.first.code, []).append(group)
-        trials = (list(filter(None, (each.first.where.trial for each in groups))) for groups in by_code.values())
-        return [(groups[0], first_few(names)) for groups, names in zip(by_code.values(), trials, strict=True)]
+        places = (list(filter(None, (each.first.place for each in groups))) for groups in by_code.values())
+        return [(groups[0], first_few(names)) for groups, names in zip(by_code.values(), places, strict=True)]
 
     def _top(self, severity: Severity) -> list[Finding]:
         return [one for one in self.findings if one.severity is severity and one.is_open]
@@ -140,12 +138,10 @@ class FindingView:
         return [rule(code) for code in sorted({one.code for one in shown_})]
 
 
-def _correction(one: Finding, explained: Sequence[Finding]) -> Correction:
+def _correction(one: Finding, explained: tuple[Group, ...]) -> Correction:
     what = one.name.removesuffix("-corrected").replace("-", " ")
     size = next((evidence_text(one, name, signed=True) for name in one.evidence), "")
-    return Correction(
-        one, place_text(one.where, with_trial=True) or "all trials", what, size, tuple(grouped(explained))
-    )
+    return Correction(one, place_text(one.where, with_trial=True) or "all trials", what, size, explained)
 
 
 def place_text(where: Where, with_trial: bool = False) -> str:
@@ -198,14 +194,9 @@ def linked(sentence: str) -> Markup:
     )
 
 
-def asks(one: Rule) -> str:
-    """The question that a rule is an answer to."""
-    return questions(one.code[0])[one.question]
-
-
 def lines(findings: Iterable[Finding], least: Severity = Severity.CORRECTED) -> list[str]:
     """Open findings from this severity on, one line each, equal ones together."""
-    return [group.line for group in grouped(in_order(one for one in findings if one.is_open and one.severity >= least))]
+    return [group.line for group in grouped(reported(findings, least))]
 
 
 def digest(overview: Overview) -> dict[str, Any]:
@@ -220,7 +211,7 @@ def digest(overview: Overview) -> dict[str, Any]:
                 "code": group.first.code,
                 "severity": group.first.severity.name,
                 "status": group.first.status,
-                "trial": group.first.where.trial,
+                "place": group.first.place,
                 "message": group.message,
                 "remedy": group.first.remedy,
             }

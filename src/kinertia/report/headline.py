@@ -16,7 +16,7 @@ from kinertia.diagnostics.result.suitability import Suitability, suitability
 from kinertia.estimation.identifiability import INFORMED, MEASURED, evidence
 from kinertia.estimation.result import Fit, TrialFit
 from kinertia.findings.finding import Severity
-from kinertia.findings.overview import DO_NOT_USE, USE, WITH_CARE
+from kinertia.findings.overview import DO_NOT_USE, USES, WITH_CARE
 from kinertia.report.bsp_figures import DEPARTURE_SD, NAMES, departures, estimated_rows, segment_name
 from kinertia.report.coordinate_titles import title_of
 from kinertia.report.time_figures import motion_change
@@ -31,7 +31,6 @@ _EVIDENCE = {
 }
 IMPOSSIBLE = "R202"
 """The code of bodies that cannot exist."""
-_WORST_FIRST = (DO_NOT_USE, WITH_CARE, USE)
 
 
 class Purpose(NamedTuple):
@@ -79,15 +78,11 @@ def purposes(outputs: Sequence[Suitability], no_body: bool) -> tuple[Purpose, ..
     moments, motion = of["joint moments"], of["motion"]
     segments = [of[name] for name in ("segment masses", "centres of mass", "moments of inertia")]
     uses = {one.use for one in segments}
-    by_use = [
-        f"{use}: {', '.join(one.output for one in segments if one.use == use)}"
-        for use in (USE, WITH_CARE, DO_NOT_USE)
-        if use in uses
-    ]
+    by_use = [f"{use}: {', '.join(one.output for one in segments if one.use == use)}" for use in USES if use in uses]
     codes = dict.fromkeys(code for one in segments for code in one.codes)
     by_use += [f"see {', '.join(codes)}"] if codes else []
     parameters = segments[0] if len(uses) == 1 else Suitability("", WITH_CARE, "; ".join(by_use))
-    worse = min((moments, motion), key=lambda one: _WORST_FIRST.index(one.use))
+    worse = max((moments, motion), key=lambda one: USES.index(one.use))
     opensim = Purpose("Next OpenSim step (RRA, CMC)", worse.use, worse.reason)
     if no_body:
         opensim = opensim._replace(use=DO_NOT_USE, reason=f"a segment is physically impossible; see {IMPOSSIBLE}")

@@ -15,7 +15,7 @@ from markupsafe import Markup
 
 from kinertia.findings.display import outlined
 from kinertia.io.provenance import VERSION
-from kinertia.report.finding_view import LOOKS, asks, linked
+from kinertia.report.finding_view import LOOKS, linked
 from kinertia.report.plotly_script import packed_script
 from kinertia.report.wording import fixed
 
@@ -55,7 +55,7 @@ def templates_of(package: str) -> jinja2.Environment:
 def _environment() -> jinja2.Environment:
     environment = templates_of("kinertia.report")
     environment.globals.update(asset=_asset, packed_script=lambda: Markup(packed_script()))
-    environment.globals.update(asks=asks, looks=LOOKS)
+    environment.globals.update(looks=LOOKS)
     environment.filters.update(fixed=fixed, outlined=outlined, linked=linked)
     return environment
 

@@ -20,8 +20,8 @@ from kinertia.errors import KinertiaError, findings_of
 from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.result import Fit
 from kinertia.estimation.simultaneous.instruments import FLOOR_PRIOR, PLATE_PRIOR
-from kinertia.findings.finding import Finding, Severity
-from kinertia.findings.overview import in_order
+from kinertia.findings.finding import Finding
+from kinertia.findings.overview import reported
 from kinertia.findings.quantity import Quantity
 from kinertia.io.subject_file import SubjectFile, read_subject
 from kinertia.studies.parallel import in_parallel
@@ -210,11 +210,6 @@ def checked(subject: Path) -> tuple[Finding, ...]:
         return findings_of(error)
 
 
-def reported(findings: Sequence[Finding]) -> list[Finding]:
-    """What a user reads first: open findings that are no mere assumptions, the worst first."""
-    return in_order(one for one in findings if one.is_open and one.severity > Severity.INFO)
-
-
 def judged(
     case: FaultOutcome, mistake: Mistake, sound: Sequence[Finding], findings: Sequence[Finding], by: str
 ) -> FaultOutcome | None:
@@ -233,11 +228,7 @@ def judged(
 def _is_new(one: Finding, before: Sequence[Finding]) -> bool:
     """Whether it is not found there before, at least as severe and of about the same size."""
     same = [other for other in before if other.code == one.code and other.where.overlaps(one.where)]
-    return not any(other.severity >= one.severity and not _differ(_headline(one), _headline(other)) for other in same)
-
-
-def _headline(one: Finding) -> Quantity | None:
-    return next((each for each in one.evidence.values() if isinstance(each.value, float)), None)
+    return not any(other.severity >= one.severity and not _differ(one.headline, other.headline) for other in same)
 
 
 def _differ(one: Quantity | None, other: Quantity | None) -> bool:
