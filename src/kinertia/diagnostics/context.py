@@ -16,6 +16,7 @@ from kinertia.diagnostics.evidence.loaded_plates import adult_share
 from kinertia.diagnostics.evidence.marker_precision import MarkerPrecision
 from kinertia.diagnostics.evidence.plate_contacts import PlateContact, contacts_of
 from kinertia.diagnostics.evidence.plate_edges import Overhang, overhangs
+from kinertia.diagnostics.evidence.plate_masses import plate_masses
 from kinertia.diagnostics.evidence.trajectory_faults import TrajectoryFaults
 from kinertia.errors import KinertiaError
 from kinertia.estimation.carried_mass import CarriedMass
@@ -170,6 +171,13 @@ class RecordingContext:
         if self.trial is None:
             return None
         return force_mass(self.segment_of_label, self.trial, self.travel.kind == "stands still")
+
+    @cached_property
+    def plate_masses(self) -> Mapping[str, float]:
+        """kg, body mass by each plate that carries all of it for a while; empty where loads are not sorted by foot."""
+        if self.plates is None or self.trial is None:
+            return {}
+        return plate_masses(self.plates, self.trial, self.all_markers, self.segment_of_label)
 
     def at(self, **where: Any) -> Where:
         """A place in this recording: `at(plate="plate 1", **self.along(2))`."""

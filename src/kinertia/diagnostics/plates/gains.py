@@ -13,18 +13,13 @@ import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.caused_velocity import CausedVelocity
-from kinertia.diagnostics.evidence.markers_centre import markers_centre
 from kinertia.diagnostics.evidence.ups_and_downs import ups_and_downs_of
 from kinertia.diagnostics.evidence.velocity_residual import HORIZONTAL, Scaled, VelocityResidual
 from kinertia.findings.finding import Finding, with_evidence
 from kinertia.findings.quantity import Quantity
-from kinertia.model.skeleton import GRAVITY_M_S2
-from kinertia.motion.smoothing import SmoothingError, smooth
-from kinertia.trial.data import FloatArray, PlateLoads, Trial
-from kinertia.trial.sampled_time import nearest_samples, runs, span_s, within
+from kinertia.trial.data import PlateLoads
+from kinertia.trial.sampled_time import span_s
 
-_CENTRE_HZ = 8.0
-_SINGLE_SUPPORT_N, _UNLOADED_N, _SHORTEST_S = 50.0, 10.0, 0.2
 _DIFFERENCE = 0.075
 _LEAST_WINDOW_S, _LEAST_GAIN, _RESIDUAL_SHARE = 1.0, 0.025, 0.9
 """Of 31 fault-free trials gains by pelvis and by markers' centre are of one sign and both beyond 0.5 % in eight, and
@@ -36,10 +31,10 @@ are as large another gain leaves 0.72 and more, or another zero explains more. B
 
 def gains(context: RecordingContext) -> Iterator[Finding]:
     """P221, of the plates in single support or else by the vertical velocity; P222, of each horizontal axis."""
-    plates, trial = context.plates, context.trial
-    if plates is None or trial is None:
+    plates = context.plates
+    if plates is None or context.trial is None:
         return
-    weights = _by_single_support(context, plates, trial) or _by_vertical_velocity(context, plates)
+    weights = _by_single_support(context) or _by_vertical_velocity(context, plates)
     if weights is not None:
         yield weights
     long = [part for part in context.velocities if span_s(part.time) >= _LEAST_WINDOW_S]
@@ -49,8 +44,8 @@ def gains(context: RecordingContext) -> Iterator[Finding]:
             yield scaled
 
 
-def _by_single_support(context: RecordingContext, plates: PlateLoads, trial: Trial) -> Finding | None:
-    mass_kg = _masses(context, plates, trial)
+def _by_single_support(context: RecordingContext) -> Finding | None:
+    mass_kg = context.plate_masses
     if len(mass_kg) < 2:
         return None
     heavy, light = (pick(mass_kg, key=lambda name: mass_kg[name]) for pick in (max, min))
@@ -106,36 +101,6 @@ def _disagreeing(
     plates = {"plate": Quantity(names[0]), "other": Quantity(names[1])}
     masses = {"mass_kg": Quantity(mass_kg[0], "kg"), "other_kg": Quantity(mass_kg[1], "kg")}
     return with_evidence("P221", context.at(**context.along(1)), {**masses, **plates, **evidence})
-
-
-def _masses(context: RecordingContext, plates: PlateLoads, trial: Trial) -> dict[str, float]:
-    """kg, by plate, of a body that moves like the markers' centre."""
-    markers = context.all_markers
-    place = markers_centre(context.segment_of_label, markers)
-    if place is None or len(plates.names) < 2:
-        return {}
-    try:
-        centre = smooth(markers.time, place[:, 1], _CENTRE_HZ)
-    except SmoothingError:
-        return {}
-    measured = trial.measured[nearest_samples(markers.time, plates.time)]
-    measured &= within(plates.time, markers.time[0], markers.time[-1])
-    by_plate = {}
-    for p, name in enumerate(plates.names):
-        vertical: FloatArray = plates.force[:, p, 1]
-        others = np.delete(plates.force[..., 1], p, axis=1).max(axis=1)
-        masses_kg = []
-        for first, last in runs((vertical > _SINGLE_SUPPORT_N) & (others < _UNLOADED_N) & measured):
-            span = span_s(plates.time, first, last)
-            if span < _SHORTEST_S:
-                continue
-            step = np.diff(plates.time[first : last + 1])
-            impulse = float(((vertical[first + 1 : last + 1] + vertical[first:last]) / 2 * step).sum())
-            velocity = centre(plates.time[[first, last]], 1)
-            masses_kg.append(impulse / (GRAVITY_M_S2 * span + float(velocity[1] - velocity[0])))
-        if masses_kg:
-            by_plate[name] = float(np.mean(masses_kg))
-    return by_plate
 
 
 def _scaled_axis(

@@ -20,7 +20,6 @@ import numpy as np
 from kinertia.diagnostics.context import PersonContext
 from kinertia.diagnostics.evidence.force_mass import MISSING, ForceMass
 from kinertia.diagnostics.subject.majority import odd_ones
-from kinertia.diagnostics.subject.plate_masses import plate_masses
 from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.quantity import Quantity
@@ -142,7 +141,7 @@ def _contradiction(
             yield finding("P202", where, unit=Quantity(unit), ratio=Quantity(ratio, "1"))
     by_plate: dict[str, float] = {}
     for trial in context.trials:
-        by_plate |= plate_masses(trial) if one.trial in (None, trial.name) else {}
+        by_plate |= trial.plate_masses if one.trial in (None, trial.name) else {}
     causes, action = _causes(one, total.total_kg, by_plate, witnesses)
     heavier = one.mass_kg > total.total_kg
     limit = total.total_kg + (1.0 if heavier else -1.0) * one.allowed_kg(total, WARNING_SHARE)

@@ -2,24 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
-from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.markers_centre import markers_centre
 from kinertia.model.skeleton import GRAVITY_M_S2
 from kinertia.motion.smoothing import SmoothingError, smooth
-from kinertia.trial.data import FloatArray
+from kinertia.trial.data import FloatArray, Markers, PlateLoads, Trial
 from kinertia.trial.sampled_time import nearest_samples, runs, span_s, within
 
 _CENTRE_HZ = 8.0
 _ALONE_N, _UNLOADED_N, _SHORTEST_S = 50.0, 10.0, 0.2
 
 
-def plate_masses(context: RecordingContext) -> dict[str, float]:
-    """kg, by plate, of a body that moves like the markers' centre; plates that never carry it alone are left out."""
-    plates, markers, trial = context.plates, context.all_markers, context.trial
-    place = None if plates is None or trial is None else markers_centre(context.segment_of_label, markers)
-    if plates is None or trial is None or place is None:
+def plate_masses(
+    plates: PlateLoads, trial: Trial, markers: Markers, segment_of_label: Mapping[str, str]
+) -> dict[str, float]:
+    """kg, by plate, of a body that moves like the markers' centre; plates that never carry it alone are left out.
+
+    Args:
+        plates: of the recording.
+        trial: the same with loads sorted by foot; it knows in which frames ground contact is measured.
+        markers: all of the recording.
+        segment_of_label: which marker is on which segment.
+    """
+    place = markers_centre(segment_of_label, markers)
+    if place is None:
         return {}
     try:
         centre = smooth(markers.time, place[:, 1], _CENTRE_HZ)
