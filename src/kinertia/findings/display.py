@@ -84,9 +84,14 @@ def outlined(template: str, mark: str = "<{}>") -> str:
         template: with `{names}` of evidence and places.
         mark: how a name is shown, with its place as `{}`.
 
-    >>> outlined("Forces of {plate} lag by {delay_s:+}.")
+    >>> outlined("Forces of {plate} lag by {delay_s:+}{condition}.")  # what joins a word is an addition
     'Forces of <plate> lag by <delay>.'
+    >>> outlined("{action}.")
+    'It depends on what was found: see the finding.'
     """
+    if template.endswith(".") and _FIELD.fullmatch(template[:-1]):
+        return "It depends on what was found: see the finding."
+    template = re.sub(r"(?<=[\w}])" + _FIELD.pattern, "", template)
     return _FIELD.sub(lambda field: mark.format(_UNIT_SUFFIX.sub("", field.group(1)).replace("_", " ")), template)
 
 
