@@ -14,7 +14,6 @@ from itertools import combinations
 import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.evidence.caused_velocity import VelocityChanges
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.trial.data import BoolArray, FloatArray, Markers
@@ -29,13 +28,12 @@ _MOSTLY_SEEN = 0.9
 
 def over_smoothed(context: RecordingContext) -> Iterator[Finding]:
     """M133: markers without the quick part of the motion that the forces show; nothing where nobody steps."""
-    trial, owners = context.trial, context.segment_of_label
-    if trial is None or not context.velocities:
+    trial, owners, changes = context.trial, context.segment_of_label, context.velocity_changes
+    if trial is None or changes is None:
         return
     share = _quick_share(trial.markers, owners)
     if share is None or share > _LEAST_SHARE:
         return
-    changes = VelocityChanges.of(context.velocities)
     ratio = min(changes.vertical_ratio(shown) or 0.0 for shown in (changes.pelvis, changes.centre))
     rigid = ratio > _RATIO_OF_A_RATE and _distances_change_m(trial.markers, owners) < _RIGID_M
     if ratio >= _MOST_RATIO and not rigid:

@@ -47,11 +47,11 @@ def force_directions(context: RecordingContext) -> Iterator[Finding]:
 
     One about both axes is weighed against the best of each axis.
     """
-    trial, plates, parts = context.trial, context.plates, context.velocities
-    if trial is None or plates is None or not parts:
+    trial, plates, parts, changes = context.trial, context.plates, context.velocities, context.velocity_changes
+    if trial is None or plates is None or changes is None:
         return
     residuals = {axis: _best_explained(plates, parts, axis) for axis in HORIZONTAL}
-    correlations = _correlations(VelocityChanges.of(parts))
+    correlations = _correlations(changes)
     against = [axis for axis in HORIZONTAL if correlations[axis] < _OPPOSED and not _one_zero_off(trial, parts, axis)]
     best, others, both = [], [], []
     for axis in HORIZONTAL:
@@ -62,7 +62,7 @@ def force_directions(context: RecordingContext) -> Iterator[Finding]:
         best += own[:1]
         others += own[1:]
         both.append(own[0].residual_m_s if own else residuals[axis].as_read)
-    rotated = _rotated(context, parts, residuals, correlations, against)
+    rotated = _rotated(context, changes, residuals, correlations, against)
     if rotated is not None and (not best or rotated.residual_m_s <= float(np.linalg.norm(both))):
         best, others = [rotated], [*best, *others]
     elif rotated is not None:
@@ -75,13 +75,13 @@ def force_directions(context: RecordingContext) -> Iterator[Finding]:
 
 def _rotated(
     context: RecordingContext,
-    parts: Sequence[CausedVelocity],
+    changes: VelocityChanges,
     residuals: dict[int, VelocityResidual],
     correlations: dict[int, float],
     against: Sequence[int],
 ) -> _Hypothesis | None:
     """P231: by 180 degrees where both axes oppose the motion, else by the angle at which the forces go with it."""
-    angle_deg, strength = _angle(VelocityChanges.of(parts))
+    angle_deg, strength = _angle(changes)
     # beside an axis that is opposed, one that goes with the markers says that they are not rotated
     enough = -_OPPOSED if against else _CLEAR
     fitting = any(one > enough for one in correlations.values())
@@ -89,7 +89,7 @@ def _rotated(
         angle, residual = np.pi, float(np.linalg.norm([one.all_reversed for one in residuals.values()]))
     elif strength > _CLEAR_ROTATION and abs(angle_deg) > _ROTATED_DEG and not fitting:
         angle = float(np.radians(90 * round(angle_deg / 90)))
-        residual = rotated_residual(parts, angle)
+        residual = rotated_residual(context.velocities, angle)
     else:
         return None
     found = finding(

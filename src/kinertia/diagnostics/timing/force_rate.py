@@ -12,7 +12,6 @@ from collections.abc import Iterator
 import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.evidence.caused_velocity import VelocityChanges
 from kinertia.diagnostics.evidence.ups_and_downs import ups_and_downs_of
 from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.quantity import Quantity
@@ -27,9 +26,9 @@ _LEAST_RATIO, _MOST_RATIO, _USUAL_RATIO, _TYPICAL_RATIO = 0.4, 1.8, (0.67, 0.99)
 
 def force_rate(context: RecordingContext) -> Iterator[Finding]:
     """T202, and T201 of forces that come ever later, or ever earlier, in a measured window."""
-    if not context.velocities:
+    changes = context.velocity_changes
+    if changes is None:
         return
-    changes = VelocityChanges.of(context.velocities)
     ratio = changes.vertical_ratio(changes.pelvis)
     if ratio is not None and not _LEAST_RATIO < ratio < _MOST_RATIO:
         yield finding(
@@ -47,8 +46,9 @@ def force_rate(context: RecordingContext) -> Iterator[Finding]:
 def _growing_delays(context: RecordingContext) -> Iterator[Finding]:
     """T201, of every window."""
     trial = context.trial
-    for part in context.velocities if trial is not None else ():
-        assert trial is not None
+    if trial is None:
+        return
+    for part in context.velocities:
         if span_s(part.time) < _LEAST_WINDOW_S:
             continue
         found = ups_and_downs_of(part, growing=True)
