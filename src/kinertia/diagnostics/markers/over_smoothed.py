@@ -14,9 +14,10 @@ from itertools import combinations
 import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
+from kinertia.diagnostics.evidence.markers_centre import bridged_way
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
-from kinertia.trial.data import BoolArray, FloatArray, Markers
+from kinertia.trial.data import Markers
 
 _QUICK_HZ, _LEAST_SHARE, _USUAL_SHARE, _LEAST_SWING_M_S = 4.0, 0.002, (0.008, 0.06), 1.0
 _MOST_RATIO, _USUAL_RATIO, _RATIO_OF_A_RATE = 1.15, (0.8, 1.05), 1.8
@@ -52,7 +53,7 @@ def _quick_share(markers: Markers, owners: Mapping[str, str]) -> float | None:
         seen = np.asarray(np.isfinite(markers.positions[:, k]).all(axis=1))
         if not owners.get(label, "").startswith("foot") or seen.mean() < _MOSTLY_SEEN:
             continue
-        velocity = np.gradient(_bridged(markers, k, seen), markers.time, axis=0)
+        velocity = np.gradient(bridged_way(markers.time, markers.positions[:, k]), markers.time, axis=0)
         velocity -= velocity.mean(axis=0)
         if np.quantile(np.linalg.norm(velocity, axis=1), 0.95) < _LEAST_SWING_M_S:
             continue
@@ -60,12 +61,6 @@ def _quick_share(markers: Markers, owners: Mapping[str, str]) -> float | None:
         frequency = np.fft.rfftfreq(len(velocity), 1.0 / markers.rate_hz)
         shares.append(float(power[frequency > _QUICK_HZ].sum() / power.sum()))
     return float(np.median(shares)) if shares else None
-
-
-def _bridged(markers: Markers, k: int, seen: BoolArray) -> FloatArray:
-    """(n, 3) m, of one marker."""
-    place = markers.positions[seen, k]
-    return np.column_stack([np.interp(markers.time, markers.time[seen], place[:, axis]) for axis in range(3)])
 
 
 def _distances_change_m(markers: Markers, owners: Mapping[str, str]) -> float:
