@@ -16,6 +16,7 @@ import numpy as np
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.caused_velocity import LEAST_CHANGE_M_S, CausedVelocity, VelocityChanges
 from kinertia.diagnostics.evidence.velocity_residual import (
+    CLEARLY_BEST,
     DISTINGUISHABLE,
     HORIZONTAL,
     VelocityResidual,
@@ -29,7 +30,7 @@ from kinertia.trial.sampled_time import span_s
 
 _OPPOSED, _USUAL_CORRELATION = -0.4, (0.5, 1.0)
 _CLEAR, _CLEAR_ROTATION, _ROTATED_DEG = 0.7, 0.35, 60.0
-_ONE_REVERSED, _CLEARLY_BEST, _LEAST_REVERSED_M_S, _LONG_WINDOW_S = 0.65, 0.85, 0.08, 1.0
+_ONE_REVERSED, _LEAST_REVERSED_M_S, _LONG_WINDOW_S = 0.65, 0.08, 1.0
 """Where one plate's sign is wrong, reversing it leaves 0.04 to 0.57 of the residual on five trials; on nine fault-free
 ones 0.9 (squats), 1.4 (runs) and more."""
 
@@ -124,7 +125,7 @@ def _reversed_plate(
     best = int(np.argmin(residual.plate_reversed))
     left = float(residual.plate_reversed[best])
     rivals = [residual.all_reversed, residual.without_trend, *np.delete(residual.plate_reversed, best).tolist()]
-    limit = min(_ONE_REVERSED * residual.as_read, _CLEARLY_BEST * min(rivals))
+    limit = min(_ONE_REVERSED * residual.as_read, CLEARLY_BEST * min(rivals))
     zero = int(np.argmin(residual.plate_zeroed))
     zeroed = float(residual.plate_zeroed[zero])
     if (
