@@ -8,10 +8,11 @@ from functools import cached_property
 from typing import Any
 
 from kinertia.diagnostics.axes import Axes, AxisNames
-from kinertia.diagnostics.evidence.caused_velocity import CausedVelocity, caused_velocities
+from kinertia.diagnostics.evidence.caused_velocity import CausedVelocity, VelocityChanges, caused_velocities
 from kinertia.diagnostics.evidence.copied_frames import without_copied_frames
 from kinertia.diagnostics.evidence.foot_trajectories import FootTrajectory, foot_trajectories
 from kinertia.diagnostics.evidence.force_mass import ForceMass, force_mass
+from kinertia.diagnostics.evidence.landmarks import CLEAR, headings, landmark_positions, most_forwards
 from kinertia.diagnostics.evidence.loaded_plates import adult_share
 from kinertia.diagnostics.evidence.marker_precision import MarkerPrecision
 from kinertia.diagnostics.evidence.plate_contacts import PlateContact, contacts_of
@@ -25,7 +26,7 @@ from kinertia.findings.where import Where
 from kinertia.model.imported import OsimModel
 from kinertia.model.marker_set import MarkerSet
 from kinertia.settings import Subject
-from kinertia.trial.data import Markers, PlateLoads, Recording, Trial
+from kinertia.trial.data import FloatArray, Markers, PlateLoads, Recording, Trial
 from kinertia.trial.ground_contact import FootMarkers
 from kinertia.trial.marker_quality import Travel, travel
 from kinertia.trial.plate_assignment import build_trial
@@ -77,6 +78,12 @@ class RecordingContext:
         return self.recording.markers.select([label for label in self.marker_set.labels if label in present])
 
     @cached_property
+    def seen_labels(self) -> frozenset[str]:
+        """Labels of all markers that a frame shows."""
+        markers = self.all_markers
+        return frozenset(label for label, seen in zip(markers.labels, markers.seen.T, strict=True) if seen.any())
+
+    @cached_property
     def measured_markers(self) -> Markers:
         """`markers` without copies of lost frames."""
         return self.markers if self.is_static else without_copied_frames(self.markers)
@@ -101,7 +108,27 @@ class RecordingContext:
     @cached_property
     def axes(self) -> Axes:
         """What the ground axes are called."""
-        return Axes.of(self.recording.vertical, self.markers)
+        return Axes.of(self.recording.vertical, self.travel)
+
+    @cached_property
+    def landmark_positions(self) -> Mapping[str, FloatArray]:
+        """(n, 3) m of every landmark whose labels are all there."""
+        return {} if self.marker_set is None else landmark_positions(self.all_markers, self.marker_set)
+
+    @cached_property
+    def headings(self) -> Mapping[str, FloatArray]:
+        """(n, 3): where feet and pelvis point."""
+        return headings(self.landmark_positions)
+
+    @cached_property
+    def most_forwards(self) -> float:
+        """Largest cosine of these to the way that the person goes; 0 of who goes nowhere."""
+        return most_forwards(self.all_markers, self.headings)
+
+    @property
+    def walks_backwards(self) -> bool:
+        """Whether the person goes where neither feet nor pelvis point."""
+        return self.most_forwards < -CLEAR
 
     @cached_property
     def feet(self) -> FootMarkers | None:
@@ -164,6 +191,11 @@ class RecordingContext:
     def velocities(self) -> Sequence[CausedVelocity]:
         """How fast the body is by markers and by forces, one entry per measured window."""
         return () if self.trial is None else caused_velocities(self.trial, self.segment_of_label)
+
+    @cached_property
+    def velocity_changes(self) -> VelocityChanges | None:
+        """The same of all windows together, each without its trend; None where there are none."""
+        return VelocityChanges.of(self.velocities) if self.velocities else None
 
     @cached_property
     def force_mass(self) -> ForceMass | None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from kinertia.diagnostics.labels.anatomy import anatomy
-from kinertia.diagnostics.labels.heading import direction_of_travel, heading, walks_backwards
+from kinertia.diagnostics.labels.heading import direction_of_travel, heading
 from kinertia.diagnostics.markers.axes_and_floor import unit_and_vertical
 from kinertia.findings.finding import Severity
 from kinertia.io.marker_set_file import choose_marker_set
@@ -162,10 +162,10 @@ def test_the_way_of_a_walk_confirms_a_single_heading(recorded):
 def test_who_walks_backwards(recorded):
     """It is a remark, and no talk of labels that feet and pelvis have shown to be right (D19)."""
     markers, marker_set = recorded
-    assert not walks_backwards(markers, marker_set)
+    assert not context_of(markers, marker_set).walks_backwards
     backwards = Markers(markers.time, markers.labels, markers.positions[::-1])
     goes = np.linalg.norm(np.nanmedian(markers.positions[-1] - markers.positions[0], axis=0)[[0, 2]]) > 0.5
-    assert walks_backwards(backwards, marker_set) == goes
+    assert context_of(backwards, marker_set).walks_backwards == goes
     said = list(direction_of_travel(context_of(backwards, marker_set)))
     assert [(one.code, one.severity, one.causes) for one in said] == (
         [("S311", Severity.INFO, ("walking backwards",))] if goes else []

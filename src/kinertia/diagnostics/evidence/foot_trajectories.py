@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kinertia.diagnostics.evidence.markers_centre import bridged_way
 from kinertia.trial.belt import Belt
 from kinertia.trial.data import FEET, BoolArray, FloatArray, Markers
 from kinertia.trial.ground_contact import bridged
@@ -237,9 +238,4 @@ def _ends(time: FloatArray, place: FloatArray) -> tuple[FloatArray, FloatArray, 
                 usual[one, other] = float(np.nanmedian(apart[:, one, other]))
     one, other = np.unravel_index(int(np.argmax(usual)), usual.shape)
     both = seen[:, one] & seen[:, other]
-    return _filled(time, flat[:, one]), _filled(time, flat[:, other]), both
-
-
-def _filled(time: FloatArray, place: FloatArray) -> FloatArray:
-    known = np.isfinite(place).all(axis=1)
-    return np.column_stack([np.interp(time, time[known], place[known, axis]) for axis in range(2)])
+    return bridged_way(time, flat[:, one]), bridged_way(time, flat[:, other]), both

@@ -13,6 +13,7 @@ CLEAR = 0.5
 """Cosine beyond which a direction is clear: feet turn out and knees turn in by less than 60 degrees."""
 _FLAT = 0.8
 """Cosine of 37 degrees."""
+_GOES_M = 0.5
 
 
 def landmark_positions(markers: Markers, marker_set: MarkerSet) -> dict[str, FloatArray]:
@@ -39,6 +40,16 @@ def headings(places: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
     if back and {"asis_r", "asis_l"} <= set(places):
         found["pelvis"] = horizontal((places["asis_r"] + places["asis_l"]) / 2 - np.mean(back, axis=0))
     return {name: heading for name, heading in found.items() if np.isfinite(heading).all(axis=1).any()}
+
+
+def most_forwards(markers: Markers, known: Mapping[str, FloatArray]) -> float:
+    """Of these headings the largest cosine to the way of the markers' middle; 0 where there is neither."""
+    shown = np.asarray(np.isfinite(markers.positions).any(axis=(1, 2)))
+    middle = np.nanmedian(markers.positions[shown], axis=1)
+    if not known or len(middle) < 2 or np.linalg.norm(horizontal(middle[-1] - middle[0])) < _GOES_M:
+        return 0.0
+    way = np.broadcast_to(middle[-1] - middle[0], markers.positions[:, 0].shape)
+    return max(cosine(each, way) for each in known.values())
 
 
 def horizontal(vectors: FloatArray) -> FloatArray:

@@ -12,7 +12,7 @@ from kinertia.trial.data import FloatArray, PlateLoads
 
 _ADULT_N = 70.0 * GRAVITY_M_S2
 _HEAVIEST_PERCENT = 95.0
-_STEP_N, _FEWEST = 350.0, 10
+STEP_N, _FEWEST = 350.0, 10
 """Half the weight of an adult, which no bump has; so many samples under load, at least."""
 
 
@@ -46,6 +46,4 @@ def loaded_wrenches(plates: PlateLoads, fewest: int = 1) -> Iterator[tuple[str, 
 
 def carrying(plates: PlateLoads, share: float) -> Iterator[tuple[str, FloatArray]]:
     """The same of every plate that carries a person whose `adult_share` this is."""
-    return (
-        (name, loaded) for name, loaded in loaded_wrenches(plates, _FEWEST) if loaded[:, 1].max() >= _STEP_N * share
-    )
+    return ((name, loaded) for name, loaded in loaded_wrenches(plates, _FEWEST) if loaded[:, 1].max() >= STEP_N * share)

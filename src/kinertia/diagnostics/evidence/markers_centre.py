@@ -8,7 +8,7 @@ import numpy as np
 
 from kinertia.model.anatomy import segment_of
 from kinertia.model.skeleton import Skeleton
-from kinertia.trial.data import BoolArray, FloatArray, Markers
+from kinertia.trial.data import FloatArray, Markers
 
 _SHARES = {"pelvis": 14.2, "torso": 40.0, "thigh": 12.3, "shank": 4.8, "foot": 1.2, "upper_arm": 2.4, "forearm": 2.3}
 """Per cent of the body's mass, head with torso, hand with forearm (Dumas 2007, men)."""
@@ -31,8 +31,7 @@ def markers_centre(owners: Mapping[str, str], markers: Markers) -> FloatArray | 
     places: dict[str, list[FloatArray]] = {}
     for column, label in enumerate(markers.labels):
         if owners.get(label) and seen[:, column].mean() >= _SEEN:
-            known = seen[:, column]
-            places.setdefault(owners[label], []).append(_filled(markers.time, markers.positions[:, column], known))
+            places.setdefault(owners[label], []).append(bridged_way(markers.time, markers.positions[:, column]))
     if not places.keys() & {"pelvis", "torso"}:
         return None
     shares = _shares(places)
@@ -41,8 +40,9 @@ def markers_centre(owners: Mapping[str, str], markers: Markers) -> FloatArray | 
     return total / sum(shares.values())
 
 
-def _filled(time: FloatArray, way: FloatArray, known: BoolArray) -> FloatArray:
-    """A way (n, 3), bridged by lines where it is not known."""
+def bridged_way(time: FloatArray, way: FloatArray) -> FloatArray:
+    """A way (n, k), bridged by lines where it is not known."""
+    known = np.isfinite(way).all(axis=1)
     if known.all():
         return way
     return np.stack([np.interp(time, time[known], along[known]) for along in way.T], axis=1)

@@ -35,6 +35,7 @@ class PlateContact:
         foot: 0 right, 1 left, under which it mostly is.
         weight: (k,) N, its vertical force where that is reliable and the foot is seen.
         time: (k,) s.
+        place: (k, 2) m, centre of pressure.
         offset_m: (2, k, 2) m, horizontally from each foot to the centre of pressure.
         ends_m: how far the first twentieth of the load is in front of the heel, and the last one in front of the toes.
     """
@@ -45,6 +46,7 @@ class PlateContact:
     foot: int
     weight: FloatArray
     time: FloatArray
+    place: FloatArray
     offset_m: FloatArray
     ends_m: tuple[float, float]
 
@@ -87,12 +89,12 @@ def contacts_of(plates: PlateLoads, feet: tuple[FootTrajectory, FootTrajectory])
     contacts = []
     for p in range(len(plates.names)):
         vertical = plates.force[:, p, 1]
-        for first, last in runs(bridged(plates.time, vertical > CONTACT_FORCE_N)):
+        for first, last in loads_on(plates, p):
             start, end = float(plates.time[first]), float(plates.time[last])
             rows = np.arange(first, last + 1)
             time = plates.time[rows]
             rows = rows[(vertical[rows] > COP_MIN_FORCE_N) & (time >= first_s) & (time <= last_s)]
-            if span_s(plates.time, first, last) < SHORTEST_S or len(rows) < 3:
+            if len(rows) < 3:
                 continue
             off = np.stack([one.offset_m(plates.time[rows], point[rows, p]) for one in feet])
             near = [float(vertical[rows] @ np.linalg.norm(one, axis=1)) for one in off]
@@ -101,12 +103,19 @@ def contacts_of(plates: PlateLoads, feet: tuple[FootTrajectory, FootTrajectory])
             if vertical[rows][seen].sum() < vertical[rows].sum() / 2:
                 continue
             rows, off = rows[seen], off[:, seen]
-            ahead = feet[foot].beyond(plates.time[rows], point[rows, p])
-            ends_m = (_quantile(ahead[0], vertical[rows], _END), _quantile(ahead[1], vertical[rows], 1 - _END))
+            weight, time, place = vertical[rows], plates.time[rows], point[rows, p]
+            ahead = feet[foot].beyond(time, place)
+            ends_m = (_quantile(ahead[0], weight, _END), _quantile(ahead[1], weight, 1 - _END))
             begins, ends = first > 0 and start > first_s, last < len(plates.time) - 1 and end < last_s
             begin_s, end_s = start if begins else np.nan, end if ends else np.nan
-            contacts.append(PlateContact(p, begin_s, end_s, foot, vertical[rows], plates.time[rows], off, ends_m))
+            contacts.append(PlateContact(p, begin_s, end_s, foot, weight, time, place, off, ends_m))
     return contacts
+
+
+def loads_on(plates: PlateLoads, p: int) -> list[tuple[int, int]]:
+    """First and last sample of every load of at least `SHORTEST_S` on plate `p`."""
+    loaded = runs(bridged(plates.time, plates.force[:, p, 1] > CONTACT_FORCE_N))
+    return [(first, last) for first, last in loaded if span_s(plates.time, first, last) >= SHORTEST_S]
 
 
 def cop_horizontal(plates: PlateLoads) -> FloatArray:

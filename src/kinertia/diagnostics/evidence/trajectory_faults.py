@@ -31,7 +31,15 @@ _FROZEN_M = 1e-3
 
 
 @dataclass(frozen=True)
-class Spikes:
+class Fault:
+    """What is wrong with one marker for a while."""
+
+    label: str
+    span_s: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Spikes(Fault):
     """Single frames in which one marker is off.
 
     Attributes:
@@ -40,30 +48,24 @@ class Spikes:
         far_frames: how many of them are beyond `spike_limit_m`.
     """
 
-    label: str
     distance_m: float
     frames: int
     far_frames: int
-    span_s: tuple[float, float]
 
 
 @dataclass(frozen=True)
-class Jump:
+class Jump(Fault):
     """A step (m) of one marker that stays."""
 
-    label: str
     step_m: float
-    span_s: tuple[float, float]
 
 
 @dataclass(frozen=True)
-class Filled:
+class Filled(Fault):
     """An interval in which one marker is frozen, or goes along a straight line, while its segment (m) does not."""
 
-    label: str
     frozen: bool
     relative_motion_m: float
-    span_s: tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -103,7 +105,7 @@ class TrajectoryFaults:
     @property
     def labels(self) -> frozenset[str]:
         """Of all markers with faults."""
-        found: tuple[Spikes | Jump | Filled, ...] = (*self.spikes, *self.jumps, *self.filled)
+        found: tuple[Fault, ...] = (*self.spikes, *self.jumps, *self.filled)
         return frozenset(one.label for one in found)
 
 
@@ -143,14 +145,14 @@ def _spikes(markers: Markers, off: FloatArray, far: BoolArray, single: BoolArray
             continue
         span = (float(markers.time[1 + frames[0]]), float(markers.time[1 + frames[-1]]))
         count = int(np.count_nonzero(far[frames, k]))
-        found.append(Spikes(markers.labels[k], float(off[frames, k].max()), len(frames), count, span))
+        found.append(Spikes(markers.labels[k], span, float(off[frames, k].max()), len(frames), count))
     return tuple(found)
 
 
 def _jumps(markers: Markers, size: FloatArray) -> tuple[Jump, ...]:
     """Of steps (n - 3, m) m; 0 where there are none. Of adjacent ones the largest is the jump."""
     return tuple(
-        Jump(markers.labels[k], float(size[frame, k]), (float(markers.time[frame + 1]), float(markers.time[frame + 2])))
+        Jump(markers.labels[k], (float(markers.time[frame + 1]), float(markers.time[frame + 2])), float(size[frame, k]))
         for k in np.flatnonzero(size.any(axis=0))
         for frame in (first + int(np.argmax(size[first : last + 1, k])) for first, last in runs(size[:, k] > 0.0))
     )
@@ -173,7 +175,7 @@ def _filled(markers: Markers, segments: Mapping[str, Sequence[str]]) -> tuple[Fi
             relative = _relative_motion_m(way, markers.positions[inside][:, mates]) if mates else moved / 2
             if relative > OFF_M:
                 span = (float(markers.time[first]), float(markers.time[last + count - 1]))
-                found.append(Filled(label, moved < _FROZEN_M, relative, span))
+                found.append(Filled(label, span, moved < _FROZEN_M, relative))
     return tuple(found)
 
 

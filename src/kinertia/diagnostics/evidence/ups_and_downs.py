@@ -14,6 +14,8 @@ import numpy as np
 from kinertia.diagnostics.evidence.caused_velocity import CausedVelocity
 from kinertia.trial.data import FloatArray
 
+MOST_LEFT = 0.22
+"""What a delay may leave unexplained; where it is more, another fault is the reason."""
 _STEPS = 5
 
 

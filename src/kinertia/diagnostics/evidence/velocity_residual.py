@@ -16,6 +16,8 @@ HORIZONTAL = (0, 2)
 DISTINGUISHABLE = 0.5
 """Across the walk a foot pushes to one side all the time: with the wrong sign it looks like another zero. On nine
 trials what is true leaves 0.1 to 0.66 of what the other would, in one walk 0.7 to 1.7."""
+CLEARLY_BEST = 0.85
+"""A fault is told from others where undoing it leaves less than this share of what undoing any of those leaves."""
 
 
 @dataclass(frozen=True)

@@ -16,9 +16,7 @@ from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.landmarks import (
     CLEAR,
     cosine,
-    headings,
     horizontal,
-    landmark_positions,
     unit,
 )
 from kinertia.findings.finding import Finding, finding, with_evidence
@@ -66,10 +64,9 @@ def anatomy(context: RecordingContext) -> Iterator[Finding]:
     """L201 to L208; of a person upright, standing or moving, with Y up."""
     if context.marker_set is None or not context.marker_set.landmarks:
         return
-    body = _Body(context, context.marker_set, landmark_positions(context.all_markers, context.marker_set))
-    known = headings(body.places)
-    yield from _reversed_parts(body, known)
-    known = {name: heading for name, heading in known.items() if not _blamed_part(body, name)}
+    body = _Body(context, context.marker_set, context.landmark_positions)
+    yield from _reversed_parts(body, context.headings)
+    known = {name: heading for name, heading in context.headings.items() if not _blamed_part(body, name)}
     if len(known) < 2 and (travel := _travel(context, known)) is not None:
         known["travel"] = travel
     if len(known) < 2:

@@ -11,7 +11,6 @@ from collections.abc import Iterator
 import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.evidence.landmarks import landmark_positions
 from kinertia.findings.finding import Finding, finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.trial.data import FloatArray
@@ -57,9 +56,7 @@ def unit_and_vertical(context: RecordingContext) -> Iterator[Finding]:
 
 def _feet_to_pelvis_m(context: RecordingContext) -> FloatArray | None:
     """(3,) m, median over the frames; None where it is not seen."""
-    if context.marker_set is None:
-        return None
-    places = landmark_positions(context.all_markers, context.marker_set)
+    places = context.landmark_positions
     feet = [place for name, place in places.items() if name.startswith(("heel", "ankle_lateral", "metatarsal"))]
     if not feet or not {"asis_r", "asis_l"} <= set(places):
         return None
@@ -76,8 +73,6 @@ def floor_slope(context: RecordingContext) -> Iterator[Finding]:
     if len(markers.time) < 2:
         return
     labels = [label for own in context.feet.values() for label in own]
-    if len(markers.time) < 2:
-        return
     stances = [_stances(markers.time, markers.positions[:, markers.labels.index(label)]) for label in labels]
     of_marker = np.repeat(np.arange(len(labels)), [len(one) for one in stances])
     if len(of_marker) < _FEWEST_PLACES + len(labels):

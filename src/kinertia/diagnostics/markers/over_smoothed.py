@@ -14,10 +14,10 @@ from itertools import combinations
 import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.evidence.caused_velocity import VelocityChanges
+from kinertia.diagnostics.evidence.markers_centre import bridged_way
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
-from kinertia.trial.data import BoolArray, FloatArray, Markers
+from kinertia.trial.data import Markers
 
 _QUICK_HZ, _LEAST_SHARE, _USUAL_SHARE, _LEAST_SWING_M_S = 4.0, 0.002, (0.008, 0.06), 1.0
 _MOST_RATIO, _USUAL_RATIO, _RATIO_OF_A_RATE = 1.15, (0.8, 1.05), 1.8
@@ -29,13 +29,12 @@ _MOSTLY_SEEN = 0.9
 
 def over_smoothed(context: RecordingContext) -> Iterator[Finding]:
     """M133: markers without the quick part of the motion that the forces show; nothing where nobody steps."""
-    trial, owners = context.trial, context.segment_of_label
-    if trial is None or not context.velocities:
+    trial, owners, changes = context.trial, context.segment_of_label, context.velocity_changes
+    if trial is None or changes is None:
         return
     share = _quick_share(trial.markers, owners)
     if share is None or share > _LEAST_SHARE:
         return
-    changes = VelocityChanges.of(context.velocities)
     ratio = min(changes.vertical_ratio(shown) or 0.0 for shown in (changes.pelvis, changes.centre))
     rigid = ratio > _RATIO_OF_A_RATE and _distances_change_m(trial.markers, owners) < _RIGID_M
     if ratio >= _MOST_RATIO and not rigid:
@@ -54,7 +53,7 @@ def _quick_share(markers: Markers, owners: Mapping[str, str]) -> float | None:
         seen = np.asarray(np.isfinite(markers.positions[:, k]).all(axis=1))
         if not owners.get(label, "").startswith("foot") or seen.mean() < _MOSTLY_SEEN:
             continue
-        velocity = np.gradient(_bridged(markers, k, seen), markers.time, axis=0)
+        velocity = np.gradient(bridged_way(markers.time, markers.positions[:, k]), markers.time, axis=0)
         velocity -= velocity.mean(axis=0)
         if np.quantile(np.linalg.norm(velocity, axis=1), 0.95) < _LEAST_SWING_M_S:
             continue
@@ -62,12 +61,6 @@ def _quick_share(markers: Markers, owners: Mapping[str, str]) -> float | None:
         frequency = np.fft.rfftfreq(len(velocity), 1.0 / markers.rate_hz)
         shares.append(float(power[frequency > _QUICK_HZ].sum() / power.sum()))
     return float(np.median(shares)) if shares else None
-
-
-def _bridged(markers: Markers, k: int, seen: BoolArray) -> FloatArray:
-    """(n, 3) m, of one marker."""
-    place = markers.positions[seen, k]
-    return np.column_stack([np.interp(markers.time, markers.time[seen], place[:, axis]) for axis in range(3)])
 
 
 def _distances_change_m(markers: Markers, owners: Mapping[str, str]) -> float:

@@ -42,19 +42,14 @@ def _bare_segments(context: RecordingContext) -> Iterator[Finding]:
     marker_set = context.marker_set
     if marker_set is None:
         return
-    seen = _seen_labels(context.all_markers)
     trunk = set(marker_set.segments.get("torso", ()))
-    trunk_known = context.static is not None and trunk & _seen_labels(context.static.all_markers)
+    trunk_known = context.static is not None and trunk & context.static.seen_labels
     for segment, labels in marker_set.segments.items():
         if marker_set.landmarks:
             needed = bool(labels) and not segment.startswith(_DISPENSABLE) and (segment != "torso" or trunk_known)
         else:
             needed = segment in ("foot_r", "foot_l")
-        if needed and not set(labels) & seen:
+        if needed and not set(labels) & context.seen_labels:
             expected = ", ".join(labels) or "markers of the model"
             count = Quantity(float(len(labels)), "1")
             yield finding("M104", context.at(part=in_words(segment)), expected=count, labels=Quantity(expected))
-
-
-def _seen_labels(markers: Markers) -> set[str]:
-    return {label for label, seen in zip(markers.labels, markers.seen.T, strict=True) if seen.any()}

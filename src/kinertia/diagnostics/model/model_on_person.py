@@ -18,7 +18,7 @@ import numpy as np
 
 from kinertia.diagnostics.context import PersonContext
 from kinertia.diagnostics.evidence.label_exchange import swapped_labels
-from kinertia.diagnostics.evidence.segment_distances import LOWER_BODY, SegmentDistances
+from kinertia.diagnostics.evidence.segment_distances import FEWEST_PAIRS, LOWER_BODY, SegmentDistances
 from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
@@ -26,12 +26,12 @@ from kinertia.model.anatomy import segment_of
 from kinertia.model.marker_set import MarkerSet
 from kinertia.model.skeleton import Skeleton
 from kinertia.trial.data import FloatArray, Markers
+from kinertia.trial.rms import rms
 
 _OTHER_SCALE, _OTHER_BODY = 0.025, 0.05
 """Median share by which distances may differ: beyond the one a fit warns, beyond the other it refuses."""
 _NOBODY = 5.0
 """Nobody is this many times as large as another."""
-_FEWEST_PAIRS = 6
 _ELSEWHERE_M = 0.014
 _ARRANGED = {("pelvis", "torso"): (5, 1.6), ("pelvis", "thigh_r", "thigh_l"): (8, 1.15)}
 """Segments whose markers tell left from right, which pose hardly changes; how many it takes, and how many times as bad
@@ -56,7 +56,7 @@ def model_and_trials(context: PersonContext) -> Iterator[Finding]:
         distances = SegmentDistances.of(positions, trial.markers, marker_set)
         if len(distances.pairs):
             yield from swapped_labels(distances, trial.name, "model")
-        if len(distances.pairs) < _FEWEST_PAIRS:
+        if len(distances.pairs) < FEWEST_PAIRS:
             continue
         ratio = distances.ratio()
         if not 1.0 / _NOBODY < ratio < _NOBODY:
@@ -66,10 +66,10 @@ def model_and_trials(context: PersonContext) -> Iterator[Finding]:
             limit = 1.0 + _OTHER_SCALE * float(np.sign(ratio - 1.0))
             scale = Quantity(ratio, "1", limit=limit, usual=(0.989, 1.011))
             yield finding("O404", where, severity, ratio=scale, worst_pair=Quantity(distances.worst_pair()))
-        rms_m = float(np.sqrt(np.square(distances.differences()).mean()))
+        rms_m = rms(distances.differences())
         if rms_m > _ELSEWHERE_M:
-            rms = Quantity(rms_m, "m", limit=_ELSEWHERE_M, usual=(0.0, 0.011))
-            yield finding("O405", where, rms_m=rms, worst_pair=Quantity(distances.worst_pair()))
+            apart = Quantity(rms_m, "m", limit=_ELSEWHERE_M, usual=(0.0, 0.011))
+            yield finding("O405", where, rms_m=apart, worst_pair=Quantity(distances.worst_pair()))
 
 
 def moved_markers(before: Skeleton, after: Skeleton, trials: Sequence[Markers]) -> Iterator[Finding]:

@@ -64,9 +64,8 @@ def loads_and_feet(context: RecordingContext) -> Iterator[Finding]:
         yield _with_runners_up([one.finding for one in ranked])
         return
     yield from _stray(context)
-    offset = list(_offset(context))
-    if offset and lands_on_heels(context):
-        yield from offset
+    if lands_on_heels(context):
+        yield from _offset(context)
 
 
 def _with_runners_up(ranked: Sequence[Finding]) -> Finding:

@@ -11,13 +11,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.evidence.contact_fit import Feet
 from kinertia.diagnostics.evidence.foot_trajectories import FootTrajectory
-from kinertia.diagnostics.evidence.plate_contacts import PlateContact, cop_horizontal
+from kinertia.diagnostics.evidence.plate_contacts import PlateContact
 from kinertia.diagnostics.plates.heel_landing import lands_on_heels
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
-from kinertia.trial.data import FloatArray, PlateLoads
 
 _BACKWARDS_M, _FORWARDS_M, _FIXED_M = -0.08, 0.05, 0.002
 _USUAL_M = (0.043, 0.148)
@@ -28,23 +26,16 @@ def cop_progression(context: RecordingContext) -> Iterator[Finding]:
     while on another it goes from heel to toe.
     """
     plates, feet = context.plates, context.foot_trajectories
-    if plates is None or feet is None or context.is_static:
+    if plates is None or feet is None or context.is_static or not lands_on_heels(context):
         return
-    found = list(_wrong(context, plates, feet))
-    if found and lands_on_heels(context):
-        yield from found
-
-
-def _wrong(context: RecordingContext, plates: PlateLoads, feet: Feet) -> Iterator[Finding]:
-    point = cop_horizontal(plates)
-    steps = [(one, point[np.searchsorted(plates.time, one.time), one.plate]) for one in context.contacts if one.is_step]
+    steps = [one for one in context.contacts if one.is_step]
     progression: dict[int, float] = {}
-    for p in sorted({one.plate for one, _ in steps}):
-        own = [(one, place) for one, place in steps if one.plate == p]
-        range_m = max(float(np.ptp(place, axis=0).max()) for _, place in own)
+    for p in sorted({one.plate for one in steps}):
+        own = [one for one in steps if one.plate == p]
+        range_m = max(float(np.ptp(one.place, axis=0).max()) for one in own)
         if range_m < _FIXED_M:
             yield finding("P251", context.at(plate=plates.names[p]), range_m=Quantity(range_m, "m", limit=_FIXED_M))
-        progression[p] = float(np.median([_progression_m(one, place, feet[one.foot]) for one, place in own]))
+        progression[p] = float(np.median([_progression_m(one, feet[one.foot]) for one in own]))
     if all(each <= _FORWARDS_M for each in progression.values()):
         return
     for p, each in progression.items():
@@ -53,8 +44,8 @@ def _wrong(context: RecordingContext, plates: PlateLoads, feet: Feet) -> Iterato
             yield finding("P252", context.at(plate=plates.names[p]), progression_m=measured)
 
 
-def _progression_m(contact: PlateContact, place: FloatArray, foot: FootTrajectory) -> float:
+def _progression_m(contact: PlateContact, foot: FootTrajectory) -> float:
     """How much farther forwards on its foot a load is in its last third than in its first."""
-    ahead = foot.beyond(contact.time, place)[0]
+    ahead = foot.beyond(contact.time, contact.place)[0]
     third = max(len(ahead) // 3, 1)
     return float(np.median(ahead[-third:]) - np.median(ahead[:third]))

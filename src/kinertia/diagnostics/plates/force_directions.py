@@ -16,6 +16,7 @@ import numpy as np
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.caused_velocity import LEAST_CHANGE_M_S, CausedVelocity, VelocityChanges
 from kinertia.diagnostics.evidence.velocity_residual import (
+    CLEARLY_BEST,
     DISTINGUISHABLE,
     HORIZONTAL,
     VelocityResidual,
@@ -29,7 +30,7 @@ from kinertia.trial.sampled_time import span_s
 
 _OPPOSED, _USUAL_CORRELATION = -0.4, (0.5, 1.0)
 _CLEAR, _CLEAR_ROTATION, _ROTATED_DEG = 0.7, 0.35, 60.0
-_ONE_REVERSED, _CLEARLY_BEST, _LEAST_REVERSED_M_S, _LONG_WINDOW_S = 0.65, 0.85, 0.08, 1.0
+_ONE_REVERSED, _LEAST_REVERSED_M_S, _LONG_WINDOW_S = 0.65, 0.08, 1.0
 """Where one plate's sign is wrong, reversing it leaves 0.04 to 0.57 of the residual on five trials; on nine fault-free
 ones 0.9 (squats), 1.4 (runs) and more."""
 
@@ -47,11 +48,11 @@ def force_directions(context: RecordingContext) -> Iterator[Finding]:
 
     One about both axes is weighed against the best of each axis.
     """
-    trial, plates, parts = context.trial, context.plates, context.velocities
-    if trial is None or plates is None or not parts:
+    trial, plates, parts, changes = context.trial, context.plates, context.velocities, context.velocity_changes
+    if trial is None or plates is None or changes is None:
         return
     residuals = {axis: _best_explained(plates, parts, axis) for axis in HORIZONTAL}
-    correlations = _correlations(VelocityChanges.of(parts))
+    correlations = _correlations(changes)
     against = [axis for axis in HORIZONTAL if correlations[axis] < _OPPOSED and not _one_zero_off(trial, parts, axis)]
     best, others, both = [], [], []
     for axis in HORIZONTAL:
@@ -62,7 +63,7 @@ def force_directions(context: RecordingContext) -> Iterator[Finding]:
         best += own[:1]
         others += own[1:]
         both.append(own[0].residual_m_s if own else residuals[axis].as_read)
-    rotated = _rotated(context, parts, residuals, correlations, against)
+    rotated = _rotated(context, changes, residuals, correlations, against)
     if rotated is not None and (not best or rotated.residual_m_s <= float(np.linalg.norm(both))):
         best, others = [rotated], [*best, *others]
     elif rotated is not None:
@@ -75,13 +76,13 @@ def force_directions(context: RecordingContext) -> Iterator[Finding]:
 
 def _rotated(
     context: RecordingContext,
-    parts: Sequence[CausedVelocity],
+    changes: VelocityChanges,
     residuals: dict[int, VelocityResidual],
     correlations: dict[int, float],
     against: Sequence[int],
 ) -> _Hypothesis | None:
     """P231: by 180 degrees where both axes oppose the motion, else by the angle at which the forces go with it."""
-    angle_deg, strength = _angle(VelocityChanges.of(parts))
+    angle_deg, strength = _angle(changes)
     # beside an axis that is opposed, one that goes with the markers says that they are not rotated
     enough = -_OPPOSED if against else _CLEAR
     fitting = any(one > enough for one in correlations.values())
@@ -89,7 +90,7 @@ def _rotated(
         angle, residual = np.pi, float(np.linalg.norm([one.all_reversed for one in residuals.values()]))
     elif strength > _CLEAR_ROTATION and abs(angle_deg) > _ROTATED_DEG and not fitting:
         angle = float(np.radians(90 * round(angle_deg / 90)))
-        residual = rotated_residual(parts, angle)
+        residual = rotated_residual(context.velocities, angle)
     else:
         return None
     found = finding(
@@ -124,7 +125,7 @@ def _reversed_plate(
     best = int(np.argmin(residual.plate_reversed))
     left = float(residual.plate_reversed[best])
     rivals = [residual.all_reversed, residual.without_trend, *np.delete(residual.plate_reversed, best).tolist()]
-    limit = min(_ONE_REVERSED * residual.as_read, _CLEARLY_BEST * min(rivals))
+    limit = min(_ONE_REVERSED * residual.as_read, CLEARLY_BEST * min(rivals))
     zero = int(np.argmin(residual.plate_zeroed))
     zeroed = float(residual.plate_zeroed[zero])
     if (

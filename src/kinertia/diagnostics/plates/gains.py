@@ -14,7 +14,7 @@ import numpy as np
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.caused_velocity import CausedVelocity
 from kinertia.diagnostics.evidence.ups_and_downs import ups_and_downs_of
-from kinertia.diagnostics.evidence.velocity_residual import HORIZONTAL, Scaled, VelocityResidual
+from kinertia.diagnostics.evidence.velocity_residual import CLEARLY_BEST, HORIZONTAL, Scaled, VelocityResidual
 from kinertia.findings.finding import Finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.trial.data import PlateLoads
@@ -24,7 +24,7 @@ _DIFFERENCE = 0.075
 _LEAST_WINDOW_S, _LEAST_GAIN, _RESIDUAL_SHARE = 1.0, 0.025, 0.9
 """Of 31 fault-free trials gains by pelvis and by markers' centre are of one sign and both beyond 0.5 % in eight, and
 beyond 1 % in one. They must also explain so much, which a jump's do not."""
-_SCALED, _CLEARLY_BEST, _LEAST_RESIDUAL_M_S, _FACTORS = 0.55, 0.85, 0.05, ((0.4, 0.75), (1.35, 4.0))
+_SCALED, _LEAST_RESIDUAL_M_S, _FACTORS = 0.55, 0.05, ((0.4, 0.75), (1.35, 4.0))
 """Twice the force along one axis of a walk leaves 0.08 to 0.45 of the residual; of residuals of fault-free trials that
 are as large another gain leaves 0.72 and more, or another zero explains more. Beyond these factors it is no gain."""
 
@@ -109,10 +109,10 @@ def _scaled_axis(
     """P222: the axis of one plate, or of all, that reads so many times as much as it should."""
     residual = VelocityResidual.of(plates.time, plates.force, long, axis)
     best = min(residual.scaled, key=lambda one: one.residual)
-    limit = min(_SCALED * residual.as_read, _CLEARLY_BEST * float(residual.plate_zeroed.min()))
+    limit = min(_SCALED * residual.as_read, CLEARLY_BEST * float(residual.plate_zeroed.min()))
     if residual.as_read < _LEAST_RESIDUAL_M_S or best.residual > limit or not _is_gain(best):
         return None
-    alike = [one for one in residual.scaled if _CLEARLY_BEST * one.residual < best.residual and _is_gain(one)]
+    alike = [one for one in residual.scaled if CLEARLY_BEST * one.residual < best.residual and _is_gain(one)]
     names = ["all plates" if one.plate is None else plates.names[one.plate] for one in alike]
     evidence = {
         "factor": Quantity(best.factor, "1"),

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.evidence.contact_fit import Feet
 from kinertia.diagnostics.evidence.plate_contacts import BETWEEN_M, ONE_STEP_S, PlateContact
 from kinertia.diagnostics.evidence.plate_edges import OVERHANG_M
 from kinertia.diagnostics.plates.heel_landing import lands_on_heels
@@ -15,7 +14,7 @@ from kinertia.errors import KinertiaError
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.motion.kinematics import FEWEST_FRAMES
-from kinertia.trial.data import BoolArray, PlateLoads
+from kinertia.trial.data import BoolArray
 from kinertia.trial.plate_assignment import FOOT_NAMES, no_forces
 from kinertia.trial.sampled_time import span_s
 
@@ -54,14 +53,8 @@ def both_feet(context: RecordingContext) -> Iterator[Finding]:
     swings by its markers is on none.
     """
     plates, feet = context.plates, context.foot_trajectories
-    if plates is None or feet is None or context.is_static:
+    if plates is None or feet is None or context.is_static or not lands_on_heels(context):
         return
-    found = list(_shared_plates(context, plates, feet))
-    if found and lands_on_heels(context):
-        yield from found
-
-
-def _shared_plates(context: RecordingContext, plates: PlateLoads, feet: Feet) -> Iterator[Finding]:
     for contact in context.contacts:
         away = _under_both(contact) & feet[1 - contact.foot].standing(contact.time)
         share = float(contact.weight[away].sum() / contact.weight.sum())

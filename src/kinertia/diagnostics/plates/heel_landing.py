@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.labels.heading import walks_backwards
 
 _ENDS = (("heel",), ("metatarsal", "toe"))
 _LEAST_LENGTH_M = 0.08
@@ -14,9 +13,7 @@ _LEAST_LENGTH_M = 0.08
 
 def lands_on_heels(context: RecordingContext) -> bool:
     """Whether loads can be expected to go from heel to toe: whole feet, and nobody walks backwards."""
-    if not shows_whole_feet(context) or context.marker_set is None:
-        return False
-    return not walks_backwards(context.all_markers, context.marker_set)
+    return shows_whole_feet(context) and not context.walks_backwards
 
 
 def shows_whole_feet(context: RecordingContext) -> bool:
@@ -24,11 +21,9 @@ def shows_whole_feet(context: RecordingContext) -> bool:
     feet, marker_set = context.foot_trajectories, context.marker_set
     if feet is None or marker_set is None:
         return False
-    markers = context.all_markers
-    shown = {label for label, seen in zip(markers.labels, markers.seen.T, strict=True) if seen.any()}
     for side in "rl":
         for names in _ENDS:
             labels = {label for name in names for label in marker_set.landmarks.get(f"{name}_{side}", ())}
-            if labels and not labels & shown:
+            if labels and not labels & context.seen_labels:
                 return False
     return min(float(np.median(np.linalg.norm(one.front - one.back, axis=1))) for one in feet) > _LEAST_LENGTH_M

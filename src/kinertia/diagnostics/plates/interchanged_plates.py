@@ -8,7 +8,7 @@ from itertools import combinations
 import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.evidence.contact_fit import Hypothesis
+from kinertia.diagnostics.evidence.contact_fit import Feet, Hypothesis
 from kinertia.diagnostics.evidence.plate_contacts import (
     COP_MIN_FORCE_N,
     FAR_M,
@@ -42,7 +42,7 @@ def interchanged_plates(context: RecordingContext) -> Iterator[Hypothesis]:
         tried.append((max(one.distance_m for one in contacts_of(moved, feet)), pair, moved))
     after, pair, moved = min(tried, key=lambda one: one[0])
     if after > min(FAR_M / 2, before):
-        yield from _opposite(context)
+        yield from _opposite(context, plates, feet)
         return
     yield _interchanged(context, pair, moved, before, after)
 
@@ -71,20 +71,15 @@ def _middles(plates: PlateLoads, used: Sequence[int]) -> dict[int, FloatArray]:
     return {p: np.average(point[loaded[p], p], axis=0, weights=plates.force[loaded[p], p, 1]) for p in used}
 
 
-def _opposite(context: RecordingContext) -> Iterator[Hypothesis]:
+def _opposite(context: RecordingContext, plates: PlateLoads, feet: Feet) -> Iterator[Hypothesis]:
     """Loads of two plates, or belts, that are off by as much in opposite directions, each by the same all the time."""
-    plates, feet = context.plates, context.foot_trajectories
-    assert plates is not None
-    assert feet is not None
     steps = [one for one in context.contacts if one.is_step]
     used = sorted({one.plate for one in steps})
     if len(used) != 2:
         return
-    point = cop_horizontal(plates)
     offsets: dict[int, list[FloatArray]] = {p: [] for p in used}
     for one in steps:
-        place = point[np.searchsorted(plates.time, one.time), one.plate]
-        from_feet = [place - foot.expected_cop(one.time, one.weight) for foot in feet]
+        from_feet = [one.place - foot.expected_cop(one.time, one.weight) for foot in feet]
         mean = [np.average(each, axis=0, weights=one.weight) for each in from_feet]
         # the foot that swings goes away
         foot = int(np.argmin([np.square(each - m).sum(axis=1).mean() for each, m in zip(from_feet, mean, strict=True)]))

@@ -15,7 +15,8 @@ from kinertia.diagnostics.evidence.contact_fit import Feet, Hypothesis
 from kinertia.diagnostics.evidence.plate_contacts import PlateContact, cop_horizontal, displaced
 from kinertia.findings.finding import finding
 from kinertia.findings.quantity import Quantity
-from kinertia.trial.data import FloatArray, PlateLoads
+from kinertia.trial.data import FloatArray
+from kinertia.trial.rms import rms
 
 _WRONG_M, _RIGHT_M, _CLEARLY_BEST = 0.1, 0.08, 0.6
 _ORDER = "a wrong order of the corners"
@@ -37,29 +38,27 @@ def rotated_plates(context: RecordingContext) -> Iterator[Hypothesis]:
     steps = [one for one in context.contacts if one.is_step]
     if plates is None or feet is None or plates.corners is None or not steps:
         return
-    point = cop_horizontal(plates)
-    read = _places(plates, point, steps)
-    read_m = _distances(steps, read, feet)
+    read_m = _distances(steps, [one.place for one in steps], feet)
     if read_m.max() < _WRONG_M:
         return
     middle = plates.corners.mean(axis=1)[:, [0, 2]]
     used = sorted({one.plate for one in steps})
     offset = np.mean([one.own_offset_m for one in steps], axis=0)
-    left_m: dict[tuple[int, ...], FloatArray] = {(): _distances(steps, [each - offset for each in read], feet)}
+    left_m: dict[tuple[int, ...], FloatArray] = {(): _distances(steps, [one.place - offset for one in steps], feet)}
     for k, (_, matrix, _) in enumerate(_OPERATIONS):
-        turned = middle + (point - middle) @ np.array(matrix).T
-        turned_m = _distances(steps, _places(plates, turned, steps), feet)
+        turned_m = _distances(steps, [_turned(one.place, middle[one.plate], matrix) for one in steps], feet)
         for which in {*((p,) for p in used), tuple(used)}:
             left_m[(k, *which)] = np.where([one.plate in which for one in steps], turned_m, read_m)
-    best, second = sorted(left_m, key=lambda one: _rms(left_m[one]))[:2]
+    best, second = sorted(left_m, key=lambda one: rms(left_m[one]))[:2]
     only = sum(each.max() <= _RIGHT_M for each in left_m.values()) == 1
-    clearly = only or _rms(left_m[best]) < _CLEARLY_BEST * _rms(left_m[second])
+    clearly = only or rms(left_m[best]) < _CLEARLY_BEST * rms(left_m[second])
     if not best or left_m[best].max() > _RIGHT_M or not clearly:
         return
     wrong = list(best[1:])
+    operation, matrix, cause = _OPERATIONS[best[0]]
+    point = cop_horizontal(plates)
     by = np.zeros_like(point)
-    by[:, wrong] = (middle + (point - middle) @ np.array(_OPERATIONS[best[0]][1]).T - point)[:, wrong]
-    operation, _, cause = _OPERATIONS[best[0]]
+    by[:, wrong] = (_turned(point, middle, matrix) - point)[:, wrong]
     found = finding(
         "P242",
         context.at(plate=plates.names[wrong[0]] if len(wrong) == 1 else None),
@@ -72,9 +71,10 @@ def rotated_plates(context: RecordingContext) -> Iterator[Hypothesis]:
     yield Hypothesis(found, displaced(plates, by))
 
 
-def _places(plates: PlateLoads, point: FloatArray, steps: Sequence[PlateContact]) -> list[FloatArray]:
-    """(k, 2) m of each, centres of pressure."""
-    return [point[np.searchsorted(plates.time, one.time), one.plate] for one in steps]
+def _turned(place: FloatArray, middle: FloatArray, matrix: Sequence[Sequence[int]]) -> FloatArray:
+    """Places (..., 2) m turned about the middle of their plate."""
+    result: FloatArray = middle + (place - middle) @ np.array(matrix).T
+    return result
 
 
 def _distances(steps: Sequence[PlateContact], place: Sequence[FloatArray], feet: Feet) -> FloatArray:
@@ -84,7 +84,3 @@ def _distances(steps: Sequence[PlateContact], place: Sequence[FloatArray], feet:
         off = [np.square(each - foot.expected_cop(one.time, one.weight)).sum(axis=1) for foot in feet]
         errors.append(min(float(np.sqrt(np.average(square, weights=one.weight))) for square in off))
     return np.array(errors)
-
-
-def _rms(values: FloatArray) -> float:
-    return float(np.sqrt(np.square(values).mean()))

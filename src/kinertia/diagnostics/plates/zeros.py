@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
+from kinertia.diagnostics.evidence.loaded_plates import STEP_N
 from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, IdleReading
@@ -15,7 +16,7 @@ _ZERO_N, _FAR_FROM_ZERO_N, _DRIFT_N = 15.0, 40.0, 15.0
 """Zeroed plates read a few newtons; 40 N are 5 % of an adult's weight on every plate."""
 _LEAST_N = 6.0
 """Twice what zeroed plates read: no limit is lower, however light the person."""
-_STEP_N, _MOST_UNLOADED_N, _STEADY_N = 350.0, 150.0, 15.0
+_MOST_UNLOADED_N, _STEADY_N = 150.0, 15.0
 _UNLOADED_PERCENT = (2.0, 15.0)
 """A plate that somebody walks over is unloaded for at least so many percent of the record."""
 _UNKNOWN = IdleReading((np.nan, np.nan, np.nan), np.nan, 0.0, 0.0)
@@ -71,6 +72,6 @@ def _steady_minimum(vertical: FloatArray, share: float) -> float | None:
         return None
     low, high = np.percentile(vertical, _UNLOADED_PERCENT)
     small = low > LOAD_THRESHOLD_N and high < _MOST_UNLOADED_N * share
-    if vertical.max() > _STEP_N * share and small and high - low < _STEADY_N:
+    if vertical.max() > STEP_N * share and small and high - low < _STEADY_N:
         return float(low + high) / 2
     return None

@@ -13,7 +13,7 @@ import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.caused_velocity import CausedVelocity
-from kinertia.diagnostics.evidence.velocity_residual import HORIZONTAL, VelocityResidual
+from kinertia.diagnostics.evidence.velocity_residual import CLEARLY_BEST, HORIZONTAL, VelocityResidual
 from kinertia.findings.finding import Finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.rule import rule
@@ -25,7 +25,7 @@ _FORCE_N, _WINDOW_S = 20.0, 1.0
 """Mean over a window; over one that is shorter than this, pelvis and centre of mass part by as much
 velocity in less time."""
 _PLATE_ZERO_N, _LEAST_WINDOW_S, _LEAST_RESIDUAL_M_S = 12.0, 0.75, 0.05
-_ZEROED, _CLEARLY_BEST, _USUAL_RESIDUAL_M_S = 0.75, 0.85, 0.105
+_ZEROED, _USUAL_RESIDUAL_M_S = 0.75, 0.105
 """Of 31 fault-free trials zeros of one plate are up to 9 N; a drift of 40 N over a trial makes 13 to 24 N, and without
 it the residual is as on fault-free walks and runs."""
 _AGREES = 0.5
@@ -96,10 +96,10 @@ def _plate_zero(
     if residual.as_read < _LEAST_RESIDUAL_M_S or zeroed > limit_m_s:
         return None
     limit_n = _PLATE_ZERO_N * max(1.0, _WINDOW_S / max(span_s(part.time) for part in long))
-    if abs(zero_n) < limit_n or min(one.residual for one in residual.scaled) < _CLEARLY_BEST * zeroed:
+    if abs(zero_n) < limit_n or min(one.residual for one in residual.scaled) < CLEARLY_BEST * zeroed:
         return None
-    names = [plates.names[p] for p in np.flatnonzero(residual.plate_zeroed * _CLEARLY_BEST < zeroed)]
-    if all_plates and not (len(names) == 1 and zeroed < _CLEARLY_BEST * residual.without_trend):
+    names = [plates.names[p] for p in np.flatnonzero(residual.plate_zeroed * CLEARLY_BEST < zeroed)]
+    if all_plates and not (len(names) == 1 and zeroed < CLEARLY_BEST * residual.without_trend):
         return None
     evidence = {
         "offset_n": Quantity(zero_n, "N", limit=limit_n, usual=(-9.0, 9.0)),

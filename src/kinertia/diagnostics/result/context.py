@@ -14,6 +14,7 @@ from kinertia.estimation.result import Fit
 from kinertia.estimation.simultaneous.instrument_errors import InstrumentError
 from kinertia.findings.where import Where
 from kinertia.motion.kinematics import Kinematics
+from kinertia.trial.marker_quality import travel
 
 _GROUND_AXES = {"x": 0, "z": 2}
 
@@ -67,6 +68,6 @@ class ResultContext:
 def lab_axes(kinematics: Kinematics) -> Axes:
     """What the axes of the laboratory are called in a trial, which is turned to face +X here."""
     trial = kinematics.trial
-    fore_aft = Axes.of(trial.vertical, trial.markers).fore_aft
+    fore_aft = Axes.of(trial.vertical, travel(trial.markers)).fore_aft
     across = round(kinematics.turned_deg / 90.0) % 2 == 1
     return Axes(trial.vertical, 2 - fore_aft if across else fore_aft)

@@ -182,8 +182,7 @@ def _moments(fit: Fit) -> str:
         for part in (slice(0, 3), slice(3, 6))
     )
     reason = f"residual at most {force:.1f} N and {moment:.1f} N m (RMS)"
-    sds = [trial.deviations.moments[:, 6:] for trial in fit.trials if trial.deviations is not None]
-    half = _half_interval(fit, sds)
+    half = _half_interval(fit, "moments")
     if half is None:
         return reason
     return f"{reason}; typical 95 % interval of a joint moment: ± {half / fit.mass_kg:.2f} N m/kg"
@@ -192,15 +191,15 @@ def _moments(fit: Fit) -> str:
 def _motion(fit: Fit) -> str:
     apart = 1e3 * max(rms(trial.marker_errors_m["final"]) for trial in fit.trials)
     reason = f"model and measured markers are at most {apart:.1f} mm apart (RMS)"
-    sds = [trial.deviations.coordinates[:, 6:] for trial in fit.trials if trial.deviations is not None]
-    half = _half_interval(fit, sds)
+    half = _half_interval(fit, "coordinates")
     if half is None:
         return reason
     return f"{reason}; typical 95 % interval of a joint angle: ± {np.degrees(half):.1f} degrees"
 
 
-def _half_interval(fit: Fit, sds: Sequence[np.ndarray]) -> float | None:
-    """Half a 95 % interval of rotations, typical of SDs (w, c - 6) of the coordinates after the pelvis'."""
+def _half_interval(fit: Fit, of: Literal["moments", "coordinates"]) -> float | None:
+    """Half a 95 % interval, typical of rotations of the coordinates after the pelvis'; None without SDs of them."""
+    sds = [getattr(trial.deviations, of)[:, 6:] for trial in fit.trials if trial.deviations is not None]
     turns = fit.skeleton.rotational[6:]
     return _BAND_SD * rms(np.concatenate(sds)[:, turns]) if sds and turns.any() else None
 

@@ -17,23 +17,21 @@ from itertools import combinations
 import numpy as np
 
 from kinertia.diagnostics.context import PersonContext, RecordingContext
-from kinertia.diagnostics.evidence.segment_distances import SegmentDistances
+from kinertia.diagnostics.evidence.segment_distances import FEWEST_PAIRS, SAME_SESSION_M, SegmentDistances
 from kinertia.diagnostics.subject.majority import odd_ones
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
+from kinertia.trial.rms import rms
 
 AGAINST_STANDING = -0.0045
 """Usual share by which distances are longer in motion than in a standing trial."""
 _FAR_M = 0.08
 """Skin that moves a marker by 1 mm makes more than 1 % of a shorter distance."""
-_FEWEST_PAIRS = 6
 _OTHER_SCALE, _ERRORS = 0.01, 3.0
 """Distances are longer or shorter than usual by more than this share, and by more standard errors."""
 _ALIKE = 2.0 / 3.0
 """At least as many of the segments differ in the same direction."""
-_LEFT_M = 0.009
-"""RMS difference that may be left once the scale is corrected; re-applied markers leave more."""
 _MEDIAN_ERROR = 1.25 * 1.4826
 """Standard error of a median of n numbers, times the root of n and over their median deviation, if they are normal."""
 
@@ -59,7 +57,7 @@ class CameraScale:
     def differs(self) -> bool:
         """Whether another scale is the likeliest explanation."""
         far = abs(self.error) > max(_OTHER_SCALE, _ERRORS * self.se)
-        return far and self.alike >= _ALIKE * self.segments and self.left_m <= _LEFT_M
+        return far and self.alike >= _ALIKE * self.segments and self.left_m <= SAME_SESSION_M
 
     def finding(self, trial: str, reference: str, sign: float = 1.0) -> Finding:
         """S205 in this trial; `sign` is -1 where it is the other one."""
@@ -110,7 +108,7 @@ def trial_scales(context: PersonContext) -> Iterator[Finding]:
 def _scale(distances: SegmentDistances, usual: float) -> CameraScale | None:
     before, after = distances.lengths()
     far = before > _FAR_M
-    if far.sum() < _FEWEST_PAIRS:
+    if far.sum() < FEWEST_PAIRS:
         return None
     shares = (after / before)[far] - 1.0
     share = float(np.median(shares))
@@ -120,6 +118,5 @@ def _scale(distances: SegmentDistances, usual: float) -> CameraScale | None:
     owners = distances.segments[far]
     off = [np.median(shares[owners == k]) - usual for k in np.unique(owners)]
     alike = sum(np.sign(one) == np.sign(share - usual) for one in off)
-    left = after / (1.0 + share - usual) - before
-    left_m = float(np.sqrt(np.square(left).mean()))
+    left_m = rms(after / (1.0 + share - usual) - before)
     return CameraScale(share - usual, float(error), len(shares), int(alike), len(off), left_m)

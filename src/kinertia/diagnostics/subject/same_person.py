@@ -17,24 +17,22 @@ from numpy.typing import NDArray
 
 from kinertia.diagnostics.context import PersonContext, RecordingContext
 from kinertia.diagnostics.evidence.label_exchange import swapped_labels
-from kinertia.diagnostics.evidence.segment_distances import SegmentDistances
+from kinertia.diagnostics.evidence.segment_distances import FEWEST_PAIRS, SAME_SESSION_M, SegmentDistances
 from kinertia.diagnostics.subject.camera_scale import AGAINST_STANDING, camera_scale
 from kinertia.diagnostics.subject.majority import odd_ones
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.model.marker_set import MarkerSet
+from kinertia.trial.rms import rms
 
 _OTHER_PERSON = 0.05
 """Median share by which the distances may differ."""
-_FEWEST_PAIRS = 6
 _MOVED_M, _MOVED_BETWEEN_M, _MOVED_SHARE = 0.03, 0.04, 0.15
 """By which a distance differs where a marker was moved: against a static trial; between trials, where soft thighs
 change shape, a length and a share."""
 _MOST_MOVED = 3
 """Where more markers were moved, all of them may have been."""
-_SAME_SESSION_M = 0.009
-"""RMS difference of the distances: re-applied markers are 5 to 10 mm off along each axis, which makes 7 to 14."""
 
 
 def static_and_trials(context: PersonContext) -> Iterator[Finding]:
@@ -77,7 +75,7 @@ def trials_of_one_person(context: PersonContext) -> Iterator[Finding]:
             continue
         ratio = distances.ratio()
         moved = _moved_markers(distances, _MOVED_BETWEEN_M, _MOVED_SHARE)
-        if not moved and (len(distances.pairs) < _FEWEST_PAIRS or abs(ratio - 1.0) <= _OTHER_PERSON):
+        if not moved and (len(distances.pairs) < FEWEST_PAIRS or abs(ratio - 1.0) <= _OTHER_PERSON):
             continue
         further = [one for one in (*context.standing, *context.trials) if one not in (first, other)]
         for odd in odd_ones(first, other, _witnesses(first, other, further, marker_set, moved)):
@@ -105,7 +103,7 @@ def _against(
     yield from swapped
     off, ratio, count = distances.differences(), distances.ratio(), len(distances.pairs)
     worst = int(np.argmax(np.abs(off)))
-    if count >= _FEWEST_PAIRS and abs(ratio - 1.0) > _OTHER_PERSON:
+    if count >= FEWEST_PAIRS and abs(ratio - 1.0) > _OTHER_PERSON:
         yield finding(
             "S203",
             Where(trial=at),
@@ -118,13 +116,13 @@ def _against(
         yield scale.finding(at, called)
     exchanged = {label for one in swapped for label in one.where.markers}
     yield from _moved_findings(_moved_markers(distances, _MOVED_M, 0.0, exchanged), at, called)
-    rms_m = float(np.sqrt(np.square(off).mean()))
-    if count >= _FEWEST_PAIRS and rms_m > _SAME_SESSION_M:
+    rms_m = rms(off)
+    if count >= FEWEST_PAIRS and rms_m > SAME_SESSION_M:
         yield finding(
             "S204",
             Where(trial=at),
-            rms_m=Quantity(rms_m, "m", limit=_SAME_SESSION_M, usual=(0.0, 0.0046)),
-            worst_pair=Quantity(" to ".join(distances.labels[k] for k in distances.pairs[worst])),
+            rms_m=Quantity(rms_m, "m", limit=SAME_SESSION_M, usual=(0.0, 0.0046)),
+            worst_pair=Quantity(distances.worst_pair()),
             reference=Quantity(called),
         )
 
@@ -162,7 +160,7 @@ def _moved_markers(
         moved.append(_Moved(labels, float(about[k].max()), mate))
         kept &= ~_with(distances, k)
     rest = off[kept]
-    agree = not (far & kept).any() and np.sqrt(np.square(rest).mean() if len(rest) else 0.0) <= _SAME_SESSION_M
+    agree = not (far & kept).any() and (not len(rest) or rms(rest) <= SAME_SESSION_M)
     return tuple(moved) if agree else ()
 
 

@@ -10,6 +10,7 @@ from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.foot_trajectories import LEAST_BELT_M_S, standing_speeds
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
+from kinertia.trial.plate_assignment import FOOT_NAMES
 
 _APART = 0.25
 """Share by which a stated speed may differ from the one of standing feet, which roll."""
@@ -41,5 +42,5 @@ def belt_speed(context: RecordingContext) -> Iterator[Finding]:
         causes=causes,
         stated_m_s=Quantity(stated[worst], "m/s"),
         feet_m_s=Quantity(speeds[worst], "m/s"),
-        foot=Quantity(("right", "left")[worst] if belt.speed_m_s.ndim == 2 else "either"),
+        foot=Quantity(FOOT_NAMES[worst] if belt.speed_m_s.ndim == 2 else "either"),
     )

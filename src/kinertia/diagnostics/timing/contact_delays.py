@@ -16,15 +16,13 @@ from kinertia.diagnostics.evidence.contact_fit import Feet, Hypothesis
 from kinertia.diagnostics.evidence.plate_contacts import (
     CONTACT_FORCE_N,
     FAR_M,
-    SHORTEST_S,
     PlateContact,
     contacts_of,
+    loads_on,
 )
 from kinertia.findings.finding import finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.trial.data import FloatArray, PlateLoads
-from kinertia.trial.ground_contact import bridged
-from kinertia.trial.sampled_time import runs, span_s
 
 USUAL_S = (-0.025, 0.025)
 _DELAY_S, _LONGEST_DELAY_S = 0.045, 0.25
@@ -46,9 +44,9 @@ def stance_durations(context: RecordingContext) -> Iterator[Hypothesis]:
     last_row, walked = len(plates.time) - 1, [one for one in contacts if _several_steps(one, plates)]
     loaded = [
         float(plates.time[last] - plates.time[first])
-        for p, vertical in enumerate(plates.force[..., 1].T)
-        for first, last in runs(bridged(plates.time, vertical > CONTACT_FORCE_N))
-        if first > 0 and last < last_row and span_s(plates.time, first, last) >= SHORTEST_S
+        for p in range(len(plates.names))
+        for first, last in loads_on(plates, p)
+        if first > 0 and last < last_row
         if not any(one.plate == p and plates.time[first] <= one.time[0] <= plates.time[last] for one in walked)
     ]
     standing = _stances(contacts, feet)

@@ -15,13 +15,13 @@ from typing import NamedTuple
 import numpy as np
 
 from kinertia.diagnostics.context import PersonContext, RecordingContext
-from kinertia.diagnostics.evidence.ups_and_downs import ups_and_downs_of
+from kinertia.diagnostics.evidence.ups_and_downs import MOST_LEFT, ups_and_downs_of
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.trial.sampled_time import span_s
 
-_LEAST_WINDOW_S, _MOST_LEFT = 0.8, 0.22
+_LEAST_WINDOW_S = 0.8
 """Parts of half a second of one trial differ by up to 40 ms."""
 _SHORT_S = 1.0
 _APART_S, _SHORT_APART_S = 0.012, 0.018
@@ -49,7 +49,7 @@ def trial_delay(context: RecordingContext) -> TrialDelay | None:
         if span_s(part.time) < _LEAST_WINDOW_S:
             continue
         both = ups_and_downs_of(part)
-        if both and max(one.left for one in both) <= _MOST_LEFT:
+        if both and max(one.left for one in both) <= MOST_LEFT:
             found.append([one.delay_s for one in both])
             spans.append(span_s(part.time))
     if not found:
