@@ -1,8 +1,9 @@
-"""What Kinertia says of trials from laboratories that nothing was built with: regenerates docs/field-trials.md.
+"""What Kinertia says of recordings of other laboratories, and whether it is as it should be: docs/field-trials.md.
 
-python benchmarks/field_trials.py FOLDER
+    python benchmarks/field_trials.py FOLDER [PART OF A TITLE]
 
-FOLDER has the measured trials, one laboratory's in each folder.
+FOLDER has the measured data, one laboratory's in each folder; what is true of them is in field_cases.toml. With a part
+of a title only these recordings are run, and no page is written.
 """
 
 from __future__ import annotations
@@ -10,205 +11,186 @@ from __future__ import annotations
 import contextlib
 import io
 import json
-import re
 import sys
 import tempfile
 import time
+import tomllib
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
-
 from kinertia.cli.app import main as kinertia
-from kinertia.diagnostics.result.soundness import CONTRADICTION_SD
-from measured_trials import farthest, table, told
-from walks import WALKS, fit_arguments
+from measured_trials import table
 
 DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "field-trials.md"
-_LAI_ARNOLD = "LaiArnoldModified2017_poly_withArms_weldHand_scaled.osim"
+CASES = Path(__file__).with_name("field_cases.toml")
+_FILES = (".trc", ".c3d", ".mot", ".xml", ".osim")
+_OF_RESULT = "R"
+"""Codes of a result describe it; those of other families accuse a recording, a person or an instrument."""
+_IMPOSSIBLE_POSE = "R305"
+_ANYTHING = "*"
 
 
 @dataclass(frozen=True)
 class Case:
-    """One command: files relative to the data, other options as they are typed."""
+    """A recording, the command of its user, and what is true of it (fields as in field_cases.toml)."""
 
     title: str
-    folder: str
-    markers: str
-    files: dict[str, str]
-    options: str
+    folder: Path
+    arguments: tuple[str, ...]
+    truth: str
+    status: tuple[int, ...]
+    expected: tuple[str, ...]
+    allowed: tuple[str, ...]
+    never: tuple[str, ...]
+    draft: str | None
 
-    def arguments(self, data: Path) -> list[str]:
-        """Of `kinertia fit`."""
-        lab = data / self.folder
-        named = [word for option, file in self.files.items() for word in (f"--{option}", str(lab / file))]
-        return ["fit", str(lab / self.markers), *named, *self.options.split()]
+    def against(self, outcome: Outcome) -> str:
+        """What is not as it should be; empty where all is."""
+        found = {one["code"] for one in outcome.findings}
+        missing = [codes for codes in self.expected if not found & set(codes.split("|"))]
+        accused = {one["code"] for one in outcome.severe if one["code"][0] != _OF_RESULT} - self._true
+        if _ANYTHING in self.allowed:
+            accused = set()
+        against = [] if outcome.status in self.status else [f"exit status {outcome.status}"]
+        against += [f"{' or '.join(codes.split('|'))} missing" for codes in missing]
+        against += [f"{code} is false" for code in sorted(accused | found & set(self.never))]
+        if outcome.status == 0 and _IMPOSSIBLE_POSE in found:
+            against.append("an impossible pose")
+        return ", ".join(against)
 
-
-def _subject4(name: str, title: str) -> Case:
-    files = {
-        "forces": f"{name}_grf.mot",
-        "loads": f"{name}_external_forces.xml",
-        "model": "addbiomechanics_scaled.osim",
-    }
-    return Case(f"subject4: {title}, model of AddBiomechanics", "subject4", f"{name}.trc", files, "--mass 60")
-
-
-_HAMNER = {"forces": "subject02_running_grf.mot", "loads": "External_Loads.xml"}
-CASES = (
-    Case(
-        "Hamner: run at 4 m/s on a treadmill, registered model",
-        "field/hamner_run",
-        "subject02_running.trc",
-        {**_HAMNER, "model": "subject02_registered.osim"},
-        "--mass 65.9",
-    ),
-    Case(
-        "Hamner: the same, built-in model",
-        "field/hamner_run",
-        "subject02_running.trc",
-        {**_HAMNER, "static": "subject02_static.trc"},
-        "--mass 65.9 --height 1.83 --sex male",
-    ),
-    Case(
-        "Hamner: run at 2 m/s on a treadmill, model of AddBiomechanics",
-        "field/hamner_treadmill_run",
-        "run200.trc",
-        {"forces": "run200_grf.mot", "model": "final.osim"},
-        "--mass 72.84",
-    ),
-    Case(
-        "OpenCap, person 5: drop jump, LaiArnold model",
-        "field/laiarnold5_jump",
-        "DJ1.trc",
-        {"forces": "DJ1_forces.mot", "model": _LAI_ARNOLD},
-        "--mass 79.4",
-    ),
-    Case(
-        "OpenCap, person 6: walk, LaiArnold model",
-        "field/laiarnold6_walk",
-        "walking1.trc",
-        {"forces": "walking1_forces.mot", "model": _LAI_ARNOLD},
-        "--mass 59",
-    ),
-    Case(
-        "Rajagopal: run over plates, built-in model",
-        "field/rajagopal_run",
-        "motion_capture_run.trc",
-        {"forces": "grf_run.mot", "loads": "grf_run.xml", "static": "static_run.trc"},
-        "--mass 75.3 --height 1.75 --sex male",
-    ),
-    _subject4("walking1", "walk"),
-    _subject4("walking2", "second walk"),
-    _subject4("squats1", "squats"),
-)
+    @property
+    def _true(self) -> set[str]:
+        return {code for codes in (*self.expected, *self.allowed) for code in codes.split("|")}
 
 
-def commands(data: Path) -> dict[str, list[str]]:
-    """Title of every trial -> arguments of the command."""
-    fits = {case.title: case.arguments(data) for case in CASES}
-    walks = {f"{title}, built-in model": ["fit", *fit_arguments(data, name)] for name, title in WALKS.items()}
-    files = sorted((data / "c3d_variety").glob("*.c3d"))
-    return {**fits, **walks, **{f"{file.name}": ["check", str(file)] for file in files}}
+@dataclass(frozen=True)
+class Outcome:
+    """How a command ended.
+
+    Attributes:
+        status: exit status.
+        tries: commands until it ended so.
+        seconds: of the last.
+        content: what `--json` printed.
+    """
+
+    status: int
+    tries: int
+    seconds: float
+    content: dict[str, Any]
+
+    @property
+    def findings(self) -> list[dict[str, Any]]:
+        """Open findings that no other explains."""
+        every = self.content.get("findings", [])
+        return [one for one in every if one["status"] == "open" and one["muted_by"] is None]
+
+    @property
+    def severe(self) -> list[dict[str, Any]]:
+        """Of them, those that are more than a correction."""
+        return [one for one in self.findings if one["severity"] in ("WARNING", "ERROR")]
+
+    def residuals(self) -> str:
+        """Root residuals (N, N m) with the literature's parameters and with the estimate, where there is one."""
+        trials = self.content.get("trials") or []
+        if len(trials) != 1 or "residual_force_rms_N" not in trials[0]:
+            return "-"
+        force, moment = trials[0]["residual_force_rms_N"], trials[0]["residual_moment_rms_Nm"]
+        return " → ".join(f"{force[key]:.1f}, {moment[key]:.1f}" for key in ("literature", "estimate"))
 
 
-def run(arguments: list[str], folder: Path) -> dict[str, Any]:
-    """Exit status, seconds, last words and, where there is an estimate, fit.json with the BSP table under "bsp"."""
-    said, status, started = io.StringIO(), 0, time.perf_counter()
-    more = ["-o", str(folder), "--quiet"] if arguments[0] == "fit" else []
-    with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+def cases(data: Path) -> Iterator[Case]:
+    """Every recording of field_cases.toml."""
+    for laboratory in tomllib.loads(CASES.read_text(encoding="utf-8"))["laboratory"]:
+        folder = data / laboratory["folder"]
+        for recording in laboratory["recording"]:
+            words = f"{recording['files']} {laboratory['with']}".split()
+            arguments = [str(folder / word) if word.endswith(_FILES) else word for word in words]
+            yield Case(
+                title=f"{laboratory['title']}: {recording['title']}",
+                folder=folder,
+                arguments=("check" if laboratory.get("check") else "fit", *arguments),
+                truth=recording["truth"],
+                status=tuple(recording["status"]),
+                expected=tuple(recording.get("expected", ())),
+                allowed=(*laboratory.get("allowed", ()), *recording.get("allowed", ())),
+                never=tuple(recording.get("never", ())),
+                draft=laboratory.get("draft"),
+            )
+
+
+def run(case: Case, out: Path) -> Outcome:
+    """The outcome of the command, or of the second try, with a drafted marker set."""
+    outcome = _outcome([*case.arguments, *(["-o", str(out)] if case.arguments[0] == "fit" else [])], 1)
+    if case.draft is None or not {"L101", "L105"} & {one["code"] for one in outcome.findings}:
+        return outcome
+    drafted = out.with_suffix(".toml")
+    _outcome(["markers", str(case.folder / case.draft), "-o", str(drafted)], 1)
+    return _outcome([*case.arguments, "--markers", str(drafted), "-o", str(out)], 2)
+
+
+def _outcome(arguments: Sequence[str], tries: int) -> Outcome:
+    printed, status, started = io.StringIO(), 0, time.perf_counter()
+    with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(io.StringIO()):
         try:
-            kinertia([*arguments, *more])
+            kinertia([*arguments, "--json"])
         except SystemExit as ended:
             status = int(ended.code or 0)
-    outcome = {"command": arguments[0], "status": status, "seconds": time.perf_counter() - started}
-    # a path may be another one tomorrow
-    outcome["said"] = re.sub(r"(?<![\w.])/[^ :]*/", "", said.getvalue().strip())
-    if (folder / "fit.json").exists():
-        outcome |= {"fit": json.loads((folder / "fit.json").read_text()), "bsp": pd.read_csv(folder / "bsp.csv")}
-    return outcome
+    content = json.loads(printed.getvalue())
+    return Outcome(status, tries, time.perf_counter() - started, content[0] if isinstance(content, list) else content)
 
 
-def document(runs: dict[str, dict[str, Any]]) -> str:
+def document(outcomes: Sequence[tuple[Case, Outcome]]) -> str:
     """The text of docs/field-trials.md."""
-    rows, warnings, files = [], [], []
-    for title, outcome in runs.items():
-        begin = [title, str(outcome["status"])]
-        if outcome["command"] == "check":
-            files.append([*begin, conclusion(outcome["said"])])
-            continue
-        if "fit" not in outcome:
-            rows.append([*begin, *["-"] * 7, f"{outcome['seconds']:.0f}"])
-            warnings.append(f"- {title}: {' '.join(outcome['said'].split())}")
-            continue
-        fit, (trial,) = outcome["fit"], outcome["fit"]["trials"]
-        bsp = outcome["bsp"].query("prior_sd > 0")
-        beyond = int(((bsp["estimate"] - bsp["literature"]).abs() > CONTRADICTION_SD * bsp["prior_sd"]).sum())
-        residuals = [
-            f"{trial[key][stage]:.1f}"
-            for key in ("residual_force_rms_N", "residual_moment_rms_Nm")
-            for stage in ("literature", "estimate")
-        ]
-        markers = " / ".join(f"{trial['marker_rms_m'][stage] * 1e3:.1f}" for stage in ("ik", "final"))
-        rows.append(
-            [
-                *begin,
-                f"{trial['cutoff_hz']:.0f}",
-                *residuals,
-                markers,
-                f"{'yes' if fit['converged'] else 'no'}, {beyond} ({farthest(bsp)})",
-                f"{outcome['seconds']:.0f}",
-            ]
-        )
-        warnings += [f"- {title}: {each}" for each in told(fit)]
-    heads = ["trial", "exit status", "cutoff before (Hz)"]
-    heads += [f"{unit}, {stage}" for unit in ("N", "N m") for stage in ("before", "after")]
-    heads += ["markers, before / after (mm)", "converged, parameters beyond 3 sd (farthest)", "s"]
-    checked = table(["file", "exit status", "what stands against it"], files)
-    return TEXT.format(results=table(heads, rows), warnings="\n".join(warnings), files=checked)
-
-
-def conclusion(said: str) -> str:
-    """What stands against a file by the words of `kinertia check`, on one line."""
-    against = [" ".join(line.split()) for line in said.splitlines() if line.startswith(("ERROR ", "error: "))]
-    return "; ".join(against).replace("|", "\\|") or "nothing stands against it"
+    rows, told = [], []
+    for case, outcome in outcomes:
+        against = case.against(outcome)
+        codes = " ".join(dict.fromkeys(one["code"] for one in outcome.severe)) or "-"
+        end = [str(outcome.status), str(outcome.tries), codes, outcome.residuals(), f"{outcome.seconds:.0f}"]
+        rows.append([case.title, case.truth, f"no: {against}" if against else "yes", *end])
+        messages = dict.fromkeys(f"{one['code']} {one['message']}" for one in outcome.severe)
+        told += [f"- {case.title}: {message}" for message in messages]
+    heads = ["recording", "what is true of it", "as it should be", "exit status", "tries", "findings"]
+    heads += ["residuals (N, N m), literature → estimate", "s"]
+    good = sum(row[2] == "yes" for row in rows)
+    return TEXT.format(good=good, count=len(rows), results=table(heads, rows), told="\n".join(told))
 
 
 TEXT = """# Field trials
 
-What Kinertia says of recordings from other laboratories: walks, runs, a drop jump and squats, with their own models or
-static trials, files as they were published. This page is written by `python benchmarks/field_trials.py FOLDER`; do not
-edit it by hand.
+What Kinertia says of recordings of other laboratories, files as they were published: {good} of {count} are as they
+should be. This page is written by `python benchmarks/field_trials.py FOLDER`; do not edit it by hand.
 
-Exit status 0: an estimate to use, perhaps with care; 1: an estimate not to be used; 2: refused. *Before*: the model's
-or the literature's body segment parameters on the measured motion, both smoothed at the cutoff in the table, as a
-colleague would compute them. *After*: motion, parameters and calibration together. RMS over the frames used. Seconds
-are this machine's.
+*As it should be*: the exit status is right; every fault that is known is named; nobody is accused of one that is not
+there; no estimate to use has an impossible pose. *Exit status* 0: an estimate to use, perhaps with care; 1: an
+estimate, or a recording, not to be used; 2: refused. *Tries*: 2 where no preset fits, and the marker set of `kinertia
+markers` was used as drafted. *Findings* above CORRECTED. *Residuals*: RMS over the frames used, of measured motion with
+the literature's body segment parameters, and of the estimate. Seconds are this machine's.
 
 {results}
 
-## Warnings given
+## Findings
 
-{warnings}
-
-## Other files
-
-C3D files of other makers, which hold no gait or lack what a fit needs: what `kinertia check` says of each.
-
-{files}
+{told}
 """
 
 
 def main() -> None:
     """Write the page."""
-    data = Path(sys.argv[1])
+    data, part = Path(sys.argv[1]).resolve(), " ".join(sys.argv[2:])
+    outcomes = []
     with tempfile.TemporaryDirectory() as folder:
-        runs = {}
-        for k, (title, arguments) in enumerate(commands(data).items()):
-            runs[title] = run(arguments, Path(folder) / str(k))
-            print(f"{title}: status {runs[title]['status']}, {runs[title]['seconds']:.0f} s", flush=True)
-    DOCUMENT.write_text(document(runs), encoding="utf-8")
+        for k, case in enumerate(one for one in cases(data) if part in one.title):
+            outcome = run(case, Path(folder) / str(k))
+            outcomes.append((case, outcome))
+            against = case.against(outcome) or "yes"
+            print(f"{case.title}: {against} (status {outcome.status}, {outcome.seconds:.0f} s)", flush=True)
+            for one in outcome.severe:
+                print(f"    {one['severity']} {one['code']} {one['message']}", flush=True)
+    if not part:
+        DOCUMENT.write_text(document(outcomes), encoding="utf-8")
 
 
 if __name__ == "__main__":

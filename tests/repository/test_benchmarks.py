@@ -3,6 +3,8 @@
 import re
 import subprocess
 import sys
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -13,6 +15,7 @@ import command_speed
 import field_trials
 import measured_trials
 from long_trials import document, in_own_process
+from measured_data import data_folder
 
 
 def test_there_and_back_does_not_jump():
@@ -96,27 +99,62 @@ def test_a_minute_takes_little_more_memory_than_a_walk():
     assert f"| 1 min | 6000 | 100 | {minute.before_mb:.0f} |" in document([minute])
 
 
-@pytest.mark.slow
-def test_page_of_field_trials(fit_of):
-    summary = fit_of("gait2354").summary
-    outcome = {"command": "fit", "status": 1, "seconds": 12.3, "said": "", "fit": summary}
-    outcome["bsp"] = pd.read_csv(fit_of("gait2354").folder / "bsp.csv")
-    refused = {"command": "fit", "status": 2, "seconds": 1.0, "said": "error: no\nforces"}
-    checked = {
-        "command": "check",
-        "status": 1,
-        "seconds": 1.0,
-        "said": "markers\n\ndo not use: 1 error, 1 warning; 61 rules\nERROR  x  M104 b is lost.\nWARNING  c",
-    }
-    page = field_trials.document({"walk": outcome, "jump": refused, "x.c3d": checked})
-    (trial,) = summary["trials"]
-    residual = trial["residual_force_rms_N"]
-    begin = (
-        rf"\| walk \| 1 \| {trial['cutoff_hz']:.0f} \| {residual['literature']:.1f} \| {residual['estimate']:.1f} \|"
+def field_case(**changes):
+    case = field_trials.Case(
+        title="lab: walk",
+        folder=Path(),
+        arguments=("fit", "walk.c3d"),
+        truth="right heel beyond plate 2",
+        status=(0,),
+        expected=("P282|P281",),
+        allowed=("S111",),
+        never=("T211",),
+        draft=None,
     )
-    assert re.search(begin, page)
-    assert "- jump: error: no forces" in page
-    assert "| x.c3d | 1 | ERROR x M104 b is lost. |" in page
+    return replace(case, **changes)
+
+
+def field_outcome(status, *codes, severity="WARNING", **changes):
+    findings = [
+        {"code": code, "severity": severity, "status": "open", "muted_by": None, "message": f"{code} said.", **changes}
+        for code in codes
+    ]
+    return field_trials.Outcome(status, 1, 2.0, {"findings": findings})
+
+
+@pytest.mark.parametrize(
+    ("outcome", "against"),
+    [
+        (field_outcome(0, "P282", "S111", "R301"), ""),
+        (field_outcome(2, "P281"), "exit status 2"),
+        (field_outcome(0), "P282 or P281 missing"),
+        (field_outcome(0, "P282", "P223"), "P223 is false"),
+        (field_outcome(0, "P282", "T211", severity="CORRECTED"), "T211 is false"),
+        (field_outcome(0, "P282", "P223", severity="CORRECTED"), ""),
+        (field_outcome(0, "P282", "R305"), "an impossible pose"),
+        (field_outcome(0, "P282", muted_by="P281"), "P282 or P281 missing"),
+    ],
+)
+def test_what_is_not_as_it_should_be_of_a_field_trial(outcome, against):
+    assert field_case().against(outcome) == against
+
+
+def test_page_of_field_trials():
+    good, bad = (field_case(), field_outcome(0, "P282")), (field_case(title="lab: jump"), field_outcome(2, "T101"))
+    page = field_trials.document([good, bad])
+    assert "1 of 2 are as they\nshould be" in page
+    assert "| lab: walk | right heel beyond plate 2 | yes | 0 | 1 | P282 | - | 2 |" in page
+    assert "| lab: jump | right heel beyond plate 2 | no: exit status 2, P282 or P281 missing, T101 is false |" in page
+    assert "- lab: jump: T101 T101 said." in page
+
+
+def test_every_field_case_has_its_files():
+    every = list(field_trials.cases(data_folder()))
+    assert len({case.title for case in every}) == len(every) >= 48
+    for case in every:
+        files = [Path(word) for word in case.arguments if word.endswith((".trc", ".c3d", ".mot", ".xml", ".osim"))]
+        assert files
+        assert all(file.is_file() for file in files)
 
 
 def test_page_of_cohorts_says_what_was_measured():
