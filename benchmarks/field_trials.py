@@ -21,11 +21,12 @@ from pathlib import Path
 from typing import Any
 
 from kinertia.cli.app import main as kinertia
-from measured_trials import table
+from measured_trials import severe, table, told, unexplained
+from walks import fit_arguments
 
 DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "field-trials.md"
 CASES = Path(__file__).with_name("field_cases.toml")
-_FILES = (".trc", ".c3d", ".mot", ".xml", ".osim")
+FILES = (".trc", ".c3d", ".mot", ".xml", ".osim")
 _OF_RESULT = "R"
 """Codes of a result describe it; those of other families accuse a recording, a person or an instrument."""
 _IMPOSSIBLE_POSE = "R305"
@@ -48,9 +49,9 @@ class Case:
 
     def against(self, outcome: Outcome) -> str:
         """What is not as it should be; empty where all is."""
-        found = {one["code"] for one in outcome.findings}
+        found = {one["code"] for one in unexplained(outcome.content)}
         missing = [codes for codes in self.expected if not found & set(codes.split("|"))]
-        accused = {one["code"] for one in outcome.severe if one["code"][0] != _OF_RESULT} - self._true
+        accused = {one["code"] for one in severe(outcome.content) if one["code"][0] != _OF_RESULT} - self._true
         if _ANYTHING in self.allowed:
             accused = set()
         against = [] if outcome.status in self.status else [f"exit status {outcome.status}"]
@@ -81,17 +82,6 @@ class Outcome:
     seconds: float
     content: dict[str, Any]
 
-    @property
-    def findings(self) -> list[dict[str, Any]]:
-        """Open findings that no other explains."""
-        every = self.content.get("findings", [])
-        return [one for one in every if one["status"] == "open" and one["muted_by"] is None]
-
-    @property
-    def severe(self) -> list[dict[str, Any]]:
-        """Of them, those that are more than a correction."""
-        return [one for one in self.findings if one["severity"] in ("WARNING", "ERROR")]
-
     def residuals(self) -> str:
         """Root residuals (N, N m) with the literature's parameters and with the estimate, where there is one."""
         trials = self.content.get("trials") or []
@@ -106,8 +96,11 @@ def cases(data: Path) -> Iterator[Case]:
     for laboratory in tomllib.loads(CASES.read_text(encoding="utf-8"))["laboratory"]:
         folder = data / laboratory["folder"]
         for recording in laboratory["recording"]:
-            words = f"{recording['files']} {laboratory['with']}".split()
-            arguments = [str(folder / word) if word.endswith(_FILES) else word for word in words]
+            if "walk" in recording:
+                arguments = fit_arguments(data, recording["walk"])
+            else:
+                words = f"{recording['files']} {laboratory['with']}".split()
+                arguments = [str(folder / word) if word.endswith(FILES) else word for word in words]
             yield Case(
                 title=f"{laboratory['title']}: {recording['title']}",
                 folder=folder,
@@ -116,7 +109,7 @@ def cases(data: Path) -> Iterator[Case]:
                 status=tuple(recording["status"]),
                 expected=tuple(recording.get("expected", ())),
                 allowed=(*laboratory.get("allowed", ()), *recording.get("allowed", ())),
-                never=tuple(recording.get("never", ())),
+                never=(*laboratory.get("never", ()), *recording.get("never", ())),
                 draft=laboratory.get("draft"),
             )
 
@@ -124,7 +117,7 @@ def cases(data: Path) -> Iterator[Case]:
 def run(case: Case, out: Path) -> Outcome:
     """The outcome of the command, or of the second try, with a drafted marker set."""
     outcome = _outcome([*case.arguments, *(["-o", str(out)] if case.arguments[0] == "fit" else [])], 1)
-    if case.draft is None or not {"L101", "L105"} & {one["code"] for one in outcome.findings}:
+    if case.draft is None or not {"L101", "L105"} & {one["code"] for one in unexplained(outcome.content)}:
         return outcome
     drafted = out.with_suffix(".toml")
     _outcome(["markers", str(case.folder / case.draft), "-o", str(drafted)], 1)
@@ -144,18 +137,17 @@ def _outcome(arguments: Sequence[str], tries: int) -> Outcome:
 
 def document(outcomes: Sequence[tuple[Case, Outcome]]) -> str:
     """The text of docs/field-trials.md."""
-    rows, told = [], []
+    rows, messages = [], []
     for case, outcome in outcomes:
         against = case.against(outcome)
-        codes = " ".join(dict.fromkeys(one["code"] for one in outcome.severe)) or "-"
+        codes = " ".join(dict.fromkeys(one["code"] for one in severe(outcome.content))) or "-"
         end = [str(outcome.status), str(outcome.tries), codes, outcome.residuals(), f"{outcome.seconds:.0f}"]
         rows.append([case.title, case.truth, f"no: {against}" if against else "yes", *end])
-        messages = dict.fromkeys(f"{one['code']} {one['message']}" for one in outcome.severe)
-        told += [f"- {case.title}: {message}" for message in messages]
+        messages += [f"- {case.title}: {message}" for message in dict.fromkeys(told(outcome.content))]
     heads = ["recording", "what is true of it", "as it should be", "exit status", "tries", "findings"]
     heads += ["residuals (N, N m), literature → estimate", "s"]
     good = sum(row[2] == "yes" for row in rows)
-    return TEXT.format(good=good, count=len(rows), results=table(heads, rows), told="\n".join(told))
+    return TEXT.format(good=good, count=len(rows), results=table(heads, rows), messages="\n".join(messages))
 
 
 TEXT = """# Field trials
@@ -173,7 +165,7 @@ the literature's body segment parameters, and of the estimate. Seconds are this 
 
 ## Findings
 
-{told}
+{messages}
 """
 
 
@@ -187,8 +179,8 @@ def main() -> None:
             outcomes.append((case, outcome))
             against = case.against(outcome) or "yes"
             print(f"{case.title}: {against} (status {outcome.status}, {outcome.seconds:.0f} s)", flush=True)
-            for one in outcome.severe:
-                print(f"    {one['severity']} {one['code']} {one['message']}", flush=True)
+            for message in told(outcome.content):
+                print(f"    {message}", flush=True)
     if not part:
         DOCUMENT.write_text(document(outcomes), encoding="utf-8")
 

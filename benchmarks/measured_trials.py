@@ -9,7 +9,7 @@ import contextlib
 import io
 import json
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -32,10 +32,19 @@ def results(name: str, folder: Path, *more: str) -> dict[str, Any]:
     return {**json.loads((folder / "fit.json").read_text()), "bsp": pd.read_csv(folder / "bsp.csv")}
 
 
-def told(run: dict[str, Any]) -> list[str]:
-    """Code and message of what lowers a verdict, from fit.json."""
-    severe = [one for one in run["findings"] if one["severity"] in ("WARNING", "ERROR")]
-    return [f"{one['code']} {one['message']}" for one in severe if one["status"] == "open" and one["muted_by"] is None]
+def unexplained(run: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Open findings that no other explains, from what `--json` prints or fit.json."""
+    return [one for one in run.get("findings", []) if one["status"] == "open" and one["muted_by"] is None]
+
+
+def severe(run: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Of these, those that lower a verdict."""
+    return [one for one in unexplained(run) if one["severity"] in ("WARNING", "ERROR")]
+
+
+def told(run: Mapping[str, Any]) -> list[str]:
+    """Code and message of what lowers a verdict."""
+    return [f"{one['code']} {one['message']}" for one in severe(run)]
 
 
 def farthest(bsp: pd.DataFrame) -> str:

@@ -152,7 +152,7 @@ def test_every_field_case_has_its_files():
     every = list(field_trials.cases(data_folder()))
     assert len({case.title for case in every}) == len(every) >= 48
     for case in every:
-        files = [Path(word) for word in case.arguments if word.endswith((".trc", ".c3d", ".mot", ".xml", ".osim"))]
+        files = [Path(word) for word in case.arguments if word.endswith(field_trials.FILES)]
         assert files
         assert all(file.is_file() for file in files)
 
