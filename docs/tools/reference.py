@@ -22,7 +22,7 @@ from kinertia.settings import Attached, Diagnostics, KnownSegment, Settings, Sub
 DOCS = Path(__file__).resolve().parents[1]
 PAGES = tuple(DOCS / name for name in ("commands.md", "subject-file.md"))
 _PART = re.compile(r"(<!-- generated: ([\w ]+) -->\n).*?(<!-- end -->)", re.DOTALL)
-_SHARED = ("--help", "--quiet", "--verbose", "--force")
+_SHARED = ("--help", "--quiet", "--verbose", "--overwrite")
 """Options that mean the same everywhere; the page explains them once."""
 
 

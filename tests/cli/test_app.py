@@ -18,6 +18,7 @@ from rich.console import Console
 from command_line import fitted, run
 from kinertia.cli import terminal
 from kinertia.cli.fit_report import report_tables
+from kinertia.cli.renamed_options import as_named_now
 from kinertia.diagnostics.result.residuals import FORCE, MOMENT, PEAK_FORCE_SHARE
 from kinertia.findings.finding import Severity, finding
 from kinertia.findings.quantity import Quantity
@@ -250,19 +251,45 @@ def test_quiet_progress(monkeypatch):
     assert screen.getvalue() == ""
 
 
+def test_options_of_before_still_work_and_say_their_names_of_now(tmp_path):
+    """In the place of the option that they are called now; with no others is there a notice."""
+    (tmp_path / "thesis.tex").write_text("mine")
+    old = run("check", tmp_path / "none.trc", "-o", tmp_path, "--force")
+    now = run("check", tmp_path / "none.trc", "-o", tmp_path, "--overwrite")
+    assert (old.status, now.status) == (2, 2)
+    assert "--overwrite" in old.err
+    assert "none.trc" in old.err
+    assert "none.trc" in now.err
+    assert "--overwrite" not in now.err
+    assert as_named_now(["fit", "--loads", "x.xml", "--force"]) == ["fit", "--loads", "x.xml", "--overwrite"]
+
+
+def test_help_begins_with_what_a_laboratory_needs_first():
+    """The rest stands below, under a heading of its own."""
+    shown = run("--help").out
+    places = [
+        shown.index(f"│ {name} ")
+        for name in ["demo", "app", "init", "check", "fit", "compare", "export", "cohort", "explain"]
+    ]
+    assert places == sorted(places)
+    assert places[-1] < shown.index("─ More ─") < shown.index("│ markers ")
+
+
 @pytest.mark.slow
 def test_results_never_go_among_somebody_elses_files_unasked(fit_at_once, tmp_path):
-    """Refused before any work; with --force the others stay; its own results are replaced unasked."""
+    """Refused before any work; with --overwrite the others stay; its own results are replaced unasked."""
     out = tmp_path / "out"
     out.mkdir()
     (out / "thesis.tex").write_text("mine")
     for command in (fit_at_once, lambda *options: run("demo", *options), lambda *o: run("study", "table1", *o)):
         refused = command("-o", out)
         assert refused.status == 2
-        assert re.search(r"out: holds files that are not results of Kinertia \(thesis\.tex\); .* --force", refused.err)
+        assert re.search(
+            r"out: holds files that are not results of Kinertia \(thesis\.tex\); .* --overwrite", refused.err
+        )
         assert [path.name for path in out.iterdir()] == ["thesis.tex"]
     assert not fit_at_once.runs
-    assert fit_at_once("-o", out, "--force").status == 1
+    assert fit_at_once("-o", out, "--overwrite").status == 1
     assert (out / "thesis.tex").read_text() == "mine"
     (out / "fit.json").write_text('{"kinertia": "an older one"}')
     assert fit_at_once("-o", out).status == 1

@@ -256,9 +256,9 @@ def test_page_goes_only_where_it_may(lab):
     (lab / "foreign" / "thesis.tex").write_text("mine")
     refused = run("check", lab / "static.trc", "-o", lab / "foreign")
     assert refused.status == 2
-    assert "--force" in refused.err
+    assert "--overwrite" in refused.err
     assert [path.name for path in (lab / "foreign").iterdir()] == ["thesis.tex"]
-    assert run("check", lab / "static.trc", "-o", lab / "foreign", "--force").status == 0
+    assert run("check", lab / "static.trc", "-o", lab / "foreign", "--overwrite").status == 0
     assert (lab / "foreign" / "thesis.tex").read_text() == "mine"
     (lab / "foreign" / "thesis.tex").unlink()
     assert run("check", lab / "static.trc", "-o", lab / "foreign").status == 0  # its own is replaced

@@ -197,5 +197,5 @@ def test_measured_demo_refuses_a_folder_with_other_files(tmp_path):
     (tmp_path / "thesis.tex").write_text("mine")
     outcome = run("demo", "--measured", "-o", tmp_path)
     assert outcome.status == 2
-    assert "--force" in outcome.err
+    assert "--overwrite" in outcome.err
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]

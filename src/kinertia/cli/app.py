@@ -14,6 +14,7 @@ import typer
 
 from kinertia.cli.failure import STATUS, show_failure
 from kinertia.cli.outcome import add_command
+from kinertia.cli.renamed_options import as_named_now
 from kinertia.cli.terminal import out, show_error, show_problem
 from kinertia.errors import KinertiaError
 from kinertia.io.output_folder import INTERRUPTIONS
@@ -29,20 +30,14 @@ all segments out, with a motion that they and the forces explain.
 
 kinertia demo                 see it work, on a synthetic person
 kinertia demo --measured      see it work on a measured walk (downloads 0.9 MB)
+kinertia app                  all of it on a page in your browser
 kinertia init FOLDER          draft FOLDER/subject.toml from your files
 kinertia check subject.toml   can a fit use them? gaps, plates, axes, mass
-kinertia markers FILE         which marker set is it? draft one of your own
 kinertia fit subject.toml     estimate; the results go to the folder out
-kinertia report out           write the report of a fit again
 kinertia compare out1 out2    what differs between fits, and by how much
-kinertia explain P213         what a finding means, and what to do about it
 kinertia export out --csv     all tables of a fit, for other programs
-kinertia crossval subject.toml   do they hold on a held-out trial?
-kinertia plan                 which motions to record, by their error bars
-kinertia instruments A.toml B.toml   plates and clock, from a whole session
 kinertia cohort STUDY -o out  fit hundreds of people, resumable, one table
-kinertia app                  all of it on a page in your browser
-kinertia warm-up              compile now what the first fit would compile
+kinertia explain P213         what a finding means, and what to do about it
 
 Every command says more with --help, and has an example there.
 
@@ -72,21 +67,23 @@ Results go to standard output, progress and errors to standard error; with
 
 _MODULES = {
     "demo": "demo",
+    "app": "app_command",
     "init": "init",
     "check": "check",
-    "markers": "markers",
     "fit": "fit",
-    "report": "report",
     "compare": "compare",
     "export": "export",
+    "cohort": "cohort",
+    "explain": "explain",
+}
+_MORE = {
+    "markers": "markers",
+    "report": "report",
     "crossval": "plan",
     "plan": "plan",
     "instruments": "instruments",
-    "explain": "explain",
-    "cohort": "cohort",
     "population": "population",
     "study": "study",
-    "app": "app_command",
     "warm-up": "warm_up",
 }
 """Module of every command, which has its name there (with underscores); in the order of `kinertia --help`."""
@@ -102,12 +99,14 @@ def application(only: str | None = None) -> typer.Typer:
         help=_MANUAL,
     )
     app.callback()(_root)
-    for name in _MODULES if only is None else (only,):
-        command = getattr(import_module(f"kinertia.cli.{_MODULES[name]}"), name.replace("-", "_"))
+    modules = _MODULES | _MORE
+    for name in modules if only is None else (only,):
+        command = getattr(import_module(f"kinertia.cli.{modules[name]}"), name.replace("-", "_"))
+        panel = "More" if name in _MORE else None
         if isinstance(command, typer.Typer):
-            app.add_typer(command, name=name)
+            app.add_typer(command, name=name, rich_help_panel=panel)
         else:
-            add_command(app, command, name)
+            add_command(app, command, name, panel)
     return app
 
 
@@ -123,14 +122,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def application_for(given: Sequence[str]) -> typer.Typer:
     """The command line with what these arguments ask for."""
-    return application(given[0] if given and given[0] in _MODULES else None)
+    return application(given[0] if given and given[0] in _MODULES | _MORE else None)
 
 
 def run(app: typer.Typer, given: Sequence[str]) -> None:
     """Run it; a user's error is one line and exit status 2, a failure of Kinertia one line and 70."""
     try:
         with _ended_in_order():
-            app(args=given, prog_name="kinertia")
+            app(args=as_named_now(given), prog_name="kinertia")
     except KinertiaError as error:
         show_problem(error)
     except OSError as error:

@@ -12,7 +12,7 @@ import typer
 from rich.table import Table
 
 from kinertia.cli.findings_view import show_overview
-from kinertia.cli.options import Force, Quiet, Sex, Verbose, Waive, number, overrule_of, results_folder
+from kinertia.cli.options import Loads, Overwrite, Quiet, Sex, Verbose, Waive, number, overrule_of, results_folder
 from kinertia.cli.outcome import Outcome
 from kinertia.cli.terminal import out, plain_table, shown_progress
 from kinertia.errors import FileError
@@ -62,9 +62,7 @@ def check(
             "subject file (.toml); or models (.osim).",
         ),
     ],
-    loads: Annotated[
-        Path | None, typer.Option(help="OpenSim ExternalLoads (.xml) that explains the forces file.")
-    ] = None,
+    loads: Loads = None,
     mass: Annotated[
         float | None,
         typer.Option(parser=number, metavar="KG", help="Body mass, kg, to compare forces and models with."),
@@ -82,7 +80,7 @@ def check(
         Path | None, typer.Option("--output", "-o", help="Folder for the same results as a page, check.html.")
     ] = None,
     waive: Waive = None,
-    force: Force = False,
+    overwrite: Overwrite = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> Outcome:
@@ -104,7 +102,7 @@ def check(
     kinertia check scaled.osim --mass 72.6 --height 1.80 --sex male
     """
     if output is not None:
-        results_folder(output, force)
+        results_folder(output, overwrite)
     check_subject(70.0 if mass is None else mass, 1.7 if height is None else height, sex or "male")
     files = [subject_file_in(path) if _holds_subject_file(path) else path for path in files]
     subjects = [path for path in files if path.suffix.lower() == ".toml"]

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import typer
 
 from kinertia.cli.json_lines import JsonLines
-from kinertia.cli.options import Force, Output, Quiet, results_folder
+from kinertia.cli.options import Output, Overwrite, Quiet, results_folder
 from kinertia.cli.outcome import Outcome
 from kinertia.cli.terminal import be_quiet, out, plain_table, shown_progress
 from kinertia.errors import SettingsError
@@ -73,7 +73,7 @@ def cohort(
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Only say who would be fitted, what is missing, and roughly how long.")
     ] = False,
-    force: Force = False,
+    overwrite: Overwrite = False,
     quiet: Quiet = False,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print how it ended for everybody as JSON, for scripts, and nothing else.")
@@ -121,7 +121,7 @@ def cohort(
         for each in plan:
             lines.say("plan", **each)
         return Outcome({"people": plan}, int(any(one.problem for one in everybody)))
-    results_folder(output, force)
+    results_folder(output, overwrite)
     output.mkdir(parents=True, exist_ok=True)
     with sole_use(output / _LOCK, "the folder of this cohort"):
         outcomes = _run(people, output, where, csv, lines)

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from kinertia.cli.options import Force, Quiet, results_folder
+from kinertia.cli.options import Overwrite, Quiet, results_folder
 from kinertia.cli.outcome import Outcome
 from kinertia.cli.terminal import out
 from kinertia.io.output_folder import complete_folder
@@ -28,7 +28,7 @@ from kinertia.report.saved_fit import load_fit
 def compare(
     results: Annotated[list[Path], typer.Argument(help="Folders that kinertia fit has written, two or more.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder for page and table.")] = Path("comparison"),
-    force: Force = False,
+    overwrite: Overwrite = False,
     quiet: Quiet = False,
 ) -> Outcome:
     """What differs between fits beyond their error bars: sessions of one person, methods, models.
@@ -45,7 +45,7 @@ def compare(
     paths = [path.resolve() for path in results]
     if len(set(paths)) < len(paths):
         raise typer.BadParameter("one folder is named twice")
-    results_folder(output, force)
+    results_folder(output, overwrite)
     fits = {name: load_fit(path) for name, path in zip(names_from_common_folder(paths), paths, strict=True)}
     with complete_folder(output, "compare") as work:
         (work / "compare.html").write_text(render_comparison(fits), encoding="utf-8")

@@ -10,7 +10,7 @@ import typer
 
 from kinertia.cli.findings_view import show_overview
 from kinertia.cli.measured_demo import run_measured_demo
-from kinertia.cli.options import Force, Output, Quiet, results_folder
+from kinertia.cli.options import Output, Overwrite, Quiet, results_folder
 from kinertia.cli.outcome import Outcome
 from kinertia.cli.synthetic_demo import Demo, run_demo
 from kinertia.cli.terminal import out, plain_table, shown_progress
@@ -23,7 +23,7 @@ def demo(
         bool, typer.Option("--measured", help="Fit a measured walk, which is downloaded once, instead.")
     ] = False,
     output: Output = Path("out"),
-    force: Force = False,
+    overwrite: Overwrite = False,
     quiet: Quiet = False,
 ) -> Outcome:
     """Show what Kinertia does; needs no files.
@@ -41,7 +41,7 @@ def demo(
 
     kinertia demo --measured -o out
     """
-    results_folder(output, force)
+    results_folder(output, overwrite)
     if measured:
         return _measured_demo(output)
     with shown_progress() as progress:

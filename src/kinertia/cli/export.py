@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from kinertia.cli.options import Force, Quiet, results_folder
+from kinertia.cli.options import Overwrite, Quiet, results_folder
 from kinertia.cli.outcome import Outcome
 from kinertia.cli.terminal import out
 from kinertia.io.output_folder import complete_folder
@@ -25,7 +25,7 @@ def export(
     ] = False,
     mat: Annotated[bool, typer.Option("--mat", help="One file, tables.mat, for MATLAB and Octave.")] = False,
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the tables.")] = Path("export"),
-    force: Force = False,
+    overwrite: Overwrite = False,
     quiet: Quiet = False,
 ) -> Outcome:
     """Write all tables of a fit: segments, calibration, strides, curves over the gait cycle and over time.
@@ -38,7 +38,7 @@ def export(
     """
     if not (csv or as_json or mat):
         raise typer.BadParameter("say in which form: --csv, --json or --mat (several at once are fine)")
-    results_folder(output, force)
+    results_folder(output, overwrite)
     fit = load_fit(results)
     with complete_folder(output, "export") as work:
         content = {"kinertia": VERSION, "results": str(results), "subject": fit.subject.model_dump()}

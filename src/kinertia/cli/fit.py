@@ -12,7 +12,18 @@ import typer
 
 from kinertia.cli.findings_view import show_overview
 from kinertia.cli.fit_report import report_tables
-from kinertia.cli.options import Force, Output, Quiet, Sex, Verbose, Waive, number, overrule_of, results_folder
+from kinertia.cli.options import (
+    Loads,
+    Output,
+    Overwrite,
+    Quiet,
+    Sex,
+    Verbose,
+    Waive,
+    number,
+    overrule_of,
+    results_folder,
+)
 from kinertia.cli.outcome import Outcome, of_error
 from kinertia.cli.terminal import out, show_problem, shown_progress
 from kinertia.errors import FileError, KinertiaError
@@ -41,9 +52,7 @@ def fit(
     output: Output = Path("out"),
     static: Annotated[Path | None, typer.Option(help="Static trial (.c3d, .trc, .tsv, .csv).")] = None,
     forces: Annotated[Path | None, typer.Option(help="Ground reactions (.mot, .sto); a C3D file has its own.")] = None,
-    loads: Annotated[
-        Path | None, typer.Option(help="OpenSim ExternalLoads (.xml) that explains the forces file.")
-    ] = None,
+    loads: Loads = None,
     mass: Annotated[
         float | None, typer.Option(parser=number, metavar="KG", help="Body mass, kg; a C3D file may contain it.")
     ] = None,
@@ -65,7 +74,7 @@ def fit(
         str | None, typer.Option(help="Estimator: simultaneous (default) or two-level.", autocompletion=_methods)
     ] = None,
     waive: Waive = None,
-    force: Force = False,
+    overwrite: Overwrite = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
     shown_table: Annotated[
@@ -108,7 +117,7 @@ def fit(
     runs = _runs(trials, output, options, method, overrule_of(waive))
     for one in runs:
         names = [trial.name for trial in one.wanted.trials]
-        results_folder(one.folder, force, names if len(names) > 1 else ())
+        results_folder(one.folder, overwrite, names if len(names) > 1 else ())
     summaries, status = [], 0
     for one in runs:
         try:

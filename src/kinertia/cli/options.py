@@ -16,14 +16,14 @@ from kinertia.io.output_folder import check_folder, expect_own_folder
 from kinertia.settings import Overrule, number_of, sex_of
 
 
-def results_folder(folder: Path, force: bool, sub_folders: Collection[str] = ()) -> None:
+def results_folder(folder: Path, overwrite: bool, sub_folders: Collection[str] = ()) -> None:
     """Refuse, before any work, a folder that results cannot or may not go to; `sub_folders` are names of theirs in it.
 
     Raises:
-        FileError: it cannot be written to, or holds somebody else's files and `force` is False.
+        FileError: it cannot be written to, or holds somebody else's files and `overwrite` is False.
     """
-    if not force:
-        expect_own_folder(folder, ", or --force to write among them")
+    if not overwrite:
+        expect_own_folder(folder, ", or --overwrite to write among them")
     check_folder(folder, sub_folders)
 
 
@@ -59,7 +59,11 @@ Waive = Annotated[
     typer.Option("--waive", metavar="CODE", help="Go on in spite of this ERROR; shown as waived. May be repeated."),
 ]
 Output = Annotated[Path, typer.Option("--output", "-o", help="Folder for the results; Kinertia's own are replaced.")]
-Force = Annotated[bool, typer.Option("--force", help="Write into a folder that holds other files, too.")]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Write into a folder that holds other files, too.")]
+Loads = Annotated[
+    Path | None,
+    typer.Option("--loads", "--external-loads", help="OpenSim ExternalLoads (.xml) that explains the forces file."),
+]
 Quiet = Annotated[
     bool, typer.Option("--quiet", "-q", callback=be_quiet, help="Show errors only; the exit status says the rest.")
 ]

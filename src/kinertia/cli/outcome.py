@@ -30,13 +30,15 @@ class Outcome:
     status: int = 0
 
 
-def add_command(app: typer.Typer, command: Callable[..., Any], name: str | None = None) -> None:
+def add_command(
+    app: typer.Typer, command: Callable[..., Any], name: str | None = None, panel: str | None = None
+) -> None:
     """Make it a command of `app`; one that returns an `Outcome` gets `--json`, which prints that in place of all words.
 
-    A command that has an `as_json` of its own is told of the option, too.
+    `panel` is the heading of `kinertia --help` that it stands under. A command that has an `as_json` of its own is told of the option, too.
     """
     hints = get_type_hints(command, include_extras=True)
-    app.command(name)(_with_json(command, hints) if hints["return"] is Outcome else command)
+    app.command(name, rich_help_panel=panel)(_with_json(command, hints) if hints["return"] is Outcome else command)
 
 
 def of_error(error: KinertiaError) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from kinertia.cli.options import Force, Output, Quiet, results_folder
+from kinertia.cli.options import Output, Overwrite, Quiet, results_folder
 from kinertia.cli.outcome import Outcome
 from kinertia.cli.terminal import out, plain_table, shown_progress
 from kinertia.io.subject_file import read_subject
@@ -30,7 +30,7 @@ def plan(
         typer.Argument(help="Subject file (.toml) whose trials to choose from; the package's motions if left out."),
     ] = None,
     output: Output = Path("out"),
-    force: Force = False,
+    overwrite: Overwrite = False,
     quiet: Quiet = False,
 ) -> Outcome:
     """Predict the error bar of every BSP from candidate motions, to know what to record. Estimates nothing.
@@ -41,7 +41,7 @@ def plan(
 
     kinertia plan subject.toml -o out
     """
-    results_folder(output, force)
+    results_folder(output, overwrite)
     with shown_progress() as progress:
         if subject is None:
             progress("predicting", 0.0)
@@ -62,7 +62,7 @@ def plan(
 def crossval(
     subject: Annotated[Path, typer.Argument(help="Subject file (.toml) with two or more trials.")],
     output: Output = Path("out"),
-    force: Force = False,
+    overwrite: Overwrite = False,
     quiet: Quiet = False,
 ) -> Outcome:
     """Hold out each trial in turn: do BSPs from the others explain it better than the literature's?
@@ -71,7 +71,7 @@ def crossval(
 
     kinertia crossval subject.toml -o out
     """
-    results_folder(output, force)
+    results_folder(output, overwrite)
     wanted = read_subject(subject)
     with shown_progress() as progress:
         ready = prepare_subject(wanted, progress)

@@ -10,7 +10,7 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from kinertia.cli.options import Force, Output, Quiet, results_folder
+from kinertia.cli.options import Output, Overwrite, Quiet, results_folder
 from kinertia.cli.outcome import Outcome, add_command
 from kinertia.cli.terminal import out, plain_table, shown_progress
 from kinertia.findings.overview import reported
@@ -64,7 +64,7 @@ def table1(
         typer.Option("--variants", help="The noisy half again, one thing changed at a time; some 15 minutes."),
     ] = False,
     output: Output = Path("out"),
-    force: Force = False,
+    overwrite: Overwrite = False,
     quiet: Quiet = False,
 ) -> Outcome:
     """Repeat the study: 49 parameters from starts off by 50 %, with and without noise and pelvis correction.
@@ -77,7 +77,7 @@ def table1(
 
     kinertia study table1 --variants --trial subject.toml -o out
     """
-    results_folder(output, force)
+    results_folder(output, overwrite)
     with shown_progress() as progress:
         measured = None if trial is None else measured_trial(read_subject(trial), progress)
         if variants:
@@ -131,7 +131,7 @@ def accuracy(
     seed: Seed = 1,
     workers: Workers = None,
     output: Output = Path("out"),
-    force: Force = False,
+    overwrite: Overwrite = False,
     quiet: Quiet = False,
 ) -> Outcome:
     """Do the error bars hold? People drawn from the literature's prior, measured with faults, estimated.
@@ -140,7 +140,7 @@ def accuracy(
 
     kinertia study accuracy -o out
     """
-    results_folder(output, force)
+    results_folder(output, overwrite)
     with shown_progress() as progress:
         accuracies = run_accuracy(SCENARIOS, draws, seed, workers, lambda share: progress("people", share))
     save_accuracy(accuracies, seed, output)
@@ -161,7 +161,7 @@ def populations(
     seed: Seed = 1,
     workers: Workers = None,
     output: Output = Path("out"),
-    force: Force = False,
+    overwrite: Overwrite = False,
     quiet: Quiet = False,
 ) -> Outcome:
     """What does a wrong prior cost? Children, obese, old people, prostheses, with the adults' prior and their own.
@@ -173,7 +173,7 @@ def populations(
 
     kinertia study populations -o out
     """
-    results_folder(output, force)
+    results_folder(output, overwrite)
     with shown_progress() as progress:
         found = run_populations(people, seed, workers, lambda share: progress("people", share))
     save_populations(found, seed, output)
@@ -191,7 +191,7 @@ def sensitivity(
     seed: Seed = 1,
     workers: Workers = None,
     output: Output = Path("out"),
-    force: Force = False,
+    overwrite: Overwrite = False,
     quiet: Quiet = False,
 ) -> Outcome:
     """Which BSPs are not highly sensitive to noisy kinematics? Errors against noise, strides and squats.
@@ -200,7 +200,7 @@ def sensitivity(
 
     kinertia study sensitivity -o out
     """
-    results_folder(output, force)
+    results_folder(output, overwrite)
     with shown_progress() as progress:
         result = run_sensitivity(draws, seed, workers, lambda share: progress("people", share))
     save_sensitivity(result, output)
@@ -221,7 +221,7 @@ def faults(
     ] = None,
     workers: Workers = None,
     output: Output = Path("out"),
-    force: Force = False,
+    overwrite: Overwrite = False,
     quiet: Quiet = False,
 ) -> Outcome:
     """Is a wrong measurement identified? Fifty known faults in fault-free walks, one at a time.
@@ -238,7 +238,7 @@ def faults(
 
     kinertia study faults anna.toml ben.toml -o out
     """
-    results_folder(output, force)
+    results_folder(output, overwrite)
     given = [read_subject(path) for path in walks or ()]
     with TemporaryDirectory() as folder, shown_progress() as progress:
         sources = {"synthetic walk": synthetic_walk(Path(folder) / "lab")}
