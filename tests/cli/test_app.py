@@ -267,10 +267,8 @@ def test_options_of_before_still_work_and_say_their_names_of_now(tmp_path):
 def test_help_begins_with_what_a_laboratory_needs_first():
     """The rest stands below, under a heading of its own."""
     shown = run("--help").out
-    places = [
-        shown.index(f"│ {name} ")
-        for name in ["demo", "app", "init", "check", "fit", "compare", "export", "cohort", "explain"]
-    ]
+    first = ("demo", "app", "init", "check", "fit", "compare", "export", "cohort", "explain")
+    places = [shown.index(f"│ {name} ") for name in first]
     assert places == sorted(places)
     assert places[-1] < shown.index("─ More ─") < shown.index("│ markers ")
 

@@ -35,7 +35,7 @@ def add_command(
 ) -> None:
     """Make it a command of `app`; one that returns an `Outcome` gets `--json`, which prints that in place of all words.
 
-    `panel` is the heading of `kinertia --help` that it stands under. A command that has an `as_json` of its own is told of the option, too.
+    A command that has an `as_json` of its own is told of the option, too. `panel` is its heading in `kinertia --help`.
     """
     hints = get_type_hints(command, include_extras=True)
     app.command(name, rich_help_panel=panel)(_with_json(command, hints) if hints["return"] is Outcome else command)
