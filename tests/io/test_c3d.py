@@ -4,6 +4,8 @@ import pytest
 from c3d_writer import plate_parameters, write_c3d
 from kinertia.findings.finding import Severity
 from kinertia.io.c3d import read_c3d
+from kinertia.io.c3d_plates import lab_plates
+from kinertia.io.ezc3d_library import read_content
 from recordings import here, is_here
 from refusals import codes, only, refused
 
@@ -204,6 +206,39 @@ def test_calibrated_plate_of_type_4(tmp_path):
     plate["CAL_MATRIX"] = 2 * plate["CAL_MATRIX"]
     path = write_c3d(tmp_path / "x.c3d", points, labels, stepping() / 2, {**SCREEN, "FORCE_PLATFORM": plate})
     expect_centre_of_pressure(read_c3d(path).plates, 0.3, -0.2, [30, 600, -20])
+
+
+SHAPES = [("USED", (1, 1)), ("TYPE", (2, 1)), ("TYPE", (1, 2)), ("CHANNEL", (6, 2, 1)), ("CORNERS", (24,))]
+
+
+@pytest.mark.parametrize(("name", "shape"), SHAPES)
+def test_parameters_of_plates_in_other_shapes(tmp_path, name, shape):
+    points, labels = standing()
+    plates = plate_parameters(np.concatenate((CORNERS, CORNERS + np.array([600, 0, 0]))))
+    plates[name] = np.reshape(plates[name], shape, order="F")
+    analogs = np.hstack((stepping(), stepping()))
+    path = write_c3d(tmp_path / "x.c3d", points, labels, analogs, {**SCREEN, "FORCE_PLATFORM": plates})
+    assert read_c3d(path).plates.names == ("plate 1", "plate 2")
+
+
+@pytest.mark.parametrize(("name", "shape"), [("TYPE", ()), ("CHANNEL", (6,)), ("CORNERS", (3, 4)), ("ORIGIN", (3,))])
+def test_parameters_of_one_plate_in_other_shapes(tmp_path, name, shape):
+    points, labels = standing()
+    plate = plate_parameters(CORNERS)
+    plate[name] = np.reshape(plate[name], shape, order="F")
+    path = write_c3d(tmp_path / "x.c3d", points, labels, stepping(), {**SCREEN, "FORCE_PLATFORM": plate})
+    expect_centre_of_pressure(read_c3d(path).plates, 0.3, -0.2, [30, 600, -20])
+
+
+@pytest.mark.parametrize("units", [[], ["N"]])
+def test_channels_without_units_are_in_those_of_the_points(tmp_path, units):
+    points, labels = standing()
+    parameters = {**SCREEN, "FORCE_PLATFORM": plate_parameters(CORNERS), "ANALOG": {"UNITS": units}}
+    path = write_c3d(tmp_path / "x.c3d", points, labels, stepping(), parameters)
+    expect_centre_of_pressure(read_c3d(path).plates, 0.3, -0.2, [30, 600, -20])
+    content = read_content(path)
+    del content["parameters"]["ANALOG"]
+    assert lab_plates(path, content, "mm")[0].names == ("plate 1",)
 
 
 def test_plate_of_type_1_tells_the_centre_of_pressure(tmp_path):

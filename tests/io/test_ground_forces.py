@@ -323,6 +323,26 @@ def test_samples_lost_and_repeated_though_times_are_rounded(tmp_path, rate_hz, d
             read_forces(forces_at(tmp_path / "grf.mot", (kept / rate_hz).round(decimals)))
 
 
+@pytest.mark.parametrize(("rate_hz", "decimals"), [(2000, 8), (2000, 3), (1000, 3)])
+@pytest.mark.parametrize("off", [1, -5, 40])
+def test_a_last_sample_that_alone_is_off_is_left_out(tmp_path, rate_hz, decimals, off):
+    time = np.arange(3000) / rate_hz
+    time[-1] += off / rate_hz + (off == 1 and decimals == 3) * 0.002
+    loads, findings = read_forces_with_findings(forces_at(tmp_path / "grf.mot", time.round(decimals)))
+    assert len(loads.time) == len(loads.force) == 2999
+    np.testing.assert_allclose(np.diff(loads.time), 1 / rate_hz, rtol=1e-4)
+    assert only(findings, "T105").severity is Severity.CORRECTED
+
+
+@pytest.mark.parametrize("last", [[0.0], [0.0, 0.001], [5.0, 5.001]])
+def test_of_few_samples_or_of_two_at_the_end_nobody_knows_which_are_off(tmp_path, last):
+    with refused("T101", None):
+        read_forces(forces_at(tmp_path / "grf.mot", np.array([0.0, 0.001, *last])))
+    if len(last) > 1:
+        with refused("T101", None):
+            read_forces(forces_at(tmp_path / "grf.mot", np.concatenate((np.arange(3000) / 1000, last))))
+
+
 def test_times_that_do_not_go_on(tmp_path):
     with refused("T101", None, time_s=0.0, after="0 s"):
         read_forces(forces_at(tmp_path / "grf.mot", np.zeros(100)))

@@ -127,7 +127,11 @@ def test_strings_will_do(files):
     [
         (("walk_grf.mot",), "F102", {"given": ".mot", "what": "hold markers", "expected": ".trc, .c3d, .tsv or .csv"}),
         (("walk.xlsx",), "F102", {"given": ".xlsx", "what": "hold markers"}),
-        (("walk.trc", "walk.c3d"), "F102", {"given": ".c3d", "what": "hold forces", "expected": ".mot, .sto or .tsv"}),
+        (
+            ("walk.trc", "walk.c3d"),
+            "F102",
+            {"given": ".c3d", "what": "hold forces", "expected": ".mot, .sto, .tsv or .forces"},
+        ),
         (("walk.trc", "walk_grf.mot", "walk.trc"), "F102", {"given": ".trc", "what": "external loads"}),
         (("walk.trc", "walk.tsv"), "F102", {"given": "Qualisys", "expected": ".tsv"}),
         (("wlak.trc",), "F101", {"file": "wlak.trc", "nearest": "walk.trc"}),

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 import lab_files
+from kinertia.findings.finding import Severity
 from kinertia.io.recording import read_recording
-from refusals import refused
+from refusals import only, refused
 
 
 @pytest.mark.parametrize("name", ["pig_c3d/subject_a_walk.c3d"])
@@ -36,7 +37,6 @@ def test_a_walk_comes_back(recording_of, tmp_path, monkeypatch, kind, name):
 @pytest.mark.parametrize(
     ("kind", "old", "new", "code", "evidence"),
     [
-        ("tsv", "MARKER_NAMES\tHead", "MARKER_NAMES\tL.Toe", "F113", {"label": "L.Toe", "count": 2}),
         ("tsv", "FREQUENCY\t100", "FREQUENCY\t0", "F114", {"key": "FREQUENCY", "value": "0"}),
         ("tsv", "NO_OF_FRAMES\t1", "NO_OF_FRAMES\tnan", "F114", {"key": "NO_OF_FRAMES", "value": "nan"}),
         ("csv", "\n100\n", "\n1..0\n", "F114", {"value": "1..0"}),
@@ -56,3 +56,14 @@ def test_broken_exports_are_refused(tmp_path, kind, old, new, code, evidence):
     path.write_text(text.replace(old, new), encoding="utf-8")
     with refused(code, **evidence):
         read_recording(path)
+
+
+def test_of_repeated_labels_of_qualisys_the_first_with_data_is_kept(tmp_path):
+    path = tmp_path / "walk.tsv"
+    lab_files.write_qtm(path, lab_files.lab_walk())
+    names = next(line for line in path.read_text(encoding="utf-8").split("\n") if line.startswith("MARKER_NAMES"))
+    _, first, second, *_ = names.split("\t")
+    path.write_text(path.read_text(encoding="utf-8").replace(f"\t{second}", f"\t{first}", 1), encoding="utf-8")
+    recording = read_recording(path)
+    assert second not in recording.markers.labels
+    assert only(recording.findings, "F113", label=first, count=2).severity is Severity.INFO

@@ -6,6 +6,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
+from kinertia.findings.finding import Severity
 from kinertia.io.trc import read_trc, read_trc_recording, write_trc
 from kinertia.trial.data import Markers
 from recordings import here
@@ -167,7 +168,6 @@ BROKEN = {
     "count nan": (HEADER.replace("\t3\t2\t", "\tnan\t2\t") + ROWS, 3, "F114", {"key": "NumFrames", "value": "nan"}),
     "count inf": (HEADER.replace("\t3\t2\t", "\t3\tinf\t") + ROWS, 3, "F114", {"key": "NumMarkers", "value": "inf"}),
     "no rate": (HEADER.replace("100\t100\t3", "x\t100\t3") + ROWS, 3, "F114", {"key": "DataRate", "value": "x"}),
-    "repeated label": (HEADER.replace("L Heel", "R.Heel") + ROWS, 4, "F113", {"label": "R.Heel", "count": 2}),
     "no key": (HEADER.replace("NumMarkers", "Markers") + ROWS, 2, "F114", {"key": "NumMarkers", "value": "missing"}),
     "lost value": (HEADER.replace("100\t100\t3\t2\tmm", "100\t100\t3\t2") + ROWS, 3, "F114", {"expected": "8"}),
     "another file": ("nColumns=3\nendheader\n" + ROWS, 1, "F103", {"found": "nColumns=3", "expected": "PathFileType"}),
@@ -193,6 +193,16 @@ def test_the_subjects_name_before_the_labels_is_taken_off(write):
     only(recording.findings, "F163", count=2, what="'Anna:'")
     both = read_trc_recording(write(HEADER.replace("R.Heel", "Anna:A").replace("L Heel", "A") + ROWS))
     assert both.markers.labels == ("Anna:A", "A")
+
+
+def test_of_repeated_labels_the_first_with_data_is_kept(write):
+    header = HEADER.replace("\t3\t2\t", "\t3\t3\t").replace("L Heel", "R.Heel\t\t\tR.Heel")
+    first = read_trc_recording(write(header + THIRD))
+    assert first.markers.labels == ("R.Heel",)
+    np.testing.assert_allclose(first.markers.positions[0, 0], (0.001, 0.002, 0.003))
+    assert only(first.findings, "F113", label="R.Heel", count=3).severity is Severity.INFO
+    second = read_trc_recording(write(header + THIRD.replace("\t1\t2\t3\t", "\t\t\t\t")))
+    np.testing.assert_allclose(second.markers.positions[0, 0], (0.004, 0.005, 0.006))
 
 
 def test_lost_frame_in_the_middle(write):

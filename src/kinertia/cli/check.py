@@ -58,8 +58,8 @@ def check(
         list[Path],
         typer.Argument(
             metavar="FILE...",
-            help="Markers (.trc, .c3d, .tsv, .csv), each with its forces (.mot, .sto, .tsv; matched by name); or a "
-            "subject file (.toml); or models (.osim).",
+            help="Markers (.trc, .c3d, .tsv, .csv), each with its forces (.mot, .sto, .tsv, .forces; matched by "
+            "name); or a subject file (.toml); or models (.osim).",
         ),
     ],
     loads: Loads = None,

@@ -51,7 +51,9 @@ def fit(
     ],
     output: Output = Path("out"),
     static: Annotated[Path | None, typer.Option(help="Static trial (.c3d, .trc, .tsv, .csv).")] = None,
-    forces: Annotated[Path | None, typer.Option(help="Ground reactions (.mot, .sto); a C3D file has its own.")] = None,
+    forces: Annotated[
+        Path | None, typer.Option(help="Ground reactions (.mot, .sto, .forces); a C3D file has its own.")
+    ] = None,
     loads: Loads = None,
     mass: Annotated[
         float | None, typer.Option(parser=number, metavar="KG", help="Body mass, kg; a C3D file may contain it.")

@@ -10,7 +10,6 @@ from __future__ import annotations
 import contextlib
 import re
 import tempfile
-from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -19,14 +18,15 @@ import numpy as np
 
 from kinertia.errors import FileError
 from kinertia.findings.display import first_few
-from kinertia.findings.finding import Finding, Severity, finding, with_evidence
+from kinertia.findings.finding import Finding, finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.io.c3d_plates import lab_plates, person_on_plates, plate_left_out, to_ground_plates
 from kinertia.io.c3d_structure import doubts_about, with_plain_samples
-from kinertia.io.ezc3d_library import C3dContent, C3dTrouble, expect_ezc3d, read_apart, read_content
+from kinertia.io.ezc3d_library import C3dContent, C3dTrouble, expect_ezc3d, parameter_values, read_apart, read_content
 from kinertia.io.lab_axes import to_ground
 from kinertia.io.number_table import expect_file
+from kinertia.io.repeated_labels import first_with_data
 from kinertia.io.subject_prefix import left_out, people_among, without_prefixes
 from kinertia.io.theia import POSE_SD_M, Poses, virtual_markers, virtual_places
 from kinertia.io.trc import METRES_PER_UNIT, read_as_missing, stand_ins, unknown_unit
@@ -82,7 +82,7 @@ def read_c3d(path: str | Path, length_unit: str | None = None, standing: bool = 
         label_findings = [with_evidence("F165", Where(path.name), {**sizes, "source": made})]
     time = _times(file, "points" if poses is None else "rotations")[: len(positions)]
     plates, more_findings = lab_plates(path, file, unit_name)
-    stated = str(_values(parameters, "POINT", "Y_SCREEN", [""])[0]).strip().upper()
+    stated = str(parameter_values(parameters, "POINT", "Y_SCREEN", [""])[0]).strip().upper()
     rotation, up, axis_findings = to_ground(path, stated, "POINT:Y_SCREEN", unit * positions, plates)
     markers = Markers(time, labels, unit * positions @ rotation.T)
     ground_plates, load_findings = to_ground_plates(path, plates, rotation, _times(file, "analogs"))
@@ -116,8 +116,8 @@ def _open(path: Path) -> tuple[C3dContent, list[Finding]]:
         problem = f"{doubt}; {error}" if doubt else str(error)
         raise FileError.found(path, "F106", what=Quantity(problem)) from None
     parameters = file["parameters"]
-    if file["trouble"] and _values(parameters, "FORCE_PLATFORM", "USED", [0])[0]:
-        types = ", ".join(map(str, _values(parameters, "FORCE_PLATFORM", "TYPE", [])))
+    if file["trouble"] and parameter_values(parameters, "FORCE_PLATFORM", "USED", [0])[0]:
+        types = ", ".join(map(str, parameter_values(parameters, "FORCE_PLATFORM", "TYPE", [])))
         reason = f"they are of types {types} and cannot be read, {file['trouble']}"
         findings.append(plate_left_out(path, None, reason))
     if not file["data"]["points"].shape[1] and _poses(file) is None:
@@ -143,23 +143,15 @@ def _poses(file: C3dContent) -> Poses | None:
     """The poses of a file that has no points."""
     if file["data"]["points"].shape[1] or not np.size(file["data"]["rotations"]):
         return None
-    labels = [str(label) for label in _values(file["parameters"], "ROTATION", "LABELS", [])]
-    heels = {side: _values(file["parameters"], "THEIA3D", f"{side}_heel", None) for side in "rl"}
+    labels = [str(label) for label in parameter_values(file["parameters"], "ROTATION", "LABELS", [])]
+    heels = {side: parameter_values(file["parameters"], "THEIA3D", f"{side}_heel", None) for side in "rl"}
     known = {side: np.ravel(heel).astype(float) for side, heel in heels.items() if np.size(heel) == 3}
     return Poses.of(labels, file["data"]["rotations"], known)
 
 
-def _values(parameters: Any, group: str, name: str, default: Any) -> Any:
-    with contextlib.suppress(KeyError):
-        values = parameters[group][name]["value"]
-        if len(values):
-            return values
-    return default
-
-
 def _length_unit(path: Path, parameters: Any, positions: FloatArray, stated: str | None) -> tuple[str, list[Finding]]:
     """Its name; where the file has none, the one in which markers (n, m, 3) are as far apart as on a person."""
-    unit = str(_values(parameters, "POINT", "UNITS", [""])[0]).strip().lower()
+    unit = str(parameter_values(parameters, "POINT", "UNITS", [""])[0]).strip().lower()
     if stated is not None:
         differs = finding("F123", Where(path.name), stated=Quantity(stated), unit=Quantity(f"'{unit}'"))
         return stated, [] if unit == stated else [differs]
@@ -198,7 +190,7 @@ def _continued(parameters: Any, name: str) -> list[str]:
     """A list of strings that goes on in NAME2, NAME3 after 255 entries."""
     entries: list[str] = []
     for suffix in ["", *map(str, range(2, 100))]:
-        more = _values(parameters, "POINT", name + suffix, None)
+        more = parameter_values(parameters, "POINT", name + suffix, None)
         if more is None:
             break
         entries += [str(entry).strip() for entry in more]
@@ -224,27 +216,22 @@ def _markers(path: Path, file: Any) -> tuple[tuple[str, ...], FloatArray, list[F
     if on_plates:
         who = {"person": Quantity(on_plates), "people": Quantity(", ".join(people))}
         findings.append(with_evidence("F162", Where(path.name), who))
-    chosen: dict[str, int] = {}
-    for k, name in zip(kept, names, strict=True):
-        if name not in chosen or (not seen[chosen[name]] and seen[k]):
-            chosen[name] = k
+    first, repeated = first_with_data(path, names, seen[kept])
+    chosen = {name: kept[k] for name, k in first.items()}
     if not chosen or not seen[list(chosen.values())].any():
         raise FileError.found(path, "F164", found=Quantity(f"none of its {len(labels)} points has a label and data"))
     if outputs:
         findings.append(left_out(path, len(outputs), f"model outputs ({first_few(sorted(outputs))})"))
     if unnamed:
         findings.append(left_out(path, len(unnamed), "unnamed points"))
-    for name, times in Counter(names).items():
-        if times > 1:
-            evidence = {"count": Quantity(times, "1"), "label": Quantity(name)}
-            findings.append(with_evidence("F113", Where(path.name, markers=(name,)), evidence, Severity.INFO))
+    findings += repeated
     of_markers = {what: where[:, list(chosen.values())] for what, where in missing.items()}
     findings += read_as_missing(path, tuple(chosen), of_markers)
     return tuple(chosen), positions[:, list(chosen.values())], findings
 
 
 def _outputs(parameters: Any, labels: list[str]) -> set[str]:
-    groups = _values(parameters, "POINT", "TYPE_GROUPS", [])
+    groups = parameter_values(parameters, "POINT", "TYPE_GROUPS", [])
     lists = {*_OUTPUT_LISTS, *(str(name).strip() for name in list(groups)[::2])}
     listed = {label for name in lists for label in _continued(parameters, name)}
     return {label for label in labels if label in listed or _OUTPUT_NAME.search(label)}
@@ -254,7 +241,7 @@ def _subject(path: Path, parameters: Any) -> tuple[float | None, float | None, d
     """Mass (kg), height (m) and other lengths (m) from the PROCESSING group that Plug-in Gait writes."""
     numbers: dict[str, float] = {}
     for key in parameters.get("PROCESSING", ()):
-        value = _values(parameters, "PROCESSING", key, [""]) if key != "__METADATA__" else [""]
+        value = parameter_values(parameters, "PROCESSING", key, [""]) if key != "__METADATA__" else [""]
         if np.size(value) == 1 and isinstance(value[0], (int, float, np.number)) and value[0] > 0:
             numbers[key] = float(value[0])
     by_lower = {key.lower(): value for key, value in numbers.items()}

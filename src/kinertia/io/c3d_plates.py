@@ -18,6 +18,7 @@ from kinertia.errors import FileError
 from kinertia.findings.finding import Finding, Severity, finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
+from kinertia.io.ezc3d_library import parameter_values
 from kinertia.io.plate_moments import MOMENTS_FIT
 from kinertia.io.trc import METRES_PER_UNIT
 from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads
@@ -67,14 +68,14 @@ def lab_plates(path: Path, file: Any, length_unit: str) -> tuple[LabPlates | Non
     """
     unit = METRES_PER_UNIT[length_unit]
     platforms = file["data"].get("platform", [])
-    group = file["parameters"].get("FORCE_PLATFORM", {})
+    kinds = [int(kind) for kind in parameter_values(file["parameters"], "FORCE_PLATFORM", "TYPE")]
     names, forces, moments, corners = [], [], [], []
     findings: list[Finding] = []
     for number, platform in enumerate(platforms, start=1):
         name = f"plate {number}"
         places = unit * platform["corners"].T
-        kind = int(group["TYPE"]["value"][number - 1])
-        stated, moment_unit = _moment_unit(file, group, number - 1, length_unit)
+        kind = kinds[number - 1]
+        stated, moment_unit = _moment_unit(file["parameters"], kind, number - 1, len(platforms), length_unit)
         reason, edges = _corner_trouble(places)
         if not platform["force"].size:
             reason = reason or "it has no samples"
@@ -221,12 +222,12 @@ def _corner_trouble(corners: FloatArray) -> tuple[str, dict[str, Quantity]]:
     )
 
 
-def _moment_unit(file: Any, group: Any, plate: int, length: str) -> tuple[str, float]:
+def _moment_unit(parameters: Any, kind: int, plate: int, plates: int, length: str) -> tuple[str, float]:
     """What the analog channels of a plate say its moments are in, and how many N m that is; N `length` by default."""
-    if int(group["TYPE"]["value"][plate]) not in (2, 4):
+    if kind not in (2, 4):
         return "", METRES_PER_UNIT[length]
-    channels = np.atleast_2d(group["CHANNEL"]["value"])[:, plate]
-    units = file["parameters"]["ANALOG"]["UNITS"]["value"]
+    channels = np.reshape(parameter_values(parameters, "FORCE_PLATFORM", "CHANNEL"), (plates, -1))[plate]
+    units = parameter_values(parameters, "ANALOG", "UNITS")
     channel = int(channels[3]) - 1
     unit = str(units[channel]) if channel < len(units) else ""
     said = "".join(letter for letter in unit.lower() if letter.isalpha())

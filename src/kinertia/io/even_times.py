@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 
 import numpy as np
 
 from kinertia.errors import FileError
-from kinertia.findings.finding import Finding, finding
+from kinertia.findings.finding import Finding, finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.trial.data import FloatArray
@@ -20,6 +21,8 @@ _OFF = 0.75
 """Of the unit: so far rounded times are from the even ones, half a unit and what the straight line errs by."""
 _FEWEST_ODD, _ODD_SHARE = 5, 0.02
 """Rounding makes odd steps all the time; a lost or repeated sample makes one."""
+_FEWEST_BEFORE_LAST = 10
+"""Of fewer samples nobody knows which one is off."""
 _NOTICED = 0.05
 """Of a step; times that are off by less stay as they are."""
 
@@ -33,14 +36,28 @@ def rounding_s(time: FloatArray) -> float:
 
 
 def even_times(path: Path, time: FloatArray) -> tuple[FloatArray, tuple[Finding, ...]]:
-    """Times (k,) s of forces as they are, or on the even grid that they were rounded from, with what was found (T102).
+    """Times (k,) s of forces as they are, or on the even grid that they were rounded from, with what was found.
 
-    Nothing tells the rate but the times: the grid is the straight line through them. At 2000 Hz and in whole
-    milliseconds every other step is zero.
+    Nothing tells the rate but the times: the grid is the straight line through them (T102). At 2000 Hz and in whole
+    milliseconds every other step is zero. A last sample that alone is off is left out (T105): then the times are k - 1.
 
     Raises:
         FileError: samples are lost or repeated, or time goes back.
     """
+    try:
+        return _even(path, time)
+    except FileError:
+        if len(time) < _FEWEST_BEFORE_LAST:
+            raise
+        with contextlib.suppress(FileError):
+            kept, findings = _even(path, time[:-1])
+            evidence = step_evidence(time[-2], time[-1], float(np.median(np.diff(time))))
+            return kept, (with_evidence("T105", Where(path.name), evidence), *findings)
+        raise
+
+
+def _even(path: Path, time: FloatArray) -> tuple[FloatArray, tuple[Finding, ...]]:
+    """The same of times whose last one counts as all others."""
     steps = np.diff(time)
     if not steps.size:
         return time, ()

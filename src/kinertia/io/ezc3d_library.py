@@ -17,9 +17,11 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from kinertia.errors import FileError
 from kinertia.findings.quantity import Quantity
@@ -81,6 +83,18 @@ def read_content(path: Path) -> C3dContent:
         },
         "trouble": trouble,
     }
+
+
+def parameter_values(parameters: Any, group: str, name: str, default: Sequence[Any] = ()) -> Sequence[Any]:
+    """Give the values of one parameter of a `C3dContent`, one after the other as in the file, whatever shape it gives.
+
+    USED and TYPE of p plates are p values, and CHANNEL 6 p: some writers make them p x 1, or one row.
+    """
+    with contextlib.suppress(KeyError, TypeError):
+        values = np.ravel(parameters[group][name]["value"], order="F")
+        if len(values):
+            return list(values)
+    return default
 
 
 def read_apart(path: Path) -> C3dContent:

@@ -82,7 +82,7 @@ def read_forces_with_findings(
         table = read_table(path)
         _expect_columns(groups, table, path, loads_path)
     time, time_findings = even_times(path, table.time)
-    table = replace(table, time=time)
+    table = replace(table, time=time, values=table.values[: len(time)])
     turn = np.eye(3) if turn is None else turn
     wrenches = [_wrench(path, table, group, turn) for group in groups]
     loads = PlateLoads(

@@ -23,7 +23,8 @@ from kinertia.io.c3d_plates import LabPlates, contradicting_moments, to_ground_p
 from kinertia.io.lab_axes import to_ground
 from kinertia.io.number_table import mismatch, read_lines, read_rows
 from kinertia.io.plate_moments import PlateMoments
-from kinertia.io.sto import expect_once, header_entry, other_count
+from kinertia.io.repeated_labels import first_with_data
+from kinertia.io.sto import header_entry, other_count
 from kinertia.io.trc import seen_positions
 from kinertia.trial.data import FloatArray, Markers, Recording
 
@@ -127,7 +128,6 @@ def _markers(path: Path) -> tuple[Markers, list[Finding]]:
     if not labels:
         found = "no MARKER_NAMES in its header; export 3D data with the TSV header included"
         raise FileError.found(path, "F164", found=Quantity(found))
-    expect_once(path, labels, None)
     rate = _rate(path, header)
     stated = int(_number(path, header, "NO_OF_FRAMES"))
     counted = {"Frame", "Time"} <= {name for cells in ([k, *v] for k, v in header.items()) for name in cells}
@@ -138,7 +138,9 @@ def _markers(path: Path) -> tuple[Markers, list[Finding]]:
     if stated != len(values):
         findings.append(other_count(path, None, stated, len(values), "frames"))
     start = values[0, 1] if counted else 0.0
-    return Markers(start + np.arange(len(values)) / rate, labels, _MM * positions), findings
+    chosen, repeated = first_with_data(path, labels, np.isfinite(positions).all(axis=2).any(axis=0))
+    time = start + np.arange(len(values)) / rate
+    return Markers(time, tuple(chosen), _MM * positions[:, list(chosen.values())]), [*findings, *repeated]
 
 
 @dataclass(frozen=True, eq=False)

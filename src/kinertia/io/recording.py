@@ -11,15 +11,17 @@ from kinertia.errors import FileError, TrialError
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
+from kinertia.io.cortex_forces import ENDING as CORTEX
+from kinertia.io.cortex_forces import read_cortex_forces
 from kinertia.io.ground_forces import read_forces_with_findings
 from kinertia.io.lab_axes import upright_along_z
 from kinertia.io.number_table import expect_file, wrong_kind
 from kinertia.io.trc import read_trc_recording
-from kinertia.trial.data import FloatArray, Recording
+from kinertia.trial.data import FloatArray, PlateLoads, Recording
 from kinertia.trial.impossible_data import impossible_load, impossible_position
 
 MARKER_FILES = (".trc", ".c3d", ".tsv", ".csv")
-FORCE_FILES = (".mot", ".sto", ".tsv")
+FORCE_FILES = (".mot", ".sto", ".tsv", CORTEX)
 """Endings of what is read."""
 _FARTHEST_M, _STRONGEST_N = 1000.0, 1e6
 """Farther and stronger than anything in a laboratory."""
@@ -36,8 +38,8 @@ def read_recording(
 
     Args:
         markers_path: a .trc or .c3d file, a .tsv file of Qualisys, or a .csv file of Vicon.
-        forces_path: a .mot or .sto file; its forces go before those of the markers' file. Of Qualisys also the .tsv
-            file of a plate: those of the trial's other plates beside it are read, too.
+        forces_path: a .mot or .sto file, or a .forces file of Cortex; its forces go before those of the markers' file.
+            Of Qualisys also the .tsv file of a plate: those of the trial's other plates beside it are read, too.
         loads_path: an OpenSim ExternalLoads .xml file that says which force column is what. Without
             `forces_path` its own datafile is read.
         length_unit: of a .c3d file's lengths, "mm", "cm" or "m", whatever it says itself.
@@ -65,13 +67,24 @@ def read_recording(
     if loads_path is not None:
         _expect_kind(Path(loads_path), (".xml",), "external loads")
     if forces_path is not None or loads_path is not None:
-        plates, findings = read_forces_with_findings(forces_path, loads_path, turn)
+        plates, findings = _forces(forces_path, loads_path, turn)
         if recording.plates is not None:
             findings = (finding("F158", Where(markers_path.name)), *findings)
         recording = replace(recording, plates=plates, findings=(*_of_markers(recording), *findings))
     _expect_overlap(recording)
     _expect_laboratory(markers_path, recording)
     return recording
+
+
+def _forces(
+    path: str | Path | None, loads_path: str | Path | None, turn: FloatArray | None
+) -> tuple[PlateLoads, tuple[Finding, ...]]:
+    """Plates of a file of forces, and what was found of them."""
+    if path is None or Path(path).suffix.lower() != CORTEX:
+        return read_forces_with_findings(path, loads_path, turn)
+    if loads_path is not None:
+        raise wrong_kind(Path(loads_path), "An ExternalLoads file", f"explain a {CORTEX} file", "a .mot or .sto file")
+    return read_cortex_forces(path, turn)
 
 
 def _of_markers(recording: Recording) -> list[Finding]:

@@ -12,6 +12,7 @@ from typing import Any
 
 from kinertia.errors import FileError, KinertiaError
 from kinertia.findings.quantity import Quantity
+from kinertia.io.cortex_forces import ENDING as CORTEX
 from kinertia.io.file_names import RESULT_FILES, missing_file
 from kinertia.io.measures_file import is_measures_sheet
 from kinertia.io.qualisys import plates_beside
@@ -244,6 +245,8 @@ def has_force_columns(file: Path) -> bool:
     """Whether it is a motion file with columns `..._vx`, `..._vy`, ..., or such as the ExternalLoads beside it call
     forces; whichever trial's.
     """
+    if file.suffix.lower() == CORTEX:
+        return True
     if file.suffix.lower() not in (".mot", ".sto"):
         return False
     columns = _head(file)

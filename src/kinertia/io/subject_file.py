@@ -102,7 +102,7 @@ class TrialFiles(Table):
     name: TrialName = Field(description="name in files and report; left out: the marker file's")
     markers: File = Field(description="markers, .c3d, .trc, .tsv or .csv")
     forces: File | None = Field(
-        default=None, description="plate forces, .mot or .sto; C3D, .tsv and .csv have their own"
+        default=None, description="plate forces, .mot, .sto or .forces; C3D, .tsv and .csv have their own"
     )
     loads: File | None = Field(default=None, description="ExternalLoads .xml: what the columns are")
     length_unit: LengthUnit | None = Field(

@@ -16,7 +16,8 @@ from kinertia.findings.where import Where
 from kinertia.io.even_times import rounding_s, times_rounded, uneven
 from kinertia.io.number_table import malformed, mismatch, read_lines, read_rows
 from kinertia.io.output_folder import write_then_rename
-from kinertia.io.sto import expect_once, header_entry, other_count
+from kinertia.io.repeated_labels import first_with_data
+from kinertia.io.sto import header_entry, other_count
 from kinertia.io.subject_prefix import without_prefixes
 from kinertia.trial.data import BoolArray, FloatArray, Markers, Recording
 
@@ -33,7 +34,8 @@ def read_trc(path: str | Path) -> Markers:
     """Read marker trajectories (m, ground axes as in the file) from a TRC file.
 
     Empty cells, NaN and the triples 0 0 0 and -9999 -9999 -9999 are missing markers; `subject:` before the labels is
-    taken off. Frame times that were rounded when written are put back on the uniform grid they came from.
+    taken off; of repeated labels the first one with data is kept. Frame times that were rounded when written are put
+    back on the uniform grid they came from.
     `read_trc_recording` has what was assumed.
 
     Raises:
@@ -60,10 +62,12 @@ def read_trc_recording(path: str | Path) -> Recording:
     if unit not in METRES_PER_UNIT:
         raise unknown_unit(path, "lengths", f"'{header['Units']}'", line=3)
     names, prefix_findings = without_prefixes(path, labels)
-    if len(set(names)) == len(names):
+    if len(set(names)) == len(set(labels)):
         labels, findings = tuple(names), [*findings, *prefix_findings]
-    markers = Markers(time, labels, positions * METRES_PER_UNIT[unit])
-    return Recording(path.stem, markers, findings=(*findings, *time_findings, *position_findings), length_unit=unit)
+    chosen, repeated = first_with_data(path, labels, np.isfinite(positions).all(axis=2).any(axis=0))
+    markers = Markers(time, tuple(chosen), positions[:, list(chosen.values())] * METRES_PER_UNIT[unit])
+    found = (*findings, *repeated, *time_findings, *position_findings)
+    return Recording(path.stem, markers, findings=found, length_unit=unit)
 
 
 def unknown_unit(
@@ -159,7 +163,6 @@ def _labels(path: Path, lines: list[str]) -> tuple[str, ...]:
     labels = tuple(cell for cell in _cells(lines[3]) if cell)[2:]
     if not labels:
         raise FileError.found(path, "F164", 4, found=Quantity("the row of labels is empty"))
-    expect_once(path, labels, 4)
     return labels
 
 
