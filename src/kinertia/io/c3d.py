@@ -144,7 +144,7 @@ def _poses(file: C3dContent) -> Poses | None:
     if file["data"]["points"].shape[1] or not np.size(file["data"]["rotations"]):
         return None
     labels = [str(label) for label in parameter_values(file["parameters"], "ROTATION", "LABELS", [])]
-    heels = {side: parameter_values(file["parameters"], "THEIA3D", f"{side}_heel", None) for side in "rl"}
+    heels = {side: parameter_values(file["parameters"], "THEIA3D", f"{side}_heel") for side in "rl"}
     known = {side: np.ravel(heel).astype(float) for side, heel in heels.items() if np.size(heel) == 3}
     return Poses.of(labels, file["data"]["rotations"], known)
 
@@ -190,8 +190,8 @@ def _continued(parameters: Any, name: str) -> list[str]:
     """A list of strings that goes on in NAME2, NAME3 after 255 entries."""
     entries: list[str] = []
     for suffix in ["", *map(str, range(2, 100))]:
-        more = parameter_values(parameters, "POINT", name + suffix, None)
-        if more is None:
+        more = parameter_values(parameters, "POINT", name + suffix)
+        if not more:
             break
         entries += [str(entry).strip() for entry in more]
     return entries

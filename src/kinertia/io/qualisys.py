@@ -138,7 +138,7 @@ def _markers(path: Path) -> tuple[Markers, list[Finding]]:
     if stated != len(values):
         findings.append(other_count(path, None, stated, len(values), "frames"))
     start = values[0, 1] if counted else 0.0
-    chosen, repeated = first_with_data(path, labels, np.isfinite(positions).all(axis=2).any(axis=0))
+    chosen, repeated = first_with_data(path, labels, np.asarray(np.isfinite(positions).all(axis=2).any(axis=0)))
     time = start + np.arange(len(values)) / rate
     return Markers(time, tuple(chosen), _MM * positions[:, list(chosen.values())]), [*findings, *repeated]
 

@@ -64,7 +64,7 @@ def read_trc_recording(path: str | Path) -> Recording:
     names, prefix_findings = without_prefixes(path, labels)
     if len(set(names)) == len(set(labels)):
         labels, findings = tuple(names), [*findings, *prefix_findings]
-    chosen, repeated = first_with_data(path, labels, np.isfinite(positions).all(axis=2).any(axis=0))
+    chosen, repeated = first_with_data(path, labels, np.asarray(np.isfinite(positions).all(axis=2).any(axis=0)))
     markers = Markers(time, tuple(chosen), positions[:, list(chosen.values())] * METRES_PER_UNIT[unit])
     found = (*findings, *repeated, *time_findings, *position_findings)
     return Recording(path.stem, markers, findings=found, length_unit=unit)
