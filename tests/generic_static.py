@@ -67,11 +67,12 @@ def random_coordinates(skeleton, n: int, seed: int = 0, spread: float = 0.5) -> 
     rng = np.random.default_rng(seed)
     q = rng.uniform(-spread, spread, (n, len(skeleton.coordinates)))
     q[:, 1] += 1.0
+    q[:, [name.startswith(("knee", "elbow")) for name in skeleton.coordinates]] += 0.8
     return q
 
 
 def smooth_motion(skeleton, n: int = 60, rate_hz: float = 60.0, seed: int = 0) -> tuple[np.ndarray, Motion]:
-    """Time (n,) s and a motion in which every coordinate is a sum of two slow sinusoids (0.3-2 Hz)."""
+    """Time (n,) s and a motion in which every coordinate is a sum of two slow sinusoids (0.3-2 Hz); knees and elbows are bent."""
     rng = np.random.default_rng(seed)
     time = np.arange(n) / rate_hz
     shape = (2, len(skeleton.coordinates))
@@ -82,4 +83,5 @@ def smooth_motion(skeleton, n: int = 60, rate_hz: float = 60.0, seed: int = 0) -
         (size * part).sum(axis=1) for part in (np.sin(angle), omega * np.cos(angle), -(omega**2) * np.sin(angle))
     )
     q[:, 1] += 1.0
+    q[:, [name.startswith(("knee", "elbow")) for name in skeleton.coordinates]] += 0.8
     return time, Motion(q, qd, qdd)

@@ -163,16 +163,41 @@ def test_an_elbow_that_the_static_trial_has_backwards_bends_forwards(skeleton, s
     walk = trial(Markers(time, skeleton.labels, skeleton.marker_positions(skeleton.pose(q))))
     turn = f"arm_rot_{side}"
     spoilt = skeleton.lock({turn: skeleton.locked[turn] + 0.8 * np.pi})
-    before = first_poses(spoilt, [walk])
-    assert np.median(before[0].q[:, elbow]) < -0.8
-    mended, poses = with_elbows_that_bend_forwards(spoilt, [walk], before)
+    mended, poses = with_elbows_that_bend_forwards(spoilt, [walk])
     assert np.angle(np.exp(1j * (mended.locked[turn] - skeleton.locked[turn]))) == pytest.approx(0.0, abs=0.05)
     np.testing.assert_allclose(np.median(poses[0].q[:, elbow]), 1.3, atol=0.1)
     other = f"arm_rot_{'l' if side == 'r' else 'r'}"
     assert mended.locked[other] == skeleton.locked[other]
     assert elbow_rotations(spoilt, mended) == {side: pytest.approx(-0.8 * np.pi, abs=0.05)}
-    assert with_elbows_that_bend_forwards(skeleton, [walk], poses) == (skeleton, poses)
-    assert elbow_rotations(skeleton, skeleton) == {}
+    assert elbow_rotations(skeleton, with_elbows_that_bend_forwards(skeleton, [walk])[0]) == {}
+
+
+def straight_arms(skeleton, hyperextended=0.0) -> Markers:
+    """A walk in which neither elbow bends."""
+    time, motion = smooth_motion(skeleton, 300, 100.0, 0)
+    q = motion.q.copy()
+    q[:, [skeleton.coordinates.index(f"elbow_flex_{side}") for side in "rl"]] = -hyperextended
+    return Markers(time, skeleton.labels, skeleton.marker_positions(skeleton.pose(q)))
+
+
+def test_straight_elbows_keep_the_arms_as_the_static_trial_has_them(skeleton):
+    walk = trial(straight_arms(skeleton))
+    same, poses = with_elbows_that_bend_forwards(skeleton, [walk])
+    assert same.locked == skeleton.locked
+    adapted = calibration.adapt(same, [walk], poses, deviations(same), dict.fromkeys(ARM_ROTATIONS, 1.0))
+    assert adapted.coordinates == pytest.approx({name: skeleton.locked[name] for name in ARM_ROTATIONS}, abs=1e-3)
+
+
+def test_no_calibration_bends_an_elbow_backwards(skeleton):
+    """Markers and arms are adapted so that the elbows stay within their range."""
+    walk = trial(straight_arms(skeleton, hyperextended=0.4))
+    turned, poses = with_elbows_that_bend_forwards(skeleton, [walk])
+    sd = dict.fromkeys(ARM_ROTATIONS, 1.0)
+    adapted = calibration.adapt(turned, [walk], poses, deviations(turned), sd).skeleton
+    (ik,) = first_poses(adapted, [walk])
+    elbows = ik.q[:, [ik.coordinates.index(f"elbow_flex_{side}") for side in "rl"]]
+    assert elbows.min() >= np.radians(-5.0) - 1e-9
+    assert ik.marker_rms_m < 0.01
 
 
 def test_markers_that_may_not_turn_as_a_whole_move_one_by_one(skeleton):

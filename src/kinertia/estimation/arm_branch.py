@@ -2,43 +2,50 @@
 
 With one marker at an elbow, the static trial's plane of upper arm and forearm tells where the elbow's axis points. Of a
 nearly straight arm, as in a T-pose, that plane is chance, and the axis may be turned by more than a quarter turn about
-the arm: the elbow then bends backwards in all that follows. Trials in which it does are read again with upper arm and
-forearm free to turn about their own axes, where markers and the elbow's range tell the turn.
+the arm: the elbow then bends backwards in all that follows, if its range lets it. Trials in which it would are read
+again with upper arm and forearm free to turn about their own axes. The markers then show the turn or, with an elbow
+that bends backwards, half a turn more. The straighter the elbow, the less they do: a frame counts by the square of the
+sine of its flexion.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from kinertia.estimation.calibration import first_poses
+from kinertia.model.coordinate_range import Range
 from kinertia.model.gait27 import ARM_ROTATIONS
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.inverse_kinematics import InverseKinematics
 from kinertia.trial.data import Trial
 
-_BACKWARDS_RAD = 0.5
+_BACKWARDS_RAD = 0.05
 """Beyond the end of the elbow's range, median over the frames."""
+_ELBOWS = {side: f"elbow_flex_{side}" for side in "rl"}
 
 
 def with_elbows_that_bend_forwards(
-    skeleton: Skeleton, trials: Sequence[Trial], poses: Sequence[InverseKinematics]
+    skeleton: Skeleton, trials: Sequence[Trial]
 ) -> tuple[Skeleton, list[InverseKinematics]]:
-    """The skeleton, its arms turned as the trials show them where an elbow bends backwards, and the poses with it.
+    """The skeleton, its arms turned as the trials show them where an elbow would bend backwards, and `first_poses`.
 
     Args:
         skeleton: of the 27-DOF model, from the static trial; the arms' turns about their own axes are locked.
         trials: that it will be used for.
-        poses: their `first_poses`.
     """
-    sides = [side for side in "rl" if _bends_backwards(skeleton, poses, f"elbow_flex_{side}")]
-    if not sides:
-        return skeleton, list(poses)
-    free = first_poses(skeleton.free(ARM_ROTATIONS), trials)
-    turns = {name: _mean_angle(free, name) for name in ARM_ROTATIONS if name[-1] in sides}
-    turned = skeleton.lock({name: turn for name, turn in turns.items() if np.isfinite(turn)})
-    return turned, first_poses(turned, trials)
+    poses = first_poses(skeleton.unclamped(), trials)
+    beyond = {side: _beyond(skeleton, poses, name) for side, name in _ELBOWS.items()}
+    if not any(each.any() for each in beyond.values()):
+        return skeleton, poses
+    sides = [side for side, each in beyond.items() if each.size and np.median(each) < -_BACKWARDS_RAD]
+    if sides:
+        free = first_poses(skeleton.unclamped().free(ARM_ROTATIONS), trials)
+        turns = {name: _mean_angle(free, name) for name in ARM_ROTATIONS if name[-1] in sides}
+        skeleton = skeleton.lock({name: turn for name, turn in turns.items() if np.isfinite(turn)})
+    return skeleton, first_poses(skeleton, trials)
 
 
 def elbow_rotations(before: Skeleton, after: Skeleton) -> dict[str, float]:
@@ -51,20 +58,25 @@ def elbow_rotations(before: Skeleton, after: Skeleton) -> dict[str, float]:
     return {side: float(np.angle(np.exp(1j * each))) for side, each in rotations.items() if each != 0.0}
 
 
-def _bends_backwards(skeleton: Skeleton, poses: Sequence[InverseKinematics], elbow: str) -> bool:
-    angles = _angles(poses, elbow)
-    return len(angles) > 0 and bool(np.median(angles) < skeleton.ranges[elbow].low - _BACKWARDS_RAD)
+def _beyond(skeleton: Skeleton, poses: Sequence[InverseKinematics], elbow: str) -> np.ndarray:
+    """Rad by which an elbow is beyond its range, with the sign of the side, in all frames that show it."""
+    angles, ends = _angles(poses, elbow), skeleton.ranges[elbow]
+    angles = angles[np.isfinite(angles)]
+    result: np.ndarray = angles - np.clip(angles, ends.low, ends.high)
+    return result
 
 
 def _mean_angle(poses: Sequence[InverseKinematics], name: str) -> float:
-    """Rad, on the circle; NaN where no frame shows it."""
-    angles = _angles(poses, name)
-    return float(np.angle(np.exp(1j * angles).mean())) if len(angles) else np.nan
+    """Rad, on the circle, of a turn about an arm's axis with the elbow bent forwards; NaN where no frame shows it."""
+    angles, flexion = _angles(poses, name), _angles(poses, _ELBOWS[name[-1]])
+    known = np.isfinite(angles) & np.isfinite(flexion)
+    forwards = np.where(flexion < 0.0, angles + np.pi, angles)
+    mean = (np.square(np.sin(flexion[known])) * np.exp(1j * forwards[known])).sum()
+    return float(np.angle(mean)) if known.any() else np.nan
 
 
 def _angles(poses: Sequence[InverseKinematics], name: str) -> np.ndarray:
-    """Rad, of all frames that show it."""
+    """Rad, of all frames; NaN where they do not show it."""
     columns = [ik.q[:, ik.coordinates.index(name)] for ik in poses if name in ik.coordinates]
-    found = np.concatenate([np.empty(0), *columns])
-    result: np.ndarray = found[np.isfinite(found)]
+    result: np.ndarray = np.concatenate([np.empty(0), *columns])
     return result

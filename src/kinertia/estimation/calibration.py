@@ -3,7 +3,7 @@
 A static trial shows where markers sit on a person who stands, often with raised arms; in gait the skin has moved (the
 acromia by up to 10 cm after a T-pose). Over a few frames of the trials, coordinates that move (one set per frame) and
 calibration that does not (marker positions, and locked coordinates such as the shoulder centre) are estimated together
-by Gauss-Newton; the static trial is the prior. Frames are eliminated one by one (Schur complement), so the cost grows
+by Gauss-Newton; the static trial is the prior, and a coordinate beyond its range pays (`range_terms`). Frames are eliminated one by one (Schur complement), so the cost grows
 linearly with their number.
 """
 
@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinertia.errors import TrialError
+from kinertia.estimation.simultaneous.range_terms import RangeTerms
 from kinertia.model.skeleton import Marker, Pose, Skeleton
 from kinertia.motion.inverse_kinematics import InverseKinematics, solve_ik
 from kinertia.trial.data import Markers, Trial
@@ -109,7 +110,8 @@ def adapt(
         q[:, moving_at], q[:, still_at] = moving, static[: len(still)]
         residual, jacobian = _in_segments(freed, measured, q, static[len(still) :].reshape(-1, 3))
         by_moving, by_still = jacobian[..., moving_at], jacobian[..., still_at]
-        step, moving_step = _step(residual, by_moving, by_still, information @ (prior - static), information)
+        ranges = RangeTerms.of(base.bounds, moving, frames_per_interval=1.0)
+        step, moving_step = _step(residual, by_moving, by_still, information @ (prior - static), information, ranges)
         static, moving = static + step, moving + moving_step
         if np.abs(step).max() < _TOLERANCE_M:
             break
@@ -188,20 +190,27 @@ def _in_segments(
 
 
 def _step(
-    residual: np.ndarray, by_moving: np.ndarray, by_still: np.ndarray, prior_pull: np.ndarray, information: np.ndarray
+    residual: np.ndarray,
+    by_moving: np.ndarray,
+    by_still: np.ndarray,
+    prior_pull: np.ndarray,
+    information: np.ndarray,
+    ranges: RangeTerms,
 ) -> tuple[np.ndarray, np.ndarray]:
     """One Gauss-Newton step of the static unknowns (k,), still coordinates then places, and of the moving (n, c).
 
-    Takes what `_in_segments` gives, and the prior's information (k, k).
+    Takes what `_in_segments` gives, the prior's information (k, k), and what the moving coordinates pay.
     """
     n = len(residual)
     seen = np.isfinite(residual).reshape(n, -1)
     residual = np.nan_to_num(residual).reshape(n, -1)
     by_moving, by_still = (part.reshape(n, residual.shape[1], -1) for part in (by_moving, by_still))
     transposed = by_moving.transpose(0, 2, 1)
-    normal = transposed @ by_moving + 1e-6 * np.eye(by_moving.shape[-1])
+    every = np.arange(by_moving.shape[-1])
+    normal = transposed @ by_moving
+    normal[:, every, every] += 1e-6 + ranges.curvature
     across = np.concatenate([transposed @ by_still, transposed / MARKER_NOISE_M], axis=-1)
-    gradient = transposed @ residual[..., None]
+    gradient = transposed @ residual[..., None] + ranges.pull[..., None]
     solved = np.linalg.solve(normal, np.concatenate([across, gradient], axis=-1))
     # S^T S and S^T r summed over frames; a place moves its own marker only
     k = by_still.shape[-1]

@@ -58,10 +58,12 @@ _USUAL_DEG = {
     "lumbar_rotation": (-60.0, 60.0),
     "arm_flex": (-90.0, 150.0),
     "arm_add": (-120.0, 60.0),
-    "elbow_flex": (-15.0, 155.0),
+    "elbow_flex": (-5.0, 159.7),
 }
 """How far people move, and somewhat more. These ranges only tell equal poses apart: a joint goes beyond where its
-markers do."""
+markers do. Not so an elbow: hardly any bends backwards, and an arm without markers of its own that is turned by half a
+turn fits as well (flexion: mean and three SD of Boone and Azen 1979, J Bone Joint Surg Am 61:756)."""
+_CLAMPED = ("elbow_flex",)
 
 _X, _Y, _Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
@@ -148,13 +150,13 @@ def _landmarks_of(marks: jc.Landmarks, joint: Joint) -> str:
 
 
 def _usual_ranges(joints: list[Joint]) -> dict[str, Range]:
-    names = {axis.coordinate for joint in joints for axis in joint.axes}
-    known = [(name, _USUAL_DEG.get(name.removesuffix("_r").removesuffix("_l"))) for name in sorted(names)]
-    return {
-        name: Range(float(np.radians(ends[0])), float(np.radians(ends[1])), clamped=False)
-        for name, ends in known
-        if ends is not None
-    }
+    ranges = {}
+    for name in sorted({axis.coordinate for joint in joints for axis in joint.axes}):
+        kind = name.removesuffix("_r").removesuffix("_l")
+        if kind in _USUAL_DEG:
+            low, high = np.radians(_USUAL_DEG[kind]).tolist()
+            ranges[name] = Range(low, high, clamped=kind in _CLAMPED)
+    return ranges
 
 
 def _root() -> Joint:

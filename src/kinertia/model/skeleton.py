@@ -185,6 +185,10 @@ class Skeleton:
         self._check_names(names)
         return replace(self, locked={k: v for k, v in self.locked.items() if k not in names})
 
+    def unclamped(self) -> Skeleton:
+        """The same skeleton with ranges that coordinates may leave."""
+        return replace(self, ranges={name: replace(one, clamped=False) for name, one in self.ranges.items()})
+
     def with_markers(self, markers: Sequence[Marker]) -> Skeleton:
         """The same skeleton with other markers."""
         other = replace(self, markers=tuple(markers))

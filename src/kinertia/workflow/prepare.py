@@ -14,7 +14,7 @@ from kinertia.diagnostics.runner import blocking
 from kinertia.diagnostics.subject.unobserved_segments import unobserved_segments
 from kinertia.errors import BlockedError, MarkerSetError, SettingsError, TrialError
 from kinertia.estimation.arm_branch import elbow_rotations, with_elbows_that_bend_forwards
-from kinertia.estimation.calibration import adapt, first_poses, hold_uninformed, turn_about
+from kinertia.estimation.calibration import adapt, hold_uninformed, turn_about
 from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.estimation.input_checks import check_trials, complete_subject, known
 from kinertia.estimation.population import population_prior
@@ -81,7 +81,7 @@ def calibrate(model: Gait27, trials: Sequence[Trial]) -> Calibrated:
     the shoulder centres by 40 mm. Where arms have turned the torso under its markers, since the model's shoulders lack
     an axis, its markers and the pelvis' may not turn as a whole.
     """
-    skeleton, poses = with_elbows_that_bend_forwards(model.skeleton, trials, first_poses(model.skeleton, trials))
+    skeleton, poses = with_elbows_that_bend_forwards(model.skeleton, trials)
     elbows = elbow_rotations(model.skeleton, skeleton)
     skeleton, _ = hold_uninformed(skeleton, trials, poses, dict.fromkeys(ARM_COORDINATES, 0.0))
     found = [one for trial in trials for one in labels_by_model(skeleton, trial)]

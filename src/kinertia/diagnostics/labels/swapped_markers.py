@@ -46,8 +46,8 @@ def labels_by_model(skeleton: Skeleton, trial: Trial | Recording) -> Iterator[Fi
         skeleton: the model of the static trial.
         trial: a few of its frames are looked at.
     """
-    where, model = Where(trial=trial.name), skeleton.free(ARM_ROTATIONS)
-    frames = _complete_frames(model, trial.name, sampled(trial.markers))
+    where = Where(trial=trial.name)
+    frames = _complete_frames(skeleton, trial.name, sampled(trial.markers))
     if isinstance(frames, Finding):
         yield frames
         return
@@ -81,23 +81,29 @@ def labels_by_model(skeleton: Skeleton, trial: Trial | Recording) -> Iterator[Fi
 
 
 def _complete_frames(skeleton: Skeleton, name: str, markers: Markers) -> tuple[Skeleton, Markers, np.ndarray] | Finding:
-    """The skeleton without coordinates that the trial never shows, a few frames of its markers, and their errors (f, m)
-    from the model that fits best; R103 where no frame shows all coordinates, of the rarest one.
+    """The skeleton with arms that turn about their own axes, without coordinates that the trial never shows, a few
+    frames of its markers, and their errors (f, m) from the model that fits best; R103 where no frame shows all
+    coordinates, of the rarest one.
+
+    No frame with a straight elbow shows how the arm has turned about itself, and none needs to; which way an elbow
+    bends does not matter here.
     """
-    ik = solve_ik(skeleton, markers, name, consecutive=False, gain_tolerance_m2=_ENOUGH_M2)
+    model = skeleton.unclamped().free(ARM_ROTATIONS)
+    ik = solve_ik(model, markers, name, consecutive=False, gain_tolerance_m2=_ENOUGH_M2)
     known = np.isfinite(ik.q)
     never = [c for c, shown in zip(ik.coordinates, known.any(axis=0), strict=True) if not shown]
-    known = known[:, known.any(axis=0)]
+    needed = [c for c in skeleton.coordinates if c not in never]
+    known = known[:, [ik.coordinates.index(c) for c in needed]]
     solved = np.flatnonzero(known.all(axis=1))
     if not solved.size:
-        names = [c for c in ik.coordinates if c not in never]
-        rare = names[int(np.argmin(known.sum(axis=0)))]
+        rare = needed[int(np.argmin(known.sum(axis=0)))]
         frames = Quantity(float(known.sum(axis=0).min()), "1")
         return finding("R103", Where(trial=name, part=rare), frames=frames)
     some = solved[np.unique(np.linspace(0, len(solved) - 1, _FRAMES).round().astype(int))]
     measured = markers.select(ik.labels)
     few = Markers(measured.time[some], ik.labels, measured.positions[some])
-    return skeleton.lock(dict.fromkeys(never, 0.0)), few, ik.errors_m[some]
+    held = {c: skeleton.locked.get(c, 0.0) for c in never}
+    return model.lock(held), few, ik.errors_m[some]
 
 
 def _swapped_errors(skeleton: Skeleton, labels: tuple[str, ...], measured: np.ndarray) -> np.ndarray:
