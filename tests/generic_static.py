@@ -72,7 +72,10 @@ def random_coordinates(skeleton, n: int, seed: int = 0, spread: float = 0.5) -> 
 
 
 def smooth_motion(skeleton, n: int = 60, rate_hz: float = 60.0, seed: int = 0) -> tuple[np.ndarray, Motion]:
-    """Time (n,) s and a motion in which every coordinate is a sum of two slow sinusoids (0.3-2 Hz); knees and elbows are bent."""
+    """Time (n,) s and a motion in which every coordinate is a sum of two slow sinusoids (0.3-2 Hz).
+
+    Knees and elbows are bent.
+    """
     rng = np.random.default_rng(seed)
     time = np.arange(n) / rate_hz
     shape = (2, len(skeleton.coordinates))

@@ -11,12 +11,10 @@ sine of its flexion.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from kinertia.estimation.calibration import first_poses
-from kinertia.model.coordinate_range import Range
 from kinertia.model.gait27 import ARM_ROTATIONS
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.inverse_kinematics import InverseKinematics

@@ -3,8 +3,8 @@
 A static trial shows where markers sit on a person who stands, often with raised arms; in gait the skin has moved (the
 acromia by up to 10 cm after a T-pose). Over a few frames of the trials, coordinates that move (one set per frame) and
 calibration that does not (marker positions, and locked coordinates such as the shoulder centre) are estimated together
-by Gauss-Newton; the static trial is the prior, and a coordinate beyond its range pays (`range_terms`). Frames are eliminated one by one (Schur complement), so the cost grows
-linearly with their number.
+by Gauss-Newton; the static trial is the prior, and a coordinate beyond its range pays (`range_terms`). Frames are
+eliminated one by one (Schur complement), so the cost grows linearly with their number.
 """
 
 from __future__ import annotations

@@ -138,7 +138,7 @@ def test_no_complete_frame(made):
 def test_straight_elbows_hide_no_frame(made):
     """With one marker at a straight elbow no frame shows how far the arm has turned about itself, and none needs to."""
     skeleton, markers = made
-    time, motion = smooth_motion(skeleton, n=20, rate_hz=10.0)
+    _, motion = smooth_motion(skeleton, n=20, rate_hz=10.0)
     motion.q[:, [skeleton.coordinates.index(f"elbow_flex_{side}") for side in "rl"]] = 0.0
     straight = replace(markers, positions=skeleton.marker_positions(skeleton.pose(motion.q)))
     few = straight.select([label for label in markers.labels if not label.endswith("Bicep")])
