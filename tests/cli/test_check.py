@@ -338,6 +338,18 @@ def test_subject_file_with_a_model(synthetic_lab, tmp_path):
     assert {"L101", "P278"}.isdisjoint(one["code"] for one in content["findings"])
 
 
+def test_a_model_and_forces_are_given_as_to_a_fit(synthetic_lab, tmp_path):
+    data = synthetic_lab
+    walk = (data / "walk.trc", "--forces", data / "walk_grf.mot", "--loads", data / "walk_grf.xml")
+    content = told(*walk, "--model", data / "scaled.osim", "--mass", 72.6)
+    assert facts_of(content)["walk"]["files"] == "walk.trc, walk_grf.mot"
+    assert "scaled.osim" in facts_of(content)["walk"]["marker set"]
+    for more in (("--model", data / "scaled.osim", "--markers", "plug-in-gait"), ("--calibrate",)):
+        outcome = run("check", *walk, *more)
+        assert outcome.status == 2
+        assert "F193 " in outcome.err
+
+
 def test_model_that_is_doubted_in_a_subject_file(measured_folder, tmp_path):
     """What the fit will warn of; a sound model is not mentioned."""
     data = measured_folder / "subject4"

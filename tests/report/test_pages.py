@@ -29,6 +29,7 @@ from kinertia.report.table1_variants import render_variants
 from kinertia.settings import Subject
 from kinertia.workflow.check import check_person
 from kinertia.workflow.files import files_by_name, read_files
+from kinertia.workflow.person import Person
 from study_results import ACCURACIES, HELD_OUT, OUTCOMES, PLAN, POPULATIONS_STUDY, SOUND
 
 axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="needs axe (pip install -e '.[test]')")
@@ -56,7 +57,7 @@ def pages(demo_run, fit, two_level, c3d_lab, tmp_path_factory):
 
     def check():
         files = files_by_name([c3d_lab / "static.c3d", c3d_lab / "walk.c3d"])
-        checked = check_person(read_files(files, Subject(name="person", mass_kg=80.0)))
+        checked = check_person(read_files(files, Person(Subject(name="person", mass_kg=80.0), ())))
         found = replace(checked.overview, findings=(*checked.findings, *FAULTY), left_out=("walk 2",))
         return save_check_page([found], checked.recordings, [], folder / "check")
 

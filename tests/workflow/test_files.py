@@ -3,10 +3,13 @@
 import pytest
 
 from kinertia.findings.finding import Severity
+from kinertia.io.subject_file import subject_from_options
 from kinertia.settings import Subject
 from kinertia.workflow.check import check_person
-from kinertia.workflow.files import RecordingFiles, read_files
+from kinertia.workflow.files import RecordingFiles, files_by_name, read_files
+from kinertia.workflow.person import Person, read_person
 from recordings import named_here
+from refusals import refused
 
 WALKS = named_here(
     {
@@ -26,7 +29,7 @@ def given(request, file_of):
     def check(static=None):
         wanted = [RecordingFiles(file_of(one)) for one in WALKS[request.param]]
         chosen = None if static is None else wanted[static].markers
-        return check_person(read_files(wanted, Subject(name="A"), static=chosen))
+        return check_person(read_files(wanted, Person(Subject(name="A"), ()), chosen))
 
     return request.param, check
 
@@ -48,3 +51,24 @@ def test_a_walk_given_as_the_static_trial(given):
     assert walks.where.trial == WALKS[name][0].split("/")[1][:-4]
     assert walks.evidence["distance_m"].value == pytest.approx(FAR_M[name], abs=0.05)
     assert found.recordings[0].context.name == walks.where.trial
+
+
+@pytest.mark.parametrize("name", WALKS)
+def test_files_and_options_of_a_fit_are_judged_alike(file_of, name):
+    walk, static = map(file_of, WALKS[name])
+    stated = {"mass_kg": 60.0, "height_m": 1.6, "sex": "male"}
+    options = {"subject": {"name": "A", **stated}, "model": {"static": str(static)}, "trial": [{"markers": str(walk)}]}
+    fitted = check_person(read_person(subject_from_options(options)))
+    wanted = files_by_name([walk, static], static=static)
+    checked = check_person(read_files(wanted, Person(Subject(name="A", **stated), ()), static))
+    assert [one.to_dict() for one in checked.findings] == [one.to_dict() for one in fitted.findings]
+    assert "S111" in [one.code for one in checked.findings], "60 kg are stated"
+
+
+def test_forces_that_are_given_go_with_the_only_markers(tmp_path):
+    walk, other, forces = (tmp_path / name for name in ("walk.trc", "other.trc", "grf.mot"))
+    assert files_by_name([walk], forces=forces) == (RecordingFiles(walk, forces),)
+    assert files_by_name([walk, other], forces=forces, static=other) == (RecordingFiles(walk, forces),)
+    for files in ([walk, other], [walk, tmp_path / "walk_grf.mot"]):
+        with refused("F108"):
+            files_by_name(files, forces=forces)

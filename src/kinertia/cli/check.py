@@ -12,14 +12,30 @@ import typer
 from rich.table import Table
 
 from kinertia.cli.findings_view import show_overview
-from kinertia.cli.options import Loads, Overwrite, Quiet, Sex, Verbose, Waive, number, overrule_of, results_folder
+from kinertia.cli.options import (
+    Calibrate,
+    Forces,
+    Height,
+    Loads,
+    MarkerSetName,
+    Mass,
+    Overwrite,
+    Quiet,
+    ScaledModel,
+    Sex,
+    Static,
+    Verbose,
+    Waive,
+    overrule_of,
+    results_folder,
+)
 from kinertia.cli.outcome import Outcome
 from kinertia.cli.terminal import out, plain_table, shown_progress
 from kinertia.errors import FileError
 from kinertia.findings.overview import Overview
 from kinertia.io.marker_set_file import read_marker_set
 from kinertia.io.osim.reader import read_osim
-from kinertia.io.subject_file import read_subject, subject_file_in
+from kinertia.io.subject_file import expect_one_model, read_subject, subject_file_in
 from kinertia.model.anthropometry import check_subject
 from kinertia.report.check_page import save_check_page
 from kinertia.settings import Subject
@@ -62,20 +78,15 @@ def check(
             "name); or a subject file (.toml); or models (.osim).",
         ),
     ],
+    static: Static = None,
+    forces: Forces = None,
     loads: Loads = None,
-    mass: Annotated[
-        float | None,
-        typer.Option(parser=number, metavar="KG", help="Body mass, kg, to compare forces and models with."),
-    ] = None,
-    height: Annotated[
-        float | None,
-        typer.Option(parser=number, metavar="M", help="Stature, m, to compare models with the literature."),
-    ] = None,
+    mass: Mass = None,
+    height: Height = None,
     sex: Sex = None,
-    static: Annotated[Path | None, typer.Option(help="Static trial; found among the files if left out.")] = None,
-    markers: Annotated[
-        str | None, typer.Option(help="Marker set: a preset or a TOML file; found from the labels if left out.")
-    ] = None,
+    markers: MarkerSetName = None,
+    model: ScaledModel = None,
+    calibrate: Calibrate = False,
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Folder for the same results as a page, check.html.")
     ] = None,
@@ -88,6 +99,9 @@ def check(
 
     Asks the questions that a fit asks up to inverse kinematics: markers,
     labels, force plates, synchronisation, the subject, the OpenSim model.
+    Takes what kinertia fit takes. Of several files, forces and static trial
+    are found by names and data where --forces and --static do not say them.
+
     Each finding has a code; kinertia explain CODE says what it means.
     Exit status 1 if an ERROR is open: no fit or no simulation can rest on it.
 
@@ -95,7 +109,9 @@ def check(
 
     kinertia check walk.c3d static.c3d
 
-    kinertia check walk.trc walk_grf.mot --loads loads.xml --mass 72.6 -o out
+    kinertia check walk.c3d --static static.c3d --mass 41.5 --height 1.61 --sex male
+
+    kinertia check walk.trc --forces walk_grf.mot --loads loads.xml --model scaled.osim --mass 72.6 -o out
 
     kinertia check subject.toml
 
@@ -106,30 +122,32 @@ def check(
     check_subject(70.0 if mass is None else mass, 1.7 if height is None else height, sex or "male")
     files = [subject_file_in(path) if _holds_subject_file(path) else path for path in files]
     subjects = [path for path in files if path.suffix.lower() == ".toml"]
-    if subjects and (len(files) > 1 or any(one is not None for one in (loads, mass, height, sex, markers, static))):
+    given = (static, forces, loads, mass, height, sex, markers, model, calibrate or None)
+    if subjects and (len(files) > 1 or any(one is not None for one in given)):
         raise FileError(subjects[0], "a subject file says it all; give it alone, without other files and options")
     overrule = overrule_of(waive)
     osim = [read_osim(path) for path in files if path.suffix.lower() == ".osim"]
     measured = [path for path in files if path.suffix.lower() != ".osim"]
     who = Subject.model_validate({"name": "person", "mass_kg": mass, "height_m": height, "sex": sex})
+    person: Person | None
     with shown_progress() as progress:
         if subjects:
             wanted = read_subject(subjects[0])
-            person: Person | None = read_person(wanted, progress).with_overrule(overrule)
+            person = read_person(wanted, progress)
             read = {one.name: _names(one.markers, one.forces) for one in wanted.trials}
             if wanted.model.static is not None:
                 read[wanted.model.static.stem] = wanted.model.static.name
         else:
+            expect_one_model(static=static, markers=markers, osim=model, calibrate=calibrate)
             marker_set = None if markers is None else read_marker_set(markers)
-            named = files_by_name(measured if static is None else [*measured, static], loads)
+            osim_model = None if model is None else read_osim(model)
+            named = files_by_name(measured, loads, forces, static)
             read = {name: _names(one.markers, one.forces) for name, one in zip(trial_names(named), named, strict=True)}
-            person = (
-                read_files(named, who, marker_set, overrule, static, lambda share: progress("reading", share))
-                if named
-                else None
-            )
+            read |= {} if static is None else {static.stem: static.name}
+            stated = Person(who, (), marker_set=marker_set, model=osim_model, calibrate=calibrate)
+            person = read_files(named, stated, static, lambda share: progress("reading", share)) if named else None
         checked = _Checked(
-            None if person is None else check_person(person),
+            None if person is None else check_person(person.with_overrule(overrule)),
             [check_osim(one, who, overrule) for one in osim],
             read,
         )

@@ -13,14 +13,20 @@ import typer
 from kinertia.cli.findings_view import show_overview
 from kinertia.cli.fit_report import report_tables
 from kinertia.cli.options import (
+    Calibrate,
+    Forces,
+    Height,
     Loads,
+    MarkerSetName,
+    Mass,
     Output,
     Overwrite,
     Quiet,
+    ScaledModel,
     Sex,
+    Static,
     Verbose,
     Waive,
-    number,
     overrule_of,
     results_folder,
 )
@@ -50,28 +56,15 @@ def fit(
         ),
     ],
     output: Output = Path("out"),
-    static: Annotated[Path | None, typer.Option(help="Static trial (.c3d, .trc, .tsv, .csv).")] = None,
-    forces: Annotated[
-        Path | None, typer.Option(help="Ground reactions (.mot, .sto, .forces); a C3D file has its own.")
-    ] = None,
+    static: Static = None,
+    forces: Forces = None,
     loads: Loads = None,
-    mass: Annotated[
-        float | None, typer.Option(parser=number, metavar="KG", help="Body mass, kg; a C3D file may contain it.")
-    ] = None,
-    height: Annotated[
-        float | None, typer.Option(parser=number, metavar="M", help="Stature, m; a C3D file may contain it.")
-    ] = None,
+    mass: Mass = None,
+    height: Height = None,
     sex: Sex = None,
-    markers: Annotated[
-        str | None,
-        typer.Option(help="Marker set: a preset or a TOML file; found from the labels if left out."),
-    ] = None,
-    model: Annotated[
-        Path | None, typer.Option(help="Scaled OpenSim model (.osim), in place of --static, --sex and --height.")
-    ] = None,
-    calibrate: Annotated[
-        bool, typer.Option("--calibrate", help="Let markers and joint centres of the OpenSim model move.")
-    ] = False,
+    markers: MarkerSetName = None,
+    model: ScaledModel = None,
+    calibrate: Calibrate = False,
     method: Annotated[
         str | None, typer.Option(help="Estimator: simultaneous (default) or two-level.", autocompletion=_methods)
     ] = None,

@@ -54,6 +54,25 @@ def sex(text: str) -> str:
 Sex = Annotated[
     str | None, typer.Option(parser=sex, metavar="SEX", help="male or female (m, f): which table of the literature.")
 ]
+Mass = Annotated[
+    float | None, typer.Option(parser=number, metavar="KG", help="Body mass, kg; a C3D file may contain it.")
+]
+Height = Annotated[
+    float | None, typer.Option(parser=number, metavar="M", help="Stature, m; a C3D file may contain it.")
+]
+Static = Annotated[Path | None, typer.Option(help="Static trial (.c3d, .trc, .tsv, .csv).")]
+Forces = Annotated[Path | None, typer.Option(help="Ground reactions (.mot, .sto, .forces); a C3D file has its own.")]
+MarkerSetName = Annotated[
+    str | None,
+    typer.Option("--markers", help="Marker set: a preset or a TOML file; found from the labels if left out."),
+]
+ScaledModel = Annotated[
+    Path | None,
+    typer.Option("--model", help="Scaled OpenSim model (.osim), in place of --static, --sex and --height."),
+]
+Calibrate = Annotated[
+    bool, typer.Option("--calibrate", help="Let markers and joint centres of the OpenSim model move.")
+]
 Waive = Annotated[
     list[str] | None,
     typer.Option("--waive", metavar="CODE", help="Go on in spite of this ERROR; shown as waived. May be repeated."),

@@ -277,16 +277,35 @@ def _incomplete(wanted: SubjectFile) -> tuple[Location, Finding] | None:
     for table, key, value in (("model", "static", model.static), ("subject", "sex", wanted.subject.sex)):
         if value is None and model.osim is None:
             return (table, key), _finding({"loc": (table, key), "type": "missing"})
-    if model.osim is not None:
-        for key, given in (("static", model.static), ("markers", model.markers)):
+    if lack := _two_models(model.static, model.markers, model.osim, model.calibrate):
+        return lack
+    if model.osim is not None and wanted.settings.method == "two-level":
+        two_level = 'method = "two-level" (which works on the built-in model only)'
+        return ("settings", "method"), _conflict(two_level, "osim in [model]")
+    return None
+
+
+def expect_one_model(static: Path | None, markers: str | Path | None, osim: Path | None, calibrate: bool) -> None:
+    """Refuse entries of [model] that do not go together, whoever gives them.
+
+    Raises:
+        SettingsError: they belong to the built-in and to an OpenSim model (F193).
+    """
+    if lack := _two_models(static, markers, osim, calibrate):
+        raise _settings_error(lack[1])
+
+
+def _two_models(
+    static: Path | None, markers: str | Path | None, osim: Path | None, calibrate: bool
+) -> tuple[Location, Finding] | None:
+    """Where and what entries belong to the other kind of model."""
+    if osim is not None:
+        for key, given in (("static", static), ("markers", markers)):
             if given is not None:
                 return ("model", key), _conflict("osim", f"{key} in [model] (the OpenSim model has all of it)")
-        if wanted.settings.method == "two-level":
-            two_level = 'method = "two-level" (which works on the built-in model only)'
-            return ("settings", "method"), _conflict(two_level, "osim in [model]")
-    elif model.calibrate:
-        static = "a static trial (the built-in model is always calibrated)"
-        return ("model", "calibrate"), _conflict("calibrate in [model]", static)
+    elif calibrate:
+        built_in = "a static trial (the built-in model is always calibrated)"
+        return ("model", "calibrate"), _conflict("calibrate in [model]", built_in)
     return None
 
 

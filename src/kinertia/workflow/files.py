@@ -13,8 +13,7 @@ from kinertia.findings.quantity import Quantity
 from kinertia.io.qualisys import is_plate_file
 from kinertia.io.recording import FORCE_FILES, MARKER_FILES, read_recording
 from kinertia.io.subject_draft import STATIC_NAME, matched_by_name
-from kinertia.model.marker_set import MarkerSet
-from kinertia.settings import Overrule, Subject
+from kinertia.trial.data import Recording
 from kinertia.trial.marker_quality import travel
 from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow.person import Person, Unread
@@ -29,25 +28,40 @@ class RecordingFiles:
     loads: Path | None = None
 
 
-def files_by_name(files: Sequence[Path], loads: Path | None = None) -> tuple[RecordingFiles, ...]:
-    """Which files make one recording, by their names; `loads` explains the forces of the only one that has any.
+def files_by_name(
+    files: Sequence[Path], loads: Path | None = None, forces: Path | None = None, static: Path | None = None
+) -> tuple[RecordingFiles, ...]:
+    """Which files make one recording of a motion, by their names.
+
+    Args:
+        files: markers and forces.
+        loads: explains the forces of the only one that has any.
+        forces: those of the only file of markers.
+        static: the static trial, which has no part in this; unless it is the only file, as poses may be.
 
     Raises:
-        FileError: a file of another kind, forces without markers, or loads that explain no trial or several.
+        FileError: a file of another kind, forces without markers, or loads and forces that belong to no trial or to
+            several.
     """
+    files = [path for path in files if path != static] or files
     for path in files:
         if path.is_dir():
             raise _unpaired(path, "is a folder", "Give the files in it, or a subject file (kinertia init drafts one)")
         if path.suffix.lower() not in (*MARKER_FILES, *FORCE_FILES):
             raise unknown_kind(path)
     marked = [path for path in files if path.suffix.lower() in MARKER_FILES and not is_plate_file(path)]
-    forces = [path for path in files if path not in marked]
-    pairs = _matched(marked, forces)
-    alone = [path for path in forces if path not in pairs.values()]
+    beside = [path for path in files if path not in marked]
+    pairs = _matched(marked, beside)
+    alone = [path for path in beside if path not in pairs.values()]
     if alone:
         goes = "goes with none of the marker files by its name" if marked else "holds forces only"
         raise _unpaired(alone[0], goes, f"Check it together with its markers ({', '.join(MARKER_FILES)})")
     wanted = [RecordingFiles(path, pairs.get(path)) for path in marked]
+    if forces is not None:
+        if len(wanted) != 1 or pairs:
+            problem = f"are one trial's forces, but {len(files)} files are given"
+            raise _unpaired(forces, problem, "Give one file of markers with --forces")
+        wanted = [replace(wanted[0], forces=forces)]
     if loads is not None:
         having = [k for k, one in enumerate(wanted) if one.forces is not None] or list(range(len(wanted)))
         if len(having) != 1:
@@ -78,42 +92,41 @@ def unknown_kind(path: Path) -> FileError:
 
 def read_files(
     wanted: Sequence[RecordingFiles],
-    subject: Subject,
-    marker_set: MarkerSet | None = None,
-    overrule: Overrule | None = None,
+    stated: Person,
     static: Path | None = None,
     progress: Callable[[float], None] = lambda share: None,
 ) -> Person:
     """A person of whom there are files only: a recording in which the person stands still is the static trial.
 
     Args:
-        wanted: the files of each recording.
-        subject: what is stated.
-        marker_set: the laboratory's; found among the presets if None.
-        overrule: what the user overrules.
-        static: which file is the static trial; by the data if None.
+        wanted: the files of each recording; the static trial may be among them.
+        stated: the person without recordings.
+        static: the static trial; found by the data if None, unless there is an OpenSim model in its place.
         progress: called with the share of files that are read.
 
     Raises:
         KinertiaError: no recording can be read.
     """
-    unread, recordings, stands = Unread(), [], []
+    unread = Unread()
+    statics: list[Recording] = []
+    moving: list[Recording] = []
+    if static is not None:
+        wanted = [one for one in wanted if one.markers != static] or wanted
+        recording = unread.tried(partial(read_recording, static, standing=True), None)
+        statics += [] if recording is None else [recording]
     for k, (name, one) in enumerate(zip(trial_names(wanted), wanted, strict=True)):
         progress(k / len(wanted))
         recording = unread.tried(partial(read_recording, one.markers, one.forces, one.loads), name)
         if recording is not None:
-            recordings.append(replace(recording, name=name))
-            stands.append(travel(recording.markers).kind == "stands still" if static is None else one.markers == static)
-    unread.expect_any(recordings)
-    statics = [one for one, is_static in zip(recordings, stands, strict=True) if is_static]
-    moving = [one for one, is_static in zip(recordings, stands, strict=True) if not is_static]
-    return Person(
-        subject=subject,
+            by_data = static is None and stated.model is None
+            stands = by_data and travel(recording.markers).kind == "stands still"
+            (statics if stands else moving).append(replace(recording, name=name))
+    unread.expect_any([*statics, *moving])
+    return replace(
+        stated,
         trials=[TrialInput(one) for one in moving],
         static=statics[0] if len(statics) == 1 else None,
         more_statics=statics if len(statics) > 1 else (),
-        marker_set=marker_set,
-        overrule=overrule or Overrule(),
         unread=tuple(unread.findings),
     )
 
