@@ -1,8 +1,10 @@
+import numpy as np
 import pytest
 
 from kinertia.errors import MarkerSetError
-from kinertia.io.marker_set_file import choose_marker_set, preset_names, read_marker_set
+from kinertia.io.marker_set_file import choose_marker_set, marker_set_of, preset_names, read_marker_set
 from kinertia.model.marker_set import check_marker_set, nearest_labels
+from kinertia.trial.data import Markers
 from recordings import here
 from refusals import refused
 
@@ -110,10 +112,44 @@ def test_a_spelling_that_could_be_two_labels_is_nobodys():
     assert choose_marker_set([*labels, "R.Toe", "R_Toe"]) == preset
 
 
+@pytest.mark.parametrize("name", ["cgm2", "plug-in-gait", "plug-in-gait-lower-body"])
+@pytest.mark.parametrize("sacrum", ["SACR", "sacr", "VSAC", "V.Sacral", "Sacrum"])
+def test_plug_in_gait_has_a_sacral_marker_or_the_psis(name, sacrum):
+    preset = read_marker_set(name)
+    labels = [label for label in preset.labels if label not in ("RPSI", "LPSI", "SACR")]
+    chosen = choose_marker_set([*labels, sacrum])
+    assert chosen.name == preset.name
+    assert chosen.landmarks["sacrum"] == (sacrum,)
+    assert chosen.segments["pelvis"] == ("RASI", "LASI", sacrum)
+    assert chosen.respelled == ({} if sacrum == "SACR" else {"SACR": sacrum})
+    psis = choose_marker_set([*labels, "RPSI", "LPSI"])
+    assert psis.segments["pelvis"] == ("RASI", "LASI", "RPSI", "LPSI")
+    assert "sacrum" not in psis.landmarks
+
+
+def test_another_name_of_a_marker_is_taken_where_no_other_label_comes_into_question():
+    preset = read_marker_set("plug-in-gait")
+    labels = [label for label in preset.labels if label not in ("RPSI", "LPSI", "SACR")]
+    assert choose_marker_set([*labels, "VSAC", "sacr"]).landmarks["sacrum"] == ("sacr",)
+    assert "sacrum" not in choose_marker_set([*labels, "VSAC", "SACRUM"]).landmarks
+
+
+@pytest.mark.parametrize(("off_m", "kept"), [(0.0, False), (0.003, True)])
+def test_a_computed_sacral_marker_is_no_measured_one(off_m, kept):
+    """Where all three are measured none is dropped."""
+    preset = read_marker_set("plug-in-gait-lower-body")
+    places = np.random.default_rng(1).normal(size=(5, len(preset.labels), 3))
+    sacrum, *psis = (preset.labels.index(label) for label in ("SACR", "RPSI", "LPSI"))
+    places[:, sacrum] = places[:, psis].mean(axis=1) + [0.0, off_m, 0.0]
+    chosen = marker_set_of(Markers(np.arange(5) / 100, preset.labels, places))
+    assert chosen.segments["pelvis"] == ("RASI", "LASI", "RPSI", "LPSI", *(["SACR"] if kept else []))
+
+
 OWN = {
     "field/unipd/walking1.c3d": "IOR, lower body and trunk",
     "c3d_variety/ist.c3d": None,
-    "c3d_variety/motion_analysis_walk.c3d": None,
+    "c3d_variety/motion_analysis_walk.c3d": "Helen Hayes",
+    "field/biomechzoo/HC030A/static.c3d": "Plug-in Gait",
 }
 
 
@@ -183,9 +219,9 @@ def test_the_same_key_in_two_tables_is_told_apart(tmp_path):
 
 def test_an_unknown_preset_lists_those_that_exist():
     with refused(
-        "F101", None, hint="cgm2, cleveland-clinic, ior-lower-body, opencap, opencap-mocap, plug-in-gait, plug"
+        "F101", None, hint="cgm2, cleveland-clinic, helen-hayes, ior-lower-body, opencap, opencap-mocap, plug-in-gait"
     ):
-        read_marker_set("helen-hayes")
+        read_marker_set("hayes")
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ from kinertia.io.marker_set_file import read_marker_set
 from kinertia.io.recording import read_recording
 from kinertia.model import joint_centres as jc
 from kinertia.model.gait27 import build_gait27
+from kinertia.model.marker_set import MarkerSet
 from kinertia.motion.inverse_kinematics import solve_ik
 from kinertia.synthetic.walk import HEIGHT_M
 from synthetic_lab import MARKER_DIAMETER_M, symmetric_person
@@ -103,6 +104,30 @@ def test_pelvis_frame_by_hand():
     np.testing.assert_allclose(origin, [0.06, 1.12, 0.0])
     assert width == pytest.approx(0.28)
     assert depth == pytest.approx(0.19)
+
+
+def test_a_pelvis_by_the_psis_by_a_sacral_marker_or_by_one_psis():
+    """Plug-in Gait's plane is that of ASIS and either; the side of a single PSIS does not matter."""
+    labels = {"asis_r": ("A",), "asis_l": ("B",), "psis_r": ("C",), "psis_l": ("D",), "sacrum": ("E",)}
+    named = MarkerSet("set", labels, {}, {})
+    points = {"asis_r": [0.0, 1.0, 0.12], "asis_l": [0.0, 1.0, -0.12], "psis_r": [-0.15, 1.02, 0.05]}
+    points |= {"psis_l": [-0.15, 1.02, -0.05], "sacrum": [-0.17, 1.01, 0.0]}
+    points = {name: np.array(place) for name, place in points.items()}
+
+    def frame_of(*missing):
+        kept = {name: place for name, place in points.items() if name not in missing}
+        return jc.pelvis_frame(jc.Landmarks({}, kept, {}, named))
+
+    both = frame_of()
+    for missing in (("sacrum",), ("psis_r", "sacrum"), ("psis_l", "sacrum")):
+        for mine, expected in zip(frame_of(*missing), both, strict=True):
+            np.testing.assert_allclose(mine, expected, atol=1e-12)
+    for missing in (("psis_r", "psis_l"), ("psis_r",)):
+        rotation, _, width, depth = frame_of(*missing)
+        assert (width, depth) == pytest.approx((0.24, np.hypot(0.17, 0.01)))
+        np.testing.assert_allclose(rotation[:, 0], np.array([0.17, -0.01, 0.0]) / depth, atol=1e-12)
+    with pytest.raises(MarkerSetError):
+        frame_of("psis_r", "psis_l", "sacrum")
 
 
 def test_axes_of_the_left_foot_mirror_the_right():

@@ -24,7 +24,10 @@ from kinertia.model.marker_set import (
     mismatch,
     share_worn,
     spelled_as,
+    with_posterior_pelvis,
+    without_computed_sacrum,
 )
+from kinertia.trial.data import Markers
 
 
 @cache
@@ -61,13 +64,24 @@ def choose_marker_set(labels: Sequence[str]) -> MarkerSet:
     return best
 
 
+def marker_set_of(markers: Markers, named: MarkerSet | None = None) -> MarkerSet:
+    """The preset that fits these markers, or the set that the user named, with the posterior pelvis that they show.
+
+    Raises:
+        MarkerSetError: no preset fits (L101).
+    """
+    chosen = choose_marker_set(markers.labels) if named is None else with_posterior_pelvis(named, markers.labels)
+    return without_computed_sacrum(chosen, markers)
+
+
 def nearest_preset(labels: Sequence[str]) -> MarkerSet:
     """Of the presets that these labels hardly lack anything of, but for trunk and arms, the one that has most of them,
     letter by letter before `spelled_as` they are; else the one that shares most of its labels, be it many or few, in
     the same order; of such that are part of one another, the larger. It is spelled as the labels are where it fits.
     """
-    presets = [read_marker_set(name) for name in preset_names()]
-    spelled = [spelled_as(preset, labels) for preset in presets]
+    read = [read_marker_set(name) for name in preset_names()]
+    presets = [with_posterior_pelvis(preset, labels) for preset in read]
+    spelled = [with_posterior_pelvis(spelled_as(preset, labels), labels) for preset in read]
 
     def worn(one: MarkerSet) -> int:
         return len(set(one.labels) & set(labels)) if is_worn(one, labels) else 0
@@ -82,7 +96,7 @@ def nearest_preset(labels: Sequence[str]) -> MarkerSet:
 
 def _marker_set(document: TomlFile, path: Path) -> MarkerSet:
     content = document.content
-    known = {"name": None, "landmarks": LANDMARKS, "segments": SEGMENTS, "widths": WIDTHS}
+    known = {"name": None, "landmarks": LANDMARKS, "segments": SEGMENTS, "widths": WIDTHS, "spellings": ()}
     for table, entries in content.items():
         if table not in known:
             raise _wrong(path, document.line((table,)), f"unknown entry '{table}'; it has {', '.join(known)}")
@@ -106,11 +120,12 @@ def _marker_set(document: TomlFile, path: Path) -> MarkerSet:
         landmarks={key: _labels(value) for key, value in content.get("landmarks", {}).items()},
         segments=segments,
         widths=dict(content.get("widths", {})),
+        spellings={key: _labels(value) for key, value in content.get("spellings", {}).items()},
     )
 
 
 def _check_entry(path: Path, document: TomlFile, table: str, entry: str, value: object, names: Sequence[str]) -> None:
-    if entry not in names:
+    if names and entry not in names:
         near = difflib.get_close_matches(entry, names, n=1)
         hint = f"the nearest is {near[0]}" if near else f"known are {', '.join(names)}"
         raise _wrong(path, document.line((table, entry)), f"unknown [{table}] entry '{entry}'; {hint}")

@@ -109,16 +109,20 @@ def frame(y: np.ndarray, z: np.ndarray) -> np.ndarray:
 
 
 def pelvis_frame(marks: Landmarks) -> tuple[np.ndarray, np.ndarray, float, float]:
-    """Rotation, origin (mid ASIS), width (ASIS to ASIS) and depth (mid ASIS to mid PSIS) of the pelvis, m."""
-    named = marks.marker_set.landmarks
-    sacrum = "psis_r" not in marks and ("sacrum" in marks or ("sacrum" in named and "psis_r" not in named))
-    back = ("sacrum",) if sacrum else ("psis_r", "psis_l")
+    """Rotation, origin (mid ASIS), width (ASIS to ASIS) and depth (mid ASIS to mid PSIS, or to the sacral marker), m.
+
+    The plane of ASIS and PSIS, or of ASIS and sacrum, is Plug-in Gait's. One PSIS alone stands for both.
+    """
+    psis = [name for name in ("psis_r", "psis_l") if name in marks]
+    sacral = "sacrum" in marks or ("sacrum" in marks.marker_set.landmarks and not psis)
+    back = psis if len(psis) == 2 else ["sacrum"] if sacral else psis or ["psis_r", "psis_l"]
     marks.require("pelvis", "asis_r", "asis_l", *back)
-    behind = np.mean([marks[name] for name in back], axis=0)
     origin = (marks["asis_r"] + marks["asis_l"]) / 2
     z = marks["asis_r"] - marks["asis_l"]
-    rotation = frame(np.cross(z, origin - behind), z)
-    return rotation, origin, float(np.linalg.norm(z)), float(np.linalg.norm(origin - behind))
+    behind = np.mean([marks[name] for name in back], axis=0) - origin
+    if len(back) == 1 and back == psis:
+        behind = behind - (behind @ z) / (z @ z) * z
+    return frame(np.cross(behind, z), z), origin, float(np.linalg.norm(z)), float(np.linalg.norm(behind))
 
 
 def hip_in_pelvis(width: float, depth: float, method: str, side: str) -> np.ndarray:

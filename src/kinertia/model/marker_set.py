@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import difflib
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+
+import numpy as np
 
 from kinertia.errors import MarkerSetError, problem_of
 from kinertia.findings.display import first_few
@@ -49,6 +51,7 @@ ENOUGH_LABELS = 2.0 / 3.0
 """Share of a set's labels, or of those of its pelvis, legs and feet, from which on a recording has it, be the set named
 or a preset. Measured recordings that lack part of their own set have 0.76 and more; two of other laboratories' sets
 have up to 0.62 of the labels of Plug-in Gait, which mean something else there."""
+_COMPUTED_M = 1e-4
 _SIDES = {"r": "right", "l": "left"}
 _LEGS = ("pelvis", "thigh", "shank", "foot")
 WIDTHS = tuple(f"{name}_{side}" for name in ("knee", "ankle", "elbow") for side in "rl")
@@ -65,6 +68,7 @@ class MarkerSet:
         widths: joint -> name of a measurement (m) that comes with the static file.
         in_model: one frame, where an OpenSim model has them in its default pose; None for a laboratory's.
         respelled: label of the preset -> how a recording spells it, where that differs.
+        spellings: label -> what laboratories call the same marker otherwise.
 
     Examples:
         >>> kinertia.read_marker_set("plug-in-gait").foot_labels()["r"]
@@ -77,6 +81,7 @@ class MarkerSet:
     widths: Mapping[str, str]
     in_model: Markers | None = None
     respelled: Mapping[str, str] = field(default_factory=dict)
+    spellings: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -88,10 +93,20 @@ class MarkerSet:
         """Labels of the markers on the right ("r") and left ("l") foot."""
         return {side: list(self.segments[f"foot_{side}"]) for side in "rl"}
 
+    def without(self, labels: Collection[str]) -> MarkerSet:
+        """The set without these labels, and without the landmarks that need one of them."""
+        return replace(
+            self,
+            landmarks={name: own for name, own in self.landmarks.items() if not set(own) & set(labels)},
+            segments={
+                name: tuple(label for label in own if label not in labels) for name, own in self.segments.items()
+            },
+        )
+
 
 def spelled_as(marker_set: MarkerSet, labels: Sequence[str]) -> MarkerSet:
-    """The set with the labels that these lack spelled as these are, where capitals and punctuation alone differ, and
-    one label only comes into question.
+    """The set with the labels that these lack spelled as these are, where capitals and punctuation alone differ, or a
+    marker is known by several names; and one label only comes into question.
 
     Args:
         marker_set: whose labels somebody may have typed anew, or a program has changed.
@@ -99,9 +114,13 @@ def spelled_as(marker_set: MarkerSet, labels: Sequence[str]) -> MarkerSet:
     """
     wanted = [label for label in marker_set.labels if label not in labels]
     others = [label for label in labels if label not in marker_set.labels]
-    own = Counter(map(folded, others)) + Counter(map(folded, wanted))
-    place = {folded(label): label for label in others}
-    spelled = {label: place[folded(label)] for label in wanted if folded(label) in place and own[folded(label)] == 2}
+    spelled = _matched({label: {folded(label)} for label in wanted}, others)
+    named = {
+        label: set(map(folded, names))
+        for label, names in marker_set.spellings.items()
+        if label in wanted and label not in spelled
+    }
+    spelled |= _matched(named, [label for label in others if label not in spelled.values()])
     if not spelled:
         return marker_set
 
@@ -114,6 +133,47 @@ def spelled_as(marker_set: MarkerSet, labels: Sequence[str]) -> MarkerSet:
         segments=respelled(marker_set.segments),
         respelled=spelled,
     )
+
+
+def _matched(names: Mapping[str, set[str]], labels: Sequence[str]) -> dict[str, str]:
+    """Label of a set -> the one of these labels that is among its names (folded), where no other set's label has it."""
+    fitting = {label: [one for one in labels if folded(one) in own] for label, own in names.items()}
+    claims = Counter(one for found in fitting.values() for one in found)
+    return {label: found[0] for label, found in fitting.items() if len(found) == 1 and claims[found[0]] == 1}
+
+
+def with_posterior_pelvis(marker_set: MarkerSet, labels: Sequence[str]) -> MarkerSet:
+    """The set without the sacral marker, or without the PSIS, where these labels show the other only.
+
+    Plug-in Gait has either (Vicon, Plug-in Gait Reference Guide): the pelvis needs one of them, and whichever a
+    laboratory does not use is not missing.
+    """
+    psis, sacrum = (
+        {label for name in names for label in marker_set.landmarks.get(name, ())}
+        for names in (("psis_r", "psis_l"), ("sacrum",))
+    )
+    if not psis or not sacrum or sacrum & psis:
+        return marker_set
+    if not sacrum <= set(labels):
+        return marker_set.without(sacrum)
+    return marker_set if psis & set(labels) else marker_set.without(psis)
+
+
+def without_computed_sacrum(marker_set: MarkerSet, markers: Markers) -> MarkerSet:
+    """The set without a sacral marker that a program wrote in the middle of the PSIS: it says nothing that they do not.
+
+    Args:
+        marker_set: of the recording.
+        markers: (n frames); a marker of its own keeps no distance to the middle to a tenth of a millimetre.
+    """
+    names = ("sacrum", "psis_r", "psis_l")
+    labels = [label for name in names for label in marker_set.landmarks.get(name, ())]
+    if len(labels) != len(names) or not set(labels) <= set(markers.labels):
+        return marker_set
+    sacrum, *psis = markers.select(labels).positions.transpose(1, 0, 2)
+    off = np.linalg.norm(sacrum - (psis[0] + psis[1]) / 2, axis=1)
+    off = off[np.isfinite(off)]
+    return marker_set.without(labels[:1]) if off.size and off.max() < _COMPUTED_M else marker_set
 
 
 def check_marker_set(marker_set: MarkerSet, labels: Sequence[str]) -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from kinertia.io.c3d_write import write_c3d
-from kinertia.io.marker_set_file import choose_marker_set
+from kinertia.io.marker_set_file import marker_set_of
 from kinertia.io.person_recordings import read_inputs
 from kinertia.io.sto import write_sto
 from kinertia.io.subject_file import SubjectFile
@@ -73,7 +73,7 @@ def read_person(wanted: SubjectFile, rng: np.random.Generator) -> MeasuredPerson
     """
     static, inputs, marker_set = read_inputs(wanted)
     walk = inputs[0].recording
-    marker_set = marker_set or choose_marker_set(static.markers.labels)
+    marker_set = marker_set_of(static.markers, marker_set)
     stated = {key: getattr(wanted.subject, key) or getattr(static, key) for key in ("mass_kg", "height_m")}
     subject = wanted.subject.model_copy(update=stated)
     # a static trial needs no forces

@@ -11,7 +11,7 @@ from typing import TypeVar
 from kinertia.errors import BlockedError, KinertiaError, MarkerSetError, SubjectError
 from kinertia.estimation.input_checks import complete_subject
 from kinertia.findings.finding import Finding
-from kinertia.io.marker_set_file import choose_marker_set, read_marker_set
+from kinertia.io.marker_set_file import marker_set_of, read_marker_set
 from kinertia.io.person_recordings import read_static, read_trial
 from kinertia.io.subject_file import SubjectFile
 from kinertia.model.imported import OsimModel
@@ -84,15 +84,13 @@ class Person:
         if self.model is not None:
             return markers_of_model(self.model)
         given = [*([] if self.static is None else [self.static]), *self.recordings, *self.more_statics]
-        labels = given[0].markers.labels
         try:
-            if self.marker_set is None:
-                return choose_marker_set(labels)
-            if self.static is not None:
-                check_marker_set(self.marker_set, labels)
+            marker_set = marker_set_of(given[0].markers, self.marker_set)
+            if self.marker_set is not None and self.static is not None:
+                check_marker_set(marker_set, given[0].markers.labels)
         except MarkerSetError as error:
             return error
-        return self.marker_set
+        return marker_set
 
 
 def read_person(wanted: SubjectFile, progress: Progress = lambda stage, share: None) -> Person:

@@ -12,7 +12,7 @@ from kinertia.trial.data import Markers
 from marker_contexts import codes, context_of
 from recordings import here
 
-SET = read_marker_set("plug-in-gait")
+SET = read_marker_set("plug-in-gait").without(["SACR"])
 
 
 def found(labels, marker_set):
@@ -33,6 +33,17 @@ def test_missing_labels(share, code, named):
     if code == "L101":
         assert one[0].severity is Severity.ERROR
         assert not named or one[0].evidence["labels_found"].value == len(labels)
+
+
+def test_a_sacral_marker_and_the_psis_stand_for_each_other():
+    """Neither is missing where a laboratory uses the other."""
+    whole = read_marker_set("plug-in-gait").labels
+    for unused in (["SACR"], ["RPSI", "LPSI"]):
+        assert found([label for label in whole if label not in unused], None) == []
+    (one,) = found([label for label in whole if label not in ("SACR", "LPSI")], None)
+    assert one.where.markers == ("LPSI",)
+    (one,) = found([label for label in whole if label not in ("SACR", "RPSI", "LPSI")], None)
+    assert one.where.markers == ("RPSI", "LPSI")
 
 
 def test_labels_of_a_model():
