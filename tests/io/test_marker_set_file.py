@@ -140,7 +140,7 @@ def test_a_computed_sacral_marker_is_no_measured_one(off_m, kept):
     preset = read_marker_set("plug-in-gait-lower-body")
     places = np.random.default_rng(1).normal(size=(5, len(preset.labels), 3))
     sacrum, *psis = (preset.labels.index(label) for label in ("SACR", "RPSI", "LPSI"))
-    places[:, sacrum] = places[:, psis].mean(axis=1) + [0.0, off_m, 0.0]
+    places[:, sacrum] = places[:, psis].mean(axis=1) + off_m
     chosen = marker_set_of(Markers(np.arange(5) / 100, preset.labels, places))
     assert chosen.segments["pelvis"] == ("RASI", "LASI", "RPSI", "LPSI", *(["SACR"] if kept else []))
 

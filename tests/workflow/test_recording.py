@@ -347,7 +347,7 @@ def test_measured_files_of_other_laboratories(file_of, name, unit, vertical):
 
 
 def test_a_measured_walk_with_helen_hayes_markers_in_four_letters(recording_of):
-    """VSAC is on the sacrum, 0.2 m behind the ASIS; joint centres are computed from it, which nobody takes for markers."""
+    """VSAC is on the sacrum, 0.2 m behind the ASIS; joint centres are computed from it."""
     check = check_recording(recording_of("c3d_variety/motion_analysis_walk.c3d"))
     assert (check.marker_set.name, errors(check)) == ("Helen Hayes", [])
     assert {"VPEL", "VRKN", "VLAN"} <= set(check.marker_set.others)
