@@ -236,6 +236,10 @@ class Instruments(Table):
     same_plates: bool = Field(
         default=False, description="true: columns of the same name are the same plate in all force files (.mot, .sto)"
     )
+    zeroed: bool = Field(
+        default=False,
+        description="true: the plates were zeroed; what they read while nobody stands on them stays in their loads",
+    )
 
 
 class PriorSettings(Table):

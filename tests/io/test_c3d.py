@@ -277,17 +277,18 @@ def test_unloaded_plate_is_zero(tmp_path):
     assert codes(recording.findings) == ["F133"], "such an offset is examined with the recording"
 
 
-def test_a_small_zero_offset_is_reported_and_left(tmp_path):
-    points, labels = standing()
-    analogs = np.concatenate((stepping(vertical=-7.0)[:100], stepping()[100:])) * [0.3, 0.3, 1.0, 1.0, 1.0, 1.0]
+def test_what_an_idle_plate_reads_is_taken_off_its_loads(tmp_path):
+    points, labels = standing(n=80)
+    level = np.array([2.7, -1.8, -7.0, 1500.0, 0.0, 0.0])
+    steps = np.concatenate((0.0 * stepping(60), stepping(20)))
     plate = {**SCREEN, "FORCE_PLATFORM": plate_parameters(CORNERS)}
-    recording = read_c3d(write_c3d(tmp_path / "x.c3d", points, labels, analogs, plate))
-    offsets = {one.where.file_axis: one for one in recording.findings if one.code == "P213"}
-    assert {axis: one.evidence["level_n"].value for axis, one in offsets.items()} == pytest.approx(
-        {"X": 9.0, "Z": 7.0, "-Y": -6.0}, abs=0.01
+    sound, wrong = (
+        read_c3d(write_c3d(tmp_path / name, points, labels, steps + more, plate)).plates
+        for name, more in (("sound.c3d", 0.0 * level), ("wrong.c3d", level))
     )
-    assert {one.severity for one in offsets.values()} == {Severity.INFO}
-    assert offsets["Z"].where.axis == "vertical"
+    assert (sound.idle[0].subtracted, wrong.idle[0].subtracted) == (False, True)
+    np.testing.assert_allclose(wrong.force, sound.force, atol=1e-3)
+    np.testing.assert_allclose(wrong.moment, sound.moment, atol=1e-2)
 
 
 def plates_left_out(tmp_path, plate, **arguments):

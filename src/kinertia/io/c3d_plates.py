@@ -8,28 +8,25 @@ and the free moment; ezc3d's moment has the opposite sign there, so the moment i
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from kinertia.errors import FileError
-from kinertia.findings.finding import Finding, Severity, finding, with_evidence
+from kinertia.findings.finding import Finding, finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.io.ezc3d_library import parameter_values
 from kinertia.io.plate_moments import MOMENTS_FIT
 from kinertia.io.trc import METRES_PER_UNIT
 from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads
-from kinertia.trial.idle_plate import without_idle
+from kinertia.trial.idle_plate import largest_n, without_idle
 from kinertia.trial.impossible_data import impossible_load
 
 _CORNER_LIMIT_M = 50.0
 _EDGE_LIMITS_M = (0.1, 10.0)
-_ZERO_N = (5.0, 15.0)
-"""A zero offset between these is worth a note; beyond, the plate's zeros are examined with all else."""
-_FEWEST_IDLE_SAMPLES = 50
 _MUCH_NEARER = 0.5
 
 
@@ -137,20 +134,17 @@ def to_ground_plates(
     corners = None if plates.corners is None else plates.corners @ rotation.T
     findings, noises, idle = [], [], []
     for p, name in enumerate(plates.names):
-        vertical = np.nan_to_num(force[:, p, 1])
         where = Where(path.name, plate=name)
-        largest = float(vertical[np.argmax(np.abs(vertical))])
+        largest = largest_n(time, np.nan_to_num(force[:, p]))
         if largest < -LOAD_THRESHOLD_N:
             force[:, p] *= -1
             moment[:, p] *= -1
             findings.append(finding("F157", where, force_n=Quantity(largest, "N")))
-        loaded = force[:, p, 1] >= LOAD_THRESHOLD_N
+        plate = without_idle(time, np.nan_to_num(force[:, p]), np.nan_to_num(moment[:, p]))
+        loaded = plate.force[:, 1] >= LOAD_THRESHOLD_N
         lost = np.isnan(force[:, p]).any(axis=1) | (loaded & np.isnan(moment[:, p]).any(axis=1))
         if lost.any():
             raise FileError.of(path, impossible_load(name, "force or moment", float(time[lost][0])))
-        if (~loaded).sum() >= _FEWEST_IDLE_SAMPLES:
-            findings += _small_offsets(where, np.median(force[~loaded, p], axis=0), rotation)
-        plate = without_idle(time, force[:, p], np.nan_to_num(moment[:, p]))
         force[:, p], moment[:, p] = plate.force, plate.moment
         noises.append(plate.noise_n)
         idle.append(plate.idle)
@@ -158,27 +152,6 @@ def to_ground_plates(
         time, plates.names, force, moment, (None,) * len(plates.names), corners, tuple(noises), tuple(idle)
     )
     return loads, findings
-
-
-def _small_offsets(where: Where, level_n: FloatArray, rotation: FloatArray) -> list[Finding]:
-    """Axes along which an unloaded plate reads (3,) N a little: a note, since nothing was subtracted."""
-    low, high = _ZERO_N
-    return [
-        finding(
-            "P213",
-            replace(where, axis="vertical" if axis == 1 else None, file_axis=_file_axis(rotation, axis)),
-            Severity.INFO,
-            level_n=Quantity(float(level), "N", limit=low),
-        )
-        for axis, level in enumerate(level_n)
-        if low < abs(level) <= high
-    ]
-
-
-def _file_axis(rotation: FloatArray, ground_axis: int) -> str:
-    """What the file calls ground axis 0, 1 or 2: "Z" or "-Y"."""
-    index = int(np.argmax(np.abs(rotation[ground_axis])))
-    return f"{'-' if rotation[ground_axis, index] < 0 else ''}{'XYZ'[index]}"
 
 
 def person_on_plates(platforms: Any, people: Sequence[str], labels: Sequence[str], positions: FloatArray) -> str:

@@ -19,7 +19,7 @@ from kinertia.io.file_names import path_from
 from kinertia.io.number_table import expect_file, mismatch
 from kinertia.io.sto import TimeTable, read_table
 from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads
-from kinertia.trial.idle_plate import PlateLoad, without_idle
+from kinertia.trial.idle_plate import PlateLoad, largest_n, without_idle
 from kinertia.trial.impossible_data import impossible_load
 from kinertia.trial.torque_columns import torque_columns
 
@@ -112,16 +112,16 @@ def _wrench(path: Path, table: TimeTable, group: _Columns, turn: FloatArray) -> 
             "column": Quantity(f"{group.force}y"),
         }
         raise FileError.found(path, "P201", None, Where(plate=group.name), **axes)
-    if force[np.argmax(np.abs(force[:, 1])), 1] < -LOAD_THRESHOLD_N:
+    if largest_n(table.time, force) < -LOAD_THRESHOLD_N:
         down = {"force_n": Quantity(float(force[:, 1].min()), "N"), "column": Quantity(f"{group.force}{'xyz'[up]}")}
         raise FileError.found(path, "F157", None, Where(plate=group.name), **down)
-    loaded = force[:, 1] >= LOAD_THRESHOLD_N
-    _expect_numbers(path, table, group, group.point, loaded)
-    moment = np.cross(_triple(table, group.point) @ turn.T, force)
+    moment = np.cross(np.nan_to_num(_triple(table, group.point)) @ turn.T, force)
     if group.torque is not None:
-        _expect_numbers(path, table, group, group.torque, loaded)
-        moment = moment + _triple(table, group.torque) @ turn.T
-    return without_idle(table.time, force, moment)
+        moment = moment + np.nan_to_num(_triple(table, group.torque)) @ turn.T
+    plate = without_idle(table.time, force, moment)
+    for identifier in filter(None, (group.point, group.torque)):
+        _expect_numbers(path, table, group, identifier, plate.force[:, 1] >= LOAD_THRESHOLD_N)
+    return plate
 
 
 def _stated(table: TimeTable, groups: Sequence[_Columns], turn: FloatArray) -> list[FloatArray]:

@@ -13,6 +13,7 @@ from kinertia.io.recording import read_recording
 from kinertia.io.subject_file import SubjectFile, TrialFiles
 from kinertia.model.marker_set import MarkerSet
 from kinertia.trial.data import Recording
+from kinertia.trial.idle_plate import with_idle_levels
 from kinertia.trial.plate_names import with_plates_of_trial
 from kinertia.trial.trial_input import TrialInput
 
@@ -44,7 +45,7 @@ def read_static(wanted: SubjectFile) -> Recording:
     """
     if wanted.model.static is None:
         raise SettingsError("[model] names an OpenSim model; this needs a static trial (static = ...)")
-    return read_recording(wanted.model.static, length_unit=wanted.model.length_unit, standing=True)
+    return _as_zeroed(wanted, read_recording(wanted.model.static, length_unit=wanted.model.length_unit, standing=True))
 
 
 def read_trial(wanted: SubjectFile, files: TrialFiles) -> TrialInput:
@@ -58,8 +59,15 @@ def read_trial(wanted: SubjectFile, files: TrialFiles) -> TrialInput:
         KinertiaError: a file is missing or broken.
     """
     started = time.perf_counter()
-    recording = read_recording(files.markers, files.forces, files.loads, files.length_unit)
+    recording = _as_zeroed(wanted, read_recording(files.markers, files.forces, files.loads, files.length_unit))
     seconds = time.perf_counter() - started
     recording = replace(recording, name=files.name, belt=read_belt(files.belt_speed_m_s))
     apart = files.forces is not None and len(wanted.trials) > 1 and not wanted.instruments.same_plates
     return TrialInput(with_plates_of_trial(recording) if apart else recording, files.window_s, seconds)
+
+
+def _as_zeroed(wanted: SubjectFile, recording: Recording) -> Recording:
+    """With what idle plates read in their loads, where the laboratory states that they were zeroed."""
+    if not wanted.instruments.zeroed or recording.plates is None:
+        return recording
+    return replace(recording, plates=with_idle_levels(recording.plates))

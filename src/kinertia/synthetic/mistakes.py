@@ -151,8 +151,10 @@ MISTAKES = (
     Mistake("centres of pressure 50 mm off along Z, both plates", forces.moved(0.0, 0.05), _POSITIONS),
     Mistake("plates exchanged", forces.plates_exchanged, _codes("P241")),
     Mistake("both feet on one plate for 0.08 s", forces.on_one_plate, _codes("P276")),
-    Mistake("50 N on the horizontal X axis", forces.with_offset(x_n=50.0), _codes("P212", "P213", "P214", "P215")),
-    Mistake("50 N on the vertical axis", forces.with_offset(y_n=50.0), _codes("P212", "P213")),
+    Mistake(
+        "50 N on the horizontal X axis", forces.with_offset(x_n=50.0), _codes("P212", "P213", "P214", "P215", "P216")
+    ),
+    Mistake("50 N on the vertical axis", forces.with_offset(y_n=50.0), _codes("P212", "P213", "P216")),
     Mistake("zero of the vertical force drifts by 60 N", forces.with_drift(60.0), _codes("P211")),
     Mistake("one plate reads 10 % too much", forces.scaled(force=1.1, plates=slice(1, 2)), _codes("P221", "P223")),
     Mistake("plates turned by 3 degrees about the vertical", forces.turned_about_vertical(3.0), _codes("P234")),

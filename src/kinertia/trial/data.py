@@ -24,6 +24,7 @@ from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.trial import display
 from kinertia.trial.belt import Belt
+from kinertia.trial.idle_level import IdleReading
 from kinertia.trial.impossible_data import impossible_markers, impossible_plates
 from kinertia.trial.sampled_time import nearest_samples, windows, within
 
@@ -113,25 +114,6 @@ class Markers:
     def rotated(self, rotation: FloatArray) -> Markers:
         """The same markers in axes turned by `rotation` (3, 3): new = rotation @ old."""
         return replace(self, positions=self.positions @ rotation.T)
-
-
-class IdleReading(NamedTuple):
-    """What a plate reads while nobody stands on it.
-
-    Attributes:
-        level_n: median force along X, Y, Z, N; NaN where it is hardly ever idle.
-        drift_n: by how much the vertical force changes over the recording, by a straight line, N; NaN likewise.
-        peak_n: the largest vertical force of the whole recording, N.
-        rings_s: for how long the vertical force is below zero just before feet land and just after they leave, s; 0
-            where it does not do both.
-        like_steps: the vertical force comes and goes as under feet, of whatever size.
-    """
-
-    level_n: tuple[float, float, float]
-    drift_n: float
-    peak_n: float
-    rings_s: float
-    like_steps: bool = False
 
 
 class TorqueColumns(NamedTuple):

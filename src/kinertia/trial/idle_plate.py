@@ -8,14 +8,16 @@ where the nearest firm sample does.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from kinertia.trial.centre_of_pressure import centre_of_pressure
-from kinertia.trial.data import LOAD_THRESHOLD_N, BoolArray, FloatArray, IdleReading
-from kinertia.trial.force_resolution import ringing_s
-from kinertia.trial.sampled_time import TIME_TOLERANCE_S, nearest_samples, runs, span_s
+from kinertia.trial.data import LOAD_THRESHOLD_N, BoolArray, FloatArray, PlateLoads
+from kinertia.trial.idle_level import IdleReading
+from kinertia.trial.idle_reading import idle_blocks, idle_reading
+from kinertia.trial.sampled_time import TIME_TOLERANCE_S, nearest_samples, runs
 
 LONGEST_TAIL_S = 0.03
 """A foot lands or leaves within less; what lasts longer below the threshold is an offset."""
@@ -23,15 +25,11 @@ _ABOVE_NOISE, _LEAST_TAIL_N = 4.0, 1.0
 _FEWEST_IDLE = 20
 _IDLE_MOST_N, _STEADY_N = 3 * LOAD_THRESHOLD_N, 5.0
 """An idle level is below the first, and varies by less than the second: a foot that lands or leaves does not."""
-_BLOCK_S, _FEWEST_BLOCKS = 0.1, 4
-_IDLE_BLOCK_N, _STEADY_BLOCK_N, _IDLE_SHARE, _LEAST_PEAK_N = 150.0, 15.0, 0.2, 100.0
-"""In a tenth of a second in which nobody steps on or off, a plate reads less than the first, and varies by less than
-the second. Of what it carries at its peak, if that is a load, it reads less than a fifth: half a child is 100 N."""
-_RANGE_PERCENT, _RISING, _MOST_RISING, _SHORTEST_STEP_S = (1.0, 99.0), (0.2, 0.5), 0.2, 0.1
-"""Between 20 and 50 % of its peak a force under feet is for less than a tenth of the time, noise for two fifths."""
-_SWAYS, _ROUGH = 0.03, 0.1
-"""Of the peak: deviation of the load of feet that stay, at least, and its largest change from sample to sample, at
-most; noise that makes a zero of some newtons deviate as much jumps by more."""
+_NOISY_N, _MAINS_S = 5.0, 0.02
+"""Beyond the former, loads are looked for in the mean over the latter, a period of the mains."""
+_IDLE_PERCENT, _BEYOND_IDLE, _STEP_BEYOND, _WANDERS_N = 99.0, 1.5, 2.0, 30.0
+"""A load is beyond nearly all of what the idle plate reads by the one factor, and somewhere by the other too; a mean
+farther from the usual level is no reading of an idle plate."""
 _GAUSSIAN = 1.4826
 """Deviation of Gaussian noise over its median absolute deviation."""
 
@@ -47,16 +45,19 @@ class PlateLoad(NamedTuple):
 
 
 def without_idle(time: FloatArray, force: FloatArray, moment: FloatArray) -> PlateLoad:
-    """Zero wherever nobody stands on the plate.
+    """Take off what the plate reads while nobody stands on it, and set everything to zero there.
 
     Args:
         time: (k,) s.
         force, moment: (k, 3) N and N m about the ground origin, on the person; where the force is below
             LOAD_THRESHOLD_N the moment is not looked at and may be anything.
     """
-    loaded = force[:, 1] >= load_threshold_n(force[:, 1])
+    idle = idle_reading(time, force, moment)
+    if idle.off_zero:
+        force, moment = idle.added(-1.0, force, moment)
+        idle = idle._replace(subtracted=True)
+    loaded = _loaded(time, force[:, 1], idle)
     offset_n, noise_n = _idle(force[~loaded, 1])
-    idle = idle_reading(time, force)
     if not loaded.any():
         return PlateLoad(np.zeros_like(force), np.zeros_like(force), noise_n, idle)
     firm = np.flatnonzero(loaded)
@@ -69,52 +70,48 @@ def without_idle(time: FloatArray, force: FloatArray, moment: FloatArray) -> Pla
     return PlateLoad(np.where((loaded | tail)[:, None], force, 0.0), moment, noise_n, idle)
 
 
-def idle_reading(time: FloatArray, force: FloatArray) -> IdleReading:
-    """What a plate reads (k, 3) N while nobody stands on it: in tenths of a second in which little changes."""
-    peak_n = float(np.abs(force[:, 1]).max(initial=0.0))
-    course = ringing_s(time, force[:, 1]), _like_steps(time, force[:, 1])
-    every = max(2, round(_BLOCK_S / float(np.median(np.diff(time))))) if len(time) > 1 else 2
-    count = len(time) // every
-    if not count:
-        return IdleReading((np.nan,) * 3, np.nan, peak_n, *course)
-    blocks = force[: count * every].reshape(count, every, 3)
-    low, high = np.percentile(blocks[..., 1], (5, 95), axis=1)
-    level = np.median(blocks, axis=1)
-    most = min(_IDLE_BLOCK_N, _IDLE_SHARE * peak_n) if peak_n > _LEAST_PEAK_N else _IDLE_BLOCK_N
-    idle = (high - low < _STEADY_BLOCK_N) & (np.abs(level[:, 1]) < most)
-    if idle.sum() < _FEWEST_BLOCKS:
-        return IdleReading((np.nan,) * 3, np.nan, peak_n, *course)
-    x, y, z = (float(value) for value in np.median(level[idle], axis=0))
-    when = time[: count * every].reshape(count, every).mean(axis=1)[idle]
-    drift_n = float(np.polyfit(when - when.mean(), level[idle, 1], 1)[0]) * float(time[-1] - time[0])
-    return IdleReading((x, y, z), drift_n, peak_n, *course)
+def largest_n(time: FloatArray, force: FloatArray) -> float:
+    """The vertical force that is farthest from what the idle plate reads, of forces (k, 3), without that reading."""
+    level_n = float(np.nan_to_num(idle_reading(time, force, np.zeros_like(force)).level_n[1]))
+    return float(force[np.argmax(np.abs(force[:, 1] - level_n)), 1]) - level_n
 
 
-def _like_steps(time: FloatArray, vertical: FloatArray) -> bool:
-    """Whether a force (k,) of whatever unit is like the load of feet: it pushes one way, is either next to nothing or
-    nearly all there, and stays so for a while; or it is always there and sways smoothly.
+def with_idle_levels(plates: PlateLoads) -> PlateLoads:
+    """The loads as they were read, with what the idle plates read: of a laboratory that vouches for its zeros."""
+    force, moment, readings = plates.force.copy(), plates.moment.copy(), list(plates.idle or ())
+    for p, idle in enumerate(readings):
+        if idle.subtracted:
+            loaded = force[:, p, 1] != 0.0
+            force[loaded, p], moment[loaded, p] = idle.added(1.0, force[loaded, p], moment[loaded, p])
+            readings[p] = idle._replace(subtracted=False)
+    return replace(plates, force=force, moment=moment, idle=tuple(readings) or plates.idle)
 
-    Noise, drift and hum go both ways or never back to zero, are in between as often as not, leave the upper half at
-    once, or are rough.
-    """
-    if len(time) < _FEWEST_IDLE:
-        return False
-    low, high = np.percentile(vertical if vertical.max() > -vertical.min() else -vertical, _RANGE_PERCENT)
-    share = np.abs(vertical) / max(float(high), 1e-12)
-    if low > _RISING[1] * high:
-        after = time - time.mean()
-        sways = share - np.polyval(np.polyfit(after, share, 1), after)
-        return bool(np.std(sways) > _SWAYS) and float(np.abs(np.diff(share)).max()) < _ROUGH
-    between = float(((share > _RISING[0]) & (share < _RISING[1])).mean())
-    lasts = [span_s(time, first, last) for first, last in runs(share > _RISING[1])]
-    returns = bool(abs(low) < _RISING[0] * high)
-    return returns and between < _MOST_RISING and max(lasts, default=0.0) >= _SHORTEST_STEP_S
+
+def _loaded(time: FloatArray, vertical: FloatArray, idle: IdleReading) -> BoolArray:
+    """(k,) where a vertical force (k,) is beyond what the idle plate reads."""
+    if np.isnan(idle.noise_n):
+        loaded: BoolArray = vertical >= load_threshold_n(vertical)
+        return loaded
+    course = vertical - idle.left_n[1]
+    if idle.noise_n > _NOISY_N:
+        period = min(max(1, round(_MAINS_S / float(np.median(np.diff(time))))), len(course))
+        mean = np.convolve(course, np.full(period, 1.0 / period), mode="valid")
+        course = mean[np.clip(np.arange(len(course)) - period // 2, 0, len(mean) - 1)]
+    blocks = course[idle_blocks(time, vertical)]
+    usual = np.abs(blocks[np.abs(blocks.mean(axis=1)) < _WANDERS_N])
+    beyond_n = _BEYOND_IDLE * float(np.percentile(usual, _IDLE_PERCENT)) if usual.size else 0.0
+    threshold_n = max(LOAD_THRESHOLD_N - idle.left_n[1], LOAD_THRESHOLD_N / 2, beyond_n)
+    loaded = course >= threshold_n
+    if beyond_n >= threshold_n:
+        for first, last in runs(loaded):
+            loaded[first : last + 1] &= course[first : last + 1].max() >= _STEP_BEYOND * threshold_n
+    return loaded
 
 
 def load_threshold_n(vertical: FloatArray) -> float:
-    """From which vertical force (k,) on a plate is loaded: above what it reads when nobody stands on it.
+    """From which vertical force (k,) on a plate is loaded that is idle too rarely for its level to be known.
 
-    A plate that was not zeroed reads 20 to 40 N all day long: small forces that hardly change are its idle level.
+    Small forces that hardly change are what it reads while nobody stands on it.
     """
     offset_n, noise_n = _idle(vertical[vertical < _IDLE_MOST_N])
     if noise_n > _STEADY_N:

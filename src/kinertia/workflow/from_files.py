@@ -50,7 +50,7 @@ def prepare_subject(
     session = _session(wanted)
     measures = _measures(wanted)
     ready = with_attached(_with_known_body(_prepared(wanted, progress, overrule or Overrule()), wanted, measures))
-    if known.model_copy(update={"date": None}) == InstrumentsFiles():
+    if known.model_copy(update={"date": None, "zeroed": False}) == InstrumentsFiles():
         return ready
     if wanted.settings.method == "two-level":
         return _with_unused(ready, "[instruments]")

@@ -9,21 +9,22 @@ from kinertia.diagnostics.plates.signal_questions import SIGNAL_QUESTIONS
 from kinertia.diagnostics.runner import asked, explained
 from kinertia.findings.finding import Severity
 from kinertia.trial.data import PlateLoads
-from kinertia.trial.idle_plate import without_idle
+from kinertia.trial.idle_plate import with_idle_levels, without_idle
 from plate_findings import codes, plates_alone
 
 TIME = np.arange(3000) / 1000
 
 
-def plates(offset=(0.0, 0.0, 0.0), drift_n=0.0, factor=1.0, weight_n=700.0):
-    """A plate that is stood on from 1 to 1.6 s, with noise, as the readers leave it."""
+def plates(offset=(0.0, 0.0, 0.0), drift_n=0.0, factor=1.0, weight_n=700.0, zeroed=False):
+    """A plate that is stood on from 1 to 1.6 s, with noise, as the readers leave it, or where it is stated `zeroed`."""
     vertical = np.where((TIME > 1) & (TIME < 1.6), weight_n * np.sin(np.pi * (TIME - 1) / 0.6), 0.0)
     force = np.outer(vertical, [0.0, 1.0, 0.0]) + np.array(offset) + np.outer(TIME / TIME[-1], [0.0, drift_n, 0.0])
     force = factor * (force + np.random.default_rng(3).normal(0.0, 1.0, (len(TIME), 3)))
     load = without_idle(TIME, force, np.zeros_like(force))
     twist = np.outer(0.01 * load.force[:, 1], [0.0, 1.0, 0.0])
     each = (load.force[:, None], (load.moment + twist)[:, None])
-    return PlateLoads(TIME, ("plate 1",), *each, declared_feet=(None,), idle=(load.idle,))
+    read = PlateLoads(TIME, ("plate 1",), *each, declared_feet=(None,), idle=(load.idle,))
+    return with_idle_levels(read) if zeroed else read
 
 
 def found(plates, **stated):
@@ -46,15 +47,22 @@ def test_a_fault_free_plate():
     [(0, 25.0, "WARNING"), (1, 25.0, "WARNING"), (2, -25.0, "WARNING"), (1, 50.0, "ERROR"), (0, 50.0, "WARNING")],
 )
 def test_zeros(axis, level_n, severity):
-    zero = only(plates(offset=level_n * np.eye(3)[axis]))
-    assert (zero.code, zero.severity.name) == ("P213", severity)
-    assert zero.where == plates_alone(plates()).at(plate="plate 1", **plates_alone(plates()).along(axis))
-    assert zero.evidence["level_n"].value == pytest.approx(level_n, abs=0.5)
+    """They are taken off, unless the laboratory states that there are none."""
+    there = plates_alone(plates()).at(plate="plate 1", **plates_alone(plates()).along(axis))
+    for zeroed, expected in ((False, ("P216", "CORRECTED")), (True, ("P213", severity))):
+        wrong = plates(offset=level_n * np.eye(3)[axis], zeroed=zeroed)
+        zero = only(wrong)
+        assert (zero.code, zero.severity.name, zero.where) == (*expected, there)
+        assert zero.evidence["level_n"].value == pytest.approx(level_n, abs=0.5)
+        loaded = plates().force[..., 1] > 50.0
+        left_n = (wrong.force - plates().force)[loaded].mean(axis=0)
+        np.testing.assert_allclose(left_n, zeroed * level_n * np.eye(3)[axis], atol=0.1)
 
 
 def test_all_zeros_that_are_wrong_are_found():
     """D22: of every axis."""
-    zeros = found(plates(offset=(30.0, 60.0, -30.0)))
+    assert only(plates(offset=(30.0, 60.0, -30.0))).evidence["levels_n"].value == pytest.approx((30, 60, -30), abs=0.5)
+    zeros = found(plates(offset=(30.0, 60.0, -30.0), zeroed=True))
     assert [(one.code, one.where.axis) for one in zeros] == [
         ("P213", axis) for axis in ("fore-aft", "vertical", "mediolateral")
     ]
@@ -123,14 +131,15 @@ def test_a_child_is_examined_like_an_adult(mass_kg):
     child = plates(weight_n=210.0)
     assert found(child, mass_kg=mass_kg) == []
     for axis in (0, 1):
-        zero = only(plates(weight_n=210.0, offset=8.0 * np.eye(3)[axis]), mass_kg=mass_kg)
+        zero = only(plates(weight_n=210.0, offset=8.0 * np.eye(3)[axis], zeroed=True), mass_kg=mass_kg)
         assert (zero.code, zero.where.axis) == ("P213", ("fore-aft", "vertical")[axis])
-    assert only(plates(weight_n=210.0, offset=(0.0, 14.0, 0.0)), mass_kg=mass_kg).severity == Severity.ERROR
+    far = plates(weight_n=210.0, offset=(0.0, 14.0, 0.0), zeroed=True)
+    assert only(far, mass_kg=mass_kg).severity == Severity.ERROR
     dead = replace(child, force=child.force * [0.0, 1.0, 1.0])
     assert only(dead, mass_kg=mass_kg).code == "P101"
     assert only(replace(child, moment=np.cross([0.4, 0.02, -0.3], child.force)), mass_kg=mass_kg).code == "P264"
     # the same is noise on an adult's plates
-    assert found(plates(offset=(8.0, 8.0, 8.0))) == []
+    assert found(plates(offset=(8.0, 8.0, 8.0), zeroed=True)) == []
 
 
 @pytest.mark.parametrize(("top_n", "lost"), [(600.0, True), (690.0, True), (900.0, False)])

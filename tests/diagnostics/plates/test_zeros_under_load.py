@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from kinertia.diagnostics.plates.zeros_under_load import zeros_under_load
 from kinertia.trial.data import IdleReading, Markers
-from kinertia.trial.idle_plate import without_idle
+from kinertia.trial.idle_plate import with_idle_levels, without_idle
 from plate_findings import codes, context_of, found_in, with_force
 from recordings import LONG_WALKS, WALKS, here
 
@@ -63,17 +63,24 @@ def test_what_unloaded_plates_read_decides_which_cause_comes_first(walk):
 
 @pytest.mark.parametrize("axis", [0, 2])
 def test_one_zero_is_one_finding(recording_of, axis):
-    """D12: P212 or P214 of the loaded plate, and P213 of the unloaded one, are one fault."""
+    """D12: P212 or P214 of the loaded plate, and P213 of the unloaded one, are one fault; once it is taken off it is
+    none.
+    """
     walk = recording_of(*LONG_WALKS["synthetic"])
     plates, zero = walk.plates, 30.0 * np.eye(3)[axis]
     rng = np.random.default_rng(100)
-    force = plates.force.copy()
+    force, moment = plates.force.copy(), plates.moment.copy()
     force[:, 0] += zero
+    moment[:, 0] += np.cross(
+        plates.moment[:, 0].sum(axis=0)[[2, 1, 0]] / plates.force[:, 0, 1].sum() * [1, 0, -1], zero
+    )
     force += rng.normal(0.0, 1.0, force.shape)
-    each = [without_idle(plates.time, force[:, p], plates.moment[:, p]) for p in range(2)]
+    moment += rng.normal(0.0, 0.1, moment.shape)
+    each = [without_idle(plates.time, force[:, p], moment[:, p]) for p in range(2)]
     read = np.stack([one.force for one in each], axis=1), np.stack([one.moment for one in each], axis=1)
-    wrong = replace(plates, force=read[0], moment=read[1], idle=tuple(one.idle for one in each))
-    context = context_of(replace(walk, plates=wrong))
+    corrected = replace(plates, force=read[0], moment=read[1], idle=tuple(one.idle for one in each))
+    assert codes(found_in(context_of(replace(walk, plates=corrected)))) == ["P216"]
+    context = context_of(replace(walk, plates=with_idle_levels(corrected)))
     found = found_in(context)
     assert codes(found) == ["P213"]
     (zero_found,) = [one for one in found if one.is_open]

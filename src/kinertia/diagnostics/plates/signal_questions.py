@@ -1,4 +1,4 @@
-"""What is asked of the plates' signals, and of the loads once they are sorted by foot."""
+"""What is asked of the plates' signals, in static trials too, and of the loads once they are sorted by foot."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from kinertia.diagnostics.plates.mains_interference import mains_interference
 from kinertia.diagnostics.plates.quantisation import quantisation
 from kinertia.diagnostics.plates.signals import signals
 from kinertia.diagnostics.plates.vertical_moment import vertical_moment
-from kinertia.diagnostics.plates.zeros import zeros
+from kinertia.diagnostics.plates.zeros import idle_levels, zeros
 from kinertia.diagnostics.plates.zeros_under_load import zeros_under_load
 from kinertia.diagnostics.runner import Question
 from kinertia.diagnostics.timing.force_rate import force_rate
@@ -30,6 +30,7 @@ SIGNAL_QUESTIONS: tuple[Question[RecordingContext], ...] = (
     Question("P21", zeros, unless=_OTHER_AXES),
     Question("P26", free_moments, unless=_OTHER_AXES),
 )
+STANDING_QUESTIONS: tuple[Question[RecordingContext], ...] = (Question("P21", idle_levels),)
 LOADED_QUESTIONS: tuple[Question[RecordingContext], ...] = (
     Question("M13", over_smoothed, unless=_NO_VELOCITY),
     Question("T20", force_rate, unless=_NO_VELOCITY),

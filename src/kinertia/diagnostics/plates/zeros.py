@@ -10,7 +10,8 @@ from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.loaded_plates import STEP_N
 from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.quantity import Quantity
-from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, IdleReading
+from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray
+from kinertia.trial.idle_level import ZEROED_N, ZEROED_NM, IdleReading
 
 _ZERO_N, _FAR_FROM_ZERO_N, _DRIFT_N = 15.0, 40.0, 15.0
 """Zeroed plates read a few newtons; 40 N are 5 % of an adult's weight on every plate."""
@@ -23,21 +24,22 @@ _UNKNOWN = IdleReading((np.nan, np.nan, np.nan), np.nan, 0.0, 0.0)
 
 
 def zeros(context: RecordingContext) -> Iterator[Finding]:
-    """P211 and P213, of every plate and axis; limits in newtons are those of adults.
+    """P211, P213 and P216, of every plate and axis; limits in newtons are those of adults.
 
-    Readers set samples of an unloaded plate to zero, and take nothing off those under load: a zero is still in the
-    loads.
+    Readers take a constant level off the loads (P216). One that is not constant, and one of plates that are stated to
+    be zeroed, is still in them (P213).
     """
     plates, share = context.plates, context.adult_share
     if plates is None:
         return
+    yield from idle_levels(context)
     for p, (name, idle) in enumerate(zip(plates.names, plates.idle or (_UNKNOWN,) * len(plates.names), strict=True)):
         drifts = abs(idle.drift_n) > _limit_n(_DRIFT_N, share)
         if drifts:
             drift = Quantity(idle.drift_n, "N", limit=_limit_n(_DRIFT_N, share))
             yield finding("P211", context.at(plate=name, **context.along(1)), drift_n=drift)
         vertical = False
-        for axis, level_n in enumerate(idle.level_n):
+        for axis, level_n in enumerate(idle.left_n):
             if abs(level_n) > _limit_n(_ZERO_N, share) and not (drifts and axis == 1):
                 far = axis == 1 and abs(level_n) > _FAR_FROM_ZERO_N * share
                 vertical |= axis == 1
@@ -45,6 +47,23 @@ def zeros(context: RecordingContext) -> Iterator[Finding]:
         least_n = None if drifts or vertical else _steady_minimum(plates.force[:, p, 1], share)
         if least_n is not None:
             yield _zero(context, name, 1, least_n, "minimum", Severity.ERROR)
+
+
+def idle_levels(context: RecordingContext) -> Iterator[Finding]:
+    """P216: what a plate that is stood on reads while it is not, taken off its loads."""
+    plates = context.plates
+    for p, idle in enumerate(() if plates is None else plates.idle or ()):
+        assert plates is not None
+        if not idle.subtracted or not plates.force[:, p].any():
+            continue
+        axis = int(np.argmax(np.abs(idle.level_n)))
+        yield finding(
+            "P216",
+            context.at(plate=plates.names[p], **context.along(axis)),
+            level_n=Quantity(idle.level_n[axis], "N", limit=ZEROED_N, usual=(-ZEROED_N, ZEROED_N)),
+            moment_nm=Quantity(idle.twist_nm, "N m", limit=ZEROED_NM),
+            levels_n=Quantity(idle.level_n, "N"),
+        )
 
 
 def _limit_n(adult_n: float, share: float) -> float:

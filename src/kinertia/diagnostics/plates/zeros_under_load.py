@@ -77,8 +77,10 @@ def _unexplained(
 
 
 def _levels(plates: PlateLoads, axis: int) -> FloatArray | None:
-    """(p,) N that plates read along an axis while nobody stands on them; None where that is not known of each."""
-    levels = np.array([idle.level_n[axis] for idle in plates.idle or ()])
+    """(p,) N that plates read along an axis while nobody stands on them, and that is in their loads; None where that is
+    not known of each.
+    """
+    levels = np.array([idle.left_n[axis] for idle in plates.idle or ()])
     return levels if levels.size and np.isfinite(levels).all() else None
 
 

@@ -1,0 +1,126 @@
+"""What a force plate reads while nobody stands on it, by the times at which its mean force hardly changes."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from kinertia.trial.centre_of_pressure import FIRM_LOAD_N
+from kinertia.trial.data import BoolArray, FloatArray
+from kinertia.trial.force_resolution import ringing_s
+from kinertia.trial.idle_level import IdleReading
+from kinertia.trial.sampled_time import runs, span_s
+
+_BLOCK_S, _FEWEST_BLOCKS = 0.1, 4
+"""Whole periods of the mains, of 50 and of 60 Hz: over them interference has no mean."""
+_IDLE_N, _STEADY_N, _IDLE_SHARE, _LEAST_PEAK_N = 150.0, 7.5, 0.2, 100.0
+"""In a tenth of a second in which nobody steps on or off, a plate reads less than the first on average, and half a
+block earlier or later the same within the second. Of what it carries at its peak, if that is a load, it reads less than
+a fifth: half a child is 100 N."""
+_CONSTANT_N, _CONSTANT_NM, _MOST_BLOCKS = 7.5, 5.0, 0.8
+"""Within these of its median is a constant level in most of the blocks."""
+_RANGE_PERCENT, _RISING, _MOST_RISING, _SHORTEST_STEP_S = (1.0, 99.0), (0.2, 0.5), 0.2, 0.1
+"""Between 20 and 50 % of its peak a force under feet is for less than a tenth of the time, noise for two fifths."""
+_SWAYS, _ROUGH, _FEWEST = 0.03, 0.1, 20
+"""Of the peak: deviation of the load of feet that stay, at least, and its largest change from sample to sample, at
+most; noise that makes a zero of some newtons deviate as much jumps by more."""
+
+
+def idle_reading(time: FloatArray, force: FloatArray, moment: FloatArray) -> IdleReading:
+    """Find what a plate reads while nobody stands on it.
+
+    Args:
+        time: (k,) s.
+        force, moment: (k, 3) N and N m about the ground origin, as read.
+    """
+    vertical = force[:, 1]
+    peak_n = float(np.abs(vertical).max(initial=0.0))
+    blocks = idle_blocks(time, vertical)
+    if len(blocks) < _FEWEST_BLOCKS:
+        return IdleReading((np.nan,) * 3, np.nan, peak_n, ringing_s(time, vertical), _like_steps(time, vertical))
+    levels = np.median(force[blocks], axis=1)
+    x, y, z = (float(value) for value in np.median(levels, axis=0))
+    when = time[blocks].mean(axis=1)
+    drift_n = float(np.polyfit(when - when.mean(), levels[:, 1], 1)[0]) * float(time[-1] - time[0])
+    level_nm, twist_nm = _moment(force, moment, blocks, np.array([x, y, z]))
+    return IdleReading(
+        (x, y, z),
+        drift_n,
+        peak_n,
+        ringing_s(time, vertical - y),
+        _like_steps(time, vertical),
+        level_nm,
+        twist_nm,
+        noise_n=float(np.std(vertical[blocks] - y)),
+        constant=bool((_deviation(levels) < _CONSTANT_N).all()),
+    )
+
+
+def _moment(
+    force: FloatArray, moment: FloatArray, blocks: npt.NDArray[np.int_], level_n: FloatArray
+) -> tuple[tuple[float, float, float], float]:
+    """N m, median moment about the ground origin in these blocks, and its largest component about where the plate is
+    loaded; where the file has none, that of a level (3,) N that acts there.
+    """
+    moments = np.median(moment[blocks], axis=1)
+    steady = bool((_deviation(moments) < _CONSTANT_NM).all())
+    level_nm = np.median(moments, axis=0) if steady else np.zeros(3)
+    there = np.cross(_mean_point(force - level_n, moment - level_nm), level_n)
+    # without a centre of pressure of the unloaded plate a file has zero there, and at most a torque
+    about = level_nm - (there if level_nm[[0, 2]].any() else 0.0)
+    x, y, z = (float(value) for value in about + there)
+    return (x, y, z), float(about[np.argmax(np.abs(about))])
+
+
+def idle_blocks(time: FloatArray, vertical: FloatArray) -> npt.NDArray[np.int_]:
+    """Samples (b, s) of the blocks in which a plate with this vertical force (k,) is idle."""
+    peak_n = float(np.abs(vertical).max(initial=0.0))
+    every = max(2, round(_BLOCK_S / float(np.median(np.diff(time))))) if len(time) > 1 else 2
+    count = len(time) // every
+    blocks = np.arange(count * every).reshape(count, every)
+    if not count:
+        return blocks
+    total = np.concatenate([[0.0], np.cumsum(vertical)])
+    mean = (total[every:] - total[:-every]) / every  # of the block that begins at each sample
+    first = blocks[:, 0]
+    near = [mean[np.clip(first + off, 0, len(mean) - 1)] for off in (0, -(every // 2), every // 2)]
+    most = min(_IDLE_N, _IDLE_SHARE * peak_n) if peak_n > _LEAST_PEAK_N else _IDLE_N
+    steady = np.ptp(near, axis=0) < _STEADY_N
+    idle: npt.NDArray[np.int_] = blocks[steady & (np.abs(near[0]) < most)]
+    return idle
+
+
+def _deviation(levels: FloatArray) -> FloatArray:
+    """(3,), within which most of the levels (b, 3) are of their median."""
+    result: FloatArray = np.quantile(np.abs(levels - np.median(levels, axis=0)), _MOST_BLOCKS, axis=0)
+    return result
+
+
+def _mean_point(force: FloatArray, moment: FloatArray) -> FloatArray:
+    """(3,) m, mean centre of pressure of the loads (k, 3); the origin where there are none."""
+    loaded: BoolArray = force[:, 1] > FIRM_LOAD_N
+    if not loaded.any():
+        return np.zeros(3)
+    upward = float(force[loaded, 1].sum())
+    return np.array([moment[loaded, 2].sum() / upward, 0.0, -moment[loaded, 0].sum() / upward])
+
+
+def _like_steps(time: FloatArray, vertical: FloatArray) -> bool:
+    """Whether a force (k,) of whatever unit is like the load of feet: it pushes one way, is either next to nothing or
+    nearly all there, and stays so for a while; or it is always there and sways smoothly.
+
+    Noise, drift and hum go both ways or never back to zero, are in between as often as not, leave the upper half at
+    once, or are rough.
+    """
+    if len(time) < _FEWEST:
+        return False
+    low, high = np.percentile(vertical if vertical.max() > -vertical.min() else -vertical, _RANGE_PERCENT)
+    share = np.abs(vertical) / max(float(high), 1e-12)
+    if low > _RISING[1] * high:
+        after = time - time.mean()
+        sways = share - np.polyval(np.polyfit(after, share, 1), after)
+        return bool(np.std(sways) > _SWAYS) and float(np.abs(np.diff(share)).max()) < _ROUGH
+    between = float(((share > _RISING[0]) & (share < _RISING[1])).mean())
+    lasts = [span_s(time, first, last) for first, last in runs(share > _RISING[1])]
+    returns = bool(abs(low) < _RISING[0] * high)
+    return returns and between < _MOST_RISING and max(lasts, default=0.0) >= _SHORTEST_STEP_S
