@@ -9,7 +9,8 @@ from typing import Any
 
 from kinertia.diagnostics.axes import Axes, AxisNames
 from kinertia.diagnostics.evidence.caused_velocity import CausedVelocity, VelocityChanges, caused_velocities
-from kinertia.diagnostics.evidence.copied_frames import without_copied_frames
+from kinertia.diagnostics.evidence.contact_span import contact_span_s
+from kinertia.diagnostics.evidence.copied_frames import FEWEST_FRAMES, without_copied_frames
 from kinertia.diagnostics.evidence.foot_trajectories import FootTrajectory, foot_trajectories
 from kinertia.diagnostics.evidence.force_mass import ForceMass, force_mass
 from kinertia.diagnostics.evidence.landmarks import CLEAR, headings, landmark_positions, most_forwards
@@ -84,9 +85,23 @@ class RecordingContext:
         return frozenset(label for label, seen in zip(markers.labels, markers.seen.T, strict=True) if seen.any())
 
     @cached_property
+    def contact_span_s(self) -> tuple[float, float] | None:
+        """First and last time of the part that is measured: around loads on plates; None where all of it counts."""
+        if self.is_static or self.plates is None:
+            return None
+        span = contact_span_s(self.plates)
+        if span is None or self.window_s is None:
+            return span
+        return min(span[0], self.window_s[0]), max(span[1], self.window_s[1])
+
+    @cached_property
     def measured_markers(self) -> Markers:
-        """`markers` without copies of lost frames."""
-        return self.markers if self.is_static else without_copied_frames(self.markers)
+        """`markers` of the part that is measured, without copies of lost frames."""
+        if self.is_static:
+            return self.markers
+        markers = without_copied_frames(self.markers)
+        part = markers if self.contact_span_s is None else markers.cut(*self.contact_span_s)
+        return part if len(part.time) >= FEWEST_FRAMES else markers
 
     @cached_property
     def marker_precision(self) -> MarkerPrecision:

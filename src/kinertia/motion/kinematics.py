@@ -27,13 +27,14 @@ from kinertia.motion.inverse_kinematics import InverseKinematics, solve_ik
 from kinertia.motion.one_thread import one_blas_thread
 from kinertia.motion.smoothing import SmoothedSpline, SmoothingError, smooth
 from kinertia.trial.data import Markers, Trial
+from kinertia.trial.foot_motion import AROUND_LOAD_S
 from kinertia.trial.sampled_time import TIME_TOLERANCE_S, runs, span_s, within
 
 LONGEST_BRIDGE_S = 0.1
 """The spline may bridge a coordinate that the visible markers do not determine for at most this long."""
 FEWEST_FRAMES = 11
 """A window needs at least as many frames."""
-AROUND_WINDOW_S = 0.25
+AROUND_WINDOW_S = AROUND_LOAD_S
 """Samples this near the measured window help to know what happens at its ends."""
 _END_PERIODS = 0.5
 """The window keeps off the ends of the record by this share of the cutoff's period: accelerations are poor there.

@@ -13,8 +13,10 @@ from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.trial.belt import Belt
 from kinertia.trial.data import BoolArray, FloatArray, Markers
-from kinertia.trial.sampled_time import runs, span_s
+from kinertia.trial.sampled_time import runs, span_s, within
 
+AROUND_LOAD_S = 0.25
+"""What happens so long before the first and after the last load is known to help with what happens under load."""
 _SPEED_SPAN_S = 0.01
 _FILLED_GAP_S, _SEEN_SHARE = 0.2, 0.5
 _STEP_M = 0.03
@@ -68,7 +70,8 @@ def foot_motions(feet: Sequence[Markers], loaded: BoolArray, belt: Belt | None =
     loaded feet: the median of the lowest marker's, zero on a floor, the belt's on a treadmill; this only
     tells the direction of a belt whose speed is stated. A foot that is never loaded takes the other's.
     """
-    places = [_short_gaps_filled(markers) for markers in feet]
+    near = _near(feet[0].time, np.asarray(loaded.any(axis=1)))
+    places = [_short_gaps_filled(markers, near) for markers in feet]
     moves = [_velocity(markers, place, _SPEED_SPAN_S) for markers, place in zip(feet, places, strict=True)]
     heights = [_above_lowest(place[..., 1], loaded[:, foot]) for foot, place in enumerate(places)]
     ground = []
@@ -141,16 +144,25 @@ def _still(time: FloatArray, velocity: FloatArray) -> BoolArray:
     return still
 
 
-def _short_gaps_filled(markers: Markers) -> FloatArray:
-    """Positions of the markers seen in at least half the frames, short gaps bridged by a line.
+def _near(time: FloatArray, loaded: BoolArray) -> BoolArray:
+    """(n,) from the first to the last loaded frame (n,), and a little around; everywhere where none is loaded."""
+    frames = np.flatnonzero(loaded)
+    if not frames.size:
+        return np.ones(len(time), dtype=bool)
+    return within(time, time[frames[0]] - AROUND_LOAD_S, time[frames[-1]] + AROUND_LOAD_S)
+
+
+def _short_gaps_filled(markers: Markers, near: BoolArray) -> FloatArray:
+    """Positions of the markers seen in at least half of these frames (n,), short gaps bridged by a line.
 
     Only for telling whether a foot is on the ground.
     """
     seen = markers.seen
-    kept = np.flatnonzero(seen.mean(axis=0) >= _SEEN_SHARE)
+    share = seen[near].mean(axis=0)
+    kept = np.flatnonzero(share >= _SEEN_SHARE)
     if not kept.size:
         where = Where(part="foot", markers=markers.labels)
-        share = Quantity(float(seen.mean(axis=0).max()), "1", limit=_SEEN_SHARE)
+        share = Quantity(float(share.max()), "1", limit=_SEEN_SHARE)
         found = finding("M104", where, share=share, labels=Quantity(", ".join(markers.labels)))
         raise MarkerSetError(problem_of(found), markers.labels).with_finding(found)
     positions = markers.positions[:, kept].copy()

@@ -93,6 +93,22 @@ def test_jumps(size_m):
     assert [one.evidence["time_s"].value for one in (first, second)] == pytest.approx([1.01, 1.51])
 
 
+@pytest.mark.parametrize("rate_hz", [60.0, 100.0, 250.0])
+@pytest.mark.parametrize("shape", ["step there, step back", "drifts away, step back", "step there, drifts back"])
+def test_a_marker_that_comes_back_at_once_does_not_jump(rate_hz, shape):
+    off = {"step there, step back": [1, 1, 1], "drifts away, step back": [1 / 3, 2 / 3, 1]}.get(
+        shape, [1, 2 / 3, 1 / 3]
+    )
+
+    def leave(places, time):
+        places[100:103, 1, 2] += 0.1 * np.array(off)
+
+    (spikes,) = found(trajectories, changed(walking(rate_hz=rate_hz), leave))
+    assert (spikes.code, spikes.where.markers) == ("M111", ("B",))
+    assert 1 <= spikes.evidence["frames"].value <= 3
+    assert 0.05 < spikes.evidence["distance_m"].value < 0.11
+
+
 @pytest.mark.parametrize("count", [2, 8, 20])
 def test_missing_frames(count):
     markers = walking()

@@ -27,6 +27,8 @@ OFF_M = 0.015
 """By which a marker's distances in its segment change while it is frozen or goes straight, and the segment does not."""
 _SINGLE = 1.5
 """A single frame is off by twice as much as it makes those beside it look; one before or after a jump, by as much."""
+_BRIEF_S = 0.06
+"""Steps to and from where a marker is off belong to one spike if they are within this; what lasts longer is a jump."""
 _FROZEN_M = 1e-3
 
 
@@ -40,10 +42,10 @@ class Fault:
 
 @dataclass(frozen=True)
 class Spikes(Fault):
-    """Single frames in which one marker is off.
+    """Single frames, or a few, in which one marker is off.
 
     Attributes:
-        distance_m: from the middle of its neighbours, the largest.
+        distance_m: from the middle of its neighbours, or from the line across a few frames, the largest.
         frames: how many.
         far_frames: how many of them are beyond `spike_limit_m`.
     """
@@ -100,7 +102,8 @@ class TrajectoryFaults:
         # and makes those beside them look half as large
         near = np.pad(single, ((2, 2), (0, 0)))
         size[near[3:-2] | near[2:-3] | near[1:-4] | near[4:-1]] = 0.0
-        return cls(_spikes(markers, off, far, single), _jumps(markers, size), _filled(markers, segments))
+        spikes, jumps = _brief_or_lasting(markers, _jumps(markers, size))
+        return cls(_by_marker([*_spikes(markers, off, far, single), *spikes]), tuple(jumps), _filled(markers, segments))
 
     @property
     def labels(self) -> frozenset[str]:
@@ -156,6 +159,54 @@ def _jumps(markers: Markers, size: FloatArray) -> tuple[Jump, ...]:
         for k in np.flatnonzero(size.any(axis=0))
         for frame in (first + int(np.argmax(size[first : last + 1, k])) for first, last in runs(size[:, k] > 0.0))
     )
+
+
+def _brief_or_lasting(markers: Markers, jumps: Sequence[Jump]) -> tuple[list[Spikes], list[Jump]]:
+    """Spikes of a few frames, which begin or end with a step; and the steps that stay."""
+    spikes, lasting = [], []
+    for jump in jumps:
+        place = markers.positions[:, markers.labels.index(jump.label)]
+        frame = int(np.searchsorted(markers.time, jump.span_s[0] - 0.5 / markers.rate_hz))
+        off = _frames_off(place, frame, markers.rate_hz)
+        if off is None:
+            lasting.append(jump)
+            continue
+        first, last = off
+        share = np.linspace(0.0, 1.0, last - first + 3)[1:-1, None]
+        line = (1.0 - share) * place[first - 1] + share * place[last + 1]
+        distance_m = float(np.nanmax(np.linalg.norm(place[first : last + 1] - line, axis=1), initial=0.0))
+        span = (float(markers.time[first]), float(markers.time[last]))
+        far = int(distance_m > spike_limit_m(markers.rate_hz))
+        spikes.append(Spikes(jump.label, span, distance_m, last - first + 1, far))
+    return spikes, lasting
+
+
+def _frames_off(place: FloatArray, frame: int, rate_hz: float) -> tuple[int, int] | None:
+    """The fewest frames around a step from `frame` to the next without which a marker (n, 3) goes on as before; None
+    where the step stays.
+    """
+    limit_m = step_limit_m(rate_hz) / 2
+    for count in range(1, max(2, round(_BRIEF_S * rate_hz)) + 1):
+        for first in range(frame + 1 - count, frame + 2):
+            a, b = first - 1, first + count
+            if a < 1 or b > len(place) - 2:
+                continue
+            speed = (place[a] - place[a - 1] + place[b + 1] - place[b]) / 2
+            if np.linalg.norm(place[b] - place[a] - (b - a) * speed) < limit_m:
+                return first, b - 1
+    return None
+
+
+def _by_marker(spikes: Sequence[Spikes]) -> tuple[Spikes, ...]:
+    """One entry per marker."""
+    found: dict[str, Spikes] = {}
+    for one in spikes:
+        own = found.get(one.label, one)
+        span = (min(own.span_s[0], one.span_s[0]), max(own.span_s[1], one.span_s[1]))
+        frames, far = (0, 0) if own is one else (own.frames, own.far_frames)
+        distance_m = max(own.distance_m, one.distance_m)
+        found[one.label] = Spikes(one.label, span, distance_m, frames + one.frames, far + one.far_frames)
+    return tuple(found.values())
 
 
 def _filled(markers: Markers, segments: Mapping[str, Sequence[str]]) -> tuple[Filled, ...]:

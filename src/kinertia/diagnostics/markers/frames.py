@@ -17,6 +17,7 @@ from kinertia.diagnostics.evidence.copied_frames import (
     LEAST_MOTION_M,
     CopiedFrames,
     brief_runs,
+    without_copied_frames,
 )
 from kinertia.diagnostics.evidence.trajectory_faults import slowness, steps
 from kinertia.findings.finding import Finding, Severity, finding
@@ -82,8 +83,12 @@ def _copied(context: RecordingContext, copies: CopiedFrames) -> Finding:
 
 
 def _missing(context: RecordingContext) -> Iterator[Finding]:
-    """Where most markers step at once."""
-    markers = context.measured_markers
+    """Where most markers step at once, up to the last load: frames that are missing before make forces late."""
+    markers = without_copied_frames(context.markers)
+    if context.contact_span_s is not None:
+        markers = markers.cut(markers.time[0], context.contact_span_s[1])
+    if len(markers.time) < FEWEST_FRAMES:
+        return
     step = _median_step_m(markers)
     shown = np.isfinite(step)
     usually = float(np.median(step[shown])) if shown.any() else 0.0

@@ -32,9 +32,9 @@ def visible(context: RecordingContext) -> Iterator[Finding]:
 
 
 def _in_window(context: RecordingContext) -> Markers:
-    """The frames that a fit would use; all where they are not known."""
+    """The frames that a fit would use; those around loads on plates where they are not known."""
     windows = () if context.trial is None else context.trial.windows()
-    return context.markers.cut(*windows[0]) if windows else context.markers
+    return context.markers.cut(*windows[0]) if windows else context.measured_markers
 
 
 def _bare_segments(context: RecordingContext) -> Iterator[Finding]:
@@ -43,13 +43,15 @@ def _bare_segments(context: RecordingContext) -> Iterator[Finding]:
     if marker_set is None:
         return
     trunk = set(marker_set.segments.get("torso", ()))
+    markers = context.measured_markers
+    seen = {label for label, shown in zip(markers.labels, markers.seen.T, strict=True) if shown.any()}
     trunk_known = context.static is not None and trunk & context.static.seen_labels
     for segment, labels in marker_set.segments.items():
         if marker_set.landmarks:
             needed = bool(labels) and not segment.startswith(_DISPENSABLE) and (segment != "torso" or trunk_known)
         else:
             needed = segment in ("foot_r", "foot_l")
-        if needed and not set(labels) & context.seen_labels:
+        if needed and not set(labels) & seen:
             expected = ", ".join(labels) or "markers of the model"
             count = Quantity(float(len(labels)), "1")
             yield finding("M104", context.at(part=in_words(segment)), expected=count, labels=Quantity(expected))

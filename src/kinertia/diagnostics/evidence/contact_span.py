@@ -1,0 +1,20 @@
+"""Which part of a recording is measured: from the first load on a plate to the last, and a little around."""
+
+from __future__ import annotations
+
+from kinertia.diagnostics.evidence.plate_contacts import loads_on
+from kinertia.trial.data import PlateLoads
+from kinertia.trial.foot_motion import AROUND_LOAD_S
+
+
+def contact_span_s(plates: PlateLoads) -> tuple[float, float] | None:
+    """First and last time (s) of what loads on plates are used with; None where nobody steps on them.
+
+    Before and after, people come and go: feet are out of the cameras' view, or markers are lost, and nothing depends on
+    it.
+    """
+    loads = [load for p in range(len(plates.names)) for load in loads_on(plates, p)]
+    if not loads:
+        return None
+    first, last = min(load[0] for load in loads), max(load[1] for load in loads)
+    return float(plates.time[first]) - AROUND_LOAD_S, float(plates.time[last]) + AROUND_LOAD_S
