@@ -52,6 +52,10 @@ def recording(positions: dict[str, np.ndarray], frames: int = 5) -> Recording:
     return Recording("static", Markers(np.arange(frames) / 100.0, tuple(positions), stack))
 
 
+_ROOM = 0.05
+"""Rad that poses stay off the ends of their ranges."""
+
+
 def generic_static(height_m: float = 1.75) -> Recording:
     """A static trial of a symmetric person with medial markers, facing +X."""
     return recording(standing_positions(height_m))
@@ -63,28 +67,34 @@ def generic_model(height_m: float = 1.75) -> Gait27:
 
 
 def random_coordinates(skeleton, n: int, seed: int = 0, spread: float = 0.5) -> np.ndarray:
-    """(n, c) poses with angles within `spread` rad of upright and the pelvis about 1 m up."""
+    """(n, c) poses with angles within `spread` rad of upright and within their ranges, and the pelvis about 1 m up."""
     rng = np.random.default_rng(seed)
-    q = rng.uniform(-spread, spread, (n, len(skeleton.coordinates)))
+    centre, scale = within_ranges(skeleton, spread)
+    q: np.ndarray = centre + scale * rng.uniform(-spread, spread, (n, len(skeleton.coordinates)))
     q[:, 1] += 1.0
-    q[:, [name.startswith(("knee", "elbow")) for name in skeleton.coordinates]] += 0.8
     return q
 
 
 def smooth_motion(skeleton, n: int = 60, rate_hz: float = 60.0, seed: int = 0) -> tuple[np.ndarray, Motion]:
-    """Time (n,) s and a motion in which every coordinate is a sum of two slow sinusoids (0.3-2 Hz).
-
-    Knees and elbows are bent.
-    """
+    """Time (n,) s and a motion in which every coordinate is a sum of two slow sinusoids (0.3-2 Hz) within its range."""
     rng = np.random.default_rng(seed)
     time = np.arange(n) / rate_hz
     shape = (2, len(skeleton.coordinates))
     size, omega, phase = rng.uniform(0.1, 0.4, shape), rng.uniform(2.0, 12.0, shape), rng.uniform(0.0, 6.0, shape)
     size[:, :3] *= 0.2
+    centre, scale = within_ranges(skeleton, 0.8)
+    size *= scale
     angle = omega * time[:, None, None] + phase
     q, qd, qdd = (
         (size * part).sum(axis=1) for part in (np.sin(angle), omega * np.cos(angle), -(omega**2) * np.sin(angle))
     )
+    q += centre
     q[:, 1] += 1.0
-    q[:, [name.startswith(("knee", "elbow")) for name in skeleton.coordinates]] += 0.8
     return time, Motion(q, qd, qdd)
+
+
+def within_ranges(skeleton, spread: float) -> tuple[np.ndarray, np.ndarray]:
+    """Centres and factors (c,) that bring values within `spread` of zero into the coordinates' ranges."""
+    low, high = np.clip([skeleton.bounds.low, skeleton.bounds.high], -10.0, 10.0)
+    half = np.minimum(spread, (high - low) / 2 - _ROOM)
+    return np.clip(0.0, low + _ROOM + half, high - _ROOM - half), half / spread

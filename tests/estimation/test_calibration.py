@@ -172,8 +172,8 @@ def test_an_elbow_that_the_static_trial_has_backwards_bends_forwards(skeleton, s
     assert elbow_rotations(skeleton, with_elbows_that_bend_forwards(skeleton, [walk])[0]) == {}
 
 
-def straight_arms(skeleton, hyperextended=0.0) -> Markers:
-    """A walk in which neither elbow bends."""
+def straight_arms(skeleton, hyperextended=-0.05) -> Markers:
+    """A walk in which neither elbow bends by more than three degrees."""
     time, motion = smooth_motion(skeleton, 300, 100.0, 0)
     q = motion.q.copy()
     q[:, [skeleton.coordinates.index(f"elbow_flex_{side}") for side in "rl"]] = -hyperextended

@@ -92,16 +92,34 @@ def test_perfect_markers_give_back_any_motion_within_its_ranges_in_one_branch(se
     assert ik.converged.all()
 
 
-def test_a_clamped_range_holds_and_another_one_does_not(skeleton):
+@pytest.mark.parametrize(
+    ("coordinate", "clamped"), [("elbow_flex_r", True), ("arm_flex_r", True), ("arm_flex_r", False)]
+)
+def test_a_clamped_range_holds_and_another_one_does_not(skeleton, coordinate, clamped):
     q = np.zeros((40, len(skeleton.coordinates)))
-    elbow = skeleton.coordinates.index("elbow_flex_r")
-    q[:, elbow] = np.linspace(-0.3, 0.8, 40)
+    column = skeleton.coordinates.index(coordinate)
+    q[:, column] = np.linspace(-0.3, 0.8, 40)
+    ranges = {**skeleton.ranges, coordinate: Range(0.0, 2.6, clamped)}
+    ik = solve_ik(replace(skeleton, ranges=ranges), markers_of(skeleton, q))
+    expected = np.maximum(q[:, column], 0.0) if clamped else q[:, column]
+    np.testing.assert_allclose(ik.q[:, column], expected, atol=1e-6)
+    assert ik.converged.all()
+
+
+def test_a_joint_is_drawn_back_into_the_range_that_anatomy_knows(skeleton):
+    """As far as its markers allow, and not where the user states another range."""
+    q = np.zeros((9, len(skeleton.coordinates)))
+    subtalar = skeleton.coordinates.index("subtalar_angle_l")
+    q[:, subtalar] = np.radians(np.linspace(-60.0, 0.0, 9))
     markers = markers_of(skeleton, q)
-    for clamped, expected in ((False, q[:, elbow]), (True, np.maximum(q[:, elbow], 0.0))):
-        ranges = {**skeleton.ranges, "elbow_flex_r": Range(0.0, 2.6, clamped)}
-        ik = solve_ik(replace(skeleton, ranges=ranges), markers)
-        np.testing.assert_allclose(ik.q[:, elbow], expected, atol=1e-6)
-        assert ik.converged.all()
+    angles = solve_ik(skeleton, markers).q[:, subtalar]
+    outside = q[:, subtalar] < skeleton.bounds.low[subtalar]
+    assert (angles - q[:, subtalar])[outside].min() > 0.01
+    assert (angles[outside] < skeleton.bounds.low[subtalar]).all()
+    np.testing.assert_allclose(angles[~outside], q[~outside, subtalar], atol=1e-6)
+    stated = Range(np.radians(-70.0), 0.5, clamped=False, stated=True)
+    loose = replace(skeleton, ranges={**skeleton.ranges, "subtalar_angle_l": stated})
+    np.testing.assert_allclose(solve_ik(loose, markers).q[:, subtalar], q[:, subtalar], atol=1e-6)
 
 
 def test_an_arm_that_swings_through_more_than_half_a_turn_stays_on_its_branch(skeleton):

@@ -15,14 +15,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from kinertia.estimation.calibration import first_poses
-from kinertia.model.gait27 import ARM_ROTATIONS
+from kinertia.model.gait27 import ARM_ROTATIONS, ELBOWS
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.inverse_kinematics import InverseKinematics
 from kinertia.trial.data import Trial
 
 _BACKWARDS_RAD = 0.05
 """Beyond the end of the elbow's range, median over the frames."""
-_ELBOWS = {side: f"elbow_flex_{side}" for side in "rl"}
 
 
 def with_elbows_that_bend_forwards(
@@ -34,13 +33,14 @@ def with_elbows_that_bend_forwards(
         skeleton: of the 27-DOF model, from the static trial; the arms' turns about their own axes are locked.
         trials: that it will be used for.
     """
-    poses = first_poses(skeleton.unclamped(), trials)
-    beyond = {side: _beyond(skeleton, poses, name) for side, name in _ELBOWS.items()}
+    loose = skeleton.unbounded(ELBOWS)
+    poses = first_poses(loose, trials)
+    beyond = {name[-1]: _beyond(skeleton, poses, name) for name in ELBOWS}
     if not any(each.any() for each in beyond.values()):
         return skeleton, poses
     sides = [side for side, each in beyond.items() if each.size and np.median(each) < -_BACKWARDS_RAD]
     if sides:
-        free = first_poses(skeleton.unclamped().free(ARM_ROTATIONS), trials)
+        free = first_poses(loose.free(ARM_ROTATIONS), trials)
         turns = {name: _mean_angle(free, name) for name in ARM_ROTATIONS if name[-1] in sides}
         skeleton = skeleton.lock({name: turn for name, turn in turns.items() if np.isfinite(turn)})
     return skeleton, first_poses(skeleton, trials)
@@ -66,7 +66,7 @@ def _beyond(skeleton: Skeleton, poses: Sequence[InverseKinematics], elbow: str) 
 
 def _mean_angle(poses: Sequence[InverseKinematics], name: str) -> float:
     """Rad, on the circle, of a turn about an arm's axis with the elbow bent forwards; NaN where no frame shows it."""
-    angles, flexion = _angles(poses, name), _angles(poses, _ELBOWS[name[-1]])
+    angles, flexion = _angles(poses, name), _angles(poses, f"elbow_flex_{name[-1]}")
     known = np.isfinite(angles) & np.isfinite(flexion)
     forwards = np.where(flexion < 0.0, angles + np.pi, angles)
     mean = (np.square(np.sin(flexion[known])) * np.exp(1j * forwards[known])).sum()

@@ -2,15 +2,24 @@
 
 A body has one pose but coordinates have several values for it: three angles turn a segment as three others do (a half
 turn more of the first and the last), and an arm that is turned by half a turn with the elbow bent backwards fits its
-markers nearly as well. Ranges tell which is meant.
+markers nearly as well. Ranges tell which is meant; and where markers err, a joint that leaves the range of motion that
+anatomy knows (`range_of_motion`) is less likely than a marker that sits elsewhere.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+
+from kinertia.model.range_of_motion import RangeOfMotion, range_of_motion
+
+CLAMPED_SD = 0.01
+"""Rad or m beyond a range that the model clamps: half a degree."""
+SD = 0.35
+"""Rad or m beyond a range that anatomy does not know: 20 degrees. A shoulder may go there."""
 
 
 @dataclass(frozen=True)
@@ -20,6 +29,7 @@ class Range:
     Attributes:
         low, high: the ends.
         clamped: inverse kinematics stays within; else it may go beyond where the markers say so.
+        stated: of this person, by who knows: in place of what anatomy knows of others.
 
     Examples:
         >>> from kinertia.model.coordinate_range import Range
@@ -30,11 +40,22 @@ class Range:
     low: float
     high: float
     clamped: bool
+    stated: bool = False
 
     @property
     def middle(self) -> float:
         """Halfway between the ends."""
         return (self.low + self.high) / 2
+
+    def anatomical(self, coordinate: str) -> RangeOfMotion | None:
+        """What is known of a coordinate that has this range in the model; None where nothing is."""
+        if self.stated:
+            return RangeOfMotion.exactly(self.low, self.high)
+        return range_of_motion(coordinate, self.middle)
+
+
+UNKNOWN = Range(-np.inf, np.inf, clamped=False)
+ANYTHING = Range(-np.inf, np.inf, clamped=False, stated=True)
 
 
 @dataclass(frozen=True)
@@ -42,28 +63,49 @@ class Bounds:
     """The ranges of c coordinates as arrays; infinite where there is none.
 
     Attributes:
-        low, high: (c,) ends of all ranges.
+        low, high: (c,) ends: anatomy's where it is known, but for clamped ranges that end before.
+        low_sd, high_sd: (c,) deviation beyond them, rad or m.
         least, most: (c,) ends of the clamped ones.
+        anatomical: (c,) True where anatomy knows the range, or the user states it.
     """
 
     low: np.ndarray
     high: np.ndarray
+    low_sd: np.ndarray
+    high_sd: np.ndarray
     least: np.ndarray
     most: np.ndarray
+    anatomical: np.ndarray
 
     @classmethod
     def of(cls, coordinates: Sequence[str], ranges: Mapping[str, Range]) -> Bounds:
         """Of these coordinates, in this order."""
-        free = Range(-np.inf, np.inf, clamped=False)
-        known = [ranges.get(name, free) for name in coordinates]
-        clamped = [one if one.clamped else free for one in known]
-        ends = [[getattr(one, end) for one in some] for some in (known, clamped) for end in ("low", "high")]
-        return cls(*(np.array(end, dtype=float) for end in ends))
+        own = [ranges.get(name, UNKNOWN) for name in coordinates]
+        known = [one.anatomical(name) for one, name in zip(own, coordinates, strict=True)]
+        ends = np.array([_ends(*each) for each in zip(own, known, strict=True)]).reshape(-1, 6)
+        low, high, low_sd, high_sd, least, most = ends.T
+        anatomical = np.array([one is not None for one in known], dtype=bool)
+        return cls(low, high, low_sd, high_sd, least, most, anatomical)
+
+    @cached_property
+    def ends(self) -> tuple[tuple[float, np.ndarray, np.ndarray], ...]:
+        """Side (1 or -1), value (c,) and deviation (c,) of all ends, those that are clamped farther out among them."""
+        clamped = np.full(len(self.low), CLAMPED_SD)
+        return (
+            (1.0, self.high, self.high_sd),
+            (-1.0, self.low, self.low_sd),
+            (1.0, np.where(self.most > self.high, self.most, np.inf), clamped),
+            (-1.0, np.where(self.least < self.low, self.least, -np.inf), clamped),
+        )
 
     def beyond(self, q: np.ndarray) -> np.ndarray:
         """How far coordinates (n, c) lie beyond their ranges, with the sign of the side; NaN where unknown."""
         result: np.ndarray = q - np.clip(q, self.low, self.high)
         return result
+
+    def sd(self, q: np.ndarray) -> np.ndarray:
+        """(n, c) deviation that holds for coordinates (n, c) on their side of the range."""
+        return np.where(q < self.low, self.low_sd, self.high_sd)
 
     def clamped(self, q: np.ndarray) -> np.ndarray:
         """The nearest coordinates (n, c) that the clamped ranges allow."""
@@ -74,3 +116,15 @@ class Bounds:
         """(n, c) True at an end of a clamped range, with a pull (n, c) outwards."""
         result: np.ndarray = ((q <= self.least) & (pull < 0)) | ((q >= self.most) & (pull > 0))
         return result
+
+
+def _ends(own: Range, known: RangeOfMotion | None) -> tuple[float, float, float, float, float, float]:
+    """Low and high, their deviations, and the clamped ends, in the order of `Bounds`."""
+    least, most = (own.low, own.high) if own.clamped else (-np.inf, np.inf)
+    if known is None:
+        sd = CLAMPED_SD if own.clamped else SD
+        return own.low, own.high, sd, sd, least, most
+    low_sd, high_sd = known.beyond_sd
+    low, low_sd = (least, CLAMPED_SD) if least >= known.low else (known.low, low_sd)
+    high, high_sd = (most, CLAMPED_SD) if most <= known.high else (known.high, high_sd)
+    return low, high, low_sd, high_sd, least, most

@@ -35,6 +35,7 @@ HIP_OFFSETS = tuple(f"hip_{axis}_{side}" for side in "rl" for axis in "xyz")
 LUMBAR_OFFSETS = tuple(f"lumbar_{axis}" for axis in "xyz")
 AXIS_TILTS = tuple(f"{name}_tilt_{i}_{side}" for side in "rl" for name in ("knee", "ankle", "elbow") for i in "12")
 ARM_ROTATIONS = tuple(f"{name}_{side}" for side in "rl" for name in ("arm_rot", "pro_sup"))
+ELBOWS = ("elbow_flex_r", "elbow_flex_l")
 
 ARM_COORDINATES = tuple(f"{name}_{side}" for side in "rl" for name in ("arm_flex", "arm_add", "elbow_flex"))
 """Held still where no marker shows them, as with a lower-body marker set; all others a trial must show."""
@@ -46,24 +47,12 @@ VIRTUAL_TRUNK = (
 )
 """Of a person who wears no marker on the torso; at the height of the shoulders."""
 
-_USUAL_DEG = {
-    "hip_flexion": (-40.0, 130.0),
-    "hip_adduction": (-60.0, 45.0),
-    "hip_rotation": (-60.0, 60.0),
-    "knee_angle": (-15.0, 150.0),
-    "ankle_angle": (-60.0, 45.0),
-    "subtalar_angle": (-45.0, 45.0),
-    "lumbar_extension": (-90.0, 60.0),
-    "lumbar_bending": (-60.0, 60.0),
-    "lumbar_rotation": (-60.0, 60.0),
-    "arm_flex": (-90.0, 150.0),
-    "arm_add": (-120.0, 60.0),
-    "elbow_flex": (-5.0, 159.7),
-}
+_USUAL_DEG = {"arm_flex": (-90.0, 150.0), "arm_add": (-120.0, 60.0)}
 """How far people move, and somewhat more. These ranges only tell equal poses apart: a joint goes beyond where its
-markers do. Not so an elbow: hardly any bends backwards, and an arm without markers of its own that is turned by half a
-turn fits as well (flexion: mean and three SD of Boone and Azen 1979, J Bone Joint Surg Am 61:756)."""
-_CLAMPED = ("elbow_flex",)
+markers do. Those of all other joints are anatomy's (`range_of_motion`)."""
+_ELBOW_DEG = (-5.0, 159.7)
+"""Clamped: an arm without markers of its own that is turned by half a turn, with the elbow bent backwards, fits as
+well."""
 
 _X, _Y, _Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
@@ -129,7 +118,7 @@ def _built(marks: jc.Landmarks, height_m: float, sex: str, hip_centre: str) -> G
     worn = _markers(marks, frames)
     if not any(marker.segment == "torso" for marker in worn):
         worn = (*worn, *VIRTUAL_TRUNK)
-    skeleton = Skeleton("gait27", tuple(joints), worn, locked, ranges=_usual_ranges(joints))
+    skeleton = Skeleton("gait27", tuple(joints), worn, locked, ranges=_ranges(joints))
     return Gait27(skeleton, BodyGeometry(_triple(lumbar), _triple(mid_hip), lengths))
 
 
@@ -149,13 +138,13 @@ def _landmarks_of(marks: jc.Landmarks, joint: Joint) -> str:
     return ", ".join(name for name, own in marks.marker_set.landmarks.items() if labels & set(own))
 
 
-def _usual_ranges(joints: list[Joint]) -> dict[str, Range]:
+def _ranges(joints: list[Joint]) -> dict[str, Range]:
     ranges = {}
     for name in sorted({axis.coordinate for joint in joints for axis in joint.axes}):
-        kind = name.removesuffix("_r").removesuffix("_l")
-        if kind in _USUAL_DEG:
-            low, high = np.radians(_USUAL_DEG[kind]).tolist()
-            ranges[name] = Range(low, high, clamped=kind in _CLAMPED)
+        ends = _ELBOW_DEG if name in ELBOWS else _USUAL_DEG.get(name.removesuffix("_r").removesuffix("_l"))
+        if ends is not None:
+            low, high = np.radians(ends).tolist()
+            ranges[name] = Range(low, high, clamped=name in ELBOWS)
     return ranges
 
 

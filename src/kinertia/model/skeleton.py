@@ -23,7 +23,7 @@ from scipy.spatial.transform import Rotation
 from kinertia.model.axis_functions import AxisFunction
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.coordinate_map import CoordinateMap
-from kinertia.model.coordinate_range import Bounds, Range
+from kinertia.model.coordinate_range import ANYTHING, Bounds, Range
 from kinertia.model.kinematic_tree import KinematicTree, poses
 from kinertia.model.moved_parameters import moved_parameters
 from kinertia.model.root_joint import Root
@@ -185,9 +185,9 @@ class Skeleton:
         self._check_names(names)
         return replace(self, locked={k: v for k, v in self.locked.items() if k not in names})
 
-    def unclamped(self) -> Skeleton:
-        """The same skeleton with ranges that coordinates may leave."""
-        return replace(self, ranges={name: replace(one, clamped=False) for name, one in self.ranges.items()})
+    def unbounded(self, names: Iterable[str]) -> Skeleton:
+        """The same skeleton with coordinates that may have any value, whatever model and anatomy say."""
+        return replace(self, ranges={**self.ranges, **dict.fromkeys(names, ANYTHING)})
 
     def with_markers(self, markers: Sequence[Marker]) -> Skeleton:
         """The same skeleton with other markers."""

@@ -1,10 +1,11 @@
 """Inverse kinematics by global optimisation (Lu & O'Connor 1999): all coordinates on all visible markers, per frame.
 
 For every frame the sum of squared distances between measured and model markers is minimised over all coordinates at
-once (`pose_fit`). Several poses may fit a frame nearly as well, and several sets of angles mean the same pose: an arm
-turned by half a turn with the elbow bent backwards, a foot upside down. So frames a tenth of a second apart are solved
-first; of equally good poses each takes the one that goes on from its neighbour, outwards from the frame that fits best,
-and of equal angles those that do not jump (`equal_angles`). All other frames start from there.
+once, and joints pay beyond their ranges (`pose_fit`). Several poses may fit a frame nearly as well, and several sets of
+angles mean the same pose: an arm turned by half a turn with the elbow bent backwards, a foot upside down. So frames a
+tenth of a second apart are solved first; of equally good poses each takes the one that goes on from its neighbour,
+outwards from the frame that fits best, and of equal angles those that do not jump (`equal_angles`). All other frames
+start from there.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from kinertia.motion.frames_at_once import pieces
 from kinertia.motion.held_errors import HeldErrors
 from kinertia.motion.marker_sums import variances
 from kinertia.motion.one_thread import one_blas_thread
-from kinertia.motion.pose_fit import BEYOND_M2, PoseFit, Stop, fit_poses
+from kinertia.motion.pose_fit import PoseFit, Stop, fit_poses
 from kinertia.trial.data import Markers
 from kinertia.trial.rms import rms
 
@@ -102,7 +103,7 @@ def solve_ik(
         raise TrialError.found(name, "R101")
     fine, equal = np.flatnonzero(placed), EqualAngles.of(model)
     stop = Stop(gain_tolerance_m2, most_steps)
-    choosing = replace(stop, beyond_m2=BEYOND_M2)
+    choosing = replace(stop, choosing=True)
     if consecutive:
         every = max(1, round(_WARM_START_EVERY_S * markers.rate_hz)) if len(fine) > 1 else 1
         coarse = np.unique(np.append(fine[::every], fine[-1]))

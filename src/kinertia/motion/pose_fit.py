@@ -1,8 +1,10 @@
 """The coordinates that fit the markers of single frames best: Gauss-Newton within the ranges of the model.
 
 The sum of squared distances between measured and model markers is minimised frame by frame (`marker_sums` has the
-analytic derivatives). A coordinate with a clamped range stays within it, as in OpenSim. Beyond another range it may be
-made to pay a little: that decides which of two poses is meant that fit the markers nearly as well.
+analytic derivatives). A coordinate with a clamped range stays within it, as in OpenSim. Beyond the range that anatomy
+knows it pays: one deviation is as bad as a marker that is MARKER_M off, which keeps joints from making up for markers
+in ways that no joint can. Beyond another range it may be made to pay, too: that decides which of two poses is meant
+that fit the markers nearly as well.
 """
 
 from __future__ import annotations
@@ -11,14 +13,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kinertia.model.coordinate_range import Bounds
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion import marker_sums
 from kinertia.motion.marker_sums import damped_steps
 
 _STEP_TOLERANCE = 1e-5
 """Rad or m; the step below it is still taken and leaves an error several times smaller."""
-BEYOND_M2 = (0.01 / 0.35) ** 2
-"""Per square rad (or m) beyond a range that is not clamped: 20 degrees are as bad as a marker that is 10 mm off."""
+MARKER_M = 0.01
+"""By how much a marker errs where a coordinate errs by one deviation of its range."""
 
 
 @dataclass(frozen=True)
@@ -28,12 +31,12 @@ class Stop:
     Attributes:
         gain_tolerance_m2: a step that would lower a frame's sum of squared distances by less is its last.
         most_steps: after so many a frame counts as not converged.
-        beyond_m2: what is paid per square rad or m beyond a range that is not clamped.
+        choosing: whether ranges count that neither anatomy knows nor the model clamps.
     """
 
     gain_tolerance_m2: float
     most_steps: int
-    beyond_m2: float = 0.0
+    choosing: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,16 +83,16 @@ def fit_poses(model: Skeleton, measured: np.ndarray, q: np.ndarray, stop: Stop) 
     last_h, last_g = normal, np.zeros_like(q)
     for _ in range(stop.most_steps):
         h, g, cost = normal_equations(model, measured[active], q[active])
-        beyond = bounds.beyond(q[active])
-        g -= stop.beyond_m2 * beyond
-        cost += stop.beyond_m2 * np.square(beyond).sum(axis=1)
+        paid = bounds.beyond(q[active]) * (price := _price(bounds, q[active], stop.choosing))
+        g -= price * paid
+        cost += np.square(paid).sum(axis=1)
         better = cost <= best[active] * (1 + 1e-12)
         up = active[better]
         best[up], accepted[up] = cost[better], q[up]
         h[~better], g[~better] = last_h[~better], last_g[~better]
         damping[up] = np.maximum(damping[up] * 0.1, 1e-9)
         damping[active[~better]] *= 100.0
-        step[active] = _steps(model, h, g, accepted[active], damping[active], stop.beyond_m2)
+        step[active] = _steps(model, h, g, accepted[active], damping[active], stop.choosing)
         gain = np.einsum("nc,nc->n", step[active], g)
         # a step that was cut at the end of a range may lead upwards: then the next one is shorter
         small = (np.abs(step[active]).max(axis=1) < _STEP_TOLERANCE) | ((gain >= 0) & (gain < stop.gain_tolerance_m2))
@@ -105,17 +108,24 @@ def fit_poses(model: Skeleton, measured: np.ndarray, q: np.ndarray, stop: Stop) 
     return PoseFit(accepted, converged, best, normal)
 
 
+def _price(bounds: Bounds, q: np.ndarray, choosing: bool) -> np.ndarray:
+    """(n, c) m per rad or m beyond a range; zero within."""
+    counts = (bounds.beyond(q) != 0) & (bounds.anatomical | choosing)
+    result: np.ndarray = np.where(counts, MARKER_M / bounds.sd(q), 0.0)
+    return result
+
+
 def _steps(
-    model: Skeleton, normal: np.ndarray, gradient: np.ndarray, q: np.ndarray, damping: np.ndarray, beyond_m2: float
+    model: Skeleton, normal: np.ndarray, gradient: np.ndarray, q: np.ndarray, damping: np.ndarray, choosing: bool
 ) -> np.ndarray:
     """(n, c) damped steps from q that keep within clamped ranges; the gradient has what is paid beyond the others."""
     bounds, columns = model.bounds, np.arange(q.shape[1])
-    out, held = bounds.beyond(q) != 0, bounds.held(q, gradient)
-    if out.any() or held.any():
+    price, held = _price(bounds, q, choosing), bounds.held(q, gradient)
+    if price.any() or held.any():
         free = ~held
         usual = normal[:, columns, columns].mean(axis=1, keepdims=True)
         normal = normal * (free[:, :, None] & free[:, None, :])
-        normal[:, columns, columns] += np.where(held, usual, beyond_m2 * out)
+        normal[:, columns, columns] += np.where(held, usual, np.square(price))
         gradient = np.where(free, gradient, 0.0)
     step: np.ndarray = bounds.clamped(q + damped_steps(normal, gradient, damping)) - q
     return step

@@ -47,7 +47,7 @@ def test_a_coordinate_beyond_its_usual_range(trial):
     """Of a joint that nothing clamps."""
     knee = trial.motion.q[:, trial.skeleton.coordinates.index("knee_angle_r")]
     most = float(knee.max() - np.radians(20.0))
-    usual = Range(float(knee.min() - 0.1), most, clamped=False)
+    usual = Range(float(knee.min() - 0.1), most, clamped=False, stated=True)
     skeleton = replace(trial.skeleton, ranges={**trial.skeleton.ranges, "knee_angle_r": usual})
     found = [
         one for one in range_findings(skeleton, SimpleNamespace(q=trial.motion.q, coordinates=skeleton.coordinates))

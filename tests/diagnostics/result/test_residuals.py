@@ -3,6 +3,7 @@
 from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from kinertia.diagnostics.result.context import ResultContext
@@ -96,25 +97,29 @@ def test_nobody_is_advised_to_let_move_what_moves_already_or_is_grossly_wrong():
         assert "--calibrate" not in found(file=object(), **given)["R304"].remedy
 
 
-def angles(coordinate, degrees, own=(0.0, 140.0)):
-    ranges = {coordinate: Range(*np.radians(own), clamped=False)}
+def angles(coordinate, degrees, own=(0.0, 140.0), sd_deg=0.5, stated=False):
+    low, high = np.radians(own)
+    ranges = {coordinate: Range(low, high, clamped=False, stated=stated)}
     trial = SimpleNamespace(
         name="walk",
         skeleton=SimpleNamespace(ranges=ranges),
         kinematics=SimpleNamespace(ik=SimpleNamespace(coordinates=("pelvis_tilt", coordinate))),
         motion=SimpleNamespace(q=np.radians([[200.0, 10.0], [0.0, degrees]])),
+        coordinate_sd=pd.DataFrame({coordinate: np.radians([sd_deg, sd_deg])}),
     )
     return list(joint_angles(ResultContext(SimpleNamespace(trials=(trial,)), None)))
 
 
 @pytest.mark.parametrize(
-    ("coordinate", "degrees", "own"),
-    [("subtalar_angle_r", -41.0, (-35.0, 35.0)), ("elbow_flex_l", -20.0, (0.0, 150.0)),
-     ("knee_angle_r", -18.0, (0.0, 140.0)), ("knee_angle_l", 18.0, (-160.0, 10.0))],
+    ("coordinate", "degrees", "own", "severity"),
+    [("subtalar_angle_r", -40.0, (-35.0, 35.0), "WARNING"), ("subtalar_angle_r", -41.0, (-35.0, 35.0), "ERROR"),
+     ("elbow_flex_l", -20.0, (0.0, 150.0), "ERROR"), ("knee_angle_r", -18.0, (0.0, 140.0), "WARNING"),
+     ("knee_angle_l", 18.0, (-160.0, 10.0), "WARNING"), ("knee_flex_r", -21.0, (-10.0, 160.0), "ERROR"),
+     ("lumbar_rotation", 66.0, (-90.0, 90.0), "ERROR"), ("ankle_angle_r", 80.0, (-90.0, 90.0), "ERROR")],
 )  # fmt: skip
-def test_angles_that_no_joint_has(coordinate, degrees, own):
+def test_angles_that_no_joint_has(coordinate, degrees, own, severity):
     (one,) = angles(coordinate, degrees, own)
-    assert (one.code, one.where.trial, one.where.part) == ("R305", "walk", coordinate)
+    assert (one.code, one.severity.name, one.where.trial, one.where.part) == ("R305", severity, "walk", coordinate)
     assert np.degrees(one.evidence["angle_rad"].value) == pytest.approx(degrees)
     low, high = one.evidence["range_rad"].value
     assert not low <= np.radians(degrees) <= high
@@ -127,3 +132,17 @@ def test_angles_that_no_joint_has(coordinate, degrees, own):
 )  # fmt: skip
 def test_angles_that_joints_have_and_coordinates_of_unknown_meaning(coordinate, degrees, own):
     assert angles(coordinate, degrees, own) == []
+
+
+def test_an_angle_that_is_beyond_by_less_than_it_is_uncertain():
+    """Two SDs; what is impossible is named all the same."""
+    assert angles("subtalar_angle_r", -38.0, sd_deg=1.5) == []
+    assert len(angles("subtalar_angle_r", -38.0, sd_deg=1.0)) == 1
+    assert len(angles("subtalar_angle_r", -41.0, sd_deg=9.0)) == 1
+
+
+def test_a_range_that_the_user_states_is_the_persons():
+    """A knee that bends backwards by 20 degrees, as its owner's does."""
+    assert angles("knee_angle_r", -22.0, (-20.0, 150.0), stated=True) == []
+    (one,) = angles("knee_angle_r", -31.0, (-20.0, 150.0), stated=True)
+    assert one.severity.name == "ERROR"

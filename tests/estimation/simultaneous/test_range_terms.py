@@ -5,9 +5,9 @@ import pytest
 
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.normal_equations import NormalEquations
-from kinertia.estimation.simultaneous.range_terms import CLAMPED_SD, SD, RangeTerms, add_ranges
+from kinertia.estimation.simultaneous.range_terms import RangeTerms, add_ranges
 from kinertia.estimation.simultaneous.stretches import Stretch, stretches
-from kinertia.model.coordinate_range import Bounds, Range
+from kinertia.model.coordinate_range import CLAMPED_SD, SD, Bounds, Range
 
 RANGES = {"elbow": Range(0.0, 2.6, clamped=True), "shoulder": Range(-1.0, 1.0, clamped=False)}
 BOUNDS = Bounds.of(("elbow", "shoulder", "root"), RANGES)

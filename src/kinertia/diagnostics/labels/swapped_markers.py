@@ -16,7 +16,7 @@ from kinertia.estimation.calibration import sampled
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
-from kinertia.model.gait27 import ARM_ROTATIONS
+from kinertia.model.gait27 import ARM_ROTATIONS, ELBOWS
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.inverse_kinematics import solve_ik
 from kinertia.trial.data import Markers, Recording, Trial
@@ -88,7 +88,7 @@ def _complete_frames(skeleton: Skeleton, name: str, markers: Markers) -> tuple[S
     No frame with a straight elbow shows how the arm has turned about itself, and none needs to; which way an elbow
     bends does not matter here.
     """
-    model = skeleton.unclamped().free(ARM_ROTATIONS)
+    model = skeleton.unbounded(ELBOWS).free(ARM_ROTATIONS)
     ik = solve_ik(model, markers, name, consecutive=False, gain_tolerance_m2=_ENOUGH_M2)
     known = np.isfinite(ik.q)
     never = [c for c, shown in zip(ik.coordinates, known.any(axis=0), strict=True) if not shown]

@@ -2,7 +2,8 @@
 
 Where markers hardly show a coordinate, the turn of a forearm above all, the estimate would send it through poses that
 no joint has, in long steps that do not end. What is paid is one-sided: the square of what is beyond, over a deviation,
-once per knot interval. Where the model clamps a range the deviation is so small that the coordinate stays at the end.
+once per knot interval. The deviation is what anatomy knows of people (`range_of_motion`); where the model clamps a
+range it is so small that the coordinate stays at the end.
 
 Ends are rounded off over a third of a degree: what is beyond by x counts as s log(1 + exp(x / s)). Where a corner was,
 the curvature of the cost jumped, and with it the deviations of whatever is near an end of its range; a search that
@@ -21,10 +22,6 @@ from kinertia.estimation.simultaneous.normal_equations import Gradient, NormalEq
 from kinertia.estimation.simultaneous.stretches import Stretch
 from kinertia.model.coordinate_range import Bounds
 
-CLAMPED_SD = 0.01
-"""Rad or m beyond a range that the model clamps: half a degree."""
-SD = 0.35
-"""Rad or m beyond another range: 20 degrees. A shoulder may go there."""
 _ROUNDED = 0.005
 """Rad or m over which an end is rounded off, s above."""
 _NOTHING = 8.0
@@ -56,11 +53,11 @@ class RangeTerms(NamedTuple):
         (array([    0., 10000.]), array([  -0., -500.]), 12.5)
         """
         curvature, pull, cost = np.zeros_like(q), np.zeros_like(q), 0.0
-        for side, end, clamped in ((1.0, bounds.high, bounds.most), (-1.0, bounds.low, bounds.least)):
+        for side, end, sd in bounds.ends:
             beyond = np.where(np.isfinite(end), side * (q - end), -np.inf) / _ROUNDED
             rows, columns = np.nonzero(beyond > -_NOTHING)
             x = beyond[rows, columns]
-            weight = np.where(np.isfinite(clamped), CLAMPED_SD, SD)[columns] ** -2.0 / frames_per_interval
+            weight = sd[columns] ** -2.0 / frames_per_interval
             paid, slope = _ROUNDED * np.logaddexp(0.0, x), expit(x)
             cost += 0.5 * float((weight * np.square(paid)).sum())
             pull[rows, columns] -= side * weight * paid * slope
