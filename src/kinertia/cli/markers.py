@@ -28,7 +28,8 @@ def markers(
     """Show the labels of a file against every marker-set preset, and draft a marker set from them.
 
     A preset is recognised by itself where a file has two thirds of its labels, or of those of its pelvis, legs and
-    feet. For any other set give -o, complete the draft, and name it with --markers.
+    feet. For any other set give -o with the static trial: landmarks are found where they are on somebody who stands,
+    with the labels as hints. Check the draft, and name it with --markers.
 
     [bold]Examples[/]
 
@@ -36,7 +37,8 @@ def markers(
 
     kinertia markers static.c3d -o our_lab.toml
     """
-    labels = read_recording(file).without_empty_markers().markers.labels
+    recording = read_recording(file).without_empty_markers()
+    labels = recording.markers.labels
     out.print(f"{len(labels)} labels: {', '.join(labels)}", soft_wrap=True)
     table = plain_table("preset", "labels present", "absent")
     sets = {name: spelled_as(read_marker_set(name), labels) for name in preset_names()}
@@ -58,7 +60,7 @@ def markers(
     if output is not None:
         if output.exists():
             raise FileError(output, "exists already and is left alone; remove it, or give another name")
-        write_then_rename(output, draft_marker_set(labels, output.stem))
+        write_then_rename(output, draft_marker_set(recording, output.stem))
         out.print(f"wrote {output}: check it, complete what it asks for, then give it as --markers", soft_wrap=True)
     draft = None if output is None else str(output)
     return Outcome({"labels": labels, "presets": presets, "recognised": recognised, "draft": draft})

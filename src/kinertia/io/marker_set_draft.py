@@ -1,7 +1,7 @@
-"""A first marker set from the labels of a recording: what `kinertia markers` drafts.
+"""A first marker set from a recording of somebody who stands: what `kinertia markers` drafts.
 
-A label is known by what it is called in the presets: `R.Knee`, `RKNE`, `r_knee_study`. Of others the nearest name of a
-preset is taken where it is near enough; what is left is listed to be placed by hand.
+Markers are placed by geometry, with their labels as hints. Where nobody stands, labels alone decide, by what they are
+called in the presets (`R.Knee`, `RKNE`, `r_knee_study`) or nearly so; what is left is listed to be placed by hand.
 """
 
 from __future__ import annotations
@@ -9,21 +9,48 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterator, Mapping, Sequence
 
+from kinertia.io.marker_places.placement import place_markers
 from kinertia.io.marker_set_file import preset_names, read_marker_set
 from kinertia.io.toml_lines import quoted
-from kinertia.model.marker_set import LANDMARKS, SEGMENTS, folded, share_worn
+from kinertia.model.marker_set import LANDMARKS, SEGMENTS, WIDTHS, folded, share_worn
+from kinertia.trial.data import Recording
 
 _NEAR = 0.85
+_WIDTHS = """# Joints without an inner marker: the widths in the PROCESSING group of the static C3D file, by its names.
+# For other files give them as knee_width_mm and so on under [subject] of a subject file."""
 _NEEDED = tuple(name for name in LANDMARKS if not name.startswith(("thigh_wand", "shank_wand", "head_top")))
 
 
-def draft_marker_set(labels: Sequence[str], name: str) -> str:
-    """The text of a marker set (TOML) for these labels; landmarks and labels that are not known are in comments."""
-    heading = (
-        "# Drafted from the labels: check every line, complete those marked FILL IN, and name the file with --markers\n"
-        "# or under [model] markers."
+def draft_marker_set(recording: Recording, name: str) -> str:
+    """The text of a marker set (TOML) for a recording; what is not known, and why, is in comments."""
+    placed = place_markers(recording)
+    labels = [label for label in recording.markers.labels if label not in placed.left_out]
+    landmarks, segments = placed.landmarks, placed.segments
+    if not landmarks:
+        landmarks, segments = known_places(labels)
+    heading = [
+        "# Drafted by kinertia markers: check every line, complete those marked FILL IN, and name the file with",
+        "# --markers or under [model] markers.",
+        *(f"# NOTE: {note}." for note in placed.notes),
+    ]
+    text = marker_set_text(
+        name, landmarks, segments, _widths(landmarks, recording), labels, "\n".join(heading), placed.how
     )
-    return marker_set_text(name, *known_places(labels), {}, labels, heading)
+    out = [f"#   {label}: {reason}" for label, reason in placed.left_out.items()]
+    return text + "\n".join(["", "# Not markers on the skin:", *out, ""] if out else [])
+
+
+def _widths(landmarks: Mapping[str, Sequence[str]], recording: Recording) -> dict[str, str]:
+    """Of joints with an outer marker only: the name of their width in the file, or one that it does not have."""
+    widths = {}
+    for joint in WIDTHS:
+        base, _, side = joint.rpartition("_")
+        if f"{base}_lateral_{side}" in landmarks and f"{base}_medial_{side}" not in landmarks:
+            name = f"{side.upper()}{base.capitalize()}Width"
+            known = {one.lower(): one for one in recording.measurements}
+            if base != "elbow" or name.lower() in known:  # elbows have a width by the stature
+                widths[joint] = known.get(name.lower(), name)
+    return widths
 
 
 def known_places(labels: Sequence[str]) -> tuple[dict[str, list[str]], dict[str, list[str]]]:
@@ -39,13 +66,15 @@ def marker_set_text(
     widths: Mapping[str, str],
     labels: Sequence[str],
     heading: str,
+    how: Mapping[str, str] | None = None,
 ) -> str:
     """The text of a marker set (TOML); what it lacks of these labels, and of what Kinertia knows, is in comments."""
     lines = [heading, f"name = {quoted(name)}", "", "[landmarks]"]
     for landmark in LANDMARKS:
         own = landmarks.get(landmark)
         if own:
-            lines.append(f"{landmark} = {_listed(own)}")
+            reason = "" if how is None or landmark not in how else f"  # {how[landmark]}"
+            lines.append(f"{landmark} = {_listed(own)}{reason}")
         elif landmark in _NEEDED:
             lines.append(f'# {landmark} = ""  # FILL IN, if there is one')
     lines += ["", "[segments]"]
@@ -55,7 +84,7 @@ def marker_set_text(
         else:
             lines.append(f"# {segment} = []  # FILL IN")
     if widths:
-        lines += ["", "[widths]", *(f"{joint} = {quoted(width)}" for joint, width in widths.items())]
+        lines += ["", _WIDTHS, "[widths]", *(f"{joint} = {quoted(width)}" for joint, width in widths.items())]
     placed = {label for own in segments.values() for label in own}
     rest = [label for label in labels if label not in placed]
     if rest:

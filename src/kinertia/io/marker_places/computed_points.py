@@ -1,0 +1,156 @@
+"""Points of a recording that nobody wore: bone axes, joint centres, projections and copies of other points."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations, permutations
+
+import numpy as np
+
+from kinertia.io.marker_places.label_hints import is_named_virtual, roles, sides
+from kinertia.trial.data import FloatArray, Markers
+
+_EXACT_M = 1e-4
+_SKIN_M = 3e-4
+"""By how much distances between markers on the skin change at least, in a person who stands still."""
+_RIGID_M, _RIGID_SHARE = 2e-5, 0.02
+_FEW = 0.3
+_NEIGHBOURS, _REACH_M = 8, 0.45
+_FRAMES, _FEWEST = 25, 10
+_AXES = "OALP"
+"""Vicon's bones: origin, anterior, lateral and proximal end."""
+_OXFORD = ("HDF", "FOF", "TIB", "HLX", "TPF")
+"""Bones of the Oxford foot model, whose origin and axes are numbered 0 to 3; a file that has the first two has them."""
+
+
+def unusable_points(markers: Markers) -> dict[str, str]:
+    """Label -> why it is no place on the body at all: ends of bone axes, copies, projections, constants."""
+    place = _few_frames(markers)
+    found = _bone_axes(place)
+    for label, own in place.items():
+        if label not in found and (own == 0.0).all(axis=0).sum() >= 2:
+            found[label] = "a number, no place"
+    labels = [label for label in place if label not in found]
+    for one, other in combinations(labels, 2):
+        apart = place[other] - place[one]
+        if other in found or one in found or np.abs(apart[:, [0, 2]]).max() > _EXACT_M:
+            continue
+        if np.abs(apart[:, 1]).max() < _EXACT_M:
+            copy, original = (one, other) if is_named_virtual(one) and not is_named_virtual(other) else (other, one)
+            found[copy] = f"the same point as {original}"
+        else:
+            lower, upper = (one, other) if apart[:, 1].mean() > 0 else (other, one)
+            found[lower] = f"the point below {upper}"
+    return found
+
+
+def computed_points(markers: Markers) -> dict[str, str]:
+    """Label -> how one knows that a point of the body was computed: by its name, or since it keeps its place among
+    others to a tenth of a millimetre, which skin does not.
+    """
+    place = _few_frames(markers)
+    found = {label: "a computed point by its name" for label in place if is_named_virtual(label)}
+    if len(markers.time) < _FEWEST:
+        return found
+    for label, own in place.items():
+        if label in found:
+            continue
+        if pair := _middle_of(own, {other: at for other, at in place.items() if other != label}):
+            found[label] = f"always in the middle of {pair[0]} and {pair[1]}"
+    pairs = sides(list(place))
+    hinted = {label: bool(roles(label, label in pairs)) for label in place}
+    found |= _rigid_pairs({label: own for label, own in place.items() if label not in found}, hinted)
+    for label, own in place.items():
+        others = {other: at for other, at in place.items() if other != label and other not in found}
+        sources = [] if label in found else _fixed_in(own, others)
+        if sources and not (hinted[label] and not all(hinted[one] for one in sources)):
+            found[label] = f"fixed to {', '.join(sources)} within {_EXACT_M * 1e3:.1f} mm"
+    return found
+
+
+def _few_frames(markers: Markers) -> dict[str, FloatArray]:
+    """Label -> (f, 3) m in a few frames that show all markers that are seen in most; others are left out."""
+    seen = markers.seen
+    often = np.flatnonzero(seen.mean(axis=0) > 0.5)
+    frames = np.flatnonzero(seen[:, often].all(axis=1))
+    frames = frames[:: -(-len(frames) // _FRAMES)] if len(frames) else frames
+    return {markers.labels[k]: markers.positions[frames, k] for k in often} if len(frames) else {}
+
+
+def _bone_axes(place: dict[str, FloatArray]) -> dict[str, str]:
+    """Points whose labels differ in O, A, L and P at the end, and that are square to each other."""
+    found: dict[str, str] = {}
+    for stem in {label[:-1] for label in place if label[-1:] in _AXES}:
+        if not all(stem + end in place for end in _AXES):
+            continue
+        origin, *tips = (place[stem + end] for end in _AXES)
+        axes = np.stack(tips, axis=1) - origin[:, None]
+        axes /= np.maximum(np.linalg.norm(axes, axis=2, keepdims=True), 1e-9)
+        off = np.einsum("nij,nkj->nik", axes, axes) - np.eye(3)
+        if np.abs(off).max() < 1e-2:
+            found |= {stem + end: "an axis of a bone" for end in _AXES}
+    numbered = [
+        f"{side}{bone}"
+        for side in "RL"
+        for bone in _OXFORD
+        if all(f"{side}{one}{k}" in place for one in _OXFORD[:2] for k in range(1, 4))
+    ]
+    families = [(f"{stem}_", "XYZ") for stem in {label[:-2] for label in place if label.endswith(("_X", "_Y", "_Z"))}]
+    families = [(stem, ends) for stem, ends in families if all(stem + end in place for end in ends)]
+    for stem, ends in [*families, *((stem, "0123") for stem in numbered)]:
+        found |= {stem + end: "an axis of a bone" for end in ends if stem + end in place}
+    return found
+
+
+def _middle_of(own: FloatArray, place: dict[str, FloatArray]) -> tuple[str, str] | None:
+    """Two others whose middle it always is."""
+    labels = list(place)
+    others = np.stack([place[label] for label in labels])
+    for k, label in enumerate(labels[:-1]):
+        off = np.abs((others[k] + others[k + 1 :]) / 2 - own).max(axis=(1, 2))
+        at = int(np.argmin(off))
+        if off[at] < _EXACT_M:
+            return label, labels[k + 1 + at]
+    return None
+
+
+def _rigid_pairs(place: dict[str, FloatArray], hinted: dict[str, bool]) -> dict[str, str]:
+    """Two points that never come nearer to each other, while others do: both were computed in one segment."""
+    labels = list(place)
+    if len(labels) < 3:
+        return {}
+    points = np.stack([place[label] for label in labels], axis=1)
+    varies = np.linalg.norm(points[:, :, None] - points[:, None], axis=-1).std(axis=0)
+    rows, columns = np.triu_indices(len(labels), 1)
+    limit = min(_RIGID_M, _RIGID_SHARE * float(np.median(varies[rows, columns])))
+    found: dict[str, str] = {}
+    for a, b in zip(rows, columns, strict=True):
+        if varies[a, b] < limit:
+            for one, other in ((labels[a], labels[b]), (labels[b], labels[a])):
+                if hinted[other] or not hinted[one]:
+                    found.setdefault(one, f"always equally far from {other}")
+    return found if len(found) < _FEW * len(labels) else {}  # whole segments were made rigid
+
+
+def _fixed_in(own: FloatArray, place: dict[str, FloatArray]) -> Sequence[str]:
+    """Three others in whose axes it never moves although they move among themselves."""
+    near = sorted((float(np.linalg.norm(at - own, axis=1).mean()), other) for other, at in place.items())
+    others = [other for distance, other in near if distance < _REACH_M][:_NEIGHBOURS]
+    for three in combinations(others, 3):
+        corners = [place[one] for one in three]
+        sides = [np.linalg.norm(a - b, axis=1).std() for a, b in combinations(corners, 2)]
+        if min(sides) < _SKIN_M / 3:
+            continue
+        for origin, second, third in permutations(corners):
+            x = second - origin
+            x /= np.linalg.norm(x, axis=1, keepdims=True)
+            z = np.cross(x, third - origin)
+            size = np.linalg.norm(z, axis=1, keepdims=True)
+            if size.min() < 0.02:
+                break
+            z /= size
+            axes = np.stack([x, np.cross(z, x), z], axis=1)
+            local = np.einsum("nij,nj->ni", axes, own - origin)
+            if local.std(axis=0).max() < min(_EXACT_M / 3, 0.1 * min(sides)):
+                return three
+    return ()

@@ -1,0 +1,190 @@
+"""Landmarks of pelvis, legs and feet of a standing person, from the pelvis down."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from kinertia.io.marker_places.standing_body import StandingBody
+from kinertia.io.marker_places.usual_places import (
+    ANKLE_FROM_KNEE,
+    ASIS,
+    ASIS_APART,
+    FOOT,
+    INNER_ANKLE,
+    INNER_KNEE,
+    KNEE_FROM_ASIS,
+    PSIS_FROM_ASIS,
+    SACRUM_FROM_ASIS,
+)
+from kinertia.trial.data import FloatArray
+
+_SQUARE = 0.85
+"""Cosine of the most that a pelvis is turned against the rest of the body."""
+_FOREFOOT = (0.03, 0.17)
+_FOOT_HEIGHT, _FOOT_BREADTH = 0.075, 0.09
+
+
+@dataclass(frozen=True)
+class Found:
+    """Markers that were found.
+
+    Attributes:
+        markers: landmark -> index of the marker; `metatarsal_inner_r` and the like are parts of one.
+        scores: landmark -> how well it fits, above zero.
+    """
+
+    markers: dict[str, int] = field(default_factory=dict)
+    scores: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def score(self) -> float:
+        """Of all together."""
+        return sum(self.scores.values())
+
+    def drop(self, *landmarks: str) -> None:
+        """Take these back."""
+        for landmark in landmarks:
+            self.markers.pop(landmark, None)
+            self.scores.pop(landmark, None)
+
+    def add(self, landmark: str, marker: int, score: float) -> None:
+        """Take a marker for a landmark if it fits."""
+        if score > 0 and marker not in self.markers.values():
+            self.markers[landmark], self.scores[landmark] = marker, float(score)
+
+
+def find_legs(body: StandingBody) -> Found:
+    """What is found with this facing and stature; nothing without the front of a pelvis."""
+    found = Found()
+    _pelvis(body, found)
+    if "asis_r" in found.markers:
+        for side in "rl":
+            _joints(body, found, side)
+            if f"ankle_lateral_{side}" in found.markers:
+                _foot(body, found, side)
+    return found
+
+
+def _pelvis(body: StandingBody, found: Found) -> None:
+    """Both ASIS, and behind them, in the axes of these two, both PSIS or the sacrum."""
+    free = ASIS.score(body.places, body.stature_m) + body.named("asis")
+    best: tuple[float, dict[str, tuple[int, float]]] = (0.0, {})
+    for right, left in np.argwhere(free[:, None] + free[None] > 0):
+        across = (body.places[right] - body.places[left]) * [1.0, 0.0, 1.0]
+        width = float(np.linalg.norm(across))
+        if right == left or across[2] < _SQUARE * width:
+            continue
+        front = float(
+            free[right] + free[left] + ASIS_APART.score(body.places[right] - body.places[left], body.stature_m)
+        )
+        z = across / width
+        local = (body.places - (body.places[right] + body.places[left]) / 2) @ np.array(
+            [[z[2], 0.0, -z[0]], [0.0, 1.0, 0.0], z]
+        ).T
+        back = _back_of_pelvis(body, local, (int(right), int(left)))
+        if not back:
+            continue
+        total = front + sum(score for _, score in back.values())
+        if total > best[0]:
+            best = (total, {"asis_r": (int(right), front / 2), "asis_l": (int(left), front / 2), **back})
+    for landmark, (marker, score) in best[1].items():
+        found.add(landmark, marker, max(score, 0.1))
+
+
+def _back_of_pelvis(body: StandingBody, local: FloatArray, taken: tuple[int, int]) -> dict[str, tuple[int, float]]:
+    """Both PSIS, else the sacrum, in axes of the pelvis (m, 3) m; each with its score."""
+    back: dict[str, tuple[int, float]] = {}
+    for side, sign in (("r", 1.0), ("l", -1.0)):
+        scores = PSIS_FROM_ASIS.score(local * [1.0, 1.0, sign], body.stature_m) + body.named("psis")
+        scores[[*taken, *(marker for marker, _ in back.values())]] = -np.inf
+        back[f"psis_{side}"] = (int(np.argmax(scores)), float(scores.max()))
+    if min(score for _, score in back.values()) > 0:
+        return back
+    scores = SACRUM_FROM_ASIS.score(local, body.stature_m) + body.named("sacrum")
+    scores[list(taken)] = -np.inf
+    return {"sacrum": (int(np.argmax(scores)), float(scores.max()))} if scores.max() > 0 else {}
+
+
+def _joints(body: StandingBody, found: Found, side: str) -> None:
+    """Outer and inner markers of knee and ankle."""
+    asis = {one: body.outward[one][found.markers[f"asis_{one}"]] for one in "rl"}
+    anchor = np.array([*((asis["r"] + asis["l"]) / 2)[:2], asis[side][2]])
+    knees = _hinges(body, body.scores(KNEE_FROM_ASIS, side, anchor, "knee_lateral"), "knee", side, found)
+    best: tuple[float, dict[str, tuple[int, float]]] = (0.0, {})
+    for score, knee in knees:
+        at = body.outward[side][knee[f"knee_lateral_{side}"][0]]
+        ankles = _hinges(body, body.scores(ANKLE_FROM_KNEE, side, at, "ankle_lateral"), "ankle", side, found)
+        below, ankle = max(ankles, key=lambda one: one[0], default=(0.0, {}))
+        if score + below > best[0]:
+            best = (score + below, knee | ankle)
+    for landmark, (marker, score) in best[1].items():
+        found.add(landmark, marker, score)
+
+
+def _hinges(
+    body: StandingBody, outer: FloatArray, joint: str, side: str, found: Found
+) -> list[tuple[float, dict[str, tuple[int, float]]]]:
+    """Scores and markers of outer sides of a joint, each with the inner one that suits it best."""
+    usual = INNER_KNEE if joint == "knee" else INNER_ANKLE
+    taken = list(found.markers.values())
+    hinges = []
+    for one in map(int, np.flatnonzero(outer > 0)):
+        if one in taken:
+            continue
+        own = {f"{joint}_lateral_{side}": (one, float(outer[one]))}
+        inner = body.scores(usual, side, body.outward[side][one], f"{joint}_medial")
+        inner[[one, *taken]] = -np.inf
+        best = int(np.argmax(inner))
+        if inner[best] > 0:
+            own[f"{joint}_medial_{side}"] = (best, float(inner[best]))
+        hinges.append((sum(score for _, score in own.values()), own))
+    return hinges
+
+
+def _foot(body: StandingBody, found: Found, side: str) -> None:
+    """Heel, metatarsal heads and toe, each another marker, in axes along the foot."""
+    ankle = body.outward[side][found.markers[f"ankle_lateral_{side}"]]
+    offsets = (body.outward[side] - ankle) / body.stature_m
+    low = (body.outward[side][:, 1] < _FOOT_HEIGHT * body.stature_m) & (np.abs(offsets[:, 2]) < _FOOT_BREADTH)
+    low[list(found.markers.values())] = False
+    low &= np.isfinite(body.trust)
+    ahead = low & (offsets[:, 0] > _FOREFOOT[0]) & (offsets[:, 0] < _FOREFOOT[1])
+    own = np.flatnonzero(low)
+    if not ahead.any():
+        return
+    toes = np.add(offsets[ahead].mean(axis=0), (0.0, 0.0, 0.02))  # the foot is on the inner side of the outer ankle
+    turn = np.arctan2(toes[2], toes[0])
+    c, s = np.cos(turn), np.sin(turn)
+    along = offsets[own] @ np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]]).T
+    scores = {name: usual.score(along, 1.0) + body.named(name.split("_")[0])[own] for name, usual in FOOT.items()}
+    wide = _assigned({name: score for name, score in scores.items() if name != "metatarsal_middle"})
+    if not {"metatarsal_inner", "metatarsal_outer"} <= set(wide):
+        narrow = _assigned({name: scores[name] for name in ("heel", "metatarsal_middle", "toe")})
+        wide = narrow if "metatarsal_middle" in narrow else wide
+    for name, row in wide.items():
+        found.add(f"{name}_{side}", int(own[row]), float(scores[name][row]))
+
+
+def _assigned(scores: Mapping[str, FloatArray]) -> dict[str, int]:
+    """For each name the row that makes all scores together the largest; only where they are above zero."""
+    table = np.stack(list(scores.values()), axis=1)
+    rows, columns = linear_sum_assignment(-np.maximum(table, 0.0))
+    names = list(scores)
+    return {names[k]: int(row) for row, k in zip(rows, columns, strict=True) if table[row, k] > 0}
+
+
+def metatarsals(found: Mapping[str, int], side: str) -> tuple[list[int], str]:
+    """Markers whose middle is that of the metatarsal heads, and which they are."""
+    inner, outer, middle = (found.get(f"metatarsal_{which}_{side}") for which in ("inner", "outer", "middle"))
+    if inner is not None and outer is not None:
+        return [inner, outer], "middle of the inner and the outer metatarsal heads"
+    if middle is not None:
+        return [middle], "a metatarsal head in the middle"
+    for one, which in ((inner, "inner"), (outer, "outer")):
+        if one is not None:
+            return [one], f"only a marker of the {which} metatarsal heads: the middle of the foot is a little beside it"
+    return [], ""

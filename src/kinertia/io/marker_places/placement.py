@@ -1,0 +1,183 @@
+"""Which marker is where on somebody who stands: landmarks, segments, and why."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from kinertia.io.marker_places.body_axes import body_axes
+from kinertia.io.marker_places.computed_points import computed_points, unusable_points
+from kinertia.io.marker_places.label_hints import roles, sides
+from kinertia.io.marker_places.leg_search import Found, find_legs, metatarsals
+from kinertia.io.marker_places.segment_members import segment_members, wands
+from kinertia.io.marker_places.standing_body import StandingBody
+from kinertia.io.marker_places.upper_search import find_upper_body
+from kinertia.io.marker_places.usual_places import WHERE
+from kinertia.trial.data import FloatArray, Markers, Recording
+
+_OFTEN = 0.25
+"""Share of the frames in which a marker is seen that is used."""
+_FEWEST = 8
+_STATURES_M = np.geomspace(0.85, 2.1, 37)
+_SURE, _CLEAR = 30.0, 6.0
+"""Score of legs that are somebody's, and by how much the way one faces must fit better than the other."""
+_COMPUTED = -2.0
+_APART_M = 0.02
+_OPPOSITE = {"r": "l", "l": "r"}
+
+
+@dataclass(frozen=True)
+class Placement:
+    """Where the markers of a recording are.
+
+    Attributes:
+        landmarks: landmark -> labels whose middle it is.
+        how: landmark -> how it was found.
+        segments: segment -> labels that move with it.
+        left_out: label -> why it is no marker of a segment.
+        notes: what else one should know.
+    """
+
+    landmarks: dict[str, list[str]] = field(default_factory=dict)
+    how: dict[str, str] = field(default_factory=dict)
+    segments: dict[str, list[str]] = field(default_factory=dict)
+    left_out: dict[str, str] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+
+
+def place_markers(recording: Recording) -> Placement:
+    """Find the landmarks of somebody who stands upright, by geometry with the labels as hints.
+
+    Args:
+        recording: best a static trial; in ground axes, Y up.
+
+    Returns:
+        the places; without landmarks where the markers are nobody's who stands.
+    """
+    markers = recording.markers
+    left_out = {
+        label: f"seen in {share * 100:.0f} % of the frames only"
+        for label, share in zip(markers.labels, markers.seen.mean(axis=0), strict=True)
+        if share <= _OFTEN
+    }
+    markers = markers.select([label for label in markers.labels if label not in left_out])
+    left_out |= unusable_points(markers)
+    markers = markers.select([label for label in markers.labels if label not in left_out])
+    computed = computed_points(markers)
+    result = Placement(left_out=left_out)
+    if len(markers.labels) - len(computed) < _FEWEST:
+        result.notes.append("too few markers to tell where they are")
+        return result
+    body, found, margin = _best_body(markers, computed, recording.markers.labels)
+    if found.score < _SURE:
+        result.notes.append("these are not the markers of somebody who stands upright: give the static trial")
+        return result
+    if margin < _CLEAR:
+        result.notes.append("which way the person faces is not clear: check left and right")
+    find_upper_body(body, found)
+    _explain(result, body, found, computed)
+    return result
+
+
+def _best_body(
+    markers: Markers, computed: Mapping[str, str], all_labels: Sequence[str]
+) -> tuple[StandingBody, Found, float]:
+    """The facing and stature that fit best, what is found with them, and by how much they fit better than the other
+    facing.
+    """
+    labels, pairs = markers.labels, sides(all_labels)
+    meant = tuple(roles(label, label in pairs) for label in labels)
+    points = np.nanmedian(markers.positions, axis=0)
+    worn = np.array([label not in computed for label in labels])
+    trust = np.where(worn, 0.0, np.where([bool(one) for one in meant], _COMPUTED, -np.inf))
+    axes = body_axes(points[worn])
+    others = tuple(
+        labels.index(pairs[label][1]) if label in pairs and pairs[label][1] in labels else -1 for label in labels
+    )
+    fits = []
+    for one in (axes, axes.turned()):
+        places = one.places(points)
+        side, mirrored = _label_sides(labels, places, pairs)
+        bodies = [
+            StandingBody(labels, places, float(each), meant, trust, side, others, mirrored) for each in _STATURES_M
+        ]
+        fits.append(max(((body, find_legs(body)) for body in bodies), key=_score))
+    best = max(fits, key=_score)
+    return *best, _score(best) - min(map(_score, fits))
+
+
+def _score(fit: tuple[StandingBody, Found]) -> float:
+    return fit[1].score
+
+
+def _label_sides(
+    labels: Sequence[str], places: FloatArray, pairs: Mapping[str, tuple[str, str]]
+) -> tuple[tuple[str, ...], bool]:
+    """The side that each label says, and whether most say the other one than their places."""
+    across = {label: place[2] for label, place in zip(labels, places, strict=True)}
+    apart = [
+        across[one] - across[two] for one, (side, two) in pairs.items() if side == "r" and {one, two} <= set(across)
+    ]
+    mirrored = sum(np.sign(each) for each in apart if abs(each) > _APART_M) < 0
+    return tuple(pairs[label][0] if label in pairs else "" for label in labels), bool(mirrored)
+
+
+def _explain(result: Placement, body: StandingBody, found: Found, computed: Mapping[str, str]) -> None:
+    """Write down what was found, by the sides that the labels say."""
+    if body.mirrored:
+        result.notes.append(
+            "the labels say right where the person's left is, by the feet: the axes may be mirrored; labels were kept"
+        )
+    of_landmark: dict[str, list[int]] = {}
+    for landmark, marker in found.markers.items():
+        if not landmark.startswith(("metatarsal", "wrist")):
+            of_landmark[landmark] = [marker]
+    notch = found.markers.get("sternal_notch")
+    if notch is not None:  # of two clavicles the middle
+        of_landmark["sternal_notch"] += [k for k in range(len(body.labels)) if body.other_side[k] == notch]
+    for side in "rl":
+        heads, which = metatarsals(found.markers, side)
+        wrist = [found.markers[name] for name in (f"wrist_{side}", f"wrist_other_{side}") if name in found.markers]
+        of_landmark |= {name: own for name, own in ((f"metatarsal_{side}", heads), (f"wrist_{side}", wrist)) if own}
+        if heads:
+            result.how[f"metatarsal_{side}"] = which
+    members = segment_members(body, found)
+    of_landmark |= wands(body, found, members)
+    how = {}
+    for landmark, own in of_landmark.items():
+        name = _on_side(body, landmark, own)
+        result.landmarks[name] = [body.labels[k] for k in own]
+        how[name] = "; ".join(filter(None, (result.how.get(landmark), _how(body, landmark, own, computed))))
+    result.how.clear()
+    result.how.update(how)
+    for marker, segment in members.items():
+        label = body.labels[marker]
+        if label not in computed:
+            result.segments.setdefault(_on_side(body, segment, [marker]), []).append(label)
+    result.left_out.update(computed)
+
+
+def _on_side(body: StandingBody, name: str, markers: Sequence[int]) -> str:
+    """A landmark or segment on the side that the labels of these markers say, else on that of their place."""
+    base, _, side = name.rpartition("_")
+    if side not in ("r", "l"):
+        return name
+    said = {body.side[k] for k in markers} - {""}
+    if len(said) == 1:
+        return f"{base}_{said.pop()}"
+    return f"{base}_{_OPPOSITE[side] if body.mirrored else side}"
+
+
+def _how(body: StandingBody, landmark: str, markers: Sequence[int], computed: Mapping[str, str]) -> str:
+    """By what it was found, in a few words."""
+    base = landmark[:-2] if landmark.endswith(("_r", "_l")) else landmark
+    at = body.places[list(markers)].mean(axis=0)
+    words = [WHERE[base], f"{at[1] * 100:.0f} cm above the floor"]
+    hinted = all(base in body.meant[k] for k in markers)
+    words.append("the label agrees" if hinted else "by its place alone")
+    words += [f"computed ({computed[body.labels[k]]})" for k in markers if body.labels[k] in computed]
+    if landmark.endswith(("_r", "_l")) and _on_side(body, landmark, markers) != landmark and not body.mirrored:
+        words.append("ITS LABEL SAYS THE OTHER SIDE than its place")
+    return ", ".join(words)

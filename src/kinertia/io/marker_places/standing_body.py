@@ -1,0 +1,55 @@
+"""The markers of somebody who stands, in body axes, with what their labels hint at."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from kinertia.io.marker_places.usual_places import Usual, by_label
+from kinertia.trial.data import BoolArray, FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class StandingBody:
+    """Markers of a standing person, of supposed facing and stature.
+
+    Attributes:
+        labels: of the m markers.
+        places: (m, 3) m, forward, up, right.
+        stature_m: supposed.
+        meant: of each label the landmarks and segments that it hints at.
+        trust: (m,) what counts against points that were computed; minus infinity where they are out of the question.
+        side: of each label "r" or "l" where it says so; else "".
+        other_side: of each marker the index of that whose label is the same on the other side, or -1.
+        mirrored: whether most labels say the other side than their places.
+    """
+
+    labels: tuple[str, ...]
+    places: FloatArray
+    stature_m: float
+    meant: tuple[frozenset[str], ...]
+    trust: FloatArray
+    side: tuple[str, ...]
+    other_side: tuple[int, ...]
+    mirrored: bool
+
+    @cached_property
+    def outward(self) -> dict[str, FloatArray]:
+        """Side -> places (m, 3) with the third coordinate outward on that side."""
+        return {"r": self.places, "l": self.places * np.array([1.0, 1.0, -1.0])}
+
+    def named(self, landmark: str) -> FloatArray:
+        """(m,) what labels and trust count for a landmark (without its side)."""
+        return np.array([by_label(own, landmark) for own in self.meant]) + self.trust
+
+    def scores(self, usual: Usual, side: str, anchor: FloatArray, landmark: str) -> FloatArray:
+        """(m,) of all markers for a landmark of a side, from an anchor (3,) in outward axes."""
+        return usual.score(self.outward[side] - anchor, self.stature_m) + self.named(landmark)
+
+    def is_side(self, side: str) -> BoolArray:
+        """(m,) whether a marker is on this side, by its label or else by its place."""
+        by_place, said = np.where(self.places[:, 2] > 0, "r", "l"), np.array(self.side)
+        wanted = {"r": "l", "l": "r"}[side] if self.mirrored else side
+        return np.asarray(np.where(said == "", by_place == side, said == wanted))
