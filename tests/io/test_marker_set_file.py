@@ -146,7 +146,7 @@ def test_a_computed_sacral_marker_is_no_measured_one(off_m, kept):
 
 
 OWN = {
-    "field/unipd/walking1.c3d": "IOR, lower body and trunk",
+    "field/unipd/walking1.c3d": None,
     "c3d_variety/ist.c3d": None,
     "c3d_variety/motion_analysis_walk.c3d": "Helen Hayes",
     "field/biomechzoo/HC030A/static.c3d": "Plug-in Gait",
@@ -155,7 +155,10 @@ OWN = {
 
 @pytest.mark.parametrize("path", here(OWN))
 def test_one_limit_for_presets_and_named_sets(recording_of, path):
-    """Two thirds: a laboratory's version of a set is taken for it, labels that mean something else are not (D21)."""
+    """Two thirds: a laboratory's version of a set is taken for it, labels that mean something else are not (D21).
+
+    Nor are those of a set with other feet.
+    """
     labels = recording_of(path).without_empty_markers().markers.labels
     if OWN[path] is None:
         with pytest.raises(MarkerSetError):
@@ -245,3 +248,12 @@ def test_landmark_codes_are_told_by_their_labels(codes, side, expected):
     assert chosen == read_marker_set(codes)
     assert chosen.landmarks["acromion_r"] == (expected,)
     assert set(labels) <= set(chosen.labels)
+
+
+def test_a_preset_is_not_taken_where_both_feet_lack_a_landmark():
+    """One hidden marker is an error of its own, which names the landmark."""
+    preset = read_marker_set("plug-in-gait")
+    with pytest.raises(MarkerSetError) as error:
+        choose_marker_set([label for label in preset.labels if label not in ("RTOE", "LTOE")])
+    assert error.value.finding.code == "L101"
+    assert choose_marker_set([label for label in preset.labels if label != "RTOE"]).name == preset.name

@@ -8,9 +8,11 @@ from pathlib import Path
 
 import pytest
 
+from generic_static import standing_positions
 from kinertia.errors import FileError
+from kinertia.io.marker_set_file import read_marker_set
 from kinertia.io.measures_file import measures_sheet
-from kinertia.io.subject_draft import init_subject
+from kinertia.io.subject_draft import init_files, init_subject
 from kinertia.io.subject_file import read_subject
 from kinertia.settings import Settings
 from recordings import here
@@ -301,3 +303,65 @@ def test_a_sheet_of_measures_is_taken_up(tmp_path, c3d_lab):
     (tmp_path / "static.c3d").rename(tmp_path / "stand.c3d")
     (tmp_path / "scaled.osim").touch()
     assert "measures =" not in init_subject(tmp_path), "a model cuts its segments elsewhere"
+
+
+def moving_trc(path, frames, speed_m_s):
+    """Markers that all move at this speed."""
+    trc(path, frames)
+    head = path.read_text().split("\n")[:6]
+    rows = [f"{k + 1}\t{k / 100:.2f}\t{speed_m_s * 10 * k:.2f}\t2\t3" for k in range(frames)]
+    path.write_text("\n".join([*head[:5], "", *rows]) + "\n")
+
+
+def test_init_takes_no_short_walk_for_a_static_trial(tmp_path):
+    moving_trc(tmp_path / "a.trc", 60, 1.1)
+    moving_trc(tmp_path / "b.trc", 200, 0.01)
+    moving_trc(tmp_path / "c.trc", 300, 0.0)
+    text = init_subject(tmp_path)
+    assert 'static = "b.trc"' in text
+    assert "the shortest in which nobody moves" in text
+
+
+def test_init_takes_no_static_trial_where_all_move(tmp_path):
+    moving_trc(tmp_path / "a.trc", 60, 1.1)
+    moving_trc(tmp_path / "b.trc", 200, 0.6)
+    text = init_subject(tmp_path)
+    assert '# static = "static.trc"  # FILL IN' in text
+    assert text.count("[[trial]]") == 2
+
+
+def standing_trc(path, labels):
+    """Somebody who stands, in a file, by these labels."""
+    rows = [
+        f"{k + 1}\t{k / 100:.2f}\t" + "\t".join(f"{1e3 * x:.2f}" for at in labels.values() for x in at)
+        for k in range(30)
+    ]
+    head = [
+        f"PathFileType\t4\t(X/Y/Z)\t{path.name}",
+        "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames",
+        f"100\t100\t30\t{len(labels)}\tmm\t100\t1\t30",
+        "Frame#\tTime\t" + "\t\t\t".join(labels),
+        "\t\t" + "\t".join(f"X{k}\tY{k}\tZ{k}" for k in range(1, len(labels) + 1)),
+        "",
+    ]
+    path.write_text("\n".join(head + rows) + "\n")
+
+
+def test_init_drafts_a_marker_set_where_no_preset_fits(tmp_path):
+    positions = standing_positions()
+    standing_trc(tmp_path / "static.trc", {f"Q{k}": at for k, at in enumerate(positions.values())})
+    files = init_files(tmp_path)
+    assert set(files) == {"subject.toml", "markers.toml"}
+    assert 'markers = "markers.toml"' in files["subject.toml"]
+    (tmp_path / "markers.toml").write_text(files["markers.toml"], encoding="utf-8")
+    assert "heel_r" in read_marker_set(tmp_path / "markers.toml").landmarks
+    again = init_files(tmp_path)
+    assert set(again) == {"subject.toml"}, "what is there is left alone"
+    assert again["subject.toml"] == files["subject.toml"]
+
+
+def test_init_drafts_no_marker_set_where_a_preset_fits(tmp_path):
+    standing_trc(tmp_path / "static.trc", standing_positions())
+    files = init_files(tmp_path)
+    assert set(files) == {"subject.toml"}
+    assert '# markers = "plug-in-gait"' in files["subject.toml"]

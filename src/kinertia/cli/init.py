@@ -13,7 +13,7 @@ from kinertia.errors import FileError
 from kinertia.io.file_names import missing_file
 from kinertia.io.measures_file import measures_sheet
 from kinertia.io.output_folder import write_then_rename
-from kinertia.io.subject_draft import FILL_IN, NO_FORCES, init_subject
+from kinertia.io.subject_draft import FILL_IN, MARKER_SET, NO_FORCES, SUBJECT, init_files
 from kinertia.report.measures_picture import measures_picture
 
 
@@ -25,6 +25,9 @@ def init(
 ) -> Outcome:
     """Write a first subject.toml from the files in a folder.
 
+    Where no marker-set preset fits the static trial, a draft of one,
+    markers.toml, is written beside it.
+
     A sheet of girths and lengths that is there is taken up. With --measures
     an empty one, measures.csv, and a picture of where to measure,
     measures.svg. As many as you have time for are of use.
@@ -35,18 +38,22 @@ def init(
     """
     if measures:
         return _measures(folder)
-    path = folder / "subject.toml"
+    path, own = folder / SUBJECT, folder / MARKER_SET
     if path.exists():
         raise FileError(path, "exists already and is left alone; remove it to draft a new one")
-    text = init_subject(folder)
-    write_then_rename(path, text)
-    lines = text.splitlines()
+    files = init_files(folder)
+    for name, text in sorted(files.items()):
+        write_then_rename(folder / name, text)
+    lines = files[SUBJECT].splitlines()
     notes = [line.removeprefix("# ") for line in lines if line.startswith(NO_FORCES)]
     for note in notes:
         out.print(note, soft_wrap=True)
+    if MARKER_SET in files:
+        out.print(f"no marker-set preset fits: wrote {own}, drafted from the static trial; check it", soft_wrap=True)
     out.print(f"wrote {path}: fill in what it asks for, then run: kinertia fit {path} -o out", soft_wrap=True)
     asked = [line.removeprefix("# ").partition(" =")[0] for line in lines if FILL_IN in line]
-    return Outcome({"subject_file": str(path), "fill_in": asked, "notes": notes})
+    marker_set = str(own) if MARKER_SET in files else None
+    return Outcome({"subject_file": str(path), "marker_set": marker_set, "fill_in": asked, "notes": notes})
 
 
 def _measures(folder: Path) -> Outcome:

@@ -14,7 +14,7 @@ from kinertia.io.marker_set_draft import draft_marker_set
 from kinertia.io.marker_set_file import nearest_preset, preset_names, read_marker_set
 from kinertia.io.output_folder import write_then_rename
 from kinertia.io.recording import read_recording
-from kinertia.model.marker_set import is_worn, share_worn, spelled_as
+from kinertia.model.marker_set import fits_person, share_worn, spelled_as
 
 _LISTED = 6
 
@@ -52,7 +52,8 @@ def markers(
         presets.append({"name": name, "labels": len(wanted), "absent": absent})
     out.print(table)
     best = nearest_preset(labels)
-    recognised = next((name for name in shares if is_worn(best, labels) and sets[name] == best), None)
+    named = {read_marker_set(name).name: name for name in preset_names()}
+    recognised = named[best.name] if fits_person(best, labels) else None
     if recognised:
         out.print(f"{recognised} is recognised by itself", soft_wrap=True)
     elif output is None:

@@ -20,7 +20,7 @@ from kinertia.model.marker_set import (
     SEGMENTS,
     WIDTHS,
     MarkerSet,
-    is_worn,
+    fits_person,
     mismatch,
     share_worn,
     spelled_as,
@@ -59,7 +59,7 @@ def choose_marker_set(labels: Sequence[str]) -> MarkerSet:
         MarkerSetError: no preset fits (L101); with what the nearest one lacks, and the labels that look like it.
     """
     best = nearest_preset(labels)
-    if not is_worn(best, labels):
+    if not fits_person(best, labels):
         raise mismatch(best, labels)
     return best
 
@@ -84,14 +84,14 @@ def nearest_preset(labels: Sequence[str]) -> MarkerSet:
     spelled = [with_posterior_pelvis(spelled_as(preset, labels), labels) for preset in read]
 
     def worn(one: MarkerSet) -> int:
-        return len(set(one.labels) & set(labels)) if is_worn(one, labels) else 0
+        return len(set(one.labels) & set(labels)) if fits_person(one, labels) else 0
 
     def nearness(k: int) -> tuple[float, ...]:
         both = presets[k], spelled[k]
         return *(worn(one) for one in both), *(share_worn(one, labels) for one in both), len(presets[k].labels)
 
     best = max(range(len(presets)), key=nearness)
-    return spelled[best] if is_worn(spelled[best], labels) else presets[best]
+    return spelled[best] if fits_person(spelled[best], labels) else presets[best]
 
 
 def _marker_set(document: TomlFile, path: Path) -> MarkerSet:

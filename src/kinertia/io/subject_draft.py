@@ -10,15 +10,20 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from kinertia.errors import FileError, KinertiaError
 from kinertia.findings.quantity import Quantity
 from kinertia.io.cortex_forces import ENDING as CORTEX
 from kinertia.io.file_names import RESULT_FILES, missing_file
+from kinertia.io.marker_set_draft import draft_marker_set
+from kinertia.io.marker_set_file import nearest_preset
 from kinertia.io.measures_file import is_measures_sheet
 from kinertia.io.qualisys import plates_beside
 from kinertia.io.recording import MARKER_FILES, read_recording
 from kinertia.io.subject_file import Model, PriorFiles, TrialFiles
 from kinertia.io.subject_text import entry_line
+from kinertia.model.marker_set import fits_person
 from kinertia.settings import Settings, Subject, Table
 
 FILL_IN = "  # FILL IN: "
@@ -28,20 +33,29 @@ STATIC_NAME = re.compile(r"static|(?<![a-z])cal(ib\w*)?(?![a-z])", re.IGNORECASE
 _FORCE_NAME = re.compile("force|grf", re.IGNORECASE)
 _FORCES = re.compile(r"<force_identifier>\s*(\S+?)\s*</force_identifier>")
 _LISTED = 6
+_STILL_M_S, _STRIDE_S = 0.1, 0.1
+"""Markers of people who stand move by a few cm/s, of people who walk by a metre a second; over a tenth of a second."""
+SUBJECT, MARKER_SET = "subject.toml", "markers.toml"
 NO_FORCES = "# No forces were found for"
 """How the line begins that says so of a trial."""
 
 
 def init_subject(folder: str | Path, nearby: bool = True) -> str:
-    """Draft a subject file for the recordings in a folder (not its subfolders); writes nothing.
+    """The subject file of `init_files`, with no marker set beside it."""
+    return init_files(folder, nearby, marker_set=False)[SUBJECT]
 
-    The static trial is the one whose name says so ("static", "cal"), else the shortest; forces and loads go
-    with the trial whose name is most like theirs, and are looked for in the folders in it and beside it where the
-    folder itself has none and `nearby` is True; mass and height come from a C3D file that holds them. The only OpenSim
-    model of a folder takes the place of a static trial that no name tells. A sheet of girths and lengths is taken up,
-    but not with a model, whose segments are cut elsewhere; of several, one is to be chosen. What stays unknown is a
-    commented line marked FILL IN, and so is a trial for which no forces were found. Recordings whose names begin like
-    another static trial's are left out and named in a comment.
+
+def init_files(folder: str | Path, nearby: bool = True, marker_set: bool = True) -> dict[str, str]:
+    """Draft a subject file for the recordings in a folder (not its subfolders), and a marker set where none fits the
+    static trial; writes nothing.
+
+    The static trial is the one whose name says so ("static", "cal"), else the shortest in which nobody moves; forces
+    and loads go with the trial whose name is most like theirs, and are looked for in the folders in it and beside it
+    where the folder itself has none and `nearby` is True; mass and height come from a C3D file that holds them. The
+    only OpenSim model of a folder takes the place of a static trial that no name tells. A sheet of girths and lengths
+    is taken up, but not with a model, whose segments are cut elsewhere; of several, one is to be chosen. What stays
+    unknown is a commented line marked FILL IN, and so is a trial for which no forces were found. Recordings whose names
+    begin like another static trial's are left out and named in a comment.
 
     Raises:
         FileError: no such folder, or no file of markers in it.
@@ -67,14 +81,19 @@ def init_subject(folder: str | Path, nearby: bool = True) -> str:
     if others:
         text += [f"# Left out (another subject's, another static trial, or also there as C3D): {', '.join(others)}."]
     text += ["", "[subject]", *_subject_lines([file for file in (static, *trials) if file in c3d])]
+    wanted = marker_set and static is not None and not (folder / MARKER_SET).exists()
+    own = _drafted_set(static) if wanted and static else ""
     guessed = static is not None and not STATIC_NAME.search(static.stem)
-    note = " (the shortest recording)" if guessed else ""
+    note = " (the shortest in which nobody moves)" if guessed else ""
     text += ["", "[model]"]
     if by_model:
         text += [_entry(Model, "osim", models[0].name)]
     else:
         text += [_entry(Model, "static", static and static.name, "static.trc", note)]
-        text += ["# " + _entry(Model, "markers", "plug-in-gait")]
+        if (folder / MARKER_SET).is_file() or own:
+            text += [_entry(Model, "markers", MARKER_SET)]
+        else:
+            text += ["# " + _entry(Model, "markers", "plug-in-gait")]
     for trial in trials:
         text += ["", "[[trial]]", _entry(TrialFiles, "markers", trial.name)]
         if trial in chosen:
@@ -90,7 +109,17 @@ def init_subject(folder: str | Path, nearby: bool = True) -> str:
     if sheets:
         text += ["", "[prior]", _entry(PriorFiles, "measures", sheets[0] if len(sheets) == 1 else None, sheets[0])]
     text += ["", "[settings]", *(_entry(Settings, *item) for item in Settings().model_dump().items()), ""]
-    return "\n".join(text)
+    return {SUBJECT: "\n".join(text)} | ({MARKER_SET: own} if own else {})
+
+
+def _drafted_set(static: Path) -> str:
+    """A marker set for a static trial that no preset fits; empty where one does, or nothing can be read."""
+    recording = _recording(static)
+    if recording is None:
+        return ""
+    recording = recording.without_empty_markers()
+    labels = recording.markers.labels
+    return "" if fits_person(nearest_preset(labels), labels) else draft_marker_set(recording, static.parent.name)
 
 
 def _expect_files(folder: Path) -> list[Path]:
@@ -137,7 +166,9 @@ def _static_and_trials(captures: Sequence[Path]) -> tuple[Path | None, list[Path
     """The static trial and the dynamic trials that share most of the beginning of its name."""
     statics = [file for file in captures if STATIC_NAME.search(file.stem)]
     if not statics and len(captures) > 1:
-        statics = [min(captures, key=_duration_s)]
+        speeds = {file: (_speed_m_s(file), _duration_s(file)) for file in captures}
+        still = [file for file in captures if speeds[file][0] < _STILL_M_S]
+        statics = [min(still, key=lambda file: speeds[file][1])] if still else []
     dynamic = [file for file in captures if file not in statics]
     if not statics or not dynamic:
         return (statics[0] if statics else None), dynamic
@@ -169,6 +200,20 @@ def _recording(file: Path) -> Any:
 def _duration_s(file: Path) -> float:
     recording = _recording(file)
     return recording.markers.time[-1] - recording.markers.time[0] if recording else float("inf")
+
+
+def _speed_m_s(file: Path) -> float:
+    """How fast half of the markers move in all but the quickest tenth of a recording; infinite where none is read."""
+    recording = _recording(file)
+    if recording is None:
+        return float("inf")
+    positions, time = recording.markers.positions, recording.markers.time
+    step = int(np.searchsorted(time - time[0], _STRIDE_S))
+    if not 0 < step < len(time):
+        return 0.0
+    moved = np.linalg.norm(positions[step:] - positions[:-step], axis=2) / (time[step] - time[0])
+    seen = moved[np.isfinite(moved).any(axis=1)]
+    return float(np.quantile(np.nanmedian(seen, axis=1), 0.9)) if len(seen) else float("inf")
 
 
 def _head(file: Path) -> str:

@@ -53,6 +53,7 @@ or a preset. Measured recordings that lack part of their own set have 0.76 and m
 have up to 0.62 of the labels of Plug-in Gait, which mean something else there."""
 _COMPUTED_M = 1e-4
 _SIDES = {"r": "right", "l": "left"}
+_FOOT = ("heel", "metatarsal")
 _LEGS = ("pelvis", "thigh", "shank", "foot")
 WIDTHS = tuple(f"{name}_{side}" for name in ("knee", "ankle", "elbow") for side in "rl")
 
@@ -194,6 +195,14 @@ def is_worn(marker_set: MarkerSet, labels: Sequence[str]) -> bool:
     Without trunk and arms a set still makes a model, without legs it does not.
     """
     return max(share_worn(marker_set, labels), _legs_worn(marker_set, labels)) >= ENOUGH_LABELS
+
+
+def fits_person(marker_set: MarkerSet, labels: Sequence[str]) -> bool:
+    """Whether a preset is worn, and has heels and metatarsals here, of which no foot can be made without: two
+    laboratories' sets may share most labels and not these.
+    """
+    sides = [[label for side in "rl" for label in marker_set.landmarks.get(f"{name}_{side}", ())] for name in _FOOT]
+    return is_worn(marker_set, labels) and all(set(own) & set(labels) for own in sides if own)
 
 
 def _legs_worn(marker_set: MarkerSet, labels: Sequence[str]) -> float:
