@@ -149,8 +149,9 @@ def test_a_marker_that_is_hardly_ever_seen_is_not_used(tmp_path):
 def test_legs_of_measured_laboratories_are_complete(tmp_path, name, recording_of):
     file, expected = STANDING[name]
     static = recording_of(file)
-    draft, _ = drafted(tmp_path, static)
+    draft, text = drafted(tmp_path, static)
     assert set(draft.landmarks) >= LEGS
+    assert "NOTE" not in text
     assert {landmark: set(draft.landmarks[landmark]) for landmark in expected} == {
         landmark: set(labels) for landmark, labels in expected.items()
     }

@@ -13,10 +13,10 @@ from kinertia.trial.data import FloatArray, Markers
 _EXACT_M = 1e-4
 _SKIN_M = 3e-4
 """By how much distances between markers on the skin change at least, in a person who stands still."""
-_RIGID_M, _RIGID_SHARE = 2e-5, 0.02
+_RIGID_M, _RIGID_SHARE, _LONG_S = 8e-6, 0.05, 2.0
 _FEW = 0.3
 _NEIGHBOURS, _REACH_M = 8, 0.45
-_FRAMES, _FEWEST = 25, 10
+_FRAMES, _FEWEST, _OFTEN = 25, 10, 0.95
 _AXES = "OALP"
 """Vicon's bones: origin, anterior, lateral and proximal end."""
 _OXFORD = ("HDF", "FOF", "TIB", "HLX", "TPF")
@@ -49,8 +49,8 @@ def computed_points(markers: Markers) -> dict[str, str]:
     others to a tenth of a millimetre, which skin does not.
     """
     place = _few_frames(markers)
-    found = {label: "a computed point by its name" for label in place if is_named_virtual(label)}
-    if len(markers.time) < _FEWEST:
+    found = {label: "a computed point by its name" for label in markers.labels if is_named_virtual(label)}
+    if len(next(iter(place.values()), ())) < _FEWEST:
         return found
     for label, own in place.items():
         if label in found:
@@ -59,7 +59,8 @@ def computed_points(markers: Markers) -> dict[str, str]:
             found[label] = f"always in the middle of {pair[0]} and {pair[1]}"
     pairs = sides(list(place))
     hinted = {label: bool(roles(label, label in pairs)) for label in place}
-    found |= _rigid_pairs({label: own for label, own in place.items() if label not in found}, hinted)
+    if markers.time[-1] - markers.time[0] > _LONG_S:  # within less, quiet markers keep their distances by chance
+        found |= _rigid_pairs({label: own for label, own in place.items() if label not in found}, hinted)
     for label, own in place.items():
         others = {other: at for other, at in place.items() if other != label and other not in found}
         sources = [] if label in found else _fixed_in(own, others)
@@ -69,9 +70,9 @@ def computed_points(markers: Markers) -> dict[str, str]:
 
 
 def _few_frames(markers: Markers) -> dict[str, FloatArray]:
-    """Label -> (f, 3) m in a few frames that show all markers that are seen in most; others are left out."""
+    """Label -> (f, 3) m in a few frames that show all markers but those with gaps."""
     seen = markers.seen
-    often = np.flatnonzero(seen.mean(axis=0) > 0.5)
+    often = np.flatnonzero(seen.mean(axis=0) > _OFTEN)
     frames = np.flatnonzero(seen[:, often].all(axis=1))
     frames = frames[:: -(-len(frames) // _FRAMES)] if len(frames) else frames
     return {markers.labels[k]: markers.positions[frames, k] for k in often} if len(frames) else {}
