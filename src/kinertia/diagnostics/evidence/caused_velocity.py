@@ -11,10 +11,11 @@ from kinertia.diagnostics.evidence.markers_centre import markers_centre
 from kinertia.model.skeleton import GRAVITY_M_S2
 from kinertia.motion.smoothing import SmoothingError, smooth
 from kinertia.trial.data import FloatArray, Trial
+from kinertia.trial.foot_motion import AROUND_LOAD_S
 from kinertia.trial.sampled_time import span_s, within
 
 _PELVIS_HZ = 6.0
-_LEAST_WINDOW_S = 0.4
+_LEAST_WINDOW_S, _LEAST_SPECIFIC = 0.4, 0.2
 LEAST_CHANGE_M_S, _FOLLOWS = 0.02, 0.7
 """Velocities that change by less (standard deviation) say nothing of forces."""
 
@@ -75,27 +76,38 @@ def without_trend(time: FloatArray, values: FloatArray) -> FloatArray:
 
 def caused_velocities(trial: Trial, owners: Mapping[str, str]) -> list[CausedVelocity]:
     """Of every window in which the sum of the forces is known, if it is long enough."""
-    worn = [label for label in trial.markers.labels if owners.get(label) == "pelvis"]
-    whole = markers_centre(owners, trial.markers)
+    windows = trial.carried_windows()
+    if not windows:
+        return []
+    markers = trial.markers.cut(
+        min(start for start, _ in windows) - AROUND_LOAD_S, max(end for _, end in windows) + AROUND_LOAD_S
+    )
+    worn = [label for label in markers.labels if owners.get(label) == "pelvis"]
+    whole = markers_centre(owners, markers)
     if not worn or whole is None:
         return []
-    place = trial.markers.select(worn).positions.mean(axis=1)
+    place = markers.select(worn).positions.mean(axis=1)
     seen = np.isfinite(place).all(axis=1)
     if not seen.any():
         return []
     try:
-        pelvis_m, centre_m = (smooth(trial.markers.time[seen], part[seen], _PELVIS_HZ) for part in (place, whole))
+        pelvis_m, centre_m = (smooth(markers.time[seen], part[seen], _PELVIS_HZ) for part in (place, whole))
     except SmoothingError:
         return []
-    first, last = trial.markers.time[seen][[0, -1]]
+    first, last = markers.time[seen][[0, -1]]
     parts = []
-    for start, end in trial.carried_windows():
+    for start, end in windows:
         inside = within(trial.loads.time, max(start, first), min(end, last))
         time, force = trial.loads.time[inside], trial.loads.force[inside].sum(axis=1)
         if len(time) < 10 or span_s(time) < _LEAST_WINDOW_S or not force[:, 1].mean() > 0:
             continue
-        mass_kg = float(force[:, 1].mean()) / GRAVITY_M_S2
+        centre = centre_m(time, 1)
+        # who lands, or jumps off, is faster upwards at the end
+        specific = GRAVITY_M_S2 + float(centre[-1, 1] - centre[0, 1]) / span_s(time)
+        if specific < _LEAST_SPECIFIC * GRAVITY_M_S2:
+            continue
+        mass_kg = float(force[:, 1].mean()) / specific
         impulse = np.cumsum((force[1:] + force[:-1]) / 2 * np.diff(time)[:, None], axis=0)
         caused = np.concatenate((np.zeros((1, 3)), impulse)) / mass_kg
-        parts.append(CausedVelocity(time, pelvis_m(time, 1), centre_m(time, 1), caused, mass_kg))
+        parts.append(CausedVelocity(time, pelvis_m(time, 1), centre, caused, mass_kg))
     return parts

@@ -10,6 +10,7 @@ from kinertia.diagnostics.evidence.markers_centre import markers_centre
 from kinertia.model.skeleton import GRAVITY_M_S2
 from kinertia.motion.smoothing import SmoothingError, smooth
 from kinertia.trial.data import FloatArray, Markers, PlateLoads, Trial
+from kinertia.trial.foot_motion import AROUND_LOAD_S
 from kinertia.trial.sampled_time import nearest_samples, runs, span_s, within
 
 _CENTRE_HZ = 8.0
@@ -27,6 +28,12 @@ def plate_masses(
         markers: all of the recording.
         segment_of_label: which marker is on which segment.
     """
+    windows = trial.windows()
+    if not windows:
+        return {}
+    markers = markers.cut(
+        min(start for start, _ in windows) - AROUND_LOAD_S, max(end for _, end in windows) + AROUND_LOAD_S
+    )
     place = markers_centre(segment_of_label, markers)
     if place is None:
         return {}
@@ -34,7 +41,7 @@ def plate_masses(
         centre = smooth(markers.time, place[:, 1], _CENTRE_HZ)
     except SmoothingError:
         return {}
-    measured = trial.measured[nearest_samples(markers.time, plates.time)]
+    measured = trial.measured[nearest_samples(trial.markers.time, plates.time)]
     measured &= within(plates.time, markers.time[0], markers.time[-1])
     by_plate = {}
     for p, name in enumerate(plates.names):

@@ -1,18 +1,23 @@
-"""How long strides and steps last, from the loads under the feet."""
+"""Whether a person takes strides while plates are stood on, and how long they last."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import combinations, pairwise
 
+import numpy as np
+
+from kinertia.diagnostics.evidence.foot_trajectories import FootTrajectory
 from kinertia.trial.data import FEET, FootLoads
 from kinertia.trial.ground_contact import bridged
-from kinertia.trial.sampled_time import runs
+from kinertia.trial.sampled_time import TIME_TOLERANCE_S, runs, span_s
 
 _TOGETHER = 0.2
 """Share of the time between two landings of a foot within which the other foot lands with it."""
 _SHORTEST_STEP_S = 0.2
 """Feet that land or leave within less do so together: a sprinter's steps last longer."""
+_LONGEST_SWING_S = 1.0
+"""A foot that is in the air for longer is lifted: who lands on the other one."""
 
 
 def periods(loads: FootLoads) -> tuple[list[float], list[float]]:
@@ -33,6 +38,54 @@ def periods(loads: FootLoads) -> tuple[list[float], list[float]]:
         strides += [b - a for times in events for a, b in combinations(times, 2)]
         steps += between
     return strides, steps
+
+
+def swing_in_turn(feet: tuple[FootTrajectory, FootTrajectory], part_s: tuple[float, float]) -> bool:
+    """Whether one foot swings, and then the other, by their markers: one step on a plate shows no stride by its load.
+
+    Feet that leave and land together jump. A foot that lands while the other stays lifted is a landing.
+
+    Args:
+        feet: right and left.
+        part_s: first and last time of the part that counts.
+    """
+    right, left = (
+        [(leaves, lands) for leaves, lands in _swings(foot) if not (lands < part_s[0] or leaves > part_s[1])]
+        for foot in feet
+    )
+    for swing in right if left else ():
+        nearest = min(
+            (_later_s(swing, other) for other in left), key=lambda later: abs(float(np.mean(later or np.inf)))
+        )
+        size = np.abs(np.round(nearest, 6))
+        in_step = (size >= _SHORTEST_STEP_S) & (size <= _LONGEST_SWING_S)
+        if nearest and in_step.all() and abs(np.sign(nearest).sum()) == len(nearest):
+            return True
+    return False
+
+
+def _swings(foot: FootTrajectory) -> list[tuple[float, float]]:
+    """When a foot leaves the ground and when it lands; NaN where the trial does not show it. None that is too long."""
+    spans, time = foot.stance_spans, foot.time
+    if not spans:
+        return []
+    edges = [
+        (-np.inf, spans[0][0]),
+        *((before[1], after[0]) for before, after in pairwise(spans)),
+        (spans[-1][1], np.inf),
+    ]
+    frame_s = span_s(time) / max(len(time) - 1, 1)
+    kept = []
+    for leaves, lands in edges:
+        lifted = foot.shown & (time > leaves) & (time < lands)
+        if lifted.any() and lifted.sum() * frame_s <= _LONGEST_SWING_S + TIME_TOLERANCE_S:
+            kept.append((leaves if np.isfinite(leaves) else np.nan, lands if np.isfinite(lands) else np.nan))
+    return kept
+
+
+def _later_s(swing: tuple[float, float], other: tuple[float, float]) -> list[float]:
+    """s, by how much another swing leaves and lands later, as far as both are known."""
+    return [second - first for first, second in zip(swing, other, strict=True) if np.isfinite(second - first)]
 
 
 def _alternating(right: Sequence[float], left: Sequence[float]) -> bool:

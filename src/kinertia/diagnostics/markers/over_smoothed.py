@@ -30,7 +30,7 @@ _MOSTLY_SEEN = 0.9
 def over_smoothed(context: RecordingContext) -> Iterator[Finding]:
     """M133: markers without the quick part of the motion that the forces show; nothing where nobody steps."""
     trial, owners, changes = context.trial, context.segment_of_label, context.velocity_changes
-    if trial is None or changes is None:
+    if trial is None or changes is None or not context.has_strides:
         return
     share = _quick_share(trial.markers, owners)
     if share is None or share > _LEAST_SHARE:

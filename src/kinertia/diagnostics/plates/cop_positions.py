@@ -16,10 +16,11 @@ import numpy as np
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.contact_fit import Hypothesis
 from kinertia.diagnostics.evidence.plate_contacts import FAR_M, PlateContact, displaced
-from kinertia.diagnostics.plates.heel_landing import lands_on_heels, shows_whole_feet
+from kinertia.diagnostics.plates.heel_landing import goes_forwards, lands_on_heels, shows_whole_feet
 from kinertia.diagnostics.plates.interchanged_plates import interchanged_plates
 from kinertia.diagnostics.plates.rotated_plates import rotated_plates
 from kinertia.diagnostics.timing.contact_delays import contact_delays, stance_durations
+from kinertia.diagnostics.timing.keeps_time import keeps_time
 from kinertia.diagnostics.timing.rate_and_delay import fitted_rate_or_delay
 from kinertia.findings.finding import Finding, Severity, finding, with_evidence
 from kinertia.findings.quantity import Quantity
@@ -49,12 +50,13 @@ def loads_and_feet(context: RecordingContext) -> Iterator[Finding]:
     if not shows_whole_feet(context):
         return
     feet = context.foot_trajectories
+    timely = keeps_time(context)
     hypotheses = list(
         chain(
-            fitted_rate_or_delay(context),
-            stance_durations(context),
+            () if timely else fitted_rate_or_delay(context),
+            () if timely else stance_durations(context),
             interchanged_plates(context),
-            contact_delays(context),
+            () if timely else contact_delays(context),
             rotated_plates(context),
             _displaced(context),
         )
@@ -64,7 +66,7 @@ def loads_and_feet(context: RecordingContext) -> Iterator[Finding]:
         yield _with_runners_up([one.finding for one in ranked])
         return
     yield from _stray(context)
-    if lands_on_heels(context):
+    if goes_forwards(context):
         yield from _offset(context)
 
 
@@ -138,7 +140,8 @@ def _offset(context: RecordingContext) -> Iterator[Finding]:
         offset = Quantity((float(mean[0]), float(mean[1])), "m", limit=_OFFSET_M, usual=(-0.008, 0.008))
         yield _origin(context, offset, len(contacts), "both feet off their line from heel to toe")
         return
-    yield from _ends(context, contacts)
+    if lands_on_heels(context):
+        yield from _ends(context, contacts)
 
 
 def _ends(context: RecordingContext, contacts: Sequence[PlateContact]) -> Iterator[Finding]:

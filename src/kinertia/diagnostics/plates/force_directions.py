@@ -46,17 +46,18 @@ class _Hypothesis:
 def force_directions(context: RecordingContext) -> Iterator[Finding]:
     """P231 to P233: the hypothesis that leaves least; the others that would do are among its causes.
 
-    One about both axes is weighed against the best of each axis.
+    One about both axes is weighed against the best of each axis. Without strides the trunk bends, so that pelvis and
+    markers' centre must both oppose the forces, and only a wrong sign of all of them is looked for.
     """
     trial, plates, parts, changes = context.trial, context.plates, context.velocities, context.velocity_changes
     if trial is None or plates is None or changes is None:
         return
     residuals = {axis: _best_explained(plates, parts, axis) for axis in HORIZONTAL}
-    correlations = _correlations(changes)
+    correlations = _correlations(changes, context.has_strides)
     against = [axis for axis in HORIZONTAL if correlations[axis] < _OPPOSED and not _one_zero_off(trial, parts, axis)]
     best, others, both = [], [], []
     for axis in HORIZONTAL:
-        own = [*_reversed_plate(context, plates, residuals[axis], axis)]
+        own = [*_reversed_plate(context, plates, residuals[axis], axis)] if context.has_strides else []
         if axis in against:
             own.append(_reversed_axis(context, residuals[axis], correlations[axis], axis))
         own.sort(key=lambda one: one.residual_m_s)
@@ -88,7 +89,7 @@ def _rotated(
     fitting = any(one > enough for one in correlations.values())
     if len(against) == len(HORIZONTAL):
         angle, residual = np.pi, float(np.linalg.norm([one.all_reversed for one in residuals.values()]))
-    elif strength > _CLEAR_ROTATION and abs(angle_deg) > _ROTATED_DEG and not fitting:
+    elif context.has_strides and strength > _CLEAR_ROTATION and abs(angle_deg) > _ROTATED_DEG and not fitting:
         angle = float(np.radians(90 * round(angle_deg / 90)))
         residual = rotated_residual(context.velocities, angle)
     else:
@@ -165,15 +166,16 @@ def _one_zero_off(trial: Trial, parts: Sequence[CausedVelocity], axis: int) -> b
     return bool(residual.plate_zeroed.min() < DISTINGUISHABLE * residual.all_reversed)
 
 
-def _correlations(changes: VelocityChanges) -> dict[int, float]:
-    """Along each axis, of what the forces cause with pelvis and markers' centre, mean of both; NaN where hardly
-    anything moves.
+def _correlations(changes: VelocityChanges, strides: bool) -> dict[int, float]:
+    """Along each axis, of what the forces cause with pelvis and markers' centre: in strides the mean of both, else the
+    larger one; NaN where hardly anything moves.
     """
     result = {}
     for axis in HORIZONTAL:
         caused, *shown = (part[:, axis] for part in (changes.caused, changes.pelvis, changes.centre))
         still = min(part.std() for part in (caused, *shown)) < LEAST_CHANGE_M_S
-        result[axis] = np.nan if still else float(np.mean([np.corrcoef(caused, part)[0, 1] for part in shown]))
+        both = [] if still else [np.corrcoef(caused, part)[0, 1] for part in shown]
+        result[axis] = float(np.mean(both) if strides else np.max(both)) if both else np.nan
     return result
 
 

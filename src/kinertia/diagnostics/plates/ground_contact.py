@@ -9,7 +9,7 @@ import numpy as np
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.plate_contacts import BETWEEN_M, ONE_STEP_S, PlateContact
 from kinertia.diagnostics.evidence.plate_edges import OVERHANG_M
-from kinertia.diagnostics.plates.heel_landing import lands_on_heels
+from kinertia.diagnostics.plates.heel_landing import goes_forwards
 from kinertia.errors import KinertiaError
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
@@ -53,7 +53,7 @@ def both_feet(context: RecordingContext) -> Iterator[Finding]:
     swings by its markers is on none.
     """
     plates, feet = context.plates, context.foot_trajectories
-    if plates is None or feet is None or context.is_static or not lands_on_heels(context):
+    if plates is None or feet is None or context.is_static or not goes_forwards(context):
         return
     for contact in context.contacts:
         away = _under_both(contact) & feet[1 - contact.foot].standing(contact.time)

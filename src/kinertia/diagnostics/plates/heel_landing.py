@@ -12,7 +12,12 @@ _LEAST_LENGTH_M = 0.08
 
 
 def lands_on_heels(context: RecordingContext) -> bool:
-    """Whether loads can be expected to go from heel to toe: whole feet, and nobody walks backwards."""
+    """Whether loads can be expected to go from heel to toe: strides, and nobody walks backwards."""
+    return context.has_strides and goes_forwards(context)
+
+
+def goes_forwards(context: RecordingContext) -> bool:
+    """Whether loads can be expected between heel and toe: whole feet, and nobody walks backwards."""
     return shows_whole_feet(context) and not context.walks_backwards
 
 

@@ -36,7 +36,7 @@ def rotated_plates(context: RecordingContext) -> Iterator[Hypothesis]:
     """
     plates, feet = context.plates, context.foot_trajectories
     steps = [one for one in context.contacts if one.is_step]
-    if plates is None or feet is None or plates.corners is None or not steps:
+    if plates is None or feet is None or plates.corners is None or not steps or not context.has_strides:
         return
     read_m = _distances(steps, [one.place for one in steps], feet)
     if read_m.max() < _WRONG_M:

@@ -60,9 +60,9 @@ class MeanVerticalMoment:
 
 
 def vertical_moment(context: RecordingContext) -> Iterator[Finding]:
-    """P266: about the middle of the pelvis markers, in the longest measured window."""
+    """P266: about the middle of the pelvis markers, in the longest measured window; not of who turns."""
     trial = context.trial
-    if trial is None or not trial.windows():
+    if trial is None or not trial.windows() or not context.has_strides or context.turns:
         return
     markers = trial.markers.cut(*trial.windows()[0])
     pelvis = [label for label in markers.labels if context.segment_of_label.get(label) == "pelvis"]

@@ -50,13 +50,15 @@ def zeros_under_load(context: RecordingContext) -> Iterator[Finding]:
 def _unexplained(
     context: RecordingContext, plates: PlateLoads, parts: Sequence[CausedVelocity], axis: int
 ) -> Finding | None:
-    """P214: the trend of what the forces cause beyond the pelvis, as a force; the longer windows count more."""
+    """P214: the trend of what the forces cause beyond the pelvis, as a force; the longer windows count more.
+
+    Without strides the trunk bends, so that the pelvis goes its own way: the markers' centre must say the same.
+    """
     spans = np.array([np.ptp(part.time) for part in parts])
-    trends = [
-        part.mass_kg * np.polyfit(part.time - part.time.mean(), part.caused[:, axis] - part.pelvis[:, axis], 1)[0]
-        for part in parts
-    ]
-    force_n = float(np.average(trends, weights=spans**3))
+    force_n = _trend_n([part.pelvis for part in parts], parts, axis)
+    if not context.has_strides:
+        by_centre_n = _trend_n([part.centre for part in parts], parts, axis)
+        force_n = min(force_n, by_centre_n, key=abs) if force_n * by_centre_n > 0.0 else 0.0
     limit_n = _FORCE_N * max(1.0, _WINDOW_S / float(spans.max()))
     if abs(force_n) <= limit_n:
         return None
@@ -76,6 +78,15 @@ def _unexplained(
     return with_evidence("P214", context.at(**context.along(axis)), evidence, causes=causes)
 
 
+def _trend_n(shown: Sequence[FloatArray], parts: Sequence[CausedVelocity], axis: int) -> float:
+    """N, by which the forces change the body's velocity more than these velocities (n, 3) m/s of each window show."""
+    trends = [
+        part.mass_kg * np.polyfit(part.time - part.time.mean(), part.caused[:, axis] - velocity[:, axis], 1)[0]
+        for velocity, part in zip(shown, parts, strict=True)
+    ]
+    return float(np.average(trends, weights=[np.ptp(part.time) ** 3 for part in parts]))
+
+
 def _levels(plates: PlateLoads, axis: int) -> FloatArray | None:
     """(p,) N that plates read along an axis while nobody stands on them, and that is in their loads; None where that is
     not known of each.
@@ -87,9 +98,11 @@ def _levels(plates: PlateLoads, axis: int) -> FloatArray | None:
 def _plate_zero(
     context: RecordingContext, plates: PlateLoads, parts: Sequence[CausedVelocity], axis: int, all_plates: bool
 ) -> Finding | None:
-    """P212: a force of one loaded plate that does not accelerate the body, unless all plates show it as well."""
+    """P212: a force of one loaded plate that does not accelerate the body, unless all plates show it as well, or nobody
+    takes strides: then the body's horizontal velocity is not known so well.
+    """
     long = [part for part in parts if span_s(part.time) >= _LEAST_WINDOW_S]
-    if not long:
+    if not long or not context.has_strides:
         return None
     residual = VelocityResidual.of(plates.time, plates.force, long, axis)
     best = int(np.argmin(residual.plate_zeroed))

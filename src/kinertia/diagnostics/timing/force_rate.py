@@ -25,12 +25,16 @@ _LEAST_RATIO, _MOST_RATIO, _USUAL_RATIO, _TYPICAL_RATIO = 0.4, 1.8, (0.67, 0.99)
 
 
 def force_rate(context: RecordingContext) -> Iterator[Finding]:
-    """T202, and T201 of forces that come ever later, or ever earlier, in a measured window."""
+    """T202, and T201 of forces that come ever later, or ever earlier, in a measured window.
+
+    Without strides the trunk bends, so that the pelvis goes its own way: the markers' centre must say the same.
+    """
     changes = context.velocity_changes
     if changes is None:
         return
     ratio = changes.vertical_ratio(changes.pelvis)
-    if ratio is not None and not _LEAST_RATIO < ratio < _MOST_RATIO:
+    by_centre = ratio if context.has_strides else changes.vertical_ratio(changes.centre)
+    if ratio is not None and by_centre is not None and _wrong(ratio) and _wrong(by_centre):
         yield finding(
             "T202",
             context.at(),
@@ -41,6 +45,10 @@ def force_rate(context: RecordingContext) -> Iterator[Finding]:
     grows = next(_growing_delays(context), None)
     if grows is not None:
         yield grows
+
+
+def _wrong(ratio: float) -> bool:
+    return not _LEAST_RATIO < ratio < _MOST_RATIO
 
 
 def _growing_delays(context: RecordingContext) -> Iterator[Finding]:

@@ -1,0 +1,21 @@
+"""Do forces keep time with how the body goes up and down? Where nobody takes strides, that decides of their times.
+
+Who lands on the toes, sways or holds a foot in the air has markers of the feet that are slow, or quick, at other times
+than plates are loaded. But a landing changes the body's velocity by metres a second, so that a delay shows.
+"""
+
+from __future__ import annotations
+
+from kinertia.diagnostics.context import RecordingContext
+from kinertia.diagnostics.evidence.ups_and_downs import MOST_LEFT, ups_and_downs_of
+
+_DELAY_S = 0.03
+"""Pelvis and markers' centre follow the forces of fault-free trials within this."""
+
+
+def keeps_time(context: RecordingContext) -> bool:
+    """Whether a recording without strides shows, by vertical velocities, that its forces are neither late nor early."""
+    if context.has_strides:
+        return False
+    found = [one for part in context.velocities for one in ups_and_downs_of(part) if one.left <= MOST_LEFT]
+    return bool(found) and max(abs(one.delay_s) for one in found) < _DELAY_S
