@@ -1,4 +1,4 @@
-"""Landings and jumps are judged by what holds of them: no rule asks them for the pelvis, the feet or the loads of gait."""
+"""Landings and jumps are judged by what holds of them: no rule asks them for pelvis, feet or loads of gait."""
 
 from dataclasses import replace
 
