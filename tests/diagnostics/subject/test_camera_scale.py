@@ -36,7 +36,7 @@ SOFT_CHILDREN = here(
         for trial in ("straight", "turn")
     ]
 )
-"""Of thighs, shanks and feet with one distance each, up to 4 % longer or shorter than in standing, most of them shorter."""
+"""Their thighs, shanks and feet have one distance each, up to 4 % longer or shorter than in standing."""
 RUN_ON_A_TREADMILL = KNOWN[-1]
 """The runner's soft feet are shorter than in standing: a scale that makes them longer is not seen."""
 OTHER_SCALES = [
