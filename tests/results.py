@@ -52,7 +52,9 @@ def context(*errors, ready=(), shown=None, prior=None, mass_kg=None, trials=None
         "uncertainty": SimpleNamespace(instruments=prior or InstrumentPrior()),
         **dict(ready),
     }
-    made = ResultContext(SimpleNamespace(posterior=found, trials=tuple(trials)), SimpleNamespace(**prepared))
+    skeleton = walking_subject().skeleton
+    fit = SimpleNamespace(posterior=found, trials=tuple(trials), skeleton=skeleton)
+    made = ResultContext(fit, SimpleNamespace(**prepared))
     made.__dict__["force_masses"] = {"walk": SimpleNamespace(mass_kg=mass_kg)} if mass_kg else {}
     return made
 
@@ -84,6 +86,7 @@ def of_estimate(fitted, *names, literature=None):
         trials=trials,
         converged=fitted.result.converged,
         settings=Settings(cutoff_hz=6.0),
+        skeleton=walking_subject().skeleton,
         **body,
     )
     ready = SimpleNamespace(

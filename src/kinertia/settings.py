@@ -98,6 +98,14 @@ def _size(value: object) -> tuple[float, float, float]:
     raise ValueError("must be three lengths above zero, [depth, height, width] in mm")
 
 
+def _range_deg(value: Any) -> tuple[float, float]:
+    low, high = value if isinstance(value, list | tuple) and len(value) == 2 else (0.0, 0.0)
+    if all(isinstance(end, int | float) for end in (low, high)) and -360.0 <= low < high <= 360.0:
+        return float(low), float(high)
+    raise ValueError("must be two angles, the smaller first, like [-20, 150], in degrees")
+
+
+RangeDeg = Annotated[tuple[float, float], BeforeValidator(_range_deg)]
 AttachedMass = Annotated[tuple[float, float] | None, BeforeValidator(_attached_mass)]
 Place = Annotated[tuple[float, float, float], BeforeValidator(_three)]
 Size = Annotated[tuple[float, float, float], BeforeValidator(_size)]
@@ -176,6 +184,10 @@ class Subject(Table):
     )
     ankle_width_mm: float | None = Field(default=None, gt=20.0, lt=150.0, description="the same of the ankle, mm")
     elbow_width_mm: float | None = Field(default=None, gt=20.0, lt=150.0, description="the same of the elbow, mm")
+    ranges_deg: dict[str, RangeDeg] | None = Field(
+        default=None,
+        description="joints that move farther than most people's: `{ knee_angle_r = [-20, 150] }`, degrees",
+    )
 
     @model_validator(mode="before")
     @classmethod

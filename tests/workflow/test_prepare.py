@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from kinertia.errors import SettingsError
 from kinertia.findings.finding import Severity, finding
 from kinertia.findings.where import Where
 from kinertia.settings import Subject
@@ -48,3 +49,29 @@ def test_markers_that_calibration_moves_far_are_reported(recordings):
     assert ("RSHO",) in found
     assert found["RSHO",].severity is Severity.INFO
     assert 0.03 < found["RSHO",].evidence["distance_m"].value < 0.14
+
+
+def test_a_head_beside_four_markers_of_the_trunk_is_left_out_and_named(recordings):
+    static, walk = recordings
+    ready = prepared_from(static, TrialInput(walk, (1.2, 1.9)))
+    (one,) = (each for each in ready.findings if each.code == "M174")
+    assert set(one.where.markers) == {"RFHD", "LFHD", "RBHD", "LBHD"}
+    assert not set(one.where.markers) & set(ready.skeleton.labels)
+    assert not set(one.where.markers) & set(ready.kinematics[0].ik.labels)
+
+
+def test_a_range_that_the_user_states_is_the_models_and_is_named(recordings):
+    static, walk = recordings
+    subject = Subject(name="A", sex="male", ranges_deg={"knee_angle_r": (-20, 150), "elbow_flex_l": (-12, 150)})
+    ready = prepare(subject, static, [TrialInput(walk, (1.2, 1.9))])
+    knee, elbow = (ready.skeleton.ranges[name] for name in subject.ranges_deg)
+    assert (np.degrees(knee.low), knee.clamped, knee.stated) == (pytest.approx(-20.0), False, True)
+    assert (np.degrees(elbow.low), elbow.clamped, elbow.stated) == (pytest.approx(-12.0), True, True)
+    assert [one.where.part for one in ready.findings if one.code == "S411"] == ["knee_angle_r", "elbow_flex_l"]
+
+
+def test_a_range_of_no_coordinate_is_refused(recordings):
+    static, walk = recordings
+    subject = Subject(name="A", sex="male", ranges_deg={"knee_r": (-20, 150)})
+    with pytest.raises(SettingsError, match="no coordinate knee_r moves; there is knee_angle_r"):
+        prepare(subject, static, [TrialInput(walk, (1.2, 1.9))])

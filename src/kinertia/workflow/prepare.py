@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.labels.swapped_markers import labels_by_model
 from kinertia.diagnostics.runner import blocking
+from kinertia.diagnostics.subject.stated_ranges import stated_ranges
 from kinertia.diagnostics.subject.unobserved_segments import unobserved_segments
 from kinertia.errors import BlockedError, MarkerSetError, SettingsError, TrialError
 from kinertia.estimation.arm_branch import elbow_rotations, with_elbows_that_bend_forwards
@@ -33,6 +34,7 @@ from kinertia.model.gait27 import (
     Gait27,
     build_gait27,
 )
+from kinertia.model.head_markers import without_head
 from kinertia.model.marker_set import MarkerSet
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.kinematics import facing
@@ -44,6 +46,7 @@ from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow.kinematics import Turned, solved_trials, usable_trial
 from kinertia.workflow.person import Person
 from kinertia.workflow.screening import Screened, screen
+from kinertia.workflow.stated_ranges import with_stated_ranges
 
 LOWER_BODY_SD_M = 0.01
 UPPER_BODY_SD_M = 0.04
@@ -64,6 +67,7 @@ class Calibrated:
         moved_m: per marker label, how far it sits from its position in the static trial.
         elbow_rotations_rad: side -> by how much an elbow axis was turned, where it was.
         torso_rotation_rad: by how much the torso would have turned under its markers, which were kept from it.
+        head: labels of the markers on the head, where they are left out.
     """
 
     skeleton: Skeleton
@@ -71,20 +75,24 @@ class Calibrated:
     moved_m: Mapping[str, float]
     elbow_rotations_rad: Mapping[str, float]
     torso_rotation_rad: float | None
+    head: tuple[str, ...]
 
 
 @one_blas_thread
-def calibrate(model: Gait27, trials: Sequence[Trial]) -> Calibrated:
+def calibrate(model: Gait27, trials: Sequence[Trial], acromia: Sequence[str] = ()) -> Calibrated:
     """The skeleton of the 27-DOF model as the static trial gives it, adapted to the trials.
 
     Markers of pelvis, legs and feet are held to the static trial by a deviation of 10 mm, those of torso and arms and
     the shoulder centres by 40 mm. Where arms have turned the torso under its markers, since the model's shoulders lack
-    an axis, its markers and the pelvis' may not turn as a whole.
+    an axis, its markers and the pelvis' may not turn as a whole. Markers on the head are left out where three others
+    show the trunk, which the acromia (labels), that move with the arms, do not.
     """
     skeleton, poses = with_elbows_that_bend_forwards(model.skeleton, trials)
     elbows = elbow_rotations(model.skeleton, skeleton)
     skeleton, _ = hold_uninformed(skeleton, trials, poses, dict.fromkeys(ARM_COORDINATES, 0.0))
     found = [one for trial in trials for one in labels_by_model(skeleton, trial)]
+    everywhere = set(model.skeleton.labels).intersection(*(trial.markers.labels for trial in trials))
+    skeleton, head = without_head(skeleton, acromia, everywhere)
     upper = {"torso", *(f"{name}_{side}" for side in "rl" for name in ("upper_arm", "forearm"))}
     marker_sd = {s: UPPER_BODY_SD_M if s in upper else LOWER_BODY_SD_M for s in model.skeleton.segments}
     coordinate_sd = dict.fromkeys(SHOULDER_OFFSETS, UPPER_BODY_SD_M) | dict.fromkeys(
@@ -96,7 +104,7 @@ def calibrate(model: Gait27, trials: Sequence[Trial]) -> Calibrated:
         adapted = adapt(skeleton, trials, poses, marker_sd, coordinate_sd, unturned=("pelvis", "torso"))
     else:
         torso_rad = None
-    return Calibrated(adapted.skeleton, found, adapted.moved_m, elbows, torso_rad)
+    return Calibrated(adapted.skeleton, found, adapted.moved_m, elbows, torso_rad, head)
 
 
 @one_blas_thread
@@ -145,18 +153,20 @@ def prepared(screened: Screened, settings: Settings, progress: Progress = lambda
     model = build_gait27(static.recording, marker_set, height_m, sex, settings.hip_centre)
     if VIRTUAL_TRUNK[0] in model.skeleton.markers:
         turned = [replace(one, trial=with_upright_trunk(model.skeleton, one.trial)) for one in turned]
-    calibrated = calibrate(model, [one.trial for one in turned])
+    model = replace(model, skeleton=with_stated_ranges(model.skeleton, subject))
+    acromia = [label for side in "rl" for label in marker_set.landmarks.get(f"acromion_{side}", ())]
+    calibrated = calibrate(model, [one.trial for one in turned], acromia)
     found = [*screened.findings, *calibrated.findings]
     left = _unblocked(turned, screened.overruled(found))
     if len(left) < len(turned):  # the skeleton is adapted to those that are used
-        calibrated = calibrate(model, [one.trial for one in left])
+        calibrated = calibrate(model, [one.trial for one in left], acromia)
     turned, skeleton = left, calibrated.skeleton
     total = CarriedMass.of(known(subject.mass_kg), person.attached)
     literature = literature_bsp(total.body_kg, height_m, sex, model.geometry, settings.bsp)
     expected = population_prior(literature_prior(literature), subject, total.body_kg)
     calibration_s = (time.perf_counter() - started) / len(turned)
     solved = solved_trials(skeleton, turned, settings.cutoff_hz, calibration_s, progress)
-    found += [*_adapted(calibrated.moved_m), *unobserved_segments(skeleton), *solved.findings]
+    found += [*_adapted(calibrated), *unobserved_segments(skeleton), *stated_ranges(subject), *solved.findings]
     findings = screened.overruled(found)
     return Prepared(
         subject=subject,
@@ -180,11 +190,13 @@ def prepared(screened: Screened, settings: Settings, progress: Progress = lambda
     )
 
 
-def _adapted(moved_m: Mapping[str, float]) -> Iterator[Finding]:
-    """M173 of markers that sit far from their positions in the static trial."""
-    for label, distance_m in moved_m.items():
+def _adapted(calibrated: Calibrated) -> Iterator[Finding]:
+    """M173 of markers that sit far from their positions in the static trial, M174 of those on the head."""
+    for label, distance_m in calibrated.moved_m.items():
         if distance_m > _FAR_M:
             yield finding("M173", Where(markers=(label,)), distance_m=Quantity(distance_m, "m", limit=_FAR_M))
+    if calibrated.head:
+        yield finding("M174", Where(markers=calibrated.head))
 
 
 def _unblocked(trials: Sequence[Turned], findings: Sequence[Finding]) -> list[Turned]:

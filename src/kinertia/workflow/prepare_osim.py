@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from kinertia.diagnostics.model.model_on_person import moved_markers
+from kinertia.diagnostics.subject.stated_ranges import stated_ranges
 from kinertia.estimation.calibration import adapt, first_poses, hold_uninformed
 from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.estimation.estimated_bodies import estimated_bodies
@@ -35,6 +36,7 @@ from kinertia.workflow.kinematics import Turned, solved_trials, usable_trial
 from kinertia.workflow.person import Person
 from kinertia.workflow.prepare import LOWER_BODY_SD_M, UPPER_BODY_SD_M
 from kinertia.workflow.screening import Screened, screen
+from kinertia.workflow.stated_ranges import with_stated_ranges
 
 _MASS_TOLERANCE = 0.002
 
@@ -82,7 +84,7 @@ def prepared_osim(screened: Screened, settings: Settings, progress: Progress = l
     turned = [Turned(usable_trial(one), 0.0, read_s[one.name]) for one in usable]
     trials = [one.trial for one in turned]
     may_hold = {c.name: c.default for c in model.coordinates if c.name not in model.skeleton.coordinates[:6]}
-    skeleton = replace(model.skeleton, feet=_feet(model))
+    skeleton = with_stated_ranges(replace(model.skeleton, feet=_feet(model)), subject)
     total = CarriedMass.of(known(subject.mass_kg), person.attached)
     poses = first_poses(skeleton, trials)
     skeleton, idle = hold_uninformed(skeleton, trials, poses, may_hold)
@@ -98,7 +100,7 @@ def prepared_osim(screened: Screened, settings: Settings, progress: Progress = l
     centres = {name: JOINT_CENTRE_SD_M for name in skeleton.locked if "/offset_" in name}
     uncertainty = ModelUncertainty(centres, MARKER_SD_M if person.calibrate else None, held, "the model's own values")
     solved = solved_trials(skeleton, turned, settings.cutoff_hz, calibration_s, progress)
-    found += [*solved.findings, *_assumed(model, factor, own, idle, held)]
+    found += [*stated_ranges(subject), *solved.findings, *_assumed(model, factor, own, idle, held)]
     findings = screened.overruled([*screened.findings, *found])
     return Prepared(
         subject=subject,

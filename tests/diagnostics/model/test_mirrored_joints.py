@@ -10,7 +10,7 @@ import upright_model as upright
 from kinertia.diagnostics.model.mirrored_joints import mirrored_joints
 from kinertia.io.osim.reader import read_osim
 from kinertia.model.joint_centres import subtalar_axis
-from kinertia.model.skeleton import Skeleton
+from kinertia.model.skeleton import Joint, Skeleton
 from people import with_model
 from recordings import here
 from sound_models import MODELS
@@ -65,6 +65,16 @@ def test_what_is_above_a_joint_is_not_its_fault():
     """A thigh that is turned by 8 degrees turns all below: the joints below it are still mirrored in their parents."""
     turned = Rotation.from_rotvec([0.0, np.radians(8.0), 0.0]).as_matrix()
     assert found(changed(upright.skeleton(), "femur_r", rotation=turned)) == [("O302", "hip_r", "hip_l", 8)]
+
+
+def test_a_knee_with_a_body_more_than_the_other_is_not_compared():
+    """The right shank hangs on a body of its own, a plateau in the knee; its place there is none of the left's."""
+    skeleton = upright.skeleton()
+    (knee,) = [joint for joint in skeleton.joints if joint.child == "tibia_r"]
+    plateau = replace(knee, child="plateau_r")
+    shank = Joint("plateau_r", "tibia_r", np.eye(3), np.zeros(3), ())
+    joints = [each for joint in skeleton.joints for each in ((plateau, shank) if joint is knee else (joint,))]
+    assert found(replace(skeleton, joints=tuple(joints))) == []
 
 
 @pytest.mark.parametrize("child", ["tibia_r", "talus_l", "humerus_r"])

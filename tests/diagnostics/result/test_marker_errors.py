@@ -18,6 +18,13 @@ def test_a_drifting_marker_is_named_with_what_is_usual():
     assert [found.evidence[name].value for name in ("sd_m", "usual_sd_m")] == [0.012, 0.003]
 
 
+def test_heads_and_the_skin_of_forearms_turn_without_a_loose_marker():
+    noise = MarkerNoise(
+        {"A": 0.002, "B": 0.003, "R.Wrist.Lat": 0.012, "Top.Head": 0.012}, 0.2, ("R.Wrist.Lat", "Top.Head")
+    )
+    assert list(moved_markers(context(marker_noise=(noise,)))) == []
+
+
 @pytest.mark.parametrize(("away_m", "expected"), [(0.029, []), (0.031, ["M162"])])
 def test_a_marker_that_sits_elsewhere_than_in_every_other_trial(away_m, expected):
     quiet = MarkerNoise({"A": 0.002}, 0.2, ())

@@ -66,9 +66,12 @@ def _axis_angles(neutral: NeutralJoints, pair: tuple[str, str], sideways: int) -
 
 
 def _mismatch_m(neutral: NeutralJoints, right: str, left: str, sideways: int) -> float:
-    """How far (m) the right joint is from the left one's mirror image, each in its own parent."""
+    """How far (m) the right joint is from the left one's mirror image, each in its own parent.
+
+    Zero where the parents are not each other's: one knee of a model may have more bodies than the other.
+    """
     parents = [neutral.joints[name].parent for name in (right, left)]
-    if "ground" in parents:
+    if "ground" in parents or (parents[0] != parents[1] and tuple(parents) not in neutral.pairs):
         return 0.0
     apart = []
     for turn, back, reflection in _views(neutral, right, left, sideways):

@@ -10,6 +10,9 @@ from kinertia.diagnostics.result.context import ResultContext
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
+from kinertia.model.anatomy import segment_of
+from kinertia.model.head_markers import head_markers
+from kinertia.model.skeleton import Skeleton
 
 _MOVED_M = 0.03
 """Skin moves markers up to some 30 mm."""
@@ -25,9 +28,10 @@ def moved_markers(context: ResultContext) -> Iterator[Finding]:
     posterior = context.fit.posterior
     if posterior is None:
         return
+    loose = _loose(context.fit.skeleton)
     for trial, noise in zip(context.fit.trials, posterior.marker_noise, strict=True):
         usual_m = float(np.median(list(noise.sd_m.values())))
-        for label in noise.wandering:
+        for label in (one for one in noise.wandering if one not in loose):
             sd = Quantity(noise.sd_m[label], "m", limit=_DRIFTING * usual_m)
             yield finding("M163", Where(trial=trial.name, markers=(label,)), sd_m=sd, usual_sd_m=Quantity(usual_m, "m"))
     for trial, distances in zip(context.fit.trials, posterior.marker_distances_m, strict=False):
@@ -35,6 +39,12 @@ def moved_markers(context: ResultContext) -> Iterator[Finding]:
             if away_m > _MOVED_M:
                 away = Quantity(away_m, "m", limit=_MOVED_M)
                 yield finding("M162", Where(trial=trial.name, markers=(label,)), difference_m=away)
+
+
+def _loose(skeleton: Skeleton) -> set[str]:
+    """Labels of markers that move by themselves without being loose: on the head, and on forearms, whose skin turns."""
+    forearms = {m.label for m in skeleton.markers if str(segment_of(m.segment)).startswith("forearm")}
+    return forearms.union(head_markers(skeleton))
 
 
 def corrected_joints(context: ResultContext) -> Iterator[Finding]:
