@@ -1,10 +1,12 @@
 """A marker set drafted from a recording is one, and finds what the presets know by other names."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from generic_static import generic_static, recording, standing_positions
-from kinertia.io.marker_set_draft import draft_marker_set, known_places
+from kinertia.io.marker_set_draft import draft_marker_set, known_places, preset_of
 from kinertia.io.marker_set_file import choose_marker_set, preset_names, read_marker_set
 from kinertia.model.gait27 import build_gait27
 from recordings import here
@@ -24,7 +26,7 @@ LEGS = {f"{name}_{side}" for name in ("asis", "knee_lateral", "ankle_lateral", "
 
 def drafted(tmp_path, static):
     path = tmp_path / "drafted.toml"
-    path.write_text(draft_marker_set(static, "drafted"), encoding="utf-8")
+    path.write_text(draft_marker_set(static, "drafted").text, encoding="utf-8")
     return read_marker_set(path), path.read_text(encoding="utf-8")
 
 
@@ -137,6 +139,21 @@ def test_computed_points_are_in_no_segment_and_listed(tmp_path):
     assert {label for own in draft.landmarks.values() for label in own} & added == set()
 
 
+def test_a_draft_says_which_landmarks_of_the_legs_it_lacks():
+    positions = {label: at for label, at in standing_positions().items() if label not in ("R.Heel", "V.Sacral")}
+    draft = draft_marker_set(recording(positions | {"L.PSIS": np.array([-0.1, 0.99, -0.05])}), "x")
+    assert "heel_r" in draft.needed
+    assert draft_marker_set(generic_static(), "x").needed == ()
+
+
+def test_a_preset_without_which_no_model_can_be_made_is_none():
+    preset = preset_of(generic_static())
+    assert preset is not None
+    assert preset.name == "Cleveland Clinic"
+    names = {"R.Knee.Med": "R.Innen", "L.Knee.Med": "L.Innen"}
+    assert preset_of(recording({names.get(label, label): at for label, at in standing_positions().items()})) is None
+
+
 def test_a_marker_that_is_hardly_ever_seen_is_not_used(tmp_path):
     static = generic_static()
     static.markers.positions[1:, static.markers.labels.index("R.Heel")] = np.nan
@@ -165,3 +182,12 @@ def test_every_preset_is_recognised_by_its_own_labels(name):
     """Plug-in Gait is part of CGM2: all labels of the latter are the latter."""
     preset = read_marker_set(name)
     assert choose_marker_set(preset.labels).name == preset.name
+
+
+def test_of_somebody_who_moves_a_frame_is_taken_and_said_so(tmp_path):
+    standing = recording(standing_positions(), frames=60)
+    along = np.linspace(0.0, 1.0, 60)[:, None, None] * [2.0, 0.0, 0.0]
+    moving = replace(standing.markers, positions=standing.markers.positions + along)
+    draft, text = drafted(tmp_path, replace(standing, markers=moving))
+    assert set(draft.landmarks) >= LEGS
+    assert "NOTE: nobody stands still here" in text

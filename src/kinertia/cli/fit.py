@@ -12,6 +12,7 @@ import typer
 
 from kinertia.cli.findings_view import show_overview
 from kinertia.cli.fit_report import report_tables
+from kinertia.cli.next_commands import next_commands
 from kinertia.cli.options import (
     Calibrate,
     Forces,
@@ -186,7 +187,12 @@ def _name(path: Path) -> str:
 def _fitted(one: _Run) -> Fit:
     """The fit, which is in its folder."""
     with shown_progress() as progress:
-        result = fit_subject(one.wanted, progress, one.overrule)
+        try:
+            result = fit_subject(one.wanted, progress, one.overrule)
+        except KinertiaError as error:
+            for line in next_commands(error, one.given, one.wanted.model, one.command):
+                error.add_note(line)
+            raise
     save_fit(result, one.folder, provenance_of(one.wanted, one.command), force=True)
     return result
 

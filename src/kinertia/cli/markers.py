@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -15,6 +15,7 @@ from kinertia.io.marker_set_file import nearest_preset, preset_names, read_marke
 from kinertia.io.output_folder import write_then_rename
 from kinertia.io.recording import read_recording
 from kinertia.model.marker_set import fits_person, share_worn, spelled_as
+from kinertia.trial.data import Recording
 
 _LISTED = 6
 
@@ -58,10 +59,19 @@ def markers(
         out.print(f"{recognised} is recognised by itself", soft_wrap=True)
     elif output is None:
         out.print("no preset is recognised; for a draft of your own: -o our_lab.toml", soft_wrap=True)
-    if output is not None:
-        if output.exists():
-            raise FileError(output, "exists already and is left alone; remove it, or give another name")
-        write_then_rename(output, draft_marker_set(recording, output.stem))
-        out.print(f"wrote {output}: check it, complete what it asks for, then give it as --markers", soft_wrap=True)
-    draft = None if output is None else str(output)
-    return Outcome({"labels": labels, "presets": presets, "recognised": recognised, "draft": draft})
+    content = {"labels": labels, "presets": presets, "recognised": recognised, "draft": None}
+    return Outcome(content if output is None else {**content, **_draft(recording, output)})
+
+
+def _draft(recording: Recording, output: Path) -> dict[str, Any]:
+    """Write a draft, and say what it lacks."""
+    if output.exists():
+        raise FileError(output, "exists already and is left alone; remove it, or give another name")
+    draft = draft_marker_set(recording, output.stem)
+    write_then_rename(output, draft.text)
+    for note in draft.notes:
+        out.print(f"note: {note}", soft_wrap=True)
+    if draft.needed:
+        out.print(f"not found, and needed: {', '.join(draft.needed)}", soft_wrap=True)
+    out.print(f"wrote {output}: check it, complete what it asks for, then give it as --markers", soft_wrap=True)
+    return {"draft": str(output), "needed": list(draft.needed), "notes": list(draft.notes)}

@@ -42,8 +42,10 @@ def add_command(
 
 
 def of_error(error: KinertiaError) -> dict[str, Any]:
-    """What a script needs of an error: its text, and the findings that it is of."""
-    return {"error": str(error), "findings": [one.to_dict() for one in findings_of(error)]}
+    """What a script needs of an error: its text, its findings, and what to do next where that is known."""
+    content: dict[str, Any] = {"error": str(error), "findings": [one.to_dict() for one in findings_of(error)]}
+    notes = getattr(error, "__notes__", ())
+    return {**content, "next": list(notes)} if notes else content
 
 
 def _with_json(command: Callable[..., Outcome], hints: Mapping[str, Any]) -> Callable[..., NoReturn]:

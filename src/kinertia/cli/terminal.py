@@ -86,6 +86,8 @@ def show_problem(error: KinertiaError, of: str = "") -> None:
     """One line for every finding that stopped something, or for the error; `of` says whose it is, where several are."""
     for line in str(error).split("\n") if isinstance(error, BlockedError) else [str(error)]:
         show_error(f"{of}{line}")
+    for k, line in enumerate(getattr(error, "__notes__", ())):
+        err.print(f"{'then' if k else 'next'}: {line}", soft_wrap=True, markup=False, highlight=False)
 
 
 @contextmanager

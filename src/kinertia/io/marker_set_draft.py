@@ -8,21 +8,54 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
+from kinertia.errors import MarkerSetError
 from kinertia.io.marker_places.placement import place_markers
-from kinertia.io.marker_set_file import preset_names, read_marker_set
+from kinertia.io.marker_set_file import marker_set_of, nearest_preset, preset_names, read_marker_set
 from kinertia.io.toml_lines import quoted
-from kinertia.model.marker_set import LANDMARKS, SEGMENTS, WIDTHS, folded, share_worn
+from kinertia.model.gait27 import build_gait27
+from kinertia.model.marker_set import LANDMARKS, SEGMENTS, WIDTHS, MarkerSet, folded, share_worn
 from kinertia.trial.data import Recording
 
 _NEAR = 0.85
+_ANY_WIDTH_M, _USUAL_HEIGHT_M = 0.09, 1.7
+"""Whether landmarks suffice depends on neither."""
+_LEG = ("asis", "knee_lateral", "ankle_lateral", "heel", "metatarsal")
 _WIDTHS = """# Joints without an inner marker: the widths in the PROCESSING group of the static C3D file, by its names.
 # For other files give them as knee_width_mm and so on under [subject] of a subject file."""
 _NEEDED = tuple(name for name in LANDMARKS if not name.startswith(("thigh_wand", "shank_wand", "head_top")))
 
 
-def draft_marker_set(recording: Recording, name: str) -> str:
-    """The text of a marker set (TOML) for a recording; what is not known, and why, is in comments."""
+@dataclass(frozen=True)
+class MarkerSetDraft:
+    """A marker set for a recording.
+
+    Attributes:
+        text: TOML; what is not known, and why, is in comments.
+        needed: landmarks that were not found, and without which no leg can be made.
+        notes: what one should know before one uses it.
+    """
+
+    text: str
+    needed: tuple[str, ...]
+    notes: tuple[str, ...]
+
+
+def preset_of(static: Recording) -> MarkerSet | None:
+    """The preset that a model can be made with of this static trial, whatever the widths of joints; None if none is."""
+    labels = static.markers.labels
+    preset = nearest_preset(labels)
+    widths = dict.fromkeys(preset.widths.values(), _ANY_WIDTH_M) | static.measurements
+    try:
+        build_gait27(replace(static, measurements=widths), marker_set_of(static.markers), _USUAL_HEIGHT_M, "male")
+    except MarkerSetError:
+        return None
+    return preset
+
+
+def draft_marker_set(recording: Recording, name: str) -> MarkerSetDraft:
+    """A marker set for a recording, best a static trial, called by this name."""
     placed = place_markers(recording)
     labels = [label for label in recording.markers.labels if label not in placed.left_out]
     landmarks, segments = placed.landmarks, placed.segments
@@ -37,7 +70,11 @@ def draft_marker_set(recording: Recording, name: str) -> str:
         name, landmarks, segments, _widths(landmarks, recording), labels, "\n".join(heading), placed.how
     )
     out = [f"#   {label}: {reason}" for label, reason in placed.left_out.items()]
-    return text + "\n".join(["", "# Not markers on the skin:", *out, ""] if out else [])
+    text += "\n".join(["", "# Not markers on the skin:", *out, ""] if out else [])
+    needed = [f"{one}_{side}" for one in _LEG for side in "rl"]
+    if "sacrum" not in landmarks:
+        needed += ["psis_r", "psis_l"]
+    return MarkerSetDraft(text, tuple(one for one in needed if one not in landmarks), tuple(placed.notes))
 
 
 def _widths(landmarks: Mapping[str, Sequence[str]], recording: Recording) -> dict[str, str]:

@@ -10,21 +10,18 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from kinertia.errors import FileError, KinertiaError
 from kinertia.findings.quantity import Quantity
 from kinertia.io.cortex_forces import ENDING as CORTEX
 from kinertia.io.file_names import RESULT_FILES, missing_file
-from kinertia.io.marker_set_draft import draft_marker_set
-from kinertia.io.marker_set_file import nearest_preset
+from kinertia.io.marker_set_draft import draft_marker_set, preset_of
 from kinertia.io.measures_file import is_measures_sheet
 from kinertia.io.qualisys import plates_beside
 from kinertia.io.recording import MARKER_FILES, read_recording
 from kinertia.io.subject_file import Model, PriorFiles, TrialFiles
 from kinertia.io.subject_text import entry_line
-from kinertia.model.marker_set import fits_person
 from kinertia.settings import Settings, Subject, Table
+from kinertia.trial.stillness import STILL_M_S, speed_m_s
 
 FILL_IN = "  # FILL IN: "
 """What is before the words of an entry that stays unknown."""
@@ -33,8 +30,6 @@ STATIC_NAME = re.compile(r"static|(?<![a-z])cal(ib\w*)?(?![a-z])", re.IGNORECASE
 _FORCE_NAME = re.compile("force|grf", re.IGNORECASE)
 _FORCES = re.compile(r"<force_identifier>\s*(\S+?)\s*</force_identifier>")
 _LISTED = 6
-_STILL_M_S, _STRIDE_S = 0.1, 0.1
-"""Markers of people who stand move by a few cm/s, of people who walk by a metre a second; over a tenth of a second."""
 SUBJECT, MARKER_SET = "subject.toml", "markers.toml"
 NO_FORCES = "# No forces were found for"
 """How the line begins that says so of a trial."""
@@ -113,13 +108,12 @@ def init_files(folder: str | Path, nearby: bool = True, marker_set: bool = True)
 
 
 def _drafted_set(static: Path) -> str:
-    """A marker set for a static trial that no preset fits; empty where one does, or nothing can be read."""
+    """A marker set for a static trial that no preset makes a model of; empty where one does, or nothing can be read."""
     recording = _recording(static)
     if recording is None:
         return ""
     recording = recording.without_empty_markers()
-    labels = recording.markers.labels
-    return "" if fits_person(nearest_preset(labels), labels) else draft_marker_set(recording, static.parent.name)
+    return "" if preset_of(recording) else draft_marker_set(recording, static.parent.name).text
 
 
 def _expect_files(folder: Path) -> list[Path]:
@@ -167,7 +161,7 @@ def _static_and_trials(captures: Sequence[Path]) -> tuple[Path | None, list[Path
     statics = [file for file in captures if STATIC_NAME.search(file.stem)]
     if not statics and len(captures) > 1:
         speeds = {file: (_speed_m_s(file), _duration_s(file)) for file in captures}
-        still = [file for file in captures if speeds[file][0] < _STILL_M_S]
+        still = [file for file in captures if speeds[file][0] < STILL_M_S]
         statics = [min(still, key=lambda file: speeds[file][1])] if still else []
     dynamic = [file for file in captures if file not in statics]
     if not statics or not dynamic:
@@ -203,17 +197,8 @@ def _duration_s(file: Path) -> float:
 
 
 def _speed_m_s(file: Path) -> float:
-    """How fast half of the markers move in all but the quickest tenth of a recording; infinite where none is read."""
     recording = _recording(file)
-    if recording is None:
-        return float("inf")
-    positions, time = recording.markers.positions, recording.markers.time
-    step = int(np.searchsorted(time - time[0], _STRIDE_S))
-    if not 0 < step < len(time):
-        return 0.0
-    moved = np.linalg.norm(positions[step:] - positions[:-step], axis=2) / (time[step] - time[0])
-    seen = moved[np.isfinite(moved).any(axis=1)]
-    return float(np.quantile(np.nanmedian(seen, axis=1), 0.9)) if len(seen) else float("inf")
+    return float("inf") if recording is None else speed_m_s(recording.markers)
 
 
 def _head(file: Path) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from kinertia.io.marker_places.standing_body import StandingBody
 from kinertia.io.marker_places.upper_search import find_upper_body
 from kinertia.io.marker_places.usual_places import WHERE
 from kinertia.trial.data import FloatArray, Markers, Recording
+from kinertia.trial.stillness import STILL_M_S, speed_m_s
 
 _OFTEN = 0.25
 """Share of the frames in which a marker is seen that is used."""
@@ -24,6 +26,8 @@ _STATURES_M = np.geomspace(0.85, 2.1, 37)
 _SURE, _CLEAR = 30.0, 6.0
 """Score of legs that are somebody's, and by how much the way one faces must fit better than the other."""
 _COMPUTED = -2.0
+_POSTURES, _FULL = 7, 0.8
+"""Frames of somebody who moves that are looked at, among those with the most markers."""
 _APART_M = 0.02
 _OPPOSITE = {"r": "l", "l": "r"}
 
@@ -70,10 +74,14 @@ def place_markers(recording: Recording) -> Placement:
     if len(markers.labels) - len(computed) < _FEWEST:
         result.notes.append("too few markers to tell where they are")
         return result
-    body, found, margin = _best_body(markers, computed, recording.markers.labels)
+    pairs, moves = sides(recording.markers.labels), speed_m_s(markers) > STILL_M_S
+    postures = _frames(markers) if moves else [np.nanmedian(markers.positions, axis=0)]
+    body, found, margin = max((_best_body(markers.labels, each, computed, pairs) for each in postures), key=_score)
     if found.score < _SURE:
         result.notes.append("these are not the markers of somebody who stands upright: give the static trial")
         return result
+    if moves:
+        result.notes.append("nobody stands still here: the static trial shows better where the markers are")
     if margin < _CLEAR:
         result.notes.append("which way the person faces is not clear: check left and right")
     find_upper_body(body, found)
@@ -81,21 +89,26 @@ def place_markers(recording: Recording) -> Placement:
     return result
 
 
+def _frames(markers: Markers) -> list[FloatArray]:
+    """Places (m, 3) in a few frames that show as many markers as any; markers that they do not show are NaN."""
+    count = markers.seen.sum(axis=1)
+    full = np.flatnonzero(count >= np.quantile(count, _FULL))
+    return [markers.positions[k] for k in full[:: -(-len(full) // _POSTURES)]]
+
+
 def _best_body(
-    markers: Markers, computed: Mapping[str, str], all_labels: Sequence[str]
+    labels: tuple[str, ...], points: FloatArray, computed: Mapping[str, str], pairs: Mapping[str, tuple[str, str]]
 ) -> tuple[StandingBody, Found, float]:
-    """The facing and stature that fit best, what is found with them, and by how much they fit better than the other
-    facing.
+    """The facing and stature that fit points (m, 3) best, what is found with them, and by how much they fit better than
+    the other facing.
     """
-    labels, pairs = markers.labels, sides(all_labels)
+    shown = np.asarray(np.isfinite(points).all(axis=1))
+    labels, points = tuple(label for label, one in zip(labels, shown, strict=True) if one), points[shown]
     meant = tuple(roles(label, label in pairs) for label in labels)
-    points = np.nanmedian(markers.positions, axis=0)
     worn = np.array([label not in computed for label in labels])
     trust = np.where(worn, 0.0, np.where([bool(one) for one in meant], _COMPUTED, -np.inf))
     axes = body_axes(points[worn])
-    others = tuple(
-        labels.index(pairs[label][1]) if label in pairs and pairs[label][1] in labels else -1 for label in labels
-    )
+    others = tuple(labels.index(pairs[one][1]) if one in pairs and pairs[one][1] in labels else -1 for one in labels)
     fits = []
     for one in (axes, axes.turned()):
         places = one.places(points)
@@ -108,8 +121,9 @@ def _best_body(
     return *best, _score(best) - min(map(_score, fits))
 
 
-def _score(fit: tuple[StandingBody, Found]) -> float:
-    return fit[1].score
+def _score(fit: tuple[Any, ...]) -> float:
+    found: Found = fit[1]
+    return found.score
 
 
 def _label_sides(

@@ -1,0 +1,30 @@
+"""Does anybody move in a recording? By how fast the markers are."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kinertia.trial.data import Markers
+
+STILL_M_S = 0.1
+"""Markers of people who stand move by a few cm/s, of people who walk by a metre a second."""
+_WITHIN_S = 0.1
+_SHARE = 0.9
+
+
+def speed_m_s(markers: Markers) -> float:
+    """How fast half of the markers are, over a tenth of a second, in all but the fastest tenth of the frames.
+
+    Zero for less than that time; infinite where no marker is seen so long.
+
+    >>> still = np.ones((50, 2, 3))
+    >>> speed_m_s(Markers(np.arange(50) / 100, ("A", "B"), still))
+    0.0
+    """
+    positions, time = markers.positions, markers.time
+    step = int(np.searchsorted(time - time[0], _WITHIN_S))
+    if not 0 < step < len(time):
+        return 0.0
+    speed = np.linalg.norm(positions[step:] - positions[:-step], axis=2) / (time[step] - time[0])
+    seen = speed[np.isfinite(speed).any(axis=1)]
+    return float(np.quantile(np.nanmedian(seen, axis=1), _SHARE)) if len(seen) else float("inf")
