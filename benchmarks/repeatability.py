@@ -11,33 +11,21 @@ import csv
 import json
 import statistics
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
 
 import numpy as np
 from scipy.stats import chi2
 
-from kinertia.estimation.simultaneous.instrument_errors import InstrumentError
+from kinertia.estimation.simultaneous.calibration_entry import ZERO, CalibrationEntry
 
 APART = 1.96
 """Deviations beyond which two values, or a value and none, differ (95 %)."""
 _BEYOND = 0.99
-GROUPS = ("delay", "free moment", "place", "gain", "zero", "turn", "joint", "mass", "com", "inertia")
+INSTRUMENT_GROUPS = ("delay", "free moment", "position", "gain", "zero offset", "rotation")
+GROUPS = (*INSTRUMENT_GROUPS, "joint", "mass", "com", "inertia")
 """What is compared: instruments, joint centres and axes, body segment parameters."""
-_INSTRUMENTS = {
-    "clock": "delay",
-    "later than": "delay",
-    "turned": "turn",
-    "free moment": "free moment",
-    "gain": "gain",
-    "zero": "zero",
-    ": x": "place",
-    ": y": "place",
-    ": z": "place",
-}
-"""Group by what the name of a calibrated quantity contains; the others are joints."""
-INSTRUMENT_GROUPS = tuple(dict.fromkeys(_INSTRUMENTS.values()))
 _PRODUCTS = ("ixy", "ixz", "iyz")
 """Not compared: hardly anything shows them."""
 
@@ -176,13 +164,14 @@ def _sums(unknowns: Sequence[Shared]) -> GroupSums:
 
 
 def _calibrated(folder: Path) -> Iterator[tuple[tuple[str, str, str], Estimate]]:
-    for name, entry in json.loads((folder / "fit.json").read_text(encoding="utf-8"))["calibration"].items():
-        if entry["sd"]:
-            group = next((group for part, group in _INSTRUMENTS.items() if part in name), "joint")
-            numbers = (float(entry[key]) for key in ("value", "sd", "prior_sd"))
-            error = InstrumentError(name, group, None, None, **entry)
-            warned = group in INSTRUMENT_GROUPS and error.supported
-            yield (name, group, entry["unit"]), Estimate(folder.name, *numbers, warned)
+    for entry in json.loads((folder / "fit.json").read_text(encoding="utf-8"))["calibration"]:
+        one = CalibrationEntry(**entry)
+        if one.sd and (one.trial is None or one.quantity == ZERO):
+            group = one.quantity if one.of_instrument else "joint"
+            yield (
+                (str(replace(one, trial=None)), group, one.unit),
+                Estimate(folder.name, one.value, one.sd, one.prior_sd, one.supported),
+            )
 
 
 def _body(folder: Path) -> Iterator[tuple[tuple[str, str, str], Estimate]]:

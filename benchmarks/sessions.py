@@ -19,7 +19,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from kinertia.estimation.simultaneous.instrument_errors import SHOWN_UNIT
+from kinertia.estimation.simultaneous.calibration_entry import SHOWN_UNIT
 from measured_data import data_folder
 from measured_trials import table
 from repeatability import Shared, group_sums, shared

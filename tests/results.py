@@ -8,7 +8,7 @@ from kinertia.diagnostics.result.context import ResultContext
 from kinertia.diagnostics.result.questions import ESTIMATE_QUESTIONS
 from kinertia.diagnostics.runner import asked, explained
 from kinertia.estimation.carried_mass import CarriedMass
-from kinertia.estimation.simultaneous.instrument_errors import InstrumentError
+from kinertia.estimation.simultaneous.calibration_entry import DELAY, CalibrationEntry
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation, InstrumentPrior
 from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINTY
 from kinertia.findings.finding import Severity
@@ -17,10 +17,20 @@ from kinertia.synthetic.walk import walking_subject
 from kinertia.trial.data import Markers
 
 
-def error(quantity, value, prior_sd, sd, unit, plate="plate 1", trial=None, **support):
-    """An error of an instrument, as the estimate applies it."""
-    name = f"{plate}: {quantity} ({trial})"
-    return InstrumentError(name, quantity, plate, trial, value, prior_sd, sd, unit, **support)
+def error(quantity, value, prior_sd, sd, unit, plate="plate 1", moved=np.inf, **more):
+    """An error of an instrument that matters."""
+    kind = "synchronisation" if quantity == DELAY else "plate"
+    numbers = {"value": value, "prior_sd": prior_sd, "sd": sd, "unit": unit, "moved": moved}
+    return CalibrationEntry(kind=kind, quantity=quantity, plate=plate, **numbers, **more)
+
+
+def entry_of(fit, quantity, **where):
+    """The one entry of an estimate's calibration of this quantity and place."""
+    wanted = {"quantity": quantity, "trial": None, "axis": None, **where}
+    (found,) = [
+        one for one in fit.posterior.calibration if all(getattr(one, name) == at for name, at in wanted.items())
+    ]
+    return found
 
 
 def walking(turned_deg=0.0, vertical="+Y"):
@@ -36,7 +46,7 @@ def context(*errors, ready=(), shown=None, prior=None, mass_kg=None, trials=None
     """Of a fit that found these errors of instruments.
 
     Args:
-        errors: `InstrumentError`s.
+        errors: `CalibrationEntry`s.
         ready: of the prepared person.
         shown: what the trials say of instruments; well known if left out.
         prior: of the instruments.

@@ -82,8 +82,8 @@ def test_people_who_contradict_each_other_are_named():
 
     alike = session_instruments([person("A", 0.010), person("B", 0.0101)], Instruments())
     assert alike.contradictions == ()
-    assert alike.values["clock"]["late"][0] == pytest.approx(0.010, abs=1e-4)
-    assert alike.values["clock"]["late"][1] == pytest.approx(1e-4 / np.sqrt(2.0), rel=0.01)
+    assert alike.found["synchronisation"]["delay"][0] == pytest.approx(0.010, abs=1e-4)
+    assert alike.found["synchronisation"]["delay"][1] == pytest.approx(1e-4 / np.sqrt(2.0), rel=0.01)
     (contradiction,) = session_instruments([person("A", 0.010), person("B", 0.002)], Instruments()).contradictions
     assert contradiction.code == "S501"
     found = [contradiction.evidence[name].value for name in ("error", "other_error")]

@@ -94,7 +94,7 @@ def test_instruments_says_what_its_file_holds(measured_demo, c3d_lab, tmp_path, 
     content = told("instruments", c3d_lab / "subject.toml", "-o", tmp_path / "instruments.toml")
     (person,) = read_session(Path(content["file"]))
     assert content["people"] == [person.name]
-    gain = next(found["gain"] for found in content["found"].values() if "gain" in found)
+    gain = next(one for one in content["found"] if one["quantity"] == "gain")
     written = (tmp_path / "instruments.toml").read_text(encoding="utf-8")
     assert f"gain_percent = {100 * gain['value']:.3f}"[:-2] in written
 

@@ -20,6 +20,7 @@ from kinertia.motion.kinematics import Kinematics
 from kinertia.synthetic.noise import camera_noise
 from kinertia.synthetic.walk import walk, walking_subject
 from kinertia.trial.centre_of_pressure import free_moment
+from results import entry_of
 from synthetic_walks import kinematics_of
 
 
@@ -104,8 +105,8 @@ def test_a_wrong_sign_is_turned(trial, offset):
     carried = given.trial.loads.force[..., 1] >= 20.0
     np.testing.assert_allclose(turned[carried], -free[carried], atol=1e-9)
     np.testing.assert_array_equal(used.trial.loads.force, given.trial.loads.force)
-    entry = outcome.fitted.posterior.calibration["plate left foot: free moment"]
-    assert entry["value"] == pytest.approx(offset, abs=0.002)
+    entry = entry_of(outcome.fitted, "free moment", plate="left foot")
+    assert entry.value == pytest.approx(-offset, abs=0.002)
 
 
 def test_trials_say_it_together(trial):
@@ -158,7 +159,7 @@ def test_files_whose_sign_is_wrong(measured_folder, tmp_path, name, corrected):
     codes = [one["code"] for one in fit["findings"]]
     assert codes.count("P269") == int(corrected)
     assert "P265" not in codes
-    free = [entry["value"] for key, entry in fit["calibration"].items() if key.endswith("free moment")]
+    free = [one["value"] for one in fit["calibration"] if one["quantity"] == "free moment"]
     assert np.abs(free).max() < 0.003
 
 

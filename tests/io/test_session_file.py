@@ -8,8 +8,8 @@ PERSON = PersonInstruments(
     name='O\'Neill "β"', files=("9f", "a1"), plates=("plate 1",), information=(ROW,) * 8, right=ROW
 )
 FOUND = {
-    "plate 1": {"x": (0.0182, 0.0011, "m"), "free moment": (0.001, 0.0002, "N m/N")},
-    "clock": {"late": (0.01, 0.001, "s")},
+    "plate 1": {"position x": (0.0182, 0.0011, "m"), "free moment": (0.001, 0.0002, "N m/N")},
+    "synchronisation": {"delay": (0.01, 0.001, "s")},
 }
 
 
@@ -26,7 +26,12 @@ def test_what_is_written_is_read(written):
 
 def test_people_read_millimetres_and_milliseconds(written):
     text = written.read_text(encoding="utf-8")
-    for line in ("x_mm = 18.200", "x_sd_mm = 1.100", "free_moment_Nm_per_kN = 1.000", "late_ms = 10.000"):
+    for line in (
+        "position_x_mm = 18.200",
+        "position_x_sd_mm = 1.100",
+        "free_moment_Nm_per_kN = 1.000",
+        "delay_ms = 10.000",
+    ):
         assert f"\n{line}\n" in text
 
 

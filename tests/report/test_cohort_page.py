@@ -140,7 +140,8 @@ def test_a_cohort_of_whom_nobody_was_fitted_has_a_page(tmp_path):
 
 
 def instrument(person, day, value, sd, prior_sd=0.01, with_session=False):
-    of = {"instrument": "plate 1", "unknown": "gain", "unit": "1", "with_session": with_session}
+    of = {"kind": "plate", "plate": "plate 1", "trial": None, "quantity": "gain", "axis": None, "unit": "1"}
+    of["with_session"] = with_session
     return {"person": person, "date": day, "value": value, "sd": sd, "prior_sd": prior_sd, **of}
 
 

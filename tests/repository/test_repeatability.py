@@ -1,25 +1,28 @@
 """Sums over trials of one session, checked by hand."""
 
 import json
+from dataclasses import asdict
 
 import pytest
 
 import sessions
+from kinertia.estimation.simultaneous.calibration_entry import CalibrationEntry
 from repeatability import Estimate, Shared, group_sums, shared, weighted_mean
 
 
 def of_values(*values, sd=1.0, prior_sd=2.0, group="delay"):
     estimates = tuple(Estimate(f"t{k}", value, sd, prior_sd) for k, value in enumerate(values))
-    return Shared("clock: forces late by", group, "s", estimates)
+    return Shared("synchronisation: delay", group, "s", estimates)
 
 
 def folder(parent, name, late_s, mass_kg):
     path = parent / name
     path.mkdir()
-    entry = {"value": late_s, "prior_sd": 0.002, "sd": 0.001, "unit": "s"}
-    joint = {"value": 0.0, "prior_sd": 0.01, "sd": 0.005, "unit": "m"}
-    calibration = {"clock: forces late by": entry, "hip_r/offset_x": joint}
-    (path / "fit.json").write_text(json.dumps({"calibration": calibration}))
+    late = {"value": late_s, "prior_sd": 0.002, "sd": 0.001, "unit": "s", "moved": 3.0}
+    delay = CalibrationEntry(kind="synchronisation", quantity="delay", **late)
+    moved = {"axis": "x", "value": 0.0, "prior_sd": 0.01, "sd": 0.005, "unit": "m"}
+    joint = CalibrationEntry(kind="joint", joint="hip_r", quantity="centre change", **moved)
+    (path / "fit.json").write_text(json.dumps({"calibration": [asdict(delay), asdict(joint)]}))
     rows = ["segment,parameter,estimate,prior_sd,sd", f"femur_r,mass,{mass_kg},1.0,0.5", "femur_r,ixy,0.0,1.0,0.5"]
     (path / "bsp.csv").write_text("\n".join([*rows, "talus_r,mass,0.1,,"]))
     return path

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
@@ -12,7 +13,7 @@ from kinertia.cli.options import Quiet, own_file
 from kinertia.cli.outcome import Outcome
 from kinertia.cli.terminal import out, plain_table, shown_progress
 from kinertia.errors import FileError, SessionError
-from kinertia.estimation.simultaneous.instrument_errors import SHOWN_UNIT
+from kinertia.estimation.simultaneous.calibration_entry import SHOWN_UNIT
 from kinertia.io.output_folder import write_then_rename
 from kinertia.io.provenance import VERSION, recordings
 from kinertia.io.session_file import read_session, session_text
@@ -49,19 +50,15 @@ def instruments(
             fit = fit_subject(each, progress)
         people.append(person_instruments(fit, recordings(each)))
     session = session_instruments(people, wanted[0].instruments)
-    write_then_rename(output, session_text(VERSION, session.values, session.people))
+    write_then_rename(output, session_text(VERSION, session.found, session.people))
     _report(session)
     out.print(f"written to {output}; name it in the subject files: session = ... under [instruments]", soft_wrap=True)
-    found = {
-        instrument: {unknown: dict(zip(("value", "sd", "unit"), known, strict=True)) for unknown, known in each.items()}
-        for instrument, each in session.values.items()
-    }
     names = [person.name for person in session.people]
     return Outcome(
         {
             "file": str(output),
             "people": names,
-            "found": found,
+            "found": [asdict(one) for one in session.errors],
             "findings": [one.to_dict() for one in session.contradictions],
         }
     )
@@ -78,10 +75,10 @@ def _wanted(path: Path) -> SubjectFile:
 
 
 def _report(session: SessionInstruments) -> None:
-    table = plain_table("instrument", "unknown", "found", "sd", "unit")
-    for instrument, unknowns in session.values.items():
-        for unknown, (value, sd, unit) in unknowns.items():
+    table = plain_table("instrument", "quantity", "error", "sd", "unit")
+    for instrument, quantities in session.found.items():
+        for quantity, (value, sd, unit) in quantities.items():
             factor, shown = SHOWN_UNIT[unit]
-            table.add_row(instrument, unknown, f"{value * factor:+.1f}", f"{sd * factor:.1f}", shown)
+            table.add_row(instrument, quantity, f"{value * factor:+.1f}", f"{sd * factor:.1f}", shown)
     out.print(table)
     show_all(session.contradictions)

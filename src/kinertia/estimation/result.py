@@ -14,6 +14,7 @@ from kinertia.estimation.asymmetry import asymmetries, asymmetry_columns
 from kinertia.estimation.cycles import Kind, Stage, cycle_columns, spatiotemporal_columns
 from kinertia.estimation.identifiability import evidence
 from kinertia.estimation.input_checks import known
+from kinertia.estimation.simultaneous.calibration_entry import calibration_columns
 from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
 from kinertia.estimation.simultaneous.fit import Posterior
 from kinertia.findings.finding import Finding, Severity
@@ -375,10 +376,14 @@ class Fit:
 
     @property
     def calibration(self) -> pd.DataFrame | None:
-        """Value, prior and posterior deviation and unit of every calibrated quantity; None after two-level."""
+        """A row for each calibrated quantity of instruments, joints and trunk, SI; None after two-level.
+
+        Values of instruments (kind "plate" or "synchronisation") are errors, recorded minus true; those of joints are
+        changes, the estimate minus the model's value.
+        """
         import pandas as pd
 
-        return None if self.posterior is None else pd.DataFrame(dict(self.posterior.calibration)).T
+        return None if self.posterior is None else pd.DataFrame(calibration_columns(self.posterior.calibration))
 
     @property
     def plot(self) -> FitPictures:

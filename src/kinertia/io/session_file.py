@@ -92,21 +92,21 @@ def session_text(
 
     Args:
         version: of Kinertia.
-        values: per instrument, per unknown its value, deviation and unit (m, 1, N m/N, rad or s).
+        values: per instrument, per quantity its error, deviation and unit (m, 1, N m/N, rad or s).
         people: what each says.
     """
     lines = [
         "# Plates and clock of a session, found by kinertia instruments. For use in its fits, in the subject files:",
         "#     [instruments]",
         '#     session = "instruments.toml"',
-        "# A fit leaves out what its own trials have said here.",
+        "# A fit leaves out what its own trials have said here. Values are errors, recorded minus true.",
         f"kinertia = {json.dumps(version)}",
     ]
-    for instrument, unknowns in values.items():
+    for instrument, quantities in values.items():
         lines += ["", f"[found.{json.dumps(instrument, ensure_ascii=False)}]"]
-        for unknown, (value, sd, unit) in unknowns.items():
+        for quantity, (value, sd, unit) in quantities.items():
             name, factor = _UNITS[unit]
-            key = unknown.replace(" ", "_")
+            key = quantity.replace(" ", "_")
             lines += [f"{key}_{name} = {value * factor:.3f}", f"{key}_sd_{name} = {sd * factor:.3f}"]
     for person in people:
         lines += ["", "[[person]]", f"name = {json.dumps(person.name, ensure_ascii=False)}"]

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kinertia.estimation.simultaneous.instrument_errors import CLOCK_OF, SHOWN_UNIT
-from kinertia.estimation.simultaneous.plates import ZERO_UNKNOWNS
+from kinertia.estimation.simultaneous.calibration_entry import GAIN, SHOWN_UNIT, item_text, quantity_text
 from kinertia.report import style
 from kinertia.report.panels import Panel, plain, small_multiples
 from kinertia.report.result_page import Part
@@ -16,7 +15,20 @@ from kinertia.report.result_page import Part
 if TYPE_CHECKING:
     import pandas as pd
 
-COLUMNS = ("person", "date", "instrument", "unknown", "unit", "value", "sd", "prior_sd", "with_session")
+COLUMNS = (
+    "person",
+    "date",
+    "kind",
+    "plate",
+    "trial",
+    "quantity",
+    "axis",
+    "value",
+    "prior_sd",
+    "sd",
+    "unit",
+    "with_session",
+)
 _COLOURS = (style.BLUE, style.VERMILION, style.GREEN, style.ORANGE, style.SKY, style.BLACK)
 _WITHIN = 1.96
 _UNDATED = (
@@ -26,19 +38,19 @@ _UNDATED = (
 
 
 def drift(rows: pd.DataFrame) -> Iterator[Part]:
-    """A panel per unknown, in it a line per instrument over the days; a day's people count by what they know.
+    """A panel per quantity, in it a line per instrument over the days; a day's people count by what they know.
 
     Args:
         rows: of the table of instruments, `COLUMNS`. Fits that knew what others of their session say are left out: days
             would count people twice. So are delays and zeros, which are each trial's own.
     """
-    own = rows["instrument"].str.startswith(CLOCK_OF) | rows["unknown"].isin(ZERO_UNKNOWNS)
-    rows = rows[~rows["with_session"] & ~own]
+    rows = rows[~rows["with_session"] & (rows["trial"].isna() | (rows["quantity"] == GAIN))]
     dated = rows.dropna(subset=["date"])
     if not len(dated):
         if len(rows):
             yield Part("Instruments over time", (_UNDATED,))
         return
+    dated = _named(dated)
     names = sorted(dated["instrument"].unique())
     colours = {name: _COLOURS[k % len(_COLOURS)] for k, name in enumerate(names)}
     panels = [_panel(str(unknown), colours, of) for unknown, of in dated.groupby("unknown", sort=False)]
@@ -53,6 +65,15 @@ def drift(rows: pd.DataFrame) -> Iterator[Part]:
         "instruments.parquet."
     )
     yield Part("Instruments over time", text, figure, caption)
+
+
+def _named(rows: pd.DataFrame) -> pd.DataFrame:
+    """The rows with two columns more, as people read them: whose error it is, and of what."""
+    known = rows.astype(object).where(rows.notna(), None)
+    return rows.assign(
+        instrument=list(map(item_text, known["kind"], known["plate"])),
+        unknown=list(map(quantity_text, known["quantity"], known["axis"], known["trial"])),
+    )
 
 
 def _panel(unknown: str, colours: Mapping[str, str], rows: pd.DataFrame) -> Panel:

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 from kinertia.errors import FileError, KinertiaError, findings_of
 from kinertia.estimation.cycles import UNITS, cycle_columns
 from kinertia.estimation.result import Fit
+from kinertia.estimation.simultaneous.calibration_entry import calibration_columns
 from kinertia.findings.finding import Finding, Severity
 from kinertia.findings.overview import Overview
 from kinertia.io.csv_file import read_csv
@@ -60,8 +61,11 @@ _COLUMNS: Mapping[str, Mapping[str, str]] = {
         **dict.fromkeys(("value", "sd"), "double"),
     },
     "instruments": {
-        **dict.fromkeys(("person", "date", "instrument", "unknown", "unit"), "string"),
-        **dict.fromkeys(("value", "sd", "prior_sd"), "double"),
+        **dict.fromkeys(("person", "date", "kind", "plate", "trial", "quantity", "axis"), "string"),
+        **dict.fromkeys(("value", "prior_sd", "sd"), "double"),
+        "unit": "string",
+        "moved": "double",
+        "contradicted_by": "string",
         "with_session": "bool",
     },
     "people": {
@@ -230,12 +234,10 @@ def _cycles(fit: Fit) -> dict[str, Any]:
 
 def _instruments(fit: Fit, day: date | None, with_session: bool) -> dict[str, Any]:
     """What the person's trials say of plates and clock; nothing by the two-level method."""
-    calibration = {} if fit.posterior is None else fit.posterior.calibration
-    rows = [(name.split(": ", 1), entry) for name, entry in calibration.items() if ": " in name]
-    of_entries = {key: [entry[key] for _, entry in rows] for key in ("unit", "value", "sd", "prior_sd")}
-    names = {"instrument": [name[0] for name, _ in rows], "unknown": [name[1] for name, _ in rows]}
+    errors = () if fit.posterior is None else fit.posterior.instrument_errors
+    columns = {name: values for name, values in calibration_columns(errors).items() if name in _COLUMNS["instruments"]}
     said = {"date": None if day is None else day.isoformat(), "with_session": with_session}
-    return {**{name: [value] * len(rows) for name, value in said.items()}, **names, **of_entries}
+    return {**{name: [value] * len(errors) for name, value in said.items()}, **columns}
 
 
 def _table(name: str, columns: Mapping[str, Any]) -> pyarrow.Table:

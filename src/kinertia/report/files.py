@@ -203,7 +203,7 @@ def _posterior_summary(fit: Fit) -> dict[str, Any]:
     noise = {trial.name: dict(vars(noise)) for trial, noise in zip(fit.trials, fit.posterior.marker_noise, strict=True)}
     return {
         "iterations": fit.posterior.iterations,
-        "calibration": {name: dict(entry) for name, entry in fit.posterior.calibration_of(None).items()},
+        "calibration": [asdict(one) for one in fit.posterior.calibration],
         "marker_noise": noise,
         "identifiability": _identifiability(fit.bsp_columns(), fit.posterior.base),
     }
@@ -232,10 +232,8 @@ def _trial_summary(fit: Fit, trial: TrialFit) -> dict[str, Any]:
     full_force, full_moment = (
         {stage: each[:, part] for stage, each in trial.full_residuals.items()} for part in _PARTS
     )
-    own = fit.posterior.calibration_of(trial.name) if fit.posterior else {}
     return {
         "name": trial.name,
-        "calibration": {name: dict(entry) for name, entry in own.items()},
         "n_frames": len(trial.kinematics.trial.markers.time),
         "n_dynamic_frames": len(trial.time),
         "window_s": list(trial.kinematics.window_s),

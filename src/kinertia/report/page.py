@@ -14,7 +14,7 @@ import numpy as np
 from kinertia.estimation.forces_used import forces_used, full_bandwidth
 from kinertia.estimation.identifiability import evidence
 from kinertia.estimation.result import Fit, TrialFit
-from kinertia.estimation.simultaneous.instrument_errors import SHOWN_UNIT
+from kinertia.estimation.simultaneous.calibration_entry import SHOWN_UNIT, item_text, quantity_text
 from kinertia.io.provenance import Provenance, versions
 from kinertia.model.bsp import PARAMETERS
 from kinertia.report.body_figure import body_figure
@@ -115,6 +115,8 @@ def render(
         provenance=provenance,
         versions=computed_by or versions(),
         shown_unit=SHOWN_UNIT,
+        item_text=item_text,
+        quantity_text=quantity_text,
         most_events=MOST_EVENTS,
         seconds={trial.name: dict(trial.seconds) for trial in fit.trials},
     )

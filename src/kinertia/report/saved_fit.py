@@ -9,10 +9,10 @@ from pathlib import Path
 from kinertia.errors import FileError
 from kinertia.estimation.identifiability import BaseParameters, Combination
 from kinertia.estimation.result import Fit, TrialFit
+from kinertia.estimation.simultaneous.calibration_entry import CalibrationEntry
 from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
 from kinertia.estimation.simultaneous.evidence import FreeMomentSign
 from kinertia.estimation.simultaneous.fit import Posterior
-from kinertia.estimation.simultaneous.instrument_errors import InstrumentError
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation
 from kinertia.estimation.simultaneous.marker_noise import MarkerNoise
 from kinertia.estimation.simultaneous.one_sided import OneSided
@@ -60,7 +60,7 @@ class SavedFit:
 _KINDS = (
     SavedFit, Provenance, Truth, Fit, TrialFit, CurveDeviations, Subject, Settings,
     Posterior, InstrumentInformation, MarkerNoise, BaseParameters, Combination, Unlikeness, OneSided,
-    InstrumentError, FreeMomentSign,
+    CalibrationEntry, FreeMomentSign,
     Skeleton, Joint, Axis, Marker, Range, PiecewisePolynomial, Composed, BodySegmentParameters,
     OsimModel, OsimJoint, OsimCoordinate, Coupling,
     Finding, Where, Quantity, Overrule,

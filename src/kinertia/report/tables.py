@@ -13,6 +13,7 @@ import numpy as np
 
 from kinertia.estimation.cycles import cycle_columns, spatiotemporal_columns
 from kinertia.estimation.result import Fit, TrialFit
+from kinertia.estimation.simultaneous.calibration_entry import calibration_columns
 from kinertia.report.files import write_columns
 
 Column = Sequence[Any] | np.ndarray
@@ -24,10 +25,7 @@ def person_tables(fit: Fit) -> dict[str, Table]:
     """Tables of all trials together: body segment parameters, calibration, strides and curves over the cycle."""
     tables: dict[str, Table] = {"bsp": fit.bsp_columns()}
     if fit.posterior is not None:
-        names = list(fit.posterior.calibration)
-        entries = [fit.posterior.calibration[name] for name in names]
-        values = {key: [one[key] for one in entries] for key in ("value", "prior_sd", "sd", "unit")}
-        tables["calibration"] = {"quantity": names, **values}
+        tables["calibration"] = calibration_columns(fit.posterior.calibration)
     if any(trial.strides for trial in fit.trials):
         tables["spatiotemporal"] = spatiotemporal_columns(fit.trials)
         tables["cycles"] = cycle_columns(fit.trials, fit.mass_kg)
@@ -102,10 +100,14 @@ def _plain(value: Any) -> Any:
 
 
 def _fields(table: Table) -> dict[str, Any]:
-    """Texts as rows of characters, a hundred times faster than cells (`cellstr` makes them); names as MATLAB allows."""
+    """Texts as rows of characters, a hundred times faster than cells (`cellstr` makes them); names as MATLAB allows.
+    What is not there is an empty text or NaN.
+    """
     fields = {}
     for name, values in table.items():
-        texts = any(isinstance(value, str) for value in _list(values)[:1])
+        texts = all(value is None or isinstance(value, str) for value in values)
+        blank = "" if texts else math.nan
+        cells = [blank if value is None else value for value in _list(values)]
         word = re.sub(r"\W", "_", name, flags=re.ASCII)
-        fields[word if word[:1].isalpha() else f"x{word}"] = np.array(values, dtype=str if texts else None)
+        fields[word if word[:1].isalpha() else f"x{word}"] = np.array(cells, dtype=str if texts else None)
     return fields

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TypeAlias
 
 import numpy as np
 
@@ -12,15 +11,15 @@ from kinertia.diagnostics.result.session import session_contradictions
 from kinertia.errors import SessionError
 from kinertia.estimation.prepared import Prepared
 from kinertia.estimation.result import Fit
+from kinertia.estimation.simultaneous.calibration_entry import CalibrationEntry, item_text, quantity_text
+from kinertia.estimation.simultaneous.instrument_errors import laboratory_errors
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation, InstrumentPrior
-from kinertia.estimation.simultaneous.plates import PLATE_ERRORS, PLATE_UNKNOWNS, plates_with_floor
+from kinertia.estimation.simultaneous.plates import PLATE_ERRORS, plates_with_floor
 from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.io.session_file import PersonInstruments
 from kinertia.settings import Instruments
-
-InstrumentValues: TypeAlias = dict[str, dict[str, tuple[float, float, str]]]
 
 
 @dataclass(frozen=True)
@@ -29,13 +28,22 @@ class SessionInstruments:
 
     Attributes:
         people: what each person's trials say.
-        values: per instrument, per unknown its value, posterior deviation and unit, SI.
-        contradictions: of each unknown of which a person says what the others do not (S501).
+        errors: of plates and synchronisation.
+        contradictions: errors that a person's trials find other than those of the others (S501).
     """
 
     people: tuple[PersonInstruments, ...]
-    values: InstrumentValues
+    errors: tuple[CalibrationEntry, ...]
     contradictions: tuple[Finding, ...] = ()
+
+    @property
+    def found(self) -> dict[str, dict[str, tuple[float, float, str]]]:
+        """Per instrument, per quantity its error, deviation and unit, as people read them."""
+        found: dict[str, dict[str, tuple[float, float, str]]] = {}
+        for one in self.errors:
+            of_item = found.setdefault(item_text(one.kind, one.plate), {})
+            of_item[quantity_text(one.quantity, one.axis)] = one.value, one.sd, one.unit
+        return found
 
 
 def person_instruments(fit: Fit, files: Sequence[str]) -> PersonInstruments:
@@ -66,12 +74,12 @@ def session_instruments(people: Sequence[PersonInstruments], stated: Instruments
     apart: list[Finding] = []
     # of two, one contradicts the other
     for person in people if len(people) > 2 else people[: len(people) - 1]:
-        rest = _values([other for other in people if other is not person], stated)
-        apart += session_contradictions(person.name, _values([person], stated), rest)
-    return SessionInstruments(tuple(people), _values(people, stated), tuple(apart))
+        rest = _errors([other for other in people if other is not person], stated)
+        apart += session_contradictions(person.name, _errors([person], stated), rest)
+    return SessionInstruments(tuple(people), _errors(people, stated), tuple(apart))
 
 
-def _values(people: Sequence[PersonInstruments], stated: Instruments) -> InstrumentValues:
+def _errors(people: Sequence[PersonInstruments], stated: Instruments) -> tuple[CalibrationEntry, ...]:
     plates = tuple(dict.fromkeys(name for person in people for name in person.plates))
     prior = InstrumentPrior.stated(stated, [_information(person) for person in people])
     shown, unknowns = prior.of_session(plates), prior.of_unknowns(plates)
@@ -84,14 +92,10 @@ def _values(people: Sequence[PersonInstruments], stated: Instruments) -> Instrum
     to_plates, each = plates_with_floor(len(plates)), len(PLATE_ERRORS)
     values = to_plates @ mean[:-1]
     sd = np.sqrt(np.diag(to_plates @ covariance[:-1, :-1] @ to_plates.T))
-    units = list(PLATE_UNKNOWNS.items())
-    by_instrument = {
-        name: {unknown: (float(values[i + j]), float(sd[i + j]), unit) for j, (unknown, unit) in enumerate(units)}
-        for i, name in zip(range(0, len(values), each), plates, strict=True)
-    }
-    by_instrument["plates"] = {"turned about the vertical": (float(values[-1]), float(sd[-1]), "rad")}
-    by_instrument["clock"] = {"late": (float(mean[-1]), float(np.sqrt(covariance[-1, -1])), "s")}
-    return by_instrument
+    rows = zip(values.reshape(-1, each), sd.reshape(-1, each), strict=True)
+    clock_s = float(mean[-1]), float(np.sqrt(covariance[-1, -1]))
+    solved = laboratory_errors(dict(zip(plates, rows, strict=True)), clock_s, prior)
+    return tuple(one.entry for one in solved)
 
 
 def with_instruments(

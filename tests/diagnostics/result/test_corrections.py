@@ -14,10 +14,10 @@ from kinertia.findings.finding import Severity
 from results import codes, context, error, walking
 
 
-def moments(*corrections_nm_kn, sd=0.6):
+def moments(*errors_nm_kn, sd=0.6):
     return [
         error("free moment", value / 1e3, 0.0007, sd / 1e3, "N m/N", f"plate {k}")
-        for k, value in enumerate(corrections_nm_kn, start=1)
+        for k, value in enumerate(errors_nm_kn, start=1)
     ]
 
 
@@ -26,7 +26,7 @@ def test_mirror_images_are_the_bodys(values):
     (cause,) = [one for one in explained(free_moments(context(*moments(*values)))) if one.is_open]
     assert cause.code == "P268"
     assert cause.severity < Severity.WARNING
-    assert cause.evidence["error_nm_n"].value == pytest.approx([-value / 1e3 for value in values])
+    assert cause.evidence["error_nm_n"].value == pytest.approx([value / 1e3 for value in values])
 
 
 @pytest.mark.parametrize(
@@ -49,7 +49,10 @@ def test_the_sign_of_free_moments(log_odds, expected):
 
 
 def zeros(trial="walk", axis="x", **values_n):
-    return [error(f"zero {axis}", value, 2.4, 1.5, "N", plate, trial, moved=0.5) for plate, value in values_n.items()]
+    return [
+        error("zero offset", value, 2.4, 1.5, "N", plate, moved=0.5, trial=trial, axis=axis)
+        for plate, value in values_n.items()
+    ]
 
 
 def test_zeros_that_all_plates_have_alike_are_rather_a_force_that_none_measures():
@@ -75,14 +78,14 @@ def test_the_zero_of_a_single_plate_is_its_own_also_in_two_trials():
     assert [(one.code, one.where.trial) for one in found] == [("P215", "walk"), ("P215", "run")]
 
 
-PLACE = error("x", 0.02, 0.0036, 0.002, "m", moved=3.0)
+PLACE = error("position", -0.02, 0.0036, 0.002, "m", moved=3.0, axis="x")
 
 
 @pytest.mark.parametrize(
     ("changed", "supported", "found"),
     [
         ({}, True, True),
-        ({"value": 0.007}, False, False),
+        ({"value": -0.007}, False, False),
         ({"sd": 0.011}, False, False),
         ({"moved": 0.9}, False, True),
         ({"contradicted_by": "another trial"}, False, True),
@@ -91,11 +94,11 @@ PLACE = error("x", 0.02, 0.0036, 0.002, "m", moved=3.0)
 def test_an_accusation_needs_support_and_a_finding_two_deviations(changed, supported, found):
     one = replace(PLACE, **changed)
     assert (one.supported, one.found) == (supported, found)
-    answers = list(plate_positions(context(one, replace(PLACE, plate="plate 2", value=0.001))))
+    answers = list(plate_positions(context(one, replace(PLACE, plate="plate 2", value=-0.001))))
     assert codes(answers) == ["P246"] * found
     for answer in answers:
         assert answer.severity is Severity.CORRECTED
-        assert answer.evidence["offset_m"].value == -one.value  # recorded minus true
+        assert answer.evidence["offset_m"].value == one.value
         assert answer.evidence["offset_m"].usual == (-0.0036, 0.0036)
         assert (answer.causes == ("the instrument",)) == supported
         assert ("another trial" in answer.causes[0]) == bool(one.contradicted_by)
@@ -111,7 +114,7 @@ def test_an_accusation_needs_support_and_a_finding_two_deviations(changed, suppo
     ],
 )
 def test_directions_are_the_persons_and_axes_the_files(vertical, turned_deg, x, z):
-    made = context(PLACE, replace(PLACE, quantity="z"), trials={"walk": walking(turned_deg, vertical)})
+    made = context(PLACE, replace(PLACE, axis="z"), trials={"walk": walking(turned_deg, vertical)})
     assert [(one.where.axis, one.where.file_axis) for one in plate_positions(made)] == [x, z]
 
 

@@ -11,10 +11,10 @@ from kinertia.findings.finding import Severity
 from kinertia.settings import Instruments
 from results import codes, context, error
 
-LEFT = error("x", -0.018, 0.0036, 0.005, "m", "left", moved=2.0)
+LEFT = error("position", 0.018, 0.0036, 0.005, "m", "left", moved=2.0, axis="x")
 RIGHT = replace(LEFT, plate="right", value=0.0)
-OFF, ALIKE = (LEFT, RIGHT), (LEFT, replace(RIGHT, value=-0.017))
-FINE = (replace(LEFT, value=-0.003), RIGHT)
+OFF, ALIKE = (LEFT, RIGHT), (LEFT, replace(RIGHT, value=0.017))
+FINE = (replace(LEFT, value=0.003), RIGHT)
 
 
 def shown(plates, middle_sd_m, apart_sd_m=0.002):
@@ -42,7 +42,7 @@ def test_what_trials_hardly_show_is_ambiguous():
 
 
 def test_an_error_that_is_shared_out_among_plates_is_certain_as_a_difference_only():
-    uncertain = replace(LEFT, value=-0.010, sd=0.006), replace(RIGHT, value=0.010, sd=0.006)
+    uncertain = replace(LEFT, value=0.010, sd=0.006), replace(RIGHT, value=-0.010, sd=0.006)
     assert codes(found(uncertain, ("right", "left"))) == ["P247"]
 
 

@@ -12,7 +12,7 @@ from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINT
 from kinertia.synthetic.noise import camera_noise
 from kinertia.synthetic.walk import SyntheticTrial, walk, walking_subject
 from kinertia.trial.centre_of_pressure import centre_of_pressure
-from results import codes, of_estimate
+from results import codes, entry_of, of_estimate
 from synthetic_walks import kinematics_of
 
 
@@ -55,18 +55,21 @@ def test_information_is_between_nothing_and_everything(plain):
 
 
 def test_calibration_is_told_with_its_deviations(plain):
-    calibration = plain.posterior.calibration
-    assert calibration["hip_x_r"]["prior_sd"] == JOINT_CENTRE_SD_M
-    assert calibration["plate right foot: x"]["prior_sd"] == pytest.approx(
-        np.hypot(PLATE_PRIOR["x"].sd, FLOOR_PRIOR["x"].sd)
+    hip, plate = (
+        entry_of(plain, "centre change", joint="hip_r", axis="x"),
+        entry_of(plain, "position", plate="right foot", axis="x"),
     )
-    assert calibration["plate left foot: gain"]["prior_sd"] == PLATE_PRIOR["gain"].sd
-    clock = calibration["clock: forces late by"]
+    assert (hip.prior_sd, hip.moved) == (JOINT_CENTRE_SD_M, None)
+    assert plate.prior_sd == pytest.approx(np.hypot(PLATE_PRIOR["x"].sd, FLOOR_PRIOR["x"].sd))
+    assert plate.value == -plain.result.plates["right foot"][0][0]
+    assert entry_of(plain, "gain", plate="left foot").prior_sd == PLATE_PRIOR["gain"].sd
+    delay = entry_of(plain, "delay")
     late_s, sd = plain.result.clock_s
-    assert (clock["value"], clock["prior_sd"], clock["sd"], clock["unit"]) == (late_s, CLOCK_PRIOR_S.sd, sd, "s")
-    assert clock["contradicted_by"] == ""
-    for name, one in calibration.items():
-        assert 0 < one["sd"] <= one["prior_sd"] * (1 + 1e-9), name
+    assert (delay.value, delay.prior_sd, delay.sd, delay.unit) == (late_s, CLOCK_PRIOR_S.sd, sd, "s")
+    assert delay.contradicted_by is None
+    assert len({one.key for one in plain.posterior.calibration}) == len(plain.posterior.calibration)
+    for one in plain.posterior.calibration:
+        assert 0 < one.sd <= one.prior_sd * (1 + 1e-9), one
 
 
 def test_loads_and_motion_cover_the_window(trial, plain):
@@ -118,13 +121,13 @@ def test_a_wrong_axis_of_the_knee_is_found_where_axes_are_free(trial):
             [kinematics_of(off, noisy, trial.foot_loads)],
             uncertainty=GAIT27_UNCERTAINTY.with_axes(),
         )
-    calibration = outcome.posterior.calibration
-    for name, put_in in wrong.items():
-        assert calibration[name]["unit"] == "rad"
-        assert calibration[name]["prior_sd"] == pytest.approx(np.radians(5.0))
-        assert calibration[name]["sd"] < 0.7 * calibration[name]["prior_sd"]
-        assert abs(calibration[name]["value"] + put_in) < 3.0 * calibration[name]["sd"]
-    assert "knee_tilt_1_r" not in fitted(trial).posterior.calibration
+    for (_, put_in), axis in zip(wrong.items(), "12", strict=True):
+        entry = entry_of(outcome, "axis change", joint="knee_r", axis=axis)
+        assert entry.unit == "rad"
+        assert entry.prior_sd == pytest.approx(np.radians(5.0))
+        assert entry.sd < 0.7 * entry.prior_sd
+        assert abs(entry.value + put_in) < 3.0 * entry.sd
+    assert "axis change" not in {one.quantity for one in fitted(trial).posterior.calibration}
 
 
 @pytest.mark.slow
@@ -222,18 +225,17 @@ def test_a_wrong_gain_is_named(trial, plain):
     (found,) = [one for one in of_estimate(outcome) if one.code == "P223"]
     assert (found.where.plate, found.where.trial) == ("right foot", "walk")
     assert found.evidence["gain_error"].value == pytest.approx(-0.1, abs=0.03)
-    (name,) = [name for name in outcome.posterior.calibration_of("walk") if name.startswith("plate right foot: gain")]
-    entry = outcome.posterior.calibration[name]
-    assert entry["value"] == pytest.approx(1.0 / 0.9 - 1.0, abs=3.0 * entry["sd"])
-    assert entry["sd"] < 0.015
-    assert name not in outcome.posterior.calibration_of(None)
+    where = {"plate": "right foot", "trial": "walk"}
+    entry = entry_of(outcome, "gain", **where)
+    assert entry.value == found.evidence["gain_error"].value == pytest.approx(-0.1, abs=3.0 * entry.sd)
+    assert entry.sd < 0.012
 
-    assert held_against(outcome, outcome).posterior.instrument_errors == outcome.posterior.instrument_errors
+    assert held_against(outcome, outcome).posterior.calibration == outcome.posterior.calibration
     alone = held_against(outcome, plain)
-    assert [one.name for one in outcome.posterior.instrument_errors if one.supported] == [name]
-    assert not any(one.supported for one in alone.posterior.instrument_errors)
-    assert alone.posterior.calibration[name]["contradicted_by"]
-    assert not outcome.posterior.calibration[name]["contradicted_by"]
+    assert [one for one in outcome.posterior.calibration if one.supported] == [entry]
+    assert not any(one.supported for one in alone.posterior.calibration)
+    assert entry_of(alone, "gain", **where).contradicted_by
+    assert not entry.contradicted_by
     assert outcome.result.bsp.total_mass_kg == pytest.approx(walking_subject().literature.total_mass_kg, rel=0.02)
 
 
@@ -248,32 +250,35 @@ def test_a_horizontal_zero_is_named_and_put_right(trial, plain, axis):
         loads[:, 1] += np.concatenate([force, np.cross(point, force)], axis=1)
 
     outcome = fitted(trial, disturb=push)
-    entry = outcome.posterior.calibration[f"plate left foot: zero {'xyz'[axis]}"]
-    assert entry["value"] == pytest.approx(8.0, abs=3.0 * entry["sd"])
-    assert entry["sd"] < 1.5
+    entry = entry_of(outcome, "zero offset", plate="left foot", trial="walk", axis="xyz"[axis])
+    assert entry.value == pytest.approx(8.0, abs=3.0 * entry.sd)
+    assert entry.sd < 1.5
     (found,) = of_estimate(outcome)
     assert (found.code, found.where.trial, found.where.plate) == ("P215", "walk", "left foot")
-    assert found.evidence["zero_n"].value == entry["value"]
+    assert found.evidence["zero_n"].value == entry.value
     expected, found = (fit.foot_loads[0][10:-10, 1, axis] for fit in (plain, outcome))
     assert np.abs(found.mean() - expected.mean()) < 2.0
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("disturb", "quantity"),
+    ("disturb", "where"),
     [
-        (lambda loads: loads[:, 0, 3:].__iadd__(np.cross([0.0, 0.0, 0.02], loads[:, 0, :3])), "plate right foot: z"),
-        (lambda loads: loads[:, 1].__imul__(1.05), "plate left foot: gain in walk"),
-        (lambda loads: loads.__setitem__(slice(None), np.roll(loads, 2, axis=0)), "clock: forces late by"),
+        (
+            lambda loads: loads[:, 0, 3:].__iadd__(np.cross([0.0, 0.0, 0.02], loads[:, 0, :3])),
+            {"quantity": "position", "plate": "right foot", "axis": "z"},
+        ),
+        (lambda loads: loads[:, 1].__imul__(1.05), {"quantity": "gain", "plate": "left foot", "trial": "walk"}),
+        (lambda loads: loads.__setitem__(slice(None), np.roll(loads, 2, axis=0)), {"quantity": "delay"}),
     ],
     ids=["20 mm", "5 %", "20 ms"],
 )
-def test_instruments_that_are_really_off_are_accused(trial, disturb, quantity):
+def test_instruments_that_are_really_off_are_accused(trial, disturb, where):
     """By a warning that says to check them, and by no other; sound ones are not even corrected."""
     outcome = fitted(trial, disturb=lambda positions, loads: disturb(loads))
-    calibration = outcome.posterior.calibration
-    assert calibration[quantity]["moved"] > 1.0
-    assert [one.name for one in outcome.posterior.instrument_errors if one.supported] == [quantity]
+    entry = entry_of(outcome, **where)
+    assert entry.moved > 1.0
+    assert [one for one in outcome.posterior.calibration if one.supported] == [entry]
     assert sum(one.causes == ("the instrument",) for one in of_estimate(outcome)) == 1
 
 
@@ -302,10 +307,10 @@ def test_a_plate_that_is_off_in_one_trial_of_three_is_not_accused(trial):
             kinematics.append(replace(one, trial=replace(one.trial, name=f"walk {seed}")))
         with threadpool_limits(1, user_api="blas"):
             fit = fit_simultaneous(trial.skeleton, literature_prior(walking_subject().literature), kinematics)
-        return next(one for one in fit.posterior.instrument_errors if one.name == "plate right foot: z")
+        return entry_of(fit, "position", plate="right foot", axis="z")
 
     together, apart = fit_of(0.03, 0.03, 0.03), fit_of(0.09, 0.0, 0.0)
-    assert together.contradicted_by == ""
+    assert together.contradicted_by is None
     assert together.supported
     assert apart.contradicted_by == "another trial"
     assert not apart.supported
@@ -323,11 +328,10 @@ def test_zeros_of_a_plate_that_two_trials_share_are_each_trial_s_own(trial):
         kinematics.append(replace(one, trial=replace(one.trial, name=f"walk {seed}")))
     with threadpool_limits(1, user_api="blas"):
         outcome = fit_simultaneous(trial.skeleton, literature_prior(walking_subject().literature), kinematics)
-    calibration = outcome.posterior.calibration
-    own = [calibration[f"plate left foot (walk {k}): zero x"] for k in range(2)]
-    assert own[0]["value"] == pytest.approx(0.0, abs=1.0)
-    assert own[1]["value"] == pytest.approx(-8.0, abs=3.0 * own[1]["sd"])
-    assert abs(calibration["plate left foot: x"]["value"]) < 0.002
+    own = [entry_of(outcome, "zero offset", plate="left foot", trial=f"walk {k}", axis="x") for k in range(2)]
+    assert own[0].value == pytest.approx(0.0, abs=1.0)
+    assert own[1].value == pytest.approx(-8.0, abs=3.0 * own[1].sd)
+    assert abs(entry_of(outcome, "position", plate="left foot", axis="x").value) < 0.002
 
 
 def test_a_free_moment_that_is_not_there_is_named(trial):
@@ -337,11 +341,11 @@ def test_a_free_moment_that_is_not_there_is_named(trial):
         loads[:, 1, 4] += 0.008 * loads[:, 1, 1]
 
     outcome = fitted(trial, disturb=crosstalk)
-    entry = outcome.posterior.calibration["plate left foot: free moment"]
-    assert entry["value"] == pytest.approx(-0.008, abs=2.0 * PLATE_PRIOR["free moment"].sd)
+    entry = entry_of(outcome, "free moment", plate="left foot")
+    assert entry.value == pytest.approx(0.008, abs=2.0 * PLATE_PRIOR["free moment"].sd)
     (found,) = [one for one in of_estimate(outcome) if one.code == "P267"]
     assert found.where.plate == "left foot"
-    assert found.evidence["error_nm_n"].value == pytest.approx(0.008, abs=2.0 * PLATE_PRIOR["free moment"].sd)
+    assert found.evidence["error_nm_n"].value == entry.value
 
 
 def test_plates_turned_against_the_cameras_are_named_and_put_right(trial, plain):
@@ -358,14 +362,14 @@ def test_plates_turned_against_the_cameras_are_named_and_put_right(trial, plain)
             loads[:, foot, 3:] = about @ back.T + np.cross(middle, loads[:, foot, :3])
 
     outcome = fitted(trial, disturb=turn)
-    entry = outcome.posterior.calibration["plates: turned about the vertical by"]
-    assert np.degrees(entry["value"]) == pytest.approx(3.0, abs=0.8)
-    assert abs(entry["value"] - np.radians(3.0)) < 3.0 * entry["sd"]
+    entry = entry_of(outcome, "rotation")
+    assert np.degrees(entry.value) == pytest.approx(3.0, abs=0.8)
+    assert abs(entry.value - np.radians(3.0)) < 3.0 * entry.sd
     (found,) = of_estimate(outcome)
     assert found.code == "P234"
-    assert found.evidence["rotation_rad"].value == entry["value"]  # counter-clockwise seen from above
-    sound = plain.posterior.calibration["plates: turned about the vertical by"]
-    assert abs(sound["value"]) < sound["prior_sd"]
+    assert found.evidence["rotation_rad"].value == entry.value  # counter-clockwise seen from above
+    sound = entry_of(plain, "rotation")
+    assert abs(sound.value) < sound.prior_sd
 
 
 def test_an_unfinished_estimate_is_called_so(trial, monkeypatch):

@@ -46,7 +46,7 @@ def test_files_of_a_simultaneous_fit(of_files, tmp_path):
     assert summary["method"] == "simultaneous"
     assert summary["converged"] is True
     assert summary["iterations"] > 1
-    assert set(summary["calibration"]["hip_x_r"]) == {"value", "prior_sd", "sd", "unit"}
+    assert pd.DataFrame(summary["calibration"]).equals(of_files.calibration)
     noise = summary["marker_noise"][of_files.trials[0].name]
     assert noise["correlation_s"] > 0
     assert min(noise["sd_m"].values()) >= 0.001

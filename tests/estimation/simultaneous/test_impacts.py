@@ -65,8 +65,7 @@ def clock_ms(recording_of, person, *moved_ms):
         plates = replace(walk.plates, time=walk.plates.time + each / 1e3)
         fit = estimate(prepare(Subject(sex="male"), static, [TrialInput(replace(walk, plates=plates))]))
         # of a single trial the clock's and its own are one
-        parts = [entry for name, entry in fit.posterior.calibration.items() if name.startswith("clock")]
-        late[each] = 1e3 * sum(entry["value"] for entry in parts)
+        late[each] = 1e3 * sum(one.value for one in fit.posterior.calibration if one.quantity == "delay")
     # a delay is known to some 3 ms
     assert (np.diff(list(late.values())) > -1.0).all()
     return late

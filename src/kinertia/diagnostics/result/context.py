@@ -11,7 +11,7 @@ from kinertia.diagnostics.evidence.force_mass import ForceMass, force_mass
 from kinertia.diagnostics.evidence.markers_centre import owners_of
 from kinertia.estimation.prepared import Prepared
 from kinertia.estimation.result import Fit
-from kinertia.estimation.simultaneous.instrument_errors import InstrumentError
+from kinertia.estimation.simultaneous.calibration_entry import CalibrationEntry
 from kinertia.findings.where import Where
 from kinertia.motion.kinematics import Kinematics
 from kinertia.trial.marker_quality import travel
@@ -32,7 +32,7 @@ class ResultContext:
     ready: Prepared
 
     @property
-    def errors(self) -> Sequence[InstrumentError]:
+    def errors(self) -> Sequence[CalibrationEntry]:
         """What the fit found of plates and synchronisation; nothing after two-level."""
         return () if self.fit.posterior is None else self.fit.posterior.instrument_errors
 
@@ -47,11 +47,11 @@ class ResultContext:
     def _axes(self) -> Mapping[str, Axes]:
         return {trial.name: lab_axes(trial.kinematics) for trial in self.fit.trials}
 
-    def at(self, error: InstrumentError) -> Where:
+    def at(self, error: CalibrationEntry) -> Where:
         """Plate, trial and axis of an error of an instrument."""
-        return self.along(error.quantity[-1], error.trial, error.plate)
+        return self.along(error.axis, error.trial, error.plate)
 
-    def along(self, axis: str, trial: str | None, plate: str | None = None) -> Where:
+    def along(self, axis: str | None, trial: str | None, plate: str | None = None) -> Where:
         """A plate, or all, in a trial, or in all, along an axis of the laboratory: "x" or "z", else along none.
 
         An axis that is called differently in some trials has no name.

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from kinertia.diagnostics.result.context import ResultContext
-from kinertia.estimation.simultaneous.instrument_errors import InstrumentError
+from kinertia.estimation.simultaneous.calibration_entry import CalibrationEntry
 from kinertia.findings.finding import Finding, Severity, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
@@ -26,7 +26,7 @@ def corrected(
     context: ResultContext,
     code: str,
     headline: str,
-    errors: Iterable[InstrumentError],
+    errors: Iterable[CalibrationEntry],
     severity: Severity | None = None,
 ) -> list[Finding]:
     """A finding for each of these errors that was found."""
@@ -34,13 +34,13 @@ def corrected(
 
 
 def correction(
-    code: str, headline: str, where: Where, one: InstrumentError, severity: Severity | None = None
+    code: str, headline: str, where: Where, one: CalibrationEntry, severity: Severity | None = None
 ) -> Finding:
     """The finding of an error, with this name of its headline; what is not supported is not raised to `severity`."""
     unsure = not one.supported
     evidence = {
-        headline: Quantity(one.error, one.unit, _SD * one.prior_sd, (-one.prior_sd, one.prior_sd), one.sd),
-        "moved": Quantity(one.moved, "1", limit=1.0),
+        headline: Quantity(one.value, one.unit, _SD * one.prior_sd, (-one.prior_sd, one.prior_sd), one.sd),
+        "moved": Quantity(one.moved or 0.0, "1", limit=1.0),
         "kind": Quantity("an apparent" if unsure else "a clear"),
         "condition": Quantity(" if other people's trials show it, too" if unsure else ""),
     }
@@ -49,7 +49,7 @@ def correction(
     return with_evidence(code, where, evidence, None if unsure else severity, causes)
 
 
-def equal(errors: Sequence[InstrumentError], usual_sd: float = np.inf) -> bool:
+def equal(errors: Sequence[CalibrationEntry], usual_sd: float = np.inf) -> bool:
     """Whether errors of the same quantity of several plates have all been found, and differ no more than errors of
     single plates do: by their prior SD, or this one if it is smaller.
     """

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from kinertia.diagnostics.result.context import ResultContext
 from kinertia.diagnostics.result.corrections import corrected
-from kinertia.estimation.simultaneous.instrument_errors import DELAY
+from kinertia.estimation.simultaneous.calibration_entry import DELAY
 from kinertia.findings.finding import Finding
 
 

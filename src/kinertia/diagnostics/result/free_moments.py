@@ -16,7 +16,7 @@ from kinertia.diagnostics.result.context import ResultContext
 from kinertia.diagnostics.result.corrections import corrected
 from kinertia.estimation.free_moment_sign import VERTICAL, left_moments_nm
 from kinertia.estimation.result import TrialFit
-from kinertia.estimation.simultaneous.instrument_errors import FREE_MOMENT, InstrumentError
+from kinertia.estimation.simultaneous.calibration_entry import FREE_MOMENT, CalibrationEntry
 from kinertia.findings.finding import Finding, finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
@@ -43,17 +43,17 @@ def free_moments(context: ResultContext) -> Iterator[Finding]:
     errors = [one for one in context.errors if one.quantity == FREE_MOMENT]
     yield from corrected(context, "P267", "error_nm_n", errors)
     if mirrored(errors):
-        values = tuple(one.error for one in errors)
+        values = tuple(one.value for one in errors)
         plates = Quantity(", ".join(str(one.plate) for one in errors))
         yield finding("P268", error_nm_n=Quantity(values, "N m/N", 2.0 * errors[0].prior_sd), plates=plates)
 
 
-def mirrored(errors: Sequence[InstrumentError]) -> bool:
+def mirrored(errors: Sequence[CalibrationEntry]) -> bool:
     """Whether errors under the feet were found that go to both sides alike."""
-    off = [one.error for one in errors if one.found]
+    off = [one.value for one in errors if one.found]
     if not off or not min(off) < 0.0 < max(off):
         return False
-    return abs(sum(one.error for one in errors)) <= _ONE_SIDED * sum(abs(one.error) for one in errors)
+    return abs(sum(one.value for one in errors)) <= _ONE_SIDED * sum(abs(one.value) for one in errors)
 
 
 def reversed_sign(trial: TrialFit) -> Iterator[Finding]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from kinertia.diagnostics.result.context import ResultContext
 from kinertia.diagnostics.result.corrections import corrected, equal
-from kinertia.estimation.simultaneous.instrument_errors import GAIN, InstrumentError
+from kinertia.estimation.simultaneous.calibration_entry import GAIN, CalibrationEntry
 from kinertia.findings.finding import Finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
@@ -38,20 +38,20 @@ def gains(context: ResultContext) -> Iterator[Finding]:
             yield _of_all(context, own)
 
 
-def _of_all(context: ResultContext, gains: Sequence[InstrumentError]) -> Finding:
+def _of_all(context: ResultContext, gains: Sequence[CalibrationEntry]) -> Finding:
     """P224, with the masses that the forces of the trials correspond to."""
     trial, total = gains[0].trial, context.ready.carried
     sd, limit = max(one.sd for one in gains), 2.0 * gains[0].prior_sd
-    evidence = {"gain_error": Quantity(tuple(one.error for one in gains), "1", limit, sd=sd)}
+    evidence = {"gain_error": Quantity(tuple(one.value for one in gains), "1", limit, sd=sd)}
     masses = tuple(float(mass.mass_kg) for name, mass in context.force_masses.items() if trial in (None, name))
     if masses:
         evidence["mass_by_force_kg"] = Quantity(masses, "kg")
     evidence["stated_kg"] = Quantity(total.total_kg, "kg", sd=total.sd_kg)
     evidence["plates"] = Quantity(", ".join(str(one.plate) for one in gains))
-    return with_evidence("P224", Where(trial=trial), evidence, causes=_MORE if gains[0].error > 0.0 else _LESS)
+    return with_evidence("P224", Where(trial=trial), evidence, causes=_MORE if gains[0].value > 0.0 else _LESS)
 
 
-def _certain(errors: Sequence[InstrumentError]) -> Iterator[InstrumentError]:
+def _certain(errors: Sequence[CalibrationEntry]) -> Iterator[CalibrationEntry]:
     """The gain of a plate in all trials where it is certain; else what the plate has in each."""
     lasting = {one.plate: one for one in errors if one.trial is None}
     of_trials = {one.plate for one in errors if one.trial is not None}

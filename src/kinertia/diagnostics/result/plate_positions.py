@@ -14,7 +14,7 @@ import numpy as np
 
 from kinertia.diagnostics.result.context import ResultContext
 from kinertia.diagnostics.result.corrections import corrected, correction, equal
-from kinertia.estimation.simultaneous.instrument_errors import InstrumentError
+from kinertia.estimation.simultaneous.calibration_entry import POSITION, CalibrationEntry
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation, InstrumentPrior
 from kinertia.estimation.simultaneous.plates import FLOOR_UNKNOWNS, PLATE_UNKNOWNS
 from kinertia.findings.finding import Finding, Severity, finding
@@ -34,7 +34,7 @@ def plate_positions(context: ResultContext) -> Iterator[Finding]:
     that is off.
     """
     for axis in "xz":
-        errors = [one for one in context.errors if one.quantity == axis]
+        errors = [one for one in context.errors if (one.quantity, one.axis) == (POSITION, axis)]
         ambiguous = _ambiguous(context, axis, errors)
         if equal(errors):
             first = max(errors, key=lambda one: (one.supported, abs(one.value)))
@@ -44,7 +44,7 @@ def plate_positions(context: ResultContext) -> Iterator[Finding]:
         yield from ambiguous
 
 
-def _ambiguous(context: ResultContext, axis: str, errors: Sequence[InstrumentError]) -> list[Finding]:
+def _ambiguous(context: ResultContext, axis: str, errors: Sequence[CalibrationEntry]) -> list[Finding]:
     """P247, where a plate seems off and another may be as well: how uncertain each is does not count, since that is
     what is ambiguous, but plates must differ for certain."""
     prior, posterior = context.ready.uncertainty.instruments, context.fit.posterior

@@ -12,7 +12,7 @@ import numpy as np
 
 from kinertia.diagnostics.result.context import ResultContext
 from kinertia.diagnostics.result.corrections import corrected
-from kinertia.estimation.simultaneous.instrument_errors import ROTATION
+from kinertia.estimation.simultaneous.calibration_entry import ROTATION
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation, InstrumentPrior
 from kinertia.estimation.simultaneous.plates import FLOOR_UNKNOWNS
 from kinertia.findings.finding import Finding, finding

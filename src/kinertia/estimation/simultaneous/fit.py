@@ -10,14 +10,10 @@ import numpy as np
 from kinertia.estimation.identifiability import BaseParameters, base_parameters
 from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.simultaneous.bandwidth import Bandwidth
+from kinertia.estimation.simultaneous.calibration_entry import AXIS, BENDING, CENTRE, CalibrationEntry
 from kinertia.estimation.simultaneous.evidence import FreeMomentSign
 from kinertia.estimation.simultaneous.impacts import down_weighted
-from kinertia.estimation.simultaneous.instrument_errors import (
-    GAIN_IN,
-    OTHER_SIGN,
-    InstrumentError,
-    instrument_errors,
-)
+from kinertia.estimation.simultaneous.instrument_errors import OTHER_SIGN, instrument_errors
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation
 from kinertia.estimation.simultaneous.marker_noise import MarkerNoise
 from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINTY, ModelUncertainty
@@ -28,6 +24,7 @@ from kinertia.estimation.simultaneous.solver import estimate_simultaneous
 from kinertia.estimation.simultaneous.trunk_bending import BENDING_PRIOR_M
 from kinertia.estimation.simultaneous.unlike import Unlikeness, unlikeness
 from kinertia.model.bsp import BodySegmentParameters
+from kinertia.model.centre_offsets import joint_and_axis
 from kinertia.model.gait27 import VIRTUAL_TRUNK
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion
@@ -39,8 +36,6 @@ _STAYING_SD_M = 1e-4
 TRUNK_PLACE_SD_M = 0.08
 """Of the virtual markers of a trunk that nobody sees: it may lean by 6 degrees all the time."""
 _VIRTUAL_TRUNK = [marker.label for marker in VIRTUAL_TRUNK]
-BENDING_IN = "trunk bending in "
-"""Before the name of a trial, among what is calibrated."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,15 +45,13 @@ class Posterior:
     Attributes:
         prior_sd, sd: (s, 10) deviations of the body segment parameters before and after, in the table's order.
         covariance: (10 s, 10 s) posterior covariance of the table rows, segment after segment.
-        calibration: per quantity its value, prior and posterior deviation, and unit; of instruments what supports an
-            accusation (`InstrumentError.entry`).
+        calibration: joints, instruments and trunk, each quantity with its deviations.
         marker_noise: per trial.
         iterations: Gauss-Newton steps.
         base: which combinations of parameters these motions show, and which none ever shows.
         instruments: what these trials say of plates and clock.
         prior_mean: of the body segment parameters; None in files of before, where it was not written.
         unlikeness: how far the estimate is from the prior; None in files of before.
-        instrument_errors: what `calibration` has of plates and synchronisation; none in files of before.
         free_moment_sign: what was found of it; None where there was nothing to ask.
         marker_distances_m: per trial, how far each marker is from where it is in the nearest of the other trials; of
             those that no other trial shows nothing.
@@ -72,28 +65,21 @@ class Posterior:
     prior_sd: np.ndarray
     sd: np.ndarray
     covariance: np.ndarray
-    calibration: Mapping[str, Mapping[str, float | str]]
+    calibration: tuple[CalibrationEntry, ...]
     marker_noise: tuple[MarkerNoise, ...]
     iterations: int
     base: BaseParameters
     instruments: InstrumentInformation
     prior_mean: BodySegmentParameters | None = None
     unlikeness: Unlikeness | None = None
-    instrument_errors: tuple[InstrumentError, ...] = ()
     free_moment_sign: FreeMomentSign | None = None
     marker_distances_m: tuple[Mapping[str, float], ...] = field(default=())
     down_weighted: tuple[float, ...] = ()
 
-    def with_errors(self, errors: tuple[InstrumentError, ...]) -> Posterior:
-        """The same with these errors of instruments."""
-        entries = {one.name: one.entry for one in errors}
-        return replace(self, calibration={**self.calibration, **entries}, instrument_errors=errors)
-
-    def calibration_of(self, trial: str | None) -> dict[str, Mapping[str, float | str]]:
-        """What is calibrated of a trial alone, how much its trunk bends and the whole gains of its plates; of None, all
-        the rest.
-        """
-        return {name: entry for name, entry in self.calibration.items() if _trial_of(name) == trial}
+    @property
+    def instrument_errors(self) -> tuple[CalibrationEntry, ...]:
+        """What `calibration` has of plates and synchronisation."""
+        return tuple(one for one in self.calibration if one.of_instrument)
 
     @property
     def information(self) -> np.ndarray:
@@ -167,12 +153,11 @@ def fit_simultaneous(
     loads = tuple(every[o.dynamic] for every, o in zip(result.foot_loads, together, strict=True))
     covariance, before = (uncertainty.whole_covariance(c) for c in (result.bsp_covariance, prior.covariance))
     names = [each.trial.name for each in trials]
-    errors = instrument_errors(result, uncertainty.instruments, names)
     posterior = Posterior(
         np.sqrt(np.diag(before)).reshape(-1, 10),
         np.sqrt(np.diag(covariance)).reshape(-1, 10),
         covariance,
-        _calibration(used, uncertainty, result, names, prior.mass_kg, errors),
+        _calibration(used, uncertainty, result, names, prior.mass_kg),
         seen.noise,
         result.iterations,
         base_parameters(
@@ -181,7 +166,6 @@ def fit_simultaneous(
         result.instruments,
         uncertainty.whole(prior.mean),
         unlikeness(prior, result.bsp, result.bsp_covariance),
-        errors,
         marker_distances_m=_marker_distances(result, trials),
         down_weighted=tuple(down_weighted(np.broadcast_to(o.impact, o.dynamic.shape)[o.dynamic]) for o in together),
     )
@@ -203,12 +187,12 @@ def held_against(fitted: SimultaneousFit, other: SimultaneousFit) -> Simultaneou
     """The same, where another reading of the same trials is as likely: errors that only one of both supports are
     contradicted.
     """
-    elsewhere = {one.name: one.supported for one in other.posterior.instrument_errors}
-    errors = tuple(
-        replace(one, contradicted_by=OTHER_SIGN) if one.supported and not elsewhere[one.name] else one
-        for one in fitted.posterior.instrument_errors
+    elsewhere = {one.key: one.supported for one in other.posterior.calibration}
+    calibration = tuple(
+        replace(one, contradicted_by=OTHER_SIGN) if one.supported and not elsewhere[one.key] else one
+        for one in fitted.posterior.calibration
     )
-    return replace(fitted, posterior=fitted.posterior.with_errors(errors))
+    return replace(fitted, posterior=replace(fitted.posterior, calibration=calibration))
 
 
 def used_skeleton(skeleton: Skeleton, trials: Sequence[Kinematics], uncertainty: ModelUncertainty) -> Skeleton:
@@ -250,27 +234,29 @@ def _calibration(
     result: SimultaneousResult,
     trials: Sequence[str],
     mass_kg: float,
-    errors: Sequence[InstrumentError],
-) -> dict[str, dict[str, float | str]]:
-    calibration: dict[str, dict[str, float | str]] = {}
-    for name, (value, sd) in result.coordinates.items():
-        unit = "rad" if name in uncertainty.axes else "m"
-        calibration[name] = _entry(value - skeleton.locked[name], uncertainty.coordinates[name], sd, unit)
-    calibration |= {one.name: one.entry for one in errors}
-    for trial, (kappa, sd) in zip(trials, result.trunks_kg_m, strict=False):
-        calibration[f"{BENDING_IN}{trial}"] = _entry(kappa, mass_kg * BENDING_PRIOR_M.sd, sd, "kg m")
-    return calibration
-
-
-def _trial_of(quantity: str) -> str | None:
-    for before in (GAIN_IN, BENDING_IN):
-        if before in quantity:
-            return quantity.partition(before)[2]
-    return None
-
-
-def _entry(value: float, prior_sd: float, sd: float, unit: str) -> dict[str, float | str]:
-    return {"value": float(value), "prior_sd": prior_sd, "sd": float(sd), "unit": unit}
+) -> tuple[CalibrationEntry, ...]:
+    joints = [
+        CalibrationEntry(
+            kind="joint",
+            joint=joint,
+            quantity=AXIS if name in uncertainty.axes else CENTRE,
+            axis=axis,
+            value=float(value - skeleton.locked[name]),
+            prior_sd=uncertainty.coordinates[name],
+            sd=float(sd),
+            unit="rad" if name in uncertainty.axes else "m",
+        )
+        for name, (value, sd) in result.coordinates.items()
+        for joint, axis in [joint_and_axis(name)]
+    ]
+    bending_sd = mass_kg * BENDING_PRIOR_M.sd
+    trunks = [
+        CalibrationEntry(
+            kind="trunk", trial=trial, quantity=BENDING, value=kappa, prior_sd=bending_sd, sd=sd, unit="kg m"
+        )
+        for trial, (kappa, sd) in zip(trials, result.trunks_kg_m, strict=False)
+    ]
+    return (*joints, *instrument_errors(result, uncertainty.instruments, trials), *trunks)
 
 
 def _marker_distances(result: SimultaneousResult, trials: Sequence[Kinematics]) -> tuple[dict[str, float], ...]:

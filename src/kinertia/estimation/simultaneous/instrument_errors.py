@@ -3,106 +3,61 @@
 Of any error beyond two prior and two posterior deviations the instrument is the likely cause only where it also moves
 a joint moment beyond that moment's own error bar and is contradicted by nobody (`instrument_support`). It may as well
 be the model's else.
+
+The estimate solves for what puts positions, gains and free moments right. Here all become errors, recorded minus true.
 """
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import count
+from typing import NamedTuple
 
 import numpy as np
 
+from kinertia.estimation.simultaneous.calibration_entry import (
+    DELAY,
+    FREE_MOMENT,
+    GAIN,
+    POSITION,
+    ROTATION,
+    ZERO,
+    CalibrationEntry,
+)
 from kinertia.estimation.simultaneous.instrument_support import INTERVAL_SD
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation, InstrumentPrior
 from kinertia.estimation.simultaneous.outcome import SimultaneousResult
-from kinertia.estimation.simultaneous.plates import FLOOR_UNKNOWNS, PLATE_UNKNOWNS, ZERO_UNKNOWNS
-from kinertia.trial.plate_names import columns_of_several_trials, plate_of_trial
+from kinertia.estimation.simultaneous.plates import FLOOR_UNKNOWNS, PLATE_ERRORS, PLATE_UNKNOWNS, ZERO_UNKNOWNS
+from kinertia.trial.plate_names import columns_of_several_trials
 
-GAIN, FREE_MOMENT, ROTATION, DELAY = "gain", "free moment", "rotation", "delay"
-GAIN_IN = "gain in "
-"""Before the name of a trial, the whole gain of a plate in it, in `Posterior.calibration`."""
-CLOCK_OF = "clock of "
-"""Before the name of a trial, what it has of its own besides the delay of all."""
 ANOTHER_TRIAL = "another trial"
 OTHER_SIGN = "the estimate with free moments of the other sign"
 OTHER_PEOPLE = "the session's other people"
-SHOWN_UNIT = {
-    "m": (1e3, "mm"),
-    "s": (1e3, "ms"),
-    "1": (1e2, "%"),
-    "N": (1.0, "N"),
-    "rad": (180.0 / np.pi, "degrees"),
-    "N m/N": (1e3, "N m/kN"),
-    "kg m": (1.0, "kg m"),
+_QUANTITIES = {
+    "x": (POSITION, "x"),
+    "z": (POSITION, "z"),
+    "gain": (GAIN, None),
+    "free moment": (FREE_MOMENT, None),
+    "turn": (ROTATION, None),
+    "zero x": (ZERO, "x"),
+    "zero z": (ZERO, "z"),
 }
-"""Factor and unit in which people read a calibrated quantity."""
-_NOTABLE = 2.0
+"""Quantity and axis by unknown of the estimate."""
+_UNITS = {**PLATE_ERRORS, **ZERO_UNKNOWNS}
 
 
-@dataclass(frozen=True)
-class InstrumentError:
-    """What a fit found of one instrument.
+class Solved(NamedTuple):
+    """An entry, with the place of its unknown among all instruments' and the value that the estimate solved for."""
 
-    Attributes:
-        name: its key in `Posterior.calibration`.
-        quantity: one of PLATE_UNKNOWNS, ZERO_UNKNOWNS, "rotation" or "delay".
-        plate, trial: names; None of all.
-        value: as the estimate applies it (SI): of positions, gains and free moments what puts the plate right.
-        prior_sd, sd: deviations before and after.
-        unit: "m", "1", "N m/N", "N", "rad" or "s".
-        moved: by how many halves of its own 95 % interval the error, put back, moves the joint moment that it moves
-            most.
-        contradicted_by: who says otherwise; "" nobody.
-
-    >>> gain = InstrumentError("plate left: gain", "gain", "left", None, 0.25, 0.01, 0.01, "1")
-    >>> gain.error, gain.found, gain.supported
-    (-0.2, True, True)
-    """
-
-    name: str
-    quantity: str
-    plate: str | None
-    trial: str | None
+    place: int
     value: float
-    prior_sd: float
-    sd: float
-    unit: str
-    moved: float = np.inf
-    contradicted_by: str = ""
-
-    @property
-    def error(self) -> float:
-        """Recorded minus true; of a gain, recorded over true minus one."""
-        if self.quantity == GAIN:
-            return -self.value / (1.0 + self.value)
-        return -self.value if self.quantity in PLATE_UNKNOWNS else self.value
-
-    @property
-    def notable(self) -> bool:
-        """Whether it is more than an instrument is usually off."""
-        return abs(self.value) > _NOTABLE * self.prior_sd
-
-    @property
-    def found(self) -> bool:
-        """Whether it is also certain."""
-        return self.notable and abs(self.value) > _NOTABLE * self.sd
-
-    @property
-    def supported(self) -> bool:
-        """Whether it also matters, and is contradicted by nobody."""
-        return self.found and self.moved > 1.0 and not self.contradicted_by
-
-    @property
-    def entry(self) -> dict[str, float | str]:
-        """What `Posterior.calibration` has of it."""
-        return {name: getattr(self, name) for name in ("value", "prior_sd", "sd", "unit", "moved", "contradicted_by")}
+    entry: CalibrationEntry
 
 
 def instrument_errors(
     result: SimultaneousResult, prior: InstrumentPrior, trials: Sequence[str]
-) -> tuple[InstrumentError, ...]:
+) -> tuple[CalibrationEntry, ...]:
     """All errors of instruments, found or not, each with its support.
 
     Args:
@@ -111,56 +66,94 @@ def instrument_errors(
         trials: names, in the order of the result's.
     """
     elsewhere = _session_says_otherwise(result.instruments, prior)
-    numbered = list(_numbered(result, prior, trials))
-    own = {(one.plate, one.quantity): one for _, one in numbered if one.trial is None}
+    shared = list(laboratory_errors(result.plates, result.clock_s, prior))
+    own = {(one.plate, one.quantity, one.axis): one for _, _, one in shared}
     errors = []
-    for place, one in numbered:
+    for place, value, one in (*shared, *_of_trials(result, prior, trials)):
         columns = _same_column(one.plate, list(result.plates)) if one.trial is None else []
-        by_trial = result.support.contradicted[place] or any(_apart(one, own[each, one.quantity]) for each in columns)
-        said = ANOTHER_TRIAL if by_trial else OTHER_PEOPLE if place in elsewhere else ""
-        errors.append(replace(one, moved=float(result.support.moved[place]) * abs(one.value), contradicted_by=said))
+        others = [own[column, one.quantity, one.axis] for column in columns]
+        by_trial = result.support.contradicted[place] or any(_apart(one, other) for other in others)
+        said = ANOTHER_TRIAL if by_trial else OTHER_PEOPLE if place in elsewhere else None
+        errors.append(replace(one, moved=float(result.support.moved[place]) * abs(value), contradicted_by=said))
     return tuple(errors)
 
 
-def _numbered(
-    result: SimultaneousResult, prior: InstrumentPrior, trials: Sequence[str]
-) -> Iterator[tuple[int, InstrumentError]]:
-    """Errors with the places of their unknowns among all instruments'. Whoever is rotated is displaced a little, too:
-    the cause first. A plate's position is its own and the floor's: what one moves, the other does, too.
+def laboratory_errors(
+    plates: Mapping[str, tuple[np.ndarray, np.ndarray]], clock_s: tuple[float, float], prior: InstrumentPrior
+) -> Iterator[Solved]:
+    """Errors that all trials share, without support.
+
+    Whoever is rotated is displaced a little, too: the cause first. A plate's position is its own and the floor's: what
+    one moves, the other does, too.
+
+    Args:
+        plates: per plate (5,) values of PLATE_ERRORS, as the estimate solves for them, and (5,) their deviations.
+        clock_s: the delay of the forces, and its deviation.
+        prior: what was known of the instruments before.
     """
-    floor = len(PLATE_UNKNOWNS) * len(result.plates)
-    clock = floor + len(FLOOR_UNKNOWNS)
-    for values, sds in list(result.plates.values())[:1]:
-        found = float(values[-1]), prior.floor["turn"].sd, float(sds[-1]), "rad"
-        place = floor + list(FLOOR_UNKNOWNS).index("turn")
-        yield place, InstrumentError("plates: turned about the vertical by", ROTATION, None, None, *found)
+    floor = len(PLATE_UNKNOWNS) * len(plates)
+    for values, sds in list(plates.values())[:1]:
+        turn = list(FLOOR_UNKNOWNS).index("turn")
+        yield _of_plate(floor + turn, "turn", values[-1], prior.floor["turn"].sd, sds[-1])
     places = count()
-    for plate, (values, sds) in result.plates.items():
-        for (unknown, unit), value, sd in zip(PLATE_UNKNOWNS.items(), values, sds, strict=False):
+    for plate, (values, sds) in plates.items():
+        for unknown, value, sd in zip(PLATE_UNKNOWNS, values, sds, strict=False):
             common_sd = prior.floor[unknown].sd if unknown in prior.floor else 0.0
-            found = float(value), float(np.hypot(prior.plate[unknown].sd, common_sd)), float(sd), unit
-            yield next(places), InstrumentError(f"{_plate(plate)}: {unknown}", unknown, plate, None, *found)
-    late_s, late_sd = result.clock_s
-    yield clock, InstrumentError("clock: forces late by", DELAY, None, None, late_s, prior.clock_s.sd, late_sd, "s")
-    places = count(clock + 1)
-    for trial, (later_s, sd) in zip(trials, result.delays_s, strict=False):
-        name = f"{CLOCK_OF}{trial}: forces later than in the other trials by"
-        yield next(places), InstrumentError(name, DELAY, None, trial, later_s, prior.delay_s.sd, sd, "s")
-    trials_of = Counter(plate for zeros in result.zeros_n for plate in zeros)
+            prior_sd = float(np.hypot(prior.plate[unknown].sd, common_sd))
+            yield _of_plate(next(places), unknown, value, prior_sd, sd, plate=plate)
+    yield _delay(floor + len(FLOOR_UNKNOWNS), clock_s, prior.clock_s.sd)
+
+
+def _of_trials(result: SimultaneousResult, prior: InstrumentPrior, trials: Sequence[str]) -> Iterator[Solved]:
+    """Errors that trials have of their own; of gains, what a plate has in the trial altogether."""
+    places = count(len(PLATE_UNKNOWNS) * len(result.plates) + len(FLOOR_UNKNOWNS) + 1)
+    for trial, delay_s in zip(trials, result.delays_s, strict=False):
+        yield _delay(next(places), delay_s, prior.delay_s.sd, trial)
     for trial, zeros in zip(trials, result.zeros_n, strict=True):
         for plate, (values, sds) in zeros.items():
-            column = _plate(plate if trials_of[plate] == 1 else plate_of_trial(plate, trial))
-            for (unknown, unit), value, sd in zip(ZERO_UNKNOWNS.items(), values, sds, strict=True):
-                found = float(value), prior.zero_n.sd, float(sd), unit
-                yield next(places), InstrumentError(f"{column}: {unknown}", unknown, plate, trial, *found)
+            for unknown, value, sd in zip(ZERO_UNKNOWNS, values, sds, strict=True):
+                yield _of_plate(next(places), unknown, value, prior.zero_n.sd, sd, plate=plate, trial=trial)
+    gain_sd = float(np.hypot(prior.plate["gain"].sd, prior.trial_gain.sd))
     for trial, gains in zip(trials, result.gains, strict=True):
         for plate, (gain, sd) in gains.items():
-            found = gain, float(np.hypot(prior.plate[GAIN].sd, prior.trial_gain.sd)), sd, "1"
-            yield next(places), InstrumentError(f"{_plate(plate)}: {GAIN_IN}{trial}", GAIN, plate, trial, *found)
+            yield _of_plate(next(places), "gain", gain, gain_sd, sd, plate=plate, trial=trial)
 
 
-def _plate(name: str) -> str:
-    return f"plate {name.removeprefix('plate ')}"
+def _of_plate(
+    place: int,
+    unknown: str,
+    value: float,
+    prior_sd: float,
+    sd: float,
+    plate: str | None = None,
+    trial: str | None = None,
+) -> Solved:
+    quantity, axis = _QUANTITIES[unknown]
+    error, error_sd = float(value), float(sd)
+    if quantity == GAIN:
+        error, error_sd = -error / (1.0 + error), error_sd / (1.0 + error) ** 2
+    elif unknown in PLATE_UNKNOWNS:
+        error = 0.0 - error
+    entry = CalibrationEntry(
+        kind="plate",
+        plate=plate,
+        trial=trial,
+        quantity=quantity,
+        axis=axis,
+        value=error,
+        prior_sd=prior_sd,
+        sd=error_sd,
+        unit=_UNITS[unknown],
+    )
+    return Solved(place, value, entry)
+
+
+def _delay(place: int, delay_s: tuple[float, float], prior_sd: float, trial: str | None = None) -> Solved:
+    value, sd = delay_s
+    entry = CalibrationEntry(
+        kind="synchronisation", trial=trial, quantity=DELAY, value=value, prior_sd=prior_sd, sd=sd, unit="s"
+    )
+    return Solved(place, value, entry)
 
 
 def _same_column(plate: str | None, plates: Sequence[str]) -> list[str]:
@@ -169,7 +162,7 @@ def _same_column(plate: str | None, plates: Sequence[str]) -> list[str]:
     return [other for column in columns if plate in column for other in column if other != plate]
 
 
-def _apart(one: InstrumentError, other: InstrumentError) -> bool:
+def _apart(one: CalibrationEntry, other: CalibrationEntry) -> bool:
     return abs(one.value - other.value) > INTERVAL_SD * float(np.hypot(one.sd, other.sd))
 
 

@@ -1,0 +1,114 @@
+"""`CalibrationEntry`: one quantity that the estimate calibrates, in the terms of the table that users read."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, fields
+from typing import Any, Literal
+
+import numpy as np
+
+from kinertia.findings.display import plate_text
+
+POSITION, GAIN, FREE_MOMENT, ZERO, ROTATION, DELAY = (
+    "position", "gain", "free moment", "zero offset", "rotation", "delay",
+)  # fmt: skip
+"""Quantities of instruments, each an error: recorded minus true; of a gain, recorded over true minus 1."""
+CENTRE, AXIS, BENDING = "centre change", "axis change", "bending"
+"""Quantities of the body. A change is the estimate minus the model's value."""
+SHOWN_UNIT = {
+    "m": (1e3, "mm"),
+    "s": (1e3, "ms"),
+    "1": (1e2, "%"),
+    "N": (1.0, "N"),
+    "rad": (180.0 / np.pi, "degrees"),
+    "N m/N": (1e3, "N m/kN"),
+    "kg m": (1.0, "kg m"),
+}
+"""Factor and unit in which people read a calibrated quantity."""
+_NOTABLE = 2.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class CalibrationEntry:
+    """What a fit found of one quantity, SI.
+
+    Attributes:
+        kind: what has it.
+        plate: name; None of all plates, and of what is no plate.
+        joint: name.
+        trial: name; None of what all trials share.
+        quantity: what it is: the constants of this module.
+        axis: "x" forward, "y" up or "z" to the right; "1" or "2" of two directions across the axis of a joint.
+        value: of instruments an error, of joints a change.
+        prior_sd, sd: standard deviations before and after.
+        unit: a key of SHOWN_UNIT.
+        moved: of instruments, by how many halves of its own 95 % interval the error, put back, moves the joint moment
+            that it moves most.
+        contradicted_by: who finds another error of the instrument; None nobody.
+
+    >>> gain = CalibrationEntry(
+    ...     kind="plate", plate="left", quantity=GAIN, value=-0.2, prior_sd=0.01, sd=0.01, unit="1", moved=3.0
+    ... )
+    >>> str(gain), gain.found, gain.supported
+    ('plate left: gain', True, True)
+    """
+
+    kind: Literal["plate", "synchronisation", "joint", "trunk"]
+    plate: str | None = None
+    joint: str | None = None
+    trial: str | None = None
+    quantity: str
+    axis: str | None = None
+    value: float
+    prior_sd: float
+    sd: float
+    unit: str
+    moved: float | None = None
+    contradicted_by: str | None = None
+
+    @property
+    def of_instrument(self) -> bool:
+        """Whether it is an error of plates or synchronisation."""
+        return self.kind in ("plate", "synchronisation")
+
+    @property
+    def key(self) -> tuple[str | None, ...]:
+        """What identifies the quantity among all of a fit."""
+        return self.kind, self.plate, self.joint, self.trial, self.quantity, self.axis
+
+    @property
+    def notable(self) -> bool:
+        """Whether it is more than an instrument is usually off."""
+        return abs(self.value) > _NOTABLE * self.prior_sd
+
+    @property
+    def found(self) -> bool:
+        """Whether it is also certain."""
+        return self.notable and abs(self.value) > _NOTABLE * self.sd
+
+    @property
+    def supported(self) -> bool:
+        """Whether it also matters, and is contradicted by nobody."""
+        return self.found and self.moved is not None and self.moved > 1.0 and not self.contradicted_by
+
+    def __str__(self) -> str:
+        of = item_text(self.kind, self.plate, self.joint)
+        return f"{of}: {quantity_text(self.quantity, self.axis, self.trial)}"
+
+
+def item_text(kind: str, plate: str | None, joint: str | None = None) -> str:
+    """What has a quantity: "plate left", "all plates", "hip_r", "synchronisation"."""
+    return plate_text(plate) if kind == "plate" else joint or kind
+
+
+def quantity_text(quantity: str, axis: str | None, trial: str | None = None) -> str:
+    """A quantity with its axis, and the trial that has it of its own: "position x", "gain in walk"."""
+    along = f"{quantity} {axis}" if axis else quantity
+    return f"{along} in {trial}" if trial else along
+
+
+def calibration_columns(entries: Iterable[CalibrationEntry]) -> dict[str, list[Any]]:
+    """The table of calibrated quantities, by column."""
+    entries = list(entries)
+    return {field.name: [getattr(one, field.name) for one in entries] for field in fields(CalibrationEntry)}
