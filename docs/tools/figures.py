@@ -187,7 +187,8 @@ def _opensim_moments(data: Path, work: Path) -> pd.DataFrame:
 def _verdict_strip(figure: plt.Figure, fitted: dict) -> None:
     """What the fit says of its joint moments and of the left plate, below the curves."""
     use = next(one["use"] for one in fitted["suitability"] if one["output"] == "joint moments")
-    crosstalk = fitted["calibration"]["plate left: free moment"]
+    left = {"plate": "left", "quantity": "free moment"}
+    crosstalk = next(one for one in fitted["calibration"] if one.items() >= left.items())
     found, usual = (1e3 * crosstalk[name] for name in ("value", "prior_sd"))
     fill, edge = _USE_COLORS[use]
     strip = figure.add_axes((0.015, 0.03, 0.97, 0.125))

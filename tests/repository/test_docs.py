@@ -149,6 +149,7 @@ def test_results_page_names_every_file_and_column(fit_of):
     assert _column("results.md", "## bsp.csv") == list(pd.read_csv(fitted.folder / "bsp.csv", nrows=1).columns)
     assert set(_column("results.md", "<!-- keys of fit.json -->")) == set(fitted.summary)
     assert set(_column("results.md", "<!-- keys of a trial -->")) == set(fitted.trial)
+    assert _column("results.md", "<!-- columns of calibration -->") == list(fitted.summary["calibration"][0])
 
 
 def test_the_house_is_drawn_from_the_contract():

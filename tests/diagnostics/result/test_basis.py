@@ -9,7 +9,7 @@ from kinertia.diagnostics.result.context import ResultContext
 from kinertia.diagnostics.result.session import session_contradictions
 from kinertia.findings.finding import Severity
 from kinertia.settings import Settings
-from results import codes
+from results import codes, error
 
 
 def test_a_chosen_cutoff_and_frames_that_count_less(fit):
@@ -33,24 +33,20 @@ def test_what_the_prior_decides(fit, two_level):
     assert codes(basis(ResultContext(two_level, None))) == ["R402"] * len(two_level.trials) + ["R403"]
 
 
+def offset(value, plate="left"):
+    return error("position", value, 0.004, 0.001, "m", plate, axis="x")
+
+
 @pytest.mark.parametrize(("other", "expected"), [(0.010, []), (0.002, ["S501"])])
 def test_one_person_against_the_others_of_the_session(other, expected):
-    own, others = (
-        {"left": {"x": (value, 0.001, "m")}, "clock": {"late": (0.0, 0.001, "s")}} for value in (0.012, other)
-    )
+    own, others = ([offset(value), offset(0.0, "right")] for value in (0.012, other))
     found = list(session_contradictions("Anna", own, others))
     assert codes(found) == expected
     for one in found:
         assert one.where.plate == "left"
-        assert [one.evidence[name].value for name in ("error", "other_error")] == [-0.012, -0.002]
-        assert one.evidence["person"].value == "Anna"
+        assert [one.evidence[name].value for name in ("error", "other_error")] == [0.012, 0.002]
+        assert [one.evidence[name].value for name in ("person", "instrument")] == ["Anna", "plate left: position x"]
 
 
 def test_a_person_without_others_contradicts_nobody():
-    assert list(session_contradictions("Anna", {"left": {"x": (0.1, 0.001, "m")}}, {})) == []
-
-
-def test_the_delay_of_a_session_is_an_error_as_it_is():
-    own, others = ({"clock": {"delay": (value, 0.001, "s")}} for value in (0.01, 0.0))
-    (one,) = session_contradictions("Anna", own, others)
-    assert one.evidence["error"].value == 0.01
+    assert list(session_contradictions("Anna", [offset(0.1)], [])) == []
