@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kinertia.diagnostics.result.free_moments import reversed_sign
-from kinertia.estimation.free_moment_sign import VERTICAL, left_moments_nm
+from kinertia.estimation.free_moment_sign import VERTICAL, left_moments_nm, left_without_offsets_nm
 from kinertia.motion.dynamics import residual
 from kinertia.trial.centre_of_pressure import held_centre_of_pressure
 
@@ -55,3 +55,16 @@ def test_a_wrong_sign_is_named(of_walk):
 def test_without_free_moments_there_is_no_sign(of_walk):
     as_is, otherwise = left_by(turned(of_walk, 0.0))
     assert as_is == otherwise
+
+
+def test_an_offset_under_one_foot_is_no_wrong_sign():
+    """What changes under the foot has the right sign; turned, the offset would go with the motion."""
+    phase = np.linspace(0.0, 2.0 * np.pi, 100)
+    loads = np.zeros((200, 2, 6))
+    loads[:100, 0, 1] = loads[100:, 1, 1] = 700.0
+    loads[:100, 0, 4] = 3.0 + 0.5 * np.sin(phase)
+    left = np.concatenate([np.full(100, -6.0), np.zeros(100)])
+    as_is, turned_nm = left_moments_nm(left, loads)
+    assert turned_nm < 0.8 * as_is
+    as_is, turned_nm = left_without_offsets_nm(left, loads)
+    assert as_is < 1e-9 < 0.3 < turned_nm

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -15,12 +15,14 @@ from kinertia.diagnostics.evidence.contact_span import contact_span_s
 from kinertia.diagnostics.evidence.copied_frames import FEWEST_FRAMES, without_copied_frames
 from kinertia.diagnostics.evidence.foot_trajectories import FootTrajectory, foot_trajectories
 from kinertia.diagnostics.evidence.force_mass import ForceMass, force_mass
+from kinertia.diagnostics.evidence.hallux import halluces
 from kinertia.diagnostics.evidence.landmarks import CLEAR, cosine, headings, landmark_positions, most_forwards
 from kinertia.diagnostics.evidence.loaded_plates import adult_share
 from kinertia.diagnostics.evidence.marker_precision import MarkerPrecision
 from kinertia.diagnostics.evidence.plate_contacts import PlateContact, contacts_of
-from kinertia.diagnostics.evidence.plate_edges import Overhang, overhangs
+from kinertia.diagnostics.evidence.plate_edges import FootPoints, Overhang, overhangs
 from kinertia.diagnostics.evidence.plate_masses import plate_masses
+from kinertia.diagnostics.evidence.standing_mass import StandingMass, standing_mass
 from kinertia.diagnostics.evidence.strides import periods, swing_in_turn
 from kinertia.diagnostics.evidence.trajectory_faults import TrajectoryFaults
 from kinertia.errors import KinertiaError
@@ -29,8 +31,9 @@ from kinertia.findings.finding import Finding, Severity
 from kinertia.findings.where import Where
 from kinertia.model.imported import OsimModel
 from kinertia.model.marker_set import MarkerSet
+from kinertia.motion.kinematics import FEWEST_FRAMES as FEWEST_MEASURED
 from kinertia.settings import Subject
-from kinertia.trial.data import FloatArray, Markers, PlateLoads, Recording, Trial
+from kinertia.trial.data import FEET, FloatArray, Markers, PlateLoads, Recording, Trial
 from kinertia.trial.ground_contact import FootMarkers
 from kinertia.trial.marker_quality import Travel, travel
 from kinertia.trial.plate_assignment import build_trial
@@ -185,9 +188,11 @@ class RecordingContext:
         """Feet that reach beyond the plate that they stand on; none where its corners are not known."""
         if self.plates is None or self.feet is None:
             return ()
-        landmarks = {} if self.marker_set is None else self.marker_set.landmarks
-        toes = {label for side in "rl" for label in landmarks.get(f"toe_{side}", ())}
-        return overhangs(self.plates, self.contacts, self.all_markers, self.feet, toes)
+        named = {} if self.marker_set is None else self.marker_set.landmarks
+        toes = {label for side in FEET for label in named.get(f"toe_{side}", ())}
+        tips, markers = halluces(self.landmark_positions, self.height_m), self.all_markers
+        feet = [FootPoints.of(markers, self.feet[side], toes, tips.get(side)) for side in FEET]
+        return overhangs(self.plates, self.contacts, markers.time, feet)
 
     @cached_property
     def loaded(self) -> Trial | KinertiaError | None:
@@ -231,6 +236,19 @@ class RecordingContext:
         return cosine(first[None], last[None]) < _STRAIGHT
 
     @cached_property
+    def trial_on_plates(self) -> Trial | None:
+        """The trial without frames in which a foot bears load beyond its plate, unless the user vouches for a window;
+        None where it is impossible, or hardly any frames are left.
+        """
+        trial = self.trial
+        if trial is None or self.window_s is not None:
+            return trial
+        measured = trial.measured.copy()
+        for one in self.overhangs:
+            measured &= True if one.unmeasured_s is None else ~within(trial.markers.time, *one.unmeasured_s)
+        return replace(trial, measured=measured) if measured.sum() >= FEWEST_MEASURED else None
+
+    @cached_property
     def adult_share(self) -> float:
         """Body weight over an adult's, at most 1: limits in newtons, which are those of adults, are times this."""
         return adult_share(self.plates, self.mass_kg)
@@ -248,9 +266,16 @@ class RecordingContext:
     @cached_property
     def force_mass(self) -> ForceMass | None:
         """Body mass by the vertical force; None where forces or markers do not show it."""
-        if self.trial is None:
+        if self.trial_on_plates is None:
             return None
-        return force_mass(self.segment_of_label, self.trial, self.travel.kind == "stands still")
+        return force_mass(self.segment_of_label, self.trial_on_plates, self.travel.kind == "stands still")
+
+    @cached_property
+    def standing_mass(self) -> StandingMass | None:
+        """Body mass while the person stands still with both feet on plates; None where that is not so."""
+        if self.plates is None or self.feet is None:
+            return None
+        return standing_mass(self.plates, self.all_markers, self.feet)
 
     @cached_property
     def plate_masses(self) -> Mapping[str, float]:

@@ -107,6 +107,19 @@ def left_moments_nm(left: np.ndarray, foot_loads: np.ndarray) -> tuple[float, fl
     return (as_is, as_is) if 2.0 * np.std(free) < _LARGE * as_is else (as_is, turned)
 
 
+def left_without_offsets_nm(left: np.ndarray, foot_loads: np.ndarray) -> tuple[float, float]:
+    """The same as `left_moments_nm`, each without what an error of either plate in proportion to its load explains.
+
+    An offset under one foot is no wrong sign, though the turned moments may go with the motion better.
+    """
+    free = _free_nm(foot_loads)
+    loads = np.column_stack([foot_loads[..., 1], np.ones(len(left))])
+    both = np.column_stack([left, left + 2.0 * free])
+    rest = both - loads @ np.linalg.lstsq(loads, both, rcond=None)[0]
+    as_is, turned = (float(each) for each in rest.std(axis=0))
+    return as_is, turned
+
+
 def _left_nm(left: np.ndarray, free: np.ndarray) -> tuple[float, float]:
     return float(np.std(left)), float(np.std(left + 2.0 * free))
 

@@ -14,9 +14,8 @@ from kinertia.errors import TrialError
 from kinertia.estimation.prepared import Progress
 from kinertia.findings.finding import Finding
 from kinertia.model.skeleton import Skeleton
-from kinertia.motion.kinematics import FEWEST_FRAMES, Kinematics, solve_kinematics
+from kinertia.motion.kinematics import Kinematics, solve_kinematics
 from kinertia.trial.data import Trial
-from kinertia.trial.sampled_time import within
 
 
 @dataclass(frozen=True)
@@ -37,17 +36,14 @@ class Turned:
 def usable_trial(context: RecordingContext) -> Trial:
     """The trial of a recording that can be used, without markers that no frame shows, and without copied frames.
 
-    Frames in which more than a toe is beyond its plate are not measured, unless the user vouches for a window, or
+    Frames in which a foot bears load beyond its plate are not measured, unless the user vouches for a window, or
     hardly any others are left.
     """
     trial = context.trial
     assert trial is not None
     seen = trial.markers.seen
     labels = [label for column, label in enumerate(trial.markers.labels) if seen[:, column].any()]
-    whole = trial.measured.copy()
-    for one in context.overhangs if context.window_s is None else ():
-        whole &= one.only_toe | ~within(trial.markers.time, *one.span_s)
-    measured = whole if whole.sum() >= FEWEST_FRAMES else trial.measured
+    measured = (context.trial_on_plates or trial).measured
     return replace(trial, markers=without_copied_frames(trial.markers.select(labels)), measured=measured)
 
 

@@ -43,6 +43,7 @@ from kinertia.motion.upright_trunk import with_upright_trunk
 from kinertia.settings import Attached, Overrule, Settings, Subject
 from kinertia.trial.data import Recording, Trial
 from kinertia.trial.trial_input import TrialInput
+from kinertia.workflow.doubted_mass import with_doubted_mass
 from kinertia.workflow.kinematics import Turned, solved_trials, usable_trial
 from kinertia.workflow.person import Person
 from kinertia.workflow.screening import Screened, screen
@@ -173,7 +174,7 @@ def prepared(screened: Screened, settings: Settings, progress: Progress = lambda
         settings=settings,
         skeleton=skeleton,
         literature=expected.prior.mean,
-        prior=expected.prior,
+        prior=with_doubted_mass(expected.prior, screened.findings),
         uncertainty=GAIT27_UNCERTAINTY.with_axes() if settings.joint_axes else GAIT27_UNCERTAINTY,
         file=None,
         kinematics=solved.kinematics,

@@ -32,6 +32,7 @@ from kinertia.model.skeleton import Axis, Skeleton
 from kinertia.motion.one_thread import one_blas_thread
 from kinertia.settings import Attached, Overrule, Settings, Subject
 from kinertia.trial.trial_input import TrialInput
+from kinertia.workflow.doubted_mass import with_doubted_mass
 from kinertia.workflow.kinematics import Turned, solved_trials, usable_trial
 from kinertia.workflow.person import Person
 from kinertia.workflow.prepare import LOWER_BODY_SD_M, UPPER_BODY_SD_M
@@ -107,7 +108,7 @@ def prepared_osim(screened: Screened, settings: Settings, progress: Progress = l
         settings=settings,
         skeleton=skeleton,
         literature=uncertainty.whole(prior.mean),
-        prior=prior,
+        prior=with_doubted_mass(prior, screened.findings),
         uncertainty=uncertainty,
         file=model,
         kinematics=solved.kinematics,

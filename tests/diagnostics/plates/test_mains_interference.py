@@ -46,3 +46,13 @@ def test_interference(name, mains_hz, axis, recording_of):
         assert found.where == context.at(plate=plates.names[0], **context.along(axis))
         assert found.evidence["amplitude_n"].value == pytest.approx(size, rel=0.15)
         assert found.evidence["frequency_hz"].value == mains_hz
+
+
+def test_interference_that_the_unloaded_plate_shows_is_filtered(recording_of):
+    """Its noise says from which force on the plate is loaded, and how far forces are low-passed."""
+    plates = recording_of(*WALKS["synthetic"]).plates
+    hum = np.outer(25.0 * np.sin(2 * np.pi * 50.0 * plates.time), [0.0, 1.0, 0.0])
+    force = plates.force + (plates.force[..., 1:2] > 0) * hum[:, None]
+    for noise_n, severity in ((18.0, Severity.WARNING), (1.0, Severity.ERROR)):
+        known = replace(plates, force=force, noise_n=(noise_n,) * len(plates.names))
+        assert {one.severity for one in mains_interference(plates_alone(known))} == {severity}

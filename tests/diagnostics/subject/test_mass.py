@@ -15,6 +15,7 @@ from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.settings import Attached
 from kinertia.synthetic.walk import walk, walking_subject
 from kinertia.trial.data import FootLoads, Trial
+from kinertia.trial.idle_level import IdleReading
 from people import codes, person
 from recordings import LONG_WALKS, RUNS, SQUATS, WALKS
 
@@ -222,6 +223,63 @@ def test_a_static_trial_on_plates_is_weighed(lab):
     assert (alone.code, alone.severity, alone.where.trial) == ("S111", Severity.WARNING, static.name)
     (beside,) = stated_mass(person([walked], stood, marker_set, mass_kg=72.6))
     assert (beside.severity, beside.where.trial) == (Severity.INFO, static.name)
+
+
+def test_two_occasions_that_agree_are_believed(lab):
+    """Plates are not scaled to a mass that static trial and walk contradict by 7 %; one of them alone warns."""
+    walked, static, marker_set = lab
+    stood = standing_on_plates(static, walked, 72.6)
+    (both,) = stated_mass(person([walked], stood, marker_set, mass_kg=67.5))
+    (alone,) = stated_mass(person([walked], None, marker_set, mass_kg=67.5))
+    assert (both.severity, alone.severity) == (Severity.ERROR, Severity.WARNING)
+    assert [both.evidence[name].value for name in ("mass_by_force_kg", "stated_kg")] == [
+        pytest.approx(72.6, abs=0.5),
+        67.5,
+    ]
+    assert causes_of(both)[0] in ("a wrong stated mass", "a load that was worn or carried and not declared")
+
+
+def on_one_plate(stood, level_n=0.0):
+    """Both feet on the first plate, which reads so much more, all the time."""
+    plates = stood.plates
+    level = level_n * np.array([0.0, 1.0, 0.0])
+    corners = np.array([[[2.0, 0.0, 2.0], [-2.0, 0.0, 2.0], [-2.0, 0.0, -2.0], [2.0, 0.0, -2.0]]] * 2)
+    return replace(
+        stood,
+        plates=replace(
+            plates,
+            force=np.stack([plates.force.sum(axis=1) + level, 0.0 * plates.force[:, 0]], axis=1),
+            moment=np.stack([plates.moment.sum(axis=1), 0.0 * plates.moment[:, 0]], axis=1),
+            corners=corners,
+            idle=(IdleReading((np.nan,) * 3, np.nan, 800.0, 0.0), IdleReading((0.0,) * 3, 0.0, 0.0, 0.0)),
+        ),
+    )
+
+
+def test_both_feet_on_one_plate_are_weighed(lab):
+    walked, static, marker_set = lab
+    stood = on_one_plate(standing_on_plates(static, walked, 60.0))
+    (found,) = stated_mass(person([], stood, marker_set, mass_kg=72.6))
+    assert found.evidence["mass_by_force_kg"].value == pytest.approx(60.0, abs=0.1)
+
+
+def test_one_foot_beside_the_plates_is_not_weighed(lab):
+    walked, static, marker_set = lab
+    stood = standing_on_plates(static, walked, 72.6)
+    force, moment = stood.plates.force.copy(), stood.plates.moment.copy()
+    force[:, 1], moment[:, 1] = 0.0, 0.0
+    stood = replace(stood, plates=replace(stood.plates, force=force, moment=moment))
+    assert list(stated_mass(person([], stood, marker_set, mass_kg=72.6))) == []
+
+
+def test_a_plate_that_is_never_idle_in_the_static_trial_is_in_the_walk(lab):
+    """It reads 60 N all day long."""
+    walked, static, marker_set = lab
+    stood = on_one_plate(standing_on_plates(static, walked, 72.6), level_n=60.0)
+    idle = IdleReading((0.0, 60.0, 0.0), 0.0, 800.0, 0.0, subtracted=True)
+    plates = replace(walked.plates, names=stood.plates.names, corners=stood.plates.corners, idle=(idle, idle))
+    assert list(stated_mass(person([replace(walked, plates=plates)], stood, marker_set, mass_kg=72.6))) == []
+    assert codes(stated_mass(person([walked], stood, marker_set, mass_kg=72.6))) == ["S111"]
 
 
 def test_trials_of_different_masses(lab):

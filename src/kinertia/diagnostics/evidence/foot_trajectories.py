@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -27,6 +27,8 @@ _THIRD_DIFFERENCE = 0.6745 * np.sqrt(20.0)
 _SHORTEST_S, _MOSTLY = 0.1, 0.5
 _LOAD_BEGINS, _LOAD_GOES_ON = 0.25, 0.65
 """Shares of the line between a foot's outermost markers."""
+_TOES = 0.35
+"""Length of the toes over that from heel to metatarsal heads."""
 _LANDING_S = 0.05
 """A foot may bear load so long before it stands and after."""
 
@@ -69,6 +71,10 @@ class FootTrajectory:
         length = np.maximum(np.linalg.norm(along, axis=1), 1e-6)
         ahead: FloatArray = ((place - back) * along).sum(axis=1) / length
         return ahead, ahead - length
+
+    def with_toes(self) -> FootTrajectory:
+        """The same foot with toes in front of the metatarsal heads, where no marker shows them."""
+        return replace(self, front=self.front + _TOES * (self.front - self.back))
 
     def expected_cop(self, time: FloatArray, weight: FloatArray) -> FloatArray:
         """(k, 2) m, where the load of a step is expected that has this vertical force (k,) N at these times (k,)."""

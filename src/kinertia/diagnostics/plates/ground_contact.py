@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
+from kinertia.diagnostics.evidence.foot_trajectories import FootTrajectory
 from kinertia.diagnostics.evidence.plate_contacts import BETWEEN_M, ONE_STEP_S, PlateContact
 from kinertia.diagnostics.evidence.plate_edges import OVERHANG_M
 from kinertia.diagnostics.plates.heel_landing import goes_forwards
@@ -14,7 +16,7 @@ from kinertia.errors import KinertiaError
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.motion.kinematics import FEWEST_FRAMES
-from kinertia.trial.data import BoolArray
+from kinertia.trial.data import FEET, BoolArray
 from kinertia.trial.plate_assignment import FOOT_NAMES, no_forces
 from kinertia.trial.sampled_time import span_s
 
@@ -56,7 +58,7 @@ def both_feet(context: RecordingContext) -> Iterator[Finding]:
     if plates is None or feet is None or context.is_static or not goes_forwards(context):
         return
     for contact in context.contacts:
-        away = _under_both(contact) & feet[1 - contact.foot].standing(contact.time)
+        away = _under_both(_to_toes(context, contact, feet)) & feet[1 - contact.foot].standing(contact.time)
         share = float(contact.weight[away].sum() / contact.weight.sum())
         limit = _MOSTLY if span_s(contact.time) > ONE_STEP_S else _OUTSIDE_SHARE
         if share > limit:
@@ -64,6 +66,15 @@ def both_feet(context: RecordingContext) -> Iterator[Finding]:
             span = (float(when[0]), float(when[-1]))
             where = context.at(plate=plates.names[contact.plate], span_s=span)
             yield finding("P276", where, share=Quantity(share, "1", limit=limit))
+
+
+def _to_toes(
+    context: RecordingContext, contact: PlateContact, feet: tuple[FootTrajectory, FootTrajectory]
+) -> PlateContact:
+    """The load, with its distance to the end of the toes of feet that have no marker there."""
+    named = {} if context.marker_set is None else context.marker_set.landmarks
+    whole = [foot if f"toe_{side}" in named else foot.with_toes() for side, foot in zip(FEET, feet, strict=True)]
+    return replace(contact, offset_m=np.stack([foot.offset_m(contact.time, contact.place) for foot in whole]))
 
 
 def _under_both(contact: PlateContact) -> BoolArray:

@@ -25,13 +25,17 @@ from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.model.skeleton import GRAVITY_M_S2
+from kinertia.trial.data import PlateLoads
 
-WARNING_SHARE, ERROR_SHARE = 0.02, 0.10
-"""Stated mass and vertical force may differ by this share and twice the SD of the difference."""
+WARNING_SHARE, ERROR_SHARE, AGREED_SHARE = 0.02, 0.10, 0.05
+"""Stated mass and vertical force may differ by this share and twice the SD of the difference; by the last one, where
+several occasions agree that they do."""
 _SAME = 0.04
 """Share by which two plates, or a plate and the stated mass, may differ and still agree: usual are 2 %."""
 _REPEATED = 0.005
 """By which a mass by the same plates differs from one occasion to another, SD as a share."""
+_SAME_PLACE_M = 1e-3
+"""Corners of the same plate in two files."""
 _LOAD_KG = 2.0
 """From which on a surplus may be something that was worn or carried."""
 _POUND, _UNIT_OFF = 0.45359, 0.1
@@ -46,13 +50,19 @@ _PLATES = "gain or zero of the plates"
 
 @dataclass(frozen=True)
 class _Occasion:
-    """A mass by force, and the trial that it is of; None of all trials together."""
+    """A mass by force, and the trial that it is of; None of all `count` occasions together."""
 
     trial: str | None
     mass_kg: float
     sd_kg: float
     over: str
     standing: bool = False
+    count: int = 1
+
+    @property
+    def error_share(self) -> float:
+        """By which the stated mass may differ before nothing is computed with it."""
+        return ERROR_SHARE if self.count == 1 else AGREED_SHARE
 
     def allowed_kg(self, total: CarriedMass, share: float) -> float:
         """By which the stated mass may differ."""
@@ -75,7 +85,7 @@ def stated_mass(context: PersonContext) -> Iterator[Finding]:
     for name, found in apart.items():
         missing, complete = Quantity(found.missing, "1", limit=MISSING), Quantity(found.complete, "1")
         yield finding("P281", Where(trial=name, span_s=found.span_s), missing=missing, complete=complete)
-    standing = [_occasion(one.name, mass, True) for one in context.standing if (mass := one.force_mass) is not None]
+    standing = [*_standing(context)]
     whole = [_occasion(name, mass) for name, mass in known.items() if name not in apart]
     partly = [_occasion(name, mass) for name, mass in known.items() if name in apart]
     for one in [*_together([*whole, *standing]), *partly]:
@@ -92,7 +102,7 @@ def masses_of_trials(context: PersonContext) -> Iterator[Finding]:
     speak against.
     """
     known = {one.name: one.force_mass for one in context.trials if one.force_mass is not None}
-    standing = [mass.mass_kg for one in context.standing if (mass := one.force_mass) is not None]
+    standing = [one.mass_kg for one in _standing(context)]
     for (first, own), (other, others) in combinations(known.items(), 2):
         lighter_kg = min(own.mass_kg, others.mass_kg)
         allowed = ERROR_SHARE * lighter_kg + 2.0 * float(np.hypot(own.sd_kg, others.sd_kg))
@@ -116,6 +126,37 @@ def _occasion(name: str | None, mass: ForceMass, standing: bool = False) -> _Occ
     return _Occasion(name, mass.mass_kg, float(np.hypot(mass.sd_kg, _REPEATED * mass.mass_kg)), mass.over, standing)
 
 
+def _standing(context: PersonContext) -> Iterator[_Occasion]:
+    """While the person stands still with both feet on plates: in static trials, and in the course of others."""
+    for one in (*context.standing, *context.trials):
+        still = one.standing_mass
+        other_way = one.is_static or one.force_mass is None or one.travel.kind != "stands still"
+        if still is not None and one.plates is not None and other_way:
+            mass_kg = still.mass_kg - _level_kg(context, one.plates, still.plates)
+            sd_kg = float(np.hypot(still.sd_kg, _REPEATED * mass_kg))
+            yield _Occasion(one.name, mass_kg, sd_kg, "standing", True)
+        elif one.is_static and one.force_mass is not None:
+            yield _occasion(one.name, one.force_mass, True)
+
+
+def _level_kg(context: PersonContext, plates: PlateLoads, loaded: Sequence[str]) -> float:
+    """What these plates read while nobody stands on them, by trials that show it, where the static trial does not."""
+    if plates.idle is None or plates.corners is None:
+        return 0.0
+    level_n = 0.0
+    for name, idle, corners in zip(plates.names, plates.idle, plates.corners, strict=True):
+        levels = [
+            there.level_n[1]
+            for trial in context.trials
+            if (other := trial.plates) is not None and other.idle is not None and other.corners is not None
+            for same, there, place in zip(other.names, other.idle, other.corners, strict=True)
+            if same == name and there.subtracted and np.allclose(place, corners, atol=_SAME_PLACE_M)
+        ]
+        if name in loaded and np.isnan(idle.level_n[1]) and levels:
+            level_n += float(np.median(levels))
+    return level_n / GRAVITY_M_S2
+
+
 def _together(occasions: Sequence[_Occasion]) -> list[_Occasion]:
     """One for all where they agree, else each by itself."""
     if len(occasions) < 2:
@@ -126,7 +167,8 @@ def _together(occasions: Sequence[_Occasion]) -> list[_Occasion]:
     for one, two in combinations(occasions, 2):
         if abs(one.mass_kg - two.mass_kg) > WARNING_SHARE * mass_kg + 2.0 * float(np.hypot(one.sd_kg, two.sd_kg)):
             return list(occasions)
-    return [_Occasion(None, mass_kg, sd_kg, " and ".join(dict.fromkeys(one.over for one in occasions)))]
+    over = " and ".join(dict.fromkeys(one.over for one in occasions))
+    return [_Occasion(None, mass_kg, sd_kg, over, count=len({one.trial for one in occasions}))]
 
 
 def _contradiction(
@@ -156,7 +198,7 @@ def _contradiction(
         evidence["static_kg"] = Quantity(standing.mass_kg, "kg", sd=standing.sd_kg)
     if len(by_plate) > 1:
         evidence["plates_kg"] = Quantity(tuple(by_plate.values()), "kg")
-    severity = Severity.ERROR if one.differs(total, ERROR_SHARE) else Severity.WARNING
+    severity = Severity.ERROR if one.differs(total, one.error_share) else Severity.WARNING
     yield finding("S111", where, severity, causes, **evidence)
 
 
