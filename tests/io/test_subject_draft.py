@@ -8,12 +8,13 @@ from pathlib import Path
 
 import pytest
 
-from generic_static import standing_positions
+from generic_static import recording, standing_positions
 from kinertia.errors import FileError
 from kinertia.io.marker_set_file import read_marker_set
 from kinertia.io.measures_file import measures_sheet
 from kinertia.io.subject_draft import init_files, init_subject
 from kinertia.io.subject_file import read_subject
+from kinertia.io.trc import write_trc
 from kinertia.settings import Settings
 from recordings import here
 from refusals import refused
@@ -332,19 +333,7 @@ def test_init_takes_no_static_trial_where_all_move(tmp_path):
 
 def standing_trc(path, labels):
     """Somebody who stands, in a file, by these labels."""
-    rows = [
-        f"{k + 1}\t{k / 100:.2f}\t" + "\t".join(f"{1e3 * x:.2f}" for at in labels.values() for x in at)
-        for k in range(30)
-    ]
-    head = [
-        f"PathFileType\t4\t(X/Y/Z)\t{path.name}",
-        "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames",
-        f"100\t100\t30\t{len(labels)}\tmm\t100\t1\t30",
-        "Frame#\tTime\t" + "\t\t\t".join(labels),
-        "\t\t" + "\t".join(f"X{k}\tY{k}\tZ{k}" for k in range(1, len(labels) + 1)),
-        "",
-    ]
-    path.write_text("\n".join(head + rows) + "\n")
+    write_trc(path, recording(labels, frames=30).markers)
 
 
 def test_init_drafts_a_marker_set_where_no_preset_fits(tmp_path):

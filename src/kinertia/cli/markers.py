@@ -10,12 +10,13 @@ import typer
 from kinertia.cli.outcome import Outcome
 from kinertia.cli.terminal import out, plain_table
 from kinertia.errors import FileError
-from kinertia.io.marker_set_draft import draft_marker_set
+from kinertia.io.marker_set_draft import draft_marker_set, preset_of
 from kinertia.io.marker_set_file import nearest_preset, preset_names, read_marker_set
 from kinertia.io.output_folder import write_then_rename
 from kinertia.io.recording import read_recording
 from kinertia.model.marker_set import fits_person, share_worn, spelled_as
 from kinertia.trial.data import Recording
+from kinertia.trial.stillness import STILL_M_S, speed_m_s
 
 _LISTED = 6
 
@@ -57,6 +58,8 @@ def markers(
     recognised = named[best.name] if fits_person(best, labels) else None
     if recognised:
         out.print(f"{recognised} is recognised by itself", soft_wrap=True)
+        if speed_m_s(recording.markers) < STILL_M_S and preset_of(recording) is None:
+            out.print("but this static trial lacks landmarks of it: draft one of your own with -o", soft_wrap=True)
     elif output is None:
         out.print("no preset is recognised; for a draft of your own: -o our_lab.toml", soft_wrap=True)
     content = {"labels": labels, "presets": presets, "recognised": recognised, "draft": None}

@@ -13,6 +13,7 @@ from kinertia.cli.web.entries import entries, write
 from kinertia.cli.web.library import Person
 from kinertia.diagnostics.labels.marker_set_match import match_labels
 from kinertia.errors import FileError, KinertiaError, SettingsError
+from kinertia.io.marker_places.placement import place_markers
 from kinertia.io.marker_set_draft import known_places, marker_set_text
 from kinertia.io.marker_set_file import preset_names, read_marker_set
 from kinertia.io.osim.reader import read_osim
@@ -67,13 +68,16 @@ def marker_places(person: Person) -> MarkerPlaces:
     content = entries(person)
     model = _table(content.get("model"))
     path, unit = _recording(person, content)
-    markers = read_recording(path, length_unit=unit).without_empty_markers().markers
+    recording = read_recording(path, length_unit=unit).without_empty_markers()
+    markers = recording.markers
     wanted = _named_set(person, model)
     match, used = match_labels(markers.labels, wanted)
     if used is not None:
         places = {name: dict(_owners(own)) for name, own in (("s", used.segments), ("l", used.landmarks))}
     else:
-        landmarks, segments = known_places(markers.labels)
+        placed = place_markers(recording)
+        found = placed.landmarks, placed.segments
+        landmarks, segments = found if placed.landmarks else known_places(markers.labels)
         places = {"s": dict(_owners(segments)), "l": dict(_owners(landmarks))}
     here = set(markers.labels)
     return MarkerPlaces(

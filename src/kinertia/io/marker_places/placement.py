@@ -78,7 +78,7 @@ def place_markers(recording: Recording) -> Placement:
     postures = _frames(markers) if moves else [np.nanmedian(markers.positions, axis=0)]
     body, found, margin = max((_best_body(markers.labels, each, computed, pairs) for each in postures), key=_score)
     if found.score < _SURE:
-        result.notes.append("these are not the markers of somebody who stands upright: give the static trial")
+        result.notes.append("nobody was found who stands upright, and labels alone decide: give the static trial")
         return result
     if moves:
         result.notes.append("nobody stands still here: the static trial shows better where the markers are")
