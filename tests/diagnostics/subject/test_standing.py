@@ -53,6 +53,12 @@ def test_another_stature(standing, off_m):
     assert found.evidence["implied_m"].value == pytest.approx(standing.height_m, abs=0.08)
 
 
+def test_markers_on_top_of_shoes(standing):
+    """53 to 60 mm above the floor in one laboratory, where the corners of the plates are at zero."""
+    positions = standing.all_markers.positions
+    assert list(floor(moved(standing, positions + np.array([0.0, 0.02, 0.0])))) == []
+
+
 @pytest.mark.parametrize("rise_m", [-0.06, 0.06])
 def test_another_floor(standing, rise_m):
     positions = standing.recording.markers.positions
