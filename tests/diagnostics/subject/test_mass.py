@@ -8,6 +8,7 @@ import pytest
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.force_mass import force_mass
 from kinertia.diagnostics.evidence.markers_centre import owners_of
+from kinertia.diagnostics.evidence.plate_edges import Overhang
 from kinertia.diagnostics.runner import explained
 from kinertia.diagnostics.subject.mass import masses_of_trials, stated_mass
 from kinertia.findings.finding import Severity
@@ -280,6 +281,21 @@ def test_a_plate_that_is_never_idle_in_the_static_trial_is_in_the_walk(lab):
     plates = replace(walked.plates, names=stood.plates.names, corners=stood.plates.corners, idle=(idle, idle))
     assert list(stated_mass(person([replace(walked, plates=plates)], stood, marker_set, mass_kg=72.6))) == []
     assert codes(stated_mass(person([walked], stood, marker_set, mass_kg=72.6))) == ["S111"]
+
+
+def test_a_foot_beyond_its_plate_leaves_the_other_plate(lab):
+    """Where no window is left that weighs the person, the other foot's single support does."""
+    walked, _, marker_set = lab
+    context = person([walked], marker_set=marker_set, mass_kg=90.0)
+    (trial,) = context.trials
+    first, second = walked.plates.names
+    trial.__dict__["force_mass"] = None
+    trial.__dict__["plate_masses"] = {first: 72.6, second: 60.0}
+    assert list(stated_mass(context)) == []
+    trial.__dict__["overhangs"] = [Overhang(1, 1, 0.15, (0.5, 1.0), (0.5, 1.0))]
+    (found,) = stated_mass(context)
+    assert (found.code, found.evidence["mass_by_force_kg"].value) == ("S111", 72.6)
+    assert found.where.trial == walked.name
 
 
 def test_trials_of_different_masses(lab):

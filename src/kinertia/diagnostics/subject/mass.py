@@ -36,6 +36,9 @@ _REPEATED = 0.005
 """By which a mass by the same plates differs from one occasion to another, SD as a share."""
 _SAME_PLACE_M = 1e-3
 """Corners of the same plate in two files."""
+_LITTLE_BEYOND_M, _SINGLE_SUPPORT = 0.03, 0.04
+"""So little of a heel bears no load to speak of; SD of a mass by one single support, as a share: velocities of the
+markers' centre at its ends are known to 0.14 m/s."""
 _LOAD_KG = 2.0
 """From which on a surplus may be something that was worn or carried."""
 _POUND, _UNIT_OFF = 0.45359, 0.1
@@ -87,6 +90,7 @@ def stated_mass(context: PersonContext) -> Iterator[Finding]:
         yield finding("P281", Where(trial=name, span_s=found.span_s), missing=missing, complete=complete)
     standing = [*_standing(context)]
     whole = [_occasion(name, mass) for name, mass in known.items() if name not in apart]
+    whole += _by_plates(context)
     partly = [_occasion(name, mass) for name, mass in known.items() if name in apart]
     for one in [*_together([*whole, *standing]), *partly]:
         if one.differs(total, WARNING_SHARE):
@@ -124,6 +128,20 @@ def masses_of_trials(context: PersonContext) -> Iterator[Finding]:
 
 def _occasion(name: str | None, mass: ForceMass, standing: bool = False) -> _Occasion:
     return _Occasion(name, mass.mass_kg, float(np.hypot(mass.sd_kg, _REPEATED * mass.mass_kg)), mass.over, standing)
+
+
+def _by_plates(context: PersonContext) -> list[_Occasion]:
+    """By the plates that carry the whole foot, of trials in which another foot is beyond its plate most of the time."""
+    found = []
+    for one in context.trials:
+        if one.force_mass is not None or one.plates is None:
+            continue
+        beyond = {one.plates.names[each.plate] for each in one.overhangs if each.overhang_m > _LITTLE_BEYOND_M}
+        masses_kg = [mass_kg for name, mass_kg in one.plate_masses.items() if name not in beyond]
+        if beyond and masses_kg:
+            mass_kg = float(np.mean(masses_kg))
+            found.append(_Occasion(one.name, mass_kg, _SINGLE_SUPPORT * mass_kg, "single support"))
+    return found
 
 
 def _standing(context: PersonContext) -> Iterator[_Occasion]:
