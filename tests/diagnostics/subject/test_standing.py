@@ -5,13 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinertia.diagnostics.context import RecordingContext
+from kinertia.diagnostics.context import PersonContext, RecordingContext
 from kinertia.diagnostics.labels.landmarks import landmarks
 from kinertia.diagnostics.runner import asked
 from kinertia.diagnostics.subject.questions import STATIC_QUESTIONS
 from kinertia.diagnostics.subject.standing import flat_feet, floor
 from kinertia.diagnostics.subject.stature import stature
+from kinertia.findings.finding import Severity
 from kinertia.io.marker_set_file import choose_marker_set
+from kinertia.settings import Subject
 from kinertia.trial.data import Markers
 from people import codes, with_markers
 from recordings import is_here
@@ -44,6 +46,7 @@ def moved(context, positions):
 
 def test_the_own_stature_and_floor(standing):
     assert asked(STATIC_QUESTIONS, standing) == []
+    assert list(floor(person(standing, standing))) == []
 
 
 @pytest.mark.parametrize("off_m", [-0.2, 0.2])
@@ -53,23 +56,34 @@ def test_another_stature(standing, off_m):
     assert found.evidence["implied_m"].value == pytest.approx(standing.height_m, abs=0.08)
 
 
-def test_markers_on_top_of_shoes(standing):
-    """53 to 60 mm above the floor in one laboratory, where the corners of the plates are at zero."""
-    positions = standing.all_markers.positions
-    assert list(floor(moved(standing, positions + np.array([0.0, 0.02, 0.0])))) == []
+def person(static, *trials):
+    return PersonContext(Subject(name="person"), list(trials), static)
+
+
+def risen(context, rise_m):
+    return moved(context, context.recording.markers.positions + np.array([0.0, rise_m, 0.0]))
 
 
 @pytest.mark.parametrize("rise_m", [-0.06, 0.06])
 def test_another_floor(standing, rise_m):
-    positions = standing.recording.markers.positions
-    (found,) = floor(moved(standing, positions + np.array([0.0, rise_m, 0.0])))
-    assert found.code == "M143"
-    assert found.evidence["height_m"].value == pytest.approx(0.033 + rise_m, abs=0.015)
+    """In the static trial and, where there are trials, in all of them."""
+    off = risen(standing, rise_m)
+    for trials in ([], [off]):
+        (found,) = floor(person(off, *trials))
+        assert (found.code, found.severity) == ("M143", Severity.WARNING)
+        assert found.evidence["height_m"].value == pytest.approx(0.033 + rise_m, abs=0.015)
+    assert list(floor(person(standing, off))) == []
+
+
+@pytest.mark.parametrize("rise_m", [0.06, 0.25])
+def test_somebody_who_stands_on_a_box_or_in_thick_soles(standing, rise_m):
+    (found,) = floor(person(risen(standing, rise_m), standing))
+    assert (found.code, found.severity) == ("M143", Severity.INFO)
 
 
 def test_feet_that_are_not_marked_enough(standing):
     marks = {name: own for name, own in standing.marker_set.landmarks.items() if "heel" not in name}
-    assert list(floor(replace(standing, marker_set=replace(standing.marker_set, landmarks=marks)))) == []
+    assert list(floor(person(replace(standing, marker_set=replace(standing.marker_set, landmarks=marks))))) == []
 
 
 @pytest.mark.parametrize(("landmark", "rise_m"), [("heel_r", 0.06), ("metatarsal_l", 0.06), ("heel_l", 0.02)])

@@ -15,13 +15,13 @@ from kinertia.diagnostics.subject.stature import stature
 
 STATIC_QUESTIONS: tuple[Question[RecordingContext], ...] = (
     Question("S20", standing),
-    Question("M14", floor),
     Question("S20", flat_feet),
     Question("S10", stature),
 )
 PERSON_QUESTIONS: tuple[Question[PersonContext], ...] = (
     Question("S10", stated_and_filed),
     Question("M10", absent_markers),
+    Question("M14", floor),
     Question("S20", static_and_trials),
     Question("S30", trials_of_one_person),
     Question("S20", trial_scales),

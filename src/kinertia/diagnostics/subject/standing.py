@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
-from kinertia.diagnostics.context import RecordingContext
-from kinertia.findings.finding import Finding, finding
+from kinertia.diagnostics.context import PersonContext, RecordingContext
+from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.quantity import Quantity
 
-_LOWEST_M = (0.008, 0.070)
-"""A marker's own radius is 5 mm and more; soles are under both feet. On top of shoes markers are 53 to 60 mm above a
-floor whose plates are level with it."""
+_LOWEST_M = (0.008, 0.050)
+"""A marker's own radius is 5 mm and more; soles are under both feet, and markers on the side of a foot are low."""
+_HIGHEST_IN_MOTION_M = 0.058
+"""On top of shoes markers are 53 to 60 mm above the floor while standing, and 44 to 48 mm in motion."""
 _USUAL_LOWEST_M = (0.023, 0.044)
 """Of fourteen people of eight laboratories, with bare feet and in running shoes."""
 _FLAT_M = 0.04
 """Heels, and metatarsals, of seven people who stand are up to 12 mm higher on one side than on the other."""
 _WALK_M = 0.5
+_WHILE_STANDING, _IN_MOTION = 50.0, 10.0
+"""Percentiles of a marker's height: in motion it is as high as on standing feet for a part of the time only."""
 
 
 def standing(context: RecordingContext) -> Iterator[Finding]:
@@ -27,10 +31,31 @@ def standing(context: RecordingContext) -> Iterator[Finding]:
         yield finding("S201", context.at(), distance_m=distance)
 
 
-def floor(context: RecordingContext) -> Iterator[Finding]:
-    """M143: feet that stand above the floor or below it, by the lowest marker of toes, metatarsals and heels."""
-    if context.marker_set is None:
+def floor(context: PersonContext) -> Iterator[Finding]:
+    """M143: feet that stand above the floor or below it, by the lowest marker of toes, metatarsals and heels.
+
+    A mere INFO where the trials show the floor where it should be: the person stands on something then, or in thick
+    soles.
+    """
+    static = context.static
+    lowest = None if static is None else _lowest(static, _WHILE_STANDING)
+    if static is None or lowest is None:
         return
+    label, height_m = lowest
+    low, high = _LOWEST_M
+    if low <= height_m <= high:
+        return
+    in_trials = [one for one in (_lowest(trial, _IN_MOTION) for trial in context.trials) if one is not None]
+    shared = all(own_m < low if height_m < low else own_m > _HIGHEST_IN_MOTION_M for _, own_m in in_trials)
+    height = Quantity(height_m, "m", limit=low if height_m < low else high, usual=_USUAL_LOWEST_M)
+    found = finding("M143", static.at(markers=(label,)), height_m=height)
+    yield found if shared else replace(found, severity=Severity.INFO)
+
+
+def _lowest(context: RecordingContext, percentile: float) -> tuple[str, float] | None:
+    """Label and height (m) of the lowest foot marker; None where heels or metatarsals are no landmarks."""
+    if context.marker_set is None:
+        return None
     names = [f"{name}_{side}" for name in ("heel", "metatarsal", "toe") for side in "rl"]
     of_landmark = [context.marker_set.landmarks.get(name, ()) for name in names]
     present = context.all_markers.labels
@@ -38,13 +63,10 @@ def floor(context: RecordingContext) -> Iterator[Finding]:
     heights = context.all_markers.select(labels).positions[..., 1]
     shown = np.isfinite(heights).any(axis=0)
     if not all(of_landmark[:4]) or not shown.any():
-        return
-    lowest = int(np.argmin(np.where(shown, np.nanmedian(np.where(shown, heights, 0.0), axis=0), np.inf)))
-    height_m = float(np.nanmedian(heights[:, lowest]))
-    low, high = _LOWEST_M
-    if not low <= height_m <= high:
-        height = Quantity(height_m, "m", limit=low if height_m < low else high, usual=_USUAL_LOWEST_M)
-        yield finding("M143", context.at(markers=(labels[lowest],)), height_m=height)
+        return None
+    each = np.where(shown, np.nanpercentile(np.where(shown, heights, 0.0), percentile, axis=0), np.inf)
+    lowest = int(np.argmin(each))
+    return labels[lowest], float(each[lowest])
 
 
 def flat_feet(context: RecordingContext) -> Iterator[Finding]:
