@@ -139,6 +139,14 @@ def test_computed_points_are_in_no_segment_and_listed(tmp_path):
     assert {label for own in draft.landmarks.values() for label in own} & added == set()
 
 
+def test_the_lumbar_spine_is_in_no_segment(tmp_path):
+    lumbar = {"Lumbar": 1.75 * np.array([-0.065, 0.605, 0.0]), "Thoracic": 1.75 * np.array([-0.07, 0.7, 0.0])}
+    draft, text = drafted(tmp_path, recording(standing_positions() | lumbar))
+    assert "Thoracic" in draft.segments["torso"]
+    assert "FILL IN where they belong: " in text
+    assert "Lumbar" in text.split("FILL IN where they belong: ")[1]
+
+
 def test_a_draft_says_which_landmarks_of_the_legs_it_lacks():
     positions = {label: at for label, at in standing_positions().items() if label not in ("R.Heel", "V.Sacral")}
     draft = draft_marker_set(recording(positions | {"L.PSIS": np.array([-0.1, 0.99, -0.05])}), "x")

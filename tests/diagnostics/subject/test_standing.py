@@ -64,6 +64,13 @@ def risen(context, rise_m):
     return moved(context, context.recording.markers.positions + np.array([0.0, rise_m, 0.0]))
 
 
+def test_one_marker_may_be_several_landmarks(standing):
+    landmarks = standing.marker_set.landmarks
+    toes = {f"toe_{side}": landmarks[f"metatarsal_{side}"] for side in "rl"}
+    both = replace(standing.marker_set, landmarks={**landmarks, **toes})
+    assert list(floor(replace(standing, marker_set=both))) == []
+
+
 @pytest.mark.parametrize("rise_m", [-0.06, 0.06])
 def test_another_floor(standing, rise_m):
     """In the static trial and, where there are trials, in all of them."""

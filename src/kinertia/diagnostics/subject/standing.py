@@ -59,7 +59,7 @@ def _lowest(context: RecordingContext, percentile: float) -> tuple[str, float] |
     names = [f"{name}_{side}" for name in ("heel", "metatarsal", "toe") for side in "rl"]
     of_landmark = [context.marker_set.landmarks.get(name, ()) for name in names]
     present = context.all_markers.labels
-    labels = [label for own in of_landmark for label in own if label in present]
+    labels = list(dict.fromkeys(label for own in of_landmark for label in own if label in present))
     heights = context.all_markers.select(labels).positions[..., 1]
     shown = np.isfinite(heights).any(axis=0)
     if not all(of_landmark[:4]) or not shown.any():

@@ -11,6 +11,7 @@ from kinertia.io.marker_places.label_hints import is_named_virtual, roles, sides
 from kinertia.trial.data import FloatArray, Markers
 
 _EXACT_M = 1e-4
+_ON_FLOOR_M = 2e-3
 _SKIN_M = 3e-4
 """By how much distances between markers on the skin change at least, in a person who stands still."""
 _RIGID_M, _RIGID_SHARE, _LONG_S = 8e-6, 0.05, 2.0
@@ -40,7 +41,8 @@ def unusable_points(markers: Markers) -> dict[str, str]:
             found[copy] = f"the same point as {original}"
         else:
             lower, upper = (one, other) if apart[:, 1].mean() > 0 else (other, one)
-            found[lower] = f"the point below {upper}"
+            if np.abs(place[lower][:, 1]).max() < _ON_FLOOR_M:
+                found[lower] = f"the point of the floor below {upper}"
     return found
 
 

@@ -76,7 +76,7 @@ def _pelvis(body: StandingBody, found: Found) -> None:
     for right, left in np.argwhere(free[:, None] + free[None] > 0):
         across = (body.places[right] - body.places[left]) * [1.0, 0.0, 1.0]
         width = float(np.linalg.norm(across))
-        if right == left or across[2] < _SQUARE * width:
+        if right == left or across[2] <= _SQUARE * width:
             continue
         front = float(
             free[right] + free[left] + ASIS_APART.score(body.places[right] - body.places[left], body.stature_m)

@@ -12,7 +12,8 @@ from kinertia.trial.data import FloatArray
 
 _KNEE_BAND, _ANKLE_BAND = 0.02, 0.012
 """What is nearer to the height of a joint (shares of the stature) and no landmark is over the joint: a kneecap."""
-_PELVIS = (-0.075, 0.065)
+_BELOW_PELVIS, _ON_PELVIS, _LUMBAR = -0.025, 0.018, 0.075
+"""Heights of a pelvis' markers over its front and its back, and from which on over the front the torso begins."""
 _PELVIS_BREADTH, _LEG_BREADTH, _TRUNK_BREADTH = 0.095, 0.075, 0.135
 _AHEAD_OF_ANKLE = 0.02
 WAND_BONUS_M = 0.1
@@ -58,11 +59,12 @@ def _trunk_or_leg(body: StandingBody, found: Mapping[str, int], side: str, marke
     asis = {one: body.outward[one][found[f"asis_{one}"]] for one in "rl"}
     middle, height = (asis["r"] + asis["l"]) / 2, (asis["r"][1] + asis["l"][1]) / 2
     above = (at[1] - height) / stature
-    if above > _PELVIS[1]:
-        return "torso" if abs(at[2]) < _TRUNK_BREADTH * stature else ""
+    back = max(body.places[found[name]][1] for name in ("psis_r", "psis_l", "sacrum") if name in found)
+    if at[1] > max(back, height) + _ON_PELVIS * stature:  # what is on the lumbar spine moves with neither
+        return "torso" if above > _LUMBAR and abs(at[2]) < _TRUNK_BREADTH * stature else ""
     if abs(at[2] - middle[2]) > 2 * _TRUNK_BREADTH * stature:
         return ""
-    if above > _PELVIS[0] / 3 and abs(body.places[marker][2]) < _PELVIS_BREADTH * stature:
+    if above > _BELOW_PELVIS and abs(body.places[marker][2]) < _PELVIS_BREADTH * stature:
         return "pelvis"
     knee, ankle = (found.get(f"{joint}_lateral_{side}") for joint in ("knee", "ankle"))
     if knee is None or ankle is None:
