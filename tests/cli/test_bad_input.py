@@ -210,9 +210,9 @@ def without(path, *labels):
 @pytest.mark.parametrize(
     ("label", "joint", "landmark"),
     [
-        ("L.Knee.Med", "knee_l", "knee_medial_l"),
+        ("L.Knee.Lat", "knee_l", "knee_lateral_l"),
         ("R.Ankle.Lat", "ankle_r", "ankle_lateral_r"),
-        ("R.Elbow", "elbow_r", "elbow_lateral_r"),
+        ("R.Heel", "foot_r", "heel_r"),
     ],
 )
 def test_static_trial_without_landmark(lab, label, joint, landmark):

@@ -218,3 +218,24 @@ def test_markers_that_may_not_turn_as_a_whole_move_one_by_one(skeleton):
     assert by_free > 0.4
     assert by_held < 0.6 * by_free
     assert held.moved_m["R.Acromium"] > 0.03
+
+
+def test_an_arm_that_one_trial_does_not_show_is_held_in_all(skeleton):
+    """Its markers are not used in the others either: nothing pulls at what is held."""
+    whole = walk(skeleton)
+    trials = [trial(whole, "one"), trial(dropped(whole, ARM), "two")]
+    poses = first_poses(skeleton, trials)
+    left = calibration.without_partly_shown(skeleton, poses, ARM_COORDINATES)
+    assert set(skeleton.labels) - set(left.labels) == set(ARM)
+    held, names = hold_uninformed(left, trials, HELD)
+    assert set(names) == {"arm_flex_r", "arm_add_r", "elbow_flex_r"}
+    assert "elbow_flex_l" in held.coordinates
+    again = calibration.without_partly_shown(skeleton, poses[:1], ARM_COORDINATES)
+    assert again.markers == skeleton.markers
+
+
+def test_a_forearm_that_one_trial_does_not_show_leaves_the_upper_arm(skeleton):
+    whole = walk(skeleton)
+    trials = [trial(whole, "one"), trial(dropped(whole, ARM[2:]), "two")]
+    left = calibration.without_partly_shown(skeleton, first_poses(skeleton, trials), ARM_COORDINATES)
+    assert set(skeleton.labels) - set(left.labels) == set(ARM[2:])

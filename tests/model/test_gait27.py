@@ -12,6 +12,7 @@ from kinertia.model.gait27 import (
     HIP_OFFSETS,
     LUMBAR_OFFSETS,
     SHOULDER_OFFSETS,
+    VIRTUAL_TRUNK,
     build_gait27,
 )
 from kinertia.motion.inverse_kinematics import solve_ik
@@ -123,14 +124,9 @@ NEEDED = {
     "R.ASIS": "pelvis",
     "V.Sacral": "pelvis",
     "L.Knee.Lat": "knee_l",
-    "R.Knee.Med": "knee_r",
     "R.Ankle.Lat": "ankle_r",
-    "L.Ankle.Med": "ankle_l",
     "R.Heel": "foot_r",
     "L.Toe.Med": "foot_l",
-    "R.Acromium": "torso and shoulders",
-    "L.Elbow": "elbow_l",
-    "R.Wrist.Med": "elbow_r",
 }
 
 
@@ -142,8 +138,49 @@ def test_a_missing_landmark_names_the_joint_and_the_nearest_label(label, joint):
         built(positions)
     assert (caught.value.finding.code, caught.value.finding.where.part) == ("L105", joint)
     assert caught.value.missing
-    if joint.split("_")[0] not in ("knee", "ankle") or label.endswith("Lat"):
-        assert label.replace(".", "") in str(caught.value)
+    assert label.replace(".", "") in str(caught.value)
+
+
+@pytest.mark.parametrize("joint", ["Knee", "Ankle"])
+def test_knees_and_ankles_need_one_medial_marker(joint):
+    """The other side's mirrors it; without either there is no joint."""
+    whole = generic_model().skeleton
+    positions = standing_positions()
+    positions.pop(f"R.{joint}.Med")
+    for mine, expected in zip(built(positions).skeleton.joints, whole.joints, strict=True):
+        np.testing.assert_allclose(mine.translation, expected.translation, atol=1e-12)
+        np.testing.assert_allclose(mine.rotation, expected.rotation, atol=1e-12)
+    positions.pop(f"L.{joint}.Med")
+    with pytest.raises(MarkerSetError) as caught:
+        built(positions)
+    assert (caught.value.finding.code, caught.value.finding.where.part) == ("L105", f"{joint.lower()}_r")
+    assert f"{joint.lower()}_medial_r" in str(caught.value)
+
+
+@pytest.mark.parametrize("gone", ["Acromium", "Elbow", "Wrist", "Temple", "Bicep"])
+def test_a_model_needs_no_marker_above_the_pelvis(gone):
+    """Its legs are the same with or without them."""
+    whole = generic_model().skeleton
+    model = built({label: at for label, at in standing_positions().items() if gone not in label})
+    legs = [k for k, joint in enumerate(whole.joints) if joint.child.startswith(("thigh", "shank", "talus", "foot"))]
+    for k in legs:
+        np.testing.assert_array_equal(model.skeleton.joints[k].translation, whole.joints[k].translation)
+    assert len(model.skeleton.coordinates) == 27
+
+
+def test_fewer_than_three_markers_of_the_trunk_are_helped_by_an_upright_one():
+    positions = standing_positions()
+    assert VIRTUAL_TRUNK[0].label not in built(positions).skeleton.labels
+    for label in ("R.Temple", "L.Temple", "Top.Head", "Sternum"):
+        positions.pop(label)
+    labels = built(positions).skeleton.labels
+    assert {"R.Acromium", "L.Acromium", *(marker.label for marker in VIRTUAL_TRUNK)} <= set(labels)
+
+
+def test_markers_of_an_arm_whose_pose_is_not_shown_are_not_used():
+    positions = {label: at for label, at in standing_positions().items() if label not in _ARM[1:]}
+    assert "R.Bicep" not in built(positions).skeleton.labels
+    assert "L.Bicep" in built(positions).skeleton.labels
 
 
 def test_landmarks_on_one_point_are_an_error_that_names_the_segment():

@@ -9,6 +9,7 @@ from kinertia.io.recording import read_recording
 from kinertia.model import joint_centres as jc
 from kinertia.model.gait27 import build_gait27
 from kinertia.model.marker_set import MarkerSet
+from kinertia.model.upper_body import torso_frame
 from kinertia.motion.inverse_kinematics import solve_ik
 from kinertia.synthetic.walk import HEIGHT_M
 from synthetic_lab import MARKER_DIAMETER_M, symmetric_person
@@ -161,7 +162,7 @@ def test_cervical_joint_lies_above_the_line_from_c7_to_the_sternal_notch(sex, ra
     points = {"c7": c7, "sternal_notch": notch}
     points |= {"acromion_r": np.array([0.0, 1.48, 0.18]), "acromion_l": np.array([0.0, 1.48, -0.18])}
     marks = jc.Landmarks({}, points, {}, PLUG_IN)
-    rotation, length, shoulders = jc.torso_frame(marks, lumbar, 1.75, sex)
+    rotation, length, shoulders = torso_frame(marks, lumbar, 1.75, sex)
     angle = np.radians(raised_deg)
     top = c7 + share * 0.14 * np.array([np.cos(angle), np.sin(angle), 0.0])
     assert length == pytest.approx(np.linalg.norm(top - lumbar))

@@ -9,7 +9,7 @@ eliminated one by one (Schur complement), so the cost grows linearly with their 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -145,6 +145,25 @@ def hold_uninformed(
         if lost:
             raise TrialError(trial.name, _not_shown(skeleton, trial.markers, lost))
     return skeleton.lock({name: may_hold[name] for name in held}), tuple(held)
+
+
+def without_partly_shown(skeleton: Skeleton, poses: Sequence[InverseKinematics], names: Collection[str]) -> Skeleton:
+    """The skeleton without the markers beyond a joint that some of the trials show and others never do.
+
+    What one trial cannot tell is then held in all of them, and nothing pulls at it.
+
+    Args:
+        skeleton: from the static trial.
+        poses: `first_poses` of the trials it will be used for.
+        names: coordinates that may be held.
+    """
+    shown = [{name for name, q in zip(ik.coordinates, ik.q.T, strict=True) if np.isfinite(q).any()} for ik in poses]
+    partly = {name for name in names if any(name in one for one in shown) and not all(name in one for one in shown)}
+    beyond: set[str] = set()
+    for joint in skeleton.joints:  # parents come first
+        if joint.parent in beyond or partly & {axis.coordinate for axis in joint.axes}:
+            beyond.add(joint.child)
+    return skeleton.with_markers([marker for marker in skeleton.markers if marker.segment not in beyond])
 
 
 def _not_shown(skeleton: Skeleton, markers: Markers, coordinates: Sequence[str]) -> str:

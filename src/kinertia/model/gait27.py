@@ -28,6 +28,7 @@ from kinertia.model.anthropometry import BodyGeometry
 from kinertia.model.coordinate_range import Range
 from kinertia.model.marker_set import MarkerSet
 from kinertia.model.skeleton import Axis, Joint, Marker, Skeleton
+from kinertia.model.upper_body import ARM_SEGMENTS, arm, arm_is_known, torso_frame
 from kinertia.trial.data import Recording
 
 SHOULDER_OFFSETS = tuple(f"shoulder_{axis}_{side}" for side in "rl" for axis in "xyz")
@@ -45,7 +46,9 @@ VIRTUAL_TRUNK = (
     Marker("(trunk, left)", "torso", np.array([0.0, 0.45, -0.3])),
     Marker("(trunk, front)", "torso", np.array([0.3, 0.45, 0.0])),
 )
-"""Of a person who wears no marker on the torso; at the height of the shoulders."""
+"""Of a person who wears no marker on the torso, or too few; at the height of the shoulders."""
+ENOUGH_TRUNK_MARKERS = 3
+"""Two and the lumbar joint may lie nearly in line."""
 
 _USUAL_DEG = {"arm_flex": (-90.0, 150.0), "arm_add": (-120.0, 60.0)}
 """How far people move, and somewhat more. These ranges only tell equal poses apart: a joint goes beyond where its
@@ -80,16 +83,16 @@ def build_gait27(
     """Segment frames, joint centres and axes, and marker positions in their segments, from a static trial.
 
     Args:
-        static: a person standing; arms hanging or raised. Feet flat on the ground. An arm without any marker is
-            taken to hang along the torso, with lengths by stature.
+        static: a person standing; arms hanging or raised. Feet flat on the ground. Of trunk and arms any landmark may
+            be missing (`assumptions`).
         marker_set: which label is which landmark, and which marker moves with which segment.
         height_m: stature, for lengths that markers do not show (arms, and the torso without C7).
         sex: "male" or "female", for the lumbar and cervical joints.
         hip_centre: "bell" (1990) or "harrington" (2007).
 
     Raises:
-        MarkerSetError: a landmark that a joint needs is missing (names the joint and the nearest labels), or landmarks
-            coincide or lie in line, so that they make no frame.
+        MarkerSetError: a landmark that a joint of pelvis or legs needs is missing (names the joint and the nearest
+            labels), or landmarks coincide or lie in line, so that they make no frame.
     """
     with np.errstate(invalid="ignore", divide="ignore"):
         return _built(jc.find_landmarks(static, marker_set), height_m, sex, hip_centre)
@@ -107,7 +110,7 @@ def _built(marks: jc.Landmarks, height_m: float, sex: str, hip_centre: str) -> G
     back = _offsets(LUMBAR_OFFSETS) + _gimbal("lumbar_", ["extension", "bending", "rotation"])
     joints.append(Joint("pelvis", "torso", np.eye(3), lumbar, back))
     at = origin + pelvis @ lumbar
-    torso, lengths["torso"], shoulders = jc.torso_frame(marks, at, height_m, sex)
+    torso, lengths["torso"], shoulders = torso_frame(marks, at, height_m, sex)
     frames["torso"] = (torso, at)
     _expect_axes(marks, [*joints, Joint("pelvis", "torso", torso, at, ())])
     locked = dict.fromkeys((*SHOULDER_OFFSETS, *HIP_OFFSETS, *LUMBAR_OFFSETS, *AXIS_TILTS), 0.0)
@@ -116,7 +119,7 @@ def _built(marks: jc.Landmarks, height_m: float, sex: str, hip_centre: str) -> G
     mid_hip = (hips["r"] + hips["l"]) / 2
     _expect_axes(marks, joints)
     worn = _markers(marks, frames)
-    if not any(marker.segment == "torso" for marker in worn):
+    if sum(marker.segment == "torso" for marker in worn) < ENOUGH_TRUNK_MARKERS:
         worn = (*worn, *VIRTUAL_TRUNK)
     skeleton = Skeleton("gait27", tuple(joints), worn, locked, ranges=_ranges(joints))
     return Gait27(skeleton, BodyGeometry(_triple(lumbar), _triple(mid_hip), lengths))
@@ -258,13 +261,7 @@ def _arm(
     side: str,
 ) -> list[Joint]:
     torso, torso_at = frames["torso"]
-    worn = marks.marker_set.segments[f"upper_arm_{side}"] + marks.marker_set.segments[f"forearm_{side}"]
-    shown = any(f"{name}_{side}" in marks for name in ("elbow_lateral", "elbow_medial", "wrist"))
-    if shown or any(label in marks.markers for label in worn):
-        elbow_at, wrist_at, elbow_axis = jc.arm(marks, shoulder, torso, height_m, side)
-    else:
-        elbow_at, wrist_at = jc.hanging_arm(shoulder, torso, height_m, sex)
-        elbow_axis = torso[:, 2]
+    elbow_at, wrist_at, elbow_axis = arm(marks, shoulder, torso, height_m, sex, side)
     upper = jc.frame(shoulder - elbow_at, elbow_axis)
     lower = jc.frame(elbow_at - wrist_at, upper[:, 2])
     frames[f"upper_arm_{side}"] = (upper, shoulder)
@@ -295,9 +292,12 @@ def _arm(
 
 
 def _markers(marks: jc.Landmarks, frames: dict[str, Frame]) -> tuple[Marker, ...]:
+    """Those that the trial shows, in their segments; not those of an arm whose pose it does not show."""
     placed = []
     for segment, labels in marks.marker_set.segments.items():
         rotation, origin = frames[segment]
+        if segment.startswith(ARM_SEGMENTS) and not arm_is_known(marks, segment[-1]):
+            continue
         for label in labels:
             if label in marks.markers:
                 placed.append(Marker(label, segment, rotation.T @ (marks.markers[label] - origin)))

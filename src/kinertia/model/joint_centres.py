@@ -1,9 +1,9 @@
-"""Joint centres, joint axes and segment frames of a person standing still, from the landmarks of a static trial.
+"""Joint centres, joint axes and segment frames of pelvis and legs, from the landmarks of a static trial.
 
 All points are in ground axes (m). Frames follow ISB: x anterior, y up or proximal, z right. Sources: hip Bell et al.
 (1990) or Harrington et al. (2007); knee and ankle midpoints of the epicondyles and malleoli, or Plug-in Gait's chord
 construction where there are no medial markers (Davis et al. 1991); talocrural and subtalar axes Inman (1976); lumbar
-joint Dumas et al. (2007); shoulder Rab et al. (2002).
+joint Dumas et al. (2007).
 """
 
 from __future__ import annotations
@@ -12,28 +12,21 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from kinertia.errors import MarkerSetError, problem_of
 from kinertia.findings.finding import finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
-from kinertia.model.anthropometry import reference_lengths
 from kinertia.model.marker_set import MarkerSet, nearest_labels
+from kinertia.model.sides import mirrored
 from kinertia.trial.data import Recording
 
-_MARKER_RADIUS_M = 0.007
-_SHOULDER_DROP = 0.17
-_BIACROMIAL_OF_STATURE = 0.2
-"""Between the skin over the acromia, which lie 4 cm inside the shoulders' width of Drillis and Contini (1966)."""
-_ELBOW_WIDTH_OF_STATURE = 0.04
+MARKER_RADIUS_M = 0.007
 _TALOCRURAL_RIGHT = np.array([-0.105, -0.174, 0.979])
 _SUBTALAR_INCLINATION, _SUBTALAR_DEVIATION = np.radians(42.0), np.radians(23.0)
 _SUBTALAR_DROP_OF_FOOT = 0.018
 _METATARSALS_OF_FOOT = 0.73
-_CERVICAL_RAISED = {"male": np.radians(8.0), "female": np.radians(14.0)}
 _LUMBAR = {"male": np.array([-0.335, -0.032, 0.0]), "female": np.array([-0.340, 0.049, 0.0])}
-_CERVICAL = {"male": 0.55, "female": 0.53}
 
 
 @dataclass(frozen=True)
@@ -58,6 +51,10 @@ class Landmarks:
     def __contains__(self, name: str) -> bool:
         return name in self.points
 
+    def width(self, joint: str) -> float | None:
+        """Width of a joint, or of the other side's where only that was measured, m."""
+        return self.widths.get(joint, self.widths.get(mirrored(joint)))
+
     def require(self, joint: str, *names: str) -> None:
         """Raise MarkerSetError when a landmark that this joint needs is missing."""
         missing = [name for name in names if name not in self.points]
@@ -79,7 +76,10 @@ def _missing(
 
 
 def find_landmarks(static: Recording, marker_set: MarkerSet) -> Landmarks:
-    """Median position of every marker and landmark over the frames of a static trial."""
+    """Median position of every marker and landmark over the frames of a static trial.
+
+    A landmark needs all its markers, but a wrist one of them.
+    """
     markers = static.markers
     seen = markers.seen
     median = {
@@ -92,6 +92,10 @@ def find_landmarks(static: Recording, marker_set: MarkerSet) -> Landmarks:
         for name, labels in marker_set.landmarks.items()
         if all(label in median for label in labels)
     }
+    for wrist in ("wrist_r", "wrist_l"):
+        worn = [median[label] for label in marker_set.landmarks.get(wrist, ()) if label in median]
+        if worn:
+            points[wrist] = np.mean(worn, axis=0)
     widths = {
         joint: static.measurements[name]
         for joint, name in marker_set.widths.items()
@@ -149,7 +153,7 @@ def ankle(marks: Landmarks, knee_centre: np.ndarray, shank: np.ndarray, side: st
     The axis runs through the malleoli where both are marked, else it is Inman's in the shank frame (3, 3).
     """
     centre, across = _hinge(marks, f"ankle_{side}", knee_centre, f"shank_wand_{side}", side)
-    if f"ankle_medial_{side}" in marks:
+    if _medial(marks, "ankle", f"shank_wand_{side}", side) is not None:
         return centre, across
     return centre, shank @ mirrored_axis(_TALOCRURAL_RIGHT, side)
 
@@ -175,18 +179,40 @@ def _hinge(marks: Landmarks, joint: str, proximal: np.ndarray, wand: str, side: 
     name, _, _ = joint.rpartition("_")
     lateral, medial = f"{name}_lateral_{side}", f"{name}_medial_{side}"
     sign = 1.0 if side == "r" else -1.0
-    if medial in marks and lateral in marks:
-        across = sign * (marks[lateral] - marks[medial])
-        return (marks[lateral] + marks[medial]) / 2, across / np.linalg.norm(across)
-    if joint not in marks.widths or wand not in marks:
+    inner, width = _medial(marks, name, wand, side), marks.width(joint)
+    if inner is not None and lateral in marks:
+        across = sign * (marks[lateral] - inner)
+        return (marks[lateral] + inner) / 2, across / np.linalg.norm(across)
+    if width is None or wand not in marks:
         marks.require(joint, lateral, medial) if wand not in marks else marks.require(joint, lateral)
-        width = f"{joint.rpartition('_')[0]}_width_mm under [subject]"
-        raise _missing(joint, f"a medial marker ({medial}) or its width ({width}, or in the C3D file)", [medial])
+        stated = f"{name}_width_mm under [subject]"
+        raise _missing(joint, f"a medial marker ({medial}) or its width ({stated}, or in the C3D file)", [medial])
     marks.require(joint, lateral, wand)
-    half = marks.widths[joint] / 2 + _MARKER_RADIUS_M
+    half = width / 2 + MARKER_RADIUS_M
     centre = _chord(proximal, marks[lateral], marks[wand], half)
     across = sign * (marks[lateral] - centre)
     return centre, across / np.linalg.norm(across)
+
+
+def _medial(marks: Landmarks, joint: str, wand: str, side: str) -> np.ndarray | None:
+    """The medial marker of a knee or ankle, or its mirror image where width and wand do not show the joint either."""
+    inner = marks.points.get(f"{joint}_medial_{side}")
+    if inner is None and (marks.width(f"{joint}_{side}") is None or wand not in marks):
+        inner = medial_by_the_other_side(marks, joint, side)
+    return inner
+
+
+def medial_by_the_other_side(marks: Landmarks, joint: str, side: str) -> np.ndarray | None:
+    """Where the medial marker of a knee or ankle would be if the sides mirrored each other about the pelvis; None where
+    that is unknown.
+    """
+    lateral, medial = (f"{joint}_{which}_{side}" for which in ("lateral", "medial"))
+    if not all(name in marks for name in (lateral, mirrored(lateral), mirrored(medial), "asis_r", "asis_l")):
+        return None
+    z = marks["asis_r"] - marks["asis_l"]
+    inward = marks[mirrored(medial)] - marks[mirrored(lateral)]
+    result: np.ndarray = marks[lateral] + inward - 2.0 * (inward @ z) / (z @ z) * z
+    return result
 
 
 def _chord(proximal: np.ndarray, lateral: np.ndarray, wand: np.ndarray, half: float) -> np.ndarray:
@@ -216,86 +242,3 @@ def foot_frame(marks: Landmarks, side: str) -> tuple[np.ndarray, float]:
     x = x / length
     up = np.array([0.0, 1.0, 0.0])
     return np.column_stack([x, up, np.cross(x, up)]), length if tip in marks else length / _METATARSALS_OF_FOOT
-
-
-def torso_frame(
-    marks: Landmarks, lumbar: np.ndarray, height_m: float, sex: str
-) -> tuple[np.ndarray, float, dict[str, np.ndarray]]:
-    """Rotation of the torso (origin: lumbar joint), its length to the cervical joint (m), and the shoulder centres.
-
-    With C7 and sternal notch the cervical joint is Dumas' (2007). Otherwise the axis points to the middle of the
-    acromia and the length is Dumas' share of the stature: acromia rise by up to 10 cm with raised arms, as in a T-pose.
-    A marker set without acromia leaves the shoulders to the stature, a static trial without any marker of the
-    torso its axis to the vertical.
-    """
-    acromia = ("acromion_r", "acromion_l")
-    torso = any(label in marks.markers for label in marks.marker_set.segments.get("torso", ()))
-    worn = any(name in marks for name in acromia) or (
-        torso and any(name in marks.marker_set.landmarks for name in acromia)
-    )
-    if worn:
-        marks.require("torso and shoulders", *acromia)
-    across = marks["acromion_r"] - marks["acromion_l"] if worn else marks["asis_r"] - marks["asis_l"]
-    if "c7" in marks and "sternal_notch" in marks:
-        depth = marks["sternal_notch"] - marks["c7"]
-        upward = Rotation.from_rotvec(_CERVICAL_RAISED[sex] * across / np.linalg.norm(across))
-        top = marks["c7"] + _CERVICAL[sex] * upward.apply(depth)
-        length = float(np.linalg.norm(top - lumbar))
-    elif worn:
-        top = (marks["acromion_r"] + marks["acromion_l"]) / 2
-        length = reference_lengths(height_m, sex)["torso"]
-    else:
-        top = lumbar + np.array([0.0, 1.0, 0.0])
-        length = reference_lengths(height_m, sex)["torso"]
-    rotation = frame(top - lumbar, across)
-    width = float(np.linalg.norm(across)) if worn else _BIACROMIAL_OF_STATURE * height_m
-    if worn:
-        places = {side: marks[f"acromion_{side}"] for side in "rl"}
-    else:
-        neck = lumbar + length * rotation[:, 1]
-        places = {side: neck + sign * width / 2 * rotation[:, 2] for side, sign in (("r", 1.0), ("l", -1.0))}
-    drop = _SHOULDER_DROP * width * rotation[:, 1]
-    return rotation, length, {side: place - drop for side, place in places.items()}
-
-
-def arm(
-    marks: Landmarks, shoulder: np.ndarray, torso: np.ndarray, height_m: float, side: str
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Elbow centre, wrist centre and elbow flexion axis (unit, to the right when the arm hangs).
-
-    The axis runs through the epicondyles where both are marked; else it is square to the plane of upper arm and
-    forearm, or, with a straight elbow, the torso's z axis swung along with the arm. Without a medial marker the centre
-    lies half an elbow width (measured, or 4 % of the stature) inward from the lateral one.
-    """
-    lateral, medial, wrist_name = f"elbow_lateral_{side}", f"elbow_medial_{side}", f"wrist_{side}"
-    marks.require(f"elbow_{side}", lateral, wrist_name)
-    sign = 1.0 if side == "r" else -1.0
-    wrist = marks[wrist_name]
-    if medial in marks:
-        across = sign * (marks[lateral] - marks[medial])
-        return (marks[lateral] + marks[medial]) / 2, wrist, across / np.linalg.norm(across)
-    half = marks.widths.get(f"elbow_{side}", _ELBOW_WIDTH_OF_STATURE * height_m) / 2 + _MARKER_RADIUS_M
-    elbow = marks[lateral]
-    for _ in range(3):
-        axis = _elbow_axis(shoulder, elbow, wrist, torso)
-        elbow = marks[lateral] - sign * half * axis
-    return elbow, wrist, axis
-
-
-def hanging_arm(shoulder: np.ndarray, torso: np.ndarray, height_m: float, sex: str) -> tuple[np.ndarray, np.ndarray]:
-    """Elbow and wrist centres of an arm without markers: it hangs along the torso, as long as de Leva's (1996)."""
-    lengths = reference_lengths(height_m, sex)
-    elbow = shoulder - lengths["upper_arm"] * torso[:, 1]
-    return elbow, elbow - lengths["forearm"] * torso[:, 1]
-
-
-def _elbow_axis(shoulder: np.ndarray, elbow: np.ndarray, wrist: np.ndarray, torso: np.ndarray) -> np.ndarray:
-    upper = (elbow - shoulder) / np.linalg.norm(elbow - shoulder)
-    lower = (wrist - elbow) / np.linalg.norm(wrist - elbow)
-    normal = np.cross(upper, lower)
-    if np.linalg.norm(normal) > np.sin(np.radians(15.0)):
-        axis: np.ndarray = normal / np.linalg.norm(normal)
-    else:
-        swing, _ = Rotation.align_vectors(upper[None], -torso[:, 1][None])
-        axis = swing.apply(torso[:, 2])
-    return axis

@@ -19,3 +19,15 @@ def by_side(names: Sequence[str]) -> dict[str, dict[str, int]]:
         paired = side in ("r", "l") and {f"{base}_r", f"{base}_l"} <= set(names)
         columns.setdefault(base if paired else name, {})[side if paired else ""] = column
     return columns
+
+
+def mirrored(name: str) -> str:
+    """The name of what is on the other side; of what has no side, its own.
+
+    Examples:
+        >>> from kinertia.model.sides import mirrored
+        >>> mirrored("knee_r"), mirrored("c7")
+        ('knee_l', 'c7')
+    """
+    base, _, side = name.rpartition("_")
+    return f"{base}_{'l' if side == 'r' else 'r'}" if side in ("r", "l") else name

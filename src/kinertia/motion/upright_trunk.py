@@ -1,4 +1,4 @@
-"""The trunk of somebody who wears no marker on it: upright over the pelvis, facing where the pelvis does on average.
+"""The trunk of somebody with too few markers on it: upright over the pelvis, facing where that does on average.
 
 A walking trunk leans by a few degrees and turns against the pelvis, so this is known within some 10 degrees. It
 becomes three virtual markers of that uncertainty, so that the ground reactions may say better.
@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from kinertia.model.gait27 import VIRTUAL_TRUNK
+from kinertia.model.gait27 import ENOUGH_TRUNK_MARKERS, VIRTUAL_TRUNK
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.moving_windows import gaussian_mean
 from kinertia.trial.data import FloatArray, Markers, Trial
@@ -19,6 +19,13 @@ from kinertia.trial.data import FloatArray, Markers, Trial
 TRUNK_SD_M = 0.08
 """Of each coordinate of each: 10 degrees."""
 _HEADING_S = 0.5
+
+
+def shows_trunk(skeleton: Skeleton, trial: Trial) -> bool:
+    """Whether any frame shows enough markers of the torso to tell how it leans and turns."""
+    own = {marker.label for marker in skeleton.markers if marker.segment == "torso"}
+    seen = trial.markers.seen[:, [label in own for label in trial.markers.labels]]
+    return bool((seen.sum(axis=1) >= ENOUGH_TRUNK_MARKERS).any())
 
 
 def with_upright_trunk(skeleton: Skeleton, trial: Trial) -> Trial:

@@ -15,7 +15,7 @@ from kinertia.diagnostics.subject.stated_ranges import stated_ranges
 from kinertia.diagnostics.subject.unobserved_segments import unobserved_segments
 from kinertia.errors import BlockedError, MarkerSetError, SettingsError, TrialError
 from kinertia.estimation.arm_branch import elbow_rotations, with_elbows_that_bend_forwards
-from kinertia.estimation.calibration import adapt, hold_uninformed, turn_about
+from kinertia.estimation.calibration import adapt, hold_uninformed, turn_about, without_partly_shown
 from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.estimation.input_checks import check_trials, complete_subject, known
 from kinertia.estimation.population import population_prior
@@ -39,7 +39,7 @@ from kinertia.model.marker_set import MarkerSet
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.kinematics import facing
 from kinertia.motion.one_thread import one_blas_thread
-from kinertia.motion.upright_trunk import with_upright_trunk
+from kinertia.motion.upright_trunk import shows_trunk, with_upright_trunk
 from kinertia.settings import Attached, Overrule, Settings, Subject
 from kinertia.trial.data import Recording, Trial
 from kinertia.trial.trial_input import TrialInput
@@ -89,6 +89,9 @@ def calibrate(model: Gait27, trials: Sequence[Trial], acromia: Sequence[str] = (
     show the trunk, which the acromia (labels), that move with the arms, do not.
     """
     skeleton, poses = with_elbows_that_bend_forwards(model.skeleton, trials)
+    complete = without_partly_shown(skeleton, poses, ARM_COORDINATES)
+    if complete.markers != skeleton.markers:
+        skeleton, poses = with_elbows_that_bend_forwards(complete, trials)
     elbows = elbow_rotations(model.skeleton, skeleton)
     skeleton, _ = hold_uninformed(skeleton, trials, poses, dict.fromkeys(ARM_COORDINATES, 0.0))
     found = [one for trial in trials for one in labels_by_model(skeleton, trial)]
@@ -152,8 +155,7 @@ def prepared(screened: Screened, settings: Settings, progress: Progress = lambda
     turned = [_turned(one, read_s[one.name]) for one in usable]
     height_m, sex = known(subject.height_m), known(subject.sex)
     model = build_gait27(static.recording, marker_set, height_m, sex, settings.hip_centre)
-    if VIRTUAL_TRUNK[0] in model.skeleton.markers:
-        turned = [replace(one, trial=with_upright_trunk(model.skeleton, one.trial)) for one in turned]
+    model, turned = _with_trunk(model, turned)
     model = replace(model, skeleton=with_stated_ranges(model.skeleton, subject))
     acromia = [label for side in "rl" for label in marker_set.landmarks.get(f"acromion_{side}", ())]
     calibrated = calibrate(model, [one.trial for one in turned], acromia)
@@ -189,6 +191,17 @@ def prepared(screened: Screened, settings: Settings, progress: Progress = lambda
         elbow_rotations_rad=calibrated.elbow_rotations_rad,
         torso_rotation_rad=calibrated.torso_rotation_rad,
     )
+
+
+def _with_trunk(model: Gait27, trials: Sequence[Turned]) -> tuple[Gait27, list[Turned]]:
+    """The model and its trials, with an upright trunk in those that show too few markers of it."""
+    lacking = [not shows_trunk(model.skeleton, one.trial) for one in trials]
+    if any(lacking) and VIRTUAL_TRUNK[0] not in model.skeleton.markers:
+        model = replace(model, skeleton=model.skeleton.with_markers([*model.skeleton.markers, *VIRTUAL_TRUNK]))
+    return model, [
+        replace(one, trial=with_upright_trunk(model.skeleton, one.trial)) if lacks else one
+        for one, lacks in zip(trials, lacking, strict=True)
+    ]
 
 
 def _adapted(calibrated: Calibrated) -> Iterator[Finding]:

@@ -73,3 +73,15 @@ def test_a_landmark_that_is_missing(recording_of):
     without = static.markers.select([label for label in static.markers.labels if label != lateral])
     (one,) = landmarks(context_of(without, marker_set, is_static=True))
     assert (one.code, one.where.trial) == ("L105", "walk")
+
+
+def test_a_landmark_that_one_can_do_without(recording_of):
+    """L107 says what stands in its place; a leg's is a warning."""
+    static = recording_of("synthetic/static.trc")
+    marker_set = choose_marker_set(static.markers.labels)
+    for landmark, part, severity in (("elbow_lateral_r", "arm_r", "INFO"), ("knee_medial_l", "knee_l", "WARNING")):
+        (label,) = marker_set.landmarks[landmark]
+        without = static.markers.select([one for one in static.markers.labels if one != label])
+        (one,) = landmarks(context_of(without, marker_set, is_static=True))
+        assert (one.code, one.where.part, one.severity) == ("L107", part, Severity[severity])
+        assert (one.evidence["lacking"].value, one.evidence["labels"].value[: len(label)]) == (landmark, label)

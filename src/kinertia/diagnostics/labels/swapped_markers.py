@@ -31,6 +31,7 @@ _SUSPECT_M = 0.025
 _MOST_SUSPECTS = 8
 _RESOLVED_SHARE = 0.55
 """Two labels were swapped if swapping them back brings their errors below this share of what they were."""
+_FEWEST_TO_TURN = 2
 _LOST_M = 0.08
 """The static model fits the trial not at all if it misses the markers by more than this (root mean square)."""
 
@@ -86,9 +87,10 @@ def _complete_frames(skeleton: Skeleton, name: str, markers: Markers) -> tuple[S
     coordinates, of the rarest one.
 
     No frame with a straight elbow shows how the arm has turned about itself, and none needs to; which way an elbow
-    bends does not matter here.
+    bends does not matter here. A single marker shows where an arm points, as long as it does not turn.
     """
-    model = skeleton.unbounded(ELBOWS).free(ARM_ROTATIONS)
+    free = [name for name in ARM_ROTATIONS if _arm_markers(skeleton, markers, name[-1]) >= _FEWEST_TO_TURN]
+    model = skeleton.unbounded(ELBOWS).free(free)
     ik = solve_ik(model, markers, name, consecutive=False, gain_tolerance_m2=_ENOUGH_M2)
     known = np.isfinite(ik.q)
     never = [c for c, shown in zip(ik.coordinates, known.any(axis=0), strict=True) if not shown]
@@ -104,6 +106,12 @@ def _complete_frames(skeleton: Skeleton, name: str, markers: Markers) -> tuple[S
     few = Markers(measured.time[some], ik.labels, measured.positions[some])
     held = {c: skeleton.locked.get(c, 0.0) for c in never}
     return model.lock(held), few, ik.errors_m[some]
+
+
+def _arm_markers(skeleton: Skeleton, markers: Markers, side: str) -> int:
+    """How many of an arm's markers the trial has."""
+    segments = (f"upper_arm_{side}", f"forearm_{side}")
+    return sum(marker.segment in segments and marker.label in markers.labels for marker in skeleton.markers)
 
 
 def _swapped_errors(skeleton: Skeleton, labels: tuple[str, ...], measured: np.ndarray) -> np.ndarray:

@@ -1,0 +1,135 @@
+"""Joint centres and axes of trunk and arms of a person standing still, from the landmarks of a static trial.
+
+Points are in ground axes (m), frames follow ISB: x anterior, y up or proximal, z right. Sources: cervical joint Dumas
+et al. (2007); shoulder Rab et al. (2002). What the trial does not show is taken from stature and from an upright pose:
+`assumptions` lists it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from kinertia.model.anthropometry import reference_lengths
+from kinertia.model.joint_centres import MARKER_RADIUS_M, Landmarks, frame
+
+_SHOULDER_DROP = 0.17
+_BIACROMIAL_OF_STATURE = 0.2
+"""Between the skin over the acromia, which lie 4 cm inside the shoulders' width of Drillis and Contini (1966)."""
+_ELBOW_WIDTH_OF_STATURE = 0.04
+_CERVICAL_RAISED = {"male": np.radians(8.0), "female": np.radians(14.0)}
+_CERVICAL = {"male": 0.55, "female": 0.53}
+_SIGNS = {"r": 1.0, "l": -1.0}
+ARM_SEGMENTS = ("upper_arm", "forearm")
+
+
+class Arm(NamedTuple):
+    """Centres (3,) m of elbow and wrist, and the elbow's flexion axis (unit, to the right when the arm hangs)."""
+
+    elbow: np.ndarray
+    wrist: np.ndarray
+    axis: np.ndarray
+
+
+def torso_frame(
+    marks: Landmarks, lumbar: np.ndarray, height_m: float, sex: str
+) -> tuple[np.ndarray, float, dict[str, np.ndarray]]:
+    """Rotation of the torso (origin: lumbar joint), its length to the cervical joint (m), and the shoulder centres.
+
+    With C7 and sternal notch the cervical joint is Dumas' (2007). Otherwise the axis points to the middle of the
+    acromia and the length is Dumas' share of the stature: acromia rise by up to 10 cm with raised arms, as in a T-pose.
+    Without acromia either, the torso stands upright over the pelvis. An acromion that is missing mirrors the other one
+    about the torso; without both, the shoulders are where stature has them.
+    """
+    acromia = {side: marks[f"acromion_{side}"] for side in "rl" if f"acromion_{side}" in marks}
+    both = len(acromia) == len(_SIGNS)
+    across = acromia["r"] - acromia["l"] if both else marks["asis_r"] - marks["asis_l"]
+    length = reference_lengths(height_m, sex)["torso"]
+    if "c7" in marks and "sternal_notch" in marks:
+        depth = marks["sternal_notch"] - marks["c7"]
+        upward = Rotation.from_rotvec(_CERVICAL_RAISED[sex] * across / np.linalg.norm(across))
+        top = marks["c7"] + _CERVICAL[sex] * upward.apply(depth)
+        length = float(np.linalg.norm(top - lumbar))
+    elif both:
+        top = (acromia["r"] + acromia["l"]) / 2
+    else:
+        top = lumbar + np.array([0.0, 1.0, 0.0])
+    rotation = frame(top - lumbar, across)
+    width = float(np.linalg.norm(across)) if both else _BIACROMIAL_OF_STATURE * height_m
+    drop = _SHOULDER_DROP * width * rotation[:, 1]
+    places = _shoulders(acromia, rotation, lumbar, length, width)
+    return rotation, length, {side: place - drop for side, place in places.items()}
+
+
+def _shoulders(
+    acromia: Mapping[str, np.ndarray], rotation: np.ndarray, lumbar: np.ndarray, length: float, width: float
+) -> dict[str, np.ndarray]:
+    """Both acromia: those known, the mirror image of a single one, or the ends of a width at the height of the neck."""
+    z = rotation[:, 2]
+    if len(acromia) == 1:
+        ((side, known),) = acromia.items()
+        image = known - 2.0 * ((known - lumbar) @ z) * z
+        return {one: known if one == side else image for one in _SIGNS}
+    neck = lumbar + length * rotation[:, 1]
+    return {side: acromia.get(side, neck + sign * width / 2 * z) for side, sign in _SIGNS.items()}
+
+
+def arm_is_known(marks: Landmarks, side: str) -> bool:
+    """Whether an elbow or a wrist shows where the arm is."""
+    return any(f"{name}_{side}" in marks for name in ("elbow_lateral", "elbow_medial", "wrist"))
+
+
+def arm(marks: Landmarks, shoulder: np.ndarray, torso: np.ndarray, height_m: float, sex: str, side: str) -> Arm:
+    """Joint centres of an arm.
+
+    The elbow's axis runs through the epicondyles where both are marked; else it is square to the plane of upper arm and
+    forearm, or, with a straight elbow, the torso's z axis swung along with the arm. With one epicondyle the centre lies
+    half an elbow width (measured, or 4 % of the stature) from it. An arm without a wrist is straight, with a forearm by
+    stature; of one without an elbow, the elbow is on the line from shoulder to wrist. An arm that shows neither hangs
+    along the torso, as long as de Leva's (1996).
+    """
+    lateral, medial = (marks.points.get(f"elbow_{which}_{side}") for which in ("lateral", "medial"))
+    wrist = marks.points.get(f"wrist_{side}")
+    lengths = reference_lengths(height_m, sex)
+    if lateral is None and medial is None:
+        if wrist is None:
+            elbow = shoulder - lengths["upper_arm"] * torso[:, 1]
+            return Arm(elbow, elbow - lengths["forearm"] * torso[:, 1], torso[:, 2])
+        elbow = shoulder + (wrist - shoulder) * lengths["upper_arm"] / (lengths["upper_arm"] + lengths["forearm"])
+        return Arm(elbow, wrist, _elbow_axis(shoulder, elbow, wrist, torso))
+    sign = _SIGNS[side]
+    if lateral is not None and medial is not None:
+        across, elbow = sign * (lateral - medial), (lateral + medial) / 2
+        wrist = _straight(shoulder, elbow, lengths) if wrist is None else wrist
+        return Arm(elbow, wrist, across / np.linalg.norm(across))
+    half = (marks.width(f"elbow_{side}") or _ELBOW_WIDTH_OF_STATURE * height_m) / 2 + MARKER_RADIUS_M
+    seen, inward = (lateral, -sign * half) if lateral is not None else (medial, sign * half)
+    assert seen is not None
+    elbow = seen
+    for _ in range(3):
+        end = _straight(shoulder, elbow, lengths) if wrist is None else wrist
+        axis = _elbow_axis(shoulder, elbow, end, torso)
+        elbow = seen + inward * axis
+    return Arm(elbow, _straight(shoulder, elbow, lengths) if wrist is None else wrist, axis)
+
+
+def _straight(shoulder: np.ndarray, elbow: np.ndarray, lengths: Mapping[str, float]) -> np.ndarray:
+    """The wrist of a forearm that continues the upper arm."""
+    upper = elbow - shoulder
+    result: np.ndarray = elbow + lengths["forearm"] * upper / np.linalg.norm(upper)
+    return result
+
+
+def _elbow_axis(shoulder: np.ndarray, elbow: np.ndarray, wrist: np.ndarray, torso: np.ndarray) -> np.ndarray:
+    upper = (elbow - shoulder) / np.linalg.norm(elbow - shoulder)
+    lower = (wrist - elbow) / np.linalg.norm(wrist - elbow)
+    normal = np.cross(upper, lower)
+    if np.linalg.norm(normal) > np.sin(np.radians(15.0)):
+        axis: np.ndarray = normal / np.linalg.norm(normal)
+    else:
+        swing, _ = Rotation.align_vectors(upper[None], -torso[:, 1][None])
+        axis = swing.apply(torso[:, 2])
+    return axis
