@@ -22,7 +22,7 @@ from synthetic_lab import WITH_MODEL, synthetic_arguments
 from walks import fit_arguments
 
 SCREENED = STAGES[: STAGES.index("person") + 1]
-PREPARED = ("R106", "R401", "O407", "O411", "O412", "O413", "S408")
+PREPARED = ("M174", "R106", "R401", "O407", "O411", "O412", "O413", "S408")
 """What calibrating the model and the prior show as well."""
 _SUBJECT4 = "subject4/walking1"
 PEOPLE = [*FITTED, "synthetic with model", *(["subject4"] if is_here(f"{_SUBJECT4}.trc") else [])]
