@@ -23,6 +23,7 @@ from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.io.c3d_plates import lab_plates, person_on_plates, plate_left_out, to_ground_plates
 from kinertia.io.c3d_structure import doubts_about, with_plain_samples
+from kinertia.io.c3d_subject import subject_data
 from kinertia.io.ezc3d_library import C3dContent, C3dTrouble, expect_ezc3d, parameter_values, read_apart, read_content
 from kinertia.io.lab_axes import to_ground
 from kinertia.io.number_table import expect_file
@@ -36,7 +37,6 @@ _OUTPUT_LISTS = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS"
 _OUTPUT_NAME = re.compile(r"(Angles?|Forces?|Moments?|Powers?|GRF)$")
 _PERSON_M = (0.3, 2.8)
 """How far a person's markers reach in one frame."""
-_LENGTH_KEY = re.compile(r"(Width|Length|Distance|Thickness|ShoulderOffset|SoleDelta)$", re.IGNORECASE)
 
 
 def read_c3d(path: str | Path, length_unit: str | None = None, standing: bool = False) -> Recording:
@@ -86,17 +86,17 @@ def read_c3d(path: str | Path, length_unit: str | None = None, standing: bool = 
     rotation, up, axis_findings = to_ground(path, stated, "POINT:Y_SCREEN", unit * positions, plates)
     markers = Markers(time, labels, unit * positions @ rotation.T)
     ground_plates, load_findings = to_ground_plates(path, plates, rotation, _times(file, "analogs"))
-    mass, height, measurements, subject_findings = _subject(path, parameters)
+    person = subject_data(path, parameters)
     of_plates = (*plate_findings, *more_findings, *axis_findings, *load_findings)
     virtual = {} if poses is None else dict.fromkeys(labels, POSE_SD_M)
     return Recording(
         path.stem,
         markers,
         ground_plates,
-        mass,
-        height,
-        measurements,
-        (*unit_findings, *label_findings, *of_plates, *subject_findings),
+        person.mass_kg,
+        person.height_m,
+        person.measurements,
+        (*unit_findings, *label_findings, *of_plates, *person.findings),
         unit_name,
         up,
         virtual,
@@ -235,25 +235,3 @@ def _outputs(parameters: Any, labels: list[str]) -> set[str]:
     lists = {*_OUTPUT_LISTS, *(str(name).strip() for name in list(groups)[::2])}
     listed = {label for name in lists for label in _continued(parameters, name)}
     return {label for label in labels if label in listed or _OUTPUT_NAME.search(label)}
-
-
-def _subject(path: Path, parameters: Any) -> tuple[float | None, float | None, dict[str, float], list[Finding]]:
-    """Mass (kg), height (m) and other lengths (m) from the PROCESSING group that Plug-in Gait writes."""
-    numbers: dict[str, float] = {}
-    for key in parameters.get("PROCESSING", ()):
-        value = parameter_values(parameters, "PROCESSING", key, [""]) if key != "__METADATA__" else [""]
-        if np.size(value) == 1 and isinstance(value[0], (int, float, np.number)) and value[0] > 0:
-            numbers[key] = float(value[0])
-    by_lower = {key.lower(): value for key, value in numbers.items()}
-    mass, height = by_lower.get("bodymass"), by_lower.get("height")
-    lengths = {key: value for key, value in numbers.items() if _LENGTH_KEY.search(key)}
-    if height is None and not lengths:
-        return mass, None, {}, []
-    per_metre, word = 1000.0, "mm"
-    if height is not None and height < 3:
-        per_metre, word = 1.0, "m"
-    elif height is not None and height < 300:
-        per_metre, word = 100.0, "cm"
-    taken = finding("F124", Where(path.name), unit=Quantity(word))
-    height_m = None if height is None else height / per_metre
-    return mass, height_m, {key: value / per_metre for key, value in lengths.items()}, [taken]
