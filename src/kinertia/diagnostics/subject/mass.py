@@ -89,8 +89,9 @@ def stated_mass(context: PersonContext) -> Iterator[Finding]:
         missing, complete = Quantity(found.missing, "1", limit=MISSING), Quantity(found.complete, "1")
         yield finding("P281", Where(trial=name, span_s=found.span_s), missing=missing, complete=complete)
     standing = [*_standing(context)]
-    whole = [_occasion(name, mass) for name, mass in known.items() if name not in apart]
-    whole += _by_plates(context)
+    by_plates = _by_plates(context)
+    better = {*apart, *(one.trial for one in by_plates)}
+    whole = [*by_plates, *(_occasion(name, mass) for name, mass in known.items() if name not in better)]
     partly = [_occasion(name, mass) for name, mass in known.items() if name in apart]
     for one in [*_together([*whole, *standing]), *partly]:
         if one.differs(total, WARNING_SHARE):
@@ -131,10 +132,11 @@ def _occasion(name: str | None, mass: ForceMass, standing: bool = False) -> _Occ
 
 
 def _by_plates(context: PersonContext) -> list[_Occasion]:
-    """By the plates that carry the whole foot, of trials in which another foot is beyond its plate most of the time."""
+    """By the plates that carry the whole foot, of trials that another foot beyond its plate leaves hardly a window."""
     found = []
     for one in context.trials:
-        if one.force_mass is not None or one.plates is None:
+        weighed = one.force_mass
+        if one.plates is None or (weighed is not None and weighed.sd_kg < _SINGLE_SUPPORT * weighed.mass_kg):
             continue
         beyond = {one.plates.names[each.plate] for each in one.overhangs if each.overhang_m > _LITTLE_BEYOND_M}
         masses_kg = [mass_kg for name, mass_kg in one.plate_masses.items() if name not in beyond]
