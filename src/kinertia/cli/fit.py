@@ -230,12 +230,10 @@ def _from_options(trial: Path, options: dict[str, Any]) -> SubjectFile:
     given = {
         key: str(value) if isinstance(value, Path) else value for key, value in options.items() if value is not None
     }
-    for name in ("--static", "--sex"):
-        if name not in given and "--model" not in given:
-            hint = " (or --model)" if name == "--static" else ""
-            raise FileError(
-                trial, f"a trial on its own needs {name}{hint}; or write a subject file (kinertia init FOLDER)"
-            )
+    if "--sex" not in given and "--model" not in given:
+        raise FileError(
+            trial, "a trial on its own needs --sex (or --model); or write a subject file (kinertia init FOLDER)"
+        )
     names = {
         "subject": {"--mass": "mass_kg", "--height": "height_m", "--sex": "sex"},
         "model": {"--static": "static", "--markers": "markers", "--model": "osim", "--calibrate": "calibrate"},

@@ -262,7 +262,7 @@ def subject_from_options(content: Mapping[str, Any]) -> SubjectFile:
         result = SubjectFile.model_validate(content, context={"folder": Path.cwd()})
     except ValidationError as error:
         raise _settings_error(_finding(error.errors()[0])) from None
-    if lack := _incomplete(result):
+    if lack := _incomplete(result, needs_static=False):
         raise _settings_error(lack[1])
     return result
 
@@ -271,10 +271,14 @@ def _settings_error(found: Finding) -> SettingsError:
     return SettingsError(problem_of(found)).with_finding(found)
 
 
-def _incomplete(wanted: SubjectFile) -> tuple[Location, Finding] | None:
-    """Where and what the entries lack, or have too much of, for the kind of model."""
+def _incomplete(wanted: SubjectFile, needs_static: bool = True) -> tuple[Location, Finding] | None:
+    """Where and what the entries lack, or have too much of, for the kind of model.
+
+    A subject file without a static trial has forgotten it; a command without one may mean it (S207).
+    """
     model = wanted.model
-    for table, key, value in (("model", "static", model.static), ("subject", "sex", wanted.subject.sex)):
+    needed = (("model", "static", model.static), ("subject", "sex", wanted.subject.sex))
+    for table, key, value in needed if needs_static else needed[1:]:
         if value is None and model.osim is None:
             return (table, key), _finding({"loc": (table, key), "type": "missing"})
     if lack := _two_models(model.static, model.markers, model.osim, model.calibrate):

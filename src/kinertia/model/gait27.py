@@ -13,7 +13,7 @@ this model does not move but which differ between a T-pose and walking.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -78,7 +78,12 @@ class Gait27:
 
 
 def build_gait27(
-    static: Recording, marker_set: MarkerSet, height_m: float, sex: str, hip_centre: str = "bell"
+    static: Recording,
+    marker_set: MarkerSet,
+    height_m: float,
+    sex: str,
+    hip_centre: str = "bell",
+    by_stature: bool = False,
 ) -> Gait27:
     """Segment frames, joint centres and axes, and marker positions in their segments, from a static trial.
 
@@ -89,13 +94,15 @@ def build_gait27(
         height_m: stature, for lengths that markers do not show (arms, and the torso without C7).
         sex: "male" or "female", for the lumbar and cervical joints.
         hip_centre: "bell" (1990) or "harrington" (2007).
+        by_stature: place knees and ankles by stature where neither medial markers nor widths show them.
 
     Raises:
         MarkerSetError: a landmark that a joint of pelvis or legs needs is missing (names the joint and the nearest
             labels), or landmarks coincide or lie in line, so that they make no frame.
     """
     with np.errstate(invalid="ignore", divide="ignore"):
-        return _built(jc.find_landmarks(static, marker_set), height_m, sex, hip_centre)
+        marks = jc.find_landmarks(static, marker_set)
+        return _built(replace(marks, stature_m=height_m) if by_stature else marks, height_m, sex, hip_centre)
 
 
 def _built(marks: jc.Landmarks, height_m: float, sex: str, hip_centre: str) -> Gait27:

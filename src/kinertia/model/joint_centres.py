@@ -22,6 +22,8 @@ from kinertia.model.sides import mirrored
 from kinertia.trial.data import Recording
 
 MARKER_RADIUS_M = 0.007
+_WIDTHS_OF_STATURE = {"knee": 0.067, "ankle": 0.042}
+"""Mean of eight children and adults, whose widths are 15 % apart."""
 _TALOCRURAL_RIGHT = np.array([-0.105, -0.174, 0.979])
 _SUBTALAR_INCLINATION, _SUBTALAR_DEVIATION = np.radians(42.0), np.radians(23.0)
 _SUBTALAR_DROP_OF_FOOT = 0.018
@@ -38,12 +40,14 @@ class Landmarks:
         points: landmark -> (3,) m in ground axes; only those that the trial shows.
         widths: joint -> width in m; only those that the trial carries.
         marker_set: where the names come from.
+        stature_m: where given, knees and ankles that show neither medial marker nor wand are placed by it.
     """
 
     markers: Mapping[str, np.ndarray]
     points: Mapping[str, np.ndarray]
     widths: Mapping[str, float]
     marker_set: MarkerSet
+    stature_m: float | None = None
 
     def __getitem__(self, name: str) -> np.ndarray:
         return self.points[name]
@@ -183,6 +187,10 @@ def _hinge(marks: Landmarks, joint: str, proximal: np.ndarray, wand: str, side: 
     if inner is not None and lateral in marks:
         across = sign * (marks[lateral] - inner)
         return (marks[lateral] + inner) / 2, across / np.linalg.norm(across)
+    if lateral in marks and marks.stature_m is not None and (width is None or wand not in marks):
+        half = (width or _WIDTHS_OF_STATURE[name] * marks.stature_m) / 2 + MARKER_RADIUS_M
+        axis = frame(proximal - marks[lateral], marks["asis_r"] - marks["asis_l"])[:, 2]
+        return marks[lateral] - sign * half * axis, axis
     if width is None or wand not in marks:
         marks.require(joint, lateral, medial) if wand not in marks else marks.require(joint, lateral)
         stated = f"{name}_width_mm under [subject]"

@@ -7,6 +7,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.labels.swapped_markers import labels_by_model
@@ -21,7 +22,12 @@ from kinertia.estimation.input_checks import check_trials, complete_subject, kno
 from kinertia.estimation.population import population_prior
 from kinertia.estimation.prepared import Prepared, Progress
 from kinertia.estimation.prior import literature_prior
-from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINTY
+from kinertia.estimation.simultaneous.model_uncertainty import (
+    GAIT27_UNCERTAINTY,
+    JOINT_CENTRE_SD_M,
+    MARKER_SD_M,
+    ModelUncertainty,
+)
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
@@ -39,11 +45,13 @@ from kinertia.model.marker_set import MarkerSet
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.kinematics import facing
 from kinertia.motion.one_thread import one_blas_thread
+from kinertia.motion.stance_pose import stance_pose
 from kinertia.motion.upright_trunk import shows_trunk, with_upright_trunk
 from kinertia.settings import Attached, Overrule, Settings, Subject
 from kinertia.trial.data import Recording, Trial
 from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow.doubted_mass import with_doubted_mass
+from kinertia.workflow.joint_widths import with_widths
 from kinertia.workflow.kinematics import Turned, solved_trials, usable_trial
 from kinertia.workflow.person import Person
 from kinertia.workflow.screening import Screened, screen
@@ -52,6 +60,8 @@ from kinertia.workflow.stated_ranges import with_stated_ranges
 LOWER_BODY_SD_M = 0.01
 UPPER_BODY_SD_M = 0.04
 """How far markers may sit from where the model has them."""
+WITHOUT_STATIC = 2.0
+"""Times as uncertain are joint centres and markers of a model that is made from a walk."""
 _FAR_M = 0.03
 _ARM_ROTATION_SD_RAD = 1.0
 _TURNED_RAD = 0.25
@@ -145,21 +155,26 @@ def prepared(screened: Screened, settings: Settings, progress: Progress = lambda
         raise SettingsError("two-level knows the body only; where something is attached, use the default method")
     check_trials(person.recordings)
     usable = screened.usable
-    static, marker_set = context.static, context.marker_set
-    if static is None or marker_set is None:
-        raise SettingsError("the built-in model needs a static trial (static = ... under [model])")
-    subject = complete_subject(person.subject, [static.recording, *person.recordings])
+    marker_set = context.marker_set
+    if marker_set is None:
+        raise SettingsError("the built-in model needs a marker set (markers = ... under [model])")
+    statics = [] if context.static is None else [context.static.recording]
+    subject = complete_subject(person.subject, [*statics, *person.recordings])
     progress("calibration", 0.0)
     started = time.perf_counter()
     read_s = {item.recording.name: item.read_seconds for item in person.trials}
     turned = [_turned(one, read_s[one.name]) for one in usable]
     height_m, sex = known(subject.height_m), known(subject.sex)
-    model = build_gait27(static.recording, marker_set, height_m, sex, settings.hip_centre)
+    without_static: list[Finding] = []
+    if not statics:
+        statics, marker_set, without_static = _stance_of(person, turned[0], marker_set)
+    build = partial(build_gait27, statics[0], marker_set, height_m, sex, settings.hip_centre)
+    model = build(by_stature=bool(without_static))
     model, turned = _with_trunk(model, turned)
     model = replace(model, skeleton=with_stated_ranges(model.skeleton, subject))
     acromia = [label for side in "rl" for label in marker_set.landmarks.get(f"acromion_{side}", ())]
     calibrated = calibrate(model, [one.trial for one in turned], acromia)
-    found = [*screened.findings, *calibrated.findings]
+    found = [*screened.findings, *without_static, *calibrated.findings]
     left = _unblocked(turned, screened.overruled(found))
     if len(left) < len(turned):  # the skeleton is adapted to those that are used
         calibrated = calibrate(model, [one.trial for one in left], acromia)
@@ -177,7 +192,7 @@ def prepared(screened: Screened, settings: Settings, progress: Progress = lambda
         skeleton=skeleton,
         literature=expected.prior.mean,
         prior=with_doubted_mass(expected.prior, screened.findings),
-        uncertainty=GAIT27_UNCERTAINTY.with_axes() if settings.joint_axes else GAIT27_UNCERTAINTY,
+        uncertainty=_uncertainty(settings, bool(without_static)),
         file=None,
         kinematics=solved.kinematics,
         seconds=solved.seconds,
@@ -191,6 +206,35 @@ def prepared(screened: Screened, settings: Settings, progress: Progress = lambda
         elbow_rotations_rad=calibrated.elbow_rotations_rad,
         torso_rotation_rad=calibrated.torso_rotation_rad,
     )
+
+
+def _stance_of(person: Person, walk: Turned, marker_set: MarkerSet) -> tuple[list[Recording], MarkerSet, list[Finding]]:
+    """A pose of the walk in place of a static trial, the marker set with the widths that are known, and S207.
+
+    Raises:
+        SettingsError: no frame of the walk shows a pelvis over each flat foot.
+    """
+    pose = stance_pose(walk.trial.markers, marker_set)
+    if pose is None:
+        raise SettingsError(
+            "the built-in model needs a static trial (--static, or static = ... under [model]): no frames of "
+            f"{walk.trial.name} show pelvis, knee, ankle and foot of each leg while that foot is flat"
+        )
+    measured = next(one for one in person.recordings if one.name == walk.trial.name)
+    static, named = with_widths(
+        replace(measured, markers=pose, plates=None), person.recordings, marker_set, person.subject
+    )
+    found = finding("S207", Where(trial=walk.trial.name), centre_sd_m=Quantity(WITHOUT_STATIC * JOINT_CENTRE_SD_M, "m"))
+    return [static], named, [found]
+
+
+def _uncertainty(settings: Settings, without_static: bool) -> ModelUncertainty:
+    """How well joint centres, axes and markers of the built-in model are known."""
+    known_by = GAIT27_UNCERTAINTY
+    if without_static:
+        centres = {name: WITHOUT_STATIC * sd for name, sd in known_by.centres.items()}
+        known_by = replace(known_by, centres=centres, marker_sd_m=WITHOUT_STATIC * MARKER_SD_M)
+    return known_by.with_axes() if settings.joint_axes or without_static else known_by
 
 
 def _with_trunk(model: Gait27, trials: Sequence[Turned]) -> tuple[Gait27, list[Turned]]:
