@@ -53,6 +53,7 @@ def test_fit_json_keeps_its_contract(saved):
         "knee_width_mm": None,
         "ankle_width_mm": None,
         "elbow_width_mm": None,
+        "ranges_deg": None,
     }
     assert fit_summary["settings"] == Settings(method="two-level").model_dump()
     assert fit_summary["total_mass_kg"] == {
