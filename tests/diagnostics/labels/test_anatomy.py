@@ -158,6 +158,20 @@ def test_the_way_of_a_walk_confirms_a_single_heading(recorded):
     assert codes(found(swapped, marker_set)) == ["L202"]
 
 
+@pytest.mark.parametrize(
+    "recorded",
+    here(["pig_c3d/subject_a_walk.c3d", "pig_c3d/subject_b_walk.c3d", "pig_c3d/subject_b_static.c3d"]),
+    indirect=True,
+)
+def test_left_and_right_of_the_head_swapped(recorded):
+    """A head may turn, but not as far: it is named, and others show the trunk."""
+    markers, marker_set = recorded
+    swapped = relabelled(relabelled(markers, ("LFHD", "RFHD")), ("LBHD", "RBHD"))
+    said = found(swapped, marker_set)
+    assert [(one.code, one.severity) for one in said] == [("L202", Severity.WARNING)] * 2
+    assert {label for one in said for label in one.where.markers} == {"LFHD", "RFHD", "LBHD", "RBHD"}
+
+
 @pytest.mark.parametrize("recorded", FAULT_FREE, indirect=True)
 def test_who_walks_backwards(recorded):
     """It is a remark, and no talk of labels that feet and pelvis have shown to be right (D19)."""

@@ -8,7 +8,7 @@ explained by a swap is not examined further. Directions are medians over the fra
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from kinertia.diagnostics.evidence.landmarks import (
     horizontal,
     unit,
 )
-from kinertia.findings.finding import Finding, finding, with_evidence
+from kinertia.findings.finding import Finding, Severity, finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.model.marker_set import MarkerSet, in_words
 from kinertia.trial.data import FloatArray
@@ -166,6 +166,27 @@ def _swapped_sides(body: _Body, right: FloatArray) -> Iterator[Finding]:
         return
     for pair, each in wrong.items():
         yield body.found("L202", f"{pair}_r", f"{pair}_l", cosine=Quantity(each, "1", limit=-CLEAR))
+    yield from _swapped_labels(body, right)
+
+
+def _swapped_labels(body: _Body, right: FloatArray) -> Iterator[Finding]:
+    """L202, as a WARNING, of pairs on head, trunk and pelvis that are no landmarks: others show the segment, too.
+
+    Nobody turns the head so far that its right side is on the left of the body.
+    """
+    markers = body.context.all_markers
+    landmarks = {label for own in body.marker_set.landmarks.values() for label in own}
+    for segment in ("torso", "pelvis"):
+        for label in body.marker_set.segments.get(segment, ()):
+            other = f"{'L' if label[:1].isupper() else 'l'}{label[1:]}"
+            if label[:1].upper() != "R" or {label, other} & landmarks or not {label, other} <= set(markers.labels):
+                continue
+            pair = markers.arranged([label, other])
+            each = cosine(pair[:, 0] - pair[:, 1], right)
+            if each < -CLEAR:
+                where = body.context.at(markers=(label, other))
+                found = finding("L202", where, cosine=Quantity(each, "1", limit=-CLEAR))
+                yield replace(found, severity=Severity.WARNING)
 
 
 def _order(body: _Body) -> Iterator[Finding]:
