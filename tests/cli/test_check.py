@@ -58,6 +58,14 @@ def test_subject_file(lab):
     assert re.fullmatch(r"[\d.]+ to [\d.]+ s", facts["walk"]["complete contact"])
 
 
+def test_a_drafted_subject_file_needs_no_sex(lab):
+    """Which only a fit needs, and asks for."""
+    path = lab / "subject.toml"
+    path.write_text(re.sub(r"(?m)^sex = .*\n", "", path.read_text()))
+    assert run("check", path).status == 0
+    assert "F191" in run("fit", path, "-o", lab / "out").err
+
+
 def test_the_verdict_is_one_line_and_verbose_says_all(lab):
     outcome = run("check", lab / "subject.toml")
     assert outcome.status == 0

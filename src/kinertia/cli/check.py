@@ -132,7 +132,7 @@ def check(
     person: Person | None
     with shown_progress() as progress:
         if subjects:
-            wanted = read_subject(subjects[0])
+            wanted = read_subject(subjects[0], to_fit=False)
             person = read_person(wanted, progress)
             read = {one.name: _names(one.markers, one.forces) for one in wanted.trials}
             if wanted.model.static is not None:

@@ -200,8 +200,12 @@ def subject_file_in(folder: Path) -> Path:
     raise FileError.found(folder, "F108", problem=problem, action=Quantity("Name the subject file itself"))
 
 
-def read_subject(path: str | Path) -> SubjectFile:
+def read_subject(path: str | Path, to_fit: bool = True) -> SubjectFile:
     """Read and check a subject file; what the study file above it overrules holds, too.
+
+    Args:
+        path: the file.
+        to_fit: what only a fit needs must be in it: the sex, of the literature's table.
 
     Raises:
         FileError: the file is missing, not TOML, or says something that cannot be (unknown key, missing or
@@ -211,7 +215,7 @@ def read_subject(path: str | Path) -> SubjectFile:
     path = Path(path).resolve()
     document = read_toml(path, "a subject file (subject.toml)")
     result = _validated(SubjectFile, document, path)
-    if lack := _incomplete(result):
+    if lack := _incomplete(result, needs_sex=to_fit):
         place, found = lack
         raise FileError.of(path, found, document.line(place) or document.last_line)
     subject = result.subject
@@ -271,15 +275,17 @@ def _settings_error(found: Finding) -> SettingsError:
     return SettingsError(problem_of(found)).with_finding(found)
 
 
-def _incomplete(wanted: SubjectFile, needs_static: bool = True) -> tuple[Location, Finding] | None:
+def _incomplete(
+    wanted: SubjectFile, needs_static: bool = True, needs_sex: bool = True
+) -> tuple[Location, Finding] | None:
     """Where and what the entries lack, or have too much of, for the kind of model.
 
     A subject file without a static trial has forgotten it; a command without one may mean it (S207).
     """
     model = wanted.model
-    needed = (("model", "static", model.static), ("subject", "sex", wanted.subject.sex))
-    for table, key, value in needed if needs_static else needed[1:]:
-        if value is None and model.osim is None:
+    needed = (("model", "static", model.static, needs_static), ("subject", "sex", wanted.subject.sex, needs_sex))
+    for table, key, value, asked in needed:
+        if asked and value is None and model.osim is None:
             return (table, key), _finding({"loc": (table, key), "type": "missing"})
     if lack := _two_models(model.static, model.markers, model.osim, model.calibrate):
         return lack
