@@ -23,7 +23,6 @@ from kinertia.io.number_table import mismatch, read_lines, read_rows
 from kinertia.io.sto import header_entry, other_count
 from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads
 
-ENDING = ".forces"
 _TITLE, _COLUMNS = "[Force Data]", "#Sample"
 _OF_A_PLATE = ("FX", "FY", "FZ", "X", "Y", "Z", "MZ")
 _MM = 1e-3

@@ -11,8 +11,6 @@ from kinertia.errors import FileError, TrialError
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
-from kinertia.io.cortex_forces import ENDING as CORTEX
-from kinertia.io.cortex_forces import read_cortex_forces
 from kinertia.io.ground_forces import read_forces_with_findings
 from kinertia.io.lab_axes import upright_along_z
 from kinertia.io.number_table import expect_file, wrong_kind
@@ -21,6 +19,7 @@ from kinertia.trial.data import FloatArray, PlateLoads, Recording
 from kinertia.trial.impossible_data import impossible_load, impossible_position
 
 MARKER_FILES = (".trc", ".c3d", ".tsv", ".csv")
+CORTEX = ".forces"
 FORCE_FILES = (".mot", ".sto", ".tsv", CORTEX)
 """Endings of what is read."""
 _FARTHEST_M, _STRONGEST_N = 1000.0, 1e6
@@ -84,6 +83,8 @@ def _forces(
         return read_forces_with_findings(path, loads_path, turn)
     if loads_path is not None:
         raise wrong_kind(Path(loads_path), "An ExternalLoads file", f"explain a {CORTEX} file", "a .mot or .sto file")
+    from kinertia.io.cortex_forces import read_cortex_forces
+
     return read_cortex_forces(path, turn)
 
 

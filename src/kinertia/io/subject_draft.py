@@ -12,12 +12,11 @@ from typing import Any
 
 from kinertia.errors import FileError, KinertiaError
 from kinertia.findings.quantity import Quantity
-from kinertia.io.cortex_forces import ENDING as CORTEX
 from kinertia.io.file_names import RESULT_FILES, missing_file
 from kinertia.io.marker_set_draft import draft_marker_set, preset_of
 from kinertia.io.measures_file import is_measures_sheet
 from kinertia.io.qualisys import plates_beside
-from kinertia.io.recording import MARKER_FILES, read_recording
+from kinertia.io.recording import CORTEX, MARKER_FILES, read_recording
 from kinertia.io.subject_file import Model, PriorFiles, TrialFiles
 from kinertia.io.subject_text import entry_line
 from kinertia.settings import Settings, Subject, Table

@@ -3,7 +3,6 @@
 from types import SimpleNamespace
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from kinertia.diagnostics.result.context import ResultContext
@@ -105,7 +104,7 @@ def angles(coordinate, degrees, own=(0.0, 140.0), sd_deg=0.5, stated=False):
         skeleton=SimpleNamespace(ranges=ranges),
         kinematics=SimpleNamespace(ik=SimpleNamespace(coordinates=("pelvis_tilt", coordinate))),
         motion=SimpleNamespace(q=np.radians([[200.0, 10.0], [0.0, degrees]])),
-        coordinate_sd=pd.DataFrame({coordinate: np.radians([sd_deg, sd_deg])}),
+        deviations=SimpleNamespace(coordinates=np.full((2, 2), np.radians(sd_deg))),
     )
     return list(joint_angles(ResultContext(SimpleNamespace(trials=(trial,)), None)))
 

@@ -33,7 +33,7 @@ def joint_angles(context: ResultContext) -> Iterator[Finding]:
             angles = trial.motion.q[:, column]
             beyond = np.maximum(low - angles, angles - high)
             worst = int(np.argmax(beyond))
-            sd = 0.0 if trial.coordinate_sd is None else float(trial.coordinate_sd[name].iloc[worst])
+            sd = 0.0 if trial.deviations is None else float(trial.deviations.coordinates[worst, column])
             if beyond[worst] > min(_SURE * sd, _IMPOSSIBLE_RAD):
                 yield finding(
                     "R305",
