@@ -9,7 +9,6 @@ walks with one plate 20 mm off, it brings the deviation of that plate's position
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -28,8 +27,6 @@ _HARDLY_M = 0.004
 _BETTER = 0.7
 _CERTAIN = 2.0
 """SDs by which plates must differ."""
-_MATTERS = 1.0
-"""Error bars of a joint moment."""
 
 
 def plate_positions(context: ResultContext) -> Iterator[Finding]:
@@ -43,14 +40,13 @@ def plate_positions(context: ResultContext) -> Iterator[Finding]:
             first = max(errors, key=lambda one: (one.supported, abs(one.value)))
             yield correction("P246", "offset_m", context.along(axis, None), first)
         else:
-            worst = next((one.severity for one in ambiguous if one.severity is Severity.WARNING), None)
-            yield from corrected(context, "P246", "offset_m", errors, worst)
+            yield from corrected(context, "P246", "offset_m", errors, Severity.WARNING if ambiguous else None)
         yield from ambiguous
 
 
 def _ambiguous(context: ResultContext, axis: str, errors: Sequence[CalibrationEntry]) -> list[Finding]:
     """P247, where a plate seems off and another may be as well: how uncertain each is does not count, since that is
-    what is ambiguous, but plates must differ for certain. INFO where it moves no joint moment beyond its error bar."""
+    what is ambiguous, but plates must differ for certain."""
     prior, posterior = context.ready.uncertainty.instruments, context.fit.posterior
     off = [one for one in errors if one.notable and not one.contradicted_by]
     if posterior is None or prior.plate[axis].faulty_share == 0.0 or not off:
@@ -67,8 +63,7 @@ def _ambiguous(context: ResultContext, axis: str, errors: Sequence[CalibrationEn
         mean_sd_m=Quantity(each_m, "m", limit=_HARDLY_M),
         difference_m=Quantity(differ_m, "m"),
     )
-    matters = any(one.moved is not None and one.moved > _MATTERS for one in off)
-    return [found if matters else replace(found, severity=Severity.INFO)]
+    return [found]
 
 
 def position_deviations(shown: InstrumentInformation, prior: InstrumentPrior, axis: str) -> tuple[float, float]:
