@@ -189,9 +189,10 @@ def test_init_leaves_other_persons_forces_alone_and_says_so(tmp_path, sample_wal
 
 def test_init_takes_neither_hidden_twins_nor_results_of_kinertia(tmp_path):
     """Archives of Macs have a hidden twin of every file; results beside recordings hold motion files and loads, too."""
-    folder = tmp_path / "Anna"
-    for place in (folder, tmp_path / "out"):
-        place.mkdir()
+    # two folders below the tests' own, whose names may have "force" in them
+    folder, out = tmp_path / "study" / "Anna", tmp_path / "study" / "out"
+    for place in (folder, out):
+        place.mkdir(parents=True)
     for name in ("static.trc", "walk.trc", "._walk.trc", "._other.c3d"):
         (folder / name).touch()
     for name, content in (
@@ -199,7 +200,7 @@ def test_init_takes_neither_hidden_twins_nor_results_of_kinertia(tmp_path):
         ("external_loads.xml", "<ExternalLoads />"),
         ("ground_reactions.mot", "time\tplate_vx\n"),
     ):
-        (tmp_path / "out" / name).write_text(content, encoding="utf-8")
+        (out / name).write_text(content, encoding="utf-8")
     text = init_subject(folder)
     assert "._" not in text
     assert "out/" not in text
