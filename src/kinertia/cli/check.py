@@ -103,7 +103,7 @@ def check(
     are found by names and data where --forces and --static do not say them.
 
     Each finding has a code; kinertia explain CODE says what it means.
-    Exit status 1 if an ERROR is open: no fit or no simulation can rest on it.
+    Exit status 1 if an ERROR is open: such a recording or model cannot be used.
 
     [bold]Examples[/]
 
