@@ -10,6 +10,7 @@ Its C++ also ends the process, or never ends, on some damaged files: those are r
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 import pickle
 import shutil
@@ -62,15 +63,10 @@ def read_content(path: Path) -> C3dContent:
     Raises:
         C3dTrouble: ezc3d cannot read it.
     """
-    trouble = ""
-    try:
-        file = _opened(path, extract_forceplat_data=True)
-    except Exception as error:  # ezc3d lets OSError, RuntimeError, IndexError and more through
-        trouble = str(error)
-        try:
-            file = _opened(path)
-        except Exception as worse:
-            raise C3dTrouble(str(worse)) from None
+    file, trouble = _with_plates(path)
+    shapes = _plate_shapes(file["parameters"])
+    if shapes:
+        file, trouble = _with_plate_shapes(file, shapes)
     data, header = file["data"], file["header"]
     return {
         "header": {kind: dict(header[kind]) for kind in ("points", "analogs", "rotations") if kind in header},
@@ -83,6 +79,57 @@ def read_content(path: Path) -> C3dContent:
         },
         "trouble": trouble,
     }
+
+
+def _plate_shapes(parameters: Any) -> dict[str, tuple[int, ...]]:
+    """The shapes that ezc3d expects of the lists of force plates, where the file has the same numbers in others.
+
+    ezc3d looks beyond the dimensions of lists that have too few, and finds there what happens to be in memory.
+    """
+    used = parameter_values(parameters, "FORCE_PLATFORM", "USED", [0])[0]
+    plates = int(used) if isinstance(used, int | np.integer) else 0
+    if plates < 1:
+        return {}
+    channels = len(parameter_values(parameters, "FORCE_PLATFORM", "CHANNEL")) // plates
+    matrix = len(parameter_values(parameters, "FORCE_PLATFORM", "CAL_MATRIX")) // plates
+    expected = {"CORNERS": (3, 4), "ORIGIN": (3,), "CHANNEL": (channels,), "CAL_MATRIX": (channels, channels)}
+    if matrix != channels**2:
+        del expected["CAL_MATRIX"]
+    shapes = {}
+    for name, shape in expected.items():
+        values = parameter_values(parameters, "FORCE_PLATFORM", name)
+        if len(values) == math.prod(shape) * plates > 0:
+            stored = np.shape(parameters["FORCE_PLATFORM"][name]["value"])
+            if stored != (*shape, plates):
+                shapes[name] = (*shape, plates)
+    return shapes
+
+
+def _with_plate_shapes(file: Any, shapes: dict[str, tuple[int, ...]]) -> tuple[Any, str]:
+    """`_with_plates` of a copy of a file whose lists of force plates have these shapes."""
+    for name, shape in shapes.items():
+        entry = file["parameters"]["FORCE_PLATFORM"][name]
+        entry["value"] = np.reshape(np.ravel(entry["value"], order="F"), shape, order="F")
+    with tempfile.TemporaryDirectory() as folder:
+        copy = Path(folder) / _COPY
+        save_c3d(file, copy)
+        return _with_plates(copy)
+
+
+def _with_plates(path: Path) -> tuple[Any, str]:
+    """What is in a file as ezc3d holds it, with the loads on force plates or with why they could not be worked out.
+
+    Raises:
+        C3dTrouble: ezc3d cannot read it.
+    """
+    try:
+        return _opened(path, extract_forceplat_data=True), ""
+    except Exception as error:  # ezc3d lets OSError, RuntimeError, IndexError and more through
+        trouble = str(error)
+    try:
+        return _opened(path), trouble
+    except Exception as worse:
+        raise C3dTrouble(str(worse)) from None
 
 
 def parameter_values(parameters: Any, group: str, name: str, default: Sequence[Any] = ()) -> Sequence[Any]:
