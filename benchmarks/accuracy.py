@@ -1,4 +1,4 @@
-"""What the simultaneous estimate is worth, on synthetic truth and on measured walks: regenerates docs/accuracy.md.
+"""What the simultaneous estimate is worth, on synthetic truth and on measured walks: regenerates docs/validation/accuracy.md.
 
 python benchmarks/accuracy.py
 """
@@ -23,12 +23,12 @@ from study_bound import bound_rows
 from study_noise import UNIFORM_SD, study_draw, study_section
 from walks import WALKS
 
-DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "accuracy.md"
+DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "validation" / "accuracy.md"
 PEOPLE = 40
 
 
 def document(sections: dict[str, str]) -> str:
-    """The text of docs/accuracy.md."""
+    """The text of docs/validation/accuracy.md."""
     return f"""# Accuracy of the simultaneous estimate
 
 This page is written by `python benchmarks/accuracy.py`; do not edit it by hand.
@@ -108,7 +108,7 @@ scale), a walk of 2.5 s at 100 Hz, {sections["people"]} people in each laborator
 *Better*: people for whom the RMS error is below the literature's, and in brackets the share for whom that of an
 estimate at the bound would be. *Measured*, *informed* and *assumed*: parameters of all kinds, in prior SDs. Skin,
 skeleton and instruments are the same in all trials of a person. {JOINT_CAPTION} What an error bar means is explained in
-[error bars](error-bars.md).
+[error bars](../error-bars.md).
 
 {sections["error_bars"]}
 

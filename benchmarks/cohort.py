@@ -1,4 +1,4 @@
-"""What a cohort costs beside its single fits, and how memory grows with its people: writes docs/cohort-speed.md.
+"""What a cohort costs beside its single fits, and how memory grows with its people: writes docs/validation/cohort-speed.md.
 
     python benchmarks/cohort.py                 # 50 people and 200: some 20 minutes on two quiet cores
     python benchmarks/cohort.py --people 8 --fewer 4 --sample 4 --dry-run
@@ -35,7 +35,7 @@ from kinertia.synthetic.walk import walk, walking_subject
 from measured_trials import table
 from synthetic_walks import FIRST_SEED
 
-DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "cohort-speed.md"
+DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "validation" / "cohort-speed.md"
 PEOPLE, FEWER, SAMPLE = 200, 50, 20
 WALK_S = 2.5
 ALLOWED = 1.15

@@ -1,4 +1,4 @@
-"""Seconds of the simultaneous estimate beside bare Pinocchio calls, and their section of docs/speed.md."""
+"""Seconds of the simultaneous estimate beside bare Pinocchio calls, and their section of docs/validation/speed.md."""
 
 from __future__ import annotations
 

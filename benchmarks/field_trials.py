@@ -1,4 +1,4 @@
-"""What Kinertia says of recordings of other laboratories, and whether it is as it should be: docs/field-trials.md.
+"""What Kinertia says of recordings of other laboratories, and whether it is as it should be: docs/validation/field-trials.md.
 
     python benchmarks/field_trials.py FOLDER [PART OF A TITLE]
 
@@ -24,7 +24,7 @@ from kinertia.cli.app import main as kinertia
 from measured_trials import severe, table, told, unexplained
 from walks import fit_arguments
 
-DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "field-trials.md"
+DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "validation" / "field-trials.md"
 CASES = Path(__file__).with_name("field_cases.toml")
 FILES = (".trc", ".c3d", ".mot", ".xml", ".osim")
 _OF_RESULT = "R"
@@ -136,7 +136,7 @@ def _outcome(arguments: Sequence[str], tries: int) -> Outcome:
 
 
 def document(outcomes: Sequence[tuple[Case, Outcome]]) -> str:
-    """The text of docs/field-trials.md."""
+    """The text of docs/validation/field-trials.md."""
     rows, messages = [], []
     for case, outcome in outcomes:
         against = case.against(outcome)

@@ -1,4 +1,4 @@
-"""Do BSPs from some trials of a person explain the others? `kinertia crossval` on measured trials: docs/held-out.md.
+"""Do BSPs from some trials of a person explain the others? `kinertia crossval` on measured trials: docs/validation/held-out.md.
 
 python benchmarks/held_out.py
 """
@@ -16,7 +16,7 @@ from kinertia.cli.app import main as kinertia
 from measured_data import data_folder
 from measured_trials import table
 
-DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "held-out.md"
+DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "validation" / "held-out.md"
 
 TRIAL = """
 [[trial]]
@@ -58,7 +58,7 @@ def held_out(text: str) -> list[dict[str, Any]]:
 
 
 def document(people: dict[str, list[dict[str, Any]]]) -> str:
-    """The text of docs/held-out.md."""
+    """The text of docs/validation/held-out.md."""
     rows = []
     for title, trials in people.items():
         for trial in trials:
@@ -88,7 +88,7 @@ The BSPs from the other trials explain {better} of {len(rows)} trials better tha
 
 
 def main() -> None:
-    """Rewrite docs/held-out.md."""
+    """Rewrite docs/validation/held-out.md."""
     DOCUMENT.write_text(document({title: held_out(text) for title, text in subject_files(data_folder()).items()}))
 
 

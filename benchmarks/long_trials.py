@@ -1,4 +1,4 @@
-"""Memory and seconds of walks of minutes, from markers to error bars: writes docs/long-trials.md.
+"""Memory and seconds of walks of minutes, from markers to error bars: writes docs/validation/long-trials.md.
 
     python benchmarks/long_trials.py
 
@@ -29,7 +29,7 @@ from kinertia.trial.data import FootLoads, Markers, Trial
 from measured_trials import table
 from synthetic_walks import BANDWIDTH, FIRST_SEED
 
-DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "long-trials.md"
+DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "validation" / "long-trials.md"
 MINUTES = (0.5, 1.0, 3.0, 10.0)
 FAST_PLATES_HZ = 1000.0
 """Plates' rate with which the longest walk is run once more."""
@@ -133,7 +133,7 @@ def _most_mb() -> float:
 
 
 def document(walks: list[Long]) -> str:
-    """The text of docs/long-trials.md."""
+    """The text of docs/validation/long-trials.md."""
     rows = [
         [
             f"{w.minutes:g} min",

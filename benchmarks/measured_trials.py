@@ -1,4 +1,4 @@
-"""What `kinertia fit` gives on the four measured walks: regenerates docs/measured-trials.md.
+"""What `kinertia fit` gives on the four measured walks: regenerates docs/validation/measured-trials.md.
 
 python benchmarks/measured_trials.py
 """
@@ -20,7 +20,7 @@ from kinertia.cli.app import main as kinertia
 from measured_data import data_folder
 from walks import WALKS, fit_arguments
 
-DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "measured-trials.md"
+DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "validation" / "measured-trials.md"
 STAGES = ("literature", "corrected", "estimate")
 
 
@@ -62,7 +62,7 @@ def table(headings: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
 
 
 def document(runs: dict[str, dict[str, Any]]) -> str:
-    """The text of docs/measured-trials.md."""
+    """The text of docs/validation/measured-trials.md."""
     trials = {name: run["trials"][0] for name, run in runs.items()}
     used = table(
         ["walk", "frames", "used", "window (s)", "markers, IK (mm)", "markers, estimate (mm)", "converged"],

@@ -1,4 +1,4 @@
-"""What the simultaneous estimate says of the measured walks, for its section of docs/accuracy.md."""
+"""What the simultaneous estimate says of the measured walks, for its section of docs/validation/accuracy.md."""
 
 from __future__ import annotations
 

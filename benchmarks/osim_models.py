@@ -1,4 +1,4 @@
-"""What `kinertia fit --model` gives with three users' own OpenSim models: regenerates docs/osim-models.md.
+"""What `kinertia fit --model` gives with three users' own OpenSim models: regenerates docs/validation/osim-models.md.
 
 python benchmarks/osim_models.py
 """
@@ -19,7 +19,7 @@ from kinertia.cli.app import main as kinertia
 from measured_data import data_folder
 from measured_trials import STAGES, farthest, table, told
 
-DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "osim-models.md"
+DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "validation" / "osim-models.md"
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ def results(name: str, calibrate: bool, folder: Path) -> dict[str, Any]:
 
 
 def document(runs: dict[tuple[str, bool], dict[str, Any]]) -> str:
-    """The text of docs/osim-models.md."""
+    """The text of docs/validation/osim-models.md."""
     rows, bodies, warnings = [], [], []
     for (name, calibrate), run in runs.items():
         title = f"{PEOPLE[name].title}, {'calibrated' if calibrate else 'as it is'}"

@@ -1,4 +1,4 @@
-"""The walks of docs/peers.md, and what OpenSim and Kinertia make of each: files in one folder per walk."""
+"""The walks of docs/validation/peers.md, and what OpenSim and Kinertia make of each: files in one folder per walk."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Joint moments, residuals and seconds of Kinertia next to OpenSim's IK + ID and RRA: regenerates docs/peers.md.
+"""Joint moments, residuals and seconds of Kinertia next to OpenSim's IK + ID and RRA: regenerates docs/validation/peers.md.
 
 python benchmarks/peers.py [--people 6] [--folder FOLDER]
 
@@ -25,7 +25,7 @@ from kinertia.io.sto import read_sto
 from measured_trials import table
 from peer_cases import Case, Result, measured_cases, results, truth_case
 
-DOCS = Path(__file__).resolve().parents[1] / "docs"
+DOCS = Path(__file__).resolve().parents[1] / "docs" / "validation"
 FIRST_SEED = 100
 JOINTS = {
     "hip_flexion": "hip flexion",
@@ -223,7 +223,7 @@ def failures(cases: Iterable[tuple[Case, Runs]]) -> str:
 def document(
     sound: list[tuple[Case, Runs]], faulty: list[tuple[Case, Runs]], measured: dict[str, tuple[Case, Runs]]
 ) -> str:
-    """The text of docs/peers.md."""
+    """The text of docs/validation/peers.md."""
     of_truth = {
         "truth, sound instruments": [runs for _, runs in sound],
         "truth, faulty instruments": [runs for _, runs in faulty],

@@ -1,4 +1,4 @@
-"""The gait2354 walk whole, cut in two and pooled again, and its section of docs/accuracy.md."""
+"""The gait2354 walk whole, cut in two and pooled again, and its section of docs/validation/accuracy.md."""
 
 from __future__ import annotations
 

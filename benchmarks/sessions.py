@@ -1,4 +1,4 @@
-"""Fits every trial of a session alone and compares what they share: regenerates docs/sessions.md.
+"""Fits every trial of a session alone and compares what they share: regenerates docs/validation/sessions.md.
 
     python benchmarks/sessions.py [--keep FOLDER] [--only SESSION]
 
@@ -24,7 +24,7 @@ from measured_data import data_folder
 from measured_trials import table
 from repeatability import Shared, group_sums, shared
 
-DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "sessions.md"
+DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "validation" / "sessions.md"
 MARKER_SET = Path(__file__).resolve().parent / "marker_sets" / "plug-in-gait-sacrum.toml"
 CHILDREN = ("HC002D", "HC030A", "HC032A", "HC036A", "HC038A", "HC040A")
 CHILD = """[subject]
@@ -177,7 +177,7 @@ def _deviation(value: float, unit: str) -> str:
 
 
 def document(sections: Sequence[str]) -> str:
-    """The text of docs/sessions.md."""
+    """The text of docs/validation/sessions.md."""
     return TEXT.format(sections="\n\n".join(sections))
 
 
@@ -199,7 +199,7 @@ of their difference. *Median sd*: of a single trial, since bars that are long ar
 
 
 def main() -> None:
-    """Rewrite docs/sessions.md, or print the part about one session."""
+    """Rewrite docs/validation/sessions.md, or print the part about one session."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--keep", type=Path, help="folder for the results, which are used again")
     parser.add_argument("--only", choices=[session.name for session in SESSIONS], help="one session, printed")

@@ -1,4 +1,4 @@
-"""Times every stage of `kinertia fit` next to OpenSim, at one, two and four times the length: writes docs/speed.md.
+"""Times every stage of `kinertia fit` next to OpenSim, at one, two and four times the length: writes docs/validation/speed.md.
 
     python benchmarks/stages.py
 
@@ -47,7 +47,7 @@ from measured_data import data_folder
 from measured_trials import table
 from walks import WALKS, fit_arguments
 
-DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "speed.md"
+DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "validation" / "speed.md"
 SETUPS = {
     "gait2354": ("gait2354/subject01_Setup_IK.xml", "gait2354/subject01_scaled.osim"),
     "rajagopal": ("rajagopal_walk/ik_setup_walk.xml", "rajagopal_walk/scaled.osim"),
@@ -205,7 +205,7 @@ def gcv_splines(frames: int, columns: int, runs: int) -> tuple[float, float]:
 
 
 def document(runs: int = 5, lengths: Sequence[int] = (1, 2, 4), names: Sequence[str] = tuple(SETUPS)) -> str:
-    """The text of docs/speed.md, measured now."""
+    """The text of docs/validation/speed.md, measured now."""
     opensim.Logger.removeFileSink()
     opensim.Logger.setLevelString("error")
     peers, scaling = [], []

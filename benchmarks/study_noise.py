@@ -1,4 +1,4 @@
-"""The study's noise, from starts 50 % off: draws of every method, and their section of docs/accuracy.md."""
+"""The study's noise, from starts 50 % off: draws of every method, and their section of docs/validation/accuracy.md."""
 
 from __future__ import annotations
 

@@ -45,7 +45,7 @@ LEFT_TO_THE_FIT = {
     "plates turned by 3 degrees about the vertical",
     "the other sex",
 }
-"""What `check` says nothing about: the study in `docs/faults.md` tells what becomes of it."""
+"""What `check` says nothing about: the study in `docs/validation/faults.md` tells what becomes of it."""
 QUICK_EVERY = 6
 CASE = FaultOutcome("walk", "fault", "not possible")
 

@@ -166,10 +166,10 @@ def _two_level_verdict(before: tuple[float, float, float], after: tuple[float, f
     else:
         return (
             "Two-level is nearer to the truth than the literature in this run. With skin motion that is luck "
-            "rather than the rule: see docs/study.md."
+            "rather than the rule: see docs/validation/study.md."
         )
     return (
         f"{finding} than the literature: with skin motion, small residuals do not mean right body segment parameters. "
-        "That is the finding of the study whose two-level method this is (docs/study.md); without noise the same "
+        "That is the finding of the study whose two-level method this is (docs/validation/study.md); without noise the same "
         "method finds them exactly (kinertia study table1)."
     )

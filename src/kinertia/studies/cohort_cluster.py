@@ -45,7 +45,7 @@ SCHEDULING = MappingProxyType(
 NO_DASHBOARD = MappingProxyType({"dashboard": False, "dashboard_address": "127.0.0.1:0"})
 """Of their schedulers, which listen there all the same: at any free port, since another run may have the usual one."""
 _SECONDS_PER_PERSON, _SECONDS_PER_FRAME = 4.0, 0.003
-"""Of one processor, for a rough guess before anything was measured: see `docs/long-trials.md`."""
+"""Of one processor, for a rough guess before anything was measured: see `docs/validation/long-trials.md`."""
 _LEAST_LIMIT_S, _PATIENCE = 900.0, 50.0
 """A fit is given so long, and so many times the guess: what takes longer has no end."""
 
