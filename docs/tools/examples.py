@@ -21,7 +21,11 @@ from kinertia.cli.measured_demo import write_measured_lab
 from measured_data import data_folder
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGES = (*sorted((ROOT / "docs").glob("*.md")), *sorted((ROOT / "docs" / "validation").glob("*.md")), ROOT / "README.md")
+PAGES = (
+    *sorted((ROOT / "docs").glob("*.md")),
+    *sorted((ROOT / "docs" / "validation").glob("*.md")),
+    ROOT / "README.md",
+)
 MEASURED = ("gait2354", "pig_c3d", "rajagopal_walk")
 """Marks of examples that run beside the files of this folder among the measured data; others run in an empty folder."""
 
