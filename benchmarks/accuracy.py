@@ -1,4 +1,4 @@
-"""What the simultaneous estimate is worth, on synthetic truth and on measured walks: regenerates docs/validation/accuracy.md.
+"""What the simultaneous estimate is worth, on synthetic truth and on measured walks: writes validation/accuracy.md.
 
 python benchmarks/accuracy.py
 """

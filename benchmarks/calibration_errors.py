@@ -1,4 +1,4 @@
-"""Errors of calibration put into synthetic walks, what becomes of them, and their section of docs/validation/accuracy.md."""
+"""Errors of calibration put into synthetic walks, what becomes of them, and their section of the accuracy page."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a cohort costs beside its single fits, and how memory grows with its people: writes docs/validation/cohort-speed.md.
+"""What a cohort costs beside its single fits, and how memory grows with its people: writes validation/cohort-speed.md.
 
     python benchmarks/cohort.py                 # 50 people and 200: some 20 minutes on two quiet cores
     python benchmarks/cohort.py --people 8 --fewer 4 --sample 4 --dry-run

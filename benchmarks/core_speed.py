@@ -1,4 +1,4 @@
-"""The rigid-body core next to Pinocchio's bare calls in the same process, and their section of docs/validation/speed.md."""
+"""The rigid-body core next to Pinocchio's bare calls in the same process, and their section of the speed page."""
 
 from __future__ import annotations
 

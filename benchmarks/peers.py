@@ -1,4 +1,4 @@
-"""Joint moments, residuals and seconds of Kinertia next to OpenSim's IK + ID and RRA: regenerates docs/validation/peers.md.
+"""Joint moments, residuals and seconds of Kinertia next to OpenSim's IK + ID and RRA: writes validation/peers.md.
 
 python benchmarks/peers.py [--people 6] [--folder FOLDER]
 

@@ -170,6 +170,6 @@ def _two_level_verdict(before: tuple[float, float, float], after: tuple[float, f
         )
     return (
         f"{finding} than the literature: with skin motion, small residuals do not mean right body segment parameters. "
-        "That is the finding of the study whose two-level method this is (docs/validation/study.md); without noise the same "
-        "method finds them exactly (kinertia study table1)."
+        "That is the finding of the study whose two-level method this is (docs/validation/study.md); without noise the "
+        "same method finds them exactly (kinertia study table1)."
     )
