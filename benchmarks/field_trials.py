@@ -1,4 +1,4 @@
-"""What Kinertia says of recordings of other laboratories, and whether it is as it should be: validation/field-trials.md.
+"""What Kinertia says of recordings of other laboratories, and whether it is as it should be: field-trials.md.
 
     python benchmarks/field_trials.py FOLDER [PART OF A TITLE]
 

@@ -1,4 +1,4 @@
-"""Do BSPs from some trials of a person explain the others? `kinertia crossval` on measured trials: validation/held-out.md.
+"""Do BSPs from some trials of a person explain the others? `kinertia crossval` on measured trials: held-out.md.
 
 python benchmarks/held_out.py
 """

@@ -1,4 +1,4 @@
-"""Times every stage of `kinertia fit` next to OpenSim, at one, two and four times the length: writes validation/speed.md.
+"""Times every stage of `kinertia fit` next to OpenSim, at one, two and four times the length: writes speed.md.
 
     python benchmarks/stages.py
 
