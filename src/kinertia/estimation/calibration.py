@@ -29,8 +29,8 @@ _STEPS = 15
 _TOLERANCE_M = 1e-5
 _ENOUGH_M2 = 1e-6
 """Square of a millimetre."""
-_TURN_SD_RAD, _FEWEST_TO_TURN = 0.02, 3
-"""Of markers that may not turn about their segment as a whole, and how many show a turn."""
+_FEWEST_TO_TURN = 3
+"""How many markers show a turn of their segment."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,6 @@ def adapt(
     poses: Sequence[InverseKinematics],
     marker_sd_m: Mapping[str, float],
     coordinate_sd: Mapping[str, float],
-    unturned: Sequence[str] = (),
 ) -> Adaptation:
     """Adapt marker positions and locked coordinates to trials, with the skeleton as the prior.
 
@@ -69,7 +68,6 @@ def adapt(
         poses: their `first_poses`; of coordinates that are locked by now no notice is taken.
         marker_sd_m: per segment, prior deviation of its markers' positions (m, each axis).
         coordinate_sd: per locked coordinate to adapt, its prior deviation (rad or m).
-        unturned: segments about which the markers may each move, but not turn as a whole.
 
     Frames whose visible markers do not determine every coordinate are left out.
 
@@ -101,9 +99,6 @@ def adapt(
         [list(coordinate_sd.values()), np.repeat([marker_sd_m[marker.segment] for marker in kept], 3)]
     )
     information = np.diag(1.0 / deviation**2)
-    for segment in unturned:
-        turn = _turn_by_places(kept, segment) / _TURN_SD_RAD
-        information[len(still) :, len(still) :] += turn.T @ turn
     static = prior.copy()
     for _ in range(_STEPS):
         q = np.empty((len(moving), len(freed.coordinates)))
@@ -247,25 +242,16 @@ def _step(
 
 
 def turn_about(segment: str, before: Sequence[Marker], after: Sequence[Marker]) -> float:
-    """Rad: by how much a segment's markers have turned about it as a whole; 0 with fewer than three."""
+    """Rad: by how much a segment's markers have turned about it as a whole, by least squares; 0 with fewer than three."""
     moved = {marker.label: marker.position for marker in after}
     worn = [marker for marker in before if marker.segment == segment and marker.label in moved]
     if len(worn) < _FEWEST_TO_TURN:
         return 0.0
-    places = np.concatenate([moved[marker.label] - marker.position for marker in worn])
-    return float(np.linalg.norm(_turn_by_places(worn, segment) @ places))
-
-
-def _turn_by_places(markers: Sequence[Marker], segment: str) -> np.ndarray:
-    """(3, 3 m) rad/m: the turn that small displacements of the markers make of a segment's, by least squares."""
-    worn = [k for k, marker in enumerate(markers) if marker.segment == segment]
-    arms = np.array([markers[k].position for k in worn])
+    arms = np.array([marker.position for marker in worn])
     arms = arms - arms.mean(axis=0)
+    shifts = np.array([moved[marker.label] - marker.position for marker in worn])
     by_moments = np.linalg.pinv(np.sum(arms**2) * np.eye(3) - arms.T @ arms)
-    turn = np.zeros((3, 3 * len(markers)))
-    for k, arm in zip(worn, arms, strict=True):
-        turn[:, 3 * k : 3 * k + 3] = by_moments @ np.cross(arm, np.eye(3)).T
-    return turn
+    return float(np.linalg.norm(by_moments @ np.cross(arms, shifts).sum(axis=0)))
 
 
 def marker_jacobian(skeleton: Skeleton, pose: Pose, positions: np.ndarray) -> np.ndarray:

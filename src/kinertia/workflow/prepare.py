@@ -16,7 +16,7 @@ from kinertia.diagnostics.subject.stated_ranges import stated_ranges
 from kinertia.diagnostics.subject.unobserved_segments import unobserved_segments
 from kinertia.errors import BlockedError, MarkerSetError, SettingsError, TrialError
 from kinertia.estimation.arm_branch import elbow_rotations, with_elbows_that_bend_forwards
-from kinertia.estimation.calibration import adapt, hold_uninformed, turn_about, without_partly_shown
+from kinertia.estimation.calibration import Adaptation, adapt, hold_uninformed, turn_about, without_partly_shown
 from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.estimation.input_checks import check_trials, complete_subject, known
 from kinertia.estimation.population import population_prior
@@ -43,6 +43,8 @@ from kinertia.model.gait27 import (
 from kinertia.model.head_markers import without_head
 from kinertia.model.marker_set import MarkerSet
 from kinertia.model.skeleton import Skeleton
+from kinertia.model.upper_body import ARM_SEGMENTS
+from kinertia.motion.inverse_kinematics import InverseKinematics
 from kinertia.motion.kinematics import facing
 from kinertia.motion.one_thread import one_blas_thread
 from kinertia.motion.stance_pose import stance_pose
@@ -62,6 +64,8 @@ UPPER_BODY_SD_M = 0.04
 """How far markers may sit from where the model has them."""
 WITHOUT_STATIC = 2.0
 """Times as uncertain are joint centres and markers of a model that is made from a walk."""
+_STAYS_M = 1e-4
+"""Of markers that have been adapted already."""
 _FAR_M = 0.03
 _ARM_ROTATION_SD_RAD = 1.0
 _TURNED_RAD = 0.25
@@ -95,8 +99,8 @@ def calibrate(model: Gait27, trials: Sequence[Trial], acromia: Sequence[str] = (
 
     Markers of pelvis, legs and feet are held to the static trial by a deviation of 10 mm, those of torso and arms and
     the shoulder centres by 40 mm. Where arms have turned the torso under its markers, since the model's shoulders lack
-    an axis, its markers and the pelvis' may not turn as a whole. Markers on the head are left out where three others
-    show the trunk, which the acromia (labels), that move with the arms, do not.
+    an axis, the rest of the body is adapted without them. Markers on the head are left out where three others show the
+    trunk, which the acromia (labels), that move with the arms, do not.
     """
     skeleton, poses = with_elbows_that_bend_forwards(model.skeleton, trials)
     complete = without_partly_shown(skeleton, poses, ARM_COORDINATES)
@@ -115,10 +119,28 @@ def calibrate(model: Gait27, trials: Sequence[Trial], acromia: Sequence[str] = (
     adapted = adapt(skeleton, trials, poses, marker_sd, coordinate_sd)
     torso_rad: float | None = turn_about("torso", skeleton.markers, adapted.skeleton.markers)
     if torso_rad is not None and torso_rad > _TURNED_RAD:
-        adapted = adapt(skeleton, trials, poses, marker_sd, coordinate_sd, unturned=("pelvis", "torso"))
+        adapted = _arms_last(skeleton, trials, poses, marker_sd, coordinate_sd)
     else:
         torso_rad = None
     return Calibrated(adapted.skeleton, found, adapted.moved_m, elbows, torso_rad, head)
+
+
+def _arms_last(
+    skeleton: Skeleton,
+    trials: Sequence[Trial],
+    poses: Sequence[InverseKinematics],
+    marker_sd_m: Mapping[str, float],
+    coordinate_sd: Mapping[str, float],
+) -> Adaptation:
+    """Adapt the body without the markers of its arms, and then the arms on a body that stays as it is."""
+    arms = {f"{name}_{side}" for side in "rl" for name in ARM_SEGMENTS}
+    worn = [marker for marker in skeleton.markers if marker.segment in arms]
+    armless = skeleton.with_markers([marker for marker in skeleton.markers if marker.segment not in arms])
+    body = adapt(armless, trials, poses, marker_sd_m, {})
+    whole = body.skeleton.with_markers([*body.skeleton.markers, *worn])
+    staying = {segment: sd if segment in arms else _STAYS_M for segment, sd in marker_sd_m.items()}
+    adapted = adapt(whole, trials, poses, staying, coordinate_sd)
+    return replace(adapted, moved_m={**adapted.moved_m, **body.moved_m})
 
 
 @one_blas_thread

@@ -18,6 +18,7 @@ from kinertia.findings.display import first_few
 from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
+from kinertia.model.anatomy import segment_of
 from kinertia.model.bsp import PARAMETERS, impossible_segments
 
 CONTRADICTION_SD = 3.0
@@ -31,6 +32,7 @@ CONTRADICTING_COM_M = 0.1
 by 34 mm (SD)."""
 _ONE_SIDED_SD = 4.0
 """As in `one_sided`."""
+_ARMS = ("upper_arm", "forearm", "hand")
 _WRONG = "a misplaced marker or joint centre, or an error of a plate"
 _WORN = "something worn or carried that was not declared ([[attached]])"
 _OTHER = "a body that the tables do not describe (age_years, population under [subject])"
@@ -78,13 +80,14 @@ def away_from_expected(fit: Fit) -> np.ndarray:
 
 
 def _far_parameters(fit: Fit) -> Iterator[Finding]:
-    """R203 of every parameter beyond CONTRADICTION_SD."""
+    """R203 of every parameter beyond CONTRADICTION_SD; those of arms, whose shoulders lack an axis, condemn nothing."""
     away = away_from_expected(fit)
     beyond = np.abs(away) > CONTRADICTION_SD
-    whole = beyond.any(axis=1).sum() > MOST_DOUBTED_SEGMENTS
+    arms = np.array([str(segment_of(name)).startswith(_ARMS) for name in fit.estimate.segments])
+    whole = (beyond.any(axis=1) & ~arms).sum() > MOST_DOUBTED_SEGMENTS
     for row, column in np.argwhere(beyond):
         distance = float(away[row, column])
-        plain = whole or abs(distance) > PLAIN_CONTRADICTION_SD
+        plain = not arms[row] and (whole or abs(distance) > PLAIN_CONTRADICTION_SD)
         yield finding(
             "R203",
             _parameter(fit, row, PARAMETERS[column]),
