@@ -242,7 +242,7 @@ def _step(
 
 
 def turn_about(segment: str, before: Sequence[Marker], after: Sequence[Marker]) -> float:
-    """Rad: by how much a segment's markers have turned about it as a whole, by least squares; 0 with fewer than three."""
+    """Rad: by how much a segment's markers have turned about it, by least squares; 0 with fewer than three."""
     moved = {marker.label: marker.position for marker in after}
     worn = [marker for marker in before if marker.segment == segment and marker.label in moved]
     if len(worn) < _FEWEST_TO_TURN:
