@@ -26,7 +26,7 @@ PAGES = (
     *sorted((ROOT / "docs" / "validation").glob("*.md")),
     ROOT / "README.md",
 )
-MEASURED = ("gait2354", "pig_c3d", "rajagopal_walk")
+MEASURED = ("pig_c3d", "rajagopal_walk")
 """Marks of examples that run beside the files of this folder among the measured data; others run in an empty folder."""
 
 NOTEBOOKS = ("paper_figure", "opensim_day")
@@ -34,6 +34,7 @@ NOTEBOOKS = ("paper_figure", "opensim_day")
 
 _FENCE = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 _MARK = re.compile(r"<!-- example: (\w+)(, slow)? -->")
+_FILE = re.compile(r"<!-- file: ([\w.-]+) -->\n$")
 _COMMAND = re.compile(r"^\$ ((?:[^\n]*\\\n)*[^\n]*)\n((?:(?!\$ ).*\n)*)", re.MULTILINE)
 _ELISION = re.compile(r"^( ?\.\.\.(?: \(.*\))?)$\n?", re.MULTILINE)
 _NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?")
@@ -42,12 +43,16 @@ _RULE = re.compile(r"[─-]+")
 
 @dataclass(frozen=True)
 class Block:
-    """A fenced block; `folder` is the name that the last example mark above it gives, "" without one."""
+    """A fenced block; `folder` is the name that the last example mark above it gives, "" without one.
+
+    `file` is the name under which a mark just above the block puts its text into the folder, "" without one.
+    """
 
     language: str
     text: str
     folder: str
     slow: bool
+    file: str
 
     def commands(self) -> Iterator[tuple[str, str]]:
         """Each command line behind `$`, and the output shown below it."""
@@ -62,7 +67,8 @@ def blocks(text: str) -> list[Block]:
     for fence in _FENCE.finditer(text):
         above = [mark for mark in marks if mark.end() <= fence.start()]
         folder, slow = (above[-1][1], bool(above[-1][2])) if above else ("", False)
-        fenced.append(Block(fence[1], fence[2], folder, slow))
+        file = _FILE.search(text, 0, fence.start())
+        fenced.append(Block(fence[1], fence[2], folder, slow, file[1] if file else ""))
     return fenced
 
 
@@ -148,12 +154,15 @@ def main() -> None:
         text = page.read_text(encoding="utf-8")
         folders: dict[str, Path] = {}
         for block in blocks(text):
-            if block.language != "console":
+            if block.language != "console" and not block.file:
                 continue
             if block.folder not in folders:
                 folders[block.folder] = Path(tempfile.mkdtemp(prefix="kinertia-examples-"))
                 if block.folder in MEASURED:
                     link_measured(block.folder, folders[block.folder])
+            if block.file:
+                (folders[block.folder] / block.file).write_text(block.text, encoding="utf-8")
+                continue
             new = block.text
             for command, shown in block.commands():
                 environment = os.environ | {"COLUMNS": "80"}

@@ -1,4 +1,4 @@
-"""Run the notebooks of the site, keep what they show, and write each as a page beside it.
+"""Run the notebooks of the site and keep what they show.
 
     PYTHONPATH=benchmarks python docs/tools/notebooks.py
 
@@ -13,7 +13,6 @@ from tempfile import TemporaryDirectory
 
 import nbformat
 from nbclient import NotebookClient
-from nbconvert import MarkdownExporter
 
 from examples import NOTEBOOKS, ROOT, put_files
 
@@ -21,7 +20,7 @@ FOLDER = ROOT / "docs" / "notebooks"
 
 
 def main() -> None:
-    """Run and write all."""
+    """Run all."""
     for name in NOTEBOOKS:
         path = FOLDER / f"{name}.ipynb"
         notebook = nbformat.read(path, as_version=4)
@@ -31,18 +30,6 @@ def main() -> None:
         for cell in notebook.cells:
             cell.metadata.pop("execution", None)  # when, which is of no interest
         nbformat.write(notebook, path)
-        write_page(path)
-
-
-def write_page(path: Path) -> None:
-    """The notebook as Markdown, with its pictures in files."""
-    text, resources = MarkdownExporter().from_filename(str(path), resources={"output_files_dir": f"{path.stem}_files"})
-    for name, picture in resources["outputs"].items():
-        (path.parent / name).parent.mkdir(exist_ok=True)
-        (path.parent / name).write_bytes(picture)
-    download = f"\n[This page as a notebook]({path.name}), to run and to change.\n"
-    heading, rest = text.split("\n", 1)
-    path.with_suffix(".md").write_text(heading + "\n" + download + rest, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 import re
 import shlex
+from pathlib import Path
 
 import pandas as pd
 import pytest
@@ -23,7 +24,7 @@ def _examples():
     groups = {}
     for page in PAGES:
         for block in blocks(page.read_text(encoding="utf-8")):
-            if block.language in ("console", "python"):
+            if block.language in ("console", "python") or block.file:
                 groups.setdefault((page, block.folder), []).append(block)
     return [
         pytest.param(group, folder, id=f"{page.stem}-{folder}", marks=[pytest.mark.slow] * group[0].slow)
@@ -53,6 +54,9 @@ def test_examples_run(group, folder, workshop, request):
     workshop(folder)
     namespace = {}
     for block in group:
+        if block.file:
+            Path(block.file).write_text(block.text, encoding="utf-8")
+            continue
         if block.language == "python":
             exec(compile(block.text, f"example in {folder}", "exec"), namespace)
             continue

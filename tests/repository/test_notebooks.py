@@ -29,15 +29,6 @@ def test_every_notebook_is_known_and_has_been_run():
         assert not [out for cell in cells(name) for out in cell["outputs"] if out["output_type"] == "error"]
 
 
-@pytest.mark.parametrize("name", NOTEBOOKS)
-def test_pages_show_what_the_notebooks_show(name):
-    page = (FOLDER / f"{name}.md").read_text(encoding="utf-8")
-    for cell in cells(name):
-        assert "".join(cell["source"]) in page
-        for line in printed(cell).splitlines():
-            assert line in page
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NOTEBOOKS)
 def test_notebooks_run(name, tmp_path, monkeypatch, capsys, measured_folder):
