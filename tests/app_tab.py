@@ -4,13 +4,11 @@ import json
 import shutil
 from urllib.parse import urlsplit
 
-from chromium import DESKTOP, playwright
+from chromium import DESKTOP, PATIENCE_MS, playwright
 from found import FAULTY
 from kinertia.findings.overview import Overview
 from kinertia.io.provenance import sha256
 from kinertia.report.finding_view import digest
-
-PATIENCE_MS = 120_000
 
 
 class Tab:
@@ -87,10 +85,8 @@ class Tab:
         return self
 
     def checked(self):
-        playwright.expect(self.page.locator("section[aria-labelledby=check] .headline")).to_be_visible(
-            timeout=PATIENCE_MS
-        )
-        playwright.expect(self.page.locator("[data-progress]")).to_have_count(0, timeout=PATIENCE_MS)
+        playwright.expect(self.page.locator("section[aria-labelledby=check] .headline")).to_be_visible()
+        playwright.expect(self.page.locator("[data-progress]")).to_have_count(0)
         return self
 
     def estimate(self):
@@ -100,9 +96,9 @@ class Tab:
     def verdict(self):
         """The headline on the page, which the report inside it has as well."""
         headline = self.page.locator("section[aria-labelledby=results] > .headline")
-        playwright.expect(headline).to_be_visible(timeout=PATIENCE_MS)
+        playwright.expect(headline).to_be_visible()
         report = self.page.frame_locator("iframe.report").locator("#verdict .headline, .headline").first
-        playwright.expect(report).to_have_text(headline.inner_text(), timeout=PATIENCE_MS)
+        playwright.expect(report).to_have_text(headline.inner_text())
         return headline.inner_text()
 
     def person(self):

@@ -19,7 +19,8 @@ FLAGS = [
     "--disable-sync",
 ]
 DESKTOP, PHONE = {"width": 1400, "height": 900}, {"width": 390, "height": 844}
-PATIENCE_MS = 30_000
+PATIENCE_MS = 120_000
+playwright.expect.set_options(timeout=PATIENCE_MS)
 
 
 class Opened:
@@ -34,7 +35,7 @@ class Opened:
         self.page.on("request", lambda request: self.requests.append(request.url))
         self.page.goto(path.as_uri())
         self.page.evaluate("document.querySelectorAll('details').forEach((part) => (part.open = true))")
-        playwright.expect(self.page.locator(".plot:not([data-drawn])")).to_have_count(0, timeout=PATIENCE_MS)
+        playwright.expect(self.page.locator(".plot:not([data-drawn])")).to_have_count(0)
 
     def picture(self, locator):
         return picture(locator)

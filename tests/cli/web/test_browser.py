@@ -13,8 +13,8 @@ import pytest
 pytest.importorskip("starlette", reason="needs the extra app (pip install -e '.[test]')")
 pytest.importorskip("uvicorn", reason="needs the extra app (pip install -e '.[test]')")
 from app_server import running
-from app_tab import PATIENCE_MS, Tab, with_everything
-from chromium import DESKTOP, PHONE, picture, playwright
+from app_tab import Tab, with_everything
+from chromium import DESKTOP, PATIENCE_MS, PHONE, picture, playwright
 from command_line import fitted
 from kinertia.cli.web import work
 from kinertia.cli.web.entries import recognise
@@ -276,7 +276,7 @@ def test_everything_is_reached_by_the_keyboard_alone(browser, app, monkeypatch, 
     # the page before has no progress either
     with page.expect_event("domcontentloaded", timeout=PATIENCE_MS):
         press(page, "Save and check")
-    playwright.expect(page.locator("[data-progress]")).to_have_count(0, timeout=PATIENCE_MS)
+    playwright.expect(page.locator("[data-progress]")).to_have_count(0)
     assert 'sex = "female"' in person.subject.read_text(encoding="utf-8")
     press(page, "Markers")
     page.wait_for_url("**/markers")
@@ -311,7 +311,7 @@ def test_rows_of_the_form_are_filled_in_by_the_keyboard_alone(browser, app, monk
             press(page, label, "Home")
             page.keyboard.type(text)
     press(page, "Save and check")
-    playwright.expect(page.get_by_text("Segments that were measured (1)")).to_be_visible(timeout=PATIENCE_MS)
+    playwright.expect(page.get_by_text("Segments that were measured (1)")).to_be_visible()
     wanted = read_subject(person.subject)
     assert wanted.prior.measures == (person.folder / "measures.csv").resolve()
     assert (wanted.subject.population, wanted.model.markers) == ("child", "plug-in-gait")

@@ -10,7 +10,7 @@ import pytest
 pytest.importorskip("starlette", reason="needs the extra app (pip install -e '.[test]')")
 pytest.importorskip("uvicorn", reason="needs the extra app (pip install -e '.[test]')")
 from app_server import running
-from app_tab import PATIENCE_MS, Tab, with_everything
+from app_tab import Tab, with_everything
 from chromium import playwright
 from kinertia.cli.web import work
 
@@ -42,18 +42,18 @@ def test_reload_second_tab_and_cancel_during_a_fit(browser, app, waiting):
     first.estimate()
     playwright.expect(first.page.locator("progress")).to_be_in_viewport()
     stage = first.page.locator("[data-stage]")
-    playwright.expect(stage).to_have_text("estimate", timeout=PATIENCE_MS)
+    playwright.expect(stage).to_have_text("estimate")
     playwright.expect(first.page.locator("[data-left]")).to_contain_text("left")
     assert first.page.get_by_label("Body mass (kg)").is_disabled() or first.page.locator("fieldset[disabled]").count()
     first.page.reload()
-    playwright.expect(stage).to_have_text("estimate", timeout=PATIENCE_MS)
+    playwright.expect(stage).to_have_text("estimate")
     second.home()
     playwright.expect(second.page.locator(".people li").filter(has_text=waiting.name)).to_contain_text("Fit: estimate")
     second.page.goto(address)
     playwright.expect(second.page.locator("progress")).to_have_attribute("value", "0.3")
     second.page.get_by_role("button", name="Cancel").click()
     for one in (second, first):
-        playwright.expect(one.page.locator(".message.warning")).to_contain_text("Cancelled.", timeout=PATIENCE_MS)
+        playwright.expect(one.page.locator(".message.warning")).to_contain_text("Cancelled.")
         playwright.expect(one.page.get_by_role("button", name="Estimate", exact=True)).to_be_visible()
         one.quiet()
 
@@ -77,7 +77,7 @@ def test_a_fit_that_ends_repeats_no_form(browser, app, monkeypatch, tmp_path, c3
     playwright.expect(page.locator(".message.info")).to_contain_text("The results are in")
     playwright.expect(page).to_have_url(f"{app.address}people/{person.name}")
     go.touch()
-    playwright.expect(page.locator("[data-progress]")).to_have_count(0, timeout=PATIENCE_MS)
+    playwright.expect(page.locator("[data-progress]")).to_have_count(0)
     playwright.expect(page).to_have_url(f"{app.address}people/{person.name}#results")
     page.reload()
     assert sent == ["fit", "copy"]
@@ -91,7 +91,7 @@ def test_a_crash_of_one_fit_is_said_and_the_next_one_is_done(browser, app, monke
     for name, said in (("Crashing", "Kinertia failed"), ("Next", "")):
         tab.page.goto(f"{app.address}people/{ready(app.library, name, c3d_lab).name}")
         tab.estimate()
-        playwright.expect(tab.page.locator("[data-progress]")).to_have_count(0, timeout=PATIENCE_MS)
+        playwright.expect(tab.page.locator("[data-progress]")).to_have_count(0)
         messages = tab.page.locator("section[aria-labelledby=results] .message.error")
         playwright.expect(messages).to_have_count(1 if said else 0)
         if said:
@@ -113,13 +113,13 @@ def test_results_are_listed_opened_again_compared_and_deleted(browser, demo_run,
         assert page.locator(".people a").all_inner_texts() in (["Spring", "Autumn"], ["Autumn", "Spring"])
         page.get_by_role("link", name="Spring").click()
         report = page.frame_locator("iframe.report")
-        playwright.expect(report.get_by_role("heading", name="synthetic walker")).to_be_visible(timeout=PATIENCE_MS)
+        playwright.expect(report.get_by_role("heading", name="synthetic walker")).to_be_visible()
         tab.home()
         for name in ("Spring", "Autumn"):
             page.get_by_label(f"Compare {name}").check()
         page.get_by_role("button", name="Compare the chosen").click()
         compared = page.frame_locator("iframe")
-        playwright.expect(compared.get_by_role("columnheader", name="Autumn").first).to_be_visible(timeout=PATIENCE_MS)
+        playwright.expect(compared.get_by_role("columnheader", name="Autumn").first).to_be_visible()
         tab.home()
         page.get_by_label("Delete Autumn").click()
         page.get_by_role("button", name="Delete Autumn").click()
