@@ -24,7 +24,7 @@ from kinertia.motion.dynamics import Motion
 from kinertia.motion.ground_reactions import GroundReactions
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class SimultaneousResult:
     """Outcome of `estimate_simultaneous`.
 
@@ -116,30 +116,32 @@ def result_of(
     skeleton = problem.skeleton.with_markers(markers).lock({name: value for name, (value, _) in coordinates.items()})
     plates = zip(problem.plate_errors(values), problem.plate_sd(covariance), strict=True)
     zeros = [(layout.zeros_of(k), trial.ground.plates) for k, trial in enumerate(problem.trials)]
+    trials = range(len(problem.trials))
+    shown = layout.instruments
     return SimultaneousResult(
-        bsp,
-        _at_most(chain @ covariance[layout.theta, layout.theta] @ chain.T, problem.prior.covariance),
-        skeleton,
-        coordinates,
-        dict(zip(problem.plates, plates, strict=True)),
-        (float(values[layout.clock]), float(sd[layout.clock])),
-        tuple(zip(values[layout.delays].tolist(), sd[layout.delays].tolist(), strict=True)),
-        tuple(dict(zip(names, zip(values[at], sd[at], strict=True), strict=True)) for at, names in zeros),
-        tuple(_gains(problem, k, values, covariance) for k in range(len(problem.trials))),
-        tuple(zip(values[layout.trunks].tolist(), sd[layout.trunks].tolist(), strict=True)),
-        tuple(problem.foot_loads(k, values) for k in range(len(problem.trials))),
-        tuple(problem.reactions(k, values) for k in range(len(problem.trials))),
-        tuple(Motion(*basis.evaluate(part)) for basis, part in zip(problem.bases, motions, strict=True)),
-        tuple((d * own).reshape(-1, 3) for d, own in zip(problem.displacement_sd_m, point.displaced, strict=True)),
-        of_curves,
-        _shown(
-            problem, ended.instruments, values[layout.instruments], covariance[layout.instruments, layout.instruments]
+        bsp=bsp,
+        bsp_covariance=_at_most(chain @ covariance[layout.theta, layout.theta] @ chain.T, problem.prior.covariance),
+        skeleton=skeleton,
+        coordinates=coordinates,
+        plates=dict(zip(problem.plates, plates, strict=True)),
+        clock_s=(float(values[layout.clock]), float(sd[layout.clock])),
+        delays_s=tuple(zip(values[layout.delays].tolist(), sd[layout.delays].tolist(), strict=True)),
+        zeros_n=tuple(dict(zip(names, zip(values[at], sd[at], strict=True), strict=True)) for at, names in zeros),
+        gains=tuple(_gains(problem, k, values, covariance) for k in trials),
+        trunks_kg_m=tuple(zip(values[layout.trunks].tolist(), sd[layout.trunks].tolist(), strict=True)),
+        foot_loads=tuple(problem.foot_loads(k, values) for k in trials),
+        reactions=tuple(problem.reactions(k, values) for k in trials),
+        motions=tuple(Motion(*basis.evaluate(part)) for basis, part in zip(problem.bases, motions, strict=True)),
+        displacements_m=tuple(
+            (d * own).reshape(-1, 3) for d, own in zip(problem.displacement_sd_m, point.displaced, strict=True)
         ),
-        ended.converged,
-        ended.iterations,
-        ended.cost,
-        support,
-        evidence,
+        curve_deviations=of_curves,
+        instruments=_shown(problem, ended.instruments, values[shown], covariance[shown, shown]),
+        converged=ended.converged,
+        iterations=ended.iterations,
+        cost=ended.cost,
+        support=support,
+        evidence=evidence,
     )
 
 
