@@ -1,29 +1,27 @@
-"""Take the pictures of the pages: reports with numbers on what the text explains, and figures for papers.
+"""Take the pictures of the pages: the tutorial's report with numbers on what the text explains, and figures for papers.
 
-    python docs/tools/pictures.py [DEMO]
+    PYTHONPATH=benchmarks python docs/tools/pictures.py
 
-DEMO is a folder that `kinertia demo -o DEMO` has written; left out, the demo runs first. Needs Chromium, and the sample
-walk (`kinertia demo --measured`).
+Needs Chromium and the measured files of the tutorial.
 """
 
 from __future__ import annotations
 
 import subprocess
-import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from playwright.sync_api import Page, sync_playwright
 
 import kinertia
-from kinertia.cli.measured_demo import write_measured_lab
+from examples import ROOT, blocks, link_measured
 
-FOLDER = Path(__file__).resolve().parents[1] / "figures"
+FOLDER = ROOT / "docs" / "figures"
 PAGES = {
     "report": ("report.html", "#verdict", [".headline", ".uses", ".steps"], 1160),
     "report-cycle": ("report.html", "figure:has(#cycle-moments)", ["#cycle-moments", ".save"], 1130),
     "report-view": ("report.html", "#view", ["canvas", "#view .controls", "#view .legend"], 920),
-    "check": ("check.html", "#recording2", [".checks", "#recording2-forces", "#recording2-pressure"], 1400),
+    "check": ("check.html", "#recording2", ["#recording2-forces", "#recording2-pressure"], 1060),
 }
 """Picture: page, the part of it, what is numbered there, and the height from its top in px."""
 GALLERY = ("moments", "angles", "bsp")
@@ -49,21 +47,21 @@ _UNDRAWN = (
 
 def main() -> None:
     """Write all pictures."""
+    tutorial = (ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8")
     with TemporaryDirectory() as made:
-        demo = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(made) / "demo"
-        if len(sys.argv) < 2:
-            subprocess.run(["kinertia", "demo", "-o", demo, "--quiet"], check=True)
-        check = Path(made) / "check"
-        subject = write_measured_lab(Path(made) / "lab")
-        subprocess.run(["kinertia", "check", subject, "-o", check, "--quiet"], check=False)
+        link_measured("pig_c3d", Path(made))
+        subject = Path(made) / "subject.toml"
+        subject.write_text([one.text for one in blocks(tutorial) if one.file][0], encoding="utf-8")
+        for command in ("check", "fit"):
+            subprocess.run(["kinertia", command, subject, "-o", Path(made) / command, "--quiet"], check=True)
         with sync_playwright() as engine:
             browser = engine.chromium.launch(executable_path="/usr/bin/chromium", args=["--no-sandbox"])
             for name, (page, part, marked, height) in PAGES.items():
                 opened = browser.new_page(viewport={"width": 1180, "height": height})
-                opened.goto(((demo if page == "report.html" else check) / page).as_uri())
+                opened.goto((Path(made) / ("fit" if page == "report.html" else "check") / page).as_uri())
                 take(opened, part, marked, FOLDER / f"{name}.png")
             browser.close()
-        fit = kinertia.load_fit(demo)
+        fit = kinertia.load_fit(Path(made) / "fit")
         for name in GALLERY:
             fit.figure(name, FOLDER / f"gallery-{name}.svg")
 
