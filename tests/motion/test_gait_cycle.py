@@ -11,6 +11,8 @@ from kinertia.motion.spatiotemporal import spatiotemporal
 from kinertia.synthetic.walk import walk, walking_subject
 from kinertia.trial.belt import Belt
 from kinertia.trial.data import FEET, LOAD_THRESHOLD_N, FootLoads, Trial
+from kinertia.trial.file_events import contradicted_events, sides_exchanged
+from kinertia.trial.gait_event import FileEvent
 from kinertia.trial.rms import rms
 from kinertia.trial.sampled_time import runs
 
@@ -207,3 +209,46 @@ def test_turning_points_are_maxima_that_rise_enough():
     np.testing.assert_allclose(time[maxima], [0.5, 2.5, 4.5, 6.5, 8.5], atol=0.06)
     assert turning_points(wave, 3.0) == []
     assert turning_points(np.arange(5.0), 0.5) == []  # still rising at its end
+
+
+def stated(walked, late_s=0.0, exchanged=False) -> tuple[FileEvent, ...]:
+    """Every contact of both feet as a file states it."""
+    other = {"r": "l", "l": "r"}
+    events = []
+    for side in FEET:
+        for first, last in contacts(walked, side):
+            for time, kind in ((first, "heel strike"), (last, "toe off")):
+                events.append(FileEvent(time + late_s, other[side] if exchanged else side, kind, "", kind))
+    return tuple(sorted(events, key=lambda event: event.time_s))
+
+
+def with_half_of_the_loads(trial) -> Trial:
+    """Plates end in the middle of the recording."""
+    half = trial.loads.time < trial.loads.time.mean()
+    loads = replace(trial.loads, force=trial.loads.force * half[:, None, None])
+    return replace(trial, loads=loads, measured=half)
+
+
+def test_a_file_tells_the_events_that_plates_do_not_see(walked, trial):
+    half = with_half_of_the_loads(trial)
+    known = {round(first, 6) for side in FEET for first, _ in contacts(walked, side)}
+    without = strides_of(walked.skeleton, kinematics_of(walked, half))
+    given = strides_of(walked.skeleton, kinematics_of(walked, replace(half, events=stated(walked, late_s=0.004))))
+    assert len(given) >= len(without) > 2
+    by_file, by_motion = (
+        [one for one in strides if min(abs(one.end_s - time - 0.004) for time in known) < 1e-9]
+        for strides in (given, without)
+    )
+    assert len(by_file) >= 2
+    assert not any(stride.on_plates for stride in by_file)
+    assert by_motion == []
+
+
+@pytest.mark.parametrize("fault", [{"late_s": 0.05}, {"exchanged": True}])
+def test_events_that_forces_contradict_are_not_used(walked, trial, fault):
+    half = with_half_of_the_loads(trial)
+    contradicted = replace(half, events=stated(walked, **fault))
+    assert bool(contradicted_events(contradicted)) == ("late_s" in fault)
+    assert sides_exchanged(contradicted) == ("exchanged" in fault)
+    expected = strides_of(walked.skeleton, kinematics_of(walked, half))
+    assert strides_of(walked.skeleton, kinematics_of(walked, contradicted)) == expected

@@ -21,10 +21,19 @@ from kinertia.findings.display import first_few
 from kinertia.findings.finding import Finding, finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
+from kinertia.io.c3d_events import file_events
 from kinertia.io.c3d_plates import lab_plates, person_on_plates, plate_left_out, to_ground_plates
 from kinertia.io.c3d_structure import doubts_about, with_plain_samples
 from kinertia.io.c3d_subject import subject_data
-from kinertia.io.ezc3d_library import C3dContent, C3dTrouble, expect_ezc3d, parameter_values, read_apart, read_content
+from kinertia.io.ezc3d_library import (
+    C3dContent,
+    C3dTrouble,
+    continued,
+    expect_ezc3d,
+    parameter_values,
+    read_apart,
+    read_content,
+)
 from kinertia.io.lab_axes import to_ground
 from kinertia.io.number_table import expect_file
 from kinertia.io.repeated_labels import first_with_data
@@ -100,6 +109,7 @@ def read_c3d(path: str | Path, length_unit: str | None = None, standing: bool = 
         unit_name,
         up,
         virtual,
+        events=file_events(parameters, labels),
     )
 
 
@@ -186,17 +196,6 @@ def _times(file: Any, kind: str) -> FloatArray:
     return start + np.arange(count) / (header[kind]["frame_rate"] or 1.0)
 
 
-def _continued(parameters: Any, name: str) -> list[str]:
-    """A list of strings that goes on in NAME2, NAME3 after 255 entries."""
-    entries: list[str] = []
-    for suffix in ["", *map(str, range(2, 100))]:
-        more = parameter_values(parameters, "POINT", name + suffix)
-        if not more:
-            break
-        entries += [str(entry).strip() for entry in more]
-    return entries
-
-
 def _markers(path: Path, file: Any) -> tuple[tuple[str, ...], FloatArray, list[Finding]]:
     """Labels and positions (n, m, 3) in lab axes and file units of the points that are places."""
     positions = np.moveaxis(file["data"]["points"][:3], 0, 2).swapaxes(0, 1).copy()
@@ -204,7 +203,7 @@ def _markers(path: Path, file: Any) -> tuple[tuple[str, ...], FloatArray, list[F
     for where in missing.values():
         positions[where] = np.nan
     seen = np.asarray(np.isfinite(positions).all(axis=2).any(axis=0))
-    labels = _continued(file["parameters"], "LABELS")[: positions.shape[1]]
+    labels = continued(file["parameters"], "POINT", "LABELS")[: positions.shape[1]]
     labels += ["*"] * (positions.shape[1] - len(labels))
     outputs = _outputs(file["parameters"], labels)
     unnamed = [k for k, label in enumerate(labels) if not label or label.startswith("*")]
@@ -233,5 +232,5 @@ def _markers(path: Path, file: Any) -> tuple[tuple[str, ...], FloatArray, list[F
 def _outputs(parameters: Any, labels: list[str]) -> set[str]:
     groups = parameter_values(parameters, "POINT", "TYPE_GROUPS", [])
     lists = {*_OUTPUT_LISTS, *(str(name).strip() for name in list(groups)[::2])}
-    listed = {label for name in lists for label in _continued(parameters, name)}
+    listed = {label for name in lists for label in continued(parameters, "POINT", name)}
     return {label for label in labels if label in listed or _OUTPUT_NAME.search(label)}

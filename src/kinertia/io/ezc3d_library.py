@@ -144,6 +144,17 @@ def parameter_values(parameters: Any, group: str, name: str, default: Sequence[A
     return default
 
 
+def continued(parameters: Any, group: str, name: str) -> list[str]:
+    """A list of strings that goes on in NAME2, NAME3 after 255 entries."""
+    entries: list[str] = []
+    for suffix in ["", *map(str, range(2, 100))]:
+        more = parameter_values(parameters, group, name + suffix)
+        if not more:
+            break
+        entries += [str(entry).strip() for entry in more]
+    return entries
+
+
 def read_apart(path: Path) -> C3dContent:
     """`read_content` in a process of its own, with limits of time and memory.
 

@@ -3,7 +3,8 @@
 Plates see few of the contacts that a stride needs. So heel strikes and toe offs are first read off the motion: a foot
 lands about when its heel is farthest in front of the pelvis, and leaves about when its toes are farthest behind it
 (Zeni et al. 2008, Gait Posture 27:710). By how much that is early or late on average is learnt from the contacts that
-plates saw in the same trial; and where a load begins or ends at such a time, its time is taken.
+plates saw in the same trial; where a load begins or ends at such a time, its time is taken, else that of an event that
+the file states, unless the forces contradict one of these.
 """
 
 from __future__ import annotations
@@ -18,7 +19,9 @@ from kinertia.motion.frames_at_once import pieces
 from kinertia.motion.kinematics import Kinematics
 from kinertia.motion.moving_windows import gaussian_mean
 from kinertia.trial.data import FEET
-from kinertia.trial.gait_events import GaitEvent, gait_events, load_edges
+from kinertia.trial.file_events import usable_events
+from kinertia.trial.gait_event import GaitEvent
+from kinertia.trial.gait_events import gait_events, load_edges
 from kinertia.trial.ground_contact import CONTACT_SLACK_S
 
 PERCENT = np.arange(101.0)
@@ -27,6 +30,8 @@ _LEAST_SWING_M = 0.1
 """A foot moves back and forth under the pelvis by at least this much; else nobody walks."""
 _SAME_EVENT_S = 0.1
 """Plates and motion may differ by this much over one event."""
+_SAME_STEP_S = 0.3
+"""Events of one foot and kind that are farther apart are of two steps."""
 _STRIDE_S = (0.4, 3.0)
 _PHASE = (0.15, 0.85)
 """Of a stride, where the other foot lands: not so in squats and jumps, where both feet move together."""
@@ -191,8 +196,11 @@ def turning_points(values: np.ndarray, least: float) -> list[int]:
 
 
 def _with_plates(events: Sequence[GaitEvent], kinematics: Kinematics) -> list[_Event]:
-    """The events at the plates' times where these saw them, else moved by what the motion is early on average."""
+    """The events at the plates' times where these saw them, else at the file's, else moved by what the motion is early
+    on average; and those of the file that the motion does not show.
+    """
     certain, edges = gait_events(kinematics.trial), load_edges(kinematics.trial.loads)
+    stated = usable_events(kinematics.trial)
     early = {}
     for kind in ("heel strike", "toe off"):
         gaps = [
@@ -201,11 +209,13 @@ def _with_plates(events: Sequence[GaitEvent], kinematics: Kinematics) -> list[_E
             if event.kind == kind and (seen := _nearest(certain, event, _SAME_EVENT_S)) is not None
         ]
         early[kind] = float(np.median(gaps)) if gaps else 0.0
+    moved = [event._replace(time_s=event.time_s + early[event.kind]) for event in events]
+    moved = [_nearest(stated, event, _SAME_EVENT_S) or event for event in moved]
+    moved += [event for event in stated if _nearest(moved, event, _SAME_STEP_S) is None]
     placed = []
-    for event in events:
-        moved = event._replace(time_s=event.time_s + early[event.kind])
-        seen = _nearest(edges, moved, CONTACT_SLACK_S)
-        placed.append(_Event(moved if seen is None else seen, seen is not None))
+    for event in moved:
+        seen = _nearest(edges, event, CONTACT_SLACK_S)
+        placed.append(_Event(event if seen is None else seen, seen is not None))
     return sorted(placed, key=lambda one: one.event)
 
 

@@ -36,6 +36,7 @@ from kinertia.report.truth import Truth
 from kinertia.settings import Overrule, Settings, Subject
 from kinertia.trial.belt import Belt
 from kinertia.trial.data import FootLoads, Markers, Trial
+from kinertia.trial.gait_event import FileEvent
 
 FIT_FILE = "fit.npz"
 
@@ -65,6 +66,7 @@ _KINDS = (
     OsimModel, OsimJoint, OsimCoordinate, Coupling,
     Finding, Where, Quantity, Overrule,
     Kinematics, InverseKinematics, SmoothedSpline, Motion, GroundReactions, Trial, Markers, FootLoads, Belt,
+    FileEvent,
 )  # fmt: skip
 """All that a result is made of. Files know the classes by these names: who renames one keeps the old name readable."""
 

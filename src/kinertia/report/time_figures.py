@@ -19,7 +19,8 @@ from kinertia.report.coordinate_titles import Coordinate, load_title, panels_of
 from kinertia.report.figure import Figure, compact
 from kinertia.report.panels import Panel, small_multiples
 from kinertia.report.wording import INTERVAL_SD, LITERATURE, Start
-from kinertia.trial.gait_events import GaitEvent, gait_events
+from kinertia.trial.gait_event import GaitEvent
+from kinertia.trial.gait_events import gait_events
 from kinertia.trial.rms import rms, rms_length
 
 MOST_FRAMES = 1200

@@ -2,22 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple
-
 import numpy as np
 
 from kinertia.trial.data import FEET, LOAD_THRESHOLD_N, FootLoads, Trial
+from kinertia.trial.gait_event import GaitEvent
 from kinertia.trial.ground_contact import bridged
 from kinertia.trial.plate_assignment import BRIDGED_GAP_S, SHORTEST_CONTACT_S
 from kinertia.trial.sampled_time import TIME_TOLERANCE_S, runs, span_s
-
-
-class GaitEvent(NamedTuple):
-    """A foot meets the ground ("heel strike") or leaves it ("toe off") at a time (s)."""
-
-    time_s: float
-    side: str
-    kind: Literal["heel strike", "toe off"]
 
 
 def gait_events(trial: Trial) -> list[GaitEvent]:

@@ -83,6 +83,7 @@ def build_trial(recording: Recording, feet: FootMarkers, window_s: tuple[float, 
         recording.belt,
         findings,
         recording.vertical,
+        recording.events,
     )
 
 

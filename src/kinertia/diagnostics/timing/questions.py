@@ -1,14 +1,15 @@
-"""Questions of timing: the belt of one recording, and the forces of several."""
+"""Questions of timing: the belt and the events of one recording, and the forces of several."""
 
 from __future__ import annotations
 
 from kinertia.diagnostics.context import PersonContext, RecordingContext
 from kinertia.diagnostics.runner import Question
 from kinertia.diagnostics.timing.belt_speed import belt_speed
+from kinertia.diagnostics.timing.file_events import file_events
 from kinertia.diagnostics.timing.interchanged_forces import interchanged_forces
 from kinertia.diagnostics.timing.trial_delays import trial_delays
 
-QUESTIONS: tuple[Question[RecordingContext], ...] = (Question("T30", belt_speed),)
+QUESTIONS: tuple[Question[RecordingContext], ...] = (Question("T30", belt_speed), Question("T31", file_events))
 """Rates and delays compete with positions of plates: `diagnostics.plates.place_questions`."""
 
 PERSON_QUESTIONS: tuple[Question[PersonContext], ...] = (

@@ -1,0 +1,35 @@
+"""Do the events of a file come when the forces do?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from kinertia.diagnostics.context import RecordingContext
+from kinertia.findings.finding import Finding, finding
+from kinertia.findings.quantity import Quantity
+from kinertia.trial.data import FEET, Trial
+from kinertia.trial.file_events import EVENT_LIMIT_S, contradicted_events, sides_exchanged
+from kinertia.trial.plate_assignment import FOOT_NAMES
+
+
+def file_events(context: RecordingContext) -> Iterator[Finding]:
+    """T311 of the event that is farthest from its forces; T312 of sides that are exchanged."""
+    trial = context.loaded
+    if not isinstance(trial, Trial):
+        return
+    if sides_exchanged(trial):
+        count = sum(one.of_gait is not None for one in trial.events)
+        yield finding("T312", context.at(), events=Quantity(count, "1"))
+        return
+    apart = contradicted_events(trial)
+    if apart:
+        stated, shown = max(apart, key=lambda pair: abs(pair[0].time_s - pair[1].time_s))
+        yield finding(
+            "T311",
+            context.at(),
+            event=Quantity(stated.label),
+            foot=Quantity(FOOT_NAMES[FEET.index(stated.side)]),
+            time_s=Quantity(stated.time_s, "s"),
+            difference_s=Quantity(stated.time_s - shown.time_s, "s", limit=EVENT_LIMIT_S),
+            events=Quantity(len(apart), "1"),
+        )

@@ -1,0 +1,60 @@
+"""Events of a C3D file: foot strikes, foot offs and general ones, of the group EVENT."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from kinertia.io.ezc3d_library import continued, parameter_values
+from kinertia.trial.gait_event import EventKind, FileEvent
+
+_SIDES = {"right": "r", "left": "l", "r": "r", "l": "l"}
+_SHORT = re.compile(r"([rl])[ _]?(hs|ic|fs|to|fo)")
+_STRIKE, _OFF = "foot strike|heel strike|initial contact|hs|ic|fs", "foot off|toe off|to|fo"
+_SECONDS_PER_MINUTE = 60.0
+
+
+def file_events(parameters: Any, labels: Sequence[str] = ()) -> tuple[FileEvent, ...]:
+    """All events in order of time.
+
+    TIMES are 2 x n: minutes, which Vicon leaves zero, and seconds. Side and kind are Vicon's context ("Right", "Left",
+    "General") and label ("Foot Strike", "Foot Off"), or one label such as "RHS" and "LTO". Lists go on in LABELS2,
+    CONTEXTS2 and so on.
+
+    Args:
+        parameters: of the file, as ezc3d has them.
+        labels: of the markers; whoever has a prefix there is not the person of the trial, and has no event here.
+    """
+    times = np.asarray(parameter_values(parameters, "EVENT", "TIMES"))
+    if not np.issubdtype(times.dtype, np.number) or len(times) % 2:
+        return ()
+    times = times.astype(float).reshape(-1, 2)
+    contexts, names, subjects = (_texts(parameters, name, len(times)) for name in ("CONTEXTS", "LABELS", "SUBJECTS"))
+    others = {label.split(":", 1)[0] for label in labels if ":" in label}
+    events = []
+    for (minutes, seconds), context, name, subject in zip(times, contexts, names, subjects, strict=True):
+        label = name or context  # Motion Analysis writes "RHS" as the context
+        side, kind = _side_and_kind(context, label)
+        if subject not in others:
+            events.append(FileEvent(float(_SECONDS_PER_MINUTE * minutes + seconds), side, label, subject, kind))
+    return tuple(sorted((one for one in events if np.isfinite(one.time_s)), key=lambda one: one.time_s))
+
+
+def _texts(parameters: Any, name: str, count: int) -> list[str]:
+    """So many strings of a list of the group EVENT; empty ones where it is shorter."""
+    texts = continued(parameters, "EVENT", name)
+    return (texts + [""] * count)[:count]
+
+
+def _side_and_kind(context: str, label: str) -> tuple[str, EventKind | None]:
+    """Side and kind by context and label, empty and None where they name none."""
+    side, word = _SIDES.get(context.lower(), ""), label.lower().replace("-", " ")
+    short = _SHORT.fullmatch(word)
+    if short and not side:
+        side, word = short.groups()
+    if re.fullmatch(_STRIKE, word):
+        return side, "heel strike"
+    return side, "toe off" if re.fullmatch(_OFF, word) else None
