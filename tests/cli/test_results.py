@@ -80,7 +80,7 @@ def test_export_says_what_the_tables_say(fit, results):
 def test_export_asks_for_a_form(results):
     outcome = run("export", results, "-o", results.parent / "export")
     assert outcome.status == 2
-    assert "--csv, --json or --mat" in " ".join(outcome.err.split())
+    assert "--csv, --json, --mat or --draws" in " ".join(outcome.err.split())
 
 
 @pytest.mark.parametrize("command", [["report"], ["export", "--csv", "-o", "tables"]])
@@ -120,3 +120,22 @@ def test_compare_prints_json_for_scripts(demo_run, tmp_path):
     assert {row["sd"] for row in rows} == {None}, "two-level has no error bars"
     told = run("compare", demo_run[1], demo_run[1] / "two-level", "-o", tmp_path / "out").out
     assert "two-level against out: no error bars, differences only" in " ".join(told.split())
+
+
+def test_export_writes_posterior_draws(results):
+    """Each a set of its own; the same with the same seed."""
+    folder = results.parent / "draws"
+    outcome = run("export", results, "--draws", "2", "--seed", "3", "-o", folder)
+    assert outcome.status == 0, outcome.err
+    files = ["external_loads.xml", "ground_reactions.mot", "kinematics.mot", "model.osim"]
+    for draw in ("draw_001", "draw_002"):
+        assert sorted(path.name for path in (folder / draw).iterdir()) == files
+    first = {name: (folder / "draw_001" / name).read_bytes() for name in files}
+    assert all(content != (folder / "draw_002" / name).read_bytes() for name, content in list(first.items())[1:])
+    assert run("export", results, "--draws", "1", "--seed", "3", "-o", folder).status == 0
+    assert {name: (folder / "draw_001" / name).read_bytes() for name in files} == first
+    assert not (folder / "draw_002").exists()
+    outcome = run("export", results, "--draws", "5000", "-o", folder)
+    assert outcome.status == 2
+    assert "5000 posterior draws are asked for" in " ".join(outcome.err.split())
+    assert (folder / "draw_001").exists(), "what was there stays"

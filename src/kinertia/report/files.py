@@ -65,7 +65,7 @@ def save_fit(
         (work / "report.html").write_text(render(fit, provenance, truth=truth), encoding="utf-8")
         write_columns(work / "bsp.csv", fit.bsp_columns())
         _write_cycles(fit, work)
-        _write_model(fit, work)
+        write_model(fit, work)
         for trial in fit.trials:
             into = work if len(fit.trials) == 1 else work / trial.name
             into.mkdir(exist_ok=True)
@@ -110,8 +110,8 @@ def _cells(values: Sequence[Any] | np.ndarray, digits: str) -> list[Any]:
     return [None if cell != cell else inert(cell) for cell in cells]
 
 
-def _write_model(fit: Fit, folder: Path) -> None:
-    """The model with the estimate; of the user's own OpenSim model a list of what changed, too."""
+def write_model(fit: Fit, folder: Path) -> None:
+    """Write the model with the estimate; of the user's own OpenSim model a list of what changed, too."""
     if fit.file is None:
         export_osim(folder / "model.osim", fit.skeleton, fit.estimate)
         return
@@ -133,7 +133,7 @@ def _write_trial(fit: Fit, trial: TrialFit, folder: Path) -> None:
         table = TimeTable(trial.time, tuple(names), np.where(rotational, np.degrees(sd), sd), in_degrees=True)
         write_table(folder / "kinematics_sd.sto", table, "kinematics_sd", motion)
     forces = f"Ground reactions: {forces_used(trial.reactions, fit.settings, trial.motion_hz).which}. {motion}"
-    write_table(folder / "kinematics.mot", _coordinates(fit, trial), "kinematics", motion)
+    write_table(folder / "kinematics.mot", coordinates_table(fit, trial), "kinematics", motion)
     window_s, feet = trial.kinematics.window_s, fit.skeleton.feet
     write_ground_reactions(folder, trial.reactions, window_s, feet, forces)
     loads = [f"{name}_{'moment' if turn else 'force'}" for name, turn in zip(names, rotational, strict=True)]
@@ -154,15 +154,15 @@ def _write_trial(fit: Fit, trial: TrialFit, folder: Path) -> None:
     write_table(folder / "residuals.sto", residuals, "residuals", remark)
 
 
-def _coordinates(fit: Fit, trial: TrialFit) -> TimeTable:
-    """Coordinates over time, in degrees and m; of an OpenSim model all that it has."""
+def coordinates_table(fit: Fit, trial: TrialFit) -> TimeTable:
+    """Arrange coordinates over time, in degrees and m; of an OpenSim model all that it has."""
     time, q = (trial.time, trial.motion.q) if trial.course is None else (trial.kinematics.course_time, trial.course)
     if fit.file is None:
         names, angles = fit.skeleton.coordinates, fit.skeleton.rotational
     else:
         names = tuple(coordinate.name for coordinate in fit.file.coordinates)
         angles = np.array([coordinate.angle for coordinate in fit.file.coordinates])
-        q = fit.file.all_coordinates(fit.skeleton, q)
+        q = fit.file.allcoordinates_table(fit.skeleton, q)
     return TimeTable(time, tuple(names), np.where(angles, np.degrees(q), q), in_degrees=True)
 
 

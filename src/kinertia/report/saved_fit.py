@@ -16,6 +16,7 @@ from kinertia.estimation.simultaneous.fit import Posterior
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation
 from kinertia.estimation.simultaneous.marker_noise import MarkerNoise
 from kinertia.estimation.simultaneous.one_sided import OneSided
+from kinertia.estimation.simultaneous.posterior_draws import PosteriorDraws, TrialDraws
 from kinertia.estimation.simultaneous.unlike import Unlikeness
 from kinertia.findings.finding import Finding
 from kinertia.findings.quantity import Quantity
@@ -61,7 +62,7 @@ class SavedFit:
 _KINDS = (
     SavedFit, Provenance, Truth, Fit, TrialFit, CurveDeviations, Subject, Settings,
     Posterior, InstrumentInformation, MarkerNoise, BaseParameters, Combination, Unlikeness, OneSided,
-    CalibrationEntry, FreeMomentSign,
+    CalibrationEntry, FreeMomentSign, PosteriorDraws, TrialDraws,
     Skeleton, Joint, Axis, Marker, Range, PiecewisePolynomial, Composed, BodySegmentParameters,
     OsimModel, OsimJoint, OsimCoordinate, Coupling,
     Finding, Where, Quantity, Overrule,

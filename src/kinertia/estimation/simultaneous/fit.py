@@ -20,6 +20,7 @@ from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINT
 from kinertia.estimation.simultaneous.observation import Observations, observe, reading
 from kinertia.estimation.simultaneous.observed_trial import CalibrationPrior
 from kinertia.estimation.simultaneous.outcome import SimultaneousResult
+from kinertia.estimation.simultaneous.posterior_draws import PosteriorDraws
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous
 from kinertia.estimation.simultaneous.trunk_bending import BENDING_PRIOR_M
 from kinertia.estimation.simultaneous.unlike import Unlikeness, unlikeness
@@ -56,6 +57,7 @@ class Posterior:
         marker_distances_m: per trial, how far each marker is from where it is in the nearest of the other trials; of
             those that no other trial shows nothing.
         down_weighted: per trial, the share of its measured frames that impacts leave less weight.
+        draws: of motion, parameters and calibration together; None in files of before.
 
     Examples:
         >>> fit.posterior.sd.shape, bool((fit.posterior.sd <= fit.posterior.prior_sd * 1.0001).all())
@@ -75,6 +77,7 @@ class Posterior:
     free_moment_sign: FreeMomentSign | None = None
     marker_distances_m: tuple[Mapping[str, float], ...] = field(default=())
     down_weighted: tuple[float, ...] = ()
+    draws: PosteriorDraws | None = None
 
     @property
     def instrument_errors(self) -> tuple[CalibrationEntry, ...]:
@@ -168,6 +171,7 @@ def fit_simultaneous(
         unlikeness(prior, result.bsp, result.bsp_covariance),
         marker_distances_m=_marker_distances(result, trials),
         down_weighted=tuple(down_weighted(np.broadcast_to(o.impact, o.dynamic.shape)[o.dynamic]) for o in together),
+        draws=result.draws.without_places() if staying else result.draws,
     )
     return SimultaneousFit(
         result,

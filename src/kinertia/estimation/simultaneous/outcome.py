@@ -15,6 +15,7 @@ from kinertia.estimation.simultaneous.instruments import InstrumentInformation
 from kinertia.estimation.simultaneous.linearised import Linearised, Point
 from kinertia.estimation.simultaneous.plate_loads import GAIN
 from kinertia.estimation.simultaneous.plates import PLATE_ERRORS
+from kinertia.estimation.simultaneous.posterior_draws import PosteriorDraws
 from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior
 from kinertia.model.bsp import BodySegmentParameters, block_diagonal
@@ -53,6 +54,7 @@ class SimultaneousResult:
         cost: half the sum of squares, at the start and at the end.
         support: what supports an accusation of each instrument.
         evidence: how likely the trials are, and the same read otherwise.
+        draws: from the posterior.
     """
 
     bsp: BodySegmentParameters
@@ -76,6 +78,7 @@ class SimultaneousResult:
     cost: tuple[float, float]
     support: InstrumentSupport
     evidence: Evidence
+    draws: PosteriorDraws
 
 
 class Ended(NamedTuple):
@@ -99,6 +102,7 @@ def result_of(
     of_curves: tuple[CurveDeviations, ...],
     support: InstrumentSupport,
     evidence: Evidence,
+    draws: PosteriorDraws,
 ) -> SimultaneousResult:
     """In the user's terms, with these motions, covariance (S, S) of all that does not move, and curves' deviations."""
     point, layout = ended.point, problem.layout
@@ -142,6 +146,7 @@ def result_of(
         cost=ended.cost,
         support=support,
         evidence=evidence,
+        draws=draws,
     )
 
 

@@ -36,6 +36,7 @@ from kinertia.estimation.simultaneous.linearised import Linearised, Point, Slope
 from kinertia.estimation.simultaneous.marker_offsets import as_displaced
 from kinertia.estimation.simultaneous.observed_trial import CalibrationPrior, Observation
 from kinertia.estimation.simultaneous.outcome import Ended, SimultaneousResult, result_of
+from kinertia.estimation.simultaneous.posterior_draws import of_covariance, of_knots, posterior_draws
 from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.estimation.simultaneous.quasi_newton import SecantPairs
 from kinertia.estimation.simultaneous.sound_or_faulty import ErrorPriors, GaussianPrior
@@ -110,12 +111,14 @@ def estimate_simultaneous(
     static = phases.static + clock.static - ended.point.static + moved
     point = followed(problem, clock.here, ended.point, static)
     ended = ended._replace(here=clock.here, instruments=clock.instruments, point=point)
-    covariance, of_curves = _deviations(problem, ended, model)
+    roots = _roots_in_trials(problem, ended, model)
+    covariance, of_curves = _deviations(problem, ended, model, roots)
     covariance += phases.covariance + added
     of_curves = tuple(each.and_of(phases.curves_apart(k)) for k, each in enumerate(of_curves))
     motions = _through_impacts(problem, ended.point)
+    draws = posterior_draws(model, point, roots, [of_knots(phases), of_covariance(model, point, added)])
     support = instrument_support(model, ended.point, ended.instruments, of_curves)
-    return result_of(problem, ended, motions, covariance, of_curves, support, evidence)
+    return result_of(problem, ended, motions, covariance, of_curves, support, evidence, draws)
 
 
 def _of_other_tasks(problem: MapProblem, model: GaussNewton, static: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -315,18 +318,27 @@ def _through_impacts(problem: MapProblem, point: Point) -> tuple[np.ndarray, ...
 
 
 def _deviations(
-    problem: MapProblem, ended: Ended, model: GaussNewton
+    problem: MapProblem, ended: Ended, model: GaussNewton, roots: Sequence[np.ndarray]
 ) -> tuple[np.ndarray, tuple[CurveDeviations, ...]]:
     """Posterior covariance (S, S) of the static unknowns, and deviations of the curves of every trial."""
-    here, point, layout = ended.here, ended.point, problem.layout
-    root, first = model.static.root_of_covariance(), layout.in_root.stop
-    of_curves = []
-    for k, (motion, trial) in enumerate(zip(point.coefficients, here.trials, strict=True)):
+    root, point, rows = model.static.root_of_covariance(), ended.point, zip(ended.here.trials, roots, strict=True)
+    of_curves = [
+        curve_deviations(problem, k, point.coefficients[k], problem.in_trial(k, point), trial, in_trial)
+        for k, (trial, in_trial) in enumerate(rows)
+    ]
+    return root @ root.T, tuple(of_curves)
+
+
+def _roots_in_trials(problem: MapProblem, ended: Ended, model: GaussNewton) -> list[np.ndarray]:
+    """(S, S) per trial a root of the posterior covariance of the static unknowns as they are in it."""
+    here, layout = ended.here, problem.layout
+    root, first, roots = model.static.root_of_covariance(), layout.in_root.stop, []
+    for k, trial in enumerate(here.trials):
         in_trial, sd = root, problem.displacement_sd_m[k]
         if sd.any():
             elsewhere = here.information + sum(each.information for j, each in enumerate(model.displaced) if j != k)
             elsewhere[layout.instruments, layout.instruments] += ended.instruments.precision
             elsewhere = as_displaced(elsewhere, layout.locals, sd)
             in_trial = StaticInformation.of(trial.information + elsewhere, first).root_of_covariance()
-        of_curves.append(curve_deviations(problem, k, motion, problem.in_trial(k, point), trial, in_trial))
-    return root @ root.T, tuple(of_curves)
+        roots.append(in_trial)
+    return roots

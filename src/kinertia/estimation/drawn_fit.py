@@ -1,0 +1,111 @@
+"""A `Fit` whose motion, parameters and calibration are one draw from the posterior of another."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.interpolate import BSpline
+
+from kinertia.errors import KinertiaError
+from kinertia.estimation.result import Fit, TrialFit
+from kinertia.estimation.simultaneous.plate_loads import GAIN, put_right
+from kinertia.estimation.simultaneous.posterior_draws import PosteriorDraws, TrialDraws
+from kinertia.model.bsp import BodySegmentParameters
+from kinertia.model.skeleton import Skeleton
+from kinertia.motion.dynamics import Motion, inverse_dynamics
+from kinertia.motion.ground_reactions import GroundReactions
+from kinertia.motion.smoothing import interpolate
+
+_DEGREE = 5
+
+
+def kept_draws(fit: Fit) -> PosteriorDraws:
+    """The draws that came with a fit.
+
+    Raises:
+        KinertiaError: it has none.
+    """
+    if fit.posterior is None:
+        raise KinertiaError('the two-level method has no error bars to draw from: fit with method "simultaneous"')
+    if fit.posterior.draws is None:
+        raise KinertiaError("this result was saved by a version that kept no posterior draws; run kinertia fit again")
+    return fit.posterior.draws
+
+
+def chosen_draws(fit: Fit, count: int, seed: int = 0) -> list[int]:
+    """Which of the kept draws a seed chooses: so many different ones; with seed 0 the first.
+
+    Raises:
+        KinertiaError: there are not so many.
+    """
+    kept = kept_draws(fit).count
+    if not 1 <= count <= kept:
+        raise KinertiaError(f"{count} posterior draws are asked for, and this result keeps {kept}: take 1 to {kept}")
+    order = np.arange(kept) if seed == 0 else np.random.default_rng(seed).permutation(kept)
+    result: list[int] = order[:count].tolist()
+    return result
+
+
+def drawn_fit(fit: Fit, number: int) -> Fit:
+    """The fit as draw `number` (from 0) has it, without error bars of its own.
+
+    Body segment parameters, joint centres, marker places, coordinates, ground reactions and the joint moments that
+    follow from them all belong to one draw. Of `Fit` and `TrialFit` only these differ: `estimate`, `skeleton`, and
+    each trial's `skeleton`, `motion`, `course`, `reactions` and `joint_loads["estimate"]`.
+
+    Raises:
+        KinertiaError: no draws were kept.
+    """
+    draws = kept_draws(fit)
+    bsp = _bsp(fit.estimate, draws, number)
+    skeleton = _skeleton(fit, fit.skeleton, draws, number)
+    rows = zip(fit.trials, draws.trials, strict=True)
+    trials = tuple(_trial(fit, trial, own, number, bsp, skeleton) for trial, own in rows)
+    return replace(fit, estimate=bsp, skeleton=skeleton, trials=trials, posterior=None)
+
+
+def _bsp(estimate: BodySegmentParameters, draws: PosteriorDraws, number: int) -> BodySegmentParameters:
+    """With the segments that were held as they are."""
+    table = estimate.table().copy()
+    table[[estimate.segments.index(name) for name in draws.segments]] = draws.bsp[number]
+    return BodySegmentParameters.from_table(estimate.segments, table)
+
+
+def _skeleton(fit: Fit, skeleton: Skeleton, draws: PosteriorDraws, number: int) -> Skeleton:
+    """Joint centres and axes moved, and markers, but those that stay where a model has them."""
+    values = dict(zip(draws.coordinates, draws.coordinate_values[number].tolist(), strict=True))
+    return skeleton.lock(values).with_places(skeleton.marker_locals + draws.places[number])
+
+
+def _trial(
+    fit: Fit, trial: TrialFit, draws: TrialDraws, number: int, bsp: BodySegmentParameters, skeleton: Skeleton
+) -> TrialFit:
+    k, in_trial = trial.kinematics, trial.skeleton.marker_locals - fit.skeleton.marker_locals
+    time, course = (k.time, trial.motion.q) if trial.course is None else (k.course_time, trial.course)
+    course = course + BSpline(draws.knots, draws.coefficients[number].astype(float), _DEGREE)(time)
+    spline = interpolate(time, course)
+    motion = Motion(*(spline(time, order) for order in range(3))).cut(k.frames - k.frames[0])
+    reactions = _reactions(trial.reactions, draws, number)
+    own = skeleton.with_places(skeleton.marker_locals + in_trial)
+    loads = inverse_dynamics(own, bsp, motion, reactions.at(k.time))
+    return replace(
+        trial,
+        skeleton=own,
+        motion=motion,
+        course=course,
+        reactions=reactions,
+        joint_loads={**trial.joint_loads, "estimate": loads},
+        deviations=None,
+    )
+
+
+def _reactions(estimate: GroundReactions, draws: TrialDraws, number: int) -> GroundReactions:
+    """Of plates and clock as drawn. What is put right already is put right by the departures: small ones add up."""
+    departures = draws.plates[number].copy()
+    departures[:, GAIN] /= 1.0 + draws.plate_gain
+    standing = np.ascontiguousarray(estimate.loaded)
+    shared = estimate.carrier, departures, np.ascontiguousarray(draws.middles), np.ascontiguousarray(draws.turn)
+    impact = put_right(estimate.impact, np.zeros_like(standing), *shared)
+    wrench = put_right(estimate.wrench, standing, *shared) + draws.impact[number] * impact
+    return replace(estimate, time=estimate.time - draws.late_s[number], wrench=wrench, impact=impact)

@@ -1,0 +1,266 @@
+"""Draws of motion, body segment parameters and calibration together, from the posterior of the simultaneous estimate.
+
+A draw of the static unknowns is their covariance's root times independent normal numbers. The motion follows it through
+the border of the normal equations, and departs from it by what markers leave open: `Eliminated.motion_step` does both
+at once. The motion's own part is then narrowed by what is seen of the markers' errors, as `curve_deviations` narrows
+its derivatives (`motion_noise`): by a filter, since places, rates and accelerations each have a share of their own and
+a draw is one motion. Where knots lie (`knot_phases`), what thighs weigh in other tasks (`task_masses`) and impacts each
+add an independent number.
+
+Draws are made once, with a fixed seed, and kept with the result: a few hundred take less room than the factors from
+which more could be made.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from kinertia.estimation.simultaneous.elimination import Eliminated
+from kinertia.estimation.simultaneous.gauss_newton import GaussNewton
+from kinertia.estimation.simultaneous.knot_phases import OfPhases, followed
+from kinertia.estimation.simultaneous.linearised import Point
+from kinertia.estimation.simultaneous.motion_noise import motion_noise
+from kinertia.estimation.simultaneous.plate_loads import GAIN
+from kinertia.estimation.simultaneous.problem import MapProblem
+from kinertia.model.bsp import BodySegmentParameters
+from kinertia.model.log_cholesky import dynamic_jacobian, nearest_consistent
+
+MOST_DRAWS = 200
+"""Kept of one estimate. The deviation of 200 numbers is known to 5 %."""
+MOST_BYTES = 8_000_000
+"""Of the kept motions of all trials together; of long trials fewer draws are kept."""
+FEWEST_DRAWS = 20
+_SEED = 20090
+_ALIKE = 1e-3
+"""Difference between shares that makes none."""
+_LOOSE_ENDS = 5
+"""Splines at either end of a trial that few frames hold: they say nothing of the others."""
+_LEAST_MASS = 0.05
+"""Share of a segment's estimated mass that a draw leaves at least."""
+
+
+@dataclass(frozen=True, eq=False)
+class TrialDraws:
+    """What n draws have otherwise than the estimate in one trial.
+
+    Attributes:
+        knots: (k + 6,) s, of quintic splines.
+        coefficients: (n, k, c) of the coordinates' departures, rad and m.
+        plates: (n, p, 7) departures of the plates' errors: PLATE_ERRORS, ZERO_UNKNOWNS.
+        plate_gain: (p,) the estimated ones.
+        middles: (p, 3) m, about which plates are turned.
+        turn: (3, 3) from the laboratory's axes to the trial's.
+        late_s: (n,) by how much more the forces are late.
+        impact: (n,) share of the impact (`GroundReactions.impact`) that is added.
+    """
+
+    knots: np.ndarray
+    coefficients: np.ndarray
+    plates: np.ndarray
+    plate_gain: np.ndarray
+    middles: np.ndarray
+    turn: np.ndarray
+    late_s: np.ndarray
+    impact: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class PosteriorDraws:
+    """n draws from the posterior of an estimate.
+
+    Attributes:
+        segments: whose parameters are drawn.
+        bsp: (n, s, 10) tables of their body segment parameters, each physically consistent.
+        coordinates: names of the static coordinates, and ...
+        coordinate_values: (n, h) their values, rad or m.
+        places: (n, m, 3) m, departures of the markers' places in their segments.
+        trials: one per trial.
+    """
+
+    segments: tuple[str, ...]
+    bsp: np.ndarray
+    coordinates: tuple[str, ...]
+    coordinate_values: np.ndarray
+    places: np.ndarray
+    trials: tuple[TrialDraws, ...]
+
+    @property
+    def count(self) -> int:
+        """How many there are."""
+        return len(self.bsp)
+
+    def without_places(self) -> PosteriorDraws:
+        """The same with markers that stay where they are."""
+        return replace(self, places=np.zeros_like(self.places))
+
+
+@dataclass(frozen=True, eq=False)
+class Mode:
+    """One deviation of something independent: how the static unknowns (S,), and each trial's motion (k, c), go."""
+
+    static: np.ndarray
+    motions: tuple[np.ndarray, ...]
+
+
+def of_knots(phases: OfPhases) -> Mode:
+    """Where the knots lie: from the first estimate to the second, whose deviation is their distance over root two."""
+    (problem, other), (point, there) = phases.problems[:2], phases.points[:2]
+    rows = zip(problem.bases, other.bases, point.coefficients, there.coefficients, strict=True)
+    motions = tuple(own.fit(new.evaluate(b)[0]) - own.fit(own.evaluate(a)[0]) for own, new, a, b in rows)
+    scale = np.sqrt(0.5)
+    return Mode(scale * (there.static - point.static), tuple(scale * each for each in motions))
+
+
+def of_covariance(model: GaussNewton, point: Point, covariance: np.ndarray) -> Mode:
+    """Of a covariance (S, S) of rank one, with the motions that follow."""
+    most = int(np.argmax(np.diag(covariance)))
+    static = covariance[most] / np.sqrt(max(covariance[most, most], np.finfo(float).tiny))
+    there = followed(model.problem, model.here, point, point.static + static)
+    rows = zip(there.coefficients, point.coefficients, strict=True)
+    return Mode(static, tuple(after - before for after, before in rows))
+
+
+def posterior_draws(
+    model: GaussNewton, point: Point, roots_in_trials: Sequence[np.ndarray], modes: Sequence[Mode]
+) -> PosteriorDraws:
+    """Draw around an estimate.
+
+    Args:
+        model: of the estimate's normal equations, with the instruments' priors.
+        point: the estimate.
+        roots_in_trials: per trial (S, S) root of the posterior covariance of the static unknowns as they are in it,
+            block lower triangular: those that root equations depend on come first.
+        modes: what else is uncertain.
+    """
+    problem, trials, root = model.problem, model.here.trials, model.static.root_of_covariance()
+    random, count = np.random.default_rng(_SEED), _kept(sum(each.size for each in point.coefficients))
+    normal, extra = random.standard_normal((count, len(root))), random.standard_normal((count, len(modes)))
+    drawn = normal @ root.T
+    static = point.static + drawn + extra @ np.array([mode.static for mode in modes])
+    of_trials = []
+    for k, (trial, own) in enumerate(zip(trials, roots_in_trials, strict=True)):
+        in_trial = _in_trial(drawn, normal, own, problem.layout.in_root.stop)
+        motions = _motions(problem, k, point, trial, in_trial, random)
+        motions += np.einsum("nj,jkc->nkc", extra, np.array([mode.motions[k] for mode in modes]))
+        of_trials.append(_trial_draws(problem, k, point.static, static, motions, random))
+    layout = problem.layout
+    return PosteriorDraws(
+        tuple(problem.segments),
+        _bodies(problem, point, (static - point.static)[:, layout.theta]),
+        tuple(problem.calibration.coordinates),
+        static[:, layout.coordinates],
+        (static - point.static)[:, layout.locals].reshape(count, -1, 3).astype(np.float32),
+        tuple(of_trials),
+    )
+
+
+def _kept(size: int) -> int:
+    """How many draws of so many coefficients are kept."""
+    return int(np.clip(MOST_BYTES // (4 * size), FEWEST_DRAWS, MOST_DRAWS))
+
+
+def _in_trial(drawn: np.ndarray, normal: np.ndarray, root: np.ndarray, first: int) -> np.ndarray:
+    """(n, S) draws as they are in a trial: those of the first unknowns are the same in all."""
+    own = normal.copy()
+    own[:, :first] = np.linalg.solve(root[:first, :first], drawn[:, :first].T).T
+    result: np.ndarray = own @ root.T
+    return result
+
+
+def _motions(
+    problem: MapProblem, k: int, point: Point, trial: Eliminated, static: np.ndarray, random: np.random.Generator
+) -> np.ndarray:
+    """(n, k, c) departures of a motion's coefficients, with these (n, S) of the static unknowns."""
+    size, zero = point.coefficients[k].shape, np.zeros(problem.layout.size)
+    still = trial.forward(np.zeros(size))[0]
+    follow, alone = np.empty((len(static), *size)), np.empty((len(static), *size))
+    for n, each in enumerate(static):
+        follow[n] = trial.motion_step([[block.copy() for block in half] for half in still], each)
+        free = [[random.standard_normal(block.shape) for block in half] for half in still]
+        alone[n] = trial.motion_step(free, zero)
+    noise = motion_noise(problem, k, point.coefficients[k], problem.in_trial(k, point))
+    result: np.ndarray = follow + _narrowed(alone, noise / problem.trials[k].repeats)
+    return result
+
+
+def _narrowed(alone: np.ndarray, shares: np.ndarray) -> np.ndarray:
+    """Series (n, k, c) of splines' coefficients narrowed, such that the power of their sums, of these sums' rates and
+    of their accelerations is that of before times these (3,).
+
+    The logarithm of the filter's power is a parabola in the square of the frequency, the same for all columns, so that
+    what holds between them still does.
+    """
+    if np.ptp(shares) < _ALIKE * shares.max():
+        return np.sqrt(shares.mean()) * alone
+    size = alone.shape[1]
+    ends = min(_LOOSE_ENDS, (size - _LOOSE_ENDS) // 2)
+    power = np.square(np.abs(_spectrum(alone[:, ends : size - ends]))).mean(axis=0)
+    squares = _squares(len(power))
+    # a quintic spline's own spectrum
+    power = (power / power.sum(axis=0)).mean(axis=1) * np.sinc(0.5 * np.sqrt(squares)) ** 12
+    weights = power * squares ** np.arange(3)[:, None]
+    weights /= weights.sum(axis=1, keepdims=True)
+    shape = squares ** np.arange(3)[:, None]
+
+    def missing(bend: np.ndarray) -> np.ndarray:
+        gap: np.ndarray = np.log(weights @ np.exp(bend @ shape) / shares)
+        return gap
+
+    found = least_squares(missing, [np.log(shares.mean()), 0.0, 0.0], bounds=([-20.0] * 3, [20.0] * 3))
+    spectrum = _spectrum(alone)
+    gain = np.exp(0.5 * found.x @ _squares(spectrum.shape[1]) ** np.arange(3)[:, None])
+    filtered: np.ndarray = np.fft.irfft(spectrum * gain[:, None], 2 * size, axis=1)[:, :size]
+    return filtered
+
+
+def _spectrum(series: np.ndarray) -> np.ndarray:
+    """(n, f, c) of series (n, k, c) and their mirror image, which makes no jump at the ends."""
+    return np.fft.rfft(np.concatenate([series, series[:, ::-1]], axis=1), axis=1)
+
+
+def _squares(count: int) -> np.ndarray:
+    """(f,) squares of frequencies, over half a cycle per knot interval."""
+    return np.square(np.linspace(0.0, 1.0, count))
+
+
+def _bodies(problem: MapProblem, point: Point, departures: np.ndarray) -> np.ndarray:
+    """(n, s, 10) tables of drawn body segment parameters, from departures (n, 10 s) of the unknowns.
+
+    Forces are linear in masses, first and second moments, not in logarithms: departures are taken as those of the
+    first. Where that is not physically possible it is made so.
+    """
+    theta, estimate = point.static[problem.layout.theta], problem.bsp(point.static)
+    by_unknown, tables = dynamic_jacobian(theta), []
+    for each in departures.reshape(len(departures), -1, 10):
+        dynamic = estimate.dynamic_parameters().reshape(-1, 10)
+        moved = np.einsum("sij,sj->si", by_unknown, each)
+        least = np.maximum(moved[:, 0], (_LEAST_MASS - 1.0) * dynamic[:, 0])
+        moved *= (least / np.where(moved[:, 0] == 0.0, 1.0, moved[:, 0]))[:, None]
+        drawn = BodySegmentParameters.from_dynamic_parameters(estimate.segments, dynamic + moved)
+        tables.append(nearest_consistent(drawn).table())
+    return np.array(tables)
+
+
+def _trial_draws(
+    problem: MapProblem,
+    k: int,
+    estimate: np.ndarray,
+    static: np.ndarray,
+    motions: np.ndarray,
+    random: np.random.Generator,
+) -> TrialDraws:
+    ground, plates = problem.grounds[k], problem.plates_in(k, estimate)
+    return TrialDraws(
+        problem.bases[k].knots,
+        motions.astype(np.float32),
+        np.array([problem.plates_in(k, each) for each in static]) - plates,
+        plates[:, GAIN],
+        ground.middles,
+        ground.turn,
+        np.array([problem.late_s(k, each) for each in static]) - problem.late_s(k, estimate),
+        random.standard_normal(len(static)),
+    )

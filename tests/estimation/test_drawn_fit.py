@@ -1,0 +1,156 @@
+"""Draws from the posterior spread as the error bars say, and each is one possible person and motion."""
+
+import sys
+
+import numpy as np
+import pytest
+
+from kinertia.errors import KinertiaError
+from kinertia.estimation.drawn_fit import chosen_draws, drawn_fit, kept_draws
+from kinertia.estimation.simultaneous import posterior_draws
+from kinertia.motion.dynamics import inverse_dynamics
+from kinertia.report.draw_files import write_draws
+from kinertia.report.saved_fit import load_fit, write_fit
+
+SYSTEMATIC = 0.10
+"""Of reported deviations, which are linear in the unknowns; draws are not."""
+
+
+def sampling(count: int) -> float:
+    """Two deviations of the deviation of so many normal numbers."""
+    return 2.0 / np.sqrt(2.0 * count)
+
+
+def spread_over_reported(moments: np.ndarray, trial) -> np.ndarray:
+    """(j,) RMS deviation over time of drawn joint moments (n, w, c), over the reported one; without the root."""
+    drawn = np.square(moments - trial.joint_loads["estimate"]).mean(axis=(0, 1))
+    reported = np.square(trial.deviations.moments).mean(axis=0)
+    return np.sqrt(drawn / reported)[6:]
+
+
+@pytest.fixture(scope="module")
+def drawn(fit):
+    return [drawn_fit(fit, number) for number in range(kept_draws(fit).count)]
+
+
+def test_joint_moments_spread_as_reported(fit, drawn):
+    (trial,) = fit.trials
+    moments = np.array([one.trials[0].joint_loads["estimate"] for one in drawn])
+    ratio = spread_over_reported(moments, trial)
+    np.testing.assert_allclose(ratio, 1.0, atol=SYSTEMATIC + sampling(len(drawn)))
+    assert np.median(ratio) == pytest.approx(1.0, abs=SYSTEMATIC)
+
+
+def test_angles_and_parameters_spread_as_reported(fit, drawn):
+    (trial,) = fit.trials
+    q = np.array([one.trials[0].motion.q for one in drawn]) - trial.motion.q
+    ratio = np.sqrt(np.square(q).mean(axis=(0, 1)) / np.square(trial.deviations.coordinates).mean(axis=0))
+    np.testing.assert_allclose(ratio, 1.0, atol=SYSTEMATIC + sampling(len(drawn)))
+    mass = np.array([one.estimate.mass_kg for one in drawn])
+    np.testing.assert_allclose(mass.std(axis=0), fit.posterior.sd[:, 0], rtol=SYSTEMATIC + sampling(len(drawn)))
+    assert mass.sum(axis=1).std() < 0.5, "the scale knows the sum"
+    assert all(one.estimate.physically_consistent().all() for one in drawn)
+
+
+def test_parts_of_a_draw_belong_together(fit, drawn):
+    """Residuals of the pelvis are larger where the body is of one draw and motion and forces of another."""
+    time = fit.trials[0].time
+
+    def residual(body, moved) -> float:
+        (own,) = moved.trials
+        loads = inverse_dynamics(own.skeleton, body.estimate, own.motion, own.reactions.at(time))
+        return float(np.square(loads[:, :6]).mean())
+
+    together = [residual(one, one) for one in drawn[:60]]
+    mixed = [residual(one, other) for one, other in zip(drawn[:60], drawn[1:61], strict=True)]
+    print(np.mean(mixed) / np.mean(together))
+    assert np.mean(mixed) > 2.0 * np.mean(together)
+
+
+def test_a_seed_chooses_draws(fit):
+    count = kept_draws(fit).count
+    assert chosen_draws(fit, 3) == [0, 1, 2]
+    assert chosen_draws(fit, 10, 5) == chosen_draws(fit, 10, 5) != chosen_draws(fit, 10, 6)
+    assert sorted(chosen_draws(fit, count, 7)) == list(range(count))
+    with pytest.raises(KinertiaError, match=f"this result keeps {count}"):
+        chosen_draws(fit, count + 1)
+
+
+def test_two_level_has_nothing_to_draw_from(two_level):
+    with pytest.raises(KinertiaError, match="no error bars"):
+        drawn_fit(two_level, 0)
+
+
+def test_a_saved_fit_draws_the_same(fit, drawn, tmp_path):
+    write_fit(fit, None, tmp_path / "fit.npz")
+    again = drawn_fit(load_fit(tmp_path), 4)
+    np.testing.assert_array_equal(again.estimate.table(), drawn[4].estimate.table())
+    np.testing.assert_array_equal(again.trials[0].course, drawn[4].trials[0].course)
+
+
+def test_kept_draws_are_bounded():
+    kept = posterior_draws._kept
+    assert kept(1000) == posterior_draws.MOST_DRAWS
+    assert kept(60_000) * 4 * 60_000 <= posterior_draws.MOST_BYTES
+    assert kept(10_000_000) == posterior_draws.FEWEST_DRAWS
+
+
+def test_what_all_trials_share_is_the_same_in_each():
+    random = np.random.default_rng(1)
+    root, turn = np.tril(random.standard_normal((5, 5))), np.linalg.qr(random.standard_normal((3, 3)))[0]
+    other = root.copy()
+    other[:3, :3] = root[:3, :3] @ turn  # another root of the same covariance
+    normal = random.standard_normal((7, 5))
+    shared = posterior_draws._in_trial(normal @ root.T, normal, other, 3)
+    np.testing.assert_allclose(shared[:, :3], (normal @ root.T)[:, :3])
+
+
+@pytest.mark.parametrize("shares", [(0.4, 0.4, 0.4), (1.0, 0.8, 0.4), (0.2, 0.25, 0.3)])
+def test_places_rates_and_accelerations_are_narrowed_by_their_own_shares(shares):
+    """Of splines with coefficients that go on for some knots."""
+    random = np.random.default_rng(2)
+    white = random.standard_normal((100, 120, 2))
+    alone = white[:, 1:] + 0.6 * white[:, :-1]
+    narrowed = posterior_draws._narrowed(alone, np.array(shares))
+    kernels = [np.array([1, 26, 66, 26, 1]) / 120, np.array([1, 10, 0, -10, -1]) / 24, np.array([1, 2, -6, 2, 1]) / 6]
+    for kernel, share in zip(kernels, shares, strict=True):
+        before, after = (
+            np.square(np.apply_along_axis(np.convolve, 1, each, kernel, "valid")).mean() for each in (alone, narrowed)
+        )
+        assert after / before == pytest.approx(share, rel=0.15)
+
+
+@pytest.mark.slow
+def test_opensim_finds_the_reported_deviations_on_all_draws(opensim, fit, tmp_path):
+    from osim_tools import inverse_dynamics_tool
+
+    (trial,), count = fit.trials, kept_draws(fit).count
+    write_draws(fit, tmp_path, count)
+    folders = sorted(tmp_path.glob("draw_*"))
+    assert len(folders) == count
+    names = trial.kinematics.ik.coordinates
+    rotational = fit.skeleton.rotational
+    columns = [f"{name}_{'moment' if turn else 'force'}" for name, turn in zip(names, rotational, strict=True)]
+    moments = []
+    for folder in folders:
+        files = folder / "model.osim", folder / "kinematics.mot", folder / "external_loads.xml"
+        moments.append(inverse_dynamics_tool(opensim, *files, folder)[columns].to_numpy())
+    start = int(np.argmin(np.abs(trial.kinematics.course_time - trial.time[0])))
+    found = np.array(moments)[:, start : start + len(trial.time)]
+    ratio = spread_over_reported(found, trial)
+    np.testing.assert_allclose(ratio, 1.0, atol=SYSTEMATIC + sampling(count))
+    assert np.median(ratio) == pytest.approx(1.0, abs=SYSTEMATIC)
+    print(ratio.round(3), file=sys.stderr)
+
+
+@pytest.mark.slow
+def test_many_draws_spread_as_reported_within_ten_percent(demo_run, tmp_path, monkeypatch):
+    """Each joint, with hardly any sampling left."""
+    from command_line import fitted
+
+    monkeypatch.setattr(posterior_draws, "MOST_DRAWS", 1500)
+    monkeypatch.setattr(posterior_draws, "MOST_BYTES", 10**9)
+    fit = load_fit(fitted(tmp_path / "out", demo_run[0].subject_file).folder)
+    moments = [drawn_fit(fit, n).trials[0].joint_loads["estimate"] for n in range(kept_draws(fit).count)]
+    assert len(moments) == 1500
+    np.testing.assert_allclose(spread_over_reported(np.array(moments), fit.trials[0]), 1.0, atol=SYSTEMATIC)
