@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from json import dumps
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -51,8 +51,9 @@ def export(
     results_folder(output, overwrite)
     fit = load_fit(results)
     with complete_folder(output, "export") as work:
-        content = {"kinertia": VERSION, "results": str(results), "subject": fit.subject.model_dump()}
-        content |= {"draws": draws, "seed": seed} if draws else {}
+        content: dict[str, Any] = {"kinertia": VERSION, "results": str(results), "subject": fit.subject.model_dump()}
+        if draws:
+            content["draws"] = {"count": draws, "seed": seed}
         (work / "export.json").write_text(dumps(content, indent=2) + "\n", encoding="utf-8")
         if csv:
             write_csv(fit, work)

@@ -162,7 +162,7 @@ def coordinates_table(fit: Fit, trial: TrialFit) -> TimeTable:
     else:
         names = tuple(coordinate.name for coordinate in fit.file.coordinates)
         angles = np.array([coordinate.angle for coordinate in fit.file.coordinates])
-        q = fit.file.allcoordinates_table(fit.skeleton, q)
+        q = fit.file.all_coordinates(fit.skeleton, q)
     return TimeTable(time, tuple(names), np.where(angles, np.degrees(q), q), in_degrees=True)
 
 

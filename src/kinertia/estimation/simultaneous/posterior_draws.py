@@ -195,7 +195,8 @@ def _narrowed(alone: np.ndarray, shares: np.ndarray) -> np.ndarray:
     what holds between them still does.
     """
     if np.ptp(shares) < _ALIKE * shares.max():
-        return np.sqrt(shares.mean()) * alone
+        same: np.ndarray = np.sqrt(shares.mean()) * alone
+        return same
     size = alone.shape[1]
     ends = min(_LOOSE_ENDS, (size - _LOOSE_ENDS) // 2)
     power = np.square(np.abs(_spectrum(alone[:, ends : size - ends]))).mean(axis=0)
