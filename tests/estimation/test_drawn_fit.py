@@ -1,5 +1,7 @@
 """Draws from the posterior spread as the error bars say, and each is one possible person and motion."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -60,7 +62,7 @@ def test_parts_of_a_draw_belong_together(fit, drawn):
         return float(np.square(loads[:, :6]).mean())
 
     together = [residual(one, one) for one in drawn[:60]]
-    mixed = [residual(one, other) for one, other in zip(drawn[:60], drawn[1:61], strict=True)]
+    mixed = [residual(one, other) for one, other in pairwise(drawn[:61])]
     assert np.mean(mixed) > 1.5 * np.mean(together)
 
 
