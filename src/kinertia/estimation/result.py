@@ -6,12 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Protocol
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from kinertia.estimation.asymmetry import asymmetries, asymmetry_columns
 from kinertia.estimation.cycles import Kind, Stage, cycle_columns, spatiotemporal_columns
+from kinertia.estimation.fit_pictures import FitPictures
 from kinertia.estimation.identifiability import evidence
 from kinertia.estimation.input_checks import known
 from kinertia.estimation.simultaneous.calibration_entry import calibration_columns
@@ -32,62 +33,7 @@ from kinertia.trial import display
 
 if TYPE_CHECKING:
     import pandas as pd
-    from plotly.graph_objects import Figure
-
-
-class FitPictures(Protocol):
-    """Plotly figures of a fit; `Fit.figure` draws those of them that are for papers by the same names.
-
-    Those over time are of one trial; its name left out, of the first.
-
-    Raises:
-        KinertiaError: no such trial, no strides or error bars to draw from (says which figure there is in its place).
-    """
-
-    def moments(self, trial: str | None = None) -> Figure:
-        """Joint moments over the gait cycle, all trials; of a trial that is named, or without strides, over time."""
-
-    def angles(self, trial: str | None = None) -> Figure:
-        """Joint angles over the gait cycle, all trials; of a trial that is named, or without strides, over time."""
-
-    def powers(self) -> Figure:
-        """Joint powers over the gait cycle."""
-
-    def forces(self) -> Figure:
-        """Ground reactions over the gait cycle."""
-
-    def cycles(self, kind: Kind = "moment", norms: str | Path | None = None) -> Figure:
-        """Angles, moments, powers or ground reactions ("force") over the gait cycle, in front of norms.
-
-        `norms` is a CSV file with mean and standard deviation of normal curves, which become grey bands.
-        """
-
-    def coordinates(self, trial: str | None = None) -> Figure:
-        """Every coordinate over time, by inverse kinematics and as estimated."""
-
-    def residuals(self, trial: str | None = None) -> Figure:
-        """Root residual force and moment over time, stage by stage."""
-
-    def bsp(self) -> Figure:
-        """Changes of body segment parameters in kg, mm and kg m2, with intervals where there are any."""
-
-    def departures(self) -> Figure:
-        """The same in prior SDs; not after two-level."""
-
-    def information(self) -> Figure:
-        """What the data say about each parameter; not after two-level."""
-
-    def body(self, shown: Literal["mass", "information"] = "mass") -> Figure:
-        """The body, coloured by change of mass or by what the data say of it ("information"; not after two-level)."""
-
-    def markers(self, trial: str | None = None) -> Figure:
-        """Distance between every measured and modelled marker."""
-
-    def gaps(self, trial: str | None = None) -> Figure:
-        """When markers were not seen; a sentence where all always were."""
-
-    def skeleton(self, trial: str | None = None) -> Figure:
-        """The skeleton in motion, with markers, centres of mass and ground reactions."""
+    from xarray import Dataset
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -350,6 +296,42 @@ class Fit:
             FileError: a format that is not known, or the file cannot be written.
         """
         return display.figure(self, name, path, trial)
+
+    def to_xarray(self, kind: Kind = "moment", over: Literal["percent", "time"] = "percent") -> Dataset:
+        """Curves of all trials as an xarray Dataset with variables `value` and `sd`, units as their attributes.
+
+        Coordinates: trial, side, stride, percent, joint over the gait cycle; trial, time, joint over time. What was
+        not measured is NaN. `to_netcdf` writes it.
+
+        Args:
+            kind: "angle" (deg), "moment" (N m/kg; over time N m), "power" (W/kg) or "force" (% body weight).
+            over: "percent" of the gait cycle, or "time" (s; angles and moments).
+
+        Raises:
+            KinertiaError: xarray (the extra `xarray`) is missing, there are no such curves, or no strides.
+
+        Examples:
+            >>> knee = fit.to_xarray("moment").sel(joint="knee_angle", side="r")
+            >>> knee.value.attrs["units"]
+            'N m/kg'
+        """
+        result: Dataset = display.dataset(self, kind, over)
+        return result
+
+    def draws_to_xarray(self, count: int = 50, seed: int = 0) -> Dataset:
+        """Posterior draws as an xarray Dataset with coordinates chain and draw, as ArviZ takes them.
+
+        Variables: `angle` (deg) and `moment` (N m) by trial, time and joint; `bsp` by segment and parameter.
+
+        Args:
+            count: of draws; a result keeps 200, of long trials fewer.
+            seed: chooses which.
+
+        Raises:
+            KinertiaError: xarray is missing, or not so many draws are kept.
+        """
+        result: Dataset = display.draws(self, count, seed)
+        return result
 
     @property
     def covariance(self) -> pd.DataFrame | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from kinertia.estimation.result import Fit, TrialFit
+from kinertia.report.datasets import curve_dataset, draw_dataset
 from kinertia.report.files import save_fit
 from kinertia.report.journal_figure import save_figure
 from kinertia.report.notebook import fit_html, recording_html, trial_fit_html, trial_html
@@ -17,3 +18,5 @@ display.html.register(Fit, fit_html)
 display.pictures.register(Fit, lambda fit: FitFigures(fit, as_plotly))
 display.save.register(Fit, save_fit)
 display.figure.register(Fit, save_figure)
+display.dataset.register(Fit, curve_dataset)
+display.draws.register(Fit, draw_dataset)

@@ -51,6 +51,20 @@ def figure(thing: object, name: str, path: str | Path, trial: str | None = None)
     return figure(thing, name, path, trial)
 
 
+@singledispatch
+def dataset(thing: object, kind: str, over: str) -> Any:
+    """Curves of `thing` as an xarray Dataset."""
+    _load(dataset, thing)
+    return dataset(thing, kind, over)
+
+
+@singledispatch
+def draws(thing: object, count: int, seed: int) -> Any:
+    """Posterior draws of `thing` as an xarray Dataset."""
+    _load(draws, thing)
+    return draws(thing, count, seed)
+
+
 def _load(function: Any, thing: object) -> None:
     for module in _modules:
         import_module(module)
