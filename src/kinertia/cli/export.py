@@ -1,4 +1,4 @@
-"""`kinertia export`: tables of a fit, and draws from its posterior, for other programs."""
+"""`kinertia export`: tables of a fit, its trials' C3D files with results, and posterior draws, for other programs."""
 
 from __future__ import annotations
 
@@ -13,9 +13,16 @@ from kinertia.cli.outcome import Outcome
 from kinertia.cli.terminal import out
 from kinertia.io.output_folder import complete_folder
 from kinertia.io.provenance import VERSION
+from kinertia.motion.model_outputs import CONVENTIONS
+from kinertia.report.c3d_results import write_c3d_results
 from kinertia.report.draw_files import write_draws
-from kinertia.report.saved_fit import load_fit
+from kinertia.report.saved_fit import read_saved
 from kinertia.report.tables import write_csv, write_json, write_mat
+
+
+def _conventions(typed: str) -> list[str]:
+    """What the shell offers for --convention."""
+    return [name for name in CONVENTIONS if name.startswith(typed)]
 
 
 def export(
@@ -25,6 +32,20 @@ def export(
         bool, typer.Option("--json", help="One file, tables.json; which files were written is printed as JSON, too.")
     ] = False,
     mat: Annotated[bool, typer.Option("--mat", help="One file, tables.mat, for MATLAB and Octave.")] = False,
+    c3d: Annotated[
+        bool,
+        typer.Option("--c3d", help="A copy of each trial's C3D file with the results, for Vicon, Visual3D and others."),
+    ] = False,
+    convention: Annotated[
+        str | None,
+        typer.Option(
+            help="Of --c3d: plug-in-gait (default for its marker sets) or isb (default otherwise).",
+            autocompletion=_conventions,
+        ),
+    ] = None,
+    recordings: Annotated[
+        Path | None, typer.Option(help="Of --c3d: folder of the trials' files, where they are not found.")
+    ] = None,
     draws: Annotated[
         int,
         typer.Option(
@@ -32,11 +53,11 @@ def export(
         ),
     ] = 0,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Which of the kept draws; 0: the first.")] = 0,
-    output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the tables.")] = Path("export"),
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the files.")] = Path("export"),
     overwrite: Overwrite = False,
     quiet: Quiet = False,
 ) -> Outcome:
-    """Write all tables of a fit (segments, calibration, strides, curves), or draws from its posterior.
+    """Write all tables of a fit (segments, calibration, strides, curves), C3D files or posterior draws.
 
     [bold]Examples[/]
 
@@ -44,12 +65,18 @@ def export(
 
     kinertia export out --mat -o matlab
 
+    kinertia export out --c3d -o for-nexus
+
     kinertia export out --draws 50 -o draws
     """
-    if not (csv or as_json or mat or draws):
-        raise typer.BadParameter("say in which form: --csv, --json, --mat or --draws N (several at once are fine)")
+    if not (csv or as_json or mat or c3d or draws):
+        forms = "--csv, --json, --mat, --c3d or --draws N"
+        raise typer.BadParameter(f"say in which form: {forms} (several at once are fine)")
+    if convention is not None and convention not in CONVENTIONS:
+        raise typer.BadParameter(f"--convention is {' or '.join(CONVENTIONS)}, not '{convention}'")
     results_folder(output, overwrite)
-    fit = load_fit(results)
+    saved = read_saved(results)
+    fit = saved.fit
     with complete_folder(output, "export") as work:
         content: dict[str, Any] = {"kinertia": VERSION, "results": str(results), "subject": fit.subject.model_dump()}
         if draws:
@@ -61,6 +88,9 @@ def export(
             write_json(fit, work / "tables.json")
         if mat:
             write_mat(fit, work / "tables.mat")
+        if c3d:
+            chosen = write_c3d_results(saved, results, recordings, convention, work)
+            out.print(f"signs, axes and units in the C3D files: {chosen} (--convention)")
         if draws:
             write_draws(fit, work, draws, seed)
     out.print(f"files in {output}", soft_wrap=True)

@@ -22,6 +22,7 @@ from kinertia.findings.finding import Finding, finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.io.c3d_events import file_events
+from kinertia.io.c3d_outputs import OWN_GROUP
 from kinertia.io.c3d_plates import lab_plates, person_on_plates, plate_left_out, to_ground_plates
 from kinertia.io.c3d_structure import doubts_about, with_plain_samples
 from kinertia.io.c3d_subject import subject_data
@@ -52,9 +53,9 @@ def read_c3d(path: str | Path, length_unit: str | None = None, standing: bool = 
     """Read markers, force plates and measurements of the subject from a C3D file, turned to ground axes.
 
     Markers: model outputs (angles, forces, moments, powers) and unnamed points (`*...`) are left out, virtual
-    points (joint centres, segment origins) are kept; `subject:` prefixes are stripped; of repeated labels the
-    first one with data is kept. Time counts from the first frame of the capture, so a cropped file does not
-    begin at zero.
+    points (joint centres, segment origins) are kept unless Kinertia wrote them; `subject:` prefixes are stripped; of
+    repeated labels the first one with data is kept. Time counts from the first frame of the capture, so a cropped file
+    does not begin at zero.
 
     Plates: types 1 to 4 (ezc3d reads no others); moment about the ground origin; samples with less than
     `LOAD_THRESHOLD_N` of vertical force are zero. Plates that cannot be read are left out (F151), so
@@ -205,9 +206,10 @@ def _markers(path: Path, file: Any) -> tuple[tuple[str, ...], FloatArray, list[F
     seen = np.asarray(np.isfinite(positions).all(axis=2).any(axis=0))
     labels = continued(file["parameters"], "POINT", "LABELS")[: positions.shape[1]]
     labels += ["*"] * (positions.shape[1] - len(labels))
-    outputs = _outputs(file["parameters"], labels)
+    ours = set(continued(file["parameters"], OWN_GROUP, "LABELS"))
+    outputs = _outputs(file["parameters"], labels) - ours
     unnamed = [k for k, label in enumerate(labels) if not label or label.startswith("*")]
-    kept = [k for k in range(len(labels)) if k not in set(unnamed) and labels[k] not in outputs]
+    kept = [k for k in range(len(labels)) if k not in set(unnamed) and labels[k] not in outputs | ours]
     own = [labels[k] for k in kept]
     people = list(people_among([label for label, k in zip(own, kept, strict=True) if seen[k]]))
     on_plates = person_on_plates(file["data"].get("platform", []), people, own, positions[:, kept])

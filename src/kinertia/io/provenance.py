@@ -9,7 +9,7 @@ import platform
 import shlex
 import subprocess
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path, PurePath
@@ -27,10 +27,12 @@ class Provenance:
     Attributes:
         command: as typed on a command line.
         files: SHA-256 of every input file, by its path from the folder that holds them all.
+        trials: of each trial the path of its markers, as in `files`.
     """
 
     command: str
     files: Mapping[str, str]
+    trials: Mapping[str, str] = field(default_factory=dict)
 
 
 def provenance_of(wanted: SubjectFile, command: str) -> Provenance:
@@ -42,7 +44,9 @@ def provenance_of(wanted: SubjectFile, command: str) -> Provenance:
         paths += [path for path in (trial.markers, trial.forces, trial.loads) if path is not None]
         paths += [trial.belt_speed_m_s] if isinstance(trial.belt_speed_m_s, Path) else []
     names = names_from_common_folder(paths)
-    return Provenance(command, {name: sha256(path) for name, path in zip(names, paths, strict=True)})
+    by_path = dict(zip(paths, names, strict=True))
+    trials = {trial.name: by_path[trial.markers] for trial in wanted.trials}
+    return Provenance(command, {name: sha256(path) for path, name in by_path.items()}, trials)
 
 
 def recordings(wanted: SubjectFile) -> tuple[str, ...]:

@@ -1,0 +1,253 @@
+"""Writes model outputs into a copy of a C3D file: points, their types, and parameters of Kinertia's own.
+
+ezc3d would write the whole file anew: header, order and width of parameters, analog samples by their scales. Here the
+bytes of markers, analog samples, events and all parameters but the lists of points stay as they are. Files of integers
+become files of floats, since no angle fits the steps of markers; their numbers stay.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from kinertia.errors import FileError
+from kinertia.findings.quantity import Quantity
+from kinertia.io.c3d_parameters import ParameterSection, Value
+from kinertia.io.c3d_structure import doubts_about, with_plain_samples
+
+OWN_GROUP = "KINERTIA"
+"""Its LABELS are the points that Kinertia wrote."""
+_BLOCK = 512
+_ORDERS = {84: "<", 86: ">"}
+_MOST_IN_LIST = 255
+_TYPES = {"ANGLES": "ANGLE", "FORCES": "FORCE", "MOMENTS": "MOMENT", "POWERS": "POWER"}
+
+
+@dataclass(frozen=True, eq=False)
+class OutputPoint:
+    """One point to write.
+
+    Attributes:
+        label: without the subject's prefix.
+        kind: "ANGLES", "FORCES", "MOMENTS", "POWERS"; "" of a place.
+        values: (f, 3) at all frames of the file, in its units; NaN where it is missing.
+        description: what it is.
+    """
+
+    label: str
+    kind: str
+    values: np.ndarray
+    description: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class C3dFrames:
+    """What a writer of outputs needs to know of a file.
+
+    Attributes:
+        content: its bytes; those of markers and analog samples are `words`.
+        labels: of its points, Kinertia's own left out.
+        first: number of the first frame.
+        rate_hz: of the frames.
+        points: (f, p, 3) in the file's units, NaN where missing; as `labels`.
+        units: of "ANGLES", "FORCES", "MOMENTS", "POWERS", as the file states them; only those that it states.
+    """
+
+    content: bytes = field(repr=False)
+    labels: tuple[str, ...]
+    first: int
+    rate_hz: float
+    points: np.ndarray
+    units: Mapping[str, str]
+
+
+@dataclass(frozen=True, eq=False)
+class _Parts:
+    """A file taken apart: first blocks, parameters, words (f, 4 p + a) as floats, and what follows them."""
+
+    before: bytes
+    section: ParameterSection
+    words: np.ndarray
+    points: int
+    after: bytes
+    order: str
+
+
+def frames_of(path: Path) -> C3dFrames:
+    """Labels and places of the points of a C3D file that outputs are to be written into.
+
+    Raises:
+        FileError: it is damaged, or stored as only another program could (DEC's numbers, poses of segments).
+    """
+    doubt = doubts_about(path)
+    if doubt:
+        raise FileError(path, f"cannot take model outputs: {doubt}")
+    content = with_plain_samples(path) or path.read_bytes()
+    parts = _without_ours(_apart(content))
+    labels = _labels(parts)
+    first = struct.unpack_from(f"{parts.order}H", parts.before, 6)[0]
+    rate_hz = struct.unpack_from(f"{parts.order}f", parts.before, 20)[0]
+    each = parts.words[:, : 4 * parts.points].reshape(len(parts.words), parts.points, 4).astype(float)
+    seen = (each[..., 3] >= 0) & np.isfinite(each[..., :3]).all(axis=-1)
+    stated = {kind: parts.section.get("POINT", f"{name}_UNITS") for kind, name in _TYPES.items()}
+    units = {kind: str(texts[0]) for kind, texts in stated.items() if texts is not None and len(texts)}
+    return C3dFrames(content, tuple(labels), first, rate_hz, np.where(seen[..., None], each[..., :3], np.nan), units)
+
+
+def with_outputs(
+    frames: C3dFrames,
+    outputs: Sequence[OutputPoint],
+    prefix: str,
+    units: Mapping[str, str],
+    own: Mapping[str, tuple[Value, tuple[int, ...] | None]],
+) -> bytes:
+    """The file with these points behind its own, which it lists by type, and the group KINERTIA.
+
+    Args:
+        frames: of the file; what Kinertia wrote into it before is replaced.
+        outputs: with labels that no other point has.
+        prefix: of labels, "Anna:"; empty for none.
+        units: of the types, for a file that states none.
+        own: entries of the group KINERTIA by name: value, and shape as `ParameterSection.put` has it.
+
+    Raises:
+        TooManyParameters: they do not fit.
+    """
+    parts = _without_ours(_apart(frames.content))
+    section, labels = parts.section, [prefix + one.label for one in outputs]
+    _put_list(section, "LABELS", [*_labels(parts), *labels])
+    described = _listed(section, "DESCRIPTIONS")[: parts.points]
+    described += [""] * (parts.points - len(described)) + [one.description for one in outputs]
+    _put_list(section, "DESCRIPTIONS", described)
+    groups = list(_texts(section, "TYPE_GROUPS"))
+    for kind, name in _TYPES.items():
+        ours = [label for label, one in zip(labels, outputs, strict=True) if one.kind == kind]
+        if not ours:
+            continue
+        _put_list(section, kind, [*_listed(section, kind), *ours])
+        if kind not in groups[::2]:
+            groups += [kind, name]
+        if section.get("POINT", f"{name}_UNITS") is None:
+            section.put("POINT", f"{name}_UNITS", [units[kind]])
+    if groups:
+        section.put("POINT", "TYPE_GROUPS", groups, (2, len(groups) // 2))
+    _put_list(section, "LABELS", labels, OWN_GROUP)
+    for key, (value, shape) in own.items():
+        section.put(OWN_GROUP, key, value, shape)
+    return _together(parts, np.concatenate([_four(one.values) for one in outputs], axis=1))
+
+
+def _four(values: np.ndarray) -> np.ndarray:
+    """(f, 4) words of a point: 0 0 0 -1 where it is missing; a number alone that is missing is NaN."""
+    seen = np.isfinite(values).any(axis=1)
+    return np.column_stack([np.where(seen[:, None], values, 0.0), np.where(seen, 0.0, -1.0)])
+
+
+def _apart(content: bytes) -> _Parts:
+    start = _BLOCK * (content[0] - 1)
+    order = _ORDERS[content[start + 3]]
+    section = ParameterSection(content[start : start + _BLOCK * content[start + 2]], order)
+    points, analogs, first, last = struct.unpack_from(f"{order}4H", content, 2)
+    (scale,) = struct.unpack_from(f"{order}f", content, 12)
+    at, per_frame, count = (
+        _BLOCK * (struct.unpack_from(f"{order}H", content, 16)[0] - 1),
+        4 * points + analogs,
+        last - first + 1,
+    )
+    stored = "f4" if scale < 0 else "i2"
+    words = np.frombuffer(content, f"{order}{stored}", per_frame * count, at).reshape(count, per_frame)
+    before = bytearray(content[:start])
+    after = content[at + words.nbytes :]
+    if scale > 0:
+        words = _as_floats(words, points, scale, order)
+        struct.pack_into(f"{order}f", before, 12, -scale)
+        section.put("POINT", "SCALE", np.array([-scale], dtype=np.float32))
+    return _Parts(bytes(before), section, words, points, after, order)
+
+
+def _as_floats(words: np.ndarray, points: int, scale: float, order: str) -> np.ndarray:
+    """Words of a file of integers as floats: places by their scale, samples and residuals as they are."""
+    result = words.astype(f"{order}f4")
+    places = result[:, : 4 * points].reshape(len(words), points, 4)
+    places[..., :3] *= np.float32(scale)
+    return result
+
+
+def _without_ours(parts: _Parts) -> _Parts:
+    """The same without what an earlier export wrote."""
+    section = parts.section
+    ours = set(_listed(section, "LABELS", OWN_GROUP))
+    section.drop(OWN_GROUP)
+    labels = _labels(parts)
+    kept = [k for k, label in enumerate(labels) if label not in ours]
+    if len(kept) == len(labels):
+        return parts
+    described = _listed(section, "DESCRIPTIONS")
+    _put_list(section, "LABELS", [labels[k] for k in kept])
+    if described:
+        _put_list(section, "DESCRIPTIONS", [described[k] for k in kept if k < len(described)])
+    for kind in _TYPES:
+        listed = _listed(section, kind)
+        if ours & set(listed):
+            _put_list(section, kind, [label for label in listed if label not in ours])
+    of_points = (4 * np.array(kept, dtype=int)[:, None] + np.arange(4)).ravel()
+    columns = np.concatenate([of_points, np.arange(4 * parts.points, parts.words.shape[1])])
+    return _Parts(parts.before, section, parts.words[:, columns], len(kept), parts.after, parts.order)
+
+
+def _together(parts: _Parts, added: np.ndarray) -> bytes:
+    """The file again, with more points (f, 4 k)."""
+    order, section = parts.order, parts.section
+    split, points = 4 * parts.points, parts.points + added.shape[1] // 4
+    words = np.hstack([parts.words[:, :split], added.astype(f"{order}f4"), parts.words[:, split:]])
+    section.put("POINT", "USED", np.array([points], dtype=np.int16))
+    section.put("POINT", "DATA_START", np.array([1], dtype=np.int16))
+    at = len(parts.before) + len(section.content())
+    section.put("POINT", "DATA_START", np.array([at // _BLOCK + 1], dtype=np.int16))
+    before = bytearray(parts.before)
+    struct.pack_into(f"{order}H", before, 2, points)
+    struct.pack_into(f"{order}H", before, 16, at // _BLOCK + 1)
+    data = bytes(before) + section.content() + words.astype(f"{order}f4", copy=False).tobytes()
+    data += parts.after if parts.after.strip(b"\0") else b""
+    return data.ljust(-(-len(data) // _BLOCK) * _BLOCK, b"\0")
+
+
+def _texts(section: ParameterSection, name: str, group: str = "POINT") -> list[str]:
+    value = section.get(group, name)
+    return [] if value is None or isinstance(value, np.ndarray) else list(value)
+
+
+def _listed(section: ParameterSection, name: str, group: str = "POINT") -> list[str]:
+    """A list of texts that goes on in NAME2, NAME3."""
+    found: list[str] = []
+    for suffix in ["", *map(str, range(2, 100))]:
+        more = _texts(section, name + suffix, group)
+        if not more:
+            break
+        found += more
+    return found
+
+
+def _labels(parts: _Parts) -> list[str]:
+    """One per point."""
+    labels = _listed(parts.section, "LABELS")[: parts.points]
+    return labels + [""] * (parts.points - len(labels))
+
+
+def _put_list(section: ParameterSection, name: str, texts: Sequence[str], group: str = "POINT") -> None:
+    """Write a list, 255 entries in each of NAME, NAME2 ..., but leave those that stay the same."""
+    for k, start in enumerate(range(0, max(len(texts), 1), _MOST_IN_LIST)):
+        some, called = list(texts[start : start + _MOST_IN_LIST]), name + ("" if k == 0 else str(k + 1))
+        if section.get(group, called) != some:
+            section.put(group, called, some)
+
+
+def too_many(path: Path) -> FileError:
+    """That a file has no room for more parameters."""
+    return FileError.found(
+        path, "F106", what=Quantity("its parameters fill all the 255 blocks that a C3D file can have")
+    )

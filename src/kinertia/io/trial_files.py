@@ -1,0 +1,64 @@
+"""Where the files of a finished fit are now: results know them by their names and hashes, not by their places."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Iterator, Sequence
+from pathlib import Path, PurePosixPath
+
+from kinertia.errors import FileError
+from kinertia.io.provenance import Provenance, sha256
+
+_KINDS = (".c3d", ".trc", ".tsv", ".csv")
+
+
+def trial_file(provenance: Provenance | None, name: str, results: Path, recordings: Path | None) -> Path:
+    """The file with the markers of a trial.
+
+    Looked for in `recordings` if given, else in the folder of the results and those above it, the working folder, and
+    where the command of the fit looked. Of the places that have a file of its name, the one whose content was fitted.
+
+    Args:
+        provenance: of the fit; None if it was saved from Python: then only its name is known.
+        name: of the trial.
+        results: folder of the fit.
+        recordings: folder of the files.
+
+    Raises:
+        FileError: it is not there, or it has changed since.
+    """
+    stated = None if provenance is None else provenance.trials.get(name)
+    if provenance is None or stated is None:
+        named = [Path(file) for file in (provenance.files if provenance else ()) if PurePosixPath(file).stem == name]
+        names = [str(path) for path in named] or [name + kind for kind in _KINDS]
+    else:
+        names = [stated]
+    folders = [recordings] if recordings is not None else list(_folders(provenance, results))
+    found = [path for path in _candidates(folders, names) if path.is_file()]
+    if not found:
+        hint = "give the folder of the recordings with --recordings"
+        raise FileError(names[0], f"the recording of trial {name} is not found; {hint}")
+    hashes = set(provenance.files.values()) if provenance is not None else set()
+    same = [path for path in found if not hashes or sha256(path) in hashes]
+    if not same:
+        raise FileError(found[0], f"has changed since trial {name} was fitted; fit it again, or give --recordings")
+    return same[0]
+
+
+def _folders(provenance: Provenance | None, results: Path) -> Iterator[Path]:
+    whole = results.resolve()
+    yield from (whole, *whole.parents[:3], Path.cwd())
+    words: Sequence[str] = ()
+    if provenance is not None:
+        words = shlex.split(provenance.command, posix="\\" not in provenance.command)
+    for word in words:
+        path = Path(word.strip('"'))
+        if path.exists():
+            yield path.resolve() if path.is_dir() else path.resolve().parent
+
+
+def _candidates(folders: Sequence[Path], names: Sequence[str]) -> Iterator[Path]:
+    for name in names:
+        for folder in folders:
+            yield folder / name
+            yield folder / PurePosixPath(name).name

@@ -1,0 +1,225 @@
+"""Angles, moments, forces and powers of the legs as clinical software has them: three numbers each, signs alike on both
+sides.
+
+"plug-in-gait" is Vicon's convention. Angles (deg): Cardan sequence flexion, adduction, rotation. Moments (N mm/kg) are
+internal, in the axes of the distal segment, positive where they extend, abduct or rotate externally; forces (N/kg) are
+of the proximal on the distal segment in its axes (forward, left, up; of the foot down, left, forward). Powers (W/kg)
+stand third.
+
+"isb" (Wu et al. 2002, J Biomech 35:543) has the same angles but for the pelvis, whose backward tilt and lower side are
+positive. Moments (N m/kg) are internal, about the axes that the angles turn about (flexion of the parent, floating,
+long axis of the child), and positive as the angles are; forces (N/kg) are in the distal segment's axes x, y, z.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Literal, Protocol, get_args
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from kinertia.model.bsp import BodySegmentParameters
+from kinertia.model.skeleton import Pose, Skeleton
+from kinertia.motion.dynamics import Motion
+from kinertia.motion.joint_wrench import LegJoint, joint_wrenches
+from kinertia.trial.data import FEET
+
+Convention = Literal["plug-in-gait", "isb"]
+Kind = Literal["ANGLES", "FORCES", "MOMENTS", "POWERS"]
+_SINGULAR = {"ANGLES": "Angles", "FORCES": "Force", "MOMENTS": "Moment", "POWERS": "Power"}
+CONVENTIONS: tuple[Convention, ...] = get_args(Convention)
+UNITS: dict[Convention, dict[str, str]] = {
+    "plug-in-gait": {"ANGLES": "deg", "FORCES": "N", "MOMENTS": "Nmm", "POWERS": "W"},
+    "isb": {"ANGLES": "deg", "FORCES": "N", "MOMENTS": "Nm", "POWERS": "W"},
+}
+"""As Vicon writes them; forces, moments and powers are per kg of body mass."""
+_BENDS = {"Hip": 1.0, "Knee": -1.0, "Ankle": 1.0}
+"""Sign of flexion (dorsiflexion) about the axis to the right."""
+_STEP_RAD = 1e-5
+_APART_DEG = 45.0
+_UNMOVED = 0.2
+"""A direction that the free axes of a joint reach with a rest of more has no deviation: the model holds it still."""
+
+
+class Deviations(Protocol):
+    """Standard deviations at n frames, as `CurveDeviations` has them."""
+
+    @property
+    def coordinates(self) -> np.ndarray:
+        """(n, c) rad, m."""
+
+    @property
+    def moments(self) -> np.ndarray:
+        """(n, c) N m."""
+
+    @property
+    def powers(self) -> np.ndarray:
+        """(n, c) W."""
+
+
+@dataclass(frozen=True, eq=False)
+class ModelOutput:
+    """One output over n frames.
+
+    Attributes:
+        joint: "Hip", "Knee", "Ankle", "Pelvis" or "FootProgress".
+        side: "r" or "l".
+        kind: what it is.
+        values: (n, 3) in the convention's units.
+        sd: (n, 3) standard deviations; NaN where there is none. Errors of a joint's axes are taken as independent.
+    """
+
+    joint: str
+    side: str
+    kind: Kind
+    values: np.ndarray
+    sd: np.ndarray
+
+    @property
+    def name(self) -> str:
+        """As Vicon calls it: "LHipAngles"."""
+        return f"{self.side.upper()}{self.joint}{_SINGULAR[self.kind]}"
+
+
+def model_outputs(
+    skeleton: Skeleton,
+    bsp: BodySegmentParameters,
+    motion: Motion,
+    foot_loads: np.ndarray,
+    mass_kg: float,
+    convention: Convention,
+    deviations: Deviations | None = None,
+) -> list[ModelOutput]:
+    """All outputs of the legs and the pelvis; none of a model whose legs are not hip, knee and ankle in ISB's axes.
+
+    Args:
+        skeleton, bsp, motion, foot_loads: as in `joint_wrenches`; the person faces +X.
+        mass_kg: of the body.
+        convention: signs, axes and units.
+        deviations: of coordinates, moments and powers, where there are any.
+    """
+    wrenches = joint_wrenches(skeleton, bsp, motion, foot_loads)
+    if not wrenches or not _alike(skeleton, wrenches):
+        return []
+    pose, clinical = skeleton.pose(motion.q), convention == "plug-in-gait"
+    spread = _NoDeviations(motion.q) if deviations is None else deviations
+    found = _of_pelvis_and_feet(skeleton, pose, clinical)
+    for joint, wrench in wrenches.items():
+        child, parent = _rotation(skeleton, pose, joint.child), _rotation(skeleton, pose, joint.parent)
+        columns, signs = joint.columns(skeleton), _signs(joint)
+        by_angle, turning = _moved(skeleton, motion.q, joint, columns)
+        sd = np.degrees(_reached(by_angle, spread.coordinates[:, columns]))
+        found.append(ModelOutput(joint.name, joint.side, "ANGLES", np.degrees(signs * _cardan(parent, child)), sd))
+        axes = child.swapaxes(1, 2)[:, [2, 0, 1]] if clinical else _joint_axes(parent, child)
+        factor = (-1000.0 if clinical else 1.0) / mass_kg
+        sd = abs(factor) * _along(axes, turning, spread.moments[:, columns])
+        moment = factor * signs * np.einsum("nak,nk->na", axes, wrench[:, 3:])
+        found.append(ModelOutput(joint.name, joint.side, "MOMENTS", moment, sd))
+        force = np.einsum("nka,nk->na", child, wrench[:, :3]) / mass_kg
+        force = _as_vicon(joint, force) if clinical else force
+        found.append(ModelOutput(joint.name, joint.side, "FORCES", force, np.full(force.shape, np.nan)))
+        rate = np.einsum("nka,na->nk", turning, motion.qd[:, columns])
+        power = np.einsum("nk,nk->n", wrench[:, 3:], rate) / mass_kg
+        sd = np.sqrt(np.square(spread.powers[:, columns]).sum(axis=1)) / mass_kg
+        found.append(ModelOutput(joint.name, joint.side, "POWERS", _third(power), _third(sd)))
+    return found
+
+
+class _NoDeviations:
+    """NaN everywhere."""
+
+    def __init__(self, q: np.ndarray) -> None:
+        self.coordinates = self.moments = self.powers = np.full(q.shape, np.nan)
+
+
+def _alike(skeleton: Skeleton, joints: Iterable[LegJoint]) -> bool:
+    """Whether the leg's segments have axes forward, up and right where all coordinates are zero."""
+    pose = skeleton.pose(np.zeros((1, len(skeleton.coordinates))))
+    turns = [
+        _rotation(skeleton, pose, one.parent).swapaxes(1, 2) @ _rotation(skeleton, pose, one.child) for one in joints
+    ]
+    return bool(np.degrees(Rotation.from_matrix(np.concatenate(turns)).magnitude()).max() < _APART_DEG)
+
+
+def _rotation(skeleton: Skeleton, pose: Pose, segment: str) -> np.ndarray:
+    return pose.rotation[:, skeleton.segments.index(segment)]
+
+
+def _signs(joint: LegJoint) -> np.ndarray:
+    """(3,) of the turns about axes to the right, forward and up, that are flexion, adduction and internal rotation."""
+    mirrored = 1.0 if joint.side == "r" else -1.0
+    return np.array([_BENDS[joint.name], mirrored, mirrored])
+
+
+def _cardan(parent: np.ndarray, child: np.ndarray) -> np.ndarray:
+    """(n, 3) rad: turns about z of the parent, the floating axis x, and y of the child (n, 3, 3)."""
+    result: np.ndarray = Rotation.from_matrix(parent.swapaxes(-1, -2) @ child).as_euler("ZXY")
+    return result
+
+
+def _joint_axes(parent: np.ndarray, child: np.ndarray) -> np.ndarray:
+    """(n, 3, 3) in rows: the axes that `_cardan` turns about, in ground."""
+    first, last = parent[:, :, 2], child[:, :, 1]
+    floating = np.cross(last, first)
+    return np.stack([first, floating / np.linalg.norm(floating, axis=1, keepdims=True), last], axis=1)
+
+
+def _moved(skeleton: Skeleton, q: np.ndarray, joint: LegJoint, columns: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
+    """Per unit of the joint's own coordinates: (n, 3, k) its angles, and (n, 3, k) turn of the child in ground."""
+    angles, turns = np.empty((len(q), 3, len(columns))), np.empty((len(q), 3, len(columns)))
+    for k, column in enumerate(columns):
+        step = np.zeros(q.shape[1])
+        step[column] = _STEP_RAD
+        poses = [skeleton.pose(q + sign * step) for sign in (1.0, -1.0)]
+        children = [_rotation(skeleton, pose, joint.child) for pose in poses]
+        after, before = (
+            np.unwrap(_cardan(_rotation(skeleton, pose, joint.parent), child), axis=0)
+            for pose, child in zip(poses, children, strict=True)
+        )
+        angles[..., k] = (after - before) / (2.0 * _STEP_RAD)
+        turn = Rotation.from_matrix(children[0] @ children[1].swapaxes(1, 2)).as_rotvec()
+        turns[..., k] = turn / (2.0 * _STEP_RAD)
+    return angles, turns
+
+
+def _reached(by_angle: np.ndarray, sd: np.ndarray) -> np.ndarray:
+    """(n, 3) deviations of angles from those of the coordinates (n, k); NaN of an angle that none of them turns."""
+    moved = np.abs(by_angle).sum(axis=2).max(axis=0) > _UNMOVED
+    return np.where(moved, np.sqrt(np.einsum("nak,nk->na", np.square(by_angle), np.square(sd))), np.nan)
+
+
+def _along(axes: np.ndarray, turning: np.ndarray, sd: np.ndarray) -> np.ndarray:
+    """(n, 3) deviations of a moment along axes (n, 3, 3), from those about the free directions (n, 3, k)."""
+    shares = np.linalg.pinv(turning) @ axes.swapaxes(1, 2)
+    rest = np.linalg.norm(turning @ shares - axes.swapaxes(1, 2), axis=1)
+    values = np.sqrt(np.einsum("nka,nk->na", np.square(shares), np.square(sd)))
+    return np.where(rest.max(axis=0) < _UNMOVED, values, np.nan)
+
+
+def _as_vicon(joint: LegJoint, force: np.ndarray) -> np.ndarray:
+    """Components (n, 3) along x, y, z of a segment as Vicon orders and signs them; its foot points along z."""
+    x, y, z = force.T
+    return np.column_stack([-y, -z, x] if joint.name == "Ankle" else [x, -z, y])
+
+
+def _of_pelvis_and_feet(skeleton: Skeleton, pose: Pose, clinical: bool) -> list[ModelOutput]:
+    """Angles against the ground, without deviations: those of pelvis and foot lie in several coordinates together."""
+    found = []
+    ground = np.broadcast_to(np.eye(3), (len(pose.rotation), 3, 3))
+    for side, foot in zip(FEET, skeleton.feet, strict=True):
+        mirrored = 1.0 if side == "r" else -1.0
+        pelvis = np.degrees(_cardan(ground, _rotation(skeleton, pose, skeleton.segments[0])))
+        pelvis = pelvis * [-1.0, -mirrored, mirrored] if clinical else pelvis * [1.0, mirrored, mirrored]
+        found.append(ModelOutput("Pelvis", side, "ANGLES", pelvis, np.full(pelvis.shape, np.nan)))
+        angles = np.degrees(_cardan(ground, _rotation(skeleton, pose, foot))) * [1.0, mirrored, mirrored]
+        if clinical:
+            angles[:, 0] = -angles[:, 0] - 90.0
+        found.append(ModelOutput("FootProgress", side, "ANGLES", angles, np.full(angles.shape, np.nan)))
+    return found
+
+
+def _third(values: np.ndarray) -> np.ndarray:
+    """(n, 3) with a scalar where Vicon has it."""
+    return np.column_stack([np.zeros(len(values)), np.zeros(len(values)), values])

@@ -1,0 +1,218 @@
+"""Results of a trial in its own C3D file, as Vicon and Visual3D name and type model outputs."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from kinertia.errors import FileError
+from kinertia.estimation.result import Fit, TrialFit
+from kinertia.io.c3d_outputs import C3dFrames, OutputPoint, frames_of, too_many, with_outputs
+from kinertia.io.c3d_parameters import TooManyParameters, Value
+from kinertia.io.c3d_write import write_c3d
+from kinertia.io.provenance import VERSION
+from kinertia.io.recording import read_recording
+from kinertia.io.trial_files import trial_file
+from kinertia.model.bsp import PARAMETERS
+from kinertia.motion.joint_wrench import leg_joints
+from kinertia.motion.model_outputs import CONVENTIONS, UNITS, Convention, ModelOutput, model_outputs
+from kinertia.report.saved_fit import SavedFit
+from kinertia.trial.data import Recording
+
+SUFFIX = "Kinertia"
+"""Ends all labels where the file has outputs of the same names already."""
+SD = "SD"
+_PLUG_IN_GAIT = ({"LASI", "RASI", "LTHI", "RTHI", "LTIB", "RTIB"}, {"LASI", "RASI", "LTHI", "RTHI", "SACR"})
+_FACTORS = {"nmm": 1e-3, "n.mm": 1e-3, "nm": 1.0, "n.m": 1.0, "n": 1.0, "kn": 1e3, "w": 1.0, "mw": 1e-3, "deg": 1.0}
+"""Of units that files state for moments, forces, powers and angles, in SI and degrees; per kg or not."""
+_SAME_PLACE = 1e-3
+"""How far, as a share of their distances, markers may be from those of the fit: a file stores single precision."""
+_SAME_TIME_FRAMES = 0.02
+
+
+def write_c3d_results(
+    saved: SavedFit, results: Path, recordings: Path | None, convention: str | None, folder: Path
+) -> Convention:
+    """Write a C3D file with its results for each trial of a fit; returns the convention.
+
+    Args:
+        saved: the fit.
+        results: its folder.
+        recordings: where the trials' files are; searched for if None (`trial_file`).
+        convention: of signs, axes and units; the usual one of the marker set if None.
+        folder: to write to.
+
+    Raises:
+        FileError: a trial's file is not found, has changed, or cannot take results.
+    """
+    fit, provenance = saved.fit, saved.provenance
+    chosen = next((one for one in CONVENTIONS if one == convention), usual_convention(fit))
+    for trial in fit.trials:
+        path = trial_file(provenance, trial.name, results, recordings)
+        source = path if path.suffix.lower() == ".c3d" else read_recording(path)
+        content = c3d_with_results(fit, trial, source, chosen, provenance.files if provenance is not None else {})
+        (folder / f"{trial.name}.c3d").write_bytes(content)
+    return chosen
+
+
+def usual_convention(fit: Fit) -> Convention:
+    """Plug-in Gait's where the markers are, ISB's otherwise."""
+    labels = set(fit.skeleton.labels)
+    return "plug-in-gait" if any(own <= labels for own in _PLUG_IN_GAIT) else "isb"
+
+
+def outputs_of(fit: Fit, trial: TrialFit, convention: Convention) -> list[ModelOutput]:
+    """Model outputs of the estimate over the trial's measured frames."""
+    loads = trial.reactions.at(trial.time)
+    return model_outputs(trial.skeleton, fit.estimate, trial.motion, loads, fit.mass_kg, convention, trial.deviations)
+
+
+def new_file(recording: Recording, folder: Path) -> Path:
+    """A C3D file of a recording that came in others; plates whose corners are unknown are left out."""
+    plates = recording.plates if recording.plates is not None and recording.plates.corners is not None else None
+    path = folder / f"{recording.name}.c3d"
+    write_c3d(path, replace(recording, plates=plates))
+    return path
+
+
+def c3d_with_results(
+    fit: Fit, trial: TrialFit, source: Path | Recording, convention: Convention, files: Mapping[str, str]
+) -> bytes:
+    """The content of a C3D file with a trial's results.
+
+    Args:
+        fit, trial: the result.
+        source: the trial's own C3D file, or what its files of other kinds hold.
+        convention: of signs, axes and units.
+        files: SHA-256 of the files of the fit, by name.
+
+    Raises:
+        FileError: the file is damaged, is not the trial's, or has no room.
+    """
+    if isinstance(source, Recording):
+        with tempfile.TemporaryDirectory() as folder:
+            return c3d_with_results(fit, trial, new_file(source, Path(folder)), convention, files)
+    frames = frames_of(source)
+    prefix = _prefix(frames, trial)
+    at = _frames_at(source, frames, trial)
+    outputs = outputs_of(fit, trial, convention)
+    points = [*_points(outputs, frames, at, UNITS[convention]), *_centres(source, frames, trial, prefix, at)]
+    taken = set(frames.labels)
+    if any(prefix + one.label in taken for one in points):
+        points = [replace(one, label=_suffixed(one.label)) for one in points]
+    units = {kind: frames.units.get(kind, unit) for kind, unit in UNITS[convention].items()}
+    try:
+        return with_outputs(frames, points, prefix, units, _own(fit, convention, files, units))
+    except TooManyParameters:
+        raise too_many(source) from None
+
+
+def _suffixed(label: str) -> str:
+    return label[: -len(SD)] + SUFFIX + SD if label.endswith(SD) else label + SUFFIX
+
+
+def _prefix(frames: C3dFrames, trial: TrialFit) -> str:
+    """The subject's, that most of the trial's markers have in the file."""
+    labels, own = set(frames.labels), trial.kinematics.trial.markers.labels
+    prefixes = dict.fromkeys(["", *(label.split(":", 1)[0] + ":" for label in frames.labels if ":" in label)])
+    return max(prefixes, key=lambda prefix: sum(prefix + label in labels for label in own))
+
+
+def _frames_at(source: Path, frames: C3dFrames, trial: TrialFit) -> np.ndarray:
+    """(w,) index in the file of the frames of the fit."""
+    exact = trial.time * frames.rate_hz - (frames.first - 1)
+    at = exact.round().astype(int)
+    if np.abs(exact - at).max() > _SAME_TIME_FRAMES or at[0] < 0 or at[-1] >= len(frames.points):
+        raise _another(source, trial)
+    return at
+
+
+def _another(source: Path, trial: TrialFit) -> FileError:
+    return FileError(source, f"holds other frames or markers than trial {trial.name} of the fit; give its own file")
+
+
+def _points(
+    outputs: list[ModelOutput], frames: C3dFrames, at: np.ndarray, units: Mapping[str, str]
+) -> list[OutputPoint]:
+    """Outputs and their deviations at all frames of the file, in its units where it states others."""
+    points, count = [], len(frames.points)
+    for one in outputs:
+        stated = frames.units.get(one.kind, units[one.kind])
+        own = _FACTORS[units[one.kind].lower()]
+        factor = own / _FACTORS.get(stated.lower().removesuffix("/kg"), own)
+        points.append(OutputPoint(one.name, one.kind, _spread(factor * one.values, at, count)))
+        if np.isfinite(one.sd).any():
+            sd = _spread(factor * one.sd, at, count)
+            points.append(OutputPoint(one.name + SD, one.kind, sd, "standard deviation"))
+    return points
+
+
+def _spread(values: np.ndarray, at: np.ndarray, count: int) -> np.ndarray:
+    result = np.full((count, 3), np.nan)
+    result[at] = values
+    return result
+
+
+def _centres(source: Path, frames: C3dFrames, trial: TrialFit, prefix: str, at: np.ndarray) -> list[OutputPoint]:
+    """Joint centres in the axes and units of the file."""
+    lab, origin = _to_file(source, frames, trial, prefix)
+    pose = trial.skeleton.pose(trial.motion.q)
+    return [
+        OutputPoint(
+            f"{joint.side.upper()}{joint.name[0]}JC",
+            "",
+            _spread(joint.centre(trial.skeleton, pose) @ lab + origin, at, len(frames.points)),
+            f"{joint.name.lower()} joint centre",
+        )
+        for joint in leg_joints(trial.skeleton)
+    ]
+
+
+def _to_file(source: Path, frames: C3dFrames, trial: TrialFit, prefix: str) -> tuple[np.ndarray, np.ndarray]:
+    """(3, 3) and (3,): from the axes of the fit (m, person facing +X) to those of the file, by the markers of both."""
+    markers, columns = trial.kinematics.trial.markers, {label: k for k, label in enumerate(frames.labels)}
+    shared = [(k, columns[prefix + label]) for k, label in enumerate(markers.labels) if prefix + label in columns]
+    index = (markers.time * frames.rate_hz - (frames.first - 1)).round().astype(int)
+    inside = (index >= 0) & (index < len(frames.points))
+    ours = markers.positions[inside][:, [k for k, _ in shared]].reshape(-1, 3)
+    theirs = frames.points[index[inside]][:, [k for _, k in shared]].reshape(-1, 3)
+    known = np.isfinite(ours).all(axis=1) & np.isfinite(theirs).all(axis=1)
+    if known.sum() < 100:
+        raise _another(source, trial)
+    ours, theirs = np.column_stack([ours[known], np.ones(known.sum())]), theirs[known]
+    for _ in range(3):  # markers whose labels were put right are elsewhere in the file
+        turn, *_ = np.linalg.lstsq(ours, theirs, rcond=None)
+        apart = np.linalg.norm(ours @ turn - theirs, axis=1)
+        near = apart <= max(3.0 * float(np.median(apart)), 1e-9)
+        ours, theirs = ours[near], theirs[near]
+    if np.median(apart) > _SAME_PLACE * float(np.ptp(theirs, axis=0).max()):
+        raise _another(source, trial)
+    return turn[:3], turn[3]
+
+
+def _own(
+    fit: Fit, convention: Convention, files: Mapping[str, str], units: Mapping[str, str]
+) -> dict[str, tuple[Value, tuple[int, ...] | None]]:
+    """The group KINERTIA: what the outputs are, and segment masses (kg) and centres of mass (m, segment axes)."""
+    bsp, table = fit.estimate, fit.estimate.table()
+    coms = [PARAMETERS.index(name) for name in ("com_x", "com_y", "com_z")]
+    count = len(bsp.segments)
+    own: dict[str, tuple[Value, tuple[int, ...] | None]] = {
+        "VERSION": ([VERSION], None),
+        "CONVENTION": ([convention], None),
+        "UNITS": ([f"{kind} {unit}{'' if kind == 'ANGLES' else '/kg'}" for kind, unit in units.items()], None),
+        "BODY_MASS": (np.array([fit.mass_kg]), None),
+        "SEGMENTS": (list(bsp.segments), None),
+        "MASS": (table[:, PARAMETERS.index("mass")], None),
+        "COM": (table[:, coms], (3, count)),
+    }
+    if fit.posterior is not None:
+        own["MASS_SD"] = (fit.posterior.sd[:, PARAMETERS.index("mass")], None)
+        own["COM_SD"] = (fit.posterior.sd[:, coms], (3, count))
+    if files:
+        own["FILES"], own["SHA256"] = (list(files), None), (list(files.values()), None)
+    return own
