@@ -80,7 +80,7 @@ def test_export_says_what_the_tables_say(fit, results):
 def test_export_asks_for_a_form(results):
     outcome = run("export", results, "-o", results.parent / "export")
     assert outcome.status == 2
-    assert "--csv, --json, --mat or --draws" in " ".join(outcome.err.split())
+    assert "--csv, --json, --mat, --c3d or --draws" in " ".join(outcome.err.split())
 
 
 @pytest.mark.parametrize("command", [["report"], ["export", "--csv", "-o", "tables"]])

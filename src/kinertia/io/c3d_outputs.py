@@ -142,8 +142,8 @@ def with_outputs(
 
 
 def _four(values: np.ndarray) -> np.ndarray:
-    """(f, 4) words of a point: 0 0 0 -1 where it is missing; a number alone that is missing is NaN."""
-    seen = np.isfinite(values).any(axis=1)
+    """(f, 4) words of a point: 0 0 0 -1 where it is missing."""
+    seen = np.isfinite(values).all(axis=1)
     return np.column_stack([np.where(seen[:, None], values, 0.0), np.where(seen, 0.0, -1.0)])
 
 

@@ -15,8 +15,9 @@ _KINDS = (".c3d", ".trc", ".tsv", ".csv")
 def trial_file(provenance: Provenance | None, name: str, results: Path, recordings: Path | None) -> Path:
     """The file with the markers of a trial.
 
-    Looked for in `recordings` if given, else in the folder of the results and those above it, the working folder, and
-    where the command of the fit looked. Of the places that have a file of its name, the one whose content was fitted.
+    Looked for in `recordings` if given, else in the folder of the results, in `lab` there (the demo's) and above it, in
+    the working folder, and where the command of the fit looked. Of the places that have a file of its name, the one
+    whose content was fitted.
 
     Args:
         provenance: of the fit; None if it was saved from Python: then only its name is known.
@@ -47,7 +48,7 @@ def trial_file(provenance: Provenance | None, name: str, results: Path, recordin
 
 def _folders(provenance: Provenance | None, results: Path) -> Iterator[Path]:
     whole = results.resolve()
-    yield from (whole, *whole.parents[:3], Path.cwd())
+    yield from (whole, whole / "lab", *whole.parents[:3], Path.cwd())
     words: Sequence[str] = ()
     if provenance is not None:
         words = shlex.split(provenance.command, posix="\\" not in provenance.command)

@@ -23,7 +23,7 @@ from scipy.spatial.transform import Rotation
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Pose, Skeleton
 from kinertia.motion.dynamics import Motion
-from kinertia.motion.joint_wrench import LegJoint, joint_wrenches
+from kinertia.motion.joint_wrench import LegJoint, joint_wrenches, leg_joints
 from kinertia.trial.data import FEET
 
 Convention = Literal["plug-in-gait", "isb"]
@@ -100,9 +100,10 @@ def model_outputs(
         convention: signs, axes and units.
         deviations: of coordinates, moments and powers, where there are any.
     """
-    wrenches = joint_wrenches(skeleton, bsp, motion, foot_loads)
-    if not wrenches or not _alike(skeleton, wrenches):
+    joints = leg_joints(skeleton)
+    if not joints or not _alike(skeleton, joints):
         return []
+    wrenches = joint_wrenches(skeleton, bsp, motion, foot_loads)
     pose, clinical = skeleton.pose(motion.q), convention == "plug-in-gait"
     spread = _NoDeviations(motion.q) if deviations is None else deviations
     found = _of_pelvis_and_feet(skeleton, pose, clinical)

@@ -26,6 +26,8 @@ from kinertia.trial.data import Recording
 SUFFIX = "Kinertia"
 """Ends all labels where the file has outputs of the same names already."""
 SD = "SD"
+NO_DEVIATION = -1.0
+"""Where a point has deviations along other axes only: readers take a point with a NaN for missing as a whole."""
 _PLUG_IN_GAIT = ({"LASI", "RASI", "LTHI", "RTHI", "LTIB", "RTIB"}, {"LASI", "RASI", "LTHI", "RTHI", "SACR"})
 _FACTORS = {"nmm": 1e-3, "n.mm": 1e-3, "nm": 1.0, "n.m": 1.0, "n": 1.0, "kn": 1e3, "w": 1.0, "mw": 1e-3, "deg": 1.0}
 """Of units that files state for moments, forces, powers and angles, in SI and degrees; per kg or not."""
@@ -100,6 +102,9 @@ def c3d_with_results(
     prefix = _prefix(frames, trial)
     at = _frames_at(source, frames, trial)
     outputs = outputs_of(fit, trial, convention)
+    if not outputs:
+        legs = "legs are not hip, knee and ankle with axes forward, up and right"
+        raise FileError(source, f"cannot take results of the model {fit.skeleton.name}: its {legs}")
     points = [*_points(outputs, frames, at, UNITS[convention]), *_centres(source, frames, trial, prefix, at)]
     taken = set(frames.labels)
     if any(prefix + one.label in taken for one in points):
@@ -146,8 +151,8 @@ def _points(
         factor = own / _FACTORS.get(stated.lower().removesuffix("/kg"), own)
         points.append(OutputPoint(one.name, one.kind, _spread(factor * one.values, at, count)))
         if np.isfinite(one.sd).any():
-            sd = _spread(factor * one.sd, at, count)
-            points.append(OutputPoint(one.name + SD, one.kind, sd, "standard deviation"))
+            sd = np.where(np.isfinite(one.sd), factor * one.sd, NO_DEVIATION)
+            points.append(OutputPoint(one.name + SD, one.kind, _spread(sd, at, count), "SD; -1: none"))
     return points
 
 
