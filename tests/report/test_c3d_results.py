@@ -81,6 +81,8 @@ WALKS = {
     "HC036A": (*(f"field/biomechzoo/HC036A/{kind}.c3d" for kind in ("straight", "static")), "--sex male"),
     "UNIPD": ("field/unipd/walking1.c3d", "field/unipd/static.c3d", "--mass 83 --height 1.8 --sex male"),
 }
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name, files in WALKS.items() if find(files[0])])
 def test_measured_files_come_back_with_vicons_signs(tmp_path, name):
