@@ -219,7 +219,8 @@ class Settings(Table):
     )
     joint_axes: bool = Field(
         default=False,
-        description="simultaneous, built-in model; true: axes of knees, ankles, elbows are calibrated too",
+        description="simultaneous, built-in model; true: axes of knees, ankles, elbows are calibrated too, as with a "
+        'trial of use = "kinematics"',
     )
     hip_centre: Literal["bell", "harrington"] = Field(
         default="bell", description='hip joint centres from the pelvis: "bell" or "harrington"'

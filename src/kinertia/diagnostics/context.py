@@ -52,6 +52,7 @@ class RecordingContext:
         marker_set: which label is which landmark, or the markers of an OpenSim model; None where none fits.
         static: the static trial that goes with it; None for the static trial itself, and without one.
         is_static: it is given as the static trial, or the only one in which the person stands.
+        without_forces: its markers alone are used.
         window_s: the window that the user vouches for.
         height_m: stature, where it is known.
         mass_kg: stated mass, where it is known.
@@ -64,6 +65,7 @@ class RecordingContext:
     window_s: tuple[float, float] | None = None
     height_m: float | None = None
     mass_kg: float | None = None
+    without_forces: bool = False
 
     @property
     def name(self) -> str:
@@ -77,8 +79,8 @@ class RecordingContext:
 
     @property
     def plates(self) -> PlateLoads | None:
-        """Force plates, if there are any."""
-        return self.recording.plates
+        """Force plates, if there are any and they are used."""
+        return None if self.without_forces else self.recording.plates
 
     @cached_property
     def markers(self) -> Markers:

@@ -34,6 +34,7 @@ class Prepared:
         file: the OpenSim model that the skeleton is from, if it is.
         kinematics: smoothed coordinates and ground reactions, one entry per trial.
         seconds: computing time by stage, one entry per trial.
+        functional: kinematics of the trials whose markers alone are used.
         findings: what was found so far, with what explains and what overrules each.
         notes: how the trials were prepared, one sentence each.
         attached: what the person wore or carried.
@@ -69,6 +70,7 @@ class Prepared:
     rules: int = 0
     elbow_rotations_rad: Mapping[str, float] = field(default_factory=dict)
     torso_rotation_rad: float | None = None
+    functional: tuple[Kinematics, ...] = ()
 
     @property
     def carried(self) -> CarriedMass:

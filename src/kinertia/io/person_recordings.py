@@ -63,7 +63,7 @@ def read_trial(wanted: SubjectFile, files: TrialFiles) -> TrialInput:
     seconds = time.perf_counter() - started
     recording = replace(recording, name=files.name, belt=read_belt(files.belt_speed_m_s))
     apart = files.forces is not None and len(wanted.trials) > 1 and not wanted.instruments.same_plates
-    return TrialInput(with_plates_of_trial(recording) if apart else recording, files.window_s, seconds)
+    return TrialInput(with_plates_of_trial(recording) if apart else recording, files.window_s, seconds, files.use)
 
 
 def _as_zeroed(wanted: SubjectFile, recording: Recording) -> Recording:

@@ -77,6 +77,7 @@ from kinertia.settings import (
     Table,
     number_of,
 )
+from kinertia.trial.trial_input import TrialUse
 
 T = TypeVar("T", bound=Table)
 
@@ -109,6 +110,10 @@ class TrialFiles(Table):
         default=None, description="of a C3D file that says none, or a wrong one: mm, cm or m"
     )
     window_s: Window | None = Field(default=None, description="[start, end], s; left out: measured part")
+    use: TrialUse = Field(
+        default="all",
+        description='"kinematics": its markers alone, for joint centres, joint axes and places of markers',
+    )
     belt_speed_m_s: BeltSpeed | None = Field(
         default=None,
         description="of a treadmill: m/s, of two belts `{ right = 1.2, left = 0.6 }`, or a file with it over time; "

@@ -1,15 +1,24 @@
-"""A recording of a motion and the window of it that the user vouches for."""
+"""A recording of a motion, the window of it that the user vouches for, and what it is used for."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 from kinertia.trial.data import Recording
+
+TrialUse = Literal["all", "kinematics"]
 
 
 @dataclass(frozen=True)
 class TrialInput:
     """A recording and, where the user gives one, the window (s) to use instead of the detected one.
+
+    Attributes:
+        recording: as read.
+        window_s: first and last time; None: as detected.
+        read_seconds: that reading it took.
+        use: "kinematics": its markers alone, for joint centres, joint axes and the places of markers.
 
     Examples:
         >>> walk = kinertia.read_recording("lab/walk.trc", "lab/walk_grf.mot")
@@ -20,3 +29,4 @@ class TrialInput:
     recording: Recording
     window_s: tuple[float, float] | None = None
     read_seconds: float = 0.0
+    use: TrialUse = "all"

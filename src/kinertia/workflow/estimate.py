@@ -186,6 +186,7 @@ def _simultaneous(ready: Prepared, settings: Settings, started: float, progress:
             named_by_source(one),
             lambda share: progress("estimate", share),
             otherwise,
+            one.functional,
         )
 
     signed = with_likelier_sign(ready, fit)

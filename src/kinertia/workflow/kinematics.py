@@ -10,12 +10,13 @@ from typing import Literal
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.copied_frames import without_copied_frames
 from kinertia.diagnostics.model.range_limits import range_findings
-from kinertia.errors import TrialError
+from kinertia.errors import SettingsError, TrialError
 from kinertia.estimation.prepared import Progress
 from kinertia.findings.finding import Finding
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.kinematics import Kinematics, solve_kinematics
 from kinertia.trial.data import Trial
+from kinertia.trial.without_forces import trial_without_forces
 
 
 @dataclass(frozen=True)
@@ -34,12 +35,16 @@ class Turned:
 
 
 def usable_trial(context: RecordingContext) -> Trial:
-    """The trial of a recording that can be used, without markers that no frame shows, and without copied frames.
+    """The trial of a recording that can be used, without markers that no frame shows, and without copied frames; of one
+    whose markers alone are used without forces.
 
     Frames in which a foot bears load beyond its plate are not measured, unless the user vouches for a window, or
     hardly any others are left.
     """
-    trial = context.trial
+    if context.without_forces:
+        trial: Trial | None = trial_without_forces(context.recording, context.window_s)
+    else:
+        trial = context.trial
     assert trial is not None
     seen = trial.markers.seen
     labels = [label for column, label in enumerate(trial.markers.labels) if seen[:, column].any()]
@@ -56,6 +61,31 @@ class Solved:
     kinematics: tuple[Kinematics, ...]
     seconds: tuple[Mapping[str, float], ...]
     findings: tuple[Finding, ...]
+
+    @property
+    def without_forces(self) -> tuple[Kinematics, ...]:
+        """Of the trials whose markers alone are used."""
+        return tuple(one for one in self.kinematics if not one.trial.loads.plates)
+
+    @property
+    def with_forces(self) -> Solved:
+        """The others.
+
+        Raises:
+            SettingsError: none is left.
+        """
+        expect_forces([one.trial for one in self.kinematics])
+        rows = zip(self.kinematics, self.seconds, strict=True)
+        kept = [(one, seconds) for one, seconds in rows if one.trial.loads.plates]
+        return replace(self, kinematics=tuple(k for k, _ in kept), seconds=tuple(seconds for _, seconds in kept))
+
+
+def expect_forces(trials: Sequence[Trial]) -> None:
+    """Raise a SettingsError unless one of these trials has forces."""
+    if not any(trial.loads.plates for trial in trials):
+        raise SettingsError(
+            'of no trial that can be used the forces are used; leave out use = "kinematics" of one over force plates'
+        )
 
 
 def solved_trials(

@@ -24,6 +24,7 @@ from kinertia.estimation.prepared import Prepared, Progress
 from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.simultaneous.model_uncertainty import (
     GAIT27_UNCERTAINTY,
+    JOINT_AXIS_SD_RAD,
     JOINT_CENTRE_SD_M,
     MARKER_SD_M,
     ModelUncertainty,
@@ -35,6 +36,7 @@ from kinertia.model.anthropometry import literature_bsp
 from kinertia.model.gait27 import (
     ARM_COORDINATES,
     ARM_ROTATIONS,
+    LEG_AXIS_TILTS,
     SHOULDER_OFFSETS,
     VIRTUAL_TRUNK,
     Gait27,
@@ -54,7 +56,7 @@ from kinertia.trial.data import Recording, Trial
 from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow.doubted_mass import with_doubted_mass
 from kinertia.workflow.joint_widths import with_widths
-from kinertia.workflow.kinematics import Turned, solved_trials, usable_trial
+from kinertia.workflow.kinematics import Turned, expect_forces, solved_trials, usable_trial
 from kinertia.workflow.person import Person
 from kinertia.workflow.screening import Screened, screen
 from kinertia.workflow.stated_ranges import with_stated_ranges
@@ -94,13 +96,15 @@ class Calibrated:
 
 
 @one_blas_thread
-def calibrate(model: Gait27, trials: Sequence[Trial], acromia: Sequence[str] = ()) -> Calibrated:
+def calibrate(
+    model: Gait27, trials: Sequence[Trial], acromia: Sequence[str] = (), free_axes: bool = False
+) -> Calibrated:
     """The skeleton of the 27-DOF model as the static trial gives it, adapted to the trials.
 
     Markers of pelvis, legs and feet are held to the static trial by a deviation of 10 mm, those of torso and arms and
-    the shoulder centres by 40 mm. Where arms have turned the torso under its markers, since the model's shoulders lack
-    an axis, the rest of the body is adapted without them. Markers on the head are left out where three others show the
-    trunk, which the acromia (labels), that move with the arms, do not.
+    the shoulder centres by 40 mm, free axes of knees and ankles by 5 degrees. Where arms have turned the torso under
+    its markers, since the model's shoulders lack an axis, the rest of the body is adapted without them. Markers on the
+    head are left out where three others show the trunk, which the acromia (labels), that move with the arms, do not.
     """
     skeleton, poses = with_elbows_that_bend_forwards(model.skeleton, trials)
     complete = without_partly_shown(skeleton, poses, ARM_COORDINATES)
@@ -116,6 +120,8 @@ def calibrate(model: Gait27, trials: Sequence[Trial], acromia: Sequence[str] = (
     coordinate_sd = dict.fromkeys(SHOULDER_OFFSETS, UPPER_BODY_SD_M) | dict.fromkeys(
         ARM_ROTATIONS, _ARM_ROTATION_SD_RAD
     )
+    if free_axes:
+        coordinate_sd |= dict.fromkeys(LEG_AXIS_TILTS, JOINT_AXIS_SD_RAD)
     adapted = adapt(skeleton, trials, poses, marker_sd, coordinate_sd)
     torso_rad: float | None = turn_about("torso", skeleton.markers, adapted.skeleton.markers)
     if torso_rad is not None and torso_rad > _TURNED_RAD:
@@ -186,20 +192,24 @@ def prepared(screened: Screened, settings: Settings, progress: Progress = lambda
     started = time.perf_counter()
     read_s = {item.recording.name: item.read_seconds for item in person.trials}
     turned = [_turned(one, read_s[one.name]) for one in usable]
+    expect_forces([one.trial for one in turned])
     height_m, sex = known(subject.height_m), known(subject.sex)
     without_static: list[Finding] = []
     if not statics:
-        statics, marker_set, without_static = _stance_of(person, turned[0], marker_set)
+        walk = next(one for one in turned if one.trial.loads.plates)
+        statics, marker_set, without_static = _stance_of(person, walk, marker_set)
     build = partial(build_gait27, statics[0], marker_set, height_m, sex, settings.hip_centre)
     model = build(by_stature=bool(without_static))
     model, turned = _with_trunk(model, turned)
     model = replace(model, skeleton=with_stated_ranges(model.skeleton, subject))
     acromia = [label for side in "rl" for label in marker_set.landmarks.get(f"acromion_{side}", ())]
-    calibrated = calibrate(model, [one.trial for one in turned], acromia)
+    functional = any(not one.trial.loads.plates for one in turned)
+    free_axes = settings.joint_axes or bool(without_static) or functional
+    calibrated = calibrate(model, [one.trial for one in turned], acromia, free_axes)
     found = [*screened.findings, *without_static, *calibrated.findings]
     left = _unblocked(turned, screened.overruled(found))
     if len(left) < len(turned):  # the skeleton is adapted to those that are used
-        calibrated = calibrate(model, [one.trial for one in left], acromia)
+        calibrated = calibrate(model, [one.trial for one in left], acromia, free_axes)
     turned, skeleton = left, calibrated.skeleton
     total = CarriedMass.of(known(subject.mass_kg), person.attached)
     literature = literature_bsp(total.body_kg, height_m, sex, model.geometry, settings.bsp)
@@ -214,10 +224,10 @@ def prepared(screened: Screened, settings: Settings, progress: Progress = lambda
         skeleton=skeleton,
         literature=expected.prior.mean,
         prior=with_doubted_mass(expected.prior, screened.findings),
-        uncertainty=_uncertainty(settings, bool(without_static)),
+        uncertainty=_uncertainty(free_axes, bool(without_static)),
         file=None,
-        kinematics=solved.kinematics,
-        seconds=solved.seconds,
+        kinematics=solved.with_forces.kinematics,
+        seconds=solved.with_forces.seconds,
         findings=tuple(findings),
         notes=(f"marker set: {marker_set.name}", *(note for k in solved.kinematics for note in k.notes)),
         attached=tuple(person.attached),
@@ -227,6 +237,7 @@ def prepared(screened: Screened, settings: Settings, progress: Progress = lambda
         rules=screened.rules,
         elbow_rotations_rad=calibrated.elbow_rotations_rad,
         torso_rotation_rad=calibrated.torso_rotation_rad,
+        functional=solved.without_forces,
     )
 
 
@@ -250,13 +261,13 @@ def _stance_of(person: Person, walk: Turned, marker_set: MarkerSet) -> tuple[lis
     return [static], named, [found]
 
 
-def _uncertainty(settings: Settings, without_static: bool) -> ModelUncertainty:
+def _uncertainty(free_axes: bool, without_static: bool) -> ModelUncertainty:
     """How well joint centres, axes and markers of the built-in model are known."""
     known_by = GAIT27_UNCERTAINTY
     if without_static:
         centres = {name: WITHOUT_STATIC * sd for name, sd in known_by.centres.items()}
         known_by = replace(known_by, centres=centres, marker_sd_m=WITHOUT_STATIC * MARKER_SD_M)
-    return known_by.with_axes() if settings.joint_axes or without_static else known_by
+    return replace(known_by.with_axes(), before=dict.fromkeys(LEG_AXIS_TILTS, 0.0)) if free_axes else known_by
 
 
 def _with_trunk(model: Gait27, trials: Sequence[Turned]) -> tuple[Gait27, list[Turned]]:

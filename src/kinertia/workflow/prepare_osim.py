@@ -33,7 +33,7 @@ from kinertia.motion.one_thread import one_blas_thread
 from kinertia.settings import Attached, Overrule, Settings, Subject
 from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow.doubted_mass import with_doubted_mass
-from kinertia.workflow.kinematics import Turned, solved_trials, usable_trial
+from kinertia.workflow.kinematics import Turned, expect_forces, solved_trials, usable_trial
 from kinertia.workflow.person import Person
 from kinertia.workflow.prepare import LOWER_BODY_SD_M, UPPER_BODY_SD_M
 from kinertia.workflow.screening import Screened, screen
@@ -84,6 +84,7 @@ def prepared_osim(screened: Screened, settings: Settings, progress: Progress = l
     read_s = {item.recording.name: item.read_seconds for item in person.trials}
     turned = [Turned(usable_trial(one), 0.0, read_s[one.name]) for one in usable]
     trials = [one.trial for one in turned]
+    expect_forces(trials)
     may_hold = {c.name: c.default for c in model.coordinates if c.name not in model.skeleton.coordinates[:6]}
     skeleton = with_stated_ranges(replace(model.skeleton, feet=_feet(model)), subject)
     total = CarriedMass.of(known(subject.mass_kg), person.attached)
@@ -111,8 +112,8 @@ def prepared_osim(screened: Screened, settings: Settings, progress: Progress = l
         prior=with_doubted_mass(prior, screened.findings),
         uncertainty=uncertainty,
         file=model,
-        kinematics=solved.kinematics,
-        seconds=solved.seconds,
+        kinematics=solved.with_forces.kinematics,
+        seconds=solved.with_forces.seconds,
         findings=tuple(findings),
         notes=(f"OpenSim model: {model.path.name}", *(note for k in solved.kinematics for note in k.notes)),
         attached=tuple(person.attached),
@@ -120,6 +121,7 @@ def prepared_osim(screened: Screened, settings: Settings, progress: Progress = l
         overrule_of=person.overrule_of,
         left_out=screened.left_out_by(findings),
         rules=screened.rules,
+        functional=solved.without_forces,
     )
 
 

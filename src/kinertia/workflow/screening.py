@@ -140,7 +140,16 @@ def person_context(person: Person) -> PersonContext:
 
     static = None if person.static is None else standing(person.static)
     trials = [
-        RecordingContext(item.recording, label_set, static, False, item.window_s, stated.height_m, stated.mass_kg)
+        RecordingContext(
+            item.recording,
+            label_set,
+            static,
+            False,
+            item.window_s,
+            stated.height_m,
+            stated.mass_kg,
+            item.use == "kinematics",
+        )
         for item in person.trials
     ]
     total = None if stated.mass_kg is None else _total(stated.mass_kg, person)

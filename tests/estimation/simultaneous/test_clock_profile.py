@@ -35,7 +35,7 @@ def problem(priors):
     layout = SimpleNamespace(late=lambda k: list(range(n)), instruments=slice(0, n))
     instruments = ErrorPriors(tuple(priors))
     return SimpleNamespace(
-        trials=[None], layout=layout, instruments=instruments, slope=lambda at: SimpleNamespace(cost=cost(at.static, n))
+        n_forces=1, layout=layout, instruments=instruments, slope=lambda at: SimpleNamespace(cost=cost(at.static, n))
     )
 
 
@@ -115,7 +115,7 @@ def test_a_clock_that_has_been_checked_is_left_as_it_is(monkeypatch):
 
 def test_several_trials_are_left_as_they_are():
     one = problem([CLOCK])
-    several = SimpleNamespace(**{**vars(one), "trials": [None, None]})
+    several = SimpleNamespace(**{**vars(one), "n_forces": 2})
     gaussian, here, place = GaussianPrior.of(one.instruments), Quadratic(information(1, 2.0)), Place(np.zeros(2))
     profile = ClockProfile.of(several, here, gaussian, place, lambda model, held: pytest.fail("searched"))
     assert profile.here is here

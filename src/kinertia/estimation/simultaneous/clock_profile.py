@@ -57,7 +57,7 @@ class ClockProfile:
         late, first = np.array(problem.layout.late(0)), problem.layout.instruments.start
         priors = [problem.instruments.own[k] for k in late - first]
         unchanged = cls(here, instruments, point.static)
-        if len(problem.trials) > 1 or not any(0.0 < prior.faulty_share < 1.0 for prior in priors):
+        if problem.n_forces > 1 or not any(0.0 < prior.faulty_share < 1.0 for prior in priors):
             return unchanged
         model = GaussNewton.of(problem, here)
         root = model.under(instruments).static.root_of_covariance()

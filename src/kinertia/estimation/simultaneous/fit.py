@@ -126,6 +126,7 @@ def fit_simultaneous(
     uncertainty: ModelUncertainty = GAIT27_UNCERTAINTY,
     progress: Callable[[float], None] = lambda share: None,
     otherwise: Sequence[Kinematics] = (),
+    functional: Sequence[Kinematics] = (),
 ) -> SimultaneousFit:
     """Estimate motion, BSPs and calibration of all trials together.
 
@@ -138,14 +139,19 @@ def fit_simultaneous(
         progress: told the share of the estimate that is done, roughly.
         otherwise: the same trials with other ground reactions, of which it is asked how likely they are beside
             (`SimultaneousResult.evidence`).
+        functional: kinematics of trials whose markers alone are used; the outcome has none of them.
     """
-    used = used_skeleton(skeleton, trials, uncertainty)
+    every = [*trials, *functional]
+    used = used_skeleton(skeleton, every, uncertainty)
     bandwidths = bandwidths or Bandwidth.of(trials)
-    seen = observed(used, prior, trials, bandwidths, uncertainty)
+    seen = observed(used, prior, every, [*bandwidths, *Bandwidth.of(functional)], uncertainty)
     together = seen.together
     calibration = calibration_prior(used, uncertainty, seen.misplaced_m)
-    others = [reading(*each) for each in zip(together, otherwise, bandwidths, strict=True)] if otherwise else []
-    result = estimate_simultaneous(used, prior, calibration, together, progress, others)
+    count = len(trials)
+    others = [reading(*each) for each in zip(together[:count], otherwise, bandwidths, strict=True)] if otherwise else []
+    others += together[count:] if otherwise else ()
+    result = estimate_simultaneous(used, prior, calibration, together, progress, others).of_first(count)
+    together = together[:count]
     calibrated = result.skeleton.carrying(None)
     staying = uncertainty.marker_sd_m is None
     if staying:
@@ -161,7 +167,7 @@ def fit_simultaneous(
         np.sqrt(np.diag(covariance)).reshape(-1, 10),
         covariance,
         _calibration(used, uncertainty, result, names, prior.mass_kg),
-        seen.noise,
+        seen.noise[:count],
         result.iterations,
         base_parameters(
             result.skeleton, result.bsp, prior.sd, motions, [np.repeat([o.force_sd, o.moment_sd], 3) for o in together]
@@ -245,7 +251,7 @@ def _calibration(
             joint=joint,
             quantity=AXIS if name in uncertainty.axes else CENTRE,
             axis=axis,
-            value=float(value - skeleton.locked[name]),
+            value=float(value - uncertainty.before.get(name, skeleton.locked[name])),
             prior_sd=uncertainty.coordinates[name],
             sd=float(sd),
             unit="rad" if name in uncertainty.axes else "m",

@@ -28,6 +28,7 @@ class ModelUncertainty:
         source: where the prior's mean comes from, for messages.
         axes: static coordinate that tilts a joint's axis -> prior deviation, rad.
         instruments: priors of plates and clock.
+        before: static coordinate -> its value before the trials moved it; of others the skeleton's.
     """
 
     centres: Mapping[str, float]
@@ -36,6 +37,7 @@ class ModelUncertainty:
     source: str
     axes: Mapping[str, float] = field(default_factory=dict)
     instruments: InstrumentPrior = field(default_factory=InstrumentPrior)
+    before: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def coordinates(self) -> dict[str, float]:

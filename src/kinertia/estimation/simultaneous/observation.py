@@ -206,7 +206,8 @@ def _observed(
     # within the band, neighbouring frames repeat one another
     repeated = np.sqrt(max(1.0, kinematics.trial.markers.rate_hz / (2.0 * bandwidth.motion_hz)))
     force_sd = repeated * FORCE_SD_OF_WEIGHT * mass_kg * GRAVITY_M_S2
-    ground, dynamic = _ground(kinematics, time, bandwidth.motion_hz, bandwidth.force), kinematics.inside(time)
+    ground = _ground(kinematics, time, bandwidth.motion_hz, bandwidth.force)
+    dynamic = kinematics.inside(time) & bool(kinematics.trial.loads.plates)
     force = ground.loads(time).reshape(-1, 2, 6)[..., :3].sum(axis=1)
     weight_n = mass_kg * GRAVITY_M_S2
     impact = impact_factors(time, force, dynamic, bandwidth.spacing_s, force_sd)
@@ -248,7 +249,7 @@ def _ground(kinematics: Kinematics, time: np.ndarray, cutoff_hz: float, force_cu
         kinematics.smoothed_loads(cutoff_hz),
         smooth(reactions.time, reactions.loaded, cutoff_hz),
         replace(reactions, carrier=places[len(time) :]),
-        tuple(loads.plates[i] for i in used),
+        tuple(loads.plates[i] for i in used) if loads.plates else (),
         places[: len(time)],
         turn,
         plate_middles(loads, used),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -79,6 +79,12 @@ class SimultaneousResult:
     support: InstrumentSupport
     evidence: Evidence
     draws: PosteriorDraws
+
+    def of_first(self, count: int) -> SimultaneousResult:
+        """The same with the first so many trials."""
+        of_trials = ("delays_s", "zeros_n", "gains", "trunks_kg_m", "foot_loads", "reactions", "motions")
+        names = (*of_trials, "displacements_m", "curve_deviations")
+        return replace(self, **{name: getattr(self, name)[:count] for name in names})
 
 
 class Ended(NamedTuple):

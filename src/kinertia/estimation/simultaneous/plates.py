@@ -101,6 +101,8 @@ class FootPlates:
 
     def among(self, plates: Sequence[str]) -> FootPlates:
         """The same with these plates (a session's), of which its own are some."""
+        if not self.plates:  # of a trial without forces; nobody stands on the first
+            return replace(self, plates=tuple(plates), middles=np.zeros((len(plates), 3)))
         own = np.array([plates.index(name) for name in self.plates])
         middles = np.zeros((len(plates), 3))
         middles[own] = self.middles

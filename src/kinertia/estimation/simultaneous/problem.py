@@ -73,7 +73,8 @@ class MapProblem:
         self.own_plates = [[self.plates.index(name) for name in trial.ground.plates] for trial in trials]
         known = calibration.instruments
         # one trial of a session is one of several, and so may be one whose clock nobody has checked
-        n_delays = len(trials) if len(trials) > 1 or known.session or known.clock_s.faulty_share > 0.0 else 0
+        self.n_forces = sum(map(bool, self.own_plates))
+        n_delays = self.n_forces if self.n_forces > 1 or known.session or known.clock_s.faulty_share > 0.0 else 0
         plates_of_trials = list(map(len, self.own_plates))
         unknowns = (len(self.still), count, len(self.plates), n_delays, plates_of_trials, self.skin[0].size)
         self.trunk = TrunkBending.of(prior.mean, prior.mass_kg)

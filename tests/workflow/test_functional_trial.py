@@ -1,0 +1,99 @@
+"""A trial without forces says where joint axes, joint centres and markers are; a knee axis that is off is found."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kinertia import Settings, Subject, TrialInput, estimate, prepare
+from kinertia.errors import SettingsError
+from kinertia.estimation.simultaneous.calibration_entry import AXIS
+from kinertia.synthetic.laboratory import LabNoise, record
+from kinertia.synthetic.motions import squat
+from kinertia.synthetic.noise import SkinMotion, camera_noise
+from kinertia.synthetic.walk import walk, walking_subject
+from kinertia.trial.data import Recording
+
+TILTS_DEG = {"knee_tilt_1_r": 5.0, "knee_tilt_2_r": -4.0, "knee_tilt_1_l": -5.0, "knee_tilt_2_l": 3.0}
+SUBJECT = Subject(sex="male")
+
+
+def recorded(seed):
+    """Static trial and walk of somebody whose knees turn about other axes than the static trial shows, and squats."""
+    person, rng = walking_subject(), np.random.default_rng(seed)
+    locked = {name: float(np.radians(tilt)) for name, tilt in TILTS_DEG.items()}
+    person = replace(person, skeleton=person.skeleton.lock(locked))
+    lab = record(person, walk(person, 2.5, 1000.0), LabNoise(), rng, 10)
+    squats = squat(person)
+    moved = SkinMotion.draw(squats.skeleton, squats.motion.q, rng).moved(
+        squats.markers, squats.skeleton, squats.motion.q
+    )
+    return lab, Recording("squat", camera_noise(moved, 0.0005, rng))
+
+
+def off_deg(fit) -> dict[str, tuple[float, float]]:
+    """Per knee, by how much the estimated axis misses the true one, and the deviation of one of its two angles."""
+    result = {}
+    for side in "rl":
+        found = [one for one in fit.posterior.calibration if one.joint == f"knee_{side}" and one.quantity == AXIS]
+        away = [np.degrees(one.value) - TILTS_DEG[f"knee_tilt_{one.axis}_{side}"] for one in found]
+        result[side] = float(np.hypot(*away)), float(np.degrees(max(one.sd for one in found)))
+    return result
+
+
+@pytest.fixture(scope="module")
+def lab():
+    return recorded(100)
+
+
+@pytest.fixture(scope="module")
+def fit(lab):
+    measured, squats = lab
+    return estimate(
+        prepare(SUBJECT, measured.static, [TrialInput(measured.walk), TrialInput(squats, use="kinematics")])
+    )
+
+
+def test_its_markers_alone_count(fit):
+    assert [trial.name for trial in fit.trials] == ["walk"]
+    assert [one.where.trial for one in fit.findings if one.code == "P280"] == ["squat"]
+    assert not [one for one in fit.posterior.calibration if one.trial == "squat"]
+    assert not fit.left_out
+    assert fit.converged
+
+
+def test_axes_of_knees_are_found(fit):
+    for away, sd in off_deg(fit).values():
+        assert away < 3.0  # 6.4 and 5.8 by the static trial alone
+        assert sd < 2.0
+
+
+def test_a_trial_with_forces_is_needed(lab):
+    measured, squats = lab
+    with pytest.raises(SettingsError, match="forces"):
+        prepare(SUBJECT, measured.static, [TrialInput(squats, use="kinematics")])
+
+
+def test_forces_of_such_a_trial_are_not_used(lab):
+    measured, _ = lab
+    again = replace(measured.walk, name="again")
+    ready = prepare(SUBJECT, measured.static, [TrialInput(measured.walk), TrialInput(again, use="kinematics")])
+    assert [one.trial.name for one in ready.functional] == ["again"]
+    assert ready.functional[0].trial.loads.plates == ()
+    assert [one.trial.name for one in ready.kinematics] == ["walk"]
+
+
+@pytest.mark.slow
+def test_axes_and_their_deviations_hold_over_people():
+    misses, pulls = [], []
+    for seed in range(101, 107):
+        measured, squats = recorded(seed)
+        inputs = [TrialInput(measured.walk), TrialInput(squats, use="kinematics")]
+        found = estimate(prepare(SUBJECT, measured.static, inputs, Settings())).posterior.calibration
+        for one in found:
+            name = f"knee_tilt_{one.axis}_{str(one.joint)[-1]}"
+            if one.quantity == AXIS and name in TILTS_DEG and str(one.joint).startswith("knee"):
+                misses.append(np.degrees(one.value) - TILTS_DEG[name])
+                pulls.append(misses[-1] / np.degrees(one.sd))
+    assert np.sqrt(np.mean(np.square(misses))) < 1.5
+    assert np.sqrt(np.mean(np.square(pulls))) < 1.3
