@@ -21,7 +21,7 @@ _HOW = 'pip install "kinertia[app]"'
 
 def app(
     folder: Annotated[
-        Path | None, typer.Option(help="Library of people and their results; Kinertia in your own folder if left out.")
+        Path | None, typer.Option(help="Library of people and their results; left out: Kinertia in your home folder.")
     ] = None,
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port on 127.0.0.1; 0 takes a free one.")] = 0,
     no_browser: Annotated[bool, typer.Option("--no-browser", help="Only show the address.")] = False,

@@ -97,12 +97,12 @@ def check(
 ) -> Outcome:
     """Show what is in measured files or in a model, and whether it can be used.
 
-    Asks the questions that a fit asks up to inverse kinematics: markers,
+    Applies the rules that a fit applies before inverse kinematics: markers,
     labels, force plates, synchronisation, the subject, the OpenSim model.
-    Takes what kinertia fit takes. Of several files, forces and static trial
-    are found by names and data where --forces and --static do not say them.
+    Takes what kinertia fit takes. Without --forces and --static, forces and
+    static trial are found by names and data.
 
-    Each finding has a code; kinertia explain CODE says what it means.
+    Each finding has a code; kinertia explain CODE explains it.
     Exit status 1 if an ERROR is open: such a recording or model cannot be used.
 
     [bold]Examples[/]

@@ -33,7 +33,7 @@ def compare(
 ) -> Outcome:
     """What differs between fits beyond their error bars: sessions of one person, methods, models.
 
-    The first is what the others are compared with. Writes compare.html and
+    The others are compared with the first. Writes compare.html and
     compare.csv.
 
     [bold]Example[/]

@@ -28,9 +28,9 @@ def init(
     Where no marker-set preset fits the static trial, a draft of one,
     markers.toml, is written beside it.
 
-    A sheet of girths and lengths that is there is taken up. With --measures
-    an empty one, measures.csv, and a picture of where to measure,
-    measures.svg. As many as you have time for are of use.
+    A completed sheet of girths and lengths in the folder is used. --measures
+    writes an empty one, measures.csv, with a picture of where to measure,
+    measures.svg. Fill in as many as you have time for.
 
     [bold]Example[/]
 

@@ -1,4 +1,4 @@
-"""`kinertia study ...`: studies on synthetic trials, of which everything is known."""
+"""`kinertia study ...`: studies on synthetic trials with known truth."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ from kinertia.studies.sensitivity import KINDS, run_sensitivity
 from kinertia.studies.table1 import CONDITIONS, Table1, measured_trial, run_table1, study_trial
 from kinertia.studies.table1_variants import run_variants
 
-study = typer.Typer(no_args_is_help=True, help="Studies on synthetic trials, of which everything is known.")
+study = typer.Typer(no_args_is_help=True, help="Studies on synthetic trials with known truth.")
 SOUND_LABORATORIES = 10
 Seed = Annotated[int, typer.Option(min=0, help="Same seed, same numbers, whatever the number of processes.")]
 Workers = Annotated[int | None, typer.Option(min=1, help="Processes; one per core if left out.")]
