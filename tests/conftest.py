@@ -14,7 +14,6 @@ import pytest
 from hypothesis import settings
 from threadpoolctl import threadpool_limits
 
-import osim_models
 from command_line import Outcome, fitted, run
 from kinertia.cli.compiling import compile_once
 from kinertia.cli.measured_demo import run_measured_demo
@@ -28,12 +27,13 @@ from kinertia.settings import Settings, Subject
 from kinertia.trial.data import Recording
 from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow.estimate import estimate_bsp
-from measured_data import data_folder, find
 from once import once
 from quick_two_level import given_back
 from recordings import SYNTHETIC
 from synthetic_lab import WITH_MODEL, synthetic_arguments, write_synthetic_lab
-from walks import fit_arguments
+from validation import osim_models
+from validation.measured_data import data_folder, find
+from validation.walks import fit_arguments
 
 # no test judges time: machines are busy
 settings.register_profile("kinertia", deadline=None)

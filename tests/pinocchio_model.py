@@ -4,6 +4,6 @@ import pytest
 
 pin = pytest.importorskip("pinocchio", reason="Pinocchio has no wheels for this system")
 
-from pinocchio_skeleton import axis_forces, pinocchio_model  # noqa: E402
+from validation.pinocchio_skeleton import axis_forces, pinocchio_model  # noqa: E402
 
 __all__ = ["axis_forces", "pin", "pinocchio_model"]

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TypeVar
 
-from measured_data import find
+from validation.measured_data import find
 
 K = TypeVar("K")
 V = TypeVar("V", str, tuple[str | None, ...])

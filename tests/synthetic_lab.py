@@ -38,10 +38,10 @@ from kinertia.synthetic.walk import (
     without_products,
 )
 from kinertia.trial.data import Markers, Recording
-from osim_models import Person
 from synthetic_clusters import STATIC_ONLY, with_clusters
 from synthetic_motions import long_walk, run, squats
 from users_model import users_model
+from validation.osim_models import Person
 
 DURATION_S, PLATE_RATE_HZ, START, SAMPLES_PER_FRAME = 2.7, 1000.0, 0.75, 10
 MARKER_DIAMETER_M = 0.014

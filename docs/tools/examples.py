@@ -1,6 +1,6 @@
 """Examples in the pages: take them apart, compare what they show with what happens, renew their numbers.
 
-    PYTHONPATH=benchmarks python docs/tools/examples.py
+    PYTHONPATH=. python docs/tools/examples.py
 
 runs every command shown behind `$` (with measured files, where the page names them) and puts the
 numbers of now into the pages. Words that have changed are told, and to be mended by hand. The tests of the pages use
@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from kinertia.cli.measured_demo import write_measured_lab
-from measured_data import data_folder
+from validation.measured_data import data_folder
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = (

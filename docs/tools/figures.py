@@ -4,7 +4,7 @@
 
 The timeline of measured frames has the times of OpenSim's Rajagopal walk. GAIT2354 is a folder with OpenSim's example
 of that name and its scaled model (`subject01_scaled.osim`). Without it the README's figure stays as it is. That figure
-needs OpenSim, and `benchmarks` on PYTHONPATH.
+needs OpenSim, and the repository on PYTHONPATH.
 """
 
 from __future__ import annotations
@@ -173,7 +173,7 @@ def _opensim_moments(data: Path, work: Path) -> pd.DataFrame:
     """OpenSim's IK and ID with its scaled model: coordinates at 6 Hz, forces as measured."""
     import opensim
 
-    from opensim_runs import inverse_dynamics, inverse_kinematics, quietly, setup_weights, without_forces
+    from validation.opensim_runs import inverse_dynamics, inverse_kinematics, quietly, setup_weights, without_forces
 
     with quietly(work / "opensim.log"):
         model = opensim.Model(str(data / "subject01_scaled.osim"))

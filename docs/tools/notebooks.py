@@ -1,6 +1,6 @@
 """Run the notebooks of the site and keep what they show.
 
-    PYTHONPATH=benchmarks python docs/tools/notebooks.py
+    PYTHONPATH=. python docs/tools/notebooks.py
 
 Needs the extra "docs" and measured data (`measured_data`).
 """

@@ -1,6 +1,6 @@
 """Why Kinertia's joint moments differ from OpenSim's: the inputs of Inverse Dynamics exchanged one after another.
 
-    PYTHONPATH=benchmarks python docs/tools/opensim_difference.py
+    PYTHONPATH=. python docs/tools/opensim_difference.py
 
 prints the table of `docs/opensim.md`: RMS differences of joint moments of the two measured walks that come with scaled
 models, both sides together, from OpenSim's Inverse Kinematics and Inverse Dynamics at 6 Hz. Needs OpenSim.
@@ -16,7 +16,7 @@ import opensim
 import pandas as pd
 
 from kinertia.io.sto import read_sto
-from opensim_runs import (
+from validation.opensim_runs import (
     inverse_dynamics,
     inverse_kinematics,
     quietly,
@@ -24,7 +24,7 @@ from opensim_runs import (
     with_forces_file,
     without_forces,
 )
-from peer_cases import MARGIN_S, Case, fit, measured_cases, window_s
+from validation.peer_cases import MARGIN_S, Case, fit, measured_cases, window_s
 
 MOMENTS = ("hip_flexion", "knee_angle", "ankle_angle")
 

@@ -1,6 +1,6 @@
 """Take the pictures of the pages: the tutorial's report with numbers on what the text explains, and figures for papers.
 
-    PYTHONPATH=benchmarks python docs/tools/pictures.py
+    PYTHONPATH=. python docs/tools/pictures.py
 
 Needs Chromium and the measured files of the tutorial.
 """

@@ -16,7 +16,7 @@ from kinertia.synthetic.walk import HEIGHT_M, MASS_KG, walking_subject
 from kinertia.workflow.from_files import prepare_subject
 from kinertia.workflow.known_body import with_known_body
 from stadium_people import stadium_people
-from usual_build import stadium_mass_kg, stature_m
+from validation.usual_build import stadium_mass_kg, stature_m
 
 yeadon = pytest.importorskip("yeadon", reason="needs yeadon (pip install -e '.[test]')")
 WALKER = walking_subject()

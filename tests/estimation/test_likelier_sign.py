@@ -21,7 +21,7 @@ from kinertia.synthetic.noise import camera_noise
 from kinertia.synthetic.walk import walk, walking_subject
 from kinertia.trial.centre_of_pressure import free_moment
 from results import entry_of
-from synthetic_walks import kinematics_of
+from validation.synthetic_walks import kinematics_of
 
 
 @dataclass(frozen=True)

@@ -9,14 +9,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
-import osim_models
 from command_line import fitted, run
 from kinertia.io.osim.exporter import export_osim
 from kinertia.io.osim.reader import read_osim
 from kinertia.io.sto import read_sto
 from kinertia.io.trc import read_trc
-from measured_trials import told
 from recordings import FITTED
+from validation import osim_models
+from validation.measured_trials import told
 
 CASES = [
     case if case[0] == "synthetic" or case == ("gait2354", False) else pytest.param(*case, marks=pytest.mark.slow)
@@ -131,7 +131,7 @@ def test_walks_and_squats_pooled(measured_folder, tmp_path):
 
 
 @pytest.mark.slow
-def test_page_of_the_benchmark(fit_with_model):
+def test_page_of_models(fit_with_model):
     runs = {}
     for calibrate in (False, True):
         folder = fit_with_model("gait2354", calibrate)

@@ -6,9 +6,9 @@ import pytest
 from kinertia.estimation import body_measures
 from kinertia.estimation.body_measures import measured_body
 from kinertia.model.measures import log_size, measures, usual_build
-from measured_data import find
 from stadium_people import SIZES, stadium_people
-from usual_build import FILE, HEADER, fitted, read_people, stadium_mass_kg, stature_m, written
+from validation.measured_data import find
+from validation.usual_build import FILE, HEADER, fitted, read_people, stadium_mass_kg, stature_m, written
 
 pytest.importorskip("yeadon", reason="needs yeadon (pip install -e '.[test]')")
 NAMES = [one.name for one in measures()]

@@ -12,9 +12,9 @@ import fuzz
 from command_line import run
 from kinertia.findings.finding import Severity
 from kinertia.io.recording import read_recording
-from measured_data import places
 from recordings import here
 from refusals import refused
+from validation.measured_data import places
 
 LINUX = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="limits of time and memory are Linux'")
 

@@ -18,7 +18,7 @@ from kinertia.report.ground_reactions_file import FORCES_FILE, LOADS_FILE
 from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.data import LOAD_THRESHOLD_N
 from osim_tools import inverse_dynamics_tool
-from walks import fit_arguments
+from validation.walks import fit_arguments
 
 RESIDUAL = 0.02
 """Of RMS; the moments that OpenSim gives are about the axes of tilt, list and rotation, which are nearly square."""

@@ -138,7 +138,7 @@ def test_links_and_files_named_exist(page):
     text = page.read_text(encoding="utf-8")
     for target in re.findall(r"\]\((?!https?:|#)([^)#\s]+)", text):
         assert (page.parent / target).exists(), target
-    for path in re.findall(r"`((?:src|docs|tests|examples|benchmarks)/[\w./-]+)`", text):
+    for path in re.findall(r"`((?:src|docs|tests|examples|validation)/[\w./-]+)`", text):
         assert (ROOT / path).exists(), path
 
 

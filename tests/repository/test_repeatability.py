@@ -5,9 +5,9 @@ from dataclasses import asdict
 
 import pytest
 
-import sessions
 from kinertia.estimation.simultaneous.calibration_entry import CalibrationEntry
-from repeatability import Estimate, Shared, group_sums, shared, weighted_mean
+from validation import sessions
+from validation.repeatability import Estimate, Shared, group_sums, shared, weighted_mean
 
 
 def of_values(*values, sd=1.0, prior_sd=2.0, group="delay"):

@@ -1,4 +1,4 @@
-"""The benchmark against OpenSim's pipelines: its pure functions, and that its page holds what was found."""
+"""The page next to OpenSim's pipelines: its pure functions, and that its page holds what was found."""
 
 import numpy as np
 import pandas as pd
@@ -6,12 +6,9 @@ import pytest
 
 opensim = pytest.importorskip("opensim")
 
-import opensim_rra  # noqa: E402
-import opensim_runs  # noqa: E402
-import peers  # noqa: E402
-import truth_trials  # noqa: E402
 from kinertia.io.sto import write_sto  # noqa: E402
-from peer_cases import Case, Result  # noqa: E402
+from validation import opensim_rra, opensim_runs, peers, truth_trials  # noqa: E402
+from validation.peer_cases import Case, Result  # noqa: E402
 
 
 def test_plate_rows_are_the_wrench_again():

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import study_bound
 from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.simultaneous.fisher_information import Information
 from kinertia.estimation.simultaneous.instruments import InstrumentPrior
@@ -13,7 +12,8 @@ from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.estimation.simultaneous.sound_or_faulty import SoundOrFaulty
 from kinertia.studies.accuracy import at_truth, held
 from kinertia.synthetic.walk import walking_subject
-from synthetic_walks import observation_of, study_walk
+from validation import study_bound
+from validation.synthetic_walks import observation_of, study_walk
 
 
 def test_with_white_noise_alone_it_is_the_estimator_s_own(monkeypatch):

@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import pytest
 
-import osim_models
 from kinertia.errors import BlockedError
 from kinertia.findings.finding import Severity
 from kinertia.findings.rule import STAGES
@@ -15,11 +14,12 @@ from kinertia.settings import Overrule
 from kinertia.workflow.check import check_person
 from kinertia.workflow.from_files import prepare_subject
 from kinertia.workflow.person import read_person
-from measured_data import data_folder
 from recordings import FITTED, is_here
 from refusals import expect_filled
 from synthetic_lab import WITH_MODEL, synthetic_arguments
-from walks import fit_arguments
+from validation import osim_models
+from validation.measured_data import data_folder
+from validation.walks import fit_arguments
 
 SCREENED = STAGES[: STAGES.index("person") + 1]
 PREPARED = ("M174", "R106", "R401", "O407", "O411", "O412", "O413", "S408")

@@ -16,7 +16,7 @@ from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior
 from kinertia.estimation.simultaneous.static_information import StaticInformation
 from kinertia.motion.dynamics import Motion, inverse_dynamics
 from small_problem import SWITCH_S, curved_problem, point, small_problem
-from study_bound import dense_band
+from validation.study_bound import dense_band
 
 
 @pytest.fixture(scope="module", params=["27 DOF", "curved axes"])

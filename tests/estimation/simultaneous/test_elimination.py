@@ -16,7 +16,7 @@ from kinertia.estimation.simultaneous.stretches import Stretch, halves, joined, 
 from kinertia.motion import two_threads
 from kinertia.synthetic.walk import walk, walking_subject
 from small_problem import point, small_ground, small_problem, small_skin
-from study_bound import dense_band
+from validation.study_bound import dense_band
 
 DAMPING = 1e-3
 

@@ -13,7 +13,7 @@ from kinertia.synthetic.noise import camera_noise
 from kinertia.synthetic.walk import SyntheticTrial, walk, walking_subject
 from kinertia.trial.centre_of_pressure import centre_of_pressure
 from results import codes, entry_of, of_estimate
-from synthetic_walks import kinematics_of
+from validation.synthetic_walks import kinematics_of
 
 
 @pytest.fixture(scope="module")

@@ -2,11 +2,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.small_problem import INSTRUMENTS, small_problem
 
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation, InstrumentPrior
 from kinertia.estimation.simultaneous.plates import PLATE_ERRORS, PLATE_UNKNOWNS
 from kinertia.settings import Instruments
+from tests.small_problem import INSTRUMENTS, small_problem
 
 PRIOR = InstrumentPrior()
 

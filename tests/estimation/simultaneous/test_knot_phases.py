@@ -6,7 +6,7 @@ import pytest
 from kinertia.estimation.simultaneous.knot_phases import PHASES, OfPhases, followed
 from kinertia.estimation.simultaneous.linearised import Point
 from small_problem import point, small_problem
-from study_bound import dense_band
+from validation.study_bound import dense_band
 
 
 @pytest.fixture(scope="module")

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
-from tests.small_problem import process_covariance
 
 from kinertia.estimation.simultaneous.marker_errors import ErrorInformation, ErrorProcess
+from tests.small_problem import process_covariance
 
 PROCESSES = [ErrorProcess(), ErrorProcess.alike_over(9.0), ErrorProcess.with_smaller(0.2, 9.0)]
 

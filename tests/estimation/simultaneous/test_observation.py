@@ -14,7 +14,7 @@ from kinertia.estimation.simultaneous.observation import (
 from kinertia.estimation.simultaneous.shoulder_girdle import girdle_variance
 from kinertia.model.skeleton import GRAVITY_M_S2
 from kinertia.synthetic.noise import SkinMotion, camera_noise, study_noise
-from synthetic_walks import kinematics_of, study_walk
+from validation.synthetic_walks import kinematics_of, study_walk
 
 MASS_KG = 72.6
 

@@ -8,7 +8,7 @@ from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior
 from kinertia.model.log_cholesky import nearest_consistent
 from small_problem import curved_problem, point, residuals, small_problem
-from study_bound import dense_band
+from validation.study_bound import dense_band
 
 
 @pytest.fixture(scope="module")

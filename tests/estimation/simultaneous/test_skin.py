@@ -13,7 +13,7 @@ from kinertia.estimation.simultaneous.skin import (
     skin_patterns,
 )
 from kinertia.synthetic.noise import SkinMotion, camera_noise
-from synthetic_walks import kinematics_of, study_walk
+from validation.synthetic_walks import kinematics_of, study_walk
 
 MASS_KG = 72.6
 

@@ -5,7 +5,6 @@ import pytest
 from threadpoolctl import threadpool_limits
 
 import kinertia.estimation.simultaneous.solver as simultaneous
-from calibration_errors import DISTURBANCES, calibrated
 from kinertia.estimation.prior import literature_prior, with_symmetry
 from kinertia.estimation.simultaneous.instruments import InstrumentPrior
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
@@ -16,6 +15,7 @@ from kinertia.estimation.simultaneous.sound_or_faulty import SoundOrFaulty
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.motion.smoothing import smooth
 from kinertia.synthetic.walk import SyntheticTrial, unlike_literature, walk, walking_subject
+from validation.calibration_errors import DISTURBANCES, calibrated
 
 SPACING_S = 0.05
 PLATES = {"x": 0.005, "z": 0.005, "gain": 0.02, "free moment": 0.001}

@@ -5,7 +5,7 @@ from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.normal_equations import NormalEquations
 from kinertia.estimation.simultaneous.start_terms import add_start
 from kinertia.estimation.simultaneous.stretches import Stretch
-from study_bound import dense_band
+from validation.study_bound import dense_band
 
 
 def terms(moved: np.ndarray) -> NormalEquations:

@@ -1,0 +1,47 @@
+"""Where a page of evidence goes, and the line on it that says what made it, at which commit and on which day."""
+
+from __future__ import annotations
+
+import subprocess
+from datetime import UTC, datetime
+from functools import cache
+from pathlib import Path
+
+REPOSITORY = Path(__file__).resolve().parents[1]
+PAGES = REPOSITORY / "docs" / "validation"
+_CODE = ("src", "validation", "pyproject.toml")
+"""What results depend on; changed pages, for one, do not count."""
+
+
+def write_page(name: str, text: str) -> None:
+    """Write PAGES/NAME.md: the text with `made_by` below its title; also say where it is."""
+    title, _, rest = text.partition("\n")
+    path = PAGES / f"{name}.md"
+    path.write_text(f"{title}\n\n{made_by(name)}\n{rest}", encoding="utf-8", newline="\n")
+    print(f"written to {path}")
+
+
+def made_by(name: str) -> str:
+    """The line of a page: which command made it, when, and of which commit."""
+    commit, day = made_at()
+    return f"*Made by `python -m validation {name}` on {day}, at commit {commit}; not edited by hand.*"
+
+
+@cache
+def made_at() -> tuple[str, str]:
+    """Commit and day (UTC, ISO) of this process, as they were when first asked for: a page takes hours to make.
+
+    Code that is not committed is said beside the commit; outside Git there is none.
+    """
+    day = datetime.now(UTC).date().isoformat()
+    try:
+        commit = _git("rev-parse", "--short=8", "HEAD")
+        changed = _git("status", "--porcelain", "--", *_CODE)
+    except (OSError, subprocess.CalledProcessError):
+        return "unknown (not a Git clone)", day
+    return f"{commit} with changes that are not committed" if changed else commit, day
+
+
+def _git(*arguments: str) -> str:
+    done = subprocess.run(["git", *arguments], cwd=REPOSITORY, capture_output=True, encoding="utf-8", check=True)
+    return done.stdout.strip()

@@ -1,0 +1,188 @@
+"""Do trials of one session, each fitted alone, agree about what they share?
+
+Plates, clock, joint centres and body are the same in all trials of a person, plates and clock in those of a session.
+What the fits say of them must agree within their deviations, which needs no truth to judge. All deviations contain the
+same prior, so that chi2 over its degrees of freedom is at most 1 on average where they are honest.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import statistics
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+from scipy.stats import chi2
+
+from kinertia.estimation.simultaneous.calibration_entry import ZERO, CalibrationEntry
+
+APART = 1.96
+"""Deviations beyond which two values, or a value and none, differ (95 %)."""
+_BEYOND = 0.99
+INSTRUMENT_GROUPS = ("delay", "free moment", "position", "gain", "zero offset", "rotation")
+GROUPS = (*INSTRUMENT_GROUPS, "joint", "mass", "com", "inertia")
+"""What is compared: instruments, joint centres and axes, body segment parameters."""
+_PRODUCTS = ("ixy", "ixz", "iyz")
+"""Not compared: hardly anything shows them."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What one trial says of an unknown, SI.
+
+    Attributes:
+        trial: name.
+        value, sd, prior_sd: of the unknown.
+        warned: whether the fit itself says to check the instrument.
+    """
+
+    trial: str
+    value: float
+    sd: float
+    prior_sd: float
+    warned: bool = False
+
+    @property
+    def accuses(self) -> bool:
+        """Whether it is beyond what is usual, and beyond its own deviation."""
+        return abs(self.value) > APART * max(self.sd, self.prior_sd)
+
+
+@dataclass(frozen=True)
+class Shared:
+    """What several trials say of an unknown that is the same in all of them.
+
+    Attributes:
+        name: as the fits call it.
+        group: one of GROUPS.
+        unit: SI.
+        estimates: of at least two trials.
+    """
+
+    name: str
+    group: str
+    unit: str
+    estimates: tuple[Estimate, ...]
+
+    @property
+    def chi2(self) -> float:
+        """Squares about the weighted mean, each over its variance, over the degrees of freedom."""
+        mean, _ = weighted_mean(self.estimates)
+        squares = sum(((one.value - mean) / one.sd) ** 2 for one in self.estimates)
+        return squares / (len(self.estimates) - 1)
+
+    @property
+    def beyond(self) -> bool:
+        """Whether `chi2` is beyond the 99 % point for this number of trials."""
+        freedom = len(self.estimates) - 1
+        return self.chi2 > float(chi2.ppf(_BEYOND, freedom)) / freedom
+
+    @property
+    def apart(self) -> list[bool]:
+        """For each pair of trials, whether they differ by more than 1.96 deviations of their difference."""
+        return [
+            abs(a.value - b.value) > APART * float(np.hypot(a.sd, b.sd)) for a, b in combinations(self.estimates, 2)
+        ]
+
+    def accusations(self) -> Iterator[tuple[Estimate, bool]]:
+        """Each trial that accuses an instrument, and whether the other trials contradict it."""
+        if self.group not in INSTRUMENT_GROUPS:
+            return
+        for one in self.estimates:
+            if one.accuses:
+                mean, sd = weighted_mean([other for other in self.estimates if other is not one])
+                yield one, abs(one.value - mean) > APART * float(np.hypot(one.sd, sd))
+
+
+@dataclass(frozen=True)
+class GroupSums:
+    """All unknowns of a group: chi2 over degrees of freedom, pairs and deviations.
+
+    Attributes:
+        unknowns: how many.
+        mean, worst: of chi2 over degrees of freedom.
+        worst_name: of the unknown.
+        beyond: unknowns beyond the 99 % point.
+        pairs_apart: share of the pairs of trials that differ.
+        median_sd: of the single estimates, SI.
+    """
+
+    unknowns: int
+    mean: float
+    worst: float
+    worst_name: str
+    beyond: int
+    pairs_apart: float
+    median_sd: float
+
+
+def weighted_mean(estimates: Sequence[Estimate]) -> tuple[float, float]:
+    """Mean, each weighted by its inverse variance, and its deviation."""
+    weights = [one.sd**-2 for one in estimates]
+    mean = sum(weight * one.value for weight, one in zip(weights, estimates, strict=True)) / sum(weights)
+    return mean, sum(weights) ** -0.5
+
+
+def shared(folders: Sequence[Path], instruments_only: bool = False) -> list[Shared]:
+    """All unknowns that at least two of the fits in these folders estimate.
+
+    Args:
+        folders: results of `kinertia fit`, one trial each.
+        instruments_only: the trials are of different people.
+    """
+    found: dict[tuple[str, str, str], list[Estimate]] = {}
+    for folder in folders:
+        for key, estimate in (*_calibrated(folder), *([] if instruments_only else _body(folder))):
+            if not (instruments_only and key[1] not in INSTRUMENT_GROUPS):
+                found.setdefault(key, []).append(estimate)
+    return [Shared(*key, tuple(estimates)) for key, estimates in found.items() if len(estimates) > 1]
+
+
+def group_sums(unknowns: Iterable[Shared]) -> dict[str, GroupSums]:
+    """Sums of each group that has any unknowns."""
+    by_group: dict[str, list[Shared]] = {}
+    for one in unknowns:
+        by_group.setdefault(one.group, []).append(one)
+    return {group: _sums(by_group[group]) for group in GROUPS if group in by_group}
+
+
+def _sums(unknowns: Sequence[Shared]) -> GroupSums:
+    worst = max(unknowns, key=lambda one: one.chi2)
+    return GroupSums(
+        unknowns=len(unknowns),
+        mean=statistics.fmean(one.chi2 for one in unknowns),
+        worst=worst.chi2,
+        worst_name=worst.name,
+        beyond=sum(one.beyond for one in unknowns),
+        pairs_apart=statistics.fmean(apart for one in unknowns for apart in one.apart),
+        median_sd=statistics.median_high([estimate.sd for one in unknowns for estimate in one.estimates]),
+    )
+
+
+def _calibrated(folder: Path) -> Iterator[tuple[tuple[str, str, str], Estimate]]:
+    for entry in json.loads((folder / "fit.json").read_text(encoding="utf-8"))["calibration"]:
+        one = CalibrationEntry(**entry)
+        if one.sd and (one.trial is None or one.quantity == ZERO):
+            group = one.quantity if one.of_instrument else "joint"
+            yield (
+                (str(replace(one, trial=None)), group, one.unit),
+                Estimate(folder.name, one.value, one.sd, one.prior_sd, one.supported),
+            )
+
+
+def _body(folder: Path) -> Iterator[tuple[tuple[str, str, str], Estimate]]:
+    with (folder / "bsp.csv").open(encoding="utf-8") as file:
+        for row in csv.DictReader(file):
+            parameter = row["parameter"]
+            if parameter in _PRODUCTS or not float(row["sd"] or 0.0) > 0.0:
+                continue
+            group = parameter if parameter == "mass" else "com" if parameter.startswith("com") else "inertia"
+            value, sd, prior_sd = (float(row[key]) for key in ("estimate", "sd", "prior_sd"))
+            yield (f"{parameter} of {row['segment']}", group, _UNITS[group]), Estimate(folder.name, value, sd, prior_sd)
+
+
+_UNITS = {"mass": "kg", "com": "m", "inertia": "kg m2"}
