@@ -11,7 +11,7 @@ from kinertia.estimation.simultaneous.linearised import Point
 from kinertia.estimation.simultaneous.moment_derivatives import moment_derivatives
 from kinertia.estimation.simultaneous.outcome import Ended
 from kinertia.estimation.simultaneous.problem import MapProblem
-from kinertia.estimation.simultaneous.solver import _deviations
+from kinertia.estimation.simultaneous.solver import _deviations, _roots_in_trials
 from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior
 from kinertia.estimation.simultaneous.static_information import StaticInformation
 from kinertia.motion.dynamics import Motion, inverse_dynamics
@@ -190,7 +190,8 @@ def test_deviations_of_two_trials_are_those_of_one_dense_matrix(estimate, noise)
     chains, information, right = dense_pair(pair, here, gaussian)
     covariance = inverse(information)
     model = GaussNewton.of(pair, here).under(gaussian)
-    static_covariance, sds = _deviations(pair, Ended(here.point, here, gaussian, True, 1, (0.0, 0.0)), model)
+    ended = Ended(here.point, here, gaussian, True, 1, (0.0, 0.0))
+    static_covariance, sds = _deviations(pair, ended, model, _roots_in_trials(pair, ended, model))
     s = pair.layout.size
     scale = np.sqrt(np.diag(static_covariance))
     np.testing.assert_allclose(
