@@ -4,11 +4,11 @@ import json
 
 import numpy as np
 import pytest
-from measured_data import find
 
 from command_line import fitted, run
 from kinertia.report.c3d_results import outputs_of, usual_convention
 from kinertia.report.saved_fit import load_fit
+from validation.measured_data import find
 
 ezc3d = pytest.importorskip("ezc3d")
 
