@@ -82,6 +82,7 @@ _MORE = {
     "crossval": "plan",
     "plan": "plan",
     "instruments": "instruments",
+    "norms": "norms",
     "population": "population",
     "study": "study",
     "warm-up": "warm_up",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -11,8 +11,9 @@ import typer
 
 from kinertia.cli.options import Quiet, own_file
 from kinertia.cli.outcome import Outcome
+from kinertia.cli.results_of_people import PersonResults, results_of_people
 from kinertia.cli.terminal import out, plain_table, shown_progress
-from kinertia.errors import FileError, KinertiaError, PriorError
+from kinertia.errors import KinertiaError, PriorError
 from kinertia.estimation.identifiability import evidence
 from kinertia.estimation.learnt_prior import LearntPrior, learn
 from kinertia.estimation.person_information import PersonInformation, information_of
@@ -20,10 +21,8 @@ from kinertia.io.output_folder import write_then_rename
 from kinertia.io.population_file import population_text, read_population
 from kinertia.io.provenance import VERSION
 from kinertia.io.recording import MARKER_FILES
-from kinertia.io.spreadsheet import inert
 from kinertia.model.bsp import PARAMETERS
-from kinertia.report.cohort_tables import fitted_people
-from kinertia.report.saved_fit import FIT_FILE, SavedFit, read_saved
+from kinertia.report.saved_fit import SavedFit, read_saved
 
 _SHOWN = 12
 
@@ -51,7 +50,7 @@ def population(
     kinertia population out --without anna -o for_anna.toml
     """
     own_file(output, read_population, "kinertia population")
-    people, files = _read(_folders(results), set(without or ()))
+    people, files = _read(results_of_people(results), set(without or ()))
     learnt = learn(people)
     content = learnt.as_file(VERSION, [person.name for person in people], files)
     write_then_rename(output, population_text(content))
@@ -74,34 +73,7 @@ def _parameters(learnt: LearntPrior) -> list[dict[str, Any]]:
     ]
 
 
-@dataclass(frozen=True)
-class _Results:
-    """Where one person's results are, and what a cohort calls the person; None in results of `kinertia fit`."""
-
-    folder: Path
-    name: str | None = None
-
-
-def _folders(results: list[Path]) -> list[_Results]:
-    """Every person's results in these folders; those that a cohort keeps, and lists no more, are left out, said."""
-    found = []
-    for path in results:
-        if (path / FIT_FILE).is_file():
-            found.append(_Results(path))
-        elif people := sorted(path.glob(f"people/*/{FIT_FILE}")):
-            listed = fitted_people(path)
-            for folder in (one.parent for one in people):
-                if listed is None or inert(folder.name) in listed:
-                    found.append(_Results(folder, folder.name))
-                else:
-                    older = "has no results by people.csv, only older ones"
-                    out.print(f"left out: {folder.name}: {older}", soft_wrap=True)
-        else:
-            raise FileError(path, "holds no results of kinertia cohort or kinertia fit")
-    return found
-
-
-def _read(results: list[_Results], without: set[str]) -> tuple[list[PersonInformation], tuple[str, ...]]:
+def _read(results: list[PersonResults], without: set[str]) -> tuple[list[PersonInformation], tuple[str, ...]]:
     """What each person's recordings say, and their SHA-256; people without error bars are left out, said."""
     people: list[PersonInformation] = []
     files: list[str] = []

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
+import numpy as np
 import typer
 
 from kinertia.cli.options import Quiet
 from kinertia.cli.outcome import Outcome
 from kinertia.cli.terminal import out
 from kinertia.errors import FileError
+from kinertia.estimation.gait_profile import check_convention, gait_profile
+from kinertia.estimation.gait_scores import FOOT_PROGRESSION, VARIABLES
 from kinertia.estimation.result import Fit
 from kinertia.io.norms_file import Norm, read_norms
 from kinertia.io.output_folder import write_then_rename
 from kinertia.report.cycle_figures import quantities_of
+from kinertia.report.files import write_columns
 from kinertia.report.page import render
 from kinertia.report.saved_fit import read_saved
 
@@ -29,7 +33,7 @@ def report(
     """Write the report of a fit again, without the recordings: report.html in its folder is replaced.
 
     With --norms, your laboratory's normal curves are grey bands behind those
-    over the gait cycle.
+    over the gait cycle. Those of kinertia norms add the Gait Profile Score (gps.csv).
 
     [bold]Examples[/]
 
@@ -39,15 +43,24 @@ def report(
     """
     saved = read_saved(results)
     bands, without_curve = ({}, []) if norms is None else _norms_for(saved.fit, norms)
+    scores = gait_profile(saved.fit, bands).columns() if set(VARIABLES) <= set(bands) else None
     page = render(saved.fit, saved.provenance, saved.versions, bands, saved.truth)
     write_then_rename(results / "report.html", page)
     out.print(f"report in {results / 'report.html'}", soft_wrap=True)
-    return Outcome({"report": str(results / "report.html"), "norms": list(bands), "without_curve": without_curve})
+    told: dict[str, Any] = {"report": str(results / "report.html"), "norms": list(bands)}
+    if scores:
+        write_columns(results / "gps.csv", scores, "%.6g")
+        overall = scores["degrees"][-1]
+        out.print(f"Gait Profile Score {overall:.1f} degrees; {results / 'gps.csv'}", soft_wrap=True)
+        told["gps_deg"] = overall if np.isfinite(overall) else None
+    return Outcome({**told, "without_curve": without_curve})
 
 
 def _norms_for(fit: Fit, path: Path) -> tuple[dict[str, Norm], list[str]]:
     """The norms in a file, and which of them this fit has no curve for."""
     norms, known = read_norms(path), quantities_of(fit)
+    check_convention(fit, norms)
+    known |= {FOOT_PROGRESSION} if known else set()
     other = sorted(set(norms) - known)
     if len(other) == len(norms):
         expected = f"its names are those of cycles.csv, such as {min(known)}" if known else "there are no strides"

@@ -133,6 +133,11 @@ def cycle_curves(
         yield from (one for one in curves if np.isfinite(one.value).any())
 
 
+def coordinates_at(trial: Estimated, stage: Stage, time: np.ndarray) -> np.ndarray:
+    """(n, c) rad, m: coordinates of a stage at any times (n,), NaN where they are not known."""
+    return _Source(trial, stage).angle(time)
+
+
 def _directions(path: np.ndarray, side: str) -> np.ndarray:
     """(3, 3) unit vectors in rows: along the stride, upward, towards the other foot."""
     forward = path / max(float(np.linalg.norm(path)), 1e-9)

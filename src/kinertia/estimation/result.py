@@ -35,6 +35,8 @@ if TYPE_CHECKING:
     import pandas as pd
     from xarray import Dataset
 
+    from kinertia.estimation.gait_scores import GaitProfile
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class TrialFit:
@@ -316,6 +318,19 @@ class Fit:
             'N m/kg'
         """
         result: Dataset = display.dataset(self, kind, over)
+        return result
+
+    def gps(self, norms: str | Path) -> GaitProfile:
+        """Gait Profile Score and Movement Analysis Profile (Baker 2009) against norms, in degrees.
+
+        Args:
+            norms: CSV file of `kinertia norms`.
+
+        Raises:
+            KinertiaError: norms of another convention or without a variable, or there are no strides.
+            FileError: the norms cannot be read.
+        """
+        result: GaitProfile = display.gait_profile(self, norms)
         return result
 
     def draws_to_xarray(self, count: int = 50, seed: int = 0) -> Dataset:

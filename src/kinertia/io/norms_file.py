@@ -4,7 +4,8 @@
     knee_angle_angle,0,5.1,3.9
     knee_angle_angle,1,6.0,4.1
 
-Names and units of the quantities are those of `cycles.csv`. Percents may be coarser than there.
+Names and units of the quantities are those of `cycles.csv`. Percents may be coarser than there. `kinertia norms` adds
+the number of people (n), spans of age and speed, and the convention of the angles.
 """
 
 from __future__ import annotations
@@ -31,11 +32,15 @@ class Norm:
     Attributes:
         percent: (n,) of the gait cycle, ascending.
         mean, sd: (n,) in the quantity's unit.
+        people: how many, where the file says; the fewest at any percent.
+        convention: what the coordinates mean, where the file says.
     """
 
     percent: np.ndarray
     mean: np.ndarray
     sd: np.ndarray
+    people: int | None = None
+    convention: str = ""
 
 
 def read_norms(path: str | Path) -> dict[str, Norm]:
@@ -45,6 +50,8 @@ def read_norms(path: str | Path) -> dict[str, Norm]:
         FileError: the file is missing or not text, lacks a column, or has a row that cannot be; with the line.
     """
     rows: dict[str, dict[float, tuple[float, float]]] = {}
+    people: dict[str, int] = {}
+    conventions: dict[str, str] = {}
     for row in read_csv(Path(path), COLUMNS, "a row per quantity and percent: " + ",".join(COLUMNS)):
         quantity = row.cells["quantity"]
         percent, mean, sd = (row.number(name) for name in COLUMNS[1:])
@@ -53,10 +60,13 @@ def read_norms(path: str | Path) -> dict[str, Norm]:
         if percent in curve:
             raise _wrong(row.path, row.line, f"{quantity} at {percent:g} % is there twice")
         curve[percent] = (mean, sd)
+        conventions[quantity] = row.cells.get("convention", "")
+        if row.cells.get("convention") and row.cells.get("n"):
+            people[quantity] = min(int(row.number("n")), people.get(quantity, int(row.number("n"))))
     if rows and 0.0 < max(map(max, rows.values())) <= _LARGEST_SHARE:
         largest = Quantity(max(map(max, rows.values())), "1")
         raise _wrong(Path(path), None, "percent is at most 1; multiply the column by 100", percent=largest)
-    return {name: _norm(curve) for name, curve in rows.items()}
+    return {name: _norm(curve, people.get(name), conventions[name]) for name, curve in rows.items()}
 
 
 def _expect_sound(row: Row, percent: float, sd: float) -> None:
@@ -70,7 +80,7 @@ def _wrong(path: Path, line: int | None, problem: str, **evidence: Quantity) -> 
     return FileError.found(path, "F187", line, **evidence, problem=Quantity(problem))
 
 
-def _norm(curve: Mapping[float, Sequence[float]]) -> Norm:
+def _norm(curve: Mapping[float, Sequence[float]], people: int | None, convention: str) -> Norm:
     percent = sorted(curve)
     mean, sd = np.array([curve[one] for one in percent]).T
-    return Norm(np.array(percent), mean, sd)
+    return Norm(np.array(percent), mean, sd, people, convention)

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from kinertia.estimation.cycles import FORCES, UNITS, CycleCurve, Kind, Stage, cycle_curves, spread_evenly
+from kinertia.estimation.mean_cycles import opposite_on_left
 from kinertia.estimation.result import Fit
 from kinertia.io.norms_file import Norm
 from kinertia.model.skeleton import Skeleton
@@ -108,8 +109,7 @@ class _Drawn:
 
     def _traces(self, quantity: str, usual_name: str) -> Iterator[dict[str, Any]]:
         if norm := self.norms.get(quantity):
-            outline = _outline(norm.percent, norm.mean - norm.sd, norm.mean + norm.sd, style.faded(style.GREY, 0.3))
-            yield {**outline, "name": "norm, mean ± SD"}
+            yield from _norm(norm, self._opposite(quantity))
         for side in FEET:
             curves, usual = (each.get((quantity, side), []) for each in (self.estimate, self.usual))
             word, colour = style.SIDES[side]
@@ -118,6 +118,11 @@ class _Drawn:
             if usual:
                 line = {"color": colour, "dash": "dot", "width": 1.6}
                 yield {**mean_line(usual_mean(usual, curves)), "name": f"{word}, {usual_name}", "line": line}
+
+    def _opposite(self, quantity: str) -> bool:
+        """Whether the sides' curves of a quantity are opposite, though the norm is one."""
+        base, _, kind = quantity.rpartition("_")
+        return kind in ("angle", "moment") and base in opposite_on_left(self.fit.skeleton)
 
     def _toe_offs(self) -> list[dict[str, Any]]:
         """A vertical line per side at its mean toe off."""
@@ -143,6 +148,18 @@ class _Drawn:
             f"{names[kind]} ({UNITS[kind]}) over the gait cycle, estimate against {self._usual_name(kind)}; strides: "
             f"{counts[0]} right, {counts[1]} left."
         )
+
+
+def _norm(norm: Norm, opposite: bool) -> Iterator[dict[str, Any]]:
+    """A grey band; of `kinertia norms`, which mirrors what is opposite on the left, one per side in its colour."""
+    low, high = norm.mean - norm.sd, norm.mean + norm.sd
+    if not (opposite and norm.convention):
+        yield {**_outline(norm.percent, low, high, style.faded(style.GREY, 0.3)), "name": "norm, mean ± SD"}
+        return
+    for (word, colour), (bottom, top) in zip(
+        (style.SIDES[side] for side in FEET), ((low, high), (-high, -low)), strict=True
+    ):
+        yield {**_outline(norm.percent, bottom, top, style.faded(colour, _SD_OPACITY)), "name": f"norm, {word}"}
 
 
 def has_spread(figure: Figure) -> bool:

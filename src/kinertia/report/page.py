@@ -33,6 +33,7 @@ from kinertia.report.cycle_figures import MOST_STRIDES, Norms, cycle_figures, ha
 from kinertia.report.cycle_table import stride_rows
 from kinertia.report.figure import Figure, written
 from kinertia.report.finding_view import FindingView
+from kinertia.report.gait_profile_view import profile_view
 from kinertia.report.headline import held_sentence, hidden_combinations, words
 from kinertia.report.marker_figures import fit_gap_figure, marker_figure, rms_by_marker
 from kinertia.report.rendering import rendered
@@ -136,6 +137,7 @@ def _cycle(fit: Fit, norms: Norms) -> dict[str, Any] | None:
         "rows": stride_rows(fit),
         "most": MOST_STRIDES,
         "norms": bool(norms),
+        "profile": profile_view(fit, norms),
         "spread": has_spread(figures["moment"]),
         "strides": len(strides),
         "on_plates": sum(stride.on_plates for stride in strides),

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from kinertia.estimation.gait_profile import gait_profile
 from kinertia.estimation.result import Fit, TrialFit
+from kinertia.io.norms_file import read_norms
 from kinertia.report.datasets import curve_dataset, draw_dataset
 from kinertia.report.files import save_fit
 from kinertia.report.journal_figure import save_figure
@@ -20,3 +22,4 @@ display.save.register(Fit, save_fit)
 display.figure.register(Fit, save_figure)
 display.dataset.register(Fit, curve_dataset)
 display.draws.register(Fit, draw_dataset)
+display.gait_profile.register(Fit, lambda fit, norms: gait_profile(fit, read_norms(norms)))

@@ -65,6 +65,13 @@ def draws(thing: object, count: int, seed: int) -> Any:
     return draws(thing, count, seed)
 
 
+@singledispatch
+def gait_profile(thing: object, norms: str | Path) -> Any:
+    """Scores of the gait of `thing` against norms in a file."""
+    _load(gait_profile, thing)
+    return gait_profile(thing, norms)
+
+
 def _load(function: Any, thing: object) -> None:
     for module in _modules:
         import_module(module)

@@ -1,0 +1,90 @@
+"""Normative bands from the fits of people who are taken as normal: mean and spread between people."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from kinertia.errors import KinertiaError
+from kinertia.estimation.cycles import spatiotemporal_columns
+from kinertia.estimation.mean_cycles import convention_of, mean_curves
+from kinertia.estimation.result import Fit
+from kinertia.motion.gait_cycle import PERCENT
+from kinertia.trial.data import FEET
+
+FEWEST_PEOPLE = 2
+
+
+@dataclass(frozen=True, eq=False)
+class Control:
+    """What norms take of one person.
+
+    Attributes:
+        name: of the person.
+        curves: by quantity (101,), mean of both sides.
+        age_years: as stated, if it was.
+        speed_m_s: mean over all strides; NaN where unknown.
+        convention: of the coordinates.
+    """
+
+    name: str
+    curves: dict[str, np.ndarray]
+    age_years: float | None
+    speed_m_s: float
+    convention: str
+
+    @classmethod
+    def of(cls, fit: Fit) -> Control:
+        """Of a fit.
+
+        Raises:
+            KinertiaError: it has no strides.
+        """
+        by_side = mean_curves(fit)
+        if not by_side:
+            raise KinertiaError(f"{fit.subject.name}: no strides, and no curves over the gait cycle")
+        curves = {}
+        for quantity in dict.fromkeys(name for name, _ in by_side):
+            sides = np.array([by_side[quantity, side] for side in FEET if (quantity, side) in by_side])
+            known = np.isfinite(sides)
+            total = np.where(known, sides, 0.0).sum(axis=0)
+            curves[quantity] = np.where(known.any(axis=0), total / np.maximum(known.sum(axis=0), 1), np.nan)
+        speeds = np.array(spatiotemporal_columns(fit.trials)["speed_m_s"], dtype=float)
+        speed = float(np.nanmean(speeds)) if np.isfinite(speeds).any() else float("nan")
+        return cls(fit.subject.name, curves, fit.subject.age_years, speed, convention_of(fit))
+
+
+def band_columns(people: Sequence[Control]) -> dict[str, list[Any]]:
+    """The columns of a norms file, by name: a row per quantity and percent that two people and more have.
+
+    Every person counts once, however many strides were measured.
+
+    Raises:
+        KinertiaError: fewer than two people, or people whose coordinates mean different things.
+    """
+    if len(people) < FEWEST_PEOPLE:
+        raise KinertiaError(f"norms need {FEWEST_PEOPLE} people at least, and {len(people)} is given")
+    conventions = sorted({one.convention for one in people})
+    if len(conventions) > 1:
+        raise KinertiaError(f"people were fitted with different models, whose angles differ: {'; '.join(conventions)}")
+    ages = [one.age_years for one in people if one.age_years is not None]
+    speeds = [one.speed_m_s for one in people if np.isfinite(one.speed_m_s)]
+    spans = {
+        f"{name}_{end}": round(float(of(values)), 3) if values else None
+        for name, values in (("age_years", ages), ("speed_m_s", speeds))
+        for end, of in (("min", min), ("max", max))
+    }
+    names = ("quantity", "percent", "mean", "sd", "n")
+    rows: list[tuple[Any, ...]] = []
+    for quantity in sorted({name for one in people for name in one.curves}):
+        curves = np.array([one.curves[quantity] for one in people if quantity in one.curves])
+        for percent, values in zip(PERCENT.tolist(), curves.T, strict=True):
+            known = values[np.isfinite(values)]
+            if len(known) >= FEWEST_PEOPLE:
+                rows.append((quantity, int(percent), float(known.mean()), float(known.std(ddof=1)), len(known)))
+    columns = {name: [row[k] for row in rows] for k, name in enumerate(names)}
+    shared = {**spans, "convention": conventions[0]}
+    return columns | {name: [value] * len(rows) for name, value in shared.items()}
