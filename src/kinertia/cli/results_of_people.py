@@ -21,7 +21,7 @@ class PersonResults:
 
 
 def results_of_people(results: list[Path]) -> list[PersonResults]:
-    """List every person's results in these folders, each once; those that a cohort keeps, and lists no more, are left out, said."""
+    """List every person's results in these folders, each once; those that a cohort lists no more are left out, said."""
     found: list[PersonResults] = []
     for path in results:
         if (path / FIT_FILE).is_file():
