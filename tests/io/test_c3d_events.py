@@ -5,7 +5,10 @@ import pytest
 
 from c3d_writer import write_c3d
 from kinertia.io.c3d import read_c3d
+from kinertia.io.c3d_event_writer import EventToWrite, add_events
 from kinertia.io.c3d_events import file_events
+from kinertia.io.c3d_parameters import ParameterSection
+from kinertia.trial.gait_event import GaitEvent
 
 
 def events_of(path, contexts, labels, seconds, minutes=0.0, **more):
@@ -60,3 +63,38 @@ def test_events_of_another_person_are_left_out():
 @pytest.mark.parametrize("times", [np.zeros(3), np.array(["a", "b"]), np.array([[0.0], [np.nan]])])
 def test_times_that_are_none_are_no_events(times):
     assert file_events({"EVENT": {"TIMES": {"value": times}}}) == ()
+
+
+def written(section) -> list[tuple[str, str, str, float]]:
+    """Context, label, description and time of the events of a section."""
+    texts = [section.get("EVENT", name) for name in ("CONTEXTS", "LABELS", "DESCRIPTIONS")]
+    seconds = section.get("EVENT", "TIMES").reshape(-1, 2)[:, 1]
+    return [(*row, round(float(time), 4)) for *row, time in zip(*texts, seconds, strict=True)]
+
+
+def test_events_that_are_missing_are_added_with_their_method_and_no_others():
+    section = ParameterSection(bytes([1, 80, 1, 84]).ljust(512, b"\0"), "<")
+    strike, off = GaitEvent(1.5, "r", "heel strike"), GaitEvent(2.1, "r", "toe off")
+    assert add_events(section, [EventToWrite(strike, "force plate")], "Ann") == 1
+    assert written(section) == [("Right", "Foot Strike", "Kinertia: force plate", 1.5)]
+    assert section.get("EVENT", "SUBJECTS") == ["Ann"]
+    again = [EventToWrite(strike._replace(time_s=1.52), "motion"), EventToWrite(off, "motion")]
+    assert add_events(section, again, "Ann") == 2
+    assert [time for *_, time in written(section)] == [1.52, 2.1]
+
+
+def test_events_of_the_file_stay_as_they_are():
+    section = ParameterSection(bytes([1, 80, 1, 84]).ljust(512, b"\0"), "<")
+    section.put("EVENT", "USED", np.array([1], np.int16))
+    for name, text in {"CONTEXTS": "Right", "LABELS": "Foot Strike", "DESCRIPTIONS": "by hand"}.items():
+        section.put("EVENT", name, [text])
+    section.put("EVENT", "TIMES", np.array([0.0, 1.49]), (2, 1))
+    before = section.content()
+    strike, off = GaitEvent(1.5, "r", "heel strike"), GaitEvent(2.1, "r", "toe off")
+    assert add_events(section, [EventToWrite(strike, "force plate")], "") == 0
+    assert section.content() == before
+    assert add_events(section, [EventToWrite(strike, "force plate"), EventToWrite(off, "motion")], "") == 1
+    assert written(section) == [
+        ("Right", "Foot Strike", "by hand", 1.49),
+        ("Right", "Foot Off", "Kinertia: motion", 2.1),
+    ]

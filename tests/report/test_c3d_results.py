@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+import kinertia
 from command_line import fitted, run
 from kinertia.report.c3d_results import outputs_of, usual_convention
 from kinertia.report.saved_fit import load_fit
@@ -55,6 +56,12 @@ def test_a_walk_in_trc_gets_a_new_file(fit, demo_run, tmp_path):
     masses = dict(zip(own["SEGMENTS"]["value"], own["MASS"]["value"], strict=True))
     assert masses == pytest.approx(dict(zip(fit.estimate.segments, fit.estimate.mass_kg, strict=True)), rel=1e-6)
     assert len(own["SHA256"]["value"]) == len(own["FILES"]["value"]) > 1
+    events = ezc3d.c3d(str(path))["parameters"]["EVENT"]
+    assert {"Kinertia: force plate"} <= set(events["DESCRIPTIONS"]["value"])
+    strikes = events["TIMES"]["value"][1][[label == "Foot Strike" for label in events["LABELS"]["value"]]]
+    for stride in trial.strides:
+        assert np.abs(strikes - stride.start_s).min() < 1e-6
+    assert kinertia.read_recording(path).events == ()
 
 
 def test_export_refuses_what_is_not_the_trials_file(demo_run, tmp_path):

@@ -14,6 +14,8 @@ from kinertia.trial.gait_event import EventKind, FileEvent
 _SIDES = {"right": "r", "left": "l", "r": "r", "l": "l"}
 _SHORT = re.compile(r"([rl])[ _]?(hs|ic|fs|to|fo)")
 _STRIKE, _OFF = "foot strike|heel strike|initial contact|hs|ic|fs", "foot off|toe off|to|fo"
+OWN_METHOD = "Kinertia: "
+"""Begins the descriptions of events that Kinertia wrote: they are results, which another export replaces."""
 _SECONDS_PER_MINUTE = 60.0
 
 
@@ -32,13 +34,13 @@ def file_events(parameters: Any, labels: Sequence[str] = ()) -> tuple[FileEvent,
     if not np.issubdtype(times.dtype, np.number) or len(times) % 2:
         return ()
     times = times.astype(float).reshape(-1, 2)
-    contexts, names, subjects = (_texts(parameters, name, len(times)) for name in ("CONTEXTS", "LABELS", "SUBJECTS"))
+    lists = [_texts(parameters, name, len(times)) for name in ("CONTEXTS", "LABELS", "SUBJECTS", "DESCRIPTIONS")]
     others = {label.split(":", 1)[0] for label in labels if ":" in label}
     events = []
-    for (minutes, seconds), context, name, subject in zip(times, contexts, names, subjects, strict=True):
+    for (minutes, seconds), context, name, subject, description in zip(times, *lists, strict=True):
         label = name or context  # Motion Analysis writes "RHS" as the context
-        side, kind = _side_and_kind(context, label)
-        if subject not in others:
+        side, kind = side_and_kind(context, label)
+        if subject not in others and not description.startswith(OWN_METHOD):
             events.append(FileEvent(float(_SECONDS_PER_MINUTE * minutes + seconds), side, label, subject, kind))
     return tuple(sorted((one for one in events if np.isfinite(one.time_s)), key=lambda one: one.time_s))
 
@@ -49,7 +51,7 @@ def _texts(parameters: Any, name: str, count: int) -> list[str]:
     return (texts + [""] * count)[:count]
 
 
-def _side_and_kind(context: str, label: str) -> tuple[str, EventKind | None]:
+def side_and_kind(context: str, label: str) -> tuple[str, EventKind | None]:
     """Side and kind by context and label, empty and None where they name none."""
     side, word = _SIDES.get(context.lower(), ""), label.lower().replace("-", " ")
     short = _SHORT.fullmatch(word)

@@ -16,6 +16,7 @@ import numpy as np
 
 from kinertia.errors import FileError
 from kinertia.findings.quantity import Quantity
+from kinertia.io.c3d_event_writer import EventToWrite, add_events
 from kinertia.io.c3d_parameters import ParameterSection, Value
 from kinertia.io.c3d_structure import doubts_about, with_plain_samples
 
@@ -104,6 +105,7 @@ def with_outputs(
     prefix: str,
     units: Mapping[str, str],
     own: Mapping[str, tuple[Value, tuple[int, ...] | None]],
+    events: Sequence[EventToWrite] = (),
 ) -> bytes:
     """The file with these points behind its own, which it lists by type, and the group KINERTIA.
 
@@ -113,6 +115,7 @@ def with_outputs(
         prefix: of labels, "Anna:"; empty for none.
         units: of the types, for a file that states none.
         own: entries of the group KINERTIA by name: value, and shape as `ParameterSection.put` has it.
+        events: of which those are added that the file does not state.
 
     Raises:
         TooManyParameters: they do not fit.
@@ -138,6 +141,7 @@ def with_outputs(
     _put_list(section, "LABELS", labels, OWN_GROUP)
     for key, (value, shape) in own.items():
         section.put(OWN_GROUP, key, value, shape)
+    add_events(section, events, prefix.removesuffix(":"))
     return _together(parts, np.concatenate([_four(one.values) for one in outputs], axis=1))
 
 

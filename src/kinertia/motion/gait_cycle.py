@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -127,10 +128,14 @@ def _heel_and_toe(skeleton: Skeleton, segment: str) -> tuple[np.ndarray, np.ndar
     return positions[int(np.argmin(along))], positions[int(np.argmax(along))]
 
 
+def found_events(skeleton: Skeleton, kinematics: Kinematics) -> list[FoundEvent]:
+    """All heel strikes and toe offs of a trial, in order of time."""
+    return _timed(_from_motion(feet_under_pelvis(skeleton, kinematics)), kinematics)
+
+
 def strides_of(skeleton: Skeleton, kinematics: Kinematics) -> tuple[Stride, ...]:
     """All strides of a trial, right foot first; none where nobody walks or runs."""
-    feet = feet_under_pelvis(skeleton, kinematics)
-    events = _with_plates(_from_motion(feet), kinematics)
+    events = found_events(skeleton, kinematics)
     strikes = {side: [e for e in events if e.event.side == side and e.event.kind == "heel strike"] for side in FEET}
     offs = {side: [e.event.time_s for e in events if e.event[1:] == (side, "toe off")] for side in FEET}
     strides = []
@@ -145,7 +150,8 @@ def strides_of(skeleton: Skeleton, kinematics: Kinematics) -> tuple[Stride, ...]
             number += 1
             off = _only(_between(offs[side], start, end))
             other_off = _only(_between(offs[other], start, across[0]))
-            strides.append(Stride(side, number, start, end, off, other_off, across[0], first.seen and second.seen))
+            on_plates = first.source == second.source == "force plate"
+            strides.append(Stride(side, number, start, end, off, other_off, across[0], on_plates))
     return tuple(strides)
 
 
@@ -158,12 +164,14 @@ def _only(times: Sequence[float]) -> float:
     return times[0] if len(times) == 1 else float("nan")
 
 
-@dataclass(frozen=True)
-class _Event:
-    """An event, and whether a plate saw it."""
+EventSource = Literal["force plate", "file", "motion"]
+
+
+class FoundEvent(NamedTuple):
+    """An event, and what tells its time: a force plate, an event of the file, or the motion of the feet."""
 
     event: GaitEvent
-    seen: bool
+    source: EventSource
 
 
 def _from_motion(feet: FeetUnderPelvis) -> list[GaitEvent]:
@@ -195,7 +203,7 @@ def turning_points(values: np.ndarray, least: float) -> list[int]:
     return maxima
 
 
-def _with_plates(events: Sequence[GaitEvent], kinematics: Kinematics) -> list[_Event]:
+def _timed(events: Sequence[GaitEvent], kinematics: Kinematics) -> list[FoundEvent]:
     """The events at the plates' times where these saw them, else at the file's, else moved by what the motion is early
     on average; and those of the file that the motion does not show.
     """
@@ -210,13 +218,17 @@ def _with_plates(events: Sequence[GaitEvent], kinematics: Kinematics) -> list[_E
         ]
         early[kind] = float(np.median(gaps)) if gaps else 0.0
     moved = [event._replace(time_s=event.time_s + early[event.kind]) for event in events]
-    moved = [_nearest(stated, event, _SAME_EVENT_S) or event for event in moved]
-    moved += [event for event in stated if _nearest(moved, event, _SAME_STEP_S) is None]
+    shown = [_of_file(event, _nearest(stated, event, _SAME_EVENT_S)) for event in moved]
+    shown += [FoundEvent(event, "file") for event in stated if _nearest(moved, event, _SAME_STEP_S) is None]
     placed = []
-    for event in moved:
-        seen = _nearest(edges, event, CONTACT_SLACK_S)
-        placed.append(_Event(event if seen is None else seen, seen is not None))
-    return sorted(placed, key=lambda one: one.event)
+    for one in shown:
+        seen = _nearest(edges, one.event, CONTACT_SLACK_S)
+        placed.append(one if seen is None else FoundEvent(seen, "force plate"))
+    return sorted(placed)
+
+
+def _of_file(event: GaitEvent, stated: GaitEvent | None) -> FoundEvent:
+    return FoundEvent(event, "motion") if stated is None else FoundEvent(stated, "file")
 
 
 def _nearest(events: Sequence[GaitEvent], to: GaitEvent, within_s: float) -> GaitEvent | None:

@@ -11,6 +11,7 @@ import numpy as np
 
 from kinertia.errors import FileError
 from kinertia.estimation.result import Fit, TrialFit
+from kinertia.io.c3d_event_writer import EventToWrite
 from kinertia.io.c3d_outputs import C3dFrames, OutputPoint, frames_of, too_many, with_outputs
 from kinertia.io.c3d_parameters import TooManyParameters, Value
 from kinertia.io.c3d_write import write_c3d
@@ -18,6 +19,7 @@ from kinertia.io.provenance import VERSION
 from kinertia.io.recording import read_recording
 from kinertia.io.trial_files import trial_file
 from kinertia.model.bsp import PARAMETERS
+from kinertia.motion.gait_cycle import found_events
 from kinertia.motion.joint_wrench import leg_joints
 from kinertia.motion.model_outputs import CONVENTIONS, UNITS, Convention, ModelOutput, model_outputs
 from kinertia.report.saved_fit import SavedFit
@@ -110,8 +112,10 @@ def c3d_with_results(
     if any(prefix + one.label in taken for one in points):
         points = [replace(one, label=_suffixed(one.label)) for one in points]
     units = {kind: frames.units.get(kind, unit) for kind, unit in UNITS[convention].items()}
+    known = found_events(trial.skeleton, trial.kinematics)
+    events = [EventToWrite(one.event, one.source) for one in known if one.source != "file"]
     try:
-        return with_outputs(frames, points, prefix, units, _own(fit, convention, files, units))
+        return with_outputs(frames, points, prefix, units, _own(fit, convention, files, units), events)
     except TooManyParameters:
         raise too_many(source) from None
 

@@ -1,0 +1,111 @@
+"""Writes gait events that a C3D file lacks into its group EVENT."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from kinertia.io.c3d_events import OWN_METHOD, side_and_kind
+from kinertia.io.c3d_parameters import ParameterSection, Value
+from kinertia.trial.gait_event import GaitEvent
+
+_GROUP = "EVENT"
+_SAME_EVENT_S = 0.15
+_CONTEXTS = {"r": "Right", "l": "Left"}
+_LABELS = {"heel strike": "Foot Strike", "toe off": "Foot Off"}
+_ICONS = {"heel strike": 1, "toe off": 2}
+"""Vicon's."""
+_MOST = 255
+
+
+class EventToWrite(NamedTuple):
+    """An event, and what tells its time: "force plate" or "motion"."""
+
+    event: GaitEvent
+    method: str
+
+
+class _Row(NamedTuple):
+    """One event as the lists of the group have it."""
+
+    context: str
+    label: str
+    description: str
+    subject: str
+    icon: int
+    flag: int
+    minutes: float
+    seconds: float
+
+    @property
+    def of_gait(self) -> GaitEvent | None:
+        side, kind = side_and_kind(self.context, self.label or self.context)
+        return None if kind is None or not side else GaitEvent(60.0 * self.minutes + self.seconds, side, kind)
+
+
+def add_events(section: ParameterSection, events: Sequence[EventToWrite], subject: str) -> int:
+    """Add the events that a file does not state, with their method as the description; returns how many.
+
+    The file's own events keep their values and order. Nothing changes where there is none to add.
+
+    Args:
+        section: parameters of the file.
+        events: all that are known.
+        subject: whose they are; empty where the file names nobody.
+    """
+    rows = _rows(section)
+    own = [row for row in rows if not row.description.startswith(OWN_METHOD)]
+    stated = [event for row in own if (event := row.of_gait) is not None]
+    new = [
+        _Row(
+            _CONTEXTS[one.event.side],
+            _LABELS[one.event.kind],
+            OWN_METHOD + one.method,
+            subject,
+            _ICONS[one.event.kind],
+            0,
+            0.0,
+            one.event.time_s,
+        )
+        for one in events
+        if not any(one.event[1:] == at[1:] and abs(one.event.time_s - at.time_s) <= _SAME_EVENT_S for at in stated)
+    ]
+    if (new or len(own) < len(rows)) and len(own) + len(new) <= _MOST:
+        _put(section, [*own, *new])
+        return len(new)
+    return 0
+
+
+def _rows(section: ParameterSection) -> list[_Row]:
+    """Of all events of the file; lists that are too short end in what says nothing."""
+    stored = section.get(_GROUP, "TIMES")
+    times = np.zeros(0) if stored is None else np.asarray(stored, dtype=float)
+    count = len(times) // 2
+
+    def column(name: str, missing: str | int) -> list[Any]:
+        value = section.get(_GROUP, name)
+        known = [] if value is None else list(value)[:count]
+        return known + [missing] * (count - len(known))
+
+    texts = [column(name, "") for name in ("CONTEXTS", "LABELS", "DESCRIPTIONS", "SUBJECTS")]
+    numbers = [column(name, 0) for name in ("ICON_IDS", "GENERIC_FLAGS")]
+    pairs = times[: 2 * count].reshape(-1, 2).tolist()
+    return [_Row(*row, *pair) for *row, pair in zip(*texts, *numbers, pairs, strict=True)]
+
+
+def _put(section: ParameterSection, rows: Sequence[_Row]) -> None:
+    lists: dict[str, Value] = {
+        "CONTEXTS": [row.context for row in rows],
+        "LABELS": [row.label for row in rows],
+        "DESCRIPTIONS": [row.description for row in rows],
+        "SUBJECTS": [row.subject for row in rows],
+        "ICON_IDS": np.array([row.icon for row in rows], dtype=np.int16),
+        "GENERIC_FLAGS": np.array([row.flag for row in rows], dtype=np.int16),
+        "USED": np.array([len(rows)], dtype=np.int16),
+    }
+    for name, value in lists.items():
+        section.put(_GROUP, name, value)
+    times = np.array([[row.minutes, row.seconds] for row in rows], dtype=np.float32)
+    section.put(_GROUP, "TIMES", times, (2, len(rows)))
