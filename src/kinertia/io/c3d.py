@@ -22,6 +22,7 @@ from kinertia.findings.finding import Finding, finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.io.c3d_events import file_events
+from kinertia.io.c3d_file_outputs import file_outputs
 from kinertia.io.c3d_outputs import OWN_GROUP
 from kinertia.io.c3d_plates import lab_plates, person_on_plates, plate_left_out, to_ground_plates
 from kinertia.io.c3d_structure import doubts_about, with_plain_samples
@@ -42,6 +43,7 @@ from kinertia.io.subject_prefix import left_out, people_among, without_prefixes
 from kinertia.io.theia import POSE_SD_M, Poses, virtual_markers, virtual_places
 from kinertia.io.trc import METRES_PER_UNIT, read_as_missing, stand_ins, unknown_unit
 from kinertia.trial.data import FloatArray, Markers, Recording
+from kinertia.trial.file_outputs import FileOutputs
 
 _OUTPUT_LISTS = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS")
 _OUTPUT_NAME = re.compile(r"(Angles?|Forces?|Moments?|Powers?|GRF)$")
@@ -111,6 +113,7 @@ def read_c3d(path: str | Path, length_unit: str | None = None, standing: bool = 
         up,
         virtual,
         events=file_events(parameters, labels),
+        outputs=_file_outputs(file, time),
     )
 
 
@@ -229,6 +232,13 @@ def _markers(path: Path, file: Any) -> tuple[tuple[str, ...], FloatArray, list[F
     of_markers = {what: where[:, list(chosen.values())] for what, where in missing.items()}
     findings += read_as_missing(path, tuple(chosen), of_markers)
     return tuple(chosen), positions[:, list(chosen.values())], findings
+
+
+def _file_outputs(file: Any, time: FloatArray) -> FileOutputs | None:
+    parameters = file["parameters"]
+    points = np.moveaxis(file["data"]["points"][:3], 0, 2).swapaxes(0, 1)
+    labels = continued(parameters, "POINT", "LABELS")[: points.shape[1]]
+    return file_outputs(parameters, labels, points, time, set(continued(parameters, OWN_GROUP, "LABELS")))
 
 
 def _outputs(parameters: Any, labels: list[str]) -> set[str]:

@@ -40,7 +40,10 @@ _BENDS = {"Hip": 1.0, "Knee": -1.0, "Ankle": 1.0}
 _STEP_RAD = 1e-5
 _APART_DEG = 45.0
 _UNMOVED = 0.2
-"""A direction that the free axes of a joint reach with a rest of more has no deviation: the model holds it still."""
+"""An angle that no coordinate turns by more has no deviation: the model holds it still."""
+_OUT_OF_REACH = 0.5
+"""As little has a moment along a direction that is farther (sine) from the plane of the free axes: 30 degrees. Ankles'
+flexion is up to 20 degrees from it, directions that the model holds still are 45 and more."""
 
 
 class Deviations(Protocol):
@@ -196,7 +199,7 @@ def _along(axes: np.ndarray, turning: np.ndarray, sd: np.ndarray) -> np.ndarray:
     shares = np.linalg.pinv(turning) @ axes.swapaxes(1, 2)
     rest = np.linalg.norm(turning @ shares - axes.swapaxes(1, 2), axis=1)
     values = np.sqrt(np.einsum("nka,nk->na", np.square(shares), np.square(sd)))
-    return np.where(rest.max(axis=0) < _UNMOVED, values, np.nan)
+    return np.where(rest.max(axis=0) < _OUT_OF_REACH, values, np.nan)
 
 
 def _as_vicon(joint: LegJoint, force: np.ndarray) -> np.ndarray:

@@ -21,9 +21,11 @@ from kinertia.report.coordinate_titles import load_title, panels_of
 from kinertia.report.cycle_figures import curves_of, mean_curve, mean_line
 from kinertia.report.cycle_table import stride_rows
 from kinertia.report.figure import Figure, written
+from kinertia.report.file_outputs import beside_summary, beside_view
 from kinertia.report.panels import Panel, plain, small_multiples
 from kinertia.report.rendering import rendered
 from kinertia.report.same_quantities import same_segment, same_sign
+from kinertia.report.time_figures import MOST_FRAMES
 from kinertia.report.wording import INTERVAL_SD, decimals, fixed, read_in
 from kinertia.trial.data import FEET
 
@@ -31,6 +33,8 @@ CHANGED_SD = INTERVAL_SD
 """A difference of more than this many of its own deviations is a change."""
 _COLOURS = (style.BLUE, style.VERMILION, style.GREEN, style.ORANGE, style.SKY, style.BLACK)
 MOST_FITS = len(_COLOURS)
+_MOST_TRIALS = 3
+"""Of each result, whose files' own outputs are shown."""
 _MOMENTS = ("hip_flexion", "hip_adduction", "knee_angle", "ankle_angle")
 
 
@@ -162,6 +166,7 @@ def comparison_summary(fits: Mapping[str, Fit]) -> dict[str, Any]:
     return {
         "first": first_name,
         "remarks": remarks(fits),
+        "file_outputs": {name: beside_summary(fit) for name, fit in fits.items()},
         "against_first": {
             name: [{**asdict(one), "change": one.change, "changed": one.changed} for one in differences(first, other)]
             for name, other in others
@@ -194,6 +199,11 @@ def render_comparison(fits: Mapping[str, Fit]) -> str:
         strides={one: stride_rows(fit) for one, fit in fits.items() if _strides(fit)},
         measures=[row.measure for row in next((stride_rows(fit) for fit in fits.values() if _strides(fit)), [])],
         figure=None if figure is None else written(figure),
+        beside=[
+            {**one, "name": f"{result}, {one['name']}"}
+            for result, fit in fits.items()
+            for one in beside_view(fit, fit.trials[:_MOST_TRIALS], MOST_FRAMES // _MOST_TRIALS)
+        ],
         sd=CHANGED_SD,
     )
 

@@ -37,6 +37,7 @@ from kinertia.report.truth import Truth
 from kinertia.settings import Overrule, Settings, Subject
 from kinertia.trial.belt import Belt
 from kinertia.trial.data import FootLoads, Markers, Trial
+from kinertia.trial.file_outputs import FileOutputs
 from kinertia.trial.gait_event import FileEvent
 
 FIT_FILE = "fit.npz"
@@ -68,6 +69,7 @@ _KINDS = (
     Finding, Where, Quantity, Overrule,
     Kinematics, InverseKinematics, SmoothedSpline, Motion, GroundReactions, Trial, Markers, FootLoads, Belt,
     FileEvent,
+    FileOutputs,
 )  # fmt: skip
 """All that a result is made of. Files know the classes by these names: who renames one keeps the old name readable."""
 

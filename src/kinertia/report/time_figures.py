@@ -5,7 +5,7 @@ Frames that were not used are shaded; upright lines are gait events, solid where
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -38,7 +38,7 @@ def residual_figure(trial: TrialFit, most_frames: int = MOST_FRAMES, start: Star
     """Force (N) and moment (N m) at the pelvis that the model needs and the plates do not give, stage by stage, with
     forces at the bandwidth of the motion; the estimate's at full bandwidth, too.
     """
-    thin, axis = _thin(len(trial.time), most_frames), _time_axis(trial.kinematics)
+    thin, axis = _thin(len(trial.time), most_frames), time_axis(trial.kinematics)
     marks = [*_unused(trial.kinematics, axis), *_lines(_shown_events(trial.kinematics))]
     stages = {
         stage_name(stage, start, _hz(trial, stage)): (style.STAGES[stage], values)
@@ -85,7 +85,7 @@ def _hz(trial: TrialFit, stage: str) -> float:
 
 def coordinate_figure(trial: TrialFit, skeleton: Skeleton, most_frames: int = MOST_FRAMES) -> Figure:
     """Every coordinate (degrees, m) by inverse kinematics frame by frame, and as estimated with its 95 % band."""
-    ik, axis = trial.kinematics.ik, _time_axis(trial.kinematics)
+    ik, axis = trial.kinematics.ik, time_axis(trial.kinematics)
     unused, events = _unused(trial.kinematics, axis), _shown_events(trial.kinematics)
     shown = (ik.time >= axis["range"][0]) & (ik.time <= axis["range"][1])
     stages = (
@@ -129,7 +129,7 @@ def moment_figure(
 
     `truth` (w, c) N m: of a synthetic person, dashed.
     """
-    axis, thin = _time_axis(trial.kinematics), _thin(len(trial.time), most_frames)
+    axis, thin = time_axis(trial.kinematics), _thin(len(trial.time), most_frames)
     unused, events = _unused(trial.kinematics, axis), _shown_events(trial.kinematics)
     sd = None if trial.deviations is None else trial.deviations.moments / mass_kg
     middle = trial.joint_loads["estimate"] / mass_kg
@@ -151,6 +151,30 @@ def moment_figure(
     peak = np.abs(trial.joint_loads["estimate"][:, 6:]).max() / mass_kg
     alt = f"Joint moments of {trial.name} over time, {start.word} against estimate; the largest is {peak:.2f} N m/kg."
     return small_multiples(panels, alt, axis)
+
+
+def panel_over_time(
+    trial: TrialFit,
+    one: Coordinate,
+    lines: Mapping[str, tuple[np.ndarray, dict[str, Any]]],
+    band: tuple[np.ndarray, np.ndarray],
+    most_frames: int = MOST_FRAMES,
+) -> Panel:
+    """Curves of both sides over time, with a 95 % band where there are deviations.
+
+    Args:
+        trial: whose frames they are of.
+        one: title, and the column of each side.
+        lines: values (w, c) and look of the line by name.
+        band: values and deviations (w, c).
+        most_frames: drawn per curve.
+    """
+    axis, thin = time_axis(trial.kinematics), _thin(len(trial.time), most_frames)
+    traces = _bands(one, trial.time, *band, thin) if np.isfinite(band[1]).any() else []
+    for name, (values, line) in lines.items():
+        traces += _sides(one, name, trial.time, values, thin, line)
+    marks = [*_unused(trial.kinematics, axis), *_lines(_shown_events(trial.kinematics), one)]
+    return Panel(one.title, traces, marks)
 
 
 def _bands(one: Coordinate, time: np.ndarray, values: np.ndarray, sd: np.ndarray, thin: slice) -> list[dict[str, Any]]:
@@ -203,8 +227,8 @@ def _thin(frames: int, most: int) -> slice:
     return slice(None, None, -(-frames // most))
 
 
-def _time_axis(kinematics: Kinematics) -> dict[str, Any]:
-    """All stretches with a little around them."""
+def time_axis(kinematics: Kinematics) -> dict[str, Any]:
+    """Settings of the axis: all stretches with a little around them."""
     start, end = kinematics.window_s
     around = _AROUND * (end - start)
     time = kinematics.trial.markers.time
@@ -236,7 +260,7 @@ def _unused(kinematics: Kinematics, axis: dict[str, Any]) -> list[dict[str, Any]
 
 def _shown_events(kinematics: Kinematics) -> list[GaitEvent]:
     """In the frames shown; none where there are too many."""
-    first, last = _time_axis(kinematics)["range"]
+    first, last = time_axis(kinematics)["range"]
     shown = [event for event in gait_events(kinematics.trial) if first <= event.time_s <= last]
     return shown if len(shown) <= MOST_EVENTS else []
 

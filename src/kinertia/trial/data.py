@@ -24,6 +24,7 @@ from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.trial import display
 from kinertia.trial.belt import Belt
+from kinertia.trial.file_outputs import FileOutputs
 from kinertia.trial.gait_event import FileEvent
 from kinertia.trial.idle_level import IdleReading
 from kinertia.trial.impossible_data import impossible_markers, impossible_plates
@@ -201,6 +202,7 @@ class Recording:
         virtual_sd_m: label -> deviation (m) of each coordinate, of markers that nobody wore: made of something else.
         belt: of the treadmill, where its speed is stated.
         events: that the file states, in order of time.
+        outputs: angles, moments and powers that other software left in the file, if any.
 
     Raises:
         TrialError: times that are no clock's, infinite places of markers, forces that are not numbers, two plates of
@@ -224,6 +226,7 @@ class Recording:
     virtual_sd_m: Mapping[str, float] = field(default_factory=dict)
     belt: Belt | None = None
     events: tuple[FileEvent, ...] = ()
+    outputs: FileOutputs | None = None
 
     def __post_init__(self) -> None:
         markers, plates = self.markers, self.plates
@@ -326,7 +329,7 @@ class Trial:
         loads: the loads of the two feet, in their own (usually faster) time base.
         measured: (n,) True where every foot on the ground stood on a loaded plate.
         notes: one sentence for each assumption made on the way here.
-        virtual_sd_m, belt, vertical, events: as the recording's.
+        virtual_sd_m, belt, vertical, events, outputs: as the recording's.
         findings: how its loads were sorted by foot.
 
     Examples:
@@ -348,6 +351,7 @@ class Trial:
     findings: tuple[Finding, ...] = ()
     vertical: str = "+Y"
     events: tuple[FileEvent, ...] = ()
+    outputs: FileOutputs | None = None
 
     def __post_init__(self) -> None:
         _expect_shape("measured", self.measured, (len(self.markers.time),))

@@ -84,6 +84,7 @@ def build_trial(recording: Recording, feet: FootMarkers, window_s: tuple[float, 
         findings,
         recording.vertical,
         recording.events,
+        recording.outputs,
     )
 
 

@@ -1,0 +1,180 @@
+"""Joint angles, moments and powers that the files hold already beside Kinertia's, in Plug-in Gait's convention."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from kinertia.estimation.result import Fit, TrialFit
+from kinertia.motion.model_outputs import ModelOutput, model_outputs
+from kinertia.report import style
+from kinertia.report.coordinate_titles import Coordinate
+from kinertia.report.figure import Figure, written
+from kinertia.report.panels import small_multiples
+from kinertia.report.time_figures import MOST_FRAMES, panel_over_time, time_axis
+from kinertia.report.wording import INTERVAL_SD
+from kinertia.trial.file_outputs import FileOutputs
+from kinertia.trial.sampled_time import nearest_samples
+
+_SHOWN = {"ANGLES": (0, 1.0, "deg"), "MOMENTS": (0, 1e-3, "N m/kg"), "POWERS": (2, 1.0, "W/kg")}
+"""Which of the three numbers is compared, the flexion of angle and moment; its factor and unit here."""
+_NAMES = {"ANGLES": "flexion angle", "MOMENTS": "extension moment", "POWERS": "power"}
+_ANKLE = {"ANGLES": "dorsiflexion angle", "MOMENTS": "plantarflexion moment", "POWERS": "power"}
+_PER_KG_N_M = 10.0
+"""No joint moment per kg reaches as far; larger ones are not divided by body mass."""
+_FEWEST = 10
+"""Frames to compare."""
+
+
+@dataclass(frozen=True, eq=False)
+class Beside:
+    """One quantity of one joint of one side in both.
+
+    Attributes:
+        trial, joint, side, kind, unit: what is compared, of Plug-in Gait's signs.
+        ours, sd, theirs: (w,) at the frames of the fit; `sd` is NaN without error bars, `theirs` where it is missing.
+    """
+
+    trial: str
+    joint: str
+    side: str
+    kind: str
+    unit: str
+    ours: np.ndarray
+    sd: np.ndarray
+    theirs: np.ndarray
+
+    @property
+    def quantity(self) -> str:
+        """In words: "Knee extension moment"."""
+        return f"{self.joint} {(_ANKLE if self.joint == 'Ankle' else _NAMES)[self.kind]}"
+
+    @property
+    def rms(self) -> float:
+        """RMS of the file's minus ours."""
+        return float(np.sqrt(np.nanmean(np.square(self.theirs - self.ours))))
+
+    @property
+    def mean(self) -> float:
+        """Mean of the file's minus ours."""
+        return float(np.nanmean(self.theirs - self.ours))
+
+    @property
+    def correlation(self) -> float:
+        """Of both curves."""
+        both = np.isfinite(self.theirs)
+        return float(np.corrcoef(self.theirs[both], self.ours[both])[0, 1])
+
+    @property
+    def outside(self) -> float | None:
+        """Share of the frames in which the file's is outside our 95 % interval; None without error bars."""
+        both = np.isfinite(self.theirs) & np.isfinite(self.sd)
+        if not both.any():
+            return None
+        return float((np.abs(self.theirs - self.ours)[both] > INTERVAL_SD * self.sd[both]).mean())
+
+    @property
+    def beyond(self) -> bool | None:
+        """Whether they differ by more than our error bar: the RMS difference against 1.96 times the RMS deviation."""
+        if not np.isfinite(self.sd).any():
+            return None
+        return self.rms > INTERVAL_SD * float(np.sqrt(np.nanmean(np.square(self.sd))))
+
+
+def beside(fit: Fit, trial: TrialFit) -> list[Beside]:
+    """What both have; nothing of a file without outputs."""
+    stated = trial.kinematics.trial.outputs
+    if stated is None:
+        return []
+    loads = trial.reactions.at(trial.time)
+    outputs = model_outputs(
+        trial.skeleton, fit.estimate, trial.motion, loads, fit.mass_kg, "plug-in-gait", trial.deviations
+    )
+    return [one for output in outputs if (one := _beside(trial, output, stated, fit.mass_kg)) is not None]
+
+
+def _beside(trial: TrialFit, output: ModelOutput, stated: FileOutputs, mass_kg: float) -> Beside | None:
+    if output.name not in stated.values or output.kind not in _SHOWN:
+        return None
+    component, factor, unit = _SHOWN[output.kind]
+    theirs = stated.values[output.name][nearest_samples(stated.time, trial.time), component] / _divisor(
+        stated, output.kind, mass_kg
+    )
+    if np.isfinite(theirs).sum() < _FEWEST:
+        return None
+    ours, sd = factor * output.values[:, component], factor * output.sd[:, component]
+    return Beside(trial.name, output.joint, output.side, output.kind, unit, ours, sd, theirs)
+
+
+def _divisor(stated: FileOutputs, kind: str, mass_kg: float) -> float:
+    """Body mass where the file's moments are not per kg; powers go with them."""
+    moments = [values for name, values in stated.values.items() if name.endswith("Moment")]
+    whole = bool(moments) and max(float(np.nanmax(np.abs(values))) for values in moments) > _PER_KG_N_M
+    return mass_kg if whole and kind != "ANGLES" else 1.0
+
+
+def beside_figure(trial: TrialFit, compared: list[Beside], most_frames: int = MOST_FRAMES) -> Figure:
+    """All quantities over time: ours with 95 % bands, the file's dashed."""
+    panels = []
+    for quantity in dict.fromkeys(one.quantity for one in compared):
+        sides = [one for one in compared if one.quantity == quantity]
+        title = f"{quantity} ({sides[0].unit})"
+        columns = {one.side: k for k, one in enumerate(sides)}
+        ours, sd, theirs = (
+            np.stack([getattr(one, name) for one in sides], axis=1) for name in ("ours", "sd", "theirs")
+        )
+        coordinate = Coordinate(quantity, title, columns, True)
+        lines: Mapping[str, tuple[np.ndarray, dict[str, Any]]] = {
+            "Kinertia": (ours, {"width": 2}),
+            "in the file": (theirs, {"dash": "dash", "width": 1.6}),
+        }
+        panels.append(panel_over_time(trial, coordinate, lines, (ours, sd), most_frames))
+    alt = f"Angles, moments and powers of {trial.name} over time: Kinertia's and those that the file holds."
+    return small_multiples(panels, alt, time_axis(trial.kinematics))
+
+
+def beside_summary(fit: Fit) -> list[dict[str, Any]]:
+    """What `kinertia compare --json` prints of the files' own outputs, a row per trial, joint, side and quantity."""
+    return [
+        {
+            "trial": one.trial,
+            "side": one.side,
+            "quantity": one.quantity,
+            "unit": one.unit,
+            "rms": one.rms,
+            "mean": one.mean,
+            "correlation": one.correlation,
+            "outside": one.outside,
+            "beyond": one.beyond,
+        }
+        for trial in fit.trials
+        for one in beside(fit, trial)
+    ]
+
+
+def beside_view(fit: Fit, trials: Sequence[TrialFit], most_frames: int = MOST_FRAMES) -> list[dict[str, Any]]:
+    """What a page shows: per trial whose file has outputs a figure and the rows of its table."""
+    shown = []
+    for trial in trials:
+        compared = beside(fit, trial)
+        if compared:
+            figure = written(beside_figure(trial, compared, most_frames))
+            shown.append({"name": trial.name, "rows": [_row(one) for one in compared], "figure": figure})
+    return shown
+
+
+def _row(one: Beside) -> dict[str, Any]:
+    digits = 1 if one.kind == "ANGLES" else 2
+    outside = one.outside
+    return {
+        "quantity": f"{one.quantity} ({one.unit})",
+        "side": style.SIDES[one.side][0],
+        "rms": f"{one.rms:.{digits}f}",
+        "mean": f"{one.mean:+.{digits}f}",
+        "correlation": f"{one.correlation:.2f}",
+        "outside": "" if outside is None else f"{100.0 * outside:.0f}",
+        "beyond": "" if one.beyond is None else "yes" if one.beyond else "no",
+    }
