@@ -7,7 +7,9 @@ import pytest
 
 import kinertia
 from command_line import fitted, run
-from kinertia.report.c3d_results import outputs_of, usual_convention
+from kinertia.io.c3d_outputs import frames_of
+from kinertia.motion.joint_wrench import joint_wrenches
+from kinertia.report.c3d_results import outputs_of, to_file, usual_convention
 from kinertia.report.saved_fit import load_fit
 from validation.measured_data import find
 
@@ -90,6 +92,26 @@ WALKS = {
 }
 
 
+NEAR = {("B", "RHipMoment"): 0.85}
+"""Where a moment about Vicon's own joint centre correlates less: nobody knows why."""
+
+
+def extension_about(fit, joint, side, path, centre):
+    """(w,) N m/kg extending moment of a joint about another point (w, 3), in the file's axes and units."""
+    (trial,) = fit.trials
+    frames = frames_of(path)
+    turn, origin = to_file(path, frames, trial, "")
+    loads = trial.reactions.at(trial.time)
+    pose = trial.skeleton.pose(trial.motion.q)
+    for leg, wrench in joint_wrenches(trial.skeleton, fit.estimate, trial.motion, loads).items():
+        if (leg.name, leg.side.upper()) == (joint, side):
+            arm = leg.centre(trial.skeleton, pose) - (centre - origin) @ np.linalg.inv(turn)
+            moment = wrench[:, 3:] + np.cross(arm, wrench[:, :3])
+            axis = pose.rotation[:, trial.skeleton.segments.index(leg.child), :, 2]
+            return (-1.0 if joint == "Hip" else 1.0) * np.einsum("nk,nk->n", axis, moment) / fit.mass_kg
+    raise KeyError(joint, side)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name, files in WALKS.items() if find(files[0])])
 def test_measured_files_come_back_with_vicons_signs(tmp_path, name):
@@ -116,5 +138,9 @@ def test_measured_files_come_back_with_vicons_signs(tmp_path, name):
                 for kind in ("Angles", "Moment"):
                     theirs = before[f"{side}{'Vicon' if name == 'A' else ''}{joint}{kind}"][0, at]
                     ours = points[f"{side}{joint}{kind}Kinertia"][0, at]
-                    expected = 0.9 if kind == "Angles" or joint == "Ankle" else 0.7
-                    assert np.corrcoef(theirs, ours)[0, 1] > expected, (side, joint, kind)
+                    agree = np.corrcoef(theirs, ours)[0, 1]
+                    if kind == "Moment" and joint != "Ankle" and agree < 0.9:
+                        # their centres of hips and knees are up to 3 cm elsewhere: about these the moments agree
+                        own = points[side + {"Hip": "FEP", "Knee": "FEO"}[joint]][:, at].T
+                        agree = np.corrcoef(theirs, extension_about(fit, joint, side, path, own))[0, 1]
+                    assert agree > NEAR.get((name, side + joint + kind), 0.9), (side, joint, kind, agree)

@@ -168,7 +168,7 @@ def _spread(values: np.ndarray, at: np.ndarray, count: int) -> np.ndarray:
 
 def _centres(source: Path, frames: C3dFrames, trial: TrialFit, prefix: str, at: np.ndarray) -> list[OutputPoint]:
     """Joint centres in the axes and units of the file."""
-    lab, origin = _to_file(source, frames, trial, prefix)
+    lab, origin = to_file(source, frames, trial, prefix)
     pose = trial.skeleton.pose(trial.motion.q)
     return [
         OutputPoint(
@@ -181,7 +181,7 @@ def _centres(source: Path, frames: C3dFrames, trial: TrialFit, prefix: str, at: 
     ]
 
 
-def _to_file(source: Path, frames: C3dFrames, trial: TrialFit, prefix: str) -> tuple[np.ndarray, np.ndarray]:
+def to_file(source: Path, frames: C3dFrames, trial: TrialFit, prefix: str) -> tuple[np.ndarray, np.ndarray]:
     """(3, 3) and (3,): from the axes of the fit (m, person facing +X) to those of the file, by the markers of both."""
     markers, columns = trial.kinematics.trial.markers, {label: k for k, label in enumerate(frames.labels)}
     shared = [(k, columns[prefix + label]) for k, label in enumerate(markers.labels) if prefix + label in columns]
