@@ -21,7 +21,7 @@ def _one_by_one(task, cases, workers=None, progress=lambda share: None):
 def in_one_process() -> Iterator[None]:
     """As a context, or as a decorator of a test."""
     with (
-        mock.patch("kinertia.studies.accuracy.in_parallel", _one_by_one),
+        mock.patch("validation.accuracy_study.in_parallel", _one_by_one),
         mock.patch("kinertia.studies.table1.in_parallel", _one_by_one),
         mock.patch("kinertia.studies.table1_variants.in_parallel", _one_by_one),
     ):

@@ -13,13 +13,9 @@ from kinertia.findings.where import Where
 from kinertia.io.provenance import VERSION
 from kinertia.model.bsp import PARAMETERS
 from kinertia.report.cohort_tables import write_findings, write_person, write_tables
-from kinertia.studies.accuracy import CLASSES, ClassAccuracy, ScenarioAccuracy
 from kinertia.studies.cohort_record import Place, Record
 from kinertia.studies.cross_validation import Explained, HeldOut
-from kinertia.studies.faults import FaultOutcome, SoundWalk
-from kinertia.studies.joint_accuracy import JOINTS, JointAccuracy
 from kinertia.studies.plan import Plan
-from kinertia.studies.populations import MeanAccuracy, PopulationAccuracy, PopulationsStudy, RucksackAccuracy
 from kinertia.studies.sensitivity import CONDITIONS as NOISES
 from kinertia.studies.sensitivity import Sensitivity
 from kinertia.studies.table1 import CONDITIONS, PUBLISHED, Draw, Errors, Table1
@@ -32,33 +28,6 @@ PLAN = Plan(
 HELD_OUT = (
     HeldOut("one", ("two",), Explained(200.0, 10.0, 4.0, 0.010), Explained(150.0, 8.0, 3.0, 0.009)),
     HeldOut("two", ("one",), Explained(100.0, 9.0, 3.5, 0.008), Explained(120.0, 9.5, 3.6, 0.008)),
-)
-SOUND = (SoundWalk("one", None, (), None), SoundWalk("other", None, FAULTY, None))
-OUTCOMES = (
-    FaultOutcome("one", "a", "named", "P213", "said", "check"),
-    FaultOutcome("other", "a", "named", "M113", "said", "fit"),
-    FaultOutcome("one", "b", "silent"),
-    FaultOutcome("other", "b", "not possible"),
-)
-ACCURACIES = {
-    name: ScenarioAccuracy(
-        f"laboratory {name}",
-        5,
-        {each: ClassAccuracy(0.95, 0.01, 0.8, 0.01, 0.02, 0.008, 0.9) for each in CLASSES},
-        {joint: JointAccuracy(1.0, 1.1, 0.94, 0.95, 2.0, 0.01, 0.012, 0.96, 0.02, 0.01, 0.02) for joint in JOINTS},
-        1.0,
-    )
-    for name in ("one", "two")
-}
-POPULATIONS_STUDY = PopulationsStudy(
-    tuple(
-        PopulationAccuracy(
-            "children", prior, 4, *2 * [{"mass": 0.3, "CoM": 0.01, "inertia": 0.01}], 0.93, 1.2, 2.4, unlike=0.25
-        )
-        for prior in ("adults'", "their own")
-    ),
-    (MeanAccuracy("children", 4, 60, 0.3, 1.1, 0.95, 0.96),),
-    (RucksackAccuracy(4, None, 0.9, 1.0, 1.0), RucksackAccuracy(4, 0.3, 0.4, 0.5, 1.0)),
 )
 
 

@@ -15,6 +15,9 @@ from validation.page import REPOSITORY, made_at
 
 EVIDENCE = (
     "accuracy",
+    "faults",
+    "populations",
+    "sensitivity",
     "peers",
     "measured-trials",
     "field-trials",

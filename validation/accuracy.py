@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
-from typing import Any
+from typing import Annotated, Any
 
+import typer
 from threadpoolctl import threadpool_limits
 
-from kinertia.report.accuracy import JOINT_CAPTION, accuracy_markdown, moments_markdown
-from kinertia.studies.accuracy import SCENARIOS, run_accuracy
+from validation.accuracy_study import SCENARIOS, run_accuracy
+from validation.accuracy_tables import JOINT_CAPTION, accuracy_markdown, moments_markdown
 from validation.calibration_errors import DISTURBANCES, Calibrated, calibrated, calibration_section
 from validation.measured_data import data_folder
 from validation.measured_walks import measured_section, measured_walk
@@ -20,8 +21,6 @@ from validation.study_bound import bound_rows
 from validation.study_noise import UNIFORM_SD, study_draw, study_section
 from validation.walks import WALKS
 
-PEOPLE = 40
-
 
 def document(sections: dict[str, str]) -> str:
     """The text of docs/validation/accuracy.md."""
@@ -30,7 +29,7 @@ def document(sections: dict[str, str]) -> str:
 ## Joint moments
 
 RMS errors of joint moments (N m), estimate / usual pipeline, {sections["people"]} people in each laboratory, a walk of
-2.5 s (`kinertia study accuracy`). *Usual pipeline*: inverse kinematics, literature BSPs, forces as measured,
+2.5 s. *Usual pipeline*: inverse kinematics, literature BSPs, forces as measured,
 coordinates low-passed at the best of 6, 10 and 12 Hz for each joint. Both know the same skeleton and see the same
 markers and forces.
 
@@ -96,7 +95,7 @@ another initial rate of turning and by CoMs moved to the side.
 ## Error bars
 
 People drawn from the prior (masses, CoMs and inertias with all their correlations, physically possible, given the
-scale), a walk of 2.5 s at 100 Hz, {sections["people"]} people in each laboratory (`kinertia study accuracy`).
+scale), a walk of 2.5 s at 100 Hz, {sections["people"]} people in each laboratory.
 *Coverage*: parameters whose truth lies in the 95 % interval, and the standard error over people. *Error / sd*: RMS.
 *Bound*: the Cramér-Rao bound, prior included, at the true motion and parameters, with the estimator's own noise model.
 *Better*: people for whom the RMS error is below the literature's, and in brackets the share for whom that of an
@@ -142,14 +141,18 @@ def _calibrated(case: tuple[str, int]) -> Calibrated:
     return calibrated(DISTURBANCES[case[0]], case[1])
 
 
-def main() -> None:
+def main(
+    people: Annotated[int, typer.Option(min=2, help="People in each laboratory.")] = 40,
+    seed: Annotated[int, typer.Option(help="Of people and noise.")] = 1,
+    workers: Annotated[int | None, typer.Option(help="Processes; one per core if left out.")] = None,
+) -> None:
     """Run everything and write the page; what needs the measured trials is left out where they are absent."""
-    sections = {"people": str(PEOPLE)}
-    laboratories = run_accuracy(SCENARIOS, PEOPLE)
+    sections = {"people": str(people)}
+    laboratories = run_accuracy(SCENARIOS, people, seed, workers)
     sections |= {"error_bars": accuracy_markdown(laboratories), "moments": moments_markdown(laboratories)}
-    people = range(5)
-    outcomes = _in_parallel(_calibrated, [(name, seed) for name in DISTURBANCES for seed in people])
-    by_name = {name: outcomes[i * len(people) : (i + 1) * len(people)] for i, name in enumerate(DISTURBANCES)}
+    seeds = range(5)
+    outcomes = _in_parallel(_calibrated, [(name, seed) for name in DISTURBANCES for seed in seeds])
+    by_name = {name: outcomes[i * len(seeds) : (i + 1) * len(seeds)] for i, name in enumerate(DISTURBANCES)}
     sections["calibration"] = calibration_section(by_name)
     draws = _in_parallel(study_draw, range(20))
     sections |= {"study": study_section(draws, bound_rows(len(draws))), "draws": str(len(draws))}

@@ -21,6 +21,16 @@ def write_page(name: str, text: str) -> None:
     print(f"written to {path}")
 
 
+def write_part(name: str, text: str) -> None:
+    """Replace what PAGES/NAME.md has between `<!-- NAME -->` and `<!-- end -->`, `made_by` first; say where it is."""
+    path = PAGES / f"{name}.md"
+    before, start, rest = path.read_text(encoding="utf-8").partition(f"<!-- {name} -->\n")
+    _, end, after = rest.partition("<!-- end -->")
+    content = f"{before}{start}\n{made_by(name)}\n\n{text.strip()}\n\n{end}{after}"
+    path.write_text(content, encoding="utf-8", newline="\n")
+    print(f"written to {path}")
+
+
 def made_by(name: str) -> str:
     """The line of a page: which command made it, when, and of which commit."""
     commit, day = made_at()

@@ -16,9 +16,10 @@ from kinertia.estimation.simultaneous.observed_trial import Observation
 from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.model.bsp import block_diagonal
 from kinertia.model.log_cholesky import table_jacobian
-from kinertia.studies.accuracy import at_truth, held
+from kinertia.studies.drawn_people import held
 from kinertia.synthetic.noise import STUDY_AMPLITUDE_M, STUDY_RATE_RAD_S
 from kinertia.synthetic.walk import SyntheticTrial
+from validation.accuracy_study import at_truth
 from validation.study_noise import drawn_start, start_prior
 from validation.synthetic_walks import observation_of, study_walk
 

@@ -54,7 +54,7 @@ def test_help_reads_like_a_manual():
     assert "no such option" in run("fit", "--nonsense").err.lower()
 
 
-@pytest.mark.parametrize("command", ["demo", "init", "check", "fit", "study table1", "study accuracy"])
+@pytest.mark.parametrize("command", ["demo", "init", "check", "fit", "study table1", "study sensitivity"])
 def test_every_command_has_an_example_and_every_example_can_be_parsed(command):
     shown = " ".join(run(*command.split(), "--help").out.split())
     assert re.search(rf"Examples? kinertia {command}", shown)

@@ -9,8 +9,8 @@ from kinertia.errors import PriorError
 from kinertia.estimation.learnt_prior import BETWEEN, WITHIN, learn
 from kinertia.estimation.person_information import PersonInformation, information_of
 from kinertia.estimation.prior import literature_prior
-from kinertia.synthetic.populations import POPULATIONS
 from kinertia.synthetic.walk import walking_subject
+from validation.population_bodies import POPULATIONS
 
 WHOLE = literature_prior(walking_subject().literature)
 SEGMENTS = WHOLE.mean.segments[:4]

@@ -6,8 +6,8 @@ import numpy as np
 
 from kinertia.estimation.person_information import PersonInformation, person_information
 from kinertia.estimation.prior import literature_prior
-from kinertia.synthetic.populations import POPULATIONS
 from kinertia.synthetic.walk import walking_subject
+from validation.population_bodies import POPULATIONS
 
 PRIOR = literature_prior(walking_subject().literature)
 SIZE = PRIOR.covariance.shape[0]

@@ -10,14 +10,14 @@ from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.simultaneous.unlike import unlikeness
 from kinertia.model.anthropometry import BodyGeometry, literature_bsp, reference_lengths
 from kinertia.model.bsp import BodySegmentParameters
-from kinertia.report.populations import rucksack_sentence
 from kinertia.settings import Instruments, Subject
-from kinertia.studies.populations import RucksackAccuracy, own_prior, run_person
 from kinertia.synthetic.faults import Faults, measured
-from kinertia.synthetic.populations import POPULATIONS
 from kinertia.synthetic.walk import HEIGHT_M, MASS_KG, walk, walking_subject
 from kinertia.workflow.from_files import prepare_subject
 from kinertia.workflow.known_body import with_prosthesis
+from validation.population_bodies import POPULATIONS
+from validation.population_study import RucksackAccuracy, own_prior, run_person
+from validation.populations import rucksack_sentence
 
 PRIOR = literature_prior(walking_subject().literature)
 SEGMENTS = PRIOR.mean.segments

@@ -13,16 +13,13 @@ from matplotlib.image import imread
 import study_results
 from chromium import DESKTOP, Opened, colour, playwright
 from found import FAULTY, UNUSABLE
-from kinertia.report.accuracy import render_accuracy
 from kinertia.report.check_page import save_check_page
 from kinertia.report.cohort_page import PAGE, write_cohort_page
 from kinertia.report.comparison import render_comparison
 from kinertia.report.crossval_page import render_crossval
-from kinertia.report.faults import render_faults
 from kinertia.report.page import render
 from kinertia.report.plan_page import render_plan
 from kinertia.report.plotly_script import packed_script
-from kinertia.report.populations import render_populations
 from kinertia.report.sensitivity import render_sensitivity
 from kinertia.report.table1 import render_table1
 from kinertia.report.table1_variants import render_variants
@@ -30,7 +27,7 @@ from kinertia.settings import Subject
 from kinertia.workflow.check import check_person
 from kinertia.workflow.files import files_by_name, read_files
 from kinertia.workflow.person import Person
-from study_results import ACCURACIES, HELD_OUT, OUTCOMES, PLAN, POPULATIONS_STUDY, SOUND
+from study_results import HELD_OUT, PLAN
 
 axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="needs axe (pip install -e '.[test]')")
 
@@ -38,7 +35,7 @@ pytestmark = pytest.mark.slow
 
 REPORTS = ("report", "findings", "three trials", "two-level")
 """One page with other data: the first is looked at in all looks, the others in two."""
-STUDIES = ("plan", "crossval", "cohort", "accuracy", "populations", "sensitivity", "faults", "table1", "variants")
+STUDIES = ("plan", "crossval", "cohort", "sensitivity", "table1", "variants")
 """Pages of one template."""
 LOOKS = ((1400, "light"), (390, "light"), (390, "dark"), (1400, "dark"))
 """Widths of windows, and the system's colours in them."""
@@ -81,10 +78,7 @@ def pages(demo_run, fit, two_level, c3d_lab, tmp_path_factory):
         "cohort": cohort,
         "plan": lambda: written("plan.html", render_plan(PLAN)),
         "crossval": lambda: written("crossval.html", render_crossval(HELD_OUT, "literature")),
-        "accuracy": lambda: written("accuracy.html", render_accuracy(ACCURACIES, 1)),
-        "populations": lambda: written("populations.html", render_populations(POPULATIONS_STUDY)),
         "sensitivity": lambda: written("sensitivity.html", render_sensitivity(study_results.sensitivity())),
-        "faults": lambda: written("faults.html", render_faults(SOUND, OUTCOMES, SOUND)),
         "table1": lambda: written("table1.html", render_table1(study_results.table1())),
         "variants": lambda: written("variants.html", render_variants(study_results.variants())),
     }

@@ -7,11 +7,10 @@ import pytest
 
 from kinertia.cli.terminal import print_json
 from kinertia.report.crossval_page import crossval_rows, crossval_sentence, crossval_summary, render_crossval
-from kinertia.report.faults import render_faults
 from kinertia.report.plan_page import plan_rows, render_plan, save_plan
 from kinertia.report.result_page import Part, render_parts
 from report_page import figures_of
-from study_results import HELD_OUT, OUTCOMES, PLAN, SOUND
+from study_results import HELD_OUT, PLAN
 
 
 def drawn(page):
@@ -44,19 +43,6 @@ def test_cross_validation_says_how_many_trials_are_explained_better():
     assert by_panel[6:] == [pytest.approx([10.0, 8.0]), pytest.approx([9.0, 8.0])]
     assert crossval_rows(HELD_OUT, "literature")[1] == ["one", "others", "150", "8.0", "3.0", "9.0"]
     assert crossval_summary(HELD_OUT)["held_out"][0]["estimate"]["force_rms_n"] == 8.0
-
-
-def test_faults_are_counted_by_walk():
-    page = render_faults(SOUND, OUTCOMES, SOUND[:1])
-    (figure,) = drawn(page).values()
-    assert {trace["name"]: trace["x"] for trace in figure["data"]} == {
-        "named": [1, 1],
-        "warned": [0, 0],
-        "harmless": [0, 0],
-        "silent": [1, 0],
-    }
-    assert "named*" in page
-    assert "1 / 2" in page
 
 
 def test_a_page_without_figures_carries_no_plotly():

@@ -123,6 +123,13 @@ def test_it_carries_the_catalogue_of_findings(wheel):
 
 
 @pytest.mark.slow
+def test_evidence_is_not_in_it(wheel):
+    with zipfile.ZipFile(wheel) as archive:
+        folders = {name.split("/")[0] for name in archive.namelist()}
+    assert {folder for folder in folders if not folder.endswith(".dist-info")} == {"kinertia"}
+
+
+@pytest.mark.slow
 def test_what_it_needs_is_small(wheel, tmp_path):
     """Size of all files of the wheels here; pip adds the bytecode that it compiles from them, a good quarter more."""
     installed = _uv("pip", "install", "--quiet", "--target", tmp_path / "packages", wheel)

@@ -1,12 +1,13 @@
-import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from command_line import run
 from kinertia.estimation.prior import literature_prior
-from kinertia.studies.accuracy import (
+from kinertia.synthetic.faults import CAMERA_SD_M, Faults, measured, tilted
+from kinertia.synthetic.walk import walk, walking_subject
+from one_process import in_one_process
+from validation.accuracy_study import (
     CLASSES,
     JOINTS,
     PROOF,
@@ -17,10 +18,8 @@ from kinertia.studies.accuracy import (
     run_draw,
     summarised,
 )
-from kinertia.studies.joint_accuracy import JointErrors
-from kinertia.synthetic.faults import CAMERA_SD_M, Faults, measured, tilted
-from kinertia.synthetic.walk import walk, walking_subject
-from one_process import in_one_process
+from validation.accuracy_tables import accuracy_markdown, moments_markdown
+from validation.joint_accuracy import JointErrors
 
 SHORT_S = 1.3
 """About a stride."""
@@ -169,14 +168,12 @@ def test_calibration_errors_move_everything(trial):
 
 @pytest.mark.slow
 @in_one_process()
-def test_command(tmp_path, monkeypatch):
+def test_tables_have_every_laboratory():
     chosen = {key: replace(SCENARIOS[key], walk_s=0.6) for key in ("study_calibration", "gain")}
-    monkeypatch.setattr("kinertia.cli.study.SCENARIOS", chosen)
-    outcome = run("study", "accuracy", "--draws", 2, "--workers", 2, "-o", tmp_path / "out")
-    assert outcome.status == 0, outcome.err
-    content = json.loads((tmp_path / "out" / "accuracy.json").read_text())
-    assert set(content["scenarios"]) == set(chosen)
-    assert content["scenarios"]["gain"]["classes"]["mass"]["rms"] > 0
+    accuracies = run_accuracy(chosen, 2)
+    assert accuracies["gain"].classes["mass"].rms > 0
+    tables = accuracy_markdown(accuracies)
+    assert tables.count("| mass (kg) |") == len(chosen)
     for scenario in chosen.values():
-        assert scenario.title in outcome.out
-    assert (tmp_path / "out" / "accuracy.md").read_text().count("| mass (kg) |") == len(chosen)
+        assert scenario.title[1:] in tables
+        assert f"| {scenario.title} |" in moments_markdown(accuracies)

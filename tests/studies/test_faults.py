@@ -1,12 +1,10 @@
 """Faults in the files of a synthetic walk are identified by `check`, and block a fit."""
 
 import json
-import re
 
 import numpy as np
 import pytest
 
-from command_line import run
 from found import FAULTY
 from kinertia.errors import BlockedError
 from kinertia.findings.finding import Severity, finding
@@ -14,8 +12,10 @@ from kinertia.findings.quantity import Quantity
 from kinertia.findings.rule import all_rules
 from kinertia.findings.where import Where
 from kinertia.io.subject_file import read_subject
-from kinertia.report.faults import code_rows, counts, faults_markdown, save_faults
-from kinertia.studies.faults import (
+from kinertia.workflow.from_files import prepare_subject
+from one_process import in_one_process
+from validation import faults
+from validation.fault_study import (
     FaultOutcome,
     JointMoments,
     SoundWalk,
@@ -29,10 +29,11 @@ from kinertia.studies.faults import (
     sound_laboratories,
     synthetic_walk,
 )
-from kinertia.synthetic.measured_person import read_person, write_person
-from kinertia.synthetic.mistakes import MISTAKES, Mistake
-from kinertia.workflow.from_files import prepare_subject
-from one_process import in_one_process
+from validation.faults import code_rows, counts, faults_markdown, faults_summary
+from validation.measured_data import data_folder
+from validation.measured_person import read_person, write_person
+from validation.mistakes import MISTAKES, Mistake
+from validation.walks import subject_files
 
 NOT_POSSIBLE = {
     "outer and inner knee markers swapped in the static trial, one leg",
@@ -158,7 +159,7 @@ def outcomes():
     return walks, of_mistakes, laboratories
 
 
-def test_page(outcomes, tmp_path):
+def test_page(outcomes):
     page = faults_markdown(*outcomes)
     assert "| a | named | named \\* |" in page
     assert "| b | **silent** | – |" in page
@@ -168,7 +169,7 @@ def test_page(outcomes, tmp_path):
     assert "Of 2 fault-free walks 1 are blocked, and 2 have a warning." in page
     assert "- one: nothing\n- other: M113 " in page
     assert counts(outcomes[1]) == {"named": 2, "warned": 1, "harmless": 1, "silent": 1}
-    content = json.loads((save_faults(*outcomes, tmp_path / "out") / "faults.json").read_text())
+    content = json.loads(json.dumps(faults_summary(*outcomes)))
     assert content["outcomes"][0]["change_nm"] is None
     assert [one["code"] for one in content["sound"]["other"]] == [one.code for one in FAULTY]
 
@@ -179,17 +180,23 @@ def test_codes_are_counted(outcomes):
     assert rows == {"M113": (0, 1, 1), "P213": (1, 0, 1), "P215": (1, 0, 1), "T214": (0, 0, 1)}
 
 
-def test_command(outcomes, c3d_lab, tmp_path, monkeypatch):
+def test_own_walks_are_printed_and_leave_the_page_alone(outcomes, c3d_lab, tmp_path, monkeypatch, capsys):
     asked = {}
-    monkeypatch.setattr("kinertia.cli.study.run_faults", lambda walks, **_: asked.update(walks) or outcomes[:2])
-    monkeypatch.setattr("kinertia.cli.study.sound_laboratories", lambda folder, count: {})
-    monkeypatch.setattr("kinertia.cli.study.run_sound", lambda people, *_: outcomes[2])
-    outcome = run("study", "faults", c3d_lab / "subject.toml", "-o", tmp_path / "out")
-    assert outcome.status == 0, outcome.err
+    monkeypatch.setattr(faults, "run_faults", lambda walks, **_: asked.update(walks) or outcomes[:2])
+    monkeypatch.setattr(faults, "sound_laboratories", lambda folder, count: {})
+    monkeypatch.setattr(faults, "run_sound", lambda people, *_: outcomes[2])
+    monkeypatch.setattr(faults, "write_page", None)
+    faults.main([c3d_lab / "subject.toml"], tmp_path / "details.json")
     assert list(asked) == ["synthetic walk", "synthetic walker"]
-    assert "silent: one: b" in outcome.out
-    assert re.search(r"named\s+1\s+1", outcome.out)
-    assert (tmp_path / "out" / "faults.md").is_file()
+    assert "| b | **silent** | – |" in capsys.readouterr().out
+    assert json.loads((tmp_path / "details.json").read_text())["outcomes"][2]["outcome"] == "silent"
+
+
+def test_measured_walks_have_subject_files(tmp_path):
+    people = faults.named(map(read_subject, subject_files(data_folder(), tmp_path)))
+    assert len(people) == 5
+    for wanted in people.values():
+        assert all(path.is_file() for path in (wanted.model.static, wanted.trials[0].markers))
 
 
 @pytest.mark.slow

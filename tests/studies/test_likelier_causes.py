@@ -7,8 +7,8 @@ import pytest
 from scipy.signal import butter, filtfilt
 
 from kinertia.findings.overview import reported
-from kinertia.studies.faults import checked, synthetic_walk
-from kinertia.synthetic.measured_person import acting, loads_of, read_person, write_person
+from validation.fault_study import checked, synthetic_walk
+from validation.measured_person import acting, loads_of, read_person, write_person
 
 
 @pytest.fixture(scope="module")

@@ -10,9 +10,10 @@ from kinertia.estimation.simultaneous.fisher_information import Information
 from kinertia.estimation.simultaneous.instruments import InstrumentPrior
 from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.estimation.simultaneous.sound_or_faulty import SoundOrFaulty
-from kinertia.studies.accuracy import at_truth, held
+from kinertia.studies.drawn_people import held
 from kinertia.synthetic.walk import walking_subject
 from validation import study_bound
+from validation.accuracy_study import at_truth
 from validation.synthetic_walks import observation_of, study_walk
 
 

@@ -1,17 +1,28 @@
-"""Options that had another name in the version before: they still work, with a notice."""
+"""Options that had another name in the version before, which still work, and commands that went elsewhere."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 from kinertia.cli.terminal import err
+from kinertia.errors import KinertiaError
 
 RENAMED = {"--force": "--overwrite"}
 """Old names, each with what it is called now; they go with the next version."""
 
+MOVED = {f"study {name}": f"python -m validation {name}" for name in ("accuracy", "faults", "populations")}
+"""Commands that are no longer installed, each with what to run in a clone of the repository."""
+
 
 def as_named_now(given: Sequence[str]) -> list[str]:
-    """Replace old names of options among these arguments, and say so on standard error."""
+    """Replace old names of options among these arguments, and say so on standard error.
+
+    Raises:
+        KinertiaError: the command is no longer installed.
+    """
+    command = " ".join(given[:2])
+    if command in MOVED:
+        raise KinertiaError(f"kinertia {command} moved to the repository: run {MOVED[command]} in a clone of it")
     for old in [name for name in RENAMED if name in given]:
         err.print(f"{old} is called {RENAMED[old]} now; the old name goes with the next version")
     return [RENAMED.get(one, one) for one in given]

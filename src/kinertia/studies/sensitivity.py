@@ -1,6 +1,6 @@
 """Which body segment parameters are not highly sensitive to noisy kinematics? The question that the study ended on.
 
-People drawn from the literature's prior walk and are estimated, as in `accuracy_study`, with one thing changed at a
+People drawn from the literature's prior walk and are estimated (`drawn_people`), with one thing changed at a
 time: amplitude and kind of the noise, number of strides, squats recorded besides. Per parameter the RMS error over
 people is told as a share of the literature's on the same people.
 """
@@ -9,11 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from kinertia.model.bsp import PARAMETERS
-from kinertia.studies.accuracy import Draw, Scenario, run_draws
+from kinertia.studies.drawn_people import Scenario, estimate_person
+from kinertia.studies.parallel import in_parallel
 from kinertia.synthetic.faults import Faults
 from kinertia.synthetic.walk import walking_subject
 
@@ -74,17 +76,33 @@ def run_sensitivity(
     progress: Callable[[float], None] = lambda share: None,
 ) -> Sensitivity:
     """The errors in all conditions, `draws` people each."""
-    drawn = run_draws(CONDITIONS, draws, seed, workers, progress)
+    cases = [(condition, number) for condition in CONDITIONS.values() for number in range(draws)]
+    drawn = in_parallel(partial(_run_draw, seed), cases, workers, progress)
+    by_condition = {key: drawn[i * draws : (i + 1) * draws] for i, key in enumerate(CONDITIONS)}
     segments = walking_subject().literature.segments
     names = list(dict.fromkeys(segment.removesuffix("_r").removesuffix("_l") for segment in segments))
     parameters = tuple(f"{name}.{parameter}" for name in names for parameter in SHOWN)
-    return Sensitivity(parameters, {key: _errors(part, segments, names) for key, part in drawn.items()}, draws, seed)
+    errors = {key: _errors(part, segments, names) for key, part in by_condition.items()}
+    return Sensitivity(parameters, errors, draws, seed)
 
 
-def _errors(draws: list[Draw], segments: tuple[str, ...], names: list[str]) -> np.ndarray:
+@dataclass(frozen=True, eq=False)
+class _Draw:
+    """(s, 10) errors of the estimate and of the literature of one person, in prior deviations."""
+
+    errors: np.ndarray
+    literature_errors: np.ndarray
+
+
+def _run_draw(seed: int, case: tuple[Scenario, int]) -> _Draw:
+    person = estimate_person(seed, case)
+    return _Draw(person.errors / person.prior.sd, person.literature_errors / person.prior.sd)
+
+
+def _errors(draws: list[_Draw], segments: tuple[str, ...], names: list[str]) -> np.ndarray:
     """(len(names) * 7,) RMS over people and sides, over that of the literature."""
     own, before = (
-        np.square([getattr(draw, kind) / draw.prior_sd for draw in draws]).mean(axis=0)[:, : len(SHOWN)]
+        np.square([getattr(draw, kind) for draw in draws]).mean(axis=0)[:, : len(SHOWN)]
         for kind in ("errors", "literature_errors")
     )
     of_name = [[i for i, s in enumerate(segments) if s.removesuffix("_r").removesuffix("_l") == name] for name in names]

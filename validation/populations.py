@@ -1,24 +1,21 @@
-"""The study of populations on paper and screen: a page, `populations.json`, `populations.md`, rows for the terminal."""
+"""What a wrong prior costs: children, obese and old people, prostheses; what a group teaches; a rucksack."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
-from dataclasses import asdict
-from pathlib import Path
-from typing import Any
+from typing import Annotated
 
-from kinertia.io.output_folder import complete_folder
-from kinertia.io.provenance import VERSION
-from kinertia.report.result_page import Part, render_parts
-from kinertia.report.row_figures import dot_figure
-from kinertia.studies.populations import (
+import typer
+
+from validation.page import write_part
+from validation.population_study import (
     INFORMED_SD,
     RUCKSACK_KG,
     MeanAccuracy,
     PopulationAccuracy,
     PopulationsStudy,
     RucksackAccuracy,
+    run_populations,
 )
 
 HEADINGS = ("population", "prior", "mass (kg)", "CoM (mm)", "inertia (kg m2)", "moments (N m)", "coverage", "unlike")
@@ -88,46 +85,10 @@ def populations_markdown(study: PopulationsStudy) -> str:
     return "\n\n".join(text for text in texts if text) + "\n"
 
 
-def render_populations(study: PopulationsStudy) -> str:
-    """The page."""
-    accuracies = study.accuracies
-    figure = dot_figure(
-        [f"{one.title}, {one.prior}" for one in accuracies],
-        {
-            "mass (kg)": {
-                "before": [one.rms_before["mass"] for one in accuracies],
-                "estimate": [one.rms["mass"] for one in accuracies],
-            },
-            "joint moments (N m)": {
-                "before": [one.moments_before_nm for one in accuracies],
-                "estimate": [one.moments_nm for one in accuracies],
-            },
-        },
-        "RMS errors of masses and joint moments in every population, before and after the estimate.",
-    )
-    parts = [
-        Part("Errors against the truth", (CAPTION,), figure, headings=HEADINGS, rows=population_rows(accuracies)),
-        Part("What a group teaches of its mean", tuple(mean_sentences(study.means))),
-        Part("A rucksack", (rucksack_sentence(study.rucksacks),)),
-    ]
-    return render_parts("What does a wrong prior cost?", f"{accuracies[0].people} people of each population.", parts)
-
-
-def populations_summary(study: PopulationsStudy, seed: int) -> dict[str, Any]:
-    """What `populations.json` says."""
-    return {
-        "kinertia": VERSION,
-        "seed": seed,
-        "populations": [asdict(one) for one in study.accuracies],
-        "means": [asdict(one) for one in study.means],
-        "rucksack": [asdict(one) for one in study.rucksacks],
-    }
-
-
-def save_populations(study: PopulationsStudy, seed: int, folder: str | Path) -> None:
-    """Write `populations.html`, `populations.json` and `populations.md` into a folder."""
-    with complete_folder(folder, "study populations") as work:
-        text = json.dumps(populations_summary(study, seed), indent=2)
-        (work / "populations.json").write_text(text + "\n", encoding="utf-8")
-        (work / "populations.md").write_text(populations_markdown(study), encoding="utf-8")
-        (work / "populations.html").write_text(render_populations(study), encoding="utf-8")
+def main(
+    people: Annotated[int, typer.Option(min=2, help="People of each population.")] = 24,
+    seed: Annotated[int, typer.Option(help="Of people and noise.")] = 1,
+    workers: Annotated[int | None, typer.Option(help="Processes; one per core if left out.")] = None,
+) -> None:
+    """Draw and estimate everybody, and write the tables into the page."""
+    write_part("populations", populations_markdown(run_populations(people, seed, workers)))

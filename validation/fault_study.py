@@ -25,15 +25,15 @@ from kinertia.findings.overview import reported
 from kinertia.findings.quantity import Quantity
 from kinertia.io.subject_file import SubjectFile, read_subject
 from kinertia.studies.parallel import in_parallel
-from kinertia.synthetic import load_mistakes as plates
 from kinertia.synthetic.laboratory import LabNoise, record, write_lab
-from kinertia.synthetic.measured_person import MeasuredPerson, write_person
-from kinertia.synthetic.measured_person import read_person as read_measured
-from kinertia.synthetic.mistakes import MISTAKES, Mistake
 from kinertia.synthetic.walk import walk, walking_subject
 from kinertia.workflow.check import check_person
 from kinertia.workflow.from_files import fit_subject
 from kinertia.workflow.person import read_person
+from validation import load_mistakes as plates
+from validation.measured_person import MeasuredPerson, write_person
+from validation.measured_person import read_person as read_measured
+from validation.mistakes import MISTAKES, Mistake
 
 Outcome = Literal["named", "warned", "harmless", "silent", "not possible"]
 """What became of a fault: identified; other findings are new; moments within their deviations; neither; there is

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from kinertia.model.joint_centres import find_landmarks, hip_in_pelvis, pelvis_frame
-from kinertia.synthetic.measured_person import MeasuredPerson
 from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, Markers
+from validation.measured_person import MeasuredPerson
 
 Change = Callable[[MeasuredPerson, np.random.Generator], MeasuredPerson | None]
 """The person with a mistake; None where it cannot be made, for want of a marker."""

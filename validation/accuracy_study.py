@@ -1,8 +1,8 @@
-"""Do the error bars hold? Many people drawn from the literature prior walk, are measured and estimated.
+"""Errors and error bars of many people drawn from the literature's prior, measured and estimated.
 
-`run_accuracy` draws persons and noise, estimates from what a laboratory would have (`disturbed.measured`), and compares
-errors with error bars: how often the truth lies within 95 % intervals (coverage), RMS error over posterior deviation
-(ratio), and errors against those of the literature. A draw depends on seed, scenario and its number only.
+`run_accuracy` compares errors with error bars: how often the truth lies within 95 % intervals (coverage), RMS error
+over posterior deviation (ratio), and errors against those of the literature. A draw depends on seed, scenario and its
+number only.
 """
 
 from __future__ import annotations
@@ -14,20 +14,17 @@ from functools import partial
 import numpy as np
 
 from kinertia.estimation.identifiability import evidence
-from kinertia.estimation.prior import BspPrior, literature_prior
-from kinertia.estimation.simultaneous.bandwidth import Bandwidth
+from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.simultaneous.fisher_information import Information
-from kinertia.estimation.simultaneous.fit import calibration_prior
-from kinertia.estimation.simultaneous.instruments import InstrumentPrior
-from kinertia.estimation.simultaneous.observation import observe
-from kinertia.estimation.simultaneous.observed_trial import CalibrationPrior, Observation
-from kinertia.estimation.simultaneous.plates import FLOOR_UNKNOWNS, PLATE_UNKNOWNS
+from kinertia.estimation.simultaneous.observed_trial import Observation
 from kinertia.estimation.simultaneous.problem import MapProblem
-from kinertia.estimation.simultaneous.solver import estimate_simultaneous
-from kinertia.estimation.simultaneous.sound_or_faulty import SoundOrFaulty
 from kinertia.model.joint_names import JOINTS
-from kinertia.model.skeleton import Skeleton
-from kinertia.studies.joint_accuracy import (
+from kinertia.studies.drawn_people import Scenario, estimate_person
+from kinertia.studies.parallel import in_parallel
+from kinertia.synthetic.faults import Faults
+from kinertia.synthetic.walk import SyntheticTrial
+from kinertia.trial.rms import rms
+from validation.joint_accuracy import (
     WITHIN,
     Before,
     JointAccuracy,
@@ -36,13 +33,7 @@ from kinertia.studies.joint_accuracy import (
     joint_accuracy,
     joint_errors,
 )
-from kinertia.studies.parallel import in_parallel
-from kinertia.synthetic.faults import Faults, measured
-from kinertia.synthetic.motions import MOTIONS
-from kinertia.synthetic.walk import SyntheticTrial, walk, walking_subject
-from kinertia.trial.rms import rms
 
-WALK_S = 2.5
 CLASSES = {
     "mass": slice(0, 1),
     "CoM": slice(1, 4),
@@ -52,21 +43,7 @@ CLASSES = {
 """Columns of `BodySegmentParameters.table`."""
 EVIDENCE = ("measured", "informed", "assumed")
 """Parameters of all kinds by what stands behind their estimate (`identifiability.evidence`)."""
-_HELD_SD_M = 1e-4
 _TRIES = 500
-
-
-@dataclass(frozen=True)
-class Scenario:
-    """One kind of laboratory: its faults, whether the estimator calibrates, how long a walk was recorded, and which
-    other motions (`synthetic_motions.MOTIONS`) besides.
-    """
-
-    title: str
-    faults: Faults
-    calibrated: bool = True
-    walk_s: float = WALK_S
-    others: tuple[str, ...] = ()
 
 
 PROOF = {
@@ -194,30 +171,22 @@ def run_draws(
 
 def run_draw(seed: int, case: tuple[Scenario, int]) -> Draw:
     """One draw; people of one number are the same in every scenario."""
-    scenario, number = case
-    of_person, of_noise = (np.random.default_rng(s) for s in np.random.SeedSequence(seed, spawn_key=(number,)).spawn(2))
-    subject = walking_subject()
-    prior = literature_prior(subject.literature)
-    person = replace(subject, bsp=prior.draw(of_person))
-    trials = [walk(person, scenario.walk_s, trapezoid=False), *(MOTIONS[name](person) for name in scenario.others)]
-    skeleton, recorded = measured(trials, scenario.faults, of_noise)
-    seen = observe(skeleton, recorded, prior.mass_kg, Bandwidth.of(recorded))
-    calibration = calibration_prior(skeleton) if scenario.calibrated else held(skeleton)
-    result = estimate_simultaneous(skeleton, prior, calibration, seen.together)
-    trial, kinematics = trials[0], recorded[0]
+    drawn = estimate_person(seed, case)
+    person, prior, trials, seen, result = drawn.person, drawn.prior, drawn.trials, drawn.seen, drawn.result
+    trial = trials[0]
     true = [at_truth(o, truth) for o, truth in zip(seen.alone, trials, strict=True)]
-    there = MapProblem(trial.skeleton, replace(prior, mean=person.bsp), calibration, true)
+    there = MapProblem(trial.skeleton, replace(prior, mean=person.bsp), drawn.calibration, true)
     bound = Information(there, seen.repeats).root(range(len(true)))
     inside = np.flatnonzero(seen.alone[0].dynamic)
     after = Outcome(result.skeleton, result.bsp, result.motions[0].cut(inside), result.reactions[0])
     return Draw(
-        result.bsp.table() - person.bsp.table(),
-        prior.mean.table() - person.bsp.table(),
+        drawn.errors,
+        drawn.literature_errors,
         prior.sd,
         np.sqrt(np.diag(result.bsp_covariance)).reshape(-1, 10),
         np.linalg.norm(bound, axis=1).reshape(-1, 10),
-        attainable(prior, bound, of_noise),
-        joint_errors(trial, Before(skeleton, prior.mean, kinematics), after, result.curve_deviations[0]),
+        attainable(prior, bound, drawn.rng),
+        joint_errors(trial, Before(drawn.skeleton, prior.mean, drawn.recorded[0]), after, result.curve_deviations[0]),
         result.converged,
     )
 
@@ -241,14 +210,6 @@ def attainable(prior: BspPrior, root: np.ndarray, rng: np.random.Generator) -> d
         squares = (np.square(part).sum(axis=(0, 1)) for part in (own, before))
         chances[name] = float(np.mean(np.less(*squares)))
     return chances
-
-
-def held(skeleton: Skeleton) -> CalibrationPrior:
-    """Calibration switched off: skeleton and instruments count as exact."""
-    places = np.full(len(skeleton.markers), _HELD_SD_M)
-    exact = SoundOrFaulty.certain(_HELD_SD_M)
-    plate, floor = (dict.fromkeys(names, exact) for names in (PLATE_UNKNOWNS, FLOOR_UNKNOWNS))
-    return CalibrationPrior({}, places, InstrumentPrior(plate, floor, exact, exact, exact, trial_gain=exact))
 
 
 def summarised(title: str, draws: Sequence[Draw]) -> ScenarioAccuracy:

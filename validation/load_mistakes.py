@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from kinertia.synthetic.marker_mistakes import Change
-from kinertia.synthetic.measured_person import MeasuredPerson, acting, loads_of
 from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads
+from validation.marker_mistakes import Change
+from validation.measured_person import MeasuredPerson, acting, loads_of
 
 
 def loads(change: Callable[[PlateLoads], PlateLoads]) -> Change:

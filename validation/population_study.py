@@ -1,7 +1,7 @@
 """What does a wrong prior cost? People whom the tables do not describe, with the adults' prior and with their own.
 
 Every person walks once, at a pace and with a posture and swing of trunk and arms that are the person's own, in a
-laboratory with skin motion and calibration errors (`accuracy`), and is estimated twice from the same recording: as if
+laboratory with skin motion and calibration errors, and is estimated twice from the same recording: as if
 nothing were known, and with what the subject file can say of such a person. What the recording says is then joined with
 two more priors, without estimating anew: with the one learnt from others of the population, and with the distribution
 from which the person was drawn, which is the best that any prior can do. A draw depends on seed, population and its
@@ -34,16 +34,16 @@ from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import inverse_dynamics
 from kinertia.motion.kinematics import Kinematics
 from kinertia.settings import Attached, Instruments, Subject
-from kinertia.studies.accuracy import WALK_S
-from kinertia.studies.joint_accuracy import WITHIN
+from kinertia.studies.drawn_people import WALK_S
 from kinertia.studies.parallel import in_parallel
 from kinertia.synthetic.faults import Faults, measured
 from kinertia.synthetic.manner import Manner
-from kinertia.synthetic.populations import POPULATIONS
 from kinertia.synthetic.walk import HEIGHT_M, MASS_KG, SEX, SyntheticTrial, walk, walking_subject
 from kinertia.trial.rms import rms
 from kinertia.workflow.attached import with_attached_prior
 from kinertia.workflow.known_body import with_prosthesis
+from validation.joint_accuracy import WITHIN
+from validation.population_bodies import POPULATIONS
 
 LABORATORY = Faults("artefact", calibration=True)
 COLUMNS = {"mass": slice(0, 1), "CoM": slice(1, 4), "inertia": slice(4, 7)}

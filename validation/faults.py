@@ -1,32 +1,36 @@
-"""The fault study on paper: a page, `faults.md` with the tables, `faults.json` with every finding."""
+"""Which faults are identified? Fifty known ones in measured and synthetic walks, one at a time."""
 
 from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from tempfile import TemporaryDirectory
+from typing import Annotated, Any
 
 import numpy as np
+import typer
 
 from kinertia.findings.finding import Severity
 from kinertia.findings.overview import reported
 from kinertia.findings.rule import rule
-from kinertia.io.output_folder import complete_folder
 from kinertia.io.provenance import VERSION
-from kinertia.report.result_page import Part, render_parts
-from kinertia.report.row_figures import bar_figure
-from kinertia.studies.faults import FaultOutcome, SoundWalk
+from kinertia.io.subject_file import SubjectFile, read_subject
+from validation.fault_study import FaultOutcome, SoundWalk, run_faults, run_sound, sound_laboratories, synthetic_walk
+from validation.measured_data import data_folder
+from validation.page import write_page
+from validation.walks import subject_files
 
 _CODE_HEADINGS = ("code", "finding", "named", "warned", "fault-free walks")
-_BARS = ("named", "warned", "harmless", "silent")
+SOUND_LABORATORIES = 10
+_OUTCOMES = ("named", "warned", "harmless", "silent")
 _PAGE = """# Which faults are identified?
 
 Laboratories make mistakes: swapped labels, a wrong axis, another person's static trial. Each of {count} known ones was
 made in the files of {walks} walks, one at a time, and given to `kinertia check`; what it did not identify was fitted.
-`kinertia study faults` does so, with your own walks as well, and writes this page.
+`python -m validation faults SUBJECT ...` does so with your own walks.
 
 - **named**: a new open finding has a code of the fault (by `check` or, marked \\*, by the fit, which may correct it)
 - **warned**: new findings have other codes only
@@ -37,8 +41,6 @@ made in the files of {walks} walks, one at a time, and given to `kinertia check`
 {summary}
 
 {table}
-
-Findings and changes of the joint moments are in `faults.json`.
 
 ## By code
 
@@ -84,7 +86,7 @@ Findings and changes of the joint moments are in `faults.json`.
 
 def counts(outcomes: Sequence[FaultOutcome]) -> dict[str, int]:
     """How many faults came to each outcome; those that are not possible are left out."""
-    return {kind: sum(one.outcome == kind for one in outcomes) for kind in _BARS}
+    return {kind: sum(one.outcome == kind for one in outcomes) for kind in _OUTCOMES}
 
 
 def faults_markdown(
@@ -160,32 +162,6 @@ def _said_of_sound(sound: Sequence[SoundWalk]) -> list[str]:
     return [f"{walk.name}: {sentences}" for walk, sentences in zip(sound, found, strict=True)]
 
 
-def render_faults(
-    sound: Sequence[SoundWalk], outcomes: Sequence[FaultOutcome], laboratories: Sequence[SoundWalk]
-) -> str:
-    """The page."""
-    names = [walk.name for walk in sound]
-    sums = [counts([one for one in outcomes if one.walk == name]) for name in names]
-    figure = bar_figure(
-        names,
-        {kind: [one[kind] for one in sums] for kind in _BARS},
-        "How many faults in each walk are named, warned of, harmless or silent.",
-        "faults that are possible in this walk",
-    )
-    words = (
-        "Named: a new open finding has a code of the fault (by check or, marked *, by the fit). Warned: new findings "
-        "have other codes only. Harmless: nothing is new, and no joint moment of the legs changes by more than its "
-        "standard deviation. Silent: nothing is new, and one does. –: the walk has nothing to make the fault with."
-    )
-    codes = code_rows([*sound, *laboratories], outcomes)
-    parts = [
-        Part("Outcomes", (words,), figure, headings=("fault", *names), rows=faults_rows(sound, outcomes)),
-        Part("By code", headings=_CODE_HEADINGS, rows=codes),
-        Part("What is found in fault-free walks", listed=_said_of_sound([*sound, *laboratories])),
-    ]
-    return render_parts("Which faults are identified?", faults_sentence(sound, outcomes, laboratories), parts)
-
-
 def _cell(one: FaultOutcome) -> str:
     if one.outcome == "not possible":
         return "–"
@@ -197,25 +173,10 @@ def _named(walk: str, outcomes: Sequence[FaultOutcome]) -> str:
     return f"{sum(one.outcome == 'named' for one in own)} / {len(own)}"
 
 
-def save_faults(
-    sound: Sequence[SoundWalk],
-    outcomes: Sequence[FaultOutcome],
-    laboratories: Sequence[SoundWalk],
-    folder: str | Path,
-) -> Path:
-    """Write the files into a folder; returns the folder."""
-    with complete_folder(folder, "faults") as work:
-        text = json.dumps(faults_summary(sound, outcomes, laboratories), indent=1)
-        (work / "faults.json").write_text(text + "\n", encoding="utf-8")
-        (work / "faults.md").write_text(faults_markdown(sound, outcomes, laboratories), encoding="utf-8")
-        (work / "faults.html").write_text(render_faults(sound, outcomes, laboratories), encoding="utf-8")
-    return Path(folder)
-
-
 def faults_summary(
     sound: Sequence[SoundWalk], outcomes: Sequence[FaultOutcome], laboratories: Sequence[SoundWalk]
 ) -> dict[str, Any]:
-    """What `faults.json` says."""
+    """Every finding, and changes of the joint moments."""
     return {
         "kinertia": VERSION,
         "sound": {walk.name: [one.to_dict() for one in walk.findings] for walk in (*sound, *laboratories)},
@@ -224,3 +185,38 @@ def faults_summary(
             for row in map(asdict, outcomes)
         ],
     }
+
+
+def main(
+    walks: Annotated[
+        list[Path] | None,
+        typer.Argument(
+            metavar="[SUBJECT]...", help="Subject files in place of the measured walks: the page is printed."
+        ),
+    ] = None,
+    details: Annotated[Path | None, typer.Option(help="Write every finding to this JSON file.")] = None,
+    workers: Annotated[int | None, typer.Option(help="Processes; one per core if left out.")] = None,
+) -> None:
+    """Make every fault in every walk, and write the page."""
+    with TemporaryDirectory() as folder:
+        given = walks or subject_files(data_folder(), Path(folder))
+        sources = {"synthetic walk": synthetic_walk(Path(folder) / "lab"), **named(map(read_subject, given))}
+        sound, outcomes = run_faults(sources, workers=workers)
+        laboratories = run_sound(sound_laboratories(Path(folder), SOUND_LABORATORIES), workers)
+    if details is not None:
+        text = json.dumps(faults_summary(sound, outcomes, laboratories), indent=1)
+        details.write_text(text + "\n", encoding="utf-8")
+    page = faults_markdown(sound, outcomes, laboratories)
+    if walks:
+        print(page)
+    else:
+        write_page("faults", page)
+
+
+def named(people: Iterable[SubjectFile]) -> dict[str, SubjectFile]:
+    """By the person's name; of several people of one name the later ones are numbered."""
+    by_name: dict[str, SubjectFile] = {}
+    for wanted in people:
+        name = wanted.subject.name
+        by_name[name if name not in by_name else f"{name} ({len(by_name) + 1})"] = wanted
+    return by_name

@@ -1,20 +1,12 @@
-"""The accuracy study on paper and screen: a page, `accuracy.json`, `accuracy.md`, and rows for the terminal."""
+"""Tables of docs/validation/accuracy.md: error bars and joint moments in every laboratory."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from kinertia.io.output_folder import complete_folder
-from kinertia.io.provenance import VERSION
-from kinertia.report.result_page import Part, render_parts
-from kinertia.report.row_figures import dot_figure
-from kinertia.studies.accuracy import ClassAccuracy, ScenarioAccuracy
+from validation.accuracy_study import ClassAccuracy, ScenarioAccuracy
 
 HEADINGS = ("", "95 % coverage", "error / sd", "RMS error", "bound", "literature", "better (at best)")
 _SHOWN = {
@@ -91,42 +83,3 @@ def accuracy_markdown(accuracies: Mapping[str, ScenarioAccuracy]) -> str:
 def _table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     rule = ["---", *["--:"] * (len(headings) - 1)]
     return "\n".join(f"| {' | '.join(cells)} |" for cells in (headings, rule, *rows))
-
-
-def render_accuracy(accuracies: Mapping[str, ScenarioAccuracy], seed: int) -> str:
-    """The page: joint moments of all laboratories in one figure, then the tables of each."""
-    scenarios = list(accuracies.values())
-    figure = dot_figure(
-        [one.title for one in scenarios],
-        {
-            f"{joint} (N m)": {
-                "usual pipeline": [one.joints[joint].usual_nm for one in scenarios],
-                "estimate": [one.joints[joint].moment_nm for one in scenarios],
-            }
-            for joint in scenarios[0].joints
-        },
-        "RMS error of joint moments in every laboratory, usual pipeline and estimate.",
-    )
-    parts = [Part("Joint moments", (JOINT_CAPTION,), figure, "RMS error against the truth.")]
-    for one in scenarios:
-        title = one.title[0].upper() + one.title[1:]
-        people = f"{one.draws} people, {100 * one.converged:.0f} % converged."
-        parts.append(Part(title, (people,), headings=JOINT_HEADINGS, rows=joint_rows(one)))
-        parts.append(Part(f"{title}: parameters", headings=HEADINGS, rows=accuracy_rows(one)))
-    return render_parts("Do the error bars hold?", f"People drawn from the literature's prior; seed {seed}.", parts)
-
-
-def accuracy_summary(accuracies: Mapping[str, ScenarioAccuracy], seed: int) -> dict[str, Any]:
-    """What `accuracy.json` says."""
-    scenarios = {key: asdict(scenario) for key, scenario in accuracies.items()}
-    return {"kinertia": VERSION, "seed": seed, "scenarios": scenarios}
-
-
-def save_accuracy(accuracies: Mapping[str, ScenarioAccuracy], seed: int, folder: str | Path) -> Path:
-    """Write `accuracy.html`, `accuracy.json` and `accuracy.md` into a folder; returns the folder."""
-    content = accuracy_summary(accuracies, seed)
-    with complete_folder(folder, "accuracy") as work:
-        (work / "accuracy.json").write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
-        (work / "accuracy.html").write_text(render_accuracy(accuracies, seed), encoding="utf-8")
-        (work / "accuracy.md").write_text(accuracy_markdown(accuracies) + "\n", encoding="utf-8")
-    return Path(folder)

@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kinertia.synthetic import load_mistakes as forces
-from kinertia.synthetic import marker_mistakes as markers
-from kinertia.synthetic.marker_mistakes import Change
-from kinertia.synthetic.measured_person import MeasuredPerson
+from validation import load_mistakes as forces
+from validation import marker_mistakes as markers
+from validation.marker_mistakes import Change
+from validation.measured_person import MeasuredPerson
 
 KG_PER_POUND = 0.45359237
 

@@ -1,0 +1,27 @@
+"""Which body segment parameters survive noisy kinematics? The page that `kinertia study sensitivity` writes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Annotated
+
+import typer
+
+from kinertia.report.sensitivity import save_sensitivity
+from kinertia.studies.sensitivity import run_sensitivity
+from validation.page import PAGES, write_page
+
+
+def main(
+    draws: Annotated[int, typer.Option(min=2, help="People in each condition.")] = 24,
+    seed: Annotated[int, typer.Option(help="Of people and noise.")] = 1,
+    workers: Annotated[int | None, typer.Option(help="Processes; one per core if left out.")] = None,
+) -> None:
+    """Run the study, and write the page and its picture."""
+    result = run_sensitivity(draws, seed, workers)
+    with TemporaryDirectory() as folder:
+        out = Path(folder) / "out"
+        save_sensitivity(result, out)
+        (PAGES / "sensitivity.png").write_bytes((out / "sensitivity.png").read_bytes())
+        write_page("sensitivity", (out / "sensitivity.md").read_text(encoding="utf-8"))
