@@ -12,6 +12,10 @@ from scipy.spatial.transform import Rotation
 
 from generic_static import smooth_motion
 from kinertia.estimation.prior import BspPrior, literature_prior
+from kinertia.estimation.simultaneous.calibration_entry import BENDING
+from kinertia.estimation.simultaneous.given import PLACES, SKIN, STILL
+from kinertia.estimation.simultaneous.instrument_term import GAINS, ZEROS
+from kinertia.estimation.simultaneous.instrument_term import PLATES as PLATE_ERRORS
 from kinertia.estimation.simultaneous.instruments import InstrumentPrior
 from kinertia.estimation.simultaneous.marker_errors import ErrorProcess
 from kinertia.estimation.simultaneous.observed_trial import CalibrationPrior, Observation
@@ -141,37 +145,37 @@ def point(problem: MapProblem, seed: int = 1) -> tuple[list[np.ndarray], np.ndar
     rng = np.random.default_rng(seed)
     coefficients = [basis.fit(trial.q) for basis, trial in zip(problem.bases, problem.trials, strict=True)]
     coefficients = [part + rng.normal(0.0, 0.01, part.shape) for part in coefficients]
-    return coefficients, problem.start_static + rng.normal(0.0, 0.01, problem.layout.size)
+    return coefficients, problem.layout.start + rng.normal(0.0, 0.01, problem.layout.size)
 
 
 def residuals(problem: MapProblem, k: int, coefficients: np.ndarray, static: np.ndarray) -> np.ndarray:
-    """All residuals of trial k, each over its deviation, from first principles: no term of `map_terms` is used."""
+    """All residuals of trial k, each over its deviation, from first principles: no cost term is used."""
     trial, layout = problem.trials[k], problem.layout
     skeleton, rigid = _body(problem, tuple(static))
     q, qd, qdd = problem.bases[k].evaluate(coefficients)
     pose = skeleton.pose(q)
     positions = skeleton.marker_positions(pose)
-    skin, coefficient = trial.skin, iter(static[layout.skin])
+    skin, coefficient = trial.skin, iter(static[layout[SKIN]])
     for m, segment in enumerate(skeleton.marker_segments):
         for pattern in range(skin.first[m], skin.last[m]):
             along = [next(coefficient) for _ in range(3)]
             positions[:, m] += skin.values[:, pattern, None] * (pose.rotation[:, segment] @ along)
     errors = whitened(trial.markers - positions, *trial.marker_process)
-    loads = trial.ground.loads(trial.time + static[layout.late(k)].sum()).reshape(len(trial.time), 2, 6)
-    *floor, angle = static[layout.plates][-3:]
-    of_plates = np.add(static[layout.plates][:-3].reshape(-1, 4), [*floor, 0.0, 0.0])
-    values = dict(zip(problem.plates, of_plates, strict=True))
+    loads = trial.ground.loads(trial.time + problem.loads.late_s(k, static)).reshape(len(trial.time), 2, 6)
+    *floor, angle = static[layout[PLATE_ERRORS]][-3:]
+    of_plates = np.add(static[layout[PLATE_ERRORS]][:-3].reshape(-1, 4), [*floor, 0.0, 0.0])
+    values = dict(zip(problem.given.plates, of_plates, strict=True))
     here = np.array([values[name] for name in trial.ground.plates])[trial.ground.carrier]
     x, z, gain, free_moment = np.moveaxis(here, -1, 0)
-    gains = iter(static[layout.gains])
+    gains = iter(static[layout[GAINS]])
     own_gains = [np.array([next(gains) for _ in each.ground.plates]) for each in problem.trials][k]
     gain = gain + own_gains[trial.ground.carrier]
-    zeros = iter(static[layout.zeros].reshape(-1, 2))
+    zeros = iter(static[layout[ZEROS]].reshape(-1, 2))
     own_zeros = [np.array([next(zeros) for _ in each.ground.plates]) for each in problem.trials][k]
     zero_x, zero_z = np.moveaxis(own_zeros[trial.ground.carrier], -1, 0)
     middle = trial.ground.middles[trial.ground.carrier]
     zero = np.stack([zero_x, np.zeros_like(x), zero_z], axis=-1) @ trial.ground.turn.T
-    zero *= trial.ground.loaded(trial.time + static[layout.late(k)].sum())[..., None]
+    zero *= trial.ground.loaded(trial.time + problem.loads.late_s(k, static))[..., None]
     loads -= np.concatenate([zero, np.cross(middle, zero)], axis=-1)
     back = Rotation.from_rotvec([0.0, -angle, 0.0]).as_matrix()
     about = (loads[..., 3:] - np.cross(middle, loads[..., :3])) @ back.T
@@ -183,7 +187,7 @@ def residuals(problem: MapProblem, k: int, coefficients: np.ndarray, static: np.
     loads *= 1.0 + gain[..., None]
     forces = axis_forces(rigid, skeleton.map.motion(q, qd, qdd))
     load = np.linalg.solve(pose.axes[:, :6], forces[:, :6, None])[..., 0] - loads.sum(axis=1)
-    for kappa in static[layout.trunks][k : k + 1]:
+    for kappa in static[layout[BENDING]][k : k + 1]:
         load += kappa * bending(problem, skeleton, (q, qd, qdd), loads[..., :3].sum(axis=1))
     left = np.hstack([load[:, :3], load[:, 3:] - np.cross(skeleton.root.centre(q), load[:, :3])])
     left /= np.repeat([trial.force_sd, trial.moment_sd], 3)
@@ -195,8 +199,8 @@ def residuals(problem: MapProblem, k: int, coefficients: np.ndarray, static: np.
 def bending(problem: MapProblem, skeleton: Skeleton, motion: Sequence[np.ndarray], force: np.ndarray) -> np.ndarray:
     """(n, 6) load at the ground origin per kg m that stays upright while the trunk leans, from places at five times."""
     q, qd, qdd = motion
-    row = next(k for k, name in enumerate(problem.segments) if segment_of(name) == "torso")
-    number = skeleton.segments.index(problem.segments[row])
+    row = next(k for k, name in enumerate(problem.model.segments) if segment_of(name) == "torso")
+    number = skeleton.segments.index(problem.model.segments[row])
     height = 1.5 * problem.prior.mean.com_m[row, 1]
     steps = 2e-3 * np.arange(-2.0, 3.0)
     poses = [skeleton.pose(q + t * qd + 0.5 * t**2 * qdd) for t in steps]
@@ -219,10 +223,10 @@ def _start(problem: MapProblem, k: int) -> np.ndarray:
 def _body(problem: MapProblem, static: tuple[float, ...]) -> tuple[Skeleton, pin.Model]:
     """Skeleton and Pinocchio model with these static unknowns; kept while only the motion changes."""
     values, layout = np.array(static), problem.layout
-    locked = dict(zip(problem.calibration.coordinates, values[layout.coordinates], strict=True))
-    positions = values[layout.locals].reshape(-1, 3)
+    locked = dict(zip(problem.calibration.coordinates, values[layout[STILL]], strict=True))
+    positions = values[layout[PLACES]].reshape(-1, 3)
     skeleton = problem.skeleton.with_places(positions).lock(locked)
-    return skeleton, pinocchio_model(skeleton, problem.bsp(values))
+    return skeleton, pinocchio_model(skeleton, problem.model.bsp(values))
 
 
 def process_covariance(process: ErrorProcess, lags: np.ndarray) -> np.ndarray:

@@ -12,6 +12,7 @@ import numpy as np
 
 from kinertia.estimation.calibration import marker_jacobian
 from kinertia.estimation.prior import BspPrior
+from kinertia.estimation.simultaneous.given import BSP
 from kinertia.estimation.simultaneous.observed_trial import Observation
 from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.model.bsp import block_diagonal
@@ -48,12 +49,12 @@ def information_on_body(trial: SyntheticTrial, seen: Observation, prior: BspPrio
         moment_sd=0.3 * EXACT_N,
     )
     problem = MapProblem(trial.skeleton, replace(prior, mean=trial.bsp), held(trial.skeleton), [exact])
-    normal = problem.normal(0, problem.start[0], problem.start_static)
+    normal = problem.normal(0, problem.start[0], problem.layout.start)
     motion = dense_band(normal.band) + _of_markers(problem, exact, floor_m)
-    theta = problem.layout.theta
+    theta = problem.layout[BSP]
     border = normal.border[..., theta].reshape(len(motion), -1)
     information = normal.static[theta, theta] - border.T @ np.linalg.solve(motion, border)
-    chain = np.linalg.inv(block_diagonal(table_jacobian(problem.start_static[theta])))
+    chain = np.linalg.inv(block_diagonal(table_jacobian(problem.layout.start[theta])))
     return chain.T @ information @ chain
 
 

@@ -7,6 +7,8 @@ from kinertia.estimation.simultaneous import curve_deviations as module
 from kinertia.estimation.simultaneous.block_tridiagonal import BlockBand
 from kinertia.estimation.simultaneous.curve_deviations import curve_deviations
 from kinertia.estimation.simultaneous.gauss_newton import GaussNewton
+from kinertia.estimation.simultaneous.given import BSP, PLACES, STILL
+from kinertia.estimation.simultaneous.instrument_term import CLOCK, PLATES, ZEROS
 from kinertia.estimation.simultaneous.linearised import Point
 from kinertia.estimation.simultaneous.moment_derivatives import moment_derivatives
 from kinertia.estimation.simultaneous.outcome import Ended
@@ -31,17 +33,17 @@ def estimate(request, tmp_path_factory):
 def moments(problem, coefficients: np.ndarray, static: np.ndarray, with_impact: bool = False) -> np.ndarray:
     """(d, c) joint moments at a point, by `inverse_dynamics`; with the impacts added to the loads on the feet."""
     names = problem.calibration.coordinates
-    values = dict(zip(names, static[problem.layout.coordinates].tolist(), strict=True))
+    values = dict(zip(names, static[problem.layout[STILL]].tolist(), strict=True))
     dynamic = np.flatnonzero(problem.trials[0].dynamic)
     motion = Motion(*problem.bases[0].evaluate(coefficients)).cut(dynamic)
-    reactions, time = problem.reactions(0, static), problem.trials[0].time[dynamic]
+    reactions, time = problem.loads.reactions(0, static), problem.trials[0].time[dynamic]
     loads = reactions.at(time) + (reactions.impact_at(time) if with_impact else 0.0)
-    return inverse_dynamics(problem.skeleton.lock(values), problem.bsp(static), motion, loads)
+    return inverse_dynamics(problem.skeleton.lock(values), problem.model.bsp(static), motion, loads)
 
 
 def prior_information(problem, static: np.ndarray) -> np.ndarray:
-    information, places = problem.prior_information(static), problem.layout.instruments
-    information[places, places] += GaussianPrior.of(problem.instruments).precision
+    information, places = problem.prior_information(static), problem.layout.errors
+    information[places, places] += GaussianPrior.of(problem.layout.error_priors).precision
     return information
 
 
@@ -70,7 +72,7 @@ def curves(problem, coefficients: np.ndarray, static: np.ndarray) -> dict[str, n
     dynamic = np.flatnonzero(problem.trials[0].dynamic)
     q, qd, _ = (part[dynamic] for part in problem.bases[0].evaluate(coefficients))
     moment = moments(problem, coefficients, static)
-    ground = problem.reactions(0, static).at(problem.trials[0].time[dynamic])[..., :3]
+    ground = problem.loads.reactions(0, static).at(problem.trials[0].time[dynamic])[..., :3]
     return {
         "coordinates": q,
         "moments": moment,
@@ -86,8 +88,8 @@ def dense_derivatives(
     places, rates and accelerations do.
     """
     basis, frames = problem.bases[0], np.flatnonzero(problem.trials[0].dynamic)
-    motion = [part[frames] for part in problem.full(basis.evaluate(coefficients), static)]
-    by = moment_derivatives(problem, 0, motion, static, problem.reactions(0, static), frames)
+    motion = [part[frames] for part in problem.model.full(basis.evaluate(coefficients), static)]
+    by = moment_derivatives(problem, 0, motion, static, problem.loads.reactions(0, static), frames)
     d, (size, c) = len(frames), coefficients.shape
     nothing, same = np.zeros((d, c, c)), np.tile(np.eye(c), (d, 1, 1))
     still, zero = by.static, np.zeros_like(by.static)
@@ -117,14 +119,13 @@ def test_derivatives_agree_with_finite_differences(estimate):
     n, layout = coefficients.size, problem.layout
     derivatives = dense_derivatives(problem, coefficients, static)
     rng = np.random.default_rng(0)
-    kinds = (layout.theta, layout.plates, layout.zeros, layout.coordinates)
+    kinds = (layout[BSP], layout[PLATES], layout[CLOCK], layout[ZEROS], layout[STILL])
     parts = [slice(0, n), *(slice(n + part.start, n + part.stop) for part in kinds)]
-    parts.append(slice(n + layout.clock, n + layout.clock + 1))
     # a step under load, which there is none of, makes the splines through the loads swing for some samples
     frames_s = problem.trials[0].time[problem.trials[0].dynamic]
     away = np.abs(frames_s - SWITCH_S) > 0.05
     # nor is it told between samples where somebody begins to stand
-    reactions = problem.reactions(0, static)
+    reactions = problem.loads.reactions(0, static)
     steps_s = reactions.time[1:][np.diff(reactions.loaded, axis=0).any(axis=1)]
     away &= (np.abs(frames_s[:, None] - steps_s) > 0.05).all(axis=1)
     assert away.any()
@@ -156,7 +157,9 @@ def test_deviations_are_those_of_the_dense_covariance(estimate, noise):
     np.testing.assert_allclose(root @ root.T, full[n:, n:], rtol=1e-4, atol=1e-6 * np.abs(full[n:, n:]).max())
     sd = curve_deviations(problem, 0, coefficients, static, part, root)
     impacts, speed = of_impacts(problem, coefficients, static), speeds(problem, coefficients)
-    noise_n = problem.reactions(0, static).noise_n * (curves(problem, coefficients, static)["ground_forces"] != 0.0)
+    noise_n = problem.loads.reactions(0, static).noise_n * (
+        curves(problem, coefficients, static)["ground_forces"] != 0.0
+    )
     more = {
         "moments": impacts,
         "powers": impacts * speed**2,
@@ -186,7 +189,7 @@ def test_deviations_of_two_trials_are_those_of_one_dense_matrix(estimate, noise)
     static = point(pair)[1]
     rng = np.random.default_rng(0)
     here = pair.at(Point((coefficients,) * 2, static, tuple(rng.normal(size=3 * len(sd)) for _ in range(2))))
-    gaussian = GaussianPrior.of(pair.instruments)
+    gaussian = GaussianPrior.of(pair.layout.error_priors)
     chains, information, right = dense_pair(pair, here, gaussian)
     covariance = inverse(information)
     model = GaussNewton.of(pair, here).under(gaussian)
@@ -224,7 +227,7 @@ def dense_pair(pair, here, gaussian) -> tuple[list[np.ndarray], np.ndarray, np.n
     """Static unknowns, displacements and motions of two trials in one matrix: per trial the derivative of its static
     unknowns by all, information, right-hand side.
     """
-    point, places = here.point, pair.layout.instruments
+    point, places = here.point, pair.layout.errors
     normals = [pair.normal(k, part, pair.in_trial(k, point)) for k, part in enumerate(point.coefficients)]
     s, wide = pair.layout.size, len(point.displaced[0])
     sizes = [normal.right.size for normal in normals]
@@ -239,7 +242,7 @@ def dense_pair(pair, here, gaussian) -> tuple[list[np.ndarray], np.ndarray, np.n
         own, moving = slice(s + k * wide, s + (k + 1) * wide), slice(ends[k] - sizes[k], ends[k])
         chain = np.zeros((s, ends[-1]))
         chain[:, :s] = np.eye(s)
-        chain[pair.layout.locals, own] = np.diag(pair.displacement_sd_m[k])
+        chain[pair.layout[PLACES], own] = np.diag(pair.displaced_sd[k])
         across = normal.border.reshape(-1, s) @ chain
         information += chain.T @ normal.static @ chain
         information[moving] += across

@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from kinertia.estimation.simultaneous.instrument_term import CLOCK, DELAYS, InstrumentErrors
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation, InstrumentPrior
 from kinertia.estimation.simultaneous.plates import PLATE_ERRORS, PLATE_UNKNOWNS
 from kinertia.settings import Instruments
@@ -71,7 +72,12 @@ def test_what_trials_have_of_their_own_is_marginalised():
 def test_a_trial_that_began_with_the_others_has_hardly_a_delay_of_its_own(clock_sd_ms):
     """Whoever has tested the clock has not tested every trial."""
     prior = InstrumentPrior.stated(Instruments(clock_sd_ms=clock_sd_ms))
-    clock, *delays = prior.of_unknowns(("plate 1",), 3).own[-4:]
+    several = small_problem(3)
+    calibration = replace(several.calibration, instruments=prior)
+    unknowns = InstrumentErrors.unknowns(replace(several.given, calibration=calibration))
+    priors = {one.name: one.prior.own for one in unknowns}
+    (clock,), delays = priors[CLOCK], priors[DELAYS]
+    assert len(delays) == 3
     assert clock.sound_sd == (0.0003 if clock_sd_ms is None else pytest.approx(clock_sd_ms / 1e3))
     assert all((one.sound_sd, one.faulty_sd, one.faulty_share) == (0.00003, 0.010, 0.03) for one in delays)
 
@@ -114,10 +120,10 @@ def test_columns_of_the_same_name_have_faults_in_common():
 def test_the_session_counts_in_the_normal_equations():
     """Cost, right-hand side and information go together: by finite differences."""
     problem = small_problem(2)
-    session = shown(problem.plates)
+    session = shown(problem.given.plates)
     calibration = replace(problem.calibration, instruments=replace(INSTRUMENTS, session=(session, session)))
     with_session = type(problem)(problem.skeleton, problem.prior, calibration, problem.trials)
-    places, static = problem.layout.laboratory, problem.start_static.copy()
+    places, static = problem.layout.laboratory, problem.layout.start.copy()
     static[places] = np.random.default_rng(2).normal(0.0, 0.01, places.stop - places.start)
     before, information = (each.prior_information(static) for each in (problem, with_session))
     (right_before, cost_before), (right, cost) = (each.prior_slope(static) for each in (problem, with_session))
@@ -147,13 +153,25 @@ def test_a_single_trial_may_be_late_by_itself_unless_its_clock_has_been_checked(
     one = small_problem()
     known = InstrumentPrior.stated(Instruments(clock_sd_ms=clock_sd_ms))
     problem = type(one)(one.skeleton, one.prior, replace(one.calibration, instruments=known), one.trials)
-    assert problem.layout.delays.stop - problem.layout.delays.start == expected
+    assert problem.layout[DELAYS].stop - problem.layout[DELAYS].start == expected
+
+
+@pytest.mark.parametrize(
+    ("clock_sd_ms", "trials", "expected"), [(None, 1, ["clock", "delays"]), (0.5, 1, []), (None, 2, [])]
+)
+def test_the_delay_of_a_single_trial_is_profiled_where_it_is_open(clock_sd_ms, trials, expected):
+    several = small_problem(trials)
+    known = InstrumentPrior.stated(Instruments(clock_sd_ms=clock_sd_ms))
+    calibration = replace(several.calibration, instruments=known)
+    problem = type(several)(several.skeleton, several.prior, calibration, several.trials)
+    assert problem.profiled() == [problem.layout[name].start for name in expected]
 
 
 def test_a_gain_of_a_trial_is_that_of_its_plates_in_it_only():
     pair = small_problem(2)
-    static = pair.start_static.copy()
-    static[pair.layout.gains_of(1)] = [0.01, 0.02, 0.03]
+    static = pair.layout.start.copy()
+    instruments = pair.term(InstrumentErrors)
+    static[instruments.gains_of(1)] = [0.01, 0.02, 0.03]
     gains = list(PLATE_ERRORS).index("gain")
-    np.testing.assert_allclose(pair.plates_in(1, static)[:, gains], [0.01, 0.02, 0.03])
-    assert not pair.plates_in(0, static).any()
+    np.testing.assert_allclose(instruments.plates_in(1, static)[:, gains], [0.01, 0.02, 0.03])
+    assert not instruments.plates_in(0, static).any()

@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from kinertia.estimation.simultaneous.given import BSP
 from kinertia.estimation.simultaneous.knot_phases import PHASES, OfPhases, followed
 from kinertia.estimation.simultaneous.linearised import Point
 from small_problem import point, small_problem
@@ -44,7 +45,7 @@ def test_curves_of_the_same_motion_and_body_are_not_apart(problem, here):
     same = replace(found, problems=(problem, problem), points=(here, here)).curves_apart(0)
     assert not same.moments.any()
     heavier = here.static.copy()
-    heavier[problem.layout.theta.start] += 0.1
+    heavier[problem.layout[BSP].start] += 0.1
     apart = replace(found, problems=(problem, problem), points=(here, replace(here, static=heavier))).curves_apart(0)
     assert apart.moments.max() > 0.0
     assert not apart.coordinates.any()

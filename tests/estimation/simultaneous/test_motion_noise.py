@@ -47,7 +47,7 @@ def found(trial: SyntheticTrial, errors: np.ndarray) -> np.ndarray:
     calibration = CalibrationPrior({}, np.full(markers.shape[1], 0.005), INSTRUMENTS)
     prior = literature_prior(walking_subject().literature)
     problem = MapProblem(trial.skeleton, prior, calibration, [seen])
-    return motion_noise(problem, 0, problem.beginning.coefficients[0], problem.start_static)
+    return motion_noise(problem, 0, problem.beginning.coefficients[0], problem.layout.start)
 
 
 def taken_up(trial: SyntheticTrial) -> float:

@@ -3,6 +3,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from kinertia.estimation.simultaneous.calibration_entry import BENDING
+from kinertia.estimation.simultaneous.given import BSP, PLACES, SKIN, STILL
+from kinertia.estimation.simultaneous.instrument_term import CLOCK, DELAYS, GAINS, PLATES, ZEROS
 from kinertia.estimation.simultaneous.linearised import Point
 from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior
@@ -39,13 +42,10 @@ def sloped(function, size: float) -> float:
     return (function(size) - function(-size)) / (2 * size)
 
 
-@pytest.mark.parametrize(
-    "kind", ["theta", "coordinates", "locals", "skin", "plates", "clock", "zeros", "gains", "trunks"]
-)
+@pytest.mark.parametrize("kind", [BSP, STILL, PLACES, SKIN, PLATES, CLOCK, ZEROS, GAINS, BENDING])
 def test_gradient_of_static_unknowns(problem, here, kind):
     coefficients, static = here
-    part = getattr(problem.layout, kind)
-    part = slice(part, part + 1) if isinstance(part, int) else part
+    part = problem.layout[kind]
     step = np.zeros_like(static)
     step[part] = np.random.default_rng(0).normal(size=step[part].shape)
     right = problem.normal(0, coefficients, static).static_right + problem.prior_slope(static)[0]
@@ -57,7 +57,7 @@ def test_gradient_of_delays():
     """Those of a trial say nothing of another."""
     pair = small_problem(2)
     coefficients, static = point(pair)
-    delays = np.arange(len(static))[pair.layout.delays]
+    delays = np.arange(len(static))[pair.layout[DELAYS]]
     assert len(delays) == 2
     for k in range(2):
         normal = pair.normal(k, coefficients[k], static)
@@ -137,7 +137,7 @@ def test_a_slope_is_the_derivative_of_the_cost_by_everything(problem):
     coefficients, static = point(pair)
     rng = np.random.default_rng(0)
     here = Point(tuple(coefficients), static, tuple(rng.normal(size=3 * len(sd)) for _ in range(2)))
-    gaussian = GaussianPrior.of(pair.instruments)
+    gaussian = GaussianPrior.of(pair.layout.error_priors)
     slope, at = pair.slope(here), pair.at(here)
     assert at.slope.cost == pytest.approx(slope.cost, rel=1e-12)
     np.testing.assert_allclose(at.slope.right, slope.right, atol=1e-9 * np.abs(slope.right).max())
@@ -151,11 +151,11 @@ def test_a_slope_is_the_derivative_of_the_cost_by_everything(problem):
 
 def test_prior_information_is_the_derivative_of_its_gradient(problem):
     """At the prior's mean the gaps vanish, so that Gauss-Newton is exact there."""
-    static = problem.start_static
+    static = problem.layout.start
     information, (right, value) = problem.prior_information(static), problem.prior_slope(static)
     # without that of the instruments, about which this says nothing
-    places = problem.layout.instruments
-    information[places, places] += GaussianPrior.of(problem.instruments).precision
+    places = problem.layout.errors
+    information[places, places] += GaussianPrior.of(problem.layout.error_priors).precision
     scale = 1.0 / np.sqrt(np.diag(information))
     np.testing.assert_allclose(right * scale, 0.0, atol=1e-6)
     assert value == pytest.approx(0.0, abs=1e-12)
@@ -172,17 +172,17 @@ def test_prior_cost_counts_deviations(problem):
     """One deviation of a quantity that nothing else is tied to costs one half."""
     layout = problem.layout
     prior = problem.calibration
-    cases = [(layout.coordinates.start, 0.01), (layout.locals.start + 4, float(prior.marker_sd_m[1]))]
+    cases = [(layout[STILL].start, 0.01), (layout[PLACES].start + 4, float(prior.marker_sd_m[1]))]
     for at, deviation in cases:
-        static = problem.start_static.copy()
+        static = problem.layout.start.copy()
         static[at] += deviation
         assert problem.prior_slope(static)[1] == pytest.approx(0.5)
 
 
 def test_prior_cost_of_a_body_is_its_mahalanobis_distance_and_the_scale(problem, here):
     _, static = here
-    static = np.where(np.arange(len(static)) < problem.layout.theta.stop, static, problem.start_static)
-    bsp, prior = problem.bsp(static), problem.prior
+    static = np.where(np.arange(len(static)) < problem.layout[BSP].stop, static, problem.layout.start)
+    bsp, prior = problem.model.bsp(static), problem.prior
     gap = (bsp.table() - prior.mean.table()).ravel()
     scale = (bsp.total_mass_kg - prior.mass_kg) / prior.mass_sd_kg
     expected = 0.5 * (gap @ np.linalg.solve(prior.covariance, gap) + scale**2)
@@ -190,26 +190,26 @@ def test_prior_cost_of_a_body_is_its_mahalanobis_distance_and_the_scale(problem,
 
 
 def test_start_is_the_prior_s_mean(problem):
-    start = problem.bsp(problem.start_static)
+    start = problem.model.bsp(problem.layout.start)
     np.testing.assert_allclose(start.table(), nearest_consistent(problem.prior.mean).table(), rtol=1e-9, atol=1e-12)
-    positions = problem.start_static[problem.layout.locals].reshape(-1, 3)
+    positions = problem.layout.start[problem.layout[PLACES]].reshape(-1, 3)
     np.testing.assert_array_equal(positions, problem.skeleton.marker_locals)
-    assert not problem.start_static[problem.layout.plates].any()
-    assert problem.start_static[problem.layout.clock] == 0.0
+    assert not problem.layout.start[problem.layout[PLATES]].any()
+    assert not problem.layout.start[problem.layout[CLOCK]].any()
 
 
 def test_trials_share_plates_by_name_and_the_clock():
     pair = small_problem(2)
     other = replace(pair.trials[1], ground=replace(pair.trials[1].ground, plates=("second", "fourth", "third")))
     pair = MapProblem(pair.skeleton, pair.prior, pair.calibration, [pair.trials[0], other])
-    assert pair.plates == ("first", "second", "third", "fourth")
+    assert pair.given.plates == ("first", "second", "third", "fourth")
     coefficients, static = point(pair)
     for k, foreign in ((0, "fourth"), (1, "first")):
         static_terms = pair.normal(k, coefficients[k], static).static
-        for i, name in enumerate(pair.plates):
-            own = np.abs(static_terms[pair.layout.plates][4 * i : 4 * i + 4]).max(axis=1)
+        for i, name in enumerate(pair.given.plates):
+            own = np.abs(static_terms[pair.layout[PLATES]][4 * i : 4 * i + 4]).max(axis=1)
             assert (own == 0).all() if name == foreign else (own > 0).all(), (k, name)
-        assert static_terms[pair.layout.clock, pair.layout.clock] > 0
+        assert static_terms[pair.layout[CLOCK], pair.layout[CLOCK]].item() > 0
 
 
 def test_displacements_move_the_markers_of_their_trial_only(problem, here):
@@ -219,12 +219,12 @@ def test_displacements_move_the_markers_of_their_trial_only(problem, here):
     displaced = replace(trial, displacement_sd_m=sd)
     pair = MapProblem(problem.skeleton, problem.prior, problem.calibration, [displaced, trial])
     own = np.random.default_rng(0).normal(size=(len(sd), 3))
-    parts = problem.layout.zeros, problem.layout.gains, problem.layout.trunks
+    parts = problem.layout[ZEROS], problem.layout[GAINS], problem.layout[BENDING]
     where = np.repeat([part.stop for part in parts], [part.stop - part.start for part in parts])
     same = np.insert(static, where, static[parts[0].start : parts[-1].stop])
-    on_time = np.insert(same, [pair.layout.delays.start] * 2, 0.0)
+    on_time = np.insert(same, [pair.layout[DELAYS].start] * 2, 0.0)
     at = Point((coefficients, coefficients), on_time, (own.ravel(), np.zeros(own.size)))
-    moved = pair.in_trial(0, at)[pair.layout.locals].reshape(-1, 3) - on_time[pair.layout.locals].reshape(-1, 3)
+    moved = pair.in_trial(0, at)[pair.layout[PLACES]].reshape(-1, 3) - on_time[pair.layout[PLACES]].reshape(-1, 3)
     np.testing.assert_allclose(moved, sd[:, None] * own, atol=1e-15)
     np.testing.assert_array_equal(pair.in_trial(1, at), on_time)
     together = pair.at(at)
@@ -240,8 +240,8 @@ def test_a_frame_without_dynamics_says_nothing_about_the_body(problem, here):
     basis, trial = problem.bases[0], problem.trials[0]
     touched = np.unique(basis.active[trial.dynamic])
     silent = np.setdiff1d(np.arange(basis.size), touched)
-    assert not normal.border[silent][..., problem.layout.theta].any()
-    assert np.abs(normal.border[touched][..., problem.layout.theta]).max(axis=(1, 2)).min() > 0
+    assert not normal.border[silent][..., problem.layout[BSP]].any()
+    assert np.abs(normal.border[touched][..., problem.layout[BSP]]).max(axis=(1, 2)).min() > 0
 
 
 @pytest.mark.parametrize("place", [0, 4, 5, 6], ids=["mass", "Lxx", "Lyy", "Lzz"])
@@ -251,8 +251,8 @@ def test_bends_are_what_gauss_newton_leaves_out(problem, here, place):
     Second moments without products, else a diagonal of L stands in other elements, too.
     """
     coefficients, static = here[0], here[1].copy()
-    static[problem.layout.theta].reshape(-1, 10)[:, 7:] = 0.0
-    rows = np.arange(problem.layout.theta.stop).reshape(-1, 10)[:, place]
+    static[problem.layout[BSP]].reshape(-1, 10)[:, 7:] = 0.0
+    rows = np.arange(problem.layout[BSP].stop).reshape(-1, 10)[:, place]
 
     def right(values):
         place = Point((coefficients,), values, problem.beginning.displaced)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from kinertia.estimation.simultaneous.given import BSP, STILL
 from kinertia.estimation.simultaneous.root_terms import RootFrames, columns_of
 from kinertia.model.log_cholesky import by_body, dynamic_jacobian
 from kinertia.motion.dynamics import Motion, residual_terms, root_regressor
@@ -20,27 +21,27 @@ def test_they_are_those_of_the_dynamics_over_their_deviations(problem):
     rng = np.random.default_rng(6)
     wrench, sd = rng.normal(0.0, 100.0, (len(frames), 6)), rng.uniform(1.0, 10.0, (len(frames), 6))
     by_ground = np.zeros((len(frames), 6, layout.in_root.stop))
-    by_ground[..., layout.instruments] = rng.standard_normal(by_ground[..., layout.instruments].shape)
-    skeleton, bsp, theta = problem.placed(static), problem.bsp(static), static[layout.theta]
-    motion = Motion(*problem.full(problem.bases[0].evaluate(coefficients[0], frames), static))
+    by_ground[..., layout.errors] = rng.standard_normal(by_ground[..., layout.errors].shape)
+    skeleton, bsp, theta = problem.model.placed(static), problem.model.bsp(static), static[layout[BSP]]
+    motion = Motion(*problem.model.full(problem.bases[0].evaluate(coefficients[0], frames), static))
 
     left, by = residual_terms(skeleton, bsp, motion, wrench)
     by_static = np.zeros_like(by_ground)
-    by_static[..., layout.theta] = by_body(root_regressor(skeleton, bsp.segments, motion), dynamic_jacobian(theta))
-    by_static[..., layout.coordinates] = by.q[..., problem.still]
+    by_static[..., layout[BSP]] = by_body(root_regressor(skeleton, bsp.segments, motion), dynamic_jacobian(theta))
+    by_static[..., layout[STILL]] = by.q[..., problem.given.still]
     by_static -= by_ground
     by_static[:, 3:] += np.cross(skeleton.root.centre(motion.q)[:, :, None], by_ground[:, :3], axis=1)
 
-    columns = columns_of(skeleton, bsp.segments, problem.moving, problem.still, layout)
+    columns = columns_of(skeleton, bsp.segments, problem.moving, problem.given.still, layout)
     given = RootFrames(
         skeleton,
         bsp,
         theta,
         motion,
         wrench,
-        np.zeros(0),
-        np.zeros(0),
-        lambda into, *_: np.add(into, by_ground, out=into),
+        ((by_ground, lambda into, by: np.add(into, by, out=into)),),
+        np.zeros((len(frames), 6, 0)),
+        (),
         sd,
         frames,
         layout.in_root.stop,

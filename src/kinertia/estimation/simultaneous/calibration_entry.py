@@ -21,11 +21,14 @@ SHOWN_UNIT = {
     "s": (1e3, "ms"),
     "1": (1e2, "%"),
     "N": (1.0, "N"),
+    "N m": (1.0, "N m"),
     "rad": (180.0 / np.pi, "degrees"),
     "N m/N": (1e3, "N m/kN"),
     "kg m": (1.0, "kg m"),
 }
 """Factor and unit in which people read a calibrated quantity."""
+INTERVAL_SD = 1.96
+"""Half of a 95 % interval, in deviations."""
 _NOTABLE = 2.0
 
 

@@ -84,7 +84,7 @@ def curve_deviations(
         k,
         coefficients,
         static,
-        problem.reactions(k, static),
+        problem.loads.reactions(k, static),
         # errors that come back count more often only for what does not move
         np.sqrt(motion_noise(problem, k, coefficients, static) / problem.trials[k].repeats),
         frames,
@@ -142,7 +142,7 @@ class _Curves:
     def _write(self, spread: _MotionSpread, root: np.ndarray, rows: slice) -> None:
         problem, basis, chosen = self.problem, self.problem.bases[self.k], self.frames[rows]
         in_root = problem.layout.in_root
-        motion = problem.full(basis.evaluate(self.coefficients, chosen), self.static)
+        motion = problem.model.full(basis.evaluate(self.coefficients, chosen), self.static)
         by = moment_derivatives(problem, self.k, motion, self.static, self.reactions, chosen)
         self.impact[rows], self.speed[rows] = by.impact, motion[1][:, problem.moving]
         seen = _Seen.of(by, self.speed[rows], basis.first[chosen], basis.values[:, chosen], self.shares)

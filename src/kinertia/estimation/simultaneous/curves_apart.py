@@ -30,8 +30,10 @@ def _curves(problem: MapProblem, k: int, point: Point) -> tuple[np.ndarray, ...]
     """Coordinates, moments, powers and ground reactions at the dynamic frames."""
     frames = np.flatnonzero(problem.trials[k].dynamic)
     static = problem.in_trial(k, point)
-    motion = Motion(*problem.full(problem.bases[k].evaluate(point.coefficients[k], frames), static))
-    loads = problem.reactions(k, static).at(problem.trials[k].time[frames])
-    moments = inverse_dynamics(problem.placed(static), problem.bsp(static), motion, loads)[:, problem.moving]
+    motion = Motion(*problem.model.full(problem.bases[k].evaluate(point.coefficients[k], frames), static))
+    loads = problem.loads.reactions(k, static).at(problem.trials[k].time[frames])
+    moments = inverse_dynamics(problem.model.placed(static), problem.model.bsp(static), motion, loads)[
+        :, problem.moving
+    ]
     q, speed = motion.q[:, problem.moving], motion.qd[:, problem.moving]
     return q, moments, moments * speed, loads[..., :3]

@@ -16,7 +16,6 @@ import numpy as np
 from kinertia.estimation.simultaneous.gauss_newton import GaussNewton
 from kinertia.estimation.simultaneous.linearised import Slope
 from kinertia.estimation.simultaneous.observed_trial import Observation
-from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior, log_chance
 
 _WRONG_ODDS = 0.25
@@ -45,7 +44,7 @@ class Evidence(NamedTuple):
         found = log_evidence(model.here.slope, model, gaussian)
         if not otherwise:
             return cls(found, None)
-        other = MapProblem(problem.skeleton, problem.prior, problem.calibration, otherwise)
+        other = problem.of(otherwise)
         return cls(found, log_evidence(other.slope(model.here.point), model, gaussian))
 
 
@@ -65,7 +64,7 @@ def log_evidence(slope: Slope, model: GaussNewton, gaussian: GaussianPrior) -> f
     # lowest cost of all else, where the instruments are as they are at the optimum
     lowest = cost - 0.5 * float(right @ step) - gaussian.cost(mean)
     at_none = lowest - 0.5 * float(mean @ data @ mean) + float(pulled @ mean)
-    return log_chance(model.problem.instruments, data, pulled) - at_none
+    return log_chance(model.problem.layout.error_priors, data, pulled) - at_none
 
 
 @dataclass(frozen=True)

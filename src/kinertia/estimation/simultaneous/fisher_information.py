@@ -13,6 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
+from kinertia.estimation.simultaneous.given import BSP
 from kinertia.estimation.simultaneous.marker_offsets import as_displaced
 from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior
@@ -41,13 +42,13 @@ class Information:
     def of_trials(self) -> tuple[np.ndarray, ...]:
         """Per trial (S, S) information on the static unknowns, motion eliminated."""
         problem = self.problem
-        trials = (problem.eliminated(k, start, problem.start_static) for k, start in enumerate(problem.start))
+        trials = (problem.eliminated(k, start, problem.layout.start) for k, start in enumerate(problem.start))
         return tuple(trial.information for trial in trials)
 
     @cached_property
     def of_prior(self) -> np.ndarray:
         """(S, S) information of all priors but the instruments'."""
-        return self.problem.prior_information(self.problem.start_static)
+        return self.problem.prior_information(self.problem.layout.start)
 
     def root(self, trials: Iterable[int]) -> np.ndarray:
         """R (10 s, S) with covariance R R^T of the body segment parameters that these trials together would leave."""
@@ -55,18 +56,18 @@ class Information:
         counts = self.repeats[np.ix_(chosen, chosen)].sum(axis=1)
         layout, information = self.problem.layout, self.of_prior.copy()
         for k, count in zip(chosen, counts, strict=True):
-            sd = self.problem.displacement_sd_m[k]
-            information = information + as_displaced(self.of_trials[k] / count, layout.locals, sd)
+            sd = self.problem.displaced_sd[k]
+            information = information + as_displaced(self.of_trials[k] / count, layout.displaced, sd)
         first = layout.in_root
         information[first, first] += self._of_instruments(StaticInformation.of(information, first.stop).first)
-        theta = layout.theta
-        chain = block_diagonal(table_jacobian(self.problem.start_static[theta]))
+        theta = layout[BSP]
+        chain = block_diagonal(table_jacobian(self.problem.layout.start[theta]))
         result: np.ndarray = chain @ StaticInformation.of(information, first.stop).root_of_covariance()[theta]
         return result
 
     def _of_instruments(self, rest: np.ndarray) -> np.ndarray:
         """(n, n) information of the instruments' priors where the data, of which the rest tells, show them sound."""
-        priors, places = self.problem.instruments, self.problem.layout.instruments
+        priors, places = self.problem.layout.error_priors, self.problem.layout.errors
         gaussian, result = GaussianPrior.of(priors), np.zeros_like(rest)
         for _ in range(_ROUNDS):
             result[places, places] = gaussian.precision

@@ -10,10 +10,11 @@ import numpy as np
 from kinertia.estimation.identifiability import BaseParameters, base_parameters
 from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.simultaneous.bandwidth import Bandwidth
-from kinertia.estimation.simultaneous.calibration_entry import AXIS, BENDING, CENTRE, CalibrationEntry
+from kinertia.estimation.simultaneous.calibration_entry import CalibrationEntry
+from kinertia.estimation.simultaneous.cost_term import CostTerm
 from kinertia.estimation.simultaneous.evidence import FreeMomentSign
 from kinertia.estimation.simultaneous.impacts import down_weighted
-from kinertia.estimation.simultaneous.instrument_errors import OTHER_SIGN, instrument_errors
+from kinertia.estimation.simultaneous.instrument_errors import OTHER_SIGN
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation
 from kinertia.estimation.simultaneous.marker_noise import MarkerNoise
 from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINTY, ModelUncertainty
@@ -22,10 +23,9 @@ from kinertia.estimation.simultaneous.observed_trial import CalibrationPrior
 from kinertia.estimation.simultaneous.outcome import SimultaneousResult
 from kinertia.estimation.simultaneous.posterior_draws import PosteriorDraws
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous
-from kinertia.estimation.simultaneous.trunk_bending import BENDING_PRIOR_M
+from kinertia.estimation.simultaneous.terms import TERMS
 from kinertia.estimation.simultaneous.unlike import Unlikeness, unlikeness
 from kinertia.model.bsp import BodySegmentParameters
-from kinertia.model.centre_offsets import joint_and_axis
 from kinertia.model.gait27 import VIRTUAL_TRUNK
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion
@@ -127,6 +127,7 @@ def fit_simultaneous(
     progress: Callable[[float], None] = lambda share: None,
     otherwise: Sequence[Kinematics] = (),
     functional: Sequence[Kinematics] = (),
+    terms: Sequence[type[CostTerm]] = TERMS,
 ) -> SimultaneousFit:
     """Estimate motion, BSPs and calibration of all trials together.
 
@@ -140,6 +141,7 @@ def fit_simultaneous(
         otherwise: the same trials with other ground reactions, of which it is asked how likely they are beside
             (`SimultaneousResult.evidence`).
         functional: kinematics of trials whose markers alone are used; the outcome has none of them.
+        terms: of the cost.
     """
     every = [*trials, *functional]
     used = used_skeleton(skeleton, every, uncertainty)
@@ -150,7 +152,7 @@ def fit_simultaneous(
     count = len(trials)
     others = [reading(*each) for each in zip(together[:count], otherwise, bandwidths, strict=True)] if otherwise else []
     others += together[count:] if otherwise else ()
-    result = estimate_simultaneous(used, prior, calibration, together, progress, others).of_first(count)
+    result = estimate_simultaneous(used, prior, calibration, together, progress, others, terms).of_first(count)
     together = together[:count]
     calibrated = result.skeleton.carrying(None)
     staying = uncertainty.marker_sd_m is None
@@ -161,12 +163,11 @@ def fit_simultaneous(
     courses = tuple(m.q[at[0] : at[-1] + 1] for m, at in zip(result.motions, dynamic, strict=True))
     loads = tuple(every[o.dynamic] for every, o in zip(result.foot_loads, together, strict=True))
     covariance, before = (uncertainty.whole_covariance(c) for c in (result.bsp_covariance, prior.covariance))
-    names = [each.trial.name for each in trials]
     posterior = Posterior(
         np.sqrt(np.diag(before)).reshape(-1, 10),
         np.sqrt(np.diag(covariance)).reshape(-1, 10),
         covariance,
-        _calibration(used, uncertainty, result, names, prior.mass_kg),
+        result.calibration,
         seen.noise[:count],
         result.iterations,
         base_parameters(
@@ -235,38 +236,7 @@ def calibration_prior(
     each = np.maximum(misplaced_m, _STAYING_SD_M) if known is None else known
     places = np.broadcast_to(each, len(skeleton.markers)).copy()
     places[[label in _VIRTUAL_TRUNK for label in skeleton.labels]] = TRUNK_PLACE_SD_M
-    return CalibrationPrior(uncertainty.coordinates, places, uncertainty.instruments)
-
-
-def _calibration(
-    skeleton: Skeleton,
-    uncertainty: ModelUncertainty,
-    result: SimultaneousResult,
-    trials: Sequence[str],
-    mass_kg: float,
-) -> tuple[CalibrationEntry, ...]:
-    joints = [
-        CalibrationEntry(
-            kind="joint",
-            joint=joint,
-            quantity=AXIS if name in uncertainty.axes else CENTRE,
-            axis=axis,
-            value=float(value - uncertainty.before.get(name, skeleton.locked[name])),
-            prior_sd=uncertainty.coordinates[name],
-            sd=float(sd),
-            unit="rad" if name in uncertainty.axes else "m",
-        )
-        for name, (value, sd) in result.coordinates.items()
-        for joint, axis in [joint_and_axis(name)]
-    ]
-    bending_sd = mass_kg * BENDING_PRIOR_M.sd
-    trunks = [
-        CalibrationEntry(
-            kind="trunk", trial=trial, quantity=BENDING, value=kappa, prior_sd=bending_sd, sd=sd, unit="kg m"
-        )
-        for trial, (kappa, sd) in zip(trials, result.trunks_kg_m, strict=False)
-    ]
-    return (*joints, *instrument_errors(result, uncertainty.instruments, trials), *trunks)
+    return CalibrationPrior(uncertainty.coordinates, places, uncertainty.instruments, uncertainty.before)
 
 
 def _marker_distances(result: SimultaneousResult, trials: Sequence[Kinematics]) -> tuple[dict[str, float], ...]:

@@ -35,8 +35,8 @@ class GaussNewton:
     @classmethod
     def of(cls, problem: MapProblem, here: Linearised, held: np.ndarray | float = 0.0) -> GaussNewton:
         """At a point, with the diagonal of the information on the static unknowns raised by this much (S,)."""
-        places, information = problem.layout.locals, here.information.copy()
-        trials = zip(here.trials, problem.displacement_sd_m, strict=True)
+        places, information = problem.layout.displaced, here.information.copy()
+        trials = zip(here.trials, problem.displaced_sd, strict=True)
         displaced = tuple(Displaced.of(trial.information, places, sd) for trial, sd in trials)
         for each in displaced:
             information += each.information
@@ -46,7 +46,7 @@ class GaussNewton:
 
     def under(self, instruments: GaussianPrior) -> GaussNewton:
         """With this Gaussian for the instruments."""
-        places, first = self.problem.layout.instruments, self.rest.first.copy()
+        places, first = self.problem.layout.errors, self.rest.first.copy()
         first[places, places] += instruments.precision
         return replace(self, static=replace(self.rest, first=first))
 
@@ -54,7 +54,7 @@ class GaussNewton:
         """The step of all unknowns for a right-hand side, both as `Point.vector` has them."""
         pull = self.here.point.like(right)
         static, solved, rests = pull.static.copy(), [], []
-        places, sds = self.problem.layout.locals, self.problem.displacement_sd_m
+        places, sds = self.problem.layout.displaced, self.problem.displaced_sd
         for k, (trial, displaced) in enumerate(zip(self.here.trials, self.displaced, strict=True)):
             forward, lost = trial.forward(pull.coefficients[k])
             own = pull.displaced[k] - sds[k] * lost[places]
@@ -72,7 +72,7 @@ class GaussNewton:
 
     def of_instruments(self, point: Point, step: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Posterior mean (k,) and covariance (k, k) of the instruments, if a step leads from a point to the optimum."""
-        places = self.problem.layout.instruments
+        places = self.problem.layout.errors
         mean = (point.static + point.like(step).static)[places]
         return mean, np.linalg.inv(self.static.first)[places, places]
 

@@ -10,7 +10,7 @@ The estimate solves for what puts positions, gains and free moments right. Here 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import count
 from typing import NamedTuple
 
@@ -20,14 +20,13 @@ from kinertia.estimation.simultaneous.calibration_entry import (
     DELAY,
     FREE_MOMENT,
     GAIN,
+    INTERVAL_SD,
     POSITION,
     ROTATION,
     ZERO,
     CalibrationEntry,
 )
-from kinertia.estimation.simultaneous.instrument_support import INTERVAL_SD
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation, InstrumentPrior
-from kinertia.estimation.simultaneous.outcome import SimultaneousResult
 from kinertia.estimation.simultaneous.plates import FLOOR_UNKNOWNS, PLATE_ERRORS, PLATE_UNKNOWNS, ZERO_UNKNOWNS
 from kinertia.trial.plate_names import columns_of_several_trials
 
@@ -47,6 +46,18 @@ _QUANTITIES = {
 _UNITS = {**PLATE_ERRORS, **ZERO_UNKNOWNS}
 
 
+@dataclass(frozen=True, eq=False, kw_only=True)
+class FoundErrors:
+    """Values that the estimate solved for, and deviations: `SimultaneousResult` says of what."""
+
+    plates: dict[str, tuple[np.ndarray, np.ndarray]]
+    clock_s: tuple[float, float]
+    delays_s: tuple[tuple[float, float], ...]
+    zeros_n: tuple[dict[str, tuple[np.ndarray, np.ndarray]], ...]
+    gains: tuple[dict[str, tuple[float, float]], ...]
+    instruments: InstrumentInformation
+
+
 class Solved(NamedTuple):
     """An entry, with the place of its unknown among all instruments' and the value that the estimate solved for."""
 
@@ -56,25 +67,32 @@ class Solved(NamedTuple):
 
 
 def instrument_errors(
-    result: SimultaneousResult, prior: InstrumentPrior, trials: Sequence[str]
+    found: FoundErrors,
+    prior: InstrumentPrior,
+    trials: Sequence[str],
+    support: tuple[np.ndarray, np.ndarray],
+    own_place: int,
 ) -> tuple[CalibrationEntry, ...]:
     """All errors of instruments, found or not, each with its support.
 
     Args:
-        result: of the estimator.
+        found: by the estimator.
         prior: what was known of the instruments before.
-        trials: names, in the order of the result's.
+        trials: names.
+        support: `InstrumentSupport.moved` and `contradicted`, of all errors.
+        own_place: of the first that trials have of their own among them; the laboratory's come first.
     """
-    elsewhere = _session_says_otherwise(result.instruments, prior)
-    shared = list(laboratory_errors(result.plates, result.clock_s, prior))
+    moved, contradicted = support
+    elsewhere = _session_says_otherwise(found.instruments, prior)
+    shared = list(laboratory_errors(found.plates, found.clock_s, prior))
     own = {(one.plate, one.quantity, one.axis): one for _, _, one in shared}
     errors = []
-    for place, value, one in (*shared, *_of_trials(result, prior, trials)):
-        columns = _same_column(one.plate, list(result.plates)) if one.trial is None else []
+    for place, value, one in (*shared, *_of_trials(found, prior, trials, own_place)):
+        columns = _same_column(one.plate, list(found.plates)) if one.trial is None else []
         others = [own[column, one.quantity, one.axis] for column in columns]
-        by_trial = result.support.contradicted[place] or any(_apart(one, other) for other in others)
+        by_trial = contradicted[place] or any(_apart(one, other) for other in others)
         said = ANOTHER_TRIAL if by_trial else OTHER_PEOPLE if place in elsewhere else None
-        errors.append(replace(one, moved=float(result.support.moved[place]) * abs(value), contradicted_by=said))
+        errors.append(replace(one, moved=float(moved[place]) * abs(value), contradicted_by=said))
     return tuple(errors)
 
 
@@ -104,17 +122,17 @@ def laboratory_errors(
     yield _delay(floor + len(FLOOR_UNKNOWNS), clock_s, prior.clock_s.sd)
 
 
-def _of_trials(result: SimultaneousResult, prior: InstrumentPrior, trials: Sequence[str]) -> Iterator[Solved]:
+def _of_trials(found: FoundErrors, prior: InstrumentPrior, trials: Sequence[str], first: int) -> Iterator[Solved]:
     """Errors that trials have of their own; of gains, what a plate has in the trial altogether."""
-    places = count(len(PLATE_UNKNOWNS) * len(result.plates) + len(FLOOR_UNKNOWNS) + 1)
-    for trial, delay_s in zip(trials, result.delays_s, strict=False):
+    places = count(first)
+    for trial, delay_s in zip(trials, found.delays_s, strict=False):
         yield _delay(next(places), delay_s, prior.delay_s.sd, trial)
-    for trial, zeros in zip(trials, result.zeros_n, strict=True):
+    for trial, zeros in zip(trials, found.zeros_n, strict=True):
         for plate, (values, sds) in zeros.items():
             for unknown, value, sd in zip(ZERO_UNKNOWNS, values, sds, strict=True):
                 yield _of_plate(next(places), unknown, value, prior.zero_n.sd, sd, plate=plate, trial=trial)
     gain_sd = float(np.hypot(prior.plate["gain"].sd, prior.trial_gain.sd))
-    for trial, gains in zip(trials, result.gains, strict=True):
+    for trial, gains in zip(trials, found.gains, strict=True):
         for plate, (gain, sd) in gains.items():
             yield _of_plate(next(places), "gain", gain, gain_sd, sd, plate=plate, trial=trial)
 

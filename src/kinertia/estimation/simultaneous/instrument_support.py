@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtri
 
+from kinertia.estimation.simultaneous.calibration_entry import INTERVAL_SD
 from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
 from kinertia.estimation.simultaneous.gauss_newton import GaussNewton
 from kinertia.estimation.simultaneous.linearised import Point
@@ -20,8 +21,6 @@ from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior
 from kinertia.estimation.simultaneous.static_information import StaticInformation
 
-INTERVAL_SD = 1.96
-"""Half of a 95 % interval, in deviations."""
 _MOST_FRAMES = 100
 """Of each trial, evenly spaced, at which moments are looked at."""
 _ROOT = 6
@@ -30,7 +29,7 @@ _ROOT = 6
 
 @dataclass(frozen=True, eq=False)
 class InstrumentSupport:
-    """Of the k instrument unknowns, in the order of `Layout.instruments`.
+    """Of the k instrument unknowns, in the order of `Layout.errors`.
 
     Attributes:
         moved: (k,) by how many halves of its own 95 % interval a unit of the error, put back, moves the joint moment
@@ -59,13 +58,13 @@ def instrument_support(
 
 def moved_moments(problem: MapProblem, k: int, point: Point, curves: CurveDeviations) -> np.ndarray:
     """(k,) `InstrumentSupport.moved` in one trial, by the derivatives of its joint moments while the motion stays."""
-    dynamic, instruments = np.flatnonzero(problem.trials[k].dynamic), problem.layout.instruments
+    dynamic, instruments = np.flatnonzero(problem.trials[k].dynamic), problem.layout.errors
     if not len(dynamic):
         return np.zeros(instruments.stop - instruments.start)
     some = np.unique(np.linspace(0, len(dynamic) - 1, min(_MOST_FRAMES, len(dynamic))).astype(int))
     frames, static = dynamic[some], problem.in_trial(k, point)
-    motion = problem.full(problem.bases[k].evaluate(point.coefficients[k], frames), static)
-    by = moment_derivatives(problem, k, motion, static, problem.reactions(k, static), frames)
+    motion = problem.model.full(problem.bases[k].evaluate(point.coefficients[k], frames), static)
+    by = moment_derivatives(problem, k, motion, static, problem.loads.reactions(k, static), frames)
     change = np.abs(by.static[:, _ROOT:, instruments])
     result: np.ndarray = (change / (INTERVAL_SD * curves.moments[some][:, _ROOT:, None])).max(axis=(0, 1))
     return result
@@ -84,15 +83,15 @@ def trials_apart(model: GaussNewton, gaussian: GaussianPrior) -> np.ndarray:
     prior_right = here.point.like(here.slope.under(gaussian)[1]).static
     prior_right = prior_right - sum(trial.gradient.static_right for trial in here.trials)
     prior = here.information.copy()
-    prior[layout.instruments, layout.instruments] += gaussian.precision
+    prior[layout.errors, layout.errors] += gaussian.precision
     every = sum(each.information for each in model.displaced)
     shared = slice(0, layout.laboratory.stop - layout.laboratory.start)
     # by chance one of twenty instruments, however many trials there are; of two, one contradicts the other
     apart_sd = -ndtri(0.025 / (count if count > 2 else 1))
     for k, own in enumerate(model.displaced):
-        alone = _posterior(prior + own.information, prior_right + rights[k], layout.in_root.stop, layout.instruments)
+        alone = _posterior(prior + own.information, prior_right + rights[k], layout.in_root.stop, layout.errors)
         rest = prior_right + sum(rights) - rights[k]
-        others = _posterior(prior + every - own.information, rest, layout.in_root.stop, layout.instruments)
+        others = _posterior(prior + every - own.information, rest, layout.in_root.stop, layout.errors)
         apart = np.abs(alone[0] - others[0]) > apart_sd * np.hypot(alone[1], others[1])
         result[shared] |= apart[shared]
     return result
@@ -100,11 +99,11 @@ def trials_apart(model: GaussNewton, gaussian: GaussianPrior) -> np.ndarray:
 
 def _rights(model: GaussNewton) -> list[np.ndarray]:
     """Per trial the right-hand side (S,) on the static unknowns, motion and displacements eliminated."""
-    pull, places = model.here.point.like(model.here.slope.right), model.problem.layout.locals
+    pull, places = model.here.point.like(model.here.slope.right), model.problem.layout.displaced
     result = []
     for k, (trial, displaced) in enumerate(zip(model.here.trials, model.displaced, strict=True)):
         _, lost = trial.forward(pull.coefficients[k])
-        own = pull.displaced[k] - model.problem.displacement_sd_m[k] * lost[places]
+        own = pull.displaced[k] - model.problem.displaced_sd[k] * lost[places]
         result.append(trial.gradient.static_right - lost - own @ displaced.gain)
     return result
 

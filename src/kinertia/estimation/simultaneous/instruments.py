@@ -176,16 +176,8 @@ class InstrumentPrior:
             result = replace(result, clock_s=SoundOrFaulty.certain(instruments.clock_sd_ms / 1e3))
         return result
 
-    def of_unknowns(
-        self,
-        plates: Sequence[str],
-        n_delays: int = 0,
-        n_zeros: int = 0,
-        n_gains: int = 0,
-        trunks: Sequence[SoundOrFaulty] = (),
-    ) -> ErrorPriors:
-        """Priors of all plates' unknowns, the floor's, the clock's, so many delays, zeros and gains of single trials,
-        and of what trunks do in these.
+    def of_unknowns(self, plates: Sequence[str]) -> ErrorPriors:
+        """Priors of all plates' unknowns, the floor's and the clock's.
 
         Columns of the same name in the force files of several trials are plates of their own, but mostly the same one:
         what a fault of theirs has in common has a prior, too.
@@ -199,8 +191,7 @@ class InstrumentPrior:
             if (places := [len(names) * plate + k for plate in column]) and prior.faulty_share > 0.0
         ]
         floor = [self.floor[name] for name in FLOOR_UNKNOWNS]
-        of_trials = [self.delay_s] * n_delays + [self.zero_n] * n_zeros + [self.trial_gain] * n_gains
-        return ErrorPriors((*own, *floor, self.clock_s, *of_trials, *trunks), tuple(common))
+        return ErrorPriors((*own, *floor, self.clock_s), tuple(common))
 
     def of_session(self, plates: Sequence[str]) -> InstrumentInformation:
         """What the others have shown of these plates, all together."""

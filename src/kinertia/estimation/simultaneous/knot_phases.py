@@ -50,7 +50,7 @@ class OfPhases:
         """
         problems, points = [problem], [point]
         for phase in PHASES:
-            other = problem.with_knots_moved(phase)
+            other = problem.of(problem.trials, phase)
             rows = zip(other.bases, problem.bases, point.coefficients, strict=True)
             begin = tuple(new.fit(old.evaluate(part)[0]) for new, old, part in rows)
             problems.append(other)
@@ -67,13 +67,11 @@ class OfPhases:
 def followed(problem: MapProblem, here: Linearised, point: Point, static: np.ndarray) -> Point:
     """The optimum with what does not move held elsewhere, by the quadratic there."""
     model, motions, displaced = GaussNewton.of(problem, here), [], []
-    rows = zip(
-        here.trials, model.displaced, problem.displacement_sd_m, point.coefficients, point.displaced, strict=True
-    )
+    rows = zip(here.trials, model.displaced, problem.displaced_sd, point.coefficients, point.displaced, strict=True)
     for trial, own, sd, part, place in rows:
         step = static - point.static
         moved = -own.gain @ step
-        step[problem.layout.locals] += sd * moved
+        step[problem.layout.displaced] += sd * moved
         motions.append(part + _motion(trial, part, step))
         displaced.append(place + moved)
     return Point(tuple(motions), static, tuple(displaced))

@@ -1,97 +1,142 @@
-"""Where each kind of unknown that does not move stands in the vector of the simultaneous estimate."""
+"""Where the unknowns that do not move stand in the vector of the simultaneous estimate."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal, Self
 
 import numpy as np
 
-from kinertia.estimation.simultaneous.plates import FLOOR_UNKNOWNS, PLATE_UNKNOWNS, ZERO_UNKNOWNS
+from kinertia.estimation.simultaneous.sound_or_faulty import ErrorPriors
+
+_SEEN_BY = ("root", "both", "markers")
 
 
-@dataclass(frozen=True)
-class Layout:
-    """Where each kind of static unknown stands in the vector; after those of each plate stand the floor's. Of several
-    trials each has a delay of its own besides the clock's, and so has one whose clock has not been checked. Zeros and
-    gains are those of each trial's plates, the gains beside those of all trials, trunks how much bends in each trial
-    (`trunk_bending`).
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Unknowns:
+    """k unknowns of one kind that a cost term adds to the estimate: what they are called, their unit and their prior.
+
+    Attributes:
+        name: by which `Layout` finds them.
+        unit: of each.
+        start: (k,) where the search begins, and the mean of a normal prior.
+        prior: sound or faulty, of what the ground reactions depend on and nothing else; (k,) deviations of a normal
+            prior; None: the term has a prior of its own.
+        seen_by: what depends on them: the root equations, the markers or both.
+        of_laboratory: other people of a session share them.
+        in_models: whether rigid segments have them, as OpenSim's next tools know them. The motion that is written
+            follows what the others do to the forces.
+        displaced_sd: per trial (k,) prior deviations of how far they are elsewhere in it; none where they are not.
     """
 
-    theta: slice
-    plates: slice
-    clock: int
-    delays: slice
-    zeros: slice
-    gains: slice
-    trunks: slice
-    coordinates: slice
-    locals: slice
-    skin: slice
-    plates_of_trials: tuple[int, ...]
+    name: str
+    unit: str
+    start: np.ndarray
+    prior: ErrorPriors | np.ndarray | None
+    seen_by: Literal["root", "both", "markers"] = "root"
+    of_laboratory: bool = False
+    in_models: bool = True
+    displaced_sd: tuple[np.ndarray, ...] = ()
 
     @classmethod
-    def of(
-        cls,
-        n_bsp: int,
-        n_coordinates: int,
-        n_markers: int,
-        n_plates: int,
-        n_delays: int,
-        plates_of_trials: Sequence[int],
-        n_skin: int,
-        n_trunks: int = 0,
-    ) -> Layout:
-        """The layout for these numbers of unknowns; of trials, how many plates each has."""
-        n_instruments = len(PLATE_UNKNOWNS) * n_plates + len(FLOOR_UNKNOWNS)
-        n_zeros = len(ZERO_UNKNOWNS) * sum(plates_of_trials)
-        own = [n_delays, n_zeros, sum(plates_of_trials), n_trunks]
-        counts = [n_bsp, n_instruments, 1, *own, n_coordinates, 3 * n_markers, n_skin]
-        ends = np.cumsum(counts).tolist()
-        theta, plates, clock, delays, zeros, gains, trunks, coordinates, places, skin = (
-            slice(end - count, end) for end, count in zip(ends, counts, strict=True)
-        )
-        of_trials = delays, zeros, gains, trunks
-        return cls(theta, plates, clock.start, *of_trials, coordinates, places, skin, tuple(plates_of_trials))
+    def errors(
+        cls, name: str, unit: str, prior: ErrorPriors, *, of_laboratory: bool = False, in_models: bool = True
+    ) -> Self:
+        """Errors of the ground reactions, none of them at the start."""
+        start = np.zeros(len(prior.own))
+        return cls(name=name, unit=unit, start=start, prior=prior, of_laboratory=of_laboratory, in_models=in_models)
 
     @property
+    def _order(self) -> tuple[int, bool, bool]:
+        return _SEEN_BY.index(self.seen_by), isinstance(self.prior, ErrorPriors), not self.of_laboratory
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """The order of all unknowns: first what only root equations depend on, ending in errors of the ground reactions
+    (the laboratory's before others), then what markers depend on, too, and last what only they do.
+
+    Attributes:
+        unknowns: in this order; otherwise in that of the terms.
+        places: by name.
+    """
+
+    unknowns: tuple[Unknowns, ...]
+    places: Mapping[str, slice]
+
+    @classmethod
+    def of(cls, unknowns: Iterable[Unknowns]) -> Layout:
+        """The layout of the terms' unknowns."""
+        ordered = tuple(sorted(unknowns, key=lambda one: one._order))
+        ends = np.cumsum([len(one.start) for one in ordered]).tolist()
+        places = {one.name: slice(end - len(one.start), end) for one, end in zip(ordered, ends, strict=True)}
+        return cls(ordered, places)
+
+    def __getitem__(self, name: str) -> slice:
+        return self.places[name]
+
+    def _span(self, chosen: Iterable[Unknowns]) -> slice:
+        """From the first to the last of these, which stand together."""
+        places = [self[one.name] for one in chosen]
+        return slice(places[0].start, places[-1].stop) if places else slice(0, 0)
+
+    @cached_property
+    def errors(self) -> slice:
+        """Of the ground reactions: all with a prior of being sound or faulty."""
+        return self._span(one for one in self.unknowns if isinstance(one.prior, ErrorPriors))
+
+    @cached_property
+    def error_priors(self) -> ErrorPriors:
+        """Of these."""
+        return ErrorPriors.joined([one.prior for one in self.unknowns if isinstance(one.prior, ErrorPriors)])
+
+    @cached_property
     def laboratory(self) -> slice:
-        """What all of a laboratory's trials share: the plates' unknowns and the clock."""
-        return slice(self.plates.start, self.clock + 1)
+        """Those errors that other people of a session share."""
+        return self._span(one for one in self.unknowns if one.of_laboratory)
 
-    @property
-    def instruments(self) -> slice:
-        """The same, and what each trial has of its own: a delay, its plates' zeros and gains, and how much
-        the trunk bends."""
-        return slice(self.plates.start, self.trunks.stop)
+    @cached_property
+    def displaced(self) -> slice:
+        """What is elsewhere in each trial."""
+        return self._span(one for one in self.unknowns if one.displaced_sd)
 
-    def late(self, trial: int) -> list[int]:
-        """Which unknowns add up to the time by which the forces of a trial are late."""
-        return [self.clock, *range(self.delays.start, self.delays.stop)[trial : trial + 1]]
-
-    def zeros_of(self, trial: int) -> np.ndarray:
-        """(q, 2) where the zeros of the q plates of a trial stand."""
-        each = len(ZERO_UNKNOWNS)
-        first = self.zeros.start + each * sum(self.plates_of_trials[:trial])
-        return np.arange(first, first + each * self.plates_of_trials[trial]).reshape(-1, each)
-
-    def gains_of(self, trial: int) -> np.ndarray:
-        """(q,) where the gains of the q plates of a trial stand."""
-        first = self.gains.start + sum(self.plates_of_trials[:trial])
-        return np.arange(first, first + self.plates_of_trials[trial])
-
-    @property
+    @cached_property
     def in_root(self) -> slice:
-        """What the root equations depend on: all but marker positions and skin."""
-        return slice(0, self.coordinates.stop)
+        """What the root equations depend on."""
+        return slice(0, self._span(one for one in self.unknowns if one.seen_by != "markers").stop)
 
-    @property
+    @cached_property
     def in_markers(self) -> slice:
-        """What the markers depend on: static coordinates, marker positions and skin."""
-        return slice(self.coordinates.start, self.skin.stop)
+        """What the markers depend on."""
+        return self._span(one for one in self.unknowns if one.seen_by != "root")
 
-    @property
+    @cached_property
     def size(self) -> int:
         """Number of unknowns."""
-        result: int = self.skin.stop
+        return sum(len(one.start) for one in self.unknowns)
+
+    @cached_property
+    def start(self) -> np.ndarray:
+        """(S,) where the search begins."""
+        result: np.ndarray = np.concatenate([one.start for one in self.unknowns])
+        return result
+
+    @cached_property
+    def weight(self) -> np.ndarray:
+        """(S,) information of normal priors about the start; zero for unknowns that have another one."""
+        return np.concatenate(
+            [
+                1.0 / np.square(one.prior) if isinstance(one.prior, np.ndarray) else np.zeros(len(one.start))
+                for one in self.unknowns
+            ]
+        )
+
+    def rigid(self, static: np.ndarray) -> np.ndarray:
+        """(S,) the same without what rigid segments do not have."""
+        result = static.copy()
+        for one in self.unknowns:
+            if not one.in_models:
+                result[self[one.name]] = 0.0
         return result

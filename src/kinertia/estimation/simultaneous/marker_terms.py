@@ -12,12 +12,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kinertia.estimation.simultaneous.cost_term import CostTerm, InTrial
 from kinertia.estimation.simultaneous.knot_interval import Interval, longest_run, to_border, to_splines
 from kinertia.estimation.simultaneous.marker_errors import LATER
 from kinertia.estimation.simultaneous.marker_gradient import add_gradient
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.normal_equations import NO_BORDER, Gradient, NormalEquations
-from kinertia.estimation.simultaneous.seen_markers import PlacedMarkers, SeenMarkers, place_markers
+from kinertia.estimation.simultaneous.seen_markers import PlacedMarkers, SeenMarkers, place_markers, seen_markers
 from kinertia.estimation.simultaneous.stretches import Stretch
 from kinertia.model.compiled import compiled, inlined, part
 from kinertia.model.kinematic_tree import hand_down
@@ -31,6 +32,24 @@ class _Static(NamedTuple):
     square: np.ndarray
     right: np.ndarray
     cost: np.ndarray
+
+
+class Markers(CostTerm):
+    """Markers against the model, of all trials; it adds no unknowns, and depends on those of others."""
+
+    def add(self, into: Gradient, here: InTrial) -> None:
+        """Add the squares of the markers' errors, over what is expected of them."""
+        given, k, near, static = self.given, here.k, here.stretch.with_neighbours, here.static
+        seen = seen_markers(
+            self.model.placed(static),
+            given.trials[k].markers[near],
+            here.near_q,
+            given.trials[k].marker_process,
+            self.model.skin(k, static, near),
+            given.moving,
+            given.still,
+        )
+        add_markers(into, self.layout.in_markers, given.bases[k], here.stretch, seen, len(given.still))
 
 
 def add_markers(

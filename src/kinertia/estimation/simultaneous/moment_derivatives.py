@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinertia.estimation.simultaneous.axis_columns import add_bodies, take_load
+from kinertia.estimation.simultaneous.given import BSP, STILL
 from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.model.log_cholesky import by_body, dynamic_jacobian
 from kinertia.motion.dynamics import Motion, axis_motion
@@ -50,15 +51,15 @@ def moment_derivatives(
     Args:
         problem: of the estimate.
         k: the trial.
-        motion: all coordinates, static ones included, and their rates (d, c), as `MapProblem.full` has them.
+        motion: all coordinates, static ones included, and their rates (d, c), as `FreedModel.full` has them.
         static: the estimate.
-        reactions: `MapProblem.reactions` there.
+        reactions: `GroundLoads.reactions` there.
         frames: (d,) indices.
     """
-    skeleton, layout = problem.placed(static), problem.layout
+    skeleton, layout = problem.model.placed(static), problem.layout
     q, qd, qdd = motion
     state = axis_motion(skeleton, Motion(q, qd, qdd))
-    bodies, moving, row = skeleton.bodies(problem.bsp(static)), problem.moving, np.full(q.shape[1], -1)
+    bodies, moving, row = skeleton.bodies(problem.model.bsp(static)), problem.moving, np.full(q.shape[1], -1)
     row[moving] = np.arange(len(moving))
     rows = row[skeleton.map.owner]
     tau, (dq, dv, da) = axis_force_derivatives(skeleton.tree, skeleton.gravity_m_s2, bodies, *state, rows >= 0)
@@ -66,15 +67,15 @@ def moment_derivatives(
     slopes = np.ones(tau.shape) if pose.slopes is None else np.ascontiguousarray(pose.slopes)
     axes = pose.axes, slopes, rows
     by_static = np.zeros((len(q), len(moving), layout.in_root.stop))
-    carrying = [skeleton.segments.index(segment) for segment in problem.segments]
+    carrying = [skeleton.segments.index(segment) for segment in problem.model.segments]
     shown = regressor(skeleton.tree, skeleton.gravity_m_s2, *state, np.zeros((len(q), 3)))[:, :, carrying]
-    shown = by_body(shown.reshape(len(q), 6, -1), dynamic_jacobian(static[layout.theta]))
+    shown = by_body(shown.reshape(len(q), 6, -1), dynamic_jacobian(static[layout[BSP]]))
     add_bodies(*axes, skeleton.support[carrying], shown, by_static)
     loads, by_load = _loads(problem, k, static, reactions, frames)
     fast = reactions.impact_at(problem.trials[k].time[frames])
     for foot, name in enumerate(skeleton.feet):
         moved = np.flatnonzero(skeleton.support[skeleton.segments.index(name)])
-        take_load(*axes, moved, loads[foot], by_load[foot], layout.instruments.start, tau, dq, by_static)
+        take_load(*axes, moved, loads[foot], by_load[foot], layout.errors.start, tau, dq, by_static)
         impact[:, moved] -= (pose.axes[:, moved] @ fast[:, foot, :, None])[..., 0]
     by_q, by_qd, by_qdd = (
         skeleton.map.to_coordinates(part.transpose(0, 2, 1), pose.slopes).transpose(0, 2, 1)
@@ -82,7 +83,7 @@ def moment_derivatives(
     )
     each = np.arange(q.shape[1])
     by_q[:, each, each] += skeleton.map.turned_forces(tau, q)
-    by_static[:, :, layout.coordinates] = by_q[:, moving[:, None], problem.still]
+    by_static[:, :, layout[STILL]] = by_q[:, moving[:, None], problem.given.still]
     by_q, by_qd, by_qdd = (part[:, moving[:, None], moving] for part in (by_q, by_qd, by_qdd))
     value, impact = (skeleton.map.to_coordinates(each, pose.slopes)[:, moving] for each in (tau, impact))
     ground = by_load[:, :, :3].transpose(1, 0, 2, 3).reshape(len(q), -1, layout.in_root.stop)
@@ -93,11 +94,11 @@ def _loads(
     problem: MapProblem, k: int, static: np.ndarray, reactions: GroundReactions, frames: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """(2, d, 6) loads on the feet, and (2, d, 6, s) their derivatives by the static unknowns."""
-    time, ground, layout = problem.trials[k].time[frames], problem.grounds[k], problem.layout
+    time = problem.trials[k].time[frames]
     loads, rates = reactions.with_rate(time)
-    by_plate = ground.by_plate(loads, reactions.loaded_at(time), ground.carrier[frames], problem.plates_in(k, static))
-    by_load = np.zeros((loads.shape[1], len(time), 6, layout.in_root.stop))
-    for foot, by in enumerate(by_load):
-        problem.add_by_plates(k, by, by_plate[:, foot])
-        by[:, :, layout.late(k)] = rates[:, foot, :, None]
+    by_load = np.zeros((loads.shape[1], len(time), 6, problem.layout.in_root.stop))
+    for by, add in problem.loads.by_errors(k, static, loads, reactions.loaded_at(time), frames):
+        for foot, own in enumerate(by_load):
+            add(own, by[:, foot])
+    by_load[..., problem.loads.late(k)] = rates.transpose(1, 0, 2)[..., None]
     return np.ascontiguousarray(loads.transpose(1, 0, 2)), by_load

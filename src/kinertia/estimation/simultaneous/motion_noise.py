@@ -64,12 +64,13 @@ def motion_noise(problem: MapProblem, k: int, coefficients: np.ndarray, static: 
 
 def _left(problem: MapProblem, k: int, coefficients: np.ndarray, static: np.ndarray, frames: slice) -> np.ndarray:
     """(n, m, 3) m, what markers and skin leave of the measurement, in the axes of the segments; NaN where not seen."""
-    q = problem.full(problem.bases[k].evaluate(coefficients, frames), static)[0]
-    skeleton = problem.placed(static)
+    q = problem.model.full(problem.bases[k].evaluate(coefficients, frames), static)[0]
+    skeleton = problem.model.placed(static)
     pose = skeleton.pose(q)
     away = problem.trials[k].markers[frames] - skeleton.marker_positions(pose)
     own = np.einsum("nmji,nmj->nmi", pose.rotation[:, skeleton.marker_segments], away)
-    result: np.ndarray = own - problem.skin[k].cut(frames).displaced(static[problem.layout.skin])
+    patterns, along = problem.model.skin(k, static, frames)
+    result: np.ndarray = own - patterns.displaced(along)
     return result
 
 
@@ -90,4 +91,4 @@ def _free(problem: MapProblem, k: int, counts: np.ndarray) -> float:
     basis = problem.bases[k]
     shown = counts.sum() * basis.size / len(basis.first)
     splines = basis.size * problem.trials[k].dynamic.mean() * len(problem.moving)
-    return max(1.0 - float(splines + problem.skin[k].size) / float(shown), _LEAST_FREE)
+    return max(1.0 - float(splines + problem.given.skin[k].size) / float(shown), _LEAST_FREE)

@@ -7,7 +7,6 @@ from typing import Self
 
 import numpy as np
 
-from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.model.compiled import compiled
 
 SPLINES_PER_BLOCK = 6
@@ -18,25 +17,6 @@ block."""
 NO_BORDER = np.zeros((2, 2, 2))[..., :1]
 """For compiled functions, of the kind of array that they take: a part of a larger one. One without columns would be of
 another kind, for which they would be compiled once more."""
-
-
-@dataclass(frozen=True)
-class RootTerms:
-    """Residuals of the root equations at the dynamic frames and their derivatives, each over its deviation.
-
-    Attributes:
-        frames: (d,) indices.
-        q, qd, qdd: (d, 6, c) by the coordinates that move, and their rates.
-        static: (d, 6, s) by the static unknowns that they depend on.
-        left: (d, 6) residuals.
-    """
-
-    frames: np.ndarray
-    q: np.ndarray
-    qd: np.ndarray
-    qdd: np.ndarray
-    static: np.ndarray
-    left: np.ndarray
 
 
 @dataclass
@@ -128,73 +108,6 @@ class UsedAgain:
         """Take back what nobody needs any more."""
         size, coordinates = normal.right.shape
         self._free[size, coordinates, len(normal.static_right), normal.bordered].append(normal)
-
-
-def add_root(into: NormalEquations, columns: slice, basis: MotionBasis, start: int, root: RootTerms) -> None:
-    """Add the terms of the root equations at some frames, one knot interval at a time.
-
-    Args:
-        into: zero, or with other terms.
-        columns: of the static unknowns, those that the root equations depend on.
-        basis: of the motion.
-        start: the spline with which the normal equations begin.
-        root: the terms.
-    """
-    left, knots = root.left, basis.first[root.frames]
-    (_, _, c), wide = root.q.shape, root.static.shape[2]
-    flat = root.static.reshape(-1, wide)
-    into.static_right[columns] -= flat.T @ left.ravel()
-    into.cost += 0.5 * float(np.square(left).sum())
-    intervals, begins = np.unique(knots, return_index=True)
-    values = np.ascontiguousarray(basis.values[:, root.frames])
-    pulls = [(left[:, None] @ by)[:, 0] for by in (root.q, root.qd, root.qdd)]
-    for i in range(6):
-        each = sum(value[:, i, None] * pull for value, pull in zip(values, pulls, strict=True))
-        into.right[intervals - start + i] -= np.add.reduceat(each, begins, axis=0)
-    if into.bordered:
-        into.static[columns, columns] += flat.T @ flat
-    rows = by_splines(values, root.q, root.qd, root.qdd)
-    border = into.border[..., columns] if into.bordered else NO_BORDER
-    _add_intervals(
-        rows.reshape(-1, 6 * c),
-        flat,
-        intervals - start,
-        6 * np.append(begins, len(knots)),
-        into.band,
-        border,
-        into.bordered,
-    )
-
-
-@compiled
-def _add_intervals(
-    rows: np.ndarray,
-    static: np.ndarray,
-    first: np.ndarray,
-    ends: np.ndarray,
-    band: np.ndarray,
-    border: np.ndarray,
-    bordered: bool,
-) -> None:
-    """Add squares of derivatives by the coefficients of the active splines, rows (6 d, 6 c), and across those by static
-    unknowns (6 d, s) if `bordered`; rows of an interval begin and end at `ends`, its splines begin at `first`.
-    """
-    c = band.shape[2]
-    for k in range(len(first)):
-        own, at = rows[ends[k] : ends[k + 1]], first[k]
-        square = np.dot(own.T, own)
-        for i in range(6):
-            for row in range(c):
-                for j in range(i, 6):
-                    for column in range(c):
-                        band[at + i, j - i, row, column] += square[i * c + row, j * c + column]
-        if not bordered:
-            continue
-        across = np.dot(own.T, static[ends[k] : ends[k + 1]])
-        for i in range(6):
-            for row in range(c):
-                for s in range(across.shape[1]):
-                    border[at + i, row, s] += across[i * c + row, s]
 
 
 @compiled

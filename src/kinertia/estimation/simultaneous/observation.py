@@ -227,6 +227,7 @@ def _observed(
             impact=np.sqrt(np.square(impact) + np.square(swing) - 1.0),
             skin=skin,
             frame_products=products,
+            name=kinematics.trial.name,
         ),
         noise,
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -34,6 +34,7 @@ class Observation:
         skin: what the skin may follow; None: it does not move with the joints.
         frame_products: (k, 3, 3) of several kinds of errors, over their deviations, the mean products of a frame's and
             of the two before it; None: of a process with a double pole.
+        name: of the trial.
     """
 
     time: np.ndarray
@@ -51,6 +52,7 @@ class Observation:
     repeats: float = 1.0
     skin: SkinPatterns | None = None
     frame_products: np.ndarray | None = None
+    name: str = ""
 
     @cached_property
     def marker_process(self) -> tuple[np.ndarray, ErrorProcess]:
@@ -90,8 +92,10 @@ class CalibrationPrior:
         coordinates: static coordinate (locked in the skeleton) -> deviation, rad or m.
         marker_sd_m: (m,) of each marker's position in its segment, each axis.
         instruments: priors of plates and clock.
+        before: static coordinate -> its value before the trials moved it; of others the skeleton's.
     """
 
     coordinates: Mapping[str, float]
     marker_sd_m: np.ndarray
     instruments: InstrumentPrior
+    before: Mapping[str, float] = field(default_factory=dict)

@@ -8,18 +8,17 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kinertia.estimation.simultaneous.calibration_entry import CalibrationEntry
+from kinertia.estimation.simultaneous.cost_term import Solution
 from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
 from kinertia.estimation.simultaneous.evidence import Evidence
 from kinertia.estimation.simultaneous.instrument_support import InstrumentSupport
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation
 from kinertia.estimation.simultaneous.linearised import Linearised, Point
-from kinertia.estimation.simultaneous.plate_loads import GAIN
-from kinertia.estimation.simultaneous.plates import PLATE_ERRORS
 from kinertia.estimation.simultaneous.posterior_draws import PosteriorDraws
 from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior
-from kinertia.model.bsp import BodySegmentParameters, block_diagonal
-from kinertia.model.log_cholesky import table_jacobian
+from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion
 from kinertia.motion.ground_reactions import GroundReactions
@@ -48,6 +47,7 @@ class SimultaneousResult:
         motions: per trial q, qd, qdd at its frames.
         displacements_m: per trial (m, 3) how far its markers are from their places in the segments.
         curve_deviations: per trial the posterior deviations of its curves at its dynamic frames.
+        calibration: entries of all quantities that terms calibrate.
         instruments: what these trials say of plates and clock, to be added to what others say.
         converged: the last step was short: CONVERGED_SD, CONVERGED.
         iterations: Gauss-Newton steps taken.
@@ -72,6 +72,7 @@ class SimultaneousResult:
     motions: tuple[Motion, ...]
     displacements_m: tuple[np.ndarray, ...]
     curve_deviations: tuple[CurveDeviations, ...]
+    calibration: tuple[CalibrationEntry, ...]
     instruments: InstrumentInformation
     converged: bool
     iterations: int
@@ -111,42 +112,27 @@ def result_of(
     draws: PosteriorDraws,
 ) -> SimultaneousResult:
     """In the user's terms, with these motions, covariance (S, S) of all that does not move, and curves' deviations."""
-    point, layout = ended.point, problem.layout
-    values = point.static
-    bsp = problem.bsp(values)
-    # of the point at which the covariance is
-    chain = block_diagonal(table_jacobian(ended.here.point.static[layout.theta]))
-    sd = np.sqrt(np.diag(covariance))
-    names = list(problem.calibration.coordinates)
-    coordinates = {
-        name: (float(value), float(dev))
-        for name, value, dev in zip(names, values[layout.coordinates], sd[layout.coordinates], strict=True)
-    }
-    markers = problem.placed(values).markers
-    skeleton = problem.skeleton.with_markers(markers).lock({name: value for name, (value, _) in coordinates.items()})
-    plates = zip(problem.plate_errors(values), problem.plate_sd(covariance), strict=True)
-    zeros = [(layout.zeros_of(k), trial.ground.plates) for k, trial in enumerate(problem.trials)]
+    values = ended.point.static
+    solution = Solution(
+        static=values,
+        covariance=covariance,
+        there=ended.here.point.static,
+        displaced=tuple(sd * own for sd, own in zip(problem.displaced_sd, ended.point.displaced, strict=True)),
+        gaussian=ended.instruments,
+        moved=support.moved,
+        contradicted=support.contradicted,
+    )
+    read = problem.read(solution)
+    entries = tuple(entry for each in read for entry in each.pop("calibration", ()))
     trials = range(len(problem.trials))
-    shown = layout.instruments
     return SimultaneousResult(
-        bsp=bsp,
-        bsp_covariance=_at_most(chain @ covariance[layout.theta, layout.theta] @ chain.T, problem.prior.covariance),
-        skeleton=skeleton,
-        coordinates=coordinates,
-        plates=dict(zip(problem.plates, plates, strict=True)),
-        clock_s=(float(values[layout.clock]), float(sd[layout.clock])),
-        delays_s=tuple(zip(values[layout.delays].tolist(), sd[layout.delays].tolist(), strict=True)),
-        zeros_n=tuple(dict(zip(names, zip(values[at], sd[at], strict=True), strict=True)) for at, names in zeros),
-        gains=tuple(_gains(problem, k, values, covariance) for k in trials),
-        trunks_kg_m=tuple(zip(values[layout.trunks].tolist(), sd[layout.trunks].tolist(), strict=True)),
-        foot_loads=tuple(problem.foot_loads(k, values) for k in trials),
-        reactions=tuple(problem.reactions(k, values) for k in trials),
+        **{name: value for each in read for name, value in each.items()},
+        calibration=entries,
+        skeleton=problem.model.locked(values),
+        foot_loads=tuple(problem.loads.on_feet(k, values) for k in trials),
+        reactions=tuple(problem.loads.reactions(k, values) for k in trials),
         motions=tuple(Motion(*basis.evaluate(part)) for basis, part in zip(problem.bases, motions, strict=True)),
-        displacements_m=tuple(
-            (d * own).reshape(-1, 3) for d, own in zip(problem.displacement_sd_m, point.displaced, strict=True)
-        ),
         curve_deviations=of_curves,
-        instruments=_shown(problem, ended.instruments, values[shown], covariance[shown, shown]),
         converged=ended.converged,
         iterations=ended.iterations,
         cost=ended.cost,
@@ -154,35 +140,3 @@ def result_of(
         evidence=evidence,
         draws=draws,
     )
-
-
-def _at_most(covariance: np.ndarray, prior: np.ndarray) -> np.ndarray:
-    """The same with no combination more uncertain than in the prior's covariance: nobody knows less than before."""
-    root = np.linalg.cholesky(prior)
-    left = np.linalg.solve(root, np.linalg.solve(root, covariance).T)
-    shares, along = np.linalg.eigh(0.5 * (left + left.T))
-    along = root @ along
-    result: np.ndarray = (along * np.minimum(shares, 1.0)) @ along.T
-    return result
-
-
-def _gains(problem: MapProblem, k: int, values: np.ndarray, covariance: np.ndarray) -> dict[str, tuple[float, float]]:
-    """The whole gains of a trial's plates in it, and their deviations."""
-    result, layout = {}, problem.layout
-    for plate, at in zip(problem.trials[k].ground.plates, layout.gains_of(k), strict=True):
-        sums = np.zeros(layout.size)
-        sums[layout.plates] = problem.to_plates[len(PLATE_ERRORS) * problem.plates.index(plate) + GAIN]
-        sums[at] = 1.0
-        result[plate] = float(sums @ values), float(np.sqrt(sums @ covariance @ sums))
-    return result
-
-
-def _shown(
-    problem: MapProblem, prior: GaussianPrior, mean: np.ndarray, covariance: np.ndarray
-) -> InstrumentInformation:
-    """What the trials say of the laboratory's instruments, without what was known before."""
-    session, own = problem.session, slice(problem.layout.laboratory.stop - problem.layout.laboratory.start, len(mean))
-    more = (0, own.stop - own.start)
-    before = ((prior.precision, prior.pull), (np.pad(session.information, more), np.pad(session.right, more)))
-    shown = InstrumentInformation.of_posterior(problem.plates, mean, covariance, before)
-    return shown.without_own(prior.precision[own, own], prior.pull[own])

@@ -109,36 +109,13 @@ class FootPlates:
         reactions = replace(self.reactions, carrier=own[self.reactions.carrier])
         return replace(self, plates=tuple(plates), carrier=own[self.carrier], reactions=reactions, middles=middles)
 
-    def corrected(self, time: np.ndarray, carrier: np.ndarray, plates: np.ndarray, derivative: int = 0) -> np.ndarray:
-        """(n, 2, 6) loads on the feet at these times, of plates put right, or their time derivatives.
-
-        Args:
-            time: (n,) by the plates' clock.
-            carrier: (n, 2) index of the plate under each foot.
-            plates: (p, 7) what is wrong with the plates: PLATE_ERRORS, ZERO_UNKNOWNS.
-        """
-        loads = self.loads(time, derivative).reshape(len(time), 2, 6)
-        return self._put_right(loads, self.loaded(time, derivative), carrier, plates)
-
-    def corrected_reactions(self, plates: np.ndarray, late_s: float) -> GroundReactions:
-        """The loads for the joint moments, of plates (p, 7) put right, by the clock of the markers.
-
-        Args:
-            plates: what is wrong with each of `self.plates`.
-            late_s: by how much forces are recorded late.
-        """
-        raw = self.reactions
-        wrench = self._put_right(raw.wrench, raw.loaded, raw.carrier, plates)
-        impact = self._put_right(raw.impact, np.zeros(raw.carrier.shape), raw.carrier, plates)
-        return replace(raw, time=raw.time - late_s, wrench=wrench, impact=impact)
-
     def by_plate(self, loads: np.ndarray, loaded: np.ndarray, carrier: np.ndarray, plates: np.ndarray) -> np.ndarray:
         """(n, 2, 6, p, 7) derivative of the corrected loads (n, 2, 6), where somebody stands (n, 2), by what is wrong
         with the plates (p, 7).
         """
         return plate_loads.by_plate(*self._as_compiled(loads, loaded, carrier, plates))
 
-    def _put_right(self, loads: np.ndarray, loaded: np.ndarray, carrier: np.ndarray, plates: np.ndarray) -> np.ndarray:
+    def put_right(self, loads: np.ndarray, loaded: np.ndarray, carrier: np.ndarray, plates: np.ndarray) -> np.ndarray:
         """Loads (k, 2, 6) of plates (k, 2) with errors (p, 7), without their zeros where somebody stands (k, 2)."""
         return plate_loads.put_right(*self._as_compiled(loads, loaded, carrier, plates))
 

@@ -21,6 +21,8 @@ from scipy.optimize import least_squares
 
 from kinertia.estimation.simultaneous.elimination import Eliminated
 from kinertia.estimation.simultaneous.gauss_newton import GaussNewton
+from kinertia.estimation.simultaneous.given import BSP, PLACES, STILL
+from kinertia.estimation.simultaneous.instrument_term import InstrumentErrors
 from kinertia.estimation.simultaneous.knot_phases import OfPhases, followed
 from kinertia.estimation.simultaneous.linearised import Point
 from kinertia.estimation.simultaneous.motion_noise import motion_noise
@@ -149,11 +151,11 @@ def posterior_draws(
         of_trials.append(_trial_draws(problem, k, point.static, static, motions, random))
     layout = problem.layout
     return PosteriorDraws(
-        tuple(problem.segments),
-        _bodies(problem, point, (static - point.static)[:, layout.theta]),
+        tuple(problem.model.segments),
+        _bodies(problem, point, (static - point.static)[:, layout[BSP]]),
         tuple(problem.calibration.coordinates),
-        static[:, layout.coordinates],
-        (static - point.static)[:, layout.locals].reshape(count, -1, 3).astype(np.float32),
+        static[:, layout[STILL]],
+        (static - point.static)[:, layout[PLACES]].reshape(count, -1, 3).astype(np.float32),
         tuple(of_trials),
     )
 
@@ -234,7 +236,7 @@ def _bodies(problem: MapProblem, point: Point, departures: np.ndarray) -> np.nda
     Forces are linear in masses, first and second moments, not in logarithms: departures are taken as those of the
     first. Where that is not physically possible it is made so.
     """
-    theta, estimate = point.static[problem.layout.theta], problem.bsp(point.static)
+    theta, estimate = point.static[problem.layout[BSP]], problem.model.bsp(point.static)
     by_unknown, tables = dynamic_jacobian(theta), []
     for each in departures.reshape(len(departures), -1, 10):
         dynamic = estimate.dynamic_parameters().reshape(-1, 10)
@@ -254,14 +256,15 @@ def _trial_draws(
     motions: np.ndarray,
     random: np.random.Generator,
 ) -> TrialDraws:
-    ground, plates = problem.grounds[k], problem.plates_in(k, estimate)
+    ground, instruments, loads = problem.given.grounds[k], problem.term(InstrumentErrors), problem.loads
+    plates = instruments.plates_in(k, estimate)
     return TrialDraws(
         problem.bases[k].knots,
         motions.astype(np.float32),
-        np.array([problem.plates_in(k, each) for each in static]) - plates,
+        np.array([instruments.plates_in(k, each) for each in static]) - plates,
         plates[:, GAIN],
         ground.middles,
         ground.turn,
-        np.array([problem.late_s(k, each) for each in static]) - problem.late_s(k, estimate),
+        np.array([loads.late_s(k, each) for each in static]) - loads.late_s(k, estimate),
         random.standard_normal(len(static)),
     )

@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import expit
 
+from kinertia.estimation.simultaneous.cost_term import CostTerm, InTrial
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.normal_equations import Gradient, NormalEquations
 from kinertia.estimation.simultaneous.stretches import Stretch
@@ -63,6 +64,17 @@ class RangeTerms(NamedTuple):
             pull[rows, columns] -= side * weight * paid * slope
             curvature[rows, columns] += weight * slope * (slope + paid * (1.0 - slope) / _ROUNDED)
         return cls(curvature, pull, cost)
+
+
+class JointRanges(CostTerm):
+    """What the coordinates of all trials pay beyond their ranges."""
+
+    def add(self, into: Gradient, here: InTrial) -> None:
+        """Add it."""
+        frames = here.stretch.frames
+        first = frames.start - here.stretch.with_neighbours.start
+        q = here.near_q[first : first + frames.stop - frames.start, self.given.moving]
+        add_ranges(into, self.given.bases[here.k], here.stretch, self.given.skeleton.bounds, q)
 
 
 def add_ranges(into: Gradient, basis: MotionBasis, stretch: Stretch, bounds: Bounds, q: np.ndarray) -> None:

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
+from kinertia.estimation.simultaneous.given import STILL
 from kinertia.estimation.simultaneous.layout import Layout
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
-from kinertia.estimation.simultaneous.normal_equations import Gradient, RootTerms
+from kinertia.estimation.simultaneous.normal_equations import NO_BORDER, Gradient, NormalEquations, by_splines
 from kinertia.estimation.simultaneous.root_gradient import add_root_gradient
-from kinertia.estimation.simultaneous.trunk_bending import BentTrunk
 from kinertia.model.bsp import BodySegmentParameters
+from kinertia.model.compiled import compiled
 from kinertia.model.kinematic_tree import KinematicTree
 from kinertia.model.log_cholesky import dynamic_jacobian
 from kinertia.model.skeleton import Skeleton
@@ -30,6 +32,39 @@ _Moving = tuple[
 """What both compiled functions begin with."""
 
 
+@dataclass(frozen=True)
+class RootTerms:
+    """Residuals of the root equations at the dynamic frames and their derivatives, each over its deviation.
+
+    Attributes:
+        frames: (d,) indices.
+        q, qd, qdd: (d, 6, c) by the coordinates that move, and their rates.
+        static: (d, 6, s) by the static unknowns that they depend on.
+        left: (d, 6) residuals.
+    """
+
+    frames: np.ndarray
+    q: np.ndarray
+    qd: np.ndarray
+    qdd: np.ndarray
+    static: np.ndarray
+    left: np.ndarray
+
+
+class OfSegment(NamedTuple):
+    """An unknown that changes the dynamic parameters of a segment.
+
+    Attributes:
+        place: of the unknown among the static ones.
+        row: of the segment.
+        parameters: (10,) the change by a unit.
+    """
+
+    place: int
+    row: int
+    parameters: np.ndarray
+
+
 @dataclass(frozen=True, eq=False)
 class RootFrames:
     """The root equations at d frames of a trial, with all that they are made of.
@@ -40,13 +75,14 @@ class RootFrames:
         theta: (10 b,) the unknowns that they are made from.
         motion: of all coordinates.
         wrench: (d, 6) sum of the ground reactions at the ground origin: N, N m.
-        by_plates, by_own: (d, 6, p, 7), (d, 6, 1 or 2) its derivatives by what is wrong with plates, and by time and by
-            how much a trunk bends.
-        add_by_ground: adds such derivatives to those by static unknowns: `MapProblem.add_by_ground`.
+        by_errors: its derivatives (d, 6, ...) by errors of the ground reactions, with what adds such, (n, r, ...), to
+            those by all static unknowns (n, r, s).
+        by_single: (d, 6, e) its derivatives by time and others of e quantities, each of which is the sum of unknowns
+        at: these places.
         sd: (d, 6) deviations of the residuals.
         frames: (d,) indices.
         static: how many static unknowns they depend on.
-        trunk: that bends; None: all segments are rigid.
+        of_segments: unknowns beside theta that change a segment; `bsp` is of their values.
     """
 
     skeleton: Skeleton
@@ -54,36 +90,28 @@ class RootFrames:
     theta: np.ndarray
     motion: Motion
     wrench: np.ndarray
-    by_plates: np.ndarray
-    by_own: np.ndarray
-    add_by_ground: Callable[[np.ndarray, np.ndarray, np.ndarray], None]
+    by_errors: tuple[tuple[np.ndarray, Callable[[np.ndarray, np.ndarray], None]], ...]
+    by_single: np.ndarray
+    at: tuple[Sequence[int], ...]
     sd: np.ndarray
     frames: np.ndarray
     static: int
-    trunk: BentTrunk | None = None
-
-    def bent(self, trunk: BentTrunk) -> RootFrames:
-        """The same with a trunk that bends."""
-        by_kappa = trunk.by_kappa(self.wrench)
-        return replace(
-            self,
-            bsp=trunk.bsp(self.bsp),
-            wrench=trunk.upright(self.wrench),
-            by_plates=trunk.upright(self.by_plates),
-            by_own=np.concatenate([trunk.upright(self.by_own), by_kappa[..., None]], axis=2),
-            trunk=trunk,
-        )
+    of_segments: tuple[OfSegment, ...] = ()
 
     def terms(self, columns: Columns) -> RootTerms:
         """Residuals and derivatives, each over its deviation; `columns` are `columns_of` the problem."""
         by_static = np.zeros((len(self.frames), 6, self.static))
-        self.add_by_ground(by_static, self.by_plates, self.by_own)
+        for by, add in self.by_errors:
+            add(by_static, by)
+        for quantity, places in enumerate(self.at):
+            by_static[:, :, places] += self.by_single[:, :, quantity : quantity + 1]
         chain = dynamic_jacobian(self.theta)
         left, (q, qd, qdd) = root_columns(*self._moving, self.wrench, chain, self.sd, columns, by_static)
-        if self.trunk is not None:
-            by_static[:, :, self.trunk.place] += by_static[:, :, self.trunk.unknowns] @ self.trunk.by_unknowns(
-                self.theta
-            )
+        for one in self.of_segments:
+            own = slice(10 * one.row, 10 * one.row + 10)
+            # the step of the segment's unknowns that changes its parameters as much
+            step = np.linalg.solve(dynamic_jacobian(self.theta[own])[0], one.parameters)
+            by_static[:, :, one.place] += by_static[:, :, own] @ step
         return RootTerms(self.frames, q, qd, qdd, by_static, left)
 
     def add_gradient(self, into: Gradient, columns: Columns, basis: MotionBasis, start: int) -> None:
@@ -91,18 +119,19 @@ class RootFrames:
         the gradient begins.
         """
         of_basis = basis.first[self.frames] - start, np.ascontiguousarray(basis.values[:, self.frames])
-        cost, by_bodies, by_ground = add_root_gradient(
+        cost, by_bodies, pulls = add_root_gradient(
             *self._moving, self.wrench, self.sd, columns, of_basis, into.right, into.static_right
         )
         into.cost += cost
         into.static_right[: self.theta.size] -= np.einsum("bi,bij->bj", by_bodies, dynamic_jacobian(self.theta)).ravel()
         by_static = np.zeros((1, 1, self.static))
-        by_plates = np.einsum("nr,nrpe->pe", by_ground, self.by_plates)
-        by_own = np.einsum("nr,nre->e", by_ground, self.by_own)
-        self.add_by_ground(by_static, by_plates[None, None], by_own[None, None])
+        for by, add in self.by_errors:
+            add(by_static, np.einsum("nr,nr...->...", pulls, by)[None, None])
+        for places, pull in zip(self.at, np.einsum("nr,nre->e", pulls, self.by_single), strict=True):
+            by_static[:, :, places] += pull
         into.static_right[: self.static] += by_static[0, 0]
-        if self.trunk is not None:
-            into.static_right[self.trunk.place] -= by_bodies[self.trunk.trunk.row] @ self.trunk.trunk.parameters
+        for one in self.of_segments:
+            into.static_right[one.place] -= by_bodies[one.row] @ one.parameters
 
     @property
     def _moving(self) -> _Moving:
@@ -126,8 +155,74 @@ def columns_of(
     """
     to_moving, to_still = np.full((2, len(skeleton.coordinates)), -1)
     to_moving[moving] = np.arange(len(moving))
-    to_still[still] = np.arange(layout.coordinates.start, layout.coordinates.stop)
+    to_still[still] = np.arange(layout[STILL].start, layout[STILL].stop)
     owner = skeleton.map.owner
     rows = np.array([skeleton.segments.index(segment) for segment in segments])
-    instruments = layout.instruments
-    return Columns(to_moving[owner], to_still[owner], rows, len(moving), instruments.start, instruments.stop)
+    return Columns(to_moving[owner], to_still[owner], rows, len(moving), layout.errors.start, layout.errors.stop)
+
+
+def add_root(into: NormalEquations, columns: slice, basis: MotionBasis, start: int, root: RootTerms) -> None:
+    """Add the terms of the root equations at some frames, one knot interval at a time.
+
+    Args:
+        into: zero, or with other terms.
+        columns: of the static unknowns, those that the root equations depend on.
+        basis: of the motion.
+        start: the spline with which the normal equations begin.
+        root: the terms.
+    """
+    left, knots = root.left, basis.first[root.frames]
+    (_, _, c), wide = root.q.shape, root.static.shape[2]
+    flat = root.static.reshape(-1, wide)
+    into.static_right[columns] -= flat.T @ left.ravel()
+    into.cost += 0.5 * float(np.square(left).sum())
+    intervals, begins = np.unique(knots, return_index=True)
+    values = np.ascontiguousarray(basis.values[:, root.frames])
+    pulls = [(left[:, None] @ by)[:, 0] for by in (root.q, root.qd, root.qdd)]
+    for i in range(6):
+        each = sum(value[:, i, None] * pull for value, pull in zip(values, pulls, strict=True))
+        into.right[intervals - start + i] -= np.add.reduceat(each, begins, axis=0)
+    if into.bordered:
+        into.static[columns, columns] += flat.T @ flat
+    rows = by_splines(values, root.q, root.qd, root.qdd)
+    border = into.border[..., columns] if into.bordered else NO_BORDER
+    _add_intervals(
+        rows.reshape(-1, 6 * c),
+        flat,
+        intervals - start,
+        6 * np.append(begins, len(knots)),
+        into.band,
+        border,
+        into.bordered,
+    )
+
+
+@compiled
+def _add_intervals(
+    rows: np.ndarray,
+    static: np.ndarray,
+    first: np.ndarray,
+    ends: np.ndarray,
+    band: np.ndarray,
+    border: np.ndarray,
+    bordered: bool,
+) -> None:
+    """Add squares of derivatives by the coefficients of the active splines, rows (6 d, 6 c), and across those by static
+    unknowns (6 d, s) if `bordered`; rows of an interval begin and end at `ends`, its splines begin at `first`.
+    """
+    c = band.shape[2]
+    for k in range(len(first)):
+        own, at = rows[ends[k] : ends[k + 1]], first[k]
+        square = np.dot(own.T, own)
+        for i in range(6):
+            for row in range(c):
+                for j in range(i, 6):
+                    for column in range(c):
+                        band[at + i, j - i, row, column] += square[i * c + row, j * c + column]
+        if not bordered:
+            continue
+        across = np.dot(own.T, static[ends[k] : ends[k + 1]])
+        for i in range(6):
+            for row in range(c):
+                for s in range(across.shape[1]):
+                    border[at + i, row, s] += across[i * c + row, s]

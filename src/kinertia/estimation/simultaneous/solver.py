@@ -1,16 +1,14 @@
 """Motion, body segment parameters and calibration in one maximum-a-posteriori estimate.
 
-Unknowns: quintic spline coefficients of every coordinate (uniform knots; their spacing follows the cutoff);
-log-Cholesky parameters of every segment; static coordinates (joint-centre offsets), marker positions in their segments,
-how far they are from these in each of several trials (`marker_offsets`), what is wrong with each plate in all trials
-and in each (`plates.PLATE_ERRORS`, `ZERO_UNKNOWNS`), the time offset of the forces, and by how much more they are late
-in each of several trials; how much the trunk bends in each (`trunk_bending`). Minimised is the sum of squares, each
-over its deviation, of: marker errors, root residuals, and departures from the priors. Those of the instruments are
-Gaussians that change with what the data say of them (`sound_or_faulty`). Steps are those of Gauss and Newton
-(`gauss_newton`), corrected by the gradients along the way (`quasi_newton`), all derivatives analytic. The normal matrix
-is block tridiagonal in time with a border of static unknowns (`block_tridiagonal`); its Schur complement is the
-information on them, and its inverse their covariance. Where the knots lie is averaged over (`knot_phases`), the clock's
-posterior comes from its profile (`clock_profile`), and thighs' masses are those of a task (`task_masses`).
+Unknowns are the quintic spline coefficients of every coordinate (uniform knots; their spacing follows the cutoff), and
+what the cost terms add that does not move in time (`terms`), some of it displaced in each of several trials
+(`marker_offsets`). Minimised is the sum of the terms: squares of marker errors, root residuals and departures from the
+priors, each over its deviation. Priors of errors of the ground reactions are Gaussians that change with what the data
+say of them (`sound_or_faulty`). Steps are those of Gauss and Newton (`gauss_newton`), corrected by the gradients along
+the way (`quasi_newton`), all derivatives analytic. The normal matrix is block tridiagonal in time with a border of
+static unknowns (`block_tridiagonal`); its Schur complement is the information on them, and its inverse their
+covariance. Where the knots lie is averaged over (`knot_phases`), some errors have their posterior from the profile of
+the cost (`cost_profile`), and unknowns that only displace others are added at the end (`left_out`).
 
 Frames in which forces change faster than the motion can follow say less of all that does not move (`impacts`). When
 that is settled, the motion alone is made to follow the forces there, too.
@@ -26,12 +24,14 @@ from typing import NamedTuple
 import numpy as np
 
 from kinertia.estimation.prior import BspPrior
-from kinertia.estimation.simultaneous.clock_profile import ClockProfile
+from kinertia.estimation.simultaneous.cost_profile import CostProfile
+from kinertia.estimation.simultaneous.cost_term import CostTerm
 from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations, curve_deviations
 from kinertia.estimation.simultaneous.evidence import Evidence
 from kinertia.estimation.simultaneous.gauss_newton import GaussNewton, MotionAlone
 from kinertia.estimation.simultaneous.instrument_support import instrument_support
 from kinertia.estimation.simultaneous.knot_phases import OfPhases, followed
+from kinertia.estimation.simultaneous.left_out import with_left_out
 from kinertia.estimation.simultaneous.linearised import Linearised, Point, Slope
 from kinertia.estimation.simultaneous.marker_offsets import as_displaced
 from kinertia.estimation.simultaneous.observed_trial import CalibrationPrior, Observation
@@ -41,7 +41,7 @@ from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.estimation.simultaneous.quasi_newton import SecantPairs
 from kinertia.estimation.simultaneous.sound_or_faulty import ErrorPriors, GaussianPrior
 from kinertia.estimation.simultaneous.static_information import StaticInformation
-from kinertia.estimation.simultaneous.task_masses import across_tasks, task_direction
+from kinertia.estimation.simultaneous.terms import TERMS
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.one_thread import one_blas_thread
 
@@ -94,23 +94,24 @@ def estimate_simultaneous(
     trials: Sequence[Observation],
     progress: Callable[[float], None] = lambda share: None,
     otherwise: Sequence[Observation] = (),
+    terms: Sequence[type[CostTerm]] = TERMS,
 ) -> SimultaneousResult:
     """Maximum-a-posteriori motion, BSPs and calibration of one person from one or more trials; `progress` is told the
     share done, guessed from the usual number of steps. `otherwise` are the same trials with other ground reactions, to
-    be told how likely these would be.
+    be told how likely these would be. `terms` are those of the cost.
     """
-    problem = MapProblem(skeleton, prior, calibration, trials)
+    problem = MapProblem(skeleton, prior, calibration, trials, terms=terms)
     ended = _searched(problem, progress)
     model = GaussNewton.of(problem, ended.here).under(ended.instruments)
     evidence = Evidence.of(model, ended.instruments, otherwise)
     known = _Judged.known(ended.instruments)
     phases = OfPhases.of(problem, ended.point, partial(_continued, judged=known))
-    clock = ClockProfile.of(problem, ended.here, ended.instruments, ended.point, partial(_held, problem, ended.point))
-    model = GaussNewton.of(problem, clock.here).under(clock.instruments)
-    moved, added = _of_other_tasks(problem, model, ended.point.static)
-    static = phases.static + clock.static - ended.point.static + moved
-    point = followed(problem, clock.here, ended.point, static)
-    ended = ended._replace(here=clock.here, instruments=clock.instruments, point=point)
+    profile = CostProfile.of(problem, ended.here, ended.instruments, ended.point, partial(_held, problem, ended.point))
+    model = GaussNewton.of(problem, profile.here).under(profile.instruments)
+    moved, added = _left_out(problem, model, ended.point.static)
+    static = phases.static + profile.static - ended.point.static + moved
+    point = followed(problem, profile.here, ended.point, static)
+    ended = ended._replace(here=profile.here, instruments=profile.instruments, point=point)
     roots = _roots_in_trials(problem, ended, model)
     covariance, of_curves = _deviations(problem, ended, model, roots)
     covariance += phases.covariance + added
@@ -121,14 +122,13 @@ def estimate_simultaneous(
     return result_of(problem, ended, motions, covariance, of_curves, support, evidence, draws)
 
 
-def _of_other_tasks(problem: MapProblem, model: GaussNewton, static: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """`across_tasks` at an estimate of the static unknowns (S,)."""
-    theta, direction = problem.layout.theta, np.zeros(len(static))
-    direction[theta] = task_direction(problem.segments, problem.bsp(static).mass_kg)
-    data = sum(each.information for each in model.displaced) @ direction
-    pull = -float(direction @ problem.prior_slope(static)[0])
+def _left_out(problem: MapProblem, model: GaussNewton, static: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """`with_left_out` at an estimate of the static unknowns (S,)."""
+    directions = problem.left_out(static)
+    data = sum(each.information for each in model.displaced) @ directions
+    pull = -directions.T @ problem.prior_slope(static)[0]
     root = model.static.root_of_covariance()
-    return across_tasks(direction, data, pull, root @ root.T)
+    return with_left_out(directions, data, pull, root @ root.T)
 
 
 def _searched(problem: MapProblem, progress: Callable[[float], None]) -> Ended:
@@ -169,7 +169,7 @@ class _Judged(NamedTuple):
     @classmethod
     def at_first(cls, problem: MapProblem) -> _Judged:
         """Before the data have said anything."""
-        return cls(GaussianPrior.of(problem.instruments), np.full(len(problem.instruments.own), np.inf))
+        return cls(GaussianPrior.of(problem.layout.error_priors), np.full(len(problem.layout.error_priors.own), np.inf))
 
     @classmethod
     def known(cls, gaussian: GaussianPrior) -> _Judged:
@@ -260,7 +260,7 @@ def _judged_again(
 ) -> _Judged:
     """The instruments, if this step leads from a point to the optimum."""
     mean, covariance = model.under(judged.gaussian).of_instruments(point, step)
-    return judged.again(problem.instruments, mean, covariance, far)
+    return judged.again(problem.layout.error_priors, mean, covariance, far)
 
 
 def _moved(problem: MapProblem, slope: Slope, step: np.ndarray) -> Slope:
@@ -300,14 +300,13 @@ def _through_impacts(problem: MapProblem, point: Point) -> tuple[np.ndarray, ...
 
     What impacts say of body and instruments counts less (`impacts`); but a motion that did not follow the forces there
     would leave residuals that OpenSim's next tools have to take. These know rigid segments only: the motion is to
-    follow what a trunk that bends does to the forces, too.
+    follow what else changes the forces, too.
     """
-    rigid = point.static.copy()
-    rigid[problem.layout.trunks] = 0.0
+    rigid = problem.layout.rigid(point.static)
     if all(np.max(trial.impact) < _NO_IMPACT for trial in problem.trials) and (rigid == point.static).all():
         return point.coefficients
     sure = [replace(trial, impact=1.0) for trial in problem.trials]
-    following = MapProblem(problem.skeleton, problem.prior, problem.calibration, sure)
+    following = problem.of(sure)
     at = _Place(following.slope(replace(point, static=rigid)), _Judged.at_first(following))
     for _ in range(_MOST_THROUGH_IMPACTS):
         alone = MotionAlone.of(following, at.slope.point, _LEAST_DAMPING)
@@ -334,11 +333,11 @@ def _roots_in_trials(problem: MapProblem, ended: Ended, model: GaussNewton) -> l
     here, layout = ended.here, problem.layout
     root, first, roots = model.static.root_of_covariance(), layout.in_root.stop, []
     for k, trial in enumerate(here.trials):
-        in_trial, sd = root, problem.displacement_sd_m[k]
+        in_trial, sd = root, problem.displaced_sd[k]
         if sd.any():
             elsewhere = here.information + sum(each.information for j, each in enumerate(model.displaced) if j != k)
-            elsewhere[layout.instruments, layout.instruments] += ended.instruments.precision
-            elsewhere = as_displaced(elsewhere, layout.locals, sd)
+            elsewhere[layout.errors, layout.errors] += ended.instruments.precision
+            elsewhere = as_displaced(elsewhere, layout.displaced, sd)
             in_trial = StaticInformation.of(trial.information + elsewhere, first).root_of_covariance()
         roots.append(in_trial)
     return roots

@@ -91,6 +91,15 @@ class ErrorPriors:
     own: tuple[SoundOrFaulty, ...]
     common: tuple[tuple[SoundOrFaulty, tuple[int, ...]], ...] = ()
 
+    @classmethod
+    def joined(cls, every: Sequence[ErrorPriors]) -> ErrorPriors:
+        """Of all these errors, one kind after another."""
+        common, before = [], 0
+        for each in every:
+            common += [(prior, tuple(before + one for one in members)) for prior, members in each.common]
+            before += len(each.own)
+        return cls(tuple(prior for each in every for prior in each.own), tuple(common))
+
     @cached_property
     def parts(self) -> tuple[SoundOrFaulty, ...]:
         """Priors of all parts, which are independent: (k + c)."""

@@ -11,11 +11,20 @@ from __future__ import annotations
 
 import numpy as np
 
+from kinertia.estimation.simultaneous.cost_term import CostTerm, InTrial
 from kinertia.estimation.simultaneous.normal_equations import Gradient, NormalEquations
 from kinertia.estimation.simultaneous.stretches import Stretch
 
 CHANGE_SD, AWAY_SD = 1.0, 30.0
 """Rad or m: of the change from one coefficient to the next, and of each by itself."""
+
+
+class Start(CostTerm):
+    """What ties the motion of every trial to its start."""
+
+    def add(self, into: Gradient, here: InTrial) -> None:
+        """Add it."""
+        add_start(into, here.stretch, here.coefficients - self.given.start[here.k])
 
 
 def add_start(into: Gradient, stretch: Stretch, moved: np.ndarray) -> None:

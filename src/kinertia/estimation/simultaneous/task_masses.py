@@ -12,6 +12,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from kinertia.estimation.simultaneous.cost_term import CostTerm
+from kinertia.estimation.simultaneous.given import BSP
 from kinertia.model.anatomy import segment_of
 
 TASK_SD = 0.1
@@ -35,23 +37,11 @@ def task_direction(segments: Sequence[str], mass_kg: np.ndarray) -> np.ndarray:
     return moved
 
 
-def across_tasks(
-    direction: np.ndarray, data: np.ndarray, pull: float, covariance: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """What one more unknown of unit deviation changes, by which the data see the others displaced: (S,) how far the
-    estimate moves back to the prior, and (S, S) how much is added to its covariance.
+class TaskMasses(CostTerm):
+    """What one task shows of the masses otherwise than another would: one more unknown, left out of the vector."""
 
-    Args:
-        direction: (S,) by which they are displaced.
-        data: (S,) information of the data on the unknowns, times this.
-        pull: of the data along it, at the estimate without this unknown.
-        covariance: (S, S) without it.
-
-    >>> one = np.ones(1)
-    >>> moved, added = across_tasks(one, 99.0 * one, 1.98, np.array([[0.01]]))  # 1.98 +- 0.1, prior 0 +- 1
-    >>> moved.round(2), added.round(2)
-    (array([-0.99]), array([[0.49]]))
-    """
-    carried = covariance @ data
-    left = 1.0 + float(direction @ data) - float(data @ carried)
-    return -carried * pull / left, np.outer(carried, carried) / left
+    def left_out(self, static: np.ndarray) -> np.ndarray:
+        """By which the data see the masses displaced."""
+        result: np.ndarray = np.zeros(len(static))
+        result[self.layout[BSP]] = task_direction(self.model.segments, self.model.bsp(static).mass_kg)
+        return result

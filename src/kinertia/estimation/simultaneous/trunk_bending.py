@@ -12,14 +12,19 @@ specific force at the trunk (acceleration less gravity). It is taken from the gr
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from kinertia.estimation.simultaneous.sound_or_faulty import SoundOrFaulty
+from kinertia.estimation.simultaneous.calibration_entry import BENDING, CalibrationEntry
+from kinertia.estimation.simultaneous.cost_term import CostTerm, Solution
+from kinertia.estimation.simultaneous.given import FreedModel, Given
+from kinertia.estimation.simultaneous.layout import Unknowns
+from kinertia.estimation.simultaneous.root_terms import OfSegment, RootFrames
+from kinertia.estimation.simultaneous.sound_or_faulty import ErrorPriors, SoundOrFaulty
 from kinertia.model.anatomy import segment_of
 from kinertia.model.bsp import BodySegmentParameters
-from kinertia.model.log_cholesky import dynamic_jacobian
 
 BENDING_PRIOR_M = SoundOrFaulty(0.001, 0.02, 0.1)
 """Of kappa over the body's mass: a trunk that is rigid, and one that bends. Under a prior of 0.015 m, a person of 63 kg
@@ -33,7 +38,7 @@ _MOST_OF_TRUNK = 0.7
 
 
 @dataclass(frozen=True, eq=False)
-class TrunkBending:
+class BendingTrunk:
     """The trunk of a model, and what one unit of kappa (kg m) changes.
 
     Attributes:
@@ -47,7 +52,7 @@ class TrunkBending:
     mass_kg: float
 
     @classmethod
-    def of(cls, bsp: BodySegmentParameters, mass_kg: float) -> TrunkBending | None:
+    def of(cls, bsp: BodySegmentParameters, mass_kg: float) -> BendingTrunk | None:
         """Of these segments and a body of this mass; None if none of them is a trunk that stands on its origin."""
         trunk = [k for k, name in enumerate(bsp.segments) if segment_of(name) == "torso"]
         if not trunk:
@@ -76,37 +81,60 @@ class TrunkBending:
         return BodySegmentParameters.from_dynamic_parameters(bsp.segments, parameters.ravel())
 
 
-@dataclass(frozen=True, eq=False)
-class BentTrunk:
-    """A trunk that bends by kappa (kg m) in a trial; that unknown's place is among the static ones."""
+class TrunkBending(CostTerm):
+    """How much the trunk bends in each trial; nothing in models without one."""
 
-    trunk: TrunkBending
-    kappa: float
-    place: int
+    @classmethod
+    def unknowns(cls, given: Given) -> tuple[Unknowns, ...]:
+        """Kappa of each trial. The prior knows nothing of the person."""
+        trunk = BendingTrunk.of(given.prior.mean, given.prior.mass_kg)
+        priors = ErrorPriors((trunk.prior,) * len(given.trials) if trunk else ())
+        return (Unknowns.errors(BENDING, "kg m", priors, in_models=False),)
 
-    def bsp(self, rigid: BodySegmentParameters) -> BodySegmentParameters:
-        """What moves like segments with such a trunk."""
-        return self.trunk.bent(rigid, self.kappa)
+    def __init__(self, model: FreedModel) -> None:
+        super().__init__(model)
+        self.trunk = BendingTrunk.of(self.given.prior.mean, self.given.prior.mass_kg)
 
-    def upright(self, loads: np.ndarray) -> np.ndarray:
-        """Ground reactions (d, 6), or their derivatives (d, 6, ...), less the moment kappa y x F / mass."""
-        result = loads.copy()
-        result[:, 3] -= self.kappa / self.trunk.mass_kg * loads[:, 2]
-        result[:, 5] += self.kappa / self.trunk.mass_kg * loads[:, 0]
-        return result
+    def in_root(self, root: RootFrames, k: int, static: np.ndarray) -> RootFrames:
+        """Less the moment kappa y x F / mass of the ground reactions, and of a trunk that bends."""
+        if self.trunk is None:
+            return root
+        place = self.layout[BENDING].start + k
+        kappa = static[place]
+        by_kappa = _upright(root.wrench / self.trunk.mass_kg, 1.0)
+        share = kappa / self.trunk.mass_kg
+        by_single = root.by_single + _upright(root.by_single, share)
+        return replace(
+            root,
+            bsp=self.trunk.bent(root.bsp, kappa),
+            wrench=root.wrench + _upright(root.wrench, share),
+            by_errors=tuple((by + _upright(by, share), add) for by, add in root.by_errors),
+            by_single=np.concatenate([by_single, by_kappa[..., None]], axis=2),
+            at=(*root.at, [place]),
+            of_segments=(*root.of_segments, OfSegment(place, self.trunk.row, self.trunk.parameters)),
+        )
 
-    def by_kappa(self, loads: np.ndarray) -> np.ndarray:
-        """(d, 6) derivative of that by kappa."""
-        result = np.zeros_like(loads)
-        result[:, 3], result[:, 5] = -loads[:, 2] / self.trunk.mass_kg, loads[:, 0] / self.trunk.mass_kg
-        return result
+    def read(self, solution: Solution) -> dict[str, Any]:
+        """Kappa of each trial with its deviation, kg m."""
+        found = solution.pairs(self.layout[BENDING])
+        entries = [
+            CalibrationEntry(
+                kind="trunk",
+                trial=trial.name,
+                quantity=BENDING,
+                value=kappa,
+                prior_sd=self.given.prior.mass_kg * BENDING_PRIOR_M.sd,
+                sd=sd,
+                unit="kg m",
+            )
+            for trial, (kappa, sd) in zip(self.given.trials, found, strict=False)
+            if trial.ground.plates  # others show nothing of it
+        ]
+        return {"trunks_kg_m": tuple(found), "calibration": tuple(entries)}
 
-    @property
-    def unknowns(self) -> slice:
-        """Of the trunk, among the static ones."""
-        return slice(10 * self.trunk.row, 10 * self.trunk.row + 10)
 
-    def by_unknowns(self, theta: np.ndarray) -> np.ndarray:
-        """(10,) step of the trunk's unknowns, at theta (10 b,), that changes its parameters as a unit of kappa does."""
-        result: np.ndarray = np.linalg.solve(dynamic_jacobian(theta[self.unknowns])[0], self.trunk.parameters)
-        return result
+def _upright(loads: np.ndarray, share_m: float) -> np.ndarray:
+    """The moment -share y x F of ground reactions (d, 6), or of their derivatives (d, 6, ...)."""
+    result = np.zeros_like(loads)
+    result[:, 3], result[:, 5] = -share_m * loads[:, 2], share_m * loads[:, 0]
+    return result

@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from kinertia.estimation.simultaneous import clock_profile
-from kinertia.estimation.simultaneous.clock_profile import ClockProfile
+from kinertia.estimation.simultaneous import cost_profile
+from kinertia.estimation.simultaneous.cost_profile import CostProfile
 from kinertia.estimation.simultaneous.sound_or_faulty import ErrorPriors, GaussianPrior, SoundOrFaulty
 
 CLOCK, OWN = SoundOrFaulty(0.0003, 0.008, 0.3), SoundOrFaulty(0.00003, 0.01, 0.05)
@@ -32,10 +32,9 @@ def cost(static: np.ndarray, n: int) -> float:
 
 def problem(priors):
     n = len(priors)
-    layout = SimpleNamespace(late=lambda k: list(range(n)), instruments=slice(0, n))
-    instruments = ErrorPriors(tuple(priors))
+    layout = SimpleNamespace(errors=slice(0, n), error_priors=ErrorPriors(tuple(priors)))
     return SimpleNamespace(
-        n_forces=1, layout=layout, instruments=instruments, slope=lambda at: SimpleNamespace(cost=cost(at.static, n))
+        layout=layout, profiled=lambda: list(range(n)), slope=lambda at: SimpleNamespace(cost=cost(at.static, n))
     )
 
 
@@ -54,11 +53,11 @@ def model_of(here: Quadratic, n: int):
     return SimpleNamespace(under=under)
 
 
-def found(monkeypatch, priors) -> tuple[ClockProfile, np.ndarray]:
+def found(monkeypatch, priors) -> tuple[CostProfile, np.ndarray]:
     """And the posterior covariance of everything."""
     one, n = problem(priors), len(priors)
-    monkeypatch.setattr(clock_profile, "GaussNewton", SimpleNamespace(of=lambda problem, here: model_of(here, n)))
-    gaussian, here = GaussianPrior.of(one.instruments), Quadratic(information(n, 2.0))
+    monkeypatch.setattr(cost_profile, "GaussNewton", SimpleNamespace(of=lambda problem, here: model_of(here, n)))
+    gaussian, here = GaussianPrior.of(one.layout.error_priors), Quadratic(information(n, 2.0))
 
     def search(model, held: GaussianPrior) -> Place:
         whole, right = information(n, 1.0), np.append(np.full(n, SHOWN_S / SD_S**2), 0.0)
@@ -66,7 +65,7 @@ def found(monkeypatch, priors) -> tuple[ClockProfile, np.ndarray]:
         right[:n] += held.pull
         return Place(np.linalg.solve(whole, right))
 
-    profile = ClockProfile.of(one, here, gaussian, search(None, gaussian), search)
+    profile = CostProfile.of(one, here, gaussian, search(None, gaussian), search)
     root = model_of(profile.here, n).under(profile.instruments).static.root_of_covariance()
     return profile, root @ root.T
 
@@ -106,17 +105,11 @@ def test_what_one_trial_shows_may_be_the_clock_s_or_its_own(monkeypatch):
     assert 0.0 < profile.static[1] < 0.3 * profile.static[0]
 
 
-def test_a_clock_that_has_been_checked_is_left_as_it_is(monkeypatch):
-    checked = SoundOrFaulty.certain(0.01)
-    _, covariance = found(monkeypatch, [checked])
-    linear = 1.0 / (2.0 / SD_S**2 + checked.sd**-2)
-    assert covariance[0, 0] == pytest.approx(linear)
-
-
-def test_several_trials_are_left_as_they_are():
+def test_where_nothing_is_to_be_profiled_all_is_left_as_it_is():
     one = problem([CLOCK])
-    several = SimpleNamespace(**{**vars(one), "n_forces": 2})
-    gaussian, here, place = GaussianPrior.of(one.instruments), Quadratic(information(1, 2.0)), Place(np.zeros(2))
-    profile = ClockProfile.of(several, here, gaussian, place, lambda model, held: pytest.fail("searched"))
+    known = SimpleNamespace(**{**vars(one), "profiled": list})
+    gaussian, here = GaussianPrior.of(one.layout.error_priors), Quadratic(information(1, 2.0))
+    place = Place(np.zeros(2))
+    profile = CostProfile.of(known, here, gaussian, place, lambda model, held: pytest.fail("searched"))
     assert profile.here is here
     assert profile.static is place.static

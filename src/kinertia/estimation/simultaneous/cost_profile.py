@@ -23,7 +23,7 @@ _HELD = 1e6
 
 
 @dataclass(frozen=True, eq=False)
-class ClockProfile:
+class CostProfile:
     """An estimate with the delay's posterior from its profile; of several trials as it was.
 
     Attributes:
@@ -44,7 +44,7 @@ class ClockProfile:
         instruments: GaussianPrior,
         point: Point,
         search: Callable[[GaussNewton, GaussianPrior], Point],
-    ) -> ClockProfile:
+    ) -> CostProfile:
         """From where a search has ended.
 
         Args:
@@ -54,10 +54,10 @@ class ClockProfile:
             point: the end.
             search: the optimum with this quadratic and another Gaussian.
         """
-        late, first = np.array(problem.layout.late(0)), problem.layout.instruments.start
-        priors = [problem.instruments.own[k] for k in late - first]
+        late, first = np.array(problem.profiled(), dtype=int), problem.layout.errors.start
+        priors = [problem.layout.error_priors.own[k] for k in late - first]
         unchanged = cls(here, instruments, point.static)
-        if problem.n_forces > 1 or not any(0.0 < prior.faulty_share < 1.0 for prior in priors):
+        if not len(late):
             return unchanged
         model = GaussNewton.of(problem, here)
         root = model.under(instruments).static.root_of_covariance()
@@ -86,7 +86,7 @@ class ClockProfile:
 
 def _cost(problem: MapProblem, there: Point, instruments: GaussianPrior, own: np.ndarray) -> float:
     """Of everything but what the Gaussian says of some quantities alone."""
-    values = there.static[problem.layout.instruments]
+    values = there.static[problem.layout.errors]
     nothing = GaussianPrior(np.zeros_like(instruments.precision), np.zeros_like(instruments.pull))
     alone = _with(nothing, own, instruments.precision[np.ix_(own, own)], instruments.pull[own])
     return problem.slope(there).cost + instruments.cost(values) - alone.cost(values)

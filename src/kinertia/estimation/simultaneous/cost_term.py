@@ -1,0 +1,233 @@
+"""A cost term of the simultaneous estimate: unknowns that it adds, what it costs, and what it reads from the solution.
+
+`terms.TERMS` lists them. The estimate knows no term by name; what terms have to do with one another goes through
+`FreedModel`, the unknowns' names in `Layout`, and the ground reactions (`GroundLoads`), which terms may change.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from typing import Any
+
+import numpy as np
+
+from kinertia.estimation.simultaneous.given import FreedModel, Given
+from kinertia.estimation.simultaneous.layout import Unknowns
+from kinertia.estimation.simultaneous.normal_equations import Gradient
+from kinertia.estimation.simultaneous.root_terms import RootFrames
+from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior
+from kinertia.estimation.simultaneous.stretches import Stretch
+from kinertia.motion.ground_reactions import GroundReactions
+
+Derivative = tuple[np.ndarray, Callable[[np.ndarray, np.ndarray], None]]
+"""Derivatives (n, ..., 6, e) of loads by e unknowns of a term, and what adds such, (n, r, e), to those by all static
+unknowns (n, r, s)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Where the search ended, for terms to read.
+
+    Attributes:
+        static: (S,) the unknowns that do not move.
+        covariance: (S, S) of them, found at
+        there: (S,).
+        displaced: per trial (k,) how far the displaced unknowns are elsewhere in it.
+        gaussian: in place of the priors of errors.
+        moved, contradicted: (k,) of errors, as `InstrumentSupport` has them.
+    """
+
+    static: np.ndarray
+    covariance: np.ndarray
+    there: np.ndarray
+    displaced: tuple[np.ndarray, ...]
+    gaussian: GaussianPrior
+    moved: np.ndarray
+    contradicted: np.ndarray
+
+    @cached_property
+    def sd(self) -> np.ndarray:
+        """(S,) deviations."""
+        result: np.ndarray = np.sqrt(np.diag(self.covariance))
+        return result
+
+    def pairs(self, at: slice) -> list[tuple[float, float]]:
+        """Values and deviations of the unknowns at these places."""
+        return list(zip(self.static[at].tolist(), self.sd[at].tolist(), strict=True))
+
+
+class CostTerm:
+    """A term that adds no unknowns, costs nothing and reads nothing: what each term has of these three, it overrides.
+
+    Attributes:
+        given: to the estimate.
+        model: as the unknowns have it.
+        layout: where the unknowns stand.
+    """
+
+    @classmethod
+    def unknowns(cls, given: Given) -> tuple[Unknowns, ...]:
+        """The unknowns that it adds."""
+        return ()
+
+    def __init__(self, model: FreedModel) -> None:
+        self.given, self.model, self.layout = model.given, model, model.layout
+
+    def add(self, into: Gradient, here: InTrial) -> None:
+        """Add its residuals in a stretch of a trial to half the sum of squares and its derivatives."""
+
+    def add_information(self, into: np.ndarray, static: np.ndarray) -> None:
+        """Add the information (S, S) of a prior of its own."""
+
+    def add_pull(self, right: np.ndarray, static: np.ndarray) -> float:
+        """Add minus the derivatives (S,) of half the sum of squares of that prior; returns the sum."""
+        return 0.0
+
+    def add_bends(self, into: np.ndarray, right: np.ndarray) -> None:
+        """Add to the diagonal (S,) of the information what Gauss-Newton leaves out, from the right-hand side (S,)."""
+
+    def shorten(self, step: np.ndarray) -> None:
+        """Shorten a step (S,) that goes farther than the quadratic holds."""
+
+    def in_root(self, root: RootFrames, k: int, static: np.ndarray) -> RootFrames:
+        """The root equations of trial k with what its unknowns change of them, but by the ground reactions."""
+        return root
+
+    def left_out(self, static: np.ndarray) -> np.ndarray | None:
+        """(S,) by how much one more unknown of unit deviation, not in the vector, displaces the others for the data."""
+        return None
+
+    def profiled(self) -> list[int]:
+        """Places of errors of which the sum has its posterior from the profile of the cost."""
+        return []
+
+    def read(self, solution: Solution) -> dict[str, Any]:
+        """Fields of `SimultaneousResult` that are this term's; entries of several terms' "calibration" are joined."""
+        return {}
+
+
+class LoadTerm(CostTerm):
+    """A term whose unknowns are errors of the ground reactions. Loads are put right by one after the other, in the
+    order of the list.
+    """
+
+    def late(self, k: int) -> list[int]:
+        """Which unknowns add up to the time by which forces of trial k are late."""
+        return []
+
+    def put_right(
+        self, k: int, static: np.ndarray, loads: np.ndarray, loaded: np.ndarray, carrier: np.ndarray
+    ) -> np.ndarray:
+        """Loads on the feet (n, 2, 6) without this term's errors: linear in the loads and in `loaded`.
+
+        Args:
+            k: the trial.
+            static: (S,) unknowns.
+            loads: (n, 2, 6) force (N) and moment about the ground origin (N m).
+            loaded: (n, 2) 1 where somebody stands; or 0, or a rate of it, with derivatives of the loads.
+            carrier: (n, 2) index of the plate under each foot.
+        """
+        return loads
+
+    def by_unknowns(
+        self, k: int, static: np.ndarray, loads: np.ndarray, loaded: np.ndarray, carrier: np.ndarray
+    ) -> np.ndarray:
+        """(n, 2, 6, ...) derivatives of what `put_right` gives by the unknowns. `loads` are put right by all terms: the
+        derivatives of any but the last must not depend on them.
+        """
+        raise NotImplementedError
+
+    def add_by_unknowns(self, k: int, by_static: np.ndarray, by: np.ndarray) -> None:
+        """Add such derivatives (n, r, ...) to those by all static unknowns (n, r, s)."""
+        raise NotImplementedError
+
+
+class GroundLoads:
+    """Ground reactions of the trials, put right by the terms that know errors of them."""
+
+    def __init__(self, given: Given, terms: Sequence[CostTerm]) -> None:
+        self._trials, self._grounds = given.trials, given.grounds
+        self._terms = [term for term in terms if isinstance(term, LoadTerm)]
+
+    def late(self, k: int) -> list[int]:
+        """Which unknowns add up to the time by which forces of trial k are late."""
+        return [at for term in self._terms for at in term.late(k)]
+
+    def late_s(self, k: int, static: np.ndarray) -> float:
+        """By how much they are."""
+        return float(static[self.late(k)].sum())
+
+    def on_feet(
+        self, k: int, static: np.ndarray, derivative: int = 0, frames: slice | np.ndarray = slice(None)
+    ) -> np.ndarray:
+        """(n, 2, 6) loads on the feet at the frames of trial k, put right; or their time derivatives."""
+        ground, at = self._grounds[k], self._trials[k].time[frames] + self.late_s(k, static)
+        loads = ground.loads(at, derivative).reshape(len(at), 2, 6)
+        return self._put_right(k, static, loads, ground.loaded(at, derivative), ground.carrier[frames])
+
+    def reactions(self, k: int, static: np.ndarray) -> GroundReactions:
+        """The loads for the joint moments of trial k, put right, by the clock of the markers."""
+        raw = self._grounds[k].reactions
+        wrench = self._put_right(k, static, raw.wrench, raw.loaded, raw.carrier)
+        impact = self._put_right(k, static, raw.impact, np.zeros(raw.carrier.shape), raw.carrier)
+        return replace(raw, time=raw.time - self.late_s(k, static), wrench=wrench, impact=impact)
+
+    def _put_right(
+        self, k: int, static: np.ndarray, loads: np.ndarray, loaded: np.ndarray, carrier: np.ndarray
+    ) -> np.ndarray:
+        for term in self._terms:
+            loads = term.put_right(k, static, loads, loaded, carrier)
+        return loads
+
+    def by_errors(
+        self, k: int, static: np.ndarray, loads: np.ndarray, loaded: np.ndarray, frames: np.ndarray
+    ) -> Iterator[Derivative]:
+        """Derivatives (n, 2, 6, ...) by each term's unknowns of loads (n, 2, 6) put right, where somebody stands
+        (n, 2).
+        """
+        carrier, nothing = self._grounds[k].carrier[frames], np.zeros(loaded.shape)
+        for place, term in enumerate(self._terms):
+            by = term.by_unknowns(k, static, loads, loaded, carrier)
+            for later in self._terms[place + 1 :]:
+                columns = np.moveaxis(by.reshape(*loads.shape, -1), -1, 0)
+                right = [later.put_right(k, static, one, nothing, carrier) for one in columns]
+                by = np.stack(right, axis=-1).reshape(by.shape)
+            yield by, partial(term.add_by_unknowns, k)
+
+    def root(self, k: int, static: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, tuple[Derivative, ...]]:
+        """(d, 6) sum of the loads on both feet, and its derivatives (d, 6, ...) by all errors but lateness."""
+        loads = self.on_feet(k, static, 0, frames)
+        loaded = self._grounds[k].loaded(self._trials[k].time[frames] + self.late_s(k, static))
+        every = self.by_errors(k, static, loads, loaded, frames)
+        return loads.sum(axis=1), tuple((by.sum(axis=1), add) for by, add in every)
+
+
+@dataclass(frozen=True, eq=False)
+class InTrial:
+    """A stretch of a trial at a point of the estimate.
+
+    Attributes:
+        model: of the person.
+        loads: on the feet.
+        terms: all.
+        k: the trial.
+        coefficients: of its motion.
+        static: (S,) the other unknowns as they are in it.
+        stretch: of the trial.
+    """
+
+    model: FreedModel
+    loads: GroundLoads
+    terms: Sequence[CostTerm]
+    k: int
+    coefficients: np.ndarray
+    static: np.ndarray
+    stretch: Stretch
+
+    @cached_property
+    def near_q(self) -> np.ndarray:
+        """(f, c) coordinates of the freed skeleton in the stretch with its neighbours, `Stretch.with_neighbours`."""
+        parts = self.model.given.bases[self.k].evaluate(self.coefficients, self.stretch.with_neighbours)
+        return self.model.full(parts, self.static)[0]

@@ -1,0 +1,167 @@
+"""Errors of force plates and synchronisation as a cost term: of the laboratory's in all trials, and of each trial."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from kinertia.estimation.simultaneous.cost_term import LoadTerm, Solution
+from kinertia.estimation.simultaneous.given import FreedModel, Given
+from kinertia.estimation.simultaneous.instrument_errors import FoundErrors, instrument_errors
+from kinertia.estimation.simultaneous.instruments import InstrumentInformation
+from kinertia.estimation.simultaneous.layout import Unknowns
+from kinertia.estimation.simultaneous.plate_loads import GAIN
+from kinertia.estimation.simultaneous.plates import PLATE_ERRORS, ZERO_UNKNOWNS, plates_with_floor
+from kinertia.estimation.simultaneous.sound_or_faulty import ErrorPriors, SoundOrFaulty
+
+PLATES, CLOCK, DELAYS, ZEROS, GAINS = "plates", "clock", "delays", "zeros", "gains"
+
+
+class InstrumentErrors(LoadTerm):
+    """What is wrong with plates and clock.
+
+    PLATES has PLATE_UNKNOWNS of each plate, then FLOOR_UNKNOWNS. Of several trials each has a delay of its own besides
+    the clock's, and so has one whose clock has not been checked. Zeros (ZERO_UNKNOWNS) and gains are those of each
+    trial's plates, the gains beside those of all trials.
+    """
+
+    @classmethod
+    def unknowns(cls, given: Given) -> tuple[Unknowns, ...]:
+        """All errors, each sound or faulty."""
+        known, trials = given.calibration.instruments, given.trials
+        shared = known.of_unknowns(given.plates)
+        # one trial of a session is one of several, and so may be one whose clock nobody has checked
+        count = sum(bool(trial.ground.plates) for trial in trials)
+        late = count > 1 or known.session or known.clock_s.faulty_share > 0.0
+        plates = sum(len(trial.ground.plates) for trial in trials)
+
+        def of_trials(prior: SoundOrFaulty, count: int) -> ErrorPriors:
+            return ErrorPriors((prior,) * count)
+
+        return (
+            Unknowns.errors(
+                PLATES, "m, 1, N m/N or rad", ErrorPriors(shared.own[:-1], shared.common), of_laboratory=True
+            ),
+            Unknowns.errors(CLOCK, "s", ErrorPriors(shared.own[-1:]), of_laboratory=True),
+            Unknowns.errors(DELAYS, "s", of_trials(known.delay_s, count if late else 0)),
+            Unknowns.errors(ZEROS, "N", of_trials(known.zero_n, len(ZERO_UNKNOWNS) * plates)),
+            Unknowns.errors(GAINS, "1", of_trials(known.trial_gain, plates)),
+        )
+
+    def __init__(self, model: FreedModel) -> None:
+        super().__init__(model)
+        given = self.given
+        self._own = [[given.plates.index(name) for name in trial.ground.plates] for trial in given.trials]
+        self._to_plates = plates_with_floor(len(given.plates))
+        self._session = given.calibration.instruments.of_session(given.plates)
+
+    def add_information(self, into: np.ndarray, static: np.ndarray) -> None:
+        """Of what other people of the session have shown."""
+        at = self.layout.laboratory
+        into[at, at] += self._session.information
+
+    def add_pull(self, right: np.ndarray, static: np.ndarray) -> float:
+        """Of the same."""
+        own, shown = static[self.layout.laboratory], self._session
+        pull = shown.information @ own
+        right[self.layout.laboratory] += shown.right - pull
+        return float(own @ (pull - 2.0 * shown.right))
+
+    def late(self, k: int) -> list[int]:
+        """The clock's delay and the trial's own."""
+        delays = self.layout[DELAYS]
+        return [self.layout[CLOCK].start, *range(delays.start, delays.stop)[k : k + 1]]
+
+    def profiled(self) -> list[int]:
+        """The delay of a single trial with forces of which it is open whether it is late."""
+        places, priors = self.late(0), self.layout.error_priors.own
+        own = [priors[at - self.layout.errors.start] for at in places]
+        uncertain = any(0.0 < prior.faulty_share < 1.0 for prior in own)
+        return places if uncertain and sum(map(bool, self._own)) < 2 else []
+
+    def put_right(
+        self, k: int, static: np.ndarray, loads: np.ndarray, loaded: np.ndarray, carrier: np.ndarray
+    ) -> np.ndarray:
+        """Loads without all errors but lateness."""
+        return self.given.grounds[k].put_right(loads, loaded, carrier, self.plates_in(k, static))
+
+    def by_unknowns(
+        self, k: int, static: np.ndarray, loads: np.ndarray, loaded: np.ndarray, carrier: np.ndarray
+    ) -> np.ndarray:
+        """(n, 2, 6, p, 7) derivatives by what is wrong with the plates in trial k."""
+        return self.given.grounds[k].by_plate(loads, loaded, carrier, self.plates_in(k, static))
+
+    def add_by_unknowns(self, k: int, by_static: np.ndarray, by: np.ndarray) -> None:
+        """Add derivatives (n, r, p, 7) by what is wrong with the plates in trial k."""
+        n, rows, *_ = by.shape
+        errors = len(PLATE_ERRORS)
+        by_static[:, :, self.layout[PLATES]] += by[..., :errors].reshape(n, rows, -1) @ self._to_plates
+        by_static[:, :, self.zeros_of(k)] += by[:, :, self._own[k], errors:]
+        by_static[:, :, self.gains_of(k)] += by[:, :, self._own[k], GAIN]
+
+    def plates_in(self, k: int, static: np.ndarray) -> np.ndarray:
+        """(p, 7) what is wrong with every plate in trial k: PLATE_ERRORS, ZERO_UNKNOWNS."""
+        zeros = np.zeros((len(self.given.plates), len(ZERO_UNKNOWNS)))
+        errors: np.ndarray = (self._to_plates @ static[self.layout[PLATES]]).reshape(-1, len(PLATE_ERRORS))
+        errors[self._own[k], GAIN] += static[self.gains_of(k)]
+        zeros[self._own[k]] = static[self.zeros_of(k)]
+        return np.hstack([errors, zeros])
+
+    def zeros_of(self, k: int) -> np.ndarray:
+        """(q, 2) where the zeros of the q plates of trial k stand."""
+        return self._of_trial(k, ZEROS, len(ZERO_UNKNOWNS)).reshape(-1, len(ZERO_UNKNOWNS))
+
+    def gains_of(self, k: int) -> np.ndarray:
+        """(q,) where their gains stand."""
+        return self._of_trial(k, GAINS, 1)
+
+    def _of_trial(self, k: int, name: str, each: int) -> np.ndarray:
+        first = self.layout[name].start + each * sum(map(len, self._own[:k]))
+        return np.arange(first, first + each * len(self._own[k]))
+
+    def read(self, solution: Solution) -> dict[str, Any]:
+        """All errors and their deviations, and entries of each with its support."""
+        trials, plates, values, sd = self.given.trials, self.given.plates, solution.static, solution.sd
+        own = solution.covariance[self.layout[PLATES], self.layout[PLATES]]
+        shape = len(plates), len(PLATE_ERRORS)
+        shared = (self._to_plates @ values[self.layout[PLATES]]).reshape(shape)
+        shared_sd = np.sqrt(np.diag(self._to_plates @ own @ self._to_plates.T)).reshape(shape)
+        zeros = [(trial.ground.plates, self.zeros_of(k)) for k, trial in enumerate(trials)]
+        found = FoundErrors(
+            plates=dict(zip(plates, zip(shared, shared_sd, strict=True), strict=True)),
+            clock_s=solution.pairs(self.layout[CLOCK])[0],
+            delays_s=tuple(solution.pairs(self.layout[DELAYS])),
+            zeros_n=tuple(dict(zip(names, zip(values[at], sd[at], strict=True), strict=True)) for names, at in zeros),
+            gains=tuple(self._gains(k, solution) for k in range(len(trials))),
+            instruments=self._shown(solution),
+        )
+        first = self.layout.errors.start
+        entries = instrument_errors(
+            found,
+            self.given.calibration.instruments,
+            [trial.name for trial in trials],
+            (solution.moved, solution.contradicted),
+            self.layout[DELAYS].start - first,
+        )
+        return {**vars(found), "calibration": entries}
+
+    def _gains(self, k: int, solution: Solution) -> dict[str, tuple[float, float]]:
+        """The whole gains of a trial's plates in it, and their deviations."""
+        result = {}
+        for plate, at in zip(self.given.trials[k].ground.plates, self.gains_of(k), strict=True):
+            sums = np.zeros(self.layout.size)
+            sums[self.layout[PLATES]] = self._to_plates[len(PLATE_ERRORS) * self.given.plates.index(plate) + GAIN]
+            sums[at] = 1.0
+            result[plate] = float(sums @ solution.static), float(np.sqrt(sums @ solution.covariance @ sums))
+        return result
+
+    def _shown(self, solution: Solution) -> InstrumentInformation:
+        """What the trials say of the laboratory's instruments, without what was known before."""
+        prior, session, every = solution.gaussian, self._session, self.layout.errors
+        mean, covariance = solution.static[every], solution.covariance[every, every]
+        own = slice(len(session.right), len(mean))
+        more = (0, own.stop - own.start)
+        before = ((prior.precision, prior.pull), (np.pad(session.information, more), np.pad(session.right, more)))
+        shown = InstrumentInformation.of_posterior(self.given.plates, mean, covariance, before)
+        return shown.without_own(prior.precision[own, own], prior.pull[own])

@@ -1,0 +1,54 @@
+"""The root equations as a cost term: what the ground reactions leave unexplained of the body's motion."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kinertia.estimation.simultaneous.cost_term import CostTerm, InTrial
+from kinertia.estimation.simultaneous.given import BSP, FreedModel
+from kinertia.estimation.simultaneous.normal_equations import Gradient, NormalEquations
+from kinertia.estimation.simultaneous.root_terms import RootFrames, add_root, columns_of
+from kinertia.motion.dynamics import Motion
+from kinertia.motion.frames_at_once import pieces
+
+
+class RootLoads(CostTerm):
+    """The root equations at the dynamic frames of all trials; it adds no unknowns, and depends on those of others."""
+
+    def __init__(self, model: FreedModel) -> None:
+        super().__init__(model)
+        given = self.given
+        self._columns = columns_of(given.free, model.segments, given.moving, given.still, self.layout)
+
+    def add(self, into: Gradient, here: InTrial) -> None:
+        """Add the squares of the residuals, each over its deviation."""
+        basis, frames, start = self.given.bases[here.k], here.stretch.frames, here.stretch.splines.start
+        dynamic = frames.start + np.flatnonzero(self.given.trials[here.k].dynamic[frames])
+        for piece in pieces(len(dynamic)):
+            root = self._at(here, dynamic[piece])
+            if isinstance(into, NormalEquations):
+                add_root(into, self.layout.in_root, basis, start, root.terms(self._columns))
+            else:
+                root.add_gradient(into, self._columns, basis, start)
+
+    def _at(self, here: InTrial, frames: np.ndarray) -> RootFrames:
+        """The equations at some frames, with what other terms change of them."""
+        k, static = here.k, here.static
+        motion = self.model.full(self.given.bases[k].evaluate(here.coefficients, frames), static)
+        wrench, by_errors = here.loads.root(k, static, frames)
+        root = RootFrames(
+            skeleton=self.given.free,
+            bsp=self.model.bsp(static),
+            theta=static[self.layout[BSP]],
+            motion=Motion(*motion),
+            wrench=wrench,
+            by_errors=by_errors,
+            by_single=here.loads.on_feet(k, static, 1, frames).sum(axis=1)[..., None],
+            at=(here.loads.late(k),),
+            sd=self.given.trials[k].root_sd(frames),
+            frames=frames,
+            static=self.layout.in_root.stop,
+        )
+        for term in here.terms:
+            root = term.in_root(root, k, static)
+        return root

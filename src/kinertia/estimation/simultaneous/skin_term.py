@@ -1,0 +1,35 @@
+"""Skin that moves with the joints, as a cost term: the coefficients of what markers follow."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kinertia.estimation.simultaneous.cost_term import CostTerm
+from kinertia.estimation.simultaneous.given import SKIN, FreedModel, Given
+from kinertia.estimation.simultaneous.layout import Unknowns
+
+
+class Skin(CostTerm):
+    """Coefficients of skin motion (`skin`), the same in all trials."""
+
+    @classmethod
+    def unknowns(cls, given: Given) -> tuple[Unknowns, ...]:
+        """Three of each marker and pattern; those of a segment are alike."""
+        size = given.skin[0].size
+        return (Unknowns(name=SKIN, unit="1", start=np.zeros(size), prior=None, seen_by="markers"),)
+
+    def __init__(self, model: FreedModel) -> None:
+        super().__init__(model)
+        self._information = self.given.skin[0].information()
+
+    def add_information(self, into: np.ndarray, static: np.ndarray) -> None:
+        """Of the coefficients' prior."""
+        at = self.layout[SKIN]
+        into[at, at] += self._information
+
+    def add_pull(self, right: np.ndarray, static: np.ndarray) -> float:
+        """Of the same."""
+        own = static[self.layout[SKIN]]
+        pull = self._information @ own
+        right[self.layout[SKIN]] -= pull
+        return float(own @ pull)

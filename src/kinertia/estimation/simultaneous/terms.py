@@ -1,0 +1,32 @@
+"""The cost terms of the simultaneous estimate. A new unknown is one more of them."""
+
+from __future__ import annotations
+
+from kinertia.estimation.simultaneous.bsp_term import BodySegments
+from kinertia.estimation.simultaneous.cost_term import CostTerm
+from kinertia.estimation.simultaneous.instrument_term import InstrumentErrors
+from kinertia.estimation.simultaneous.marker_places import MarkerPlaces
+from kinertia.estimation.simultaneous.marker_terms import Markers
+from kinertia.estimation.simultaneous.range_terms import JointRanges
+from kinertia.estimation.simultaneous.root_loads import RootLoads
+from kinertia.estimation.simultaneous.skin_term import Skin
+from kinertia.estimation.simultaneous.start_terms import Start
+from kinertia.estimation.simultaneous.static_coordinates import StaticCoordinates
+from kinertia.estimation.simultaneous.task_masses import TaskMasses
+from kinertia.estimation.simultaneous.trunk_bending import TrunkBending
+
+TERMS: tuple[type[CostTerm], ...] = (
+    StaticCoordinates,
+    InstrumentErrors,
+    TrunkBending,
+    MarkerPlaces,
+    Skin,
+    BodySegments,
+    TaskMasses,
+    Markers,
+    JointRanges,
+    Start,
+    RootLoads,
+)
+"""In the order in which their entries are shown. The last takes about as long as all others together: of short trials,
+two threads share the work so."""

@@ -1,0 +1,21 @@
+import numpy as np
+import pytest
+
+from kinertia.estimation.simultaneous.left_out import with_left_out
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_they_are_more_unknowns_of_the_estimate(count):
+    """Against the whole problem: data on x + D z, priors on x and z."""
+    rng = np.random.default_rng(104)
+    root, prior = rng.normal(size=(6, 4)), np.diag([1.0, 4.0, 2.0, 0.5])
+    directions, measured = rng.normal(size=(4, count)), rng.normal(size=6)
+    data = root.T @ root
+    covariance = np.linalg.inv(prior + data)
+    estimate = covariance @ root.T @ measured
+    moved, added = with_left_out(directions, data @ directions, directions.T @ prior @ estimate, covariance)
+
+    rows, apart = np.hstack([root, root @ directions]), np.zeros((4, count))
+    whole = np.linalg.inv(rows.T @ rows + np.block([[prior, apart], [apart.T, np.eye(count)]]))
+    np.testing.assert_allclose(estimate + moved, (whole @ rows.T @ measured)[:4], atol=1e-12)
+    np.testing.assert_allclose(covariance + added, whole[:4, :4], atol=1e-12)
