@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from kinertia.findings.rule import Rule as Rule
     from kinertia.findings.rule import rule as rule
     from kinertia.findings.where import Where as Where
+    from kinertia.io.b3d import read_b3d as read_b3d
     from kinertia.io.marker_set_file import choose_marker_set as choose_marker_set
     from kinertia.io.marker_set_file import read_marker_set as read_marker_set
     from kinertia.io.osim.reader import read_osim as read_osim
@@ -117,6 +118,7 @@ _ROOMS = {
     "model.marker_set": "MarkerSet",
     "model.skeleton": "Skeleton",
     "motion.dynamics": "Motion inverse_dynamics residual",
+    "io.b3d": "read_b3d",
     "io.marker_set_file": "choose_marker_set read_marker_set",
     "io.osim.reader": "read_osim",
     "io.recording": "read_recording",

@@ -20,6 +20,7 @@ from kinertia.trial.impossible_data import impossible_load, impossible_position
 
 MARKER_FILES = (".trc", ".c3d", ".tsv", ".csv")
 CORTEX = ".forces"
+_SUBJECT = ".b3d"
 FORCE_FILES = (".mot", ".sto", ".tsv", CORTEX)
 """Endings of what is read."""
 _FARTHEST_M, _STRONGEST_N = 1000.0, 1e6
@@ -53,6 +54,8 @@ def read_recording(
         TrialError: forces and markers do not overlap in time.
     """
     markers_path = Path(markers_path)
+    if markers_path.suffix.lower() == _SUBJECT:
+        raise FileError(markers_path, "holds a subject's trials: kinertia.read_b3d reads them all, in Python")
     _expect_kind(markers_path, MARKER_FILES, "markers")
     tsv = forces_path is not None and Path(forces_path).suffix.lower() == ".tsv"
     recording = _read_markers(markers_path, Path(str(forces_path)) if tsv else None, length_unit, standing)

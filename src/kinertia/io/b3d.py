@@ -1,0 +1,98 @@
+"""Subjects of AddBiomechanics (`.b3d`): several trials in one file, read with nimblephysics where it is installed.
+
+Axes are OpenSim's (x forward, y up), lengths m, forces N. What is read is what the laboratory recorded, markers and
+force plates; AddBiomechanics' own model, motion and corrected forces stay in the file.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from kinertia.errors import FileError
+from kinertia.io.number_table import expect_file
+from kinertia.trial.data import Markers, PlateLoads, Recording
+
+_HOW = (
+    "needs nimblephysics, which is not installed: pip install nimblephysics (it has packages for few versions of "
+    "Python), or download TRC and MOT files from AddBiomechanics"
+)
+
+
+def read_b3d(path: str | Path) -> tuple[Recording, ...]:
+    """Read all trials of a subject that have frames.
+
+    Trials are named as in the file; two of one name get numbers. Mass and height are the subject's.
+
+    Raises:
+        FileError: no such file, nimblephysics is not installed, or the file is none of AddBiomechanics'.
+    """
+    path = Path(path)
+    expect_file(path)
+    try:
+        from nimblephysics_libs._nimblephysics import biomechanics
+    except ImportError as error:
+        raise FileError(path, _HOW) from error
+    try:
+        subject = biomechanics.SubjectOnDisk(str(path))
+        count = subject.getNumTrials()
+    except (RuntimeError, ValueError) as error:
+        raise FileError(path, f"is no subject of AddBiomechanics, or damaged ({error})") from error
+    names = [subject.getTrialName(k) or f"trial {k + 1}" for k in range(count)]
+    recordings = [
+        _recording(subject, k, name if names.count(name) == 1 else f"{name}_{k + 1}")
+        for k, name in enumerate(names)
+        if subject.getTrialLength(k) > 1
+    ]
+    if not recordings:
+        raise FileError(path, "holds no trial with frames; is it a subject of AddBiomechanics?")
+    return tuple(recordings)
+
+
+def _recording(subject: Any, trial: int, name: str) -> Recording:
+    frames = subject.readFrames(
+        trial, 0, subject.getTrialLength(trial), includeSensorData=True, includeProcessingPasses=False
+    )
+    time = subject.getTrialTimestep(trial) * np.arange(len(frames))
+    seen = [dict(frame.markerObservations) for frame in frames]
+    labels = tuple(dict.fromkeys(label for one in seen for label in one))
+    positions = np.full((len(frames), len(labels), 3), np.nan)
+    for row, one in zip(positions, seen, strict=True):
+        for label, place in one.items():
+            row[labels.index(label)] = place
+    markers, mass_kg, height_m = Markers(time, labels, positions), subject.getMassKg(), subject.getHeightM()
+    return Recording(name, markers, _plates(frames, time), mass_kg=_stated(mass_kg), height_m=_stated(height_m))
+
+
+def _stated(value: float) -> float | None:
+    """A number that the file has; AddBiomechanics writes zero or less where nobody said it."""
+    return float(value) if value > 0.0 else None
+
+
+def _plates(frames: Any, time: np.ndarray) -> PlateLoads | None:
+    """Loads at the frames, as the plates gave them; None without plates."""
+    force, torque, point = (
+        np.array([[np.asarray(one) for one in getattr(frame, name)] for frame in frames], dtype=float)
+        for name in ("rawForcePlateForces", "rawForcePlateTorques", "rawForcePlateCenterOfPressures")
+    )
+    if force.ndim < 3 or force.shape[1] == 0:
+        return None
+    loaded = np.isfinite(force).all(axis=2) & np.isfinite(torque).all(axis=2) & np.isfinite(point).all(axis=2)
+    force, torque, point = (np.where(loaded[..., None], each, 0.0) for each in (force, torque, point))
+    names = tuple(f"plate {k + 1}" for k in range(force.shape[1]))
+    return PlateLoads(time, names, force, about_origin(force, torque, point), (None,) * len(names))
+
+
+def about_origin(force: np.ndarray, torque: np.ndarray, point: np.ndarray) -> np.ndarray:
+    """(n, p, 3) N m, moments of loads about the ground origin, whichever of both the torques (n, p, 3) are about.
+
+    Laboratories wrote torques about the centre of pressure or about the origin, and the file does not say which. About
+    the centre of pressure nothing is left of their horizontal parts.
+    """
+    arm = np.cross(point, force)
+    horizontal = [0, 2]
+    of_point, of_origin = (np.square(each[..., horizontal]).sum(axis=(0, 2)) for each in (torque, torque - arm))
+    result: np.ndarray = torque + np.where((of_point <= of_origin)[:, None], arm, 0.0)
+    return result
