@@ -108,13 +108,13 @@ def test_written_twice_they_are_replaced(file_of, tmp_path):
     assert one.get("POINT", "ANGLES") == two.get("POINT", "ANGLES")
 
 
-def person(path, integers=False, labels=9, parameters=None):
+def person(path, integers=False, labels=9, parameters=None, prefix=""):
     rng = np.random.default_rng(0)
     places = 0.1 * rng.integers((0, 0, 0), (6000, 5000, 18000), (20, labels, 3))
     corners = np.array([[[0, 500, 0], [500, 500, 0], [500, 0, 0], [0, 0, 0]]], float)
     loads = rng.integers(-400, 400, (200, 6)) - [0, 0, 6000, 0, 0, 0]
     groups = {"POINT": {"Y_SCREEN": ["+Z"]}, "FORCE_PLATFORM": plate_parameters(corners), **(parameters or {})}
-    return write_c3d(path, places, [f"M{k}" for k in range(labels)], loads, groups, integers=integers)
+    return write_c3d(path, places, [f"{prefix}M{k}" for k in range(labels)], loads, groups, integers=integers)
 
 
 def test_files_of_integers_become_floats(tmp_path):
@@ -133,6 +133,14 @@ def test_more_points_than_a_list_has_room_for(tmp_path):
     assert points == 258
     assert section.get("POINT", "LABELS")[-1] == "LHipAnglesKin"
     assert section.get("POINT", "LABELS2") == ["LHipAnglesSDKin", "LHipMomentKin", "LHJCKin"]
+
+
+def test_labels_have_the_subjects_prefix(tmp_path):
+    path = person(tmp_path / "prefixed.c3d", prefix="Anna:")
+    new = written(path, tmp_path / "new.c3d", prefix="Anna:")
+    section, *_ = sections(new.read_bytes())
+    assert section.get("POINT", "LABELS")[-1] == "Anna:LHJCKin"
+    assert read_c3d(new).markers.labels == read_c3d(path).markers.labels == tuple(f"M{k}" for k in range(9))
 
 
 def test_a_file_that_contradicts_itself_is_refused(tmp_path):

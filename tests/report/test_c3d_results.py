@@ -1,6 +1,7 @@
 """Results in C3D files, and Plug-in Gait's own outputs as the oracle of signs."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ import kinertia
 from command_line import fitted, run
 from kinertia.io.c3d_outputs import frames_of
 from kinertia.motion.joint_wrench import joint_wrenches
-from kinertia.report.c3d_results import outputs_of, to_file, usual_convention
+from kinertia.report.c3d_results import outputs_of, prefix_of, to_file, usual_convention
 from kinertia.report.saved_fit import load_fit
 from validation.measured_data import find
 
@@ -81,6 +82,14 @@ def test_export_refuses_what_is_not_the_trials_file(demo_run, tmp_path):
     assert refused.status == 2
     assert "has changed since" in " ".join(refused.err.split())
     assert run("export", demo_run[1], "--c3d", "--convention", "iso", "-o", tmp_path / "out").status == 2
+
+
+@pytest.mark.parametrize("prefix", ["", "Anna:"])
+def test_the_prefix_is_the_persons(prefix):
+    labels = ("Wand:A", "Wand:B", *(prefix + label for label in ("LASI", "RASI", "LKNE")), f"{prefix}LHJC")
+    markers = SimpleNamespace(labels=("LASI", "RASI", "LKNE"))
+    trial = SimpleNamespace(kinematics=SimpleNamespace(trial=SimpleNamespace(markers=markers)))
+    assert prefix_of(SimpleNamespace(labels=labels), trial) == prefix
 
 
 WALKS = {

@@ -7,7 +7,7 @@ import pytest
 
 from kinertia.motion.model_outputs import model_outputs
 from kinertia.report.comparison import comparison_summary, render_comparison
-from kinertia.report.file_outputs import beside, beside_summary
+from kinertia.report.file_outputs import beside, beside_sentence, beside_summary
 from kinertia.report.page import render
 from kinertia.trial.file_outputs import FileOutputs
 from report_page import figures_of
@@ -70,3 +70,5 @@ def test_report_and_comparison_show_them(fit, with_outputs):
     assert summary["before"] == []
     assert summary["after"] == beside_summary(stated)
     assert len(summary["after"]) == 18
+    assert beside_sentence(fit) == ""
+    assert "hip 0.00; knee 0.00; ankle 0.00" in beside_sentence(stated)

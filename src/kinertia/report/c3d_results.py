@@ -101,7 +101,7 @@ def c3d_with_results(
         with tempfile.TemporaryDirectory() as folder:
             return c3d_with_results(fit, trial, new_file(source, Path(folder)), convention, files)
     frames = frames_of(source)
-    prefix = _prefix(frames, trial)
+    prefix = prefix_of(frames, trial)
     at = _frames_at(source, frames, trial)
     outputs = outputs_of(fit, trial, convention)
     if not outputs:
@@ -124,7 +124,7 @@ def _suffixed(label: str) -> str:
     return label[: -len(SD)] + SUFFIX + SD if label.endswith(SD) else label + SUFFIX
 
 
-def _prefix(frames: C3dFrames, trial: TrialFit) -> str:
+def prefix_of(frames: C3dFrames, trial: TrialFit) -> str:
     """The subject's, that most of the trial's markers have in the file."""
     labels, own = set(frames.labels), trial.kinematics.trial.markers.labels
     prefixes = dict.fromkeys(["", *(label.split(":", 1)[0] + ":" for label in frames.labels if ":" in label)])

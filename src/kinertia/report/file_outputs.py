@@ -155,6 +155,18 @@ def beside_summary(fit: Fit) -> list[dict[str, Any]]:
     ]
 
 
+def beside_sentence(fit: Fit) -> str:
+    """How far the files' own joint moments are from Kinertia's, joint by joint; empty where they hold none."""
+    compared = [one for trial in fit.trials for one in beside(fit, trial) if one.kind == "MOMENTS"]
+    parts = []
+    for joint in dict.fromkeys(one.joint for one in compared):
+        own = [one for one in compared if one.joint == joint]
+        rms = float(np.sqrt(np.mean([one.rms**2 for one in own])))
+        beyond = ", beyond the error bar" if any(one.beyond for one in own) else ""
+        parts.append(f"{joint.lower()} {rms:.2f}{beyond}")
+    return f"RMS differences (N m/kg) from the files' own flexion moments: {'; '.join(parts)}" if parts else ""
+
+
 def beside_view(fit: Fit, trials: Sequence[TrialFit], most_frames: int = MOST_FRAMES) -> list[dict[str, Any]]:
     """What a page shows: per trial whose file has outputs a figure and the rows of its table."""
     shown = []
