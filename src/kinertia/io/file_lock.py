@@ -1,75 +1,59 @@
-"""A file that one process at a time holds: the system takes the lock back when the process ends, however it ends.
-
-So no lock is ever stale, and none has to be judged by the number of a process that another one may have by now.
-"""
+"""A file that one process at a time holds, by filelock: no lock is ever stale, since the system takes it back."""
 
 from __future__ import annotations
 
 import json
 import os
 import platform
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import BinaryIO
+from typing import TYPE_CHECKING
 
 from kinertia.errors import FileError
 
-if sys.platform == "win32":
-    import msvcrt
-else:
-    import fcntl
-
-_HELD_BYTE = 1 << 20
-"""Windows locks bytes, and lets nobody read them: one far behind anything that is written."""
+if TYPE_CHECKING:
+    from filelock import FileLock
 
 
-def locked(path: Path) -> BinaryIO | None:
-    """The file, made if need be and held until it is closed; None where another process holds it or none can be made.
+def locked(path: Path) -> FileLock | None:
+    """The lock of a file, which is made if need be, held until it is released; None where another process holds it.
 
-    None also where a network drive knows no locks.
+    None also where no file can be made, or a network drive knows no locks.
     """
+    from filelock import FileLock, Timeout  # takes 40 ms to load
+
+    lock = FileLock(path, timeout=0)
     try:
-        file = path.open("a+b")
-    except OSError:
+        lock.acquire()
+    except (Timeout, OSError, NotImplementedError):
         return None
-    try:
-        if sys.platform == "win32":
-            file.seek(_HELD_BYTE)
-            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
-        else:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        file.close()
-        return None
-    return file
+    return lock
 
 
 @contextmanager
 def sole_use(path: Path, what: str) -> Iterator[None]:
-    """Nobody else works on `what` during the block; the file at `path` says who does, and is empty afterwards.
+    """Nobody else works on `what` during the block; a file beside the lock at `path` says who does.
 
     Raises:
         FileError: another process does, on this computer or on another with the same drive.
     """
-    file = locked(path)
-    if file is None:
-        raise FileError(path, f"{what} is in use{_by(path)}; wait until that run has ended, or give another folder")
-    with file:
-        file.truncate(0)
-        file.write(json.dumps({"pid": os.getpid(), "host": platform.node()}).encode())
-        file.flush()
-        try:
-            yield
-        finally:
-            file.truncate(0)
-
-
-def _by(path: Path) -> str:
-    """Who says in the file to be at work."""
+    holder = path.with_name(f"{path.name}.holder")
+    lock = locked(path)
+    if lock is None:
+        raise FileError(path, f"{what} is in use{_by(holder)}; wait until that run has ended, or give another folder")
     try:
-        holder = json.loads(path.read_text(encoding="utf-8"))
-        return f" by process {holder['pid']} on {holder['host']}"
+        holder.write_text(json.dumps({"pid": os.getpid(), "host": platform.node()}), encoding="utf-8")
+        yield
+    finally:
+        holder.unlink(missing_ok=True)
+        lock.release()
+
+
+def _by(holder: Path) -> str:
+    """Who says to be at work."""
+    try:
+        known = json.loads(holder.read_text(encoding="utf-8"))
+        return f" by process {known['pid']} on {known['host']}"
     except (OSError, ValueError, KeyError, TypeError):
         return " (or its drive cannot be written to, or knows no locks)"

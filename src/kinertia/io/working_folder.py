@@ -10,11 +10,14 @@ import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import BinaryIO
+from typing import TYPE_CHECKING
 from uuid import uuid4
 
 from kinertia.errors import FileError
 from kinertia.io.file_lock import locked
+
+if TYPE_CHECKING:
+    from filelock import FileLock
 
 _PREFIX, _LOCK = ".kinertia.", "lock"
 BEFORE = "before"
@@ -47,7 +50,7 @@ def sweep(within: Path) -> None:
         _remove(folder, lock)
 
 
-def _new(within: Path) -> tuple[Path, BinaryIO]:
+def _new(within: Path) -> tuple[Path, FileLock]:
     while True:
         folder = within / f"{_PREFIX}{uuid4().hex[:12]}"
         try:
@@ -60,7 +63,7 @@ def _new(within: Path) -> tuple[Path, BinaryIO]:
             return folder, lock
 
 
-def _remove(folder: Path, lock: BinaryIO) -> None:
+def _remove(folder: Path, lock: FileLock) -> None:
     shutil.rmtree(folder, ignore_errors=True)
-    lock.close()
+    lock.release()
     shutil.rmtree(folder, ignore_errors=True)  # Windows removes no file that is open
