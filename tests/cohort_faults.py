@@ -8,9 +8,9 @@ from unittest import mock
 
 import numpy as np
 
-from kinertia.report.cohort_person import fit_person
-from kinertia.studies.cohort_cluster import Job
-from kinertia.studies.cohort_record import Record
+from kinertia.cohort.cluster import Job
+from kinertia.cohort.person import fit_person
+from kinertia.cohort.record import Record
 from kinertia.synthetic.laboratory import LabNoise, record, write_lab
 from kinertia.synthetic.walk import walk, walking_subject
 
@@ -38,5 +38,5 @@ def fit_person_unless_hanging(job: Job) -> Record:
     """What a worker does, where the files of one person hang the reader."""
     if job.person != HANGING:
         return fit_person(job)
-    with mock.patch("kinertia.report.cohort_person.read_subject", hang):
+    with mock.patch("kinertia.cohort.person.read_subject", hang):
         return fit_person(job)

@@ -29,9 +29,9 @@ from distributed import Client, LocalCluster
 
 from cohort_faults import write_study
 from command_line import run
+from kinertia.cohort.resources import LOG
 from kinertia.estimation.result import Fit
 from kinertia.io.subject_file import SubjectFile
-from kinertia.studies.cohort_resources import LOG
 from kinertia.workflow.from_files import fit_subject
 
 NAMES = ("Anna", "Ben")
@@ -135,7 +135,7 @@ def main() -> None:
     with (
         mock.patch("time.perf_counter", float),
         mock.patch("kinertia.cli.cohort.local_cluster", in_this_process),
-        mock.patch("kinertia.report.cohort_person.fit_subject", made_once(study)),
+        mock.patch("kinertia.cohort.person.fit_subject", made_once(study)),
     ):
         counted = study.with_suffix(".txt")
         assert ended(forked(lambda: cohort(study, out, counted))) in (0, 1)

@@ -6,14 +6,14 @@ from pathlib import Path
 import numpy as np
 
 from found import FAULT_FREE, FAULTY, UNUSABLE
+from kinertia.cohort.record import Place, Record
+from kinertia.cohort.tables import write_findings, write_person, write_tables
 from kinertia.errors import BlockedError
 from kinertia.estimation.result import Fit
 from kinertia.findings.finding import finding
 from kinertia.findings.where import Where
 from kinertia.io.provenance import VERSION
 from kinertia.model.bsp import PARAMETERS
-from kinertia.report.cohort_tables import write_findings, write_person, write_tables
-from kinertia.studies.cohort_record import Place, Record
 from kinertia.studies.cross_validation import Explained, HeldOut
 from kinertia.studies.plan import Plan
 from kinertia.studies.sensitivity import CONDITIONS as NOISES

@@ -25,11 +25,11 @@ import numpy as np
 import psutil
 import typer
 
+from kinertia.cohort.cluster import Job, local_size
+from kinertia.cohort.people import people_of
+from kinertia.cohort.person import fit_person
+from kinertia.cohort.record import prepare_folder, standings
 from kinertia.estimation.prior import literature_prior
-from kinertia.report.cohort_person import fit_person
-from kinertia.studies.cohort_cluster import Job, local_size
-from kinertia.studies.cohort_people import people_of
-from kinertia.studies.cohort_record import prepare_folder, standings
 from kinertia.synthetic.laboratory import LabNoise, record, write_lab
 from kinertia.synthetic.walk import walk, walking_subject
 from validation.measured_trials import table

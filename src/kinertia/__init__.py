@@ -20,6 +20,7 @@ from kinertia.trial import display
 if TYPE_CHECKING:
     __version__: str
 
+    from kinertia.cohort.tables import read_cohort as read_cohort
     from kinertia.diagnostics.model.model_check import ModelCheck as ModelCheck
     from kinertia.diagnostics.model.model_check import check_model as check_model
     from kinertia.diagnostics.result.suitability import Suitability as Suitability
@@ -62,7 +63,6 @@ if TYPE_CHECKING:
     from kinertia.motion.dynamics import Motion as Motion
     from kinertia.motion.dynamics import inverse_dynamics as inverse_dynamics
     from kinertia.motion.dynamics import residual as residual
-    from kinertia.report.cohort_tables import read_cohort as read_cohort
     from kinertia.report.files import save_fit as save_fit
     from kinertia.report.saved_fit import load_fit as load_fit
     from kinertia.settings import Attached as Attached
@@ -139,7 +139,7 @@ _ROOMS = {
     "synthetic.walk": "SyntheticSubject SyntheticTrial walk walking_subject",
     "studies.cross_validation": "HeldOut cross_validate",
     "studies.plan": "Plan plan",
-    "report.cohort_tables": "read_cohort",
+    "cohort.tables": "read_cohort",
     "report.files": "save_fit",
     "report.saved_fit": "load_fit",
 }

@@ -17,9 +17,9 @@ import pytest
 from cohort_faults import write_study
 from command_line import PROGRAM, run
 from kinertia.cli.cohort import _LOCK
+from kinertia.cohort.cluster import ClusterSize, doubts_of_workers, local_cluster
 from kinertia.io.file_lock import sole_use
 from kinertia.report.files import save_fit
-from kinertia.studies.cohort_cluster import ClusterSize, doubts_of_workers, local_cluster
 from kinertia.workflow.from_files import fit_subject
 
 
@@ -100,7 +100,7 @@ def test_bad_input_is_one_line(tmp_path, monkeypatch):
     assert outcome.status == 2
     assert "F103" in outcome.err
     monkeypatch.setitem(sys.modules, "pyarrow", None)
-    monkeypatch.setattr("kinertia.studies.cohort_cluster.find_spec", lambda name: None if name == "pyarrow" else name)
+    monkeypatch.setattr("kinertia.cohort.cluster.find_spec", lambda name: None if name == "pyarrow" else name)
     outcome = run("cohort", tmp_path, "-o", tmp_path / "out")
     assert outcome.status == 2
     assert "cohorts need pyarrow, which is not installed; install: pip install 'kinertia[cohort]'" in outcome.err

@@ -15,9 +15,9 @@ import pytest
 
 from cohort_faults import HANGING, fit_person_unless_hanging, write_study
 from command_line import PROGRAM, run
+from kinertia.cohort.cluster import KEPT_MEMORY, ClusterSize, Job, local_cluster, run_jobs
+from kinertia.cohort.record import Place, inputs_of, prepare_folder
 from kinertia.io.subject_file import read_subject
-from kinertia.studies.cohort_cluster import KEPT_MEMORY, ClusterSize, Job, local_cluster, run_jobs
-from kinertia.studies.cohort_record import Place, inputs_of, prepare_folder
 
 TESTS = Path(__file__).resolve().parents[1]
 COMMAND = [*PROGRAM, "cohort"]

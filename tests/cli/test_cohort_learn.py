@@ -54,10 +54,10 @@ def quick(fit):
         write_fit(fit, provenance, folder / FIT_FILE)
 
     with (
-        mock.patch("kinertia.report.cohort_person.fit_subject", fitted),
-        mock.patch("kinertia.report.cohort_person.save_fit", saved),
+        mock.patch("kinertia.cohort.person.fit_subject", fitted),
+        mock.patch("kinertia.cohort.person.save_fit", saved),
         mock.patch("kinertia.cli.cohort.local_cluster", in_this_process),
-        mock.patch("kinertia.report.cohort_learning.in_parallel", lambda task, cases, *_: [task(one) for one in cases]),
+        mock.patch("kinertia.cohort.learning.in_parallel", lambda task, cases, *_: [task(one) for one in cases]),
     ):
         yield asked
 
@@ -92,7 +92,7 @@ def test_everybody_is_fitted_again_with_what_the_others_teach(study, quick, tmp_
     assert any("learnt from 5 people" in source for source in sources)
     assert any("known from 2 people (B, C)" in source for source in sources)
 
-    with mock.patch("kinertia.report.cohort_learning.read_saved", side_effect=AssertionError("nothing is new")):
+    with mock.patch("kinertia.cohort.learning.read_saved", side_effect=AssertionError("nothing is new")):
         again = run("cohort", study, "-o", out, "--learn")
     assert again.out.count("6 people: 0 to fit, 6 as before") == 2, again.out
     assert "note: 1 people without a date" in again.out

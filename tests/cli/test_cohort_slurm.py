@@ -11,10 +11,10 @@ import pytest
 import fake_slurm
 from cohort_faults import write_study
 from command_line import PROGRAM, run
+from kinertia.cohort.cluster import KEPT_MEMORY, Job, run_jobs
+from kinertia.cohort.slurm import slurm_cluster
 from kinertia.errors import FileError, KinertiaError
 from kinertia.io.slurm_file import SlurmFile, read_slurm
-from kinertia.studies.cohort_cluster import KEPT_MEMORY, Job, run_jobs
-from kinertia.studies.cohort_slurm import slurm_cluster
 
 
 def test_the_file_says_what_to_ask_for(tmp_path):
@@ -44,7 +44,7 @@ def test_what_cannot_be_asked_for_says_where(text, line, words, tmp_path):
 def test_without_slurm_it_says_what_to_do(tmp_path, c3d_lab, monkeypatch):
     (tmp_path / "slurm.toml").write_text("", encoding="utf-8")
     (tmp_path / "people.csv").write_text(f"subject\n{c3d_lab / 'subject.toml'}\n", encoding="utf-8")
-    monkeypatch.setattr("kinertia.studies.cohort_slurm.which", lambda name: None)
+    monkeypatch.setattr("kinertia.cohort.slurm.which", lambda name: None)
     command = ("cohort", tmp_path / "people.csv", "-o", tmp_path / "out", "--slurm", tmp_path / "slurm.toml")
     outcome = run(*command)
     assert outcome.status == 2
@@ -65,7 +65,7 @@ def slurm_that(tmp_path, monkeypatch):
     def that(*answers):
         folder = fake_slurm.fake_slurm(tmp_path / "bin", list(answers))
         monkeypatch.setenv("PATH", os.pathsep.join([str(folder), os.environ["PATH"]]))
-        monkeypatch.setattr("kinertia.studies.cohort_slurm_jobs.LOOK_S", 0.1)
+        monkeypatch.setattr("kinertia.cohort.slurm_jobs.LOOK_S", 0.1)
         return folder
 
     return that
@@ -135,7 +135,7 @@ def _dies_once_and_is_replaced(found, folder, monkeypatch):
     """The first job ends before there is a worker."""
     for name in ("PATH", "SLURM_CONF"):
         monkeypatch.setenv(name, found[name])
-    monkeypatch.setattr("kinertia.studies.cohort_slurm_jobs.LOOK_S", 1.0)
+    monkeypatch.setattr("kinertia.cohort.slurm_jobs.LOOK_S", 1.0)
     dies_once = f"test -e {folder}/died || {{ touch {folder}/died; exit 1; }}"
     with slurm_cluster(SlurmFile(workers=1, memory_gb=1.0, before=(dies_once,)), 1) as client:
         assert client.submit(abs, -3).result(timeout=120) == 3

@@ -13,8 +13,8 @@ from matplotlib.image import imread
 import study_results
 from chromium import DESKTOP, Opened, colour, playwright
 from found import FAULTY, UNUSABLE
+from kinertia.cohort.page import PAGE, write_cohort_page
 from kinertia.report.check_page import save_check_page
-from kinertia.report.cohort_page import PAGE, write_cohort_page
 from kinertia.report.comparison import render_comparison
 from kinertia.report.crossval_page import render_crossval
 from kinertia.report.page import render

@@ -15,15 +15,7 @@ from kinertia.cli.json_lines import JsonLines
 from kinertia.cli.options import Output, Overwrite, Quiet, results_folder
 from kinertia.cli.outcome import Outcome
 from kinertia.cli.terminal import be_quiet, out, plain_table, shown_progress
-from kinertia.errors import SettingsError
-from kinertia.io.file_lock import sole_use
-from kinertia.io.slurm_file import SlurmFile, read_slurm
-from kinertia.report.cohort_learning import FOLDER as LEARNT
-from kinertia.report.cohort_learning import write_second_study
-from kinertia.report.cohort_page import write_cohort_page
-from kinertia.report.cohort_person import fit_person
-from kinertia.report.cohort_tables import write_tables
-from kinertia.studies.cohort_cluster import (
+from kinertia.cohort.cluster import (
     Job,
     doubts_of_workers,
     expect_extra,
@@ -33,10 +25,18 @@ from kinertia.studies.cohort_cluster import (
     run_jobs,
     running_cluster,
 )
-from kinertia.studies.cohort_people import Person, people_of
-from kinertia.studies.cohort_record import Record, Standing, keep, prepare_folder, standings
-from kinertia.studies.cohort_resources import note_resources
-from kinertia.studies.cohort_slurm import slurm_cluster
+from kinertia.cohort.learning import FOLDER as LEARNT
+from kinertia.cohort.learning import write_second_study
+from kinertia.cohort.page import write_cohort_page
+from kinertia.cohort.people import Person, people_of
+from kinertia.cohort.person import fit_person
+from kinertia.cohort.record import Record, Standing, keep, prepare_folder, standings
+from kinertia.cohort.resources import note_resources
+from kinertia.cohort.slurm import slurm_cluster
+from kinertia.cohort.tables import write_tables
+from kinertia.errors import SettingsError
+from kinertia.io.file_lock import sole_use
+from kinertia.io.slurm_file import SlurmFile, read_slurm
 
 _LOCK = ".kinertia-cohort.lock"
 _MOST_SHOWN = 20

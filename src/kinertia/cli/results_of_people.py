@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from kinertia.cli.terminal import out
+from kinertia.cohort.tables import fitted_people
 from kinertia.errors import FileError
 from kinertia.io.spreadsheet import inert
-from kinertia.report.cohort_tables import fitted_people
 from kinertia.report.saved_fit import FIT_FILE
 
 

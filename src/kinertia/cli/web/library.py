@@ -22,6 +22,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from kinertia.cohort.record import inputs_of
 from kinertia.errors import FileError, KinertiaError
 from kinertia.io.file_lock import sole_use
 from kinertia.io.file_names import fits_everywhere, same_folder
@@ -29,7 +30,6 @@ from kinertia.io.output_folder import check_folder, write_then_rename
 from kinertia.io.provenance import sha256
 from kinertia.io.subject_file import read_subject
 from kinertia.io.working_folder import sweep
-from kinertia.studies.cohort_record import inputs_of
 
 SUBJECT, SUMMARY, OUTCOME = "subject.toml", "fit.json", "outcome.json"
 LOG = "failure.log"

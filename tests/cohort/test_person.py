@@ -7,10 +7,10 @@ from unittest import mock
 import pandas as pd
 import pytest
 
+from kinertia.cohort.cluster import Job
+from kinertia.cohort.person import fit_person
+from kinertia.cohort.record import inputs_of, prepare_folder
 from kinertia.io.subject_file import read_subject
-from kinertia.report.cohort_person import fit_person
-from kinertia.studies.cohort_cluster import Job
-from kinertia.studies.cohort_record import inputs_of, prepare_folder
 
 
 @pytest.fixture
@@ -49,7 +49,7 @@ def test_a_worker_of_another_version_fits_nobody(job):
 
 
 def test_a_failure_of_kinertia_leaves_a_log(job):
-    with mock.patch("kinertia.report.cohort_person.fit_subject", side_effect=ZeroDivisionError("0 / 0")):
+    with mock.patch("kinertia.cohort.person.fit_subject", side_effect=ZeroDivisionError("0 / 0")):
         record = fit_person(job)
     assert (record.status, record.inputs) == (70, job.inputs)
     log = job.cohort / "failed" / "A.log"
@@ -58,7 +58,7 @@ def test_a_failure_of_kinertia_leaves_a_log(job):
 
 
 def test_a_full_disk_is_told_and_tried_again(job):
-    with mock.patch("kinertia.report.cohort_person.fit_subject", side_effect=OSError(28, "No space left", "out/x")):
+    with mock.patch("kinertia.cohort.person.fit_subject", side_effect=OSError(28, "No space left", "out/x")):
         record = fit_person(job)
     assert (record.status, record.inputs) == (2, "")
     assert record.sentence.startswith("out/x: No space left; ")

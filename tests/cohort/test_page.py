@@ -8,10 +8,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from kinertia.report.cohort_instruments import drift
-from kinertia.report.cohort_outcomes import lead, outcome_parts, overruled_in_vain
-from kinertia.report.cohort_page import PAGE, _curves, _mean_curves, _outliers, write_cohort_page
-from kinertia.report.cohort_tables import write_tables
+from kinertia.cohort.instruments import drift
+from kinertia.cohort.outcomes import lead, outcome_parts, overruled_in_vain
+from kinertia.cohort.page import PAGE, _curves, _mean_curves, _outliers, write_cohort_page
+from kinertia.cohort.tables import write_tables
 from report_page import figures_of
 from study_results import person_record, write_cohort
 

@@ -12,20 +12,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from kinertia.cohort.instruments import COLUMNS, drift
+from kinertia.cohort.outcomes import FINDINGS, PEOPLE, lead, outcome_parts, report_of
+from kinertia.cohort.record import AGAINST
 from kinertia.estimation.cycles import UNITS, Kind
 from kinertia.io.output_folder import write_then_rename
 from kinertia.model.bsp import PARAMETERS
 from kinertia.motion.gait_cycle import PERCENT
 from kinertia.report import style
 from kinertia.report.bsp_figures import NAMES, segment_name
-from kinertia.report.cohort_instruments import COLUMNS, drift
-from kinertia.report.cohort_outcomes import FINDINGS, PEOPLE, lead, outcome_parts, report_of
 from kinertia.report.cycle_figures import band, mean_line
 from kinertia.report.figure import Figure
 from kinertia.report.panels import Panel, small_multiples
 from kinertia.report.result_page import Part, render_parts
 from kinertia.report.row_figures import dot_figure
-from kinertia.studies.cohort_record import AGAINST
 
 if TYPE_CHECKING:
     import pandas as pd

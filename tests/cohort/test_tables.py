@@ -9,13 +9,13 @@ import pytest
 
 import kinertia
 from found import RESIDUAL, UNEXPLAINED, WAIVED, ZERO
+from kinertia.cohort import tables as cohort_tables
+from kinertia.cohort.record import Place, Record
+from kinertia.cohort.tables import write_findings, write_person, write_tables
 from kinertia.errors import BlockedError
 from kinertia.findings.finding import finding
 from kinertia.findings.where import Where
 from kinertia.io.provenance import VERSION
-from kinertia.report import cohort_tables
-from kinertia.report.cohort_tables import write_findings, write_person, write_tables
-from kinertia.studies.cohort_record import Place, Record
 
 FOUND = (
     replace(RESIDUAL, where=Where(trial="early")),

@@ -9,10 +9,10 @@ from importlib.util import find_spec
 from shutil import which
 from typing import Any
 
+from kinertia.cohort.cluster import HOW, KEPT_MEMORY, NO_DASHBOARD, SCHEDULING
+from kinertia.cohort.slurm_jobs import replaced_jobs
 from kinertia.errors import KinertiaError
 from kinertia.io.slurm_file import SlurmFile
-from kinertia.studies.cohort_cluster import HOW, KEPT_MEMORY, NO_DASHBOARD, SCHEDULING
-from kinertia.studies.cohort_slurm_jobs import replaced_jobs
 
 _NO_LOGS = ("--output=/dev/null", "--error=/dev/null")
 """Otherwise SLURM leaves a file per job where the command was started."""

@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import pytest
 
+from kinertia.cohort.people import Person
+from kinertia.cohort.record import RECORD, Place, Record, keep, prepare_folder, standings
 from kinertia.io.provenance import VERSION
-from kinertia.studies.cohort_people import Person
-from kinertia.studies.cohort_record import RECORD, Place, Record, keep, prepare_folder, standings
 
 
 @pytest.fixture

@@ -14,9 +14,9 @@ from pathlib import Path
 from threading import Event, Thread
 from typing import Any
 
+from kinertia.cohort.record import one_line
 from kinertia.errors import KinertiaError
 from kinertia.io.slurm_file import SlurmFile
-from kinertia.studies.cohort_record import one_line
 
 LOOK_S = 30.0
 """Between two looks at the queue, which are made only while a worker is missing."""

@@ -2,8 +2,8 @@
 
 import pytest
 
+from kinertia.cohort.people import Person, people_of
 from kinertia.errors import FileError
-from kinertia.studies.cohort_people import Person, people_of
 
 
 def person(folder, *files):

@@ -14,13 +14,13 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from kinertia.cohort.people import Person
 from kinertia.errors import KinertiaError
 from kinertia.io.frame_count import frame_count
 from kinertia.io.output_folder import write_then_rename
 from kinertia.io.provenance import VERSION, sha256
 from kinertia.io.subject_file import SubjectFile, read_subject
 from kinertia.io.working_folder import sweep
-from kinertia.studies.cohort_people import Person
 
 RECORD = "person.json"
 PASSED, AGAINST, BAD_INPUT, FAILED = 0, 1, 2, 70

@@ -4,12 +4,12 @@ import os
 import subprocess
 import sys
 
-from kinertia.studies.cohort_time_limit import no_end, time_limit, was_ended
+from kinertia.cohort.time_limit import no_end, time_limit, was_ended
 
 HANGS = """
     import re, sys
     from pathlib import Path
-    from kinertia.studies.cohort_time_limit import time_limit
+    from kinertia.cohort.time_limit import time_limit
     with time_limit(0.2, Path(sys.argv[1]), "this"):
         re.match("(a+)+b", "a" * 60)
 """

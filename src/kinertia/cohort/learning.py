@@ -17,6 +17,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from kinertia.cohort.people import Person
+from kinertia.cohort.record import RECORD, Place
 from kinertia.errors import KinertiaError, PriorError
 from kinertia.estimation.input_checks import known
 from kinertia.estimation.learnt_prior import FEWEST_PEOPLE, LearntPrior, learn
@@ -31,8 +33,6 @@ from kinertia.io.subject_file import InstrumentsFiles, SubjectFile, read_subject
 from kinertia.io.subject_text import subject_text
 from kinertia.io.toml_lines import read_toml
 from kinertia.report.saved_fit import read_saved
-from kinertia.studies.cohort_people import Person
-from kinertia.studies.cohort_record import RECORD, Place
 from kinertia.studies.parallel import in_parallel
 from kinertia.workflow.from_files import check_plates
 from kinertia.workflow.session import person_instruments, session_instruments

@@ -14,6 +14,8 @@ from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from kinertia.cohort.cluster import expect_extra
+from kinertia.cohort.record import AGAINST, PASSED, Place, Record
 from kinertia.errors import FileError, KinertiaError, findings_of
 from kinertia.estimation.cycles import UNITS, cycle_columns
 from kinertia.estimation.result import Fit
@@ -25,8 +27,6 @@ from kinertia.io.spreadsheet import inert
 from kinertia.io.working_folder import working_folder
 from kinertia.report.cycle_figures import MOST_STRIDES, titled_quantities
 from kinertia.report.files import summary
-from kinertia.studies.cohort_cluster import expect_extra
-from kinertia.studies.cohort_record import AGAINST, PASSED, Place, Record
 
 if TYPE_CHECKING:
     import pyarrow

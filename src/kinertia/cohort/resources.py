@@ -13,8 +13,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import TypeVar
 
+from kinertia.cohort.record import Record
 from kinertia.io.spreadsheet import inert
-from kinertia.studies.cohort_record import Record
 
 LOG = "resources.csv"
 _COLUMNS = ("ended", "person", "status", "seconds", "memory_mb", "worker")

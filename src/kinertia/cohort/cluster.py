@@ -1,4 +1,4 @@
-"""The processes that fit a cohort: Dask's, on this computer or on a cluster that runs already (SLURM: `cohort_slurm`).
+"""The processes that fit a cohort: Dask's, on this computer or on a cluster that runs already (SLURM: `slurm`).
 
 What is to be done where, and again where a process was killed, is Dask's to say. One process works on one person at a
 time, with one thread of the linear algebra library, as Dask sets it for its workers.
@@ -17,10 +17,10 @@ from types import MappingProxyType
 from typing import Any
 from uuid import uuid4
 
+from kinertia.cohort.record import FAILED, Record, Standing, one_line
+from kinertia.cohort.resources import Finished, measured
 from kinertia.errors import KinertiaError, SettingsError
 from kinertia.io.provenance import VERSION
-from kinertia.studies.cohort_record import FAILED, Record, Standing, one_line
-from kinertia.studies.cohort_resources import Finished, measured
 from kinertia.studies.parallel import interrupted_later
 
 HOW = "pip install 'kinertia[cohort]'"

@@ -6,6 +6,10 @@ import time
 import traceback
 from dataclasses import replace
 
+from kinertia.cohort.cluster import Job
+from kinertia.cohort.record import AGAINST, BAD_INPUT, FAILED, PASSED, RECORD, Place, Record, inputs_of
+from kinertia.cohort.tables import write_findings, write_person
+from kinertia.cohort.time_limit import no_end, time_limit, was_ended
 from kinertia.errors import KinertiaError
 from kinertia.estimation.result import Fit
 from kinertia.findings.finding import Severity
@@ -13,11 +17,7 @@ from kinertia.io.output_folder import complete_folder, write_then_rename
 from kinertia.io.provenance import VERSION, command_line, provenance_of
 from kinertia.io.recording_date import session_date
 from kinertia.io.subject_file import SubjectFile, read_subject
-from kinertia.report.cohort_tables import write_findings, write_person
 from kinertia.report.files import save_fit
-from kinertia.studies.cohort_cluster import Job
-from kinertia.studies.cohort_record import AGAINST, BAD_INPUT, FAILED, PASSED, RECORD, Place, Record, inputs_of
-from kinertia.studies.cohort_time_limit import no_end, time_limit, was_ended
 from kinertia.workflow.from_files import fit_subject
 
 
