@@ -1,6 +1,7 @@
 """A trial cut into stretches says what it says in one."""
 
 from dataclasses import fields, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ import kinertia.estimation.simultaneous.elimination as elimination
 import kinertia.estimation.simultaneous.stretches as limits
 from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations, curve_deviations
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
+from kinertia.estimation.simultaneous.posterior_draws import _Steps
 from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous
 from kinertia.estimation.simultaneous.static_information import StaticInformation
@@ -213,3 +215,21 @@ def test_stretches_share_splines_and_frames_out(splines):
         # markers see the frame after theirs, too
         assert active.min() >= part.touched.start
         assert active.max() + (not part.is_last) < part.touched.stop
+
+
+def test_all_draws_at_once_are_the_steps_of_each(cut, here, double):
+    """Those of the static unknowns one by one; of what they leave open, nothing where nothing is random."""
+    coefficients, static = here
+    trial = cut.eliminated(0, coefficients, static, DAMPING)
+    steps = np.random.default_rng(4).standard_normal((3, cut.layout.size))
+    silent = SimpleNamespace(standard_normal=np.zeros)
+    written = _Steps(steps.T, silent, np.full((6, *coefficients.shape), np.nan))
+    middle = written.write(trial.middle)
+    for branch in trial.branches:
+        block = middle
+        for part in branch.outwards():
+            block = written.write(part, block)
+    still = trial.forward(np.zeros_like(coefficients))[0]
+    for found, step in zip(written.into[:3], steps, strict=True):
+        close(found, trial.motion_step(still, step))
+    assert not written.into[3:].any()

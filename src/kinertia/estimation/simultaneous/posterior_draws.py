@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import least_squares
 
-from kinertia.estimation.simultaneous.elimination import Eliminated
+from kinertia.estimation.simultaneous.elimination import Eliminated, Factored
 from kinertia.estimation.simultaneous.gauss_newton import GaussNewton
 from kinertia.estimation.simultaneous.given import BSP, PLACES, STILL
 from kinertia.estimation.simultaneous.instrument_term import InstrumentErrors
@@ -177,16 +177,46 @@ def _motions(
     problem: MapProblem, k: int, point: Point, trial: Eliminated, static: np.ndarray, random: np.random.Generator
 ) -> np.ndarray:
     """(n, k, c) departures of a motion's coefficients, with these (n, S) of the static unknowns."""
-    size, zero = point.coefficients[k].shape, np.zeros(problem.layout.size)
-    still = trial.forward(np.zeros(size))[0]
-    follow, alone = np.empty((len(static), *size)), np.empty((len(static), *size))
-    for n, each in enumerate(static):
-        follow[n] = trial.motion_step([[block.copy() for block in half] for half in still], each)
-        free = [[random.standard_normal(block.shape) for block in half] for half in still]
-        alone[n] = trial.motion_step(free, zero)
+    size = (2 * len(static), *point.coefficients[k].shape)
+    steps = _Steps(static.T, random, np.empty(size))
+    after = steps.write(trial.middle)
+    for branch in trial.branches:
+        block = after
+        for part in branch.outwards():  # each is read once
+            block = steps.write(part, block)
+    follow, alone = np.split(steps.into, 2)
     noise = motion_noise(problem, k, point.coefficients[k], problem.in_trial(k, point))
     result: np.ndarray = follow + _narrowed(alone, noise / problem.trials[k].repeats)
     return result
+
+
+@dataclass(frozen=True, eq=False)
+class _Steps:
+    """Steps of a motion for n draws of the static unknowns, and n of what they leave open.
+
+    Attributes:
+        static: (S, n) steps of the static unknowns.
+        random: of the latter.
+        into: (2 n, k, c) of both, one after the other.
+    """
+
+    static: np.ndarray
+    random: np.random.Generator
+    into: np.ndarray
+
+    def write(self, part: Factored, after: np.ndarray | None = None) -> np.ndarray:
+        """Write those of some splines, as `elimination.write_step`; returns the last block (k, 2 n) of them in the
+        order of elimination's beginning, which is `after` of the part eliminated before.
+        """
+        follow = -(part.border @ self.static.astype(part.border.dtype)).astype(float)
+        right = np.concatenate([follow, self.random.standard_normal(follow.shape)], axis=2)
+        blocks = part.band.backward(np.ascontiguousarray(right), after, in_place=True)
+        flat = part.in_order(blocks).reshape(-1, right.shape[2]).T
+        count, _, c = self.into.shape
+        own = self.into[:, part.splines]
+        own[:] = flat.reshape(count, -1, c)[:, : own.shape[1]]
+        first: np.ndarray = blocks[0]
+        return first
 
 
 def _narrowed(alone: np.ndarray, shares: np.ndarray) -> np.ndarray:
