@@ -13,9 +13,9 @@ def test_they_are_more_unknowns_of_the_estimate(count):
     data = root.T @ root
     covariance = np.linalg.inv(prior + data)
     estimate = covariance @ root.T @ measured
-    moved, added = with_left_out(directions, data @ directions, directions.T @ prior @ estimate, covariance)
+    moved, more = with_left_out(directions, data @ directions, directions.T @ prior @ estimate, covariance)
 
     rows, apart = np.hstack([root, root @ directions]), np.zeros((4, count))
     whole = np.linalg.inv(rows.T @ rows + np.block([[prior, apart], [apart.T, np.eye(count)]]))
     np.testing.assert_allclose(estimate + moved, (whole @ rows.T @ measured)[:4], atol=1e-12)
-    np.testing.assert_allclose(covariance + added, whole[:4, :4], atol=1e-12)
+    np.testing.assert_allclose(covariance + more @ more.T, whole[:4, :4], atol=1e-12)

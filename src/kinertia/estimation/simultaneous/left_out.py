@@ -9,7 +9,7 @@ def with_left_out(
     directions: np.ndarray, data: np.ndarray, pull: np.ndarray, covariance: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """What u more unknowns of unit deviation change, by which the data see the others displaced: (S,) how far the
-    estimate moves back to the prior, and (S, S) how much is added to its covariance.
+    estimate moves back to the prior, and (S, u) a root of what is added to its covariance.
 
     Args:
         directions: (S, u) by which they are displaced.
@@ -18,10 +18,11 @@ def with_left_out(
         covariance: (S, S) without them.
 
     >>> one = np.ones((1, 1))
-    >>> moved, added = with_left_out(one, 99.0 * one, np.array([1.98]), 0.01 * one)  # 1.98 +- 0.1, prior 0 +- 1
-    >>> moved.round(2), added.round(2)
+    >>> moved, root = with_left_out(one, 99.0 * one, np.array([1.98]), 0.01 * one)  # 1.98 +- 0.1, prior 0 +- 1
+    >>> moved.round(2), (root @ root.T).round(2)
     (array([-0.99]), array([[0.49]]))
     """
     carried = covariance @ data
     left = np.eye(len(pull)) + directions.T @ data - data.T @ carried
-    return -carried @ np.linalg.solve(left, pull), carried @ np.linalg.solve(left, carried.T)
+    root = np.linalg.solve(np.linalg.cholesky(left), carried.T).T
+    return -carried @ np.linalg.solve(left, pull), root

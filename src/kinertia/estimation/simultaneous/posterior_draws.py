@@ -117,13 +117,15 @@ def of_knots(phases: OfPhases) -> Mode:
     return Mode(scale * (there.static - point.static), tuple(scale * each for each in motions))
 
 
-def of_covariance(model: GaussNewton, point: Point, covariance: np.ndarray) -> Mode:
-    """Of a covariance (S, S) of rank one, with the motions that follow."""
-    most = int(np.argmax(np.diag(covariance)))
-    static = covariance[most] / np.sqrt(max(covariance[most, most], np.finfo(float).tiny))
-    there = followed(model.problem, model.here, point, point.static + static)
-    rows = zip(there.coefficients, point.coefficients, strict=True)
-    return Mode(static, tuple(after - before for after, before in rows))
+def of_root(model: GaussNewton, point: Point, root: np.ndarray) -> list[Mode]:
+    """Of each column of a covariance's root (S, u), with the motions that follow."""
+    result = []
+    for column in root.T:
+        static = column * np.sign(column[np.argmax(np.abs(column))])  # the root's sign is arbitrary
+        there = followed(model.problem, model.here, point, point.static + static)
+        rows = zip(there.coefficients, point.coefficients, strict=True)
+        result.append(Mode(static, tuple(after - before for after, before in rows)))
+    return result
 
 
 def posterior_draws(

@@ -36,7 +36,7 @@ from kinertia.estimation.simultaneous.linearised import Linearised, Point, Slope
 from kinertia.estimation.simultaneous.marker_offsets import as_displaced
 from kinertia.estimation.simultaneous.observed_trial import CalibrationPrior, Observation
 from kinertia.estimation.simultaneous.outcome import Ended, SimultaneousResult, result_of
-from kinertia.estimation.simultaneous.posterior_draws import of_covariance, of_knots, posterior_draws
+from kinertia.estimation.simultaneous.posterior_draws import of_knots, of_root, posterior_draws
 from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.estimation.simultaneous.quasi_newton import SecantPairs
 from kinertia.estimation.simultaneous.sound_or_faulty import ErrorPriors, GaussianPrior
@@ -108,22 +108,22 @@ def estimate_simultaneous(
     phases = OfPhases.of(problem, ended.point, partial(_continued, judged=known))
     profile = CostProfile.of(problem, ended.here, ended.instruments, ended.point, partial(_held, problem, ended.point))
     model = GaussNewton.of(problem, profile.here).under(profile.instruments)
-    moved, added = _left_out(problem, model, ended.point.static)
+    moved, more = _left_out(problem, model, ended.point.static)
     static = phases.static + profile.static - ended.point.static + moved
     point = followed(problem, profile.here, ended.point, static)
     ended = ended._replace(here=profile.here, instruments=profile.instruments, point=point)
     roots = _roots_in_trials(problem, ended, model)
     covariance, of_curves = _deviations(problem, ended, model, roots)
-    covariance += phases.covariance + added
+    covariance += phases.covariance + more @ more.T
     of_curves = tuple(each.and_of(phases.curves_apart(k)) for k, each in enumerate(of_curves))
     motions = _through_impacts(problem, ended.point)
-    draws = posterior_draws(model, point, roots, [of_knots(phases), of_covariance(model, point, added)])
+    draws = posterior_draws(model, point, roots, [of_knots(phases), *of_root(model, point, more)])
     support = instrument_support(model, ended.point, ended.instruments, of_curves)
     return result_of(problem, ended, motions, covariance, of_curves, support, evidence, draws)
 
 
 def _left_out(problem: MapProblem, model: GaussNewton, static: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """`with_left_out` at an estimate of the static unknowns (S,)."""
+    """`with_left_out` at an estimate of the static unknowns (S,): its move (S,), and a root (S, u) of what is added."""
     directions = problem.left_out(static)
     data = sum(each.information for each in model.displaced) @ directions
     pull = -directions.T @ problem.prior_slope(static)[0]
