@@ -1,4 +1,4 @@
-"""`python -m validation NAME`: make one page of evidence again, or with `all` every one."""
+"""Make a page of evidence again, with the commit and day on it; or all."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ TOOLS = ("command-speed", "truth-trials", "synthetic-walk-table", "usual-build")
 
 def application(only: str | None = None) -> typer.Typer:
     """The command line with all commands, or with one: what the others need may not be installed."""
-    app = typer.Typer(no_args_is_help=True, pretty_exceptions_enable=False, help=__doc__)
-    app.command("all", help="Make all pages again, each in a process of its own; takes hours.")(_make_all)
+    app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, help=__doc__)
+    app.command("all", help="Make all pages again, one after the other: hours.")(_make_all)
     for names, panel in ((EVIDENCE, "Evidence: each writes the page of its name"), (TOOLS, "Tools")):
         for name in names:
             module = name.replace("-", "_")

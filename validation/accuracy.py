@@ -1,4 +1,4 @@
-"""What the simultaneous estimate is worth, on synthetic truth and on measured walks."""
+"""Compare estimates and error bars with synthetic truth."""
 
 from __future__ import annotations
 

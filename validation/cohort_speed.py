@@ -1,4 +1,6 @@
-"""What a cohort costs beside its single fits, and how memory grows with its people.
+"""Measure what a cohort costs beside single fits.
+
+What a cohort costs beside its single fits, and how memory grows with its people.
 
 Some 20 minutes on two quiet cores; try it with --people 8 --fewer 4 --sample 4 --dry-run.
 

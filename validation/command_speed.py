@@ -1,4 +1,6 @@
-"""Times whole processes, `kinertia --version` and `kinertia fit`, next to the import of what they stand on.
+"""Time whole processes; another checkout beside.
+
+Times whole processes, `kinertia --version` and `kinertia fit`, next to the import of what they stand on.
 
 Those of another checkout of the repository, as `git worktree add FOLDER COMMIT` makes it, can run by turns with those
 of this one, and the last columns compare both. The yardstick is `python -c "import numpy, scipy.optimize, pandas"` in

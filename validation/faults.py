@@ -1,4 +1,4 @@
-"""Which faults are identified? Fifty known ones in measured and synthetic walks, one at a time."""
+"""Make fifty known faults in files: which are named?"""
 
 from __future__ import annotations
 

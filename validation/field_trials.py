@@ -1,4 +1,6 @@
-"""What Kinertia says of recordings of other laboratories, and whether it is as it should be.
+"""Judge recordings of other laboratories.
+
+What Kinertia says of recordings of other laboratories, and whether it is as it should be.
 
 What is true of the recordings is in field_cases.toml.
 """

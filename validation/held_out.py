@@ -1,4 +1,4 @@
-"""Do BSPs from some trials of a person explain the others? `kinertia crossval` on measured trials."""
+"""Explain held-out trials by BSPs of the others."""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""Memory and seconds of walks of minutes, from markers to error bars.
+"""Measure memory and seconds of walks of minutes.
+
+Memory and seconds of walks of minutes, from markers to error bars.
 
 Every length runs in a process of its own, which has nothing else in its memory. One stride on a treadmill, made exactly
 as the other synthetic walks, is repeated; skin motion comes back with every stride, the cameras' noise does not.

@@ -1,4 +1,4 @@
-"""What `kinertia fit` gives on the four measured walks."""
+"""Tell what `kinertia fit` gives on four walks."""
 
 from __future__ import annotations
 

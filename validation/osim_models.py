@@ -1,4 +1,4 @@
-"""What `kinertia fit --model` gives with three users' own OpenSim models."""
+"""Tell what fits with users' OpenSim models give."""
 
 from __future__ import annotations
 

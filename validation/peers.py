@@ -1,4 +1,6 @@
-"""Joint moments, residuals and seconds of Kinertia next to OpenSim's IK + ID and RRA.
+"""Compare joint moments with those of OpenSim and RRA.
+
+Joint moments, residuals and seconds of Kinertia next to OpenSim's IK + ID and RRA.
 
 RRA takes most of the time, a minute or two per walk; runs that are finished in FOLDER are taken from there.
 """

@@ -1,4 +1,4 @@
-"""What a wrong prior costs: children, obese and old people, prostheses; what a group teaches; a rucksack."""
+"""Ask what a wrong prior costs children and others."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which body segment parameters survive noisy kinematics? The page that `kinertia study sensitivity` writes."""
+"""Ask which BSPs survive noisy kinematics."""
 
 from __future__ import annotations
 

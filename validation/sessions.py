@@ -1,4 +1,6 @@
-"""Fits every trial of a session alone and compares what they share.
+"""Compare what trials of one session share.
+
+Fits every trial of a session alone and compares what they share.
 
 With `--keep`, results stay in FOLDER/SESSION/TRIAL, and those that are there are not computed again. With `--only`, the
 page is printed and not written. `repeatability.py` has what trials share, and how that is judged.

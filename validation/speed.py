@@ -1,4 +1,6 @@
-"""Times every stage of `kinertia fit` next to OpenSim, at one, two and four times the length.
+"""Time every stage of a fit next to OpenSim.
+
+Times every stage of `kinertia fit` next to OpenSim, at one, two and four times the length.
 
 OpenSim's InverseKinematicsTool solves the same markers in the same run, with the set-up file and scaled model that come
 with the data; its GCVSplineSet smooths the same coordinates. Both sides are the best of a few runs.

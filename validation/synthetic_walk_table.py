@@ -1,4 +1,6 @@
-"""Makes the package's synthetic walk, `src/kinertia/synthetic/data/*.csv`, from the measured gait2354 walk.
+"""Make the package's synthetic walk from a measured one.
+
+Makes the package's synthetic walk, `src/kinertia/synthetic/data/*.csv`, from the measured gait2354 walk.
 
 The walk is a truncated Fourier series of every coordinate, fitted to the inverse kinematics of two treadmill strides
 of OpenSim's gait2354 example; then, as in the study, the pelvis is modified until the motion asks for the measured

@@ -1,4 +1,6 @@
-"""Walks with known body segment parameters and joint moments, made by OpenSim alone (only file writers are ours).
+"""Make walks of known truth by OpenSim alone.
+
+Walks with known body segment parameters and joint moments, made by OpenSim alone (only file writers are ours).
 
 A measured walk gives the motion: OpenSim's inverse kinematics, fitted by splines. A person unlike the model walks it:
 every body's mass, centre of mass and inertia are perturbed, and OpenSim's inverse dynamics says which ground reactions

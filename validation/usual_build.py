@@ -1,4 +1,6 @@
-"""How large people's girths and lengths usually are; makes src/kinertia/model/data/usual_build.csv.
+"""Make the table of people's usual girths and lengths.
+
+How large people's girths and lengths usually are; makes src/kinertia/model/data/usual_build.csv.
 
 Its folder is misc/samplemeasurements of the source distribution of the package `yeadon` 2.0.1 (pip download --no-deps
 --no-binary :all: yeadon==2.0.1): the measurements of five people, which are not part of this repository.
