@@ -2,8 +2,8 @@
 
 A fit that lets markers and joint centres move (`calibrate`) makes nearly any model fit the markers: what is wrong with
 it goes into joint centres and bones, and so into joint moments, and nothing else tells. So the markers of the model in
-its default pose are compared with those of the trial: their distances in one segment, as `same_person` does with a static
-trial, and their arrangement as a whole.
+its default pose are compared with those of the trial: their distances in one segment, as `same_person` does with a
+static trial, and their arrangement as a whole.
 
 On eleven sound pairs of model and trial from seven laboratories the median ratio of distances is within 1.1 %, their
 difference 5 mm (RMS; 11 mm in one). The arrangement of pelvis and trunk fits the person's 0.02 to 0.3 times as far off
