@@ -64,7 +64,7 @@ def test_one_folder_per_person(controls, tmp_path):
 def test_too_few_people_and_other_files_are_refused(controls, tmp_path):
     outcome = run("norms", controls / "anna", "-o", tmp_path / "n.csv")
     assert outcome.status == 2
-    assert "2 people at least" in outcome.err
+    assert "at least 2 different people" in outcome.err
     assert not (tmp_path / "n.csv").exists()
     other = tmp_path / "mine.csv"
     other.write_text("a,b\n1,2\n")

@@ -29,7 +29,7 @@ all segments out, with a motion that they and the forces explain.
 [bold]In which order[/]
 
 kinertia demo                 see it work, on a synthetic person
-kinertia demo --measured      see it work on a measured walk (downloads 0.9 MB)
+kinertia demo --measured      see it work on a measured walk (0.9 MB)
 kinertia app                  all of it on a page in your browser
 kinertia init FOLDER          draft FOLDER/subject.toml from your files
 kinertia check subject.toml   can a fit use them? gaps, plates, axes, mass

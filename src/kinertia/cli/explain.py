@@ -110,7 +110,7 @@ def overruling(one: Rule) -> str:
     else:
         waived = (
             f'--waive {one.code}, or waive = ["{one.code}"] under [diagnostics] in the subject file, lets the fit go '
-            "on, whose outputs are then to be used with care at best"
+            "on; the outputs concerned are then at best to be used with care"
         )
     if one.severity == "ERROR":
         return waived

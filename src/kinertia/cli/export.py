@@ -39,12 +39,12 @@ def export(
     convention: Annotated[
         str | None,
         typer.Option(
-            help="Of --c3d: plug-in-gait (default for its marker sets) or isb (default otherwise).",
+            help="With --c3d: plug-in-gait (default for its marker sets) or isb (default otherwise).",
             autocompletion=_conventions,
         ),
     ] = None,
     recordings: Annotated[
-        Path | None, typer.Option(help="Of --c3d: folder of the trials' files, where they are not found.")
+        Path | None, typer.Option(help="With --c3d: folder with the recordings, if they are not found.")
     ] = None,
     draws: Annotated[
         int,

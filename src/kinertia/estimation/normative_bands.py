@@ -66,7 +66,7 @@ def band_columns(people: Sequence[Control]) -> dict[str, list[Any]]:
         KinertiaError: fewer than two people, or people whose coordinates mean different things.
     """
     if len(people) < FEWEST_PEOPLE:
-        raise KinertiaError(f"norms need {FEWEST_PEOPLE} people at least, and {len(people)} is given")
+        raise KinertiaError(f"norms need at least {FEWEST_PEOPLE} different people; found {len(people)}")
     conventions = sorted({one.convention for one in people})
     if len(conventions) > 1:
         raise KinertiaError(f"people were fitted with different models, whose angles differ: {'; '.join(conventions)}")
