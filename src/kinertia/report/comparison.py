@@ -112,7 +112,7 @@ def remarks(fits: Mapping[str, Fit]) -> list[str]:
     for other_name, other in others:
         if abs(first.mass_kg - other.mass_kg) > 0.1 * first.mass_kg:
             said.append(
-                f"{name} is of {first.mass_kg:.1f} kg, {other_name} of {other.mass_kg:.1f} kg: are they the same person?"
+                f"{name} is of {first.mass_kg:.1f} kg, {other_name} of {other.mass_kg:.1f} kg: is it the same person?"
             )
         lacking = sorted(set(first.estimate.segments) ^ set(other.estimate.segments))
         if lacking:
