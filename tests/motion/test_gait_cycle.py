@@ -5,7 +5,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from kinertia.motion.gait_cycle import FeetUnderPelvis, Stride, feet_under_pelvis, strides_of, turning_points
+from kinertia.motion.gait_cycle import (
+    FeetUnderPelvis,
+    Stride,
+    feet_under_pelvis,
+    found_events,
+    strides_of,
+    turning_points,
+)
 from kinertia.motion.kinematics import Kinematics, solve_kinematics
 from kinertia.motion.spatiotemporal import spatiotemporal
 from kinertia.synthetic.walk import walk, walking_subject
@@ -78,6 +85,25 @@ def test_where_no_plate_sees_a_contact_the_motion_tells_it(walked, trial, measur
     ]
     assert np.abs(gaps).max() < 2.5 * FRAME
     assert rms(np.array(gaps)) > 0
+
+
+def test_a_foot_without_markers_tells_no_events(walked, trial):
+    """Its markers end at 2.0 s but for the heel's, and no plate sees a contact after 1.6 s."""
+    blind = trial.loads.time > 1.6
+    force, moment = (np.where(blind[:, None, None], 0.0, part) for part in (trial.loads.force, trial.loads.moment))
+    positions = trial.markers.positions.copy()
+    leg = {m.label for m in walked.skeleton.markers if m.segment in ("thigh_r", "shank_r", "foot_r")} - {"R_HEEL"}
+    columns = [k for k, label in enumerate(trial.markers.labels) if label in leg]
+    positions[np.ix_(trial.markers.time > 2.0, columns)] = np.nan
+    few = replace(
+        trial,
+        markers=replace(trial.markers, positions=positions),
+        loads=replace(trial.loads, force=force, moment=moment),
+        measured=trial.markers.time < 1.5,
+    )
+    events = found_events(walked.skeleton, kinematics_of(walked, few))
+    assert max(one.event.time_s for one in events if one.event.side == "r") < 2.0 + 2 * FRAME
+    assert max(one.event.time_s for one in events if one.event.side == "l") > 3.0
 
 
 def test_one_who_squats_takes_no_strides(walked, trial):

@@ -17,13 +17,14 @@ import numpy as np
 
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.frames_at_once import pieces
-from kinertia.motion.kinematics import Kinematics
+from kinertia.motion.kinematics import LONGEST_BRIDGE_S, Kinematics
 from kinertia.motion.moving_windows import gaussian_mean
 from kinertia.trial.data import FEET
 from kinertia.trial.file_events import usable_events
 from kinertia.trial.gait_event import GaitEvent
 from kinertia.trial.gait_events import gait_events, load_edges
 from kinertia.trial.ground_contact import CONTACT_SLACK_S
+from kinertia.trial.sampled_time import TIME_TOLERANCE_S
 
 PERCENT = np.arange(101.0)
 """Of the gait cycle, at which curves are given."""
@@ -130,7 +131,29 @@ def _heel_and_toe(skeleton: Skeleton, segment: str) -> tuple[np.ndarray, np.ndar
 
 def found_events(skeleton: Skeleton, kinematics: Kinematics) -> list[FoundEvent]:
     """All heel strikes and toe offs of a trial, in order of time."""
-    return _timed(_from_motion(feet_under_pelvis(skeleton, kinematics)), kinematics)
+    trial = kinematics.trial
+    told = [*load_edges(trial.loads), *usable_events(trial)]
+    events = [
+        event
+        for event in _from_motion(feet_under_pelvis(skeleton, kinematics))
+        if _foot_is_shown(skeleton, kinematics, event) or _nearest(told, event, _SAME_EVENT_S) is not None
+    ]
+    return _timed(events, kinematics)
+
+
+def _foot_is_shown(skeleton: Skeleton, kinematics: Kinematics, event: GaitEvent) -> bool:
+    """Whether the markers determine all coordinates from the ground to the foot around the event; short gaps count as
+    known. In longer ones the spline turns where no foot did.
+    """
+    foot = skeleton.segments.index(skeleton.feet[FEET.index(event.side)])
+    columns = np.unique(skeleton.map.owner[skeleton.support[foot]])
+    ik, half = kinematics.ik, LONGEST_BRIDGE_S / 2
+    known = ik.time[np.isfinite(ik.q[:, columns]).all(axis=1)]
+    start, end = np.clip([event.time_s - half, event.time_s + half], *kinematics.spline.time[[0, -1]])
+    first, last = np.searchsorted(known, start, "right") - 1, np.searchsorted(known, end, "left")
+    if first < 0 or last >= len(known):
+        return False
+    return bool((np.diff(known[first : last + 1]) <= LONGEST_BRIDGE_S + TIME_TOLERANCE_S).all())
 
 
 def strides_of(skeleton: Skeleton, kinematics: Kinematics) -> tuple[Stride, ...]:
