@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 
 from command_line import run
+from kinertia.cli.report import score_text
 from kinertia.estimation.drawn_fit import drawn_fit
 from kinertia.io.norms_file import read_norms
 from kinertia.report.saved_fit import FIT_FILE, write_fit
@@ -83,3 +84,8 @@ def test_norms_of_another_model_are_refused(demo_run, controls, tmp_path):
     assert outcome.status == 2
     assert "the norms are of Plug-in Gait" in " ".join(outcome.err.split())
     assert not (results / "report.html").exists()
+
+
+def test_a_score_that_does_not_exist_is_not_printed_as_a_number():
+    assert score_text(7.96) == "8.0 degrees"
+    assert "nan" not in score_text(float("nan"))

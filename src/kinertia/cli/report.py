@@ -51,9 +51,14 @@ def report(
     if scores:
         write_columns(results / "gps.csv", scores, "%.6g")
         overall = scores["degrees"][-1]
-        out.print(f"Gait Profile Score {overall:.1f} degrees; {results / 'gps.csv'}", soft_wrap=True)
+        out.print(f"Gait Profile Score {score_text(overall)}; {results / 'gps.csv'}", soft_wrap=True)
         told["gps_deg"] = overall if np.isfinite(overall) else None
     return Outcome({**told, "without_curve": without_curve})
+
+
+def score_text(degrees: float) -> str:
+    """The score for a terminal; without complete curves of both sides there is none."""
+    return f"{degrees:.1f} degrees" if np.isfinite(degrees) else "not available: a side lacks complete curves"
 
 
 def _norms_for(fit: Fit, path: Path) -> tuple[dict[str, Norm], list[str]]:
