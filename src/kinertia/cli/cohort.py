@@ -79,7 +79,7 @@ def cohort(
         bool, typer.Option("--json", help="Print how it ended for everybody as JSON, for scripts, and nothing else.")
     ] = False,
 ) -> Outcome:
-    """Fit everybody of a study, in parallel; go on where the last run ended.
+    """Fit everyone in a study in parallel; continue where the last run ended.
 
     Results of each person go to out/people/NAME, as kinertia fit writes them;
     tables of everybody beside them. Run it again after adding people or
