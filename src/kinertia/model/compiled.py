@@ -38,6 +38,7 @@ SOURCES = (
     "estimation/simultaneous/normal_equations.py",
     "estimation/simultaneous/elimination.py",
     "estimation/simultaneous/root_gradient.py",
+    "estimation/simultaneous/root_terms.py",
     "estimation/simultaneous/knot_interval.py",
     "estimation/simultaneous/seen_markers.py",
     "estimation/simultaneous/marker_gradient.py",
