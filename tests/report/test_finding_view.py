@@ -61,7 +61,7 @@ def test_findings_of_several_models_are_told_apart_by_their_files_and_each_expla
 
 
 def test_corrections_have_place_size_and_deviation():
-    zero, delay = view(*CORRECTED).corrections
+    delay, zero = view(*CORRECTED).corrections
     assert (zero.where, delay.where) == ("walk: plate 1, mediolateral (Z)", "all trials")
     assert zero.size == "+6.5 N ± 0.9 N (SD) (usual within 2.4 N)"
     assert delay.size == "+7.1 ms ± 0.6 ms (SD)"
@@ -132,8 +132,8 @@ def test_the_page_in_the_browser_gets_verdict_and_open_findings():
         (RESIDUAL.code, "ERROR", "open"),
         ("M113", "WARNING", "open"),
         ("P213", "WARNING", "open"),
-        ("P215", "CORRECTED", "open"),
         ("T214", "CORRECTED", "open"),
+        ("P215", "CORRECTED", "open"),
     ]
-    for code, line in zip(("M113", "P213", "P215", "T214"), lines(FAULTY), strict=True):
+    for code, line in zip(("M113", "P213", "T214", "P215"), lines(FAULTY), strict=True):
         assert code in line

@@ -92,8 +92,12 @@ class Overview:
 
 
 def in_order(findings: Iterable[Finding]) -> list[Finding]:
-    """The worst first, of equals those of the earliest stage."""
-    return sorted(findings, key=lambda one: (-one.severity, STAGES.index(one.rule.stage), one.code))
+    """The worst first; of equals those of all trials, then those of the earliest stage."""
+
+    def importance(one: Finding) -> tuple[int, bool, int, str]:
+        return -one.severity, one.where.trial is not None, STAGES.index(one.rule.stage), one.code
+
+    return sorted(findings, key=importance)
 
 
 def reported(findings: Iterable[Finding], least: Severity = Severity.CORRECTED) -> list[Finding]:
