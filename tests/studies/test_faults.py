@@ -165,7 +165,7 @@ def test_page(outcomes):
     assert "| b | **silent** | – |" in page
     assert "Of 5 faults, 2 are named (40 %), 1 warned of with other codes, 1 harmless, and 1 silent." in page
     assert "| **named / possible** | **1 / 3** | **1 / 2** |" in page
-    assert "| none: the walk as it is | none | M113 P213 P215 T214 |" in page
+    assert "| none: the walk as it is | none | M113 P213 T214 P215 |" in page
     assert "Of 2 fault-free walks 1 are blocked, and 2 have a warning." in page
     assert "- one: nothing\n- other: M113 " in page
     assert counts(outcomes[1]) == {"named": 2, "warned": 1, "harmless": 1, "silent": 1}
