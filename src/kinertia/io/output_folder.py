@@ -7,7 +7,6 @@ import os
 import shutil
 import signal
 import sys
-import tempfile
 import threading
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
@@ -253,13 +252,12 @@ def _uninterrupted() -> Iterator[None]:
 
 
 def write_then_rename(path: Path, text: str) -> None:
-    """Write text so that `path` appears complete or not at all."""
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as file:
-            file.write(text)
-        os.chmod(temporary, 0o644)
+    """Write text so that `path` appears complete or not at all; of a killed process the next one sweeps up the rest.
+
+    Raises:
+        FileError: nothing can be written beside it.
+    """
+    with working_folder(path.parent) as work:
+        temporary = work / path.name
+        temporary.write_text(text, encoding="utf-8", newline="\n")
         os.replace(temporary, path)
-    except BaseException:
-        os.unlink(temporary)
-        raise

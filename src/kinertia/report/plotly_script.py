@@ -9,6 +9,7 @@ from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
 
+from kinertia.errors import FileError
 from kinertia.io.output_folder import write_then_rename
 from kinertia.model.compiled import cache_folder
 from kinertia.report.packing import packed
@@ -34,7 +35,7 @@ def packed_script() -> str:
     with suppress(OSError):
         return kept.read_text(encoding="ascii")
     text = packed(script.read_bytes(), _BEST)
-    with suppress(OSError):  # where nothing can be kept, every report compresses it
+    with suppress(OSError, FileError):  # where nothing can be kept, every report compresses it
         for older in kept.parent.glob("plotly-*.txt"):
             older.unlink()
         write_then_rename(kept, text)
