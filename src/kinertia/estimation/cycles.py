@@ -241,6 +241,14 @@ def spatiotemporal_columns(trials: Sequence[Estimated]) -> dict[str, list[Any]]:
     return {name: [row[name] for row in rows] for name in names}
 
 
+def mean_of_measured(values: np.ndarray) -> np.ndarray:
+    """(101,) mean of the curves (n, 101) that were measured there; NaN where none was."""
+    known = np.isfinite(values)
+    count = known.sum(axis=0)
+    total = np.where(known, values, 0.0).sum(axis=0)
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
+
+
 def spread_evenly(strides: Sequence[Stride], most: int | None) -> list[Stride]:
     """At most so many strides of each side, evenly spread over the trial."""
     kept = []

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from kinertia.estimation.cycles import coordinates_at, cycle_curves
+from kinertia.estimation.cycles import coordinates_at, cycle_curves, mean_of_measured
 from kinertia.estimation.gait_scores import FOOT_PROGRESSION, PELVIS_ROTATION
 from kinertia.estimation.result import Fit, TrialFit
 from kinertia.model.sides import by_side
@@ -59,7 +59,7 @@ def mean_curves(fit: Fit) -> MeanCurves:
             if one.kind != "angle":
                 sign = -1.0 if one.quantity in flipped and one.stride.side == "l" else 1.0
                 found.setdefault((one.quantity, one.stride.side), []).append(sign * one.value)
-    return {name: _mean(np.array(curves)) for name, curves in found.items()}
+    return {name: mean_of_measured(np.array(curves)) for name, curves in found.items()}
 
 
 def _angles(trial: TrialFit, mass_kg: float) -> list[tuple[str, Stride, np.ndarray]]:
@@ -99,11 +99,3 @@ def _within_half_a_turn(angle_deg: np.ndarray) -> np.ndarray:
     middle = np.degrees(np.angle(np.exp(1j * np.radians(known)).mean())) if known.size else 0.0
     result: np.ndarray = middle + (angle_deg - middle + 180.0) % 360.0 - 180.0
     return result
-
-
-def _mean(values: np.ndarray) -> np.ndarray:
-    """(101,) of the strides that were measured there."""
-    known = np.isfinite(values)
-    count = known.sum(axis=0)
-    total = np.where(known, values, 0.0).sum(axis=0)
-    return np.where(count > 0, total / np.maximum(count, 1), np.nan)

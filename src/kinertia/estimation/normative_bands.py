@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from kinertia.errors import KinertiaError
-from kinertia.estimation.cycles import spatiotemporal_columns
+from kinertia.estimation.cycles import mean_of_measured, spatiotemporal_columns
 from kinertia.estimation.mean_cycles import convention_of, mean_curves
 from kinertia.estimation.result import Fit
 from kinertia.motion.gait_cycle import PERCENT
@@ -49,9 +49,7 @@ class Control:
         curves = {}
         for quantity in dict.fromkeys(name for name, _ in by_side):
             sides = np.array([by_side[quantity, side] for side in FEET if (quantity, side) in by_side])
-            known = np.isfinite(sides)
-            total = np.where(known, sides, 0.0).sum(axis=0)
-            curves[quantity] = np.where(known.any(axis=0), total / np.maximum(known.sum(axis=0), 1), np.nan)
+            curves[quantity] = mean_of_measured(sides)
         speeds = np.array(spatiotemporal_columns(fit.trials)["speed_m_s"], dtype=float)
         speed = float(np.nanmean(speeds)) if np.isfinite(speeds).any() else float("nan")
         return cls(fit.subject.name, curves, fit.subject.age_years, speed, convention_of(fit))

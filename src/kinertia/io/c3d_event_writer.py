@@ -9,10 +9,9 @@ import numpy as np
 
 from kinertia.io.c3d_events import OWN_METHOD, side_and_kind
 from kinertia.io.c3d_parameters import ParameterSection, Value
-from kinertia.trial.gait_event import GaitEvent
+from kinertia.trial.gait_event import SAME_EVENT_S, GaitEvent, nearest_event
 
 _GROUP = "EVENT"
-_SAME_EVENT_S = 0.15
 _CONTEXTS = {"r": "Right", "l": "Left"}
 _LABELS = {"heel strike": "Foot Strike", "toe off": "Foot Off"}
 _ICONS = {"heel strike": 1, "toe off": 2}
@@ -70,7 +69,7 @@ def add_events(section: ParameterSection, events: Sequence[EventToWrite], subjec
             one.event.time_s,
         )
         for one in events
-        if not any(one.event[1:] == at[1:] and abs(one.event.time_s - at.time_s) <= _SAME_EVENT_S for at in stated)
+        if nearest_event(stated, one.event, SAME_EVENT_S) is None
     ]
     if (new or len(own) < len(rows)) and len(own) + len(new) <= _MOST:
         _put(section, [*own, *new])

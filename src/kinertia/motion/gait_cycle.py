@@ -21,7 +21,7 @@ from kinertia.motion.kinematics import LONGEST_BRIDGE_S, Kinematics
 from kinertia.motion.moving_windows import gaussian_mean
 from kinertia.trial.data import FEET
 from kinertia.trial.file_events import usable_events
-from kinertia.trial.gait_event import GaitEvent
+from kinertia.trial.gait_event import GaitEvent, nearest_event
 from kinertia.trial.gait_events import gait_events, load_edges
 from kinertia.trial.ground_contact import CONTACT_SLACK_S
 from kinertia.trial.sampled_time import TIME_TOLERANCE_S
@@ -131,14 +131,14 @@ def _heel_and_toe(skeleton: Skeleton, segment: str) -> tuple[np.ndarray, np.ndar
 
 def found_events(skeleton: Skeleton, kinematics: Kinematics) -> list[FoundEvent]:
     """All heel strikes and toe offs of a trial, in order of time."""
-    trial = kinematics.trial
-    told = [*load_edges(trial.loads), *usable_events(trial)]
+    edges, stated = load_edges(kinematics.trial.loads), usable_events(kinematics.trial)
+    told = [*edges, *stated]
     events = [
         event
         for event in _from_motion(feet_under_pelvis(skeleton, kinematics))
-        if _foot_is_shown(skeleton, kinematics, event) or _nearest(told, event, _SAME_EVENT_S) is not None
+        if _foot_is_shown(skeleton, kinematics, event) or nearest_event(told, event, _SAME_EVENT_S) is not None
     ]
-    return _timed(events, kinematics)
+    return _timed(events, gait_events(kinematics.trial), edges, stated)
 
 
 def _foot_is_shown(skeleton: Skeleton, kinematics: Kinematics, event: GaitEvent) -> bool:
@@ -226,35 +226,32 @@ def turning_points(values: np.ndarray, least: float) -> list[int]:
     return maxima
 
 
-def _timed(events: Sequence[GaitEvent], kinematics: Kinematics) -> list[FoundEvent]:
-    """The events at the plates' times where these saw them, else at the file's, else moved by what the motion is early
-    on average; and those of the file that the motion does not show.
+def _timed(
+    events: Sequence[GaitEvent],
+    certain: Sequence[GaitEvent],
+    edges: Sequence[GaitEvent],
+    stated: Sequence[GaitEvent],
+) -> list[FoundEvent]:
+    """The events at the plates' times (edges) where these saw them, else at the file's (stated), else moved by what the
+    motion is early on average (certain); and those of the file that the motion does not show.
     """
-    certain, edges = gait_events(kinematics.trial), load_edges(kinematics.trial.loads)
-    stated = usable_events(kinematics.trial)
     early = {}
     for kind in ("heel strike", "toe off"):
         gaps = [
             seen.time_s - event.time_s
             for event in events
-            if event.kind == kind and (seen := _nearest(certain, event, _SAME_EVENT_S)) is not None
+            if event.kind == kind and (seen := nearest_event(certain, event, _SAME_EVENT_S)) is not None
         ]
         early[kind] = float(np.median(gaps)) if gaps else 0.0
     moved = [event._replace(time_s=event.time_s + early[event.kind]) for event in events]
-    shown = [_of_file(event, _nearest(stated, event, _SAME_EVENT_S)) for event in moved]
-    shown += [FoundEvent(event, "file") for event in stated if _nearest(moved, event, _SAME_STEP_S) is None]
+    shown = [_of_file(event, nearest_event(stated, event, _SAME_EVENT_S)) for event in moved]
+    shown += [FoundEvent(event, "file") for event in stated if nearest_event(moved, event, _SAME_STEP_S) is None]
     placed = []
     for one in shown:
-        seen = _nearest(edges, one.event, CONTACT_SLACK_S)
+        seen = nearest_event(edges, one.event, CONTACT_SLACK_S)
         placed.append(one if seen is None else FoundEvent(seen, "force plate"))
     return sorted(placed)
 
 
 def _of_file(event: GaitEvent, stated: GaitEvent | None) -> FoundEvent:
     return FoundEvent(event, "motion") if stated is None else FoundEvent(stated, "file")
-
-
-def _nearest(events: Sequence[GaitEvent], to: GaitEvent, within_s: float) -> GaitEvent | None:
-    """The event of the same kind and foot that is nearest in time, if it is near."""
-    alike = [event for event in events if event[1:] == to[1:] and abs(event.time_s - to.time_s) <= within_s]
-    return min(alike, key=lambda event: abs(event.time_s - to.time_s), default=None)

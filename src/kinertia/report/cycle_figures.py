@@ -6,7 +6,6 @@ the darker one. What the usual pipeline gives is dotted. Where nothing was measu
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -14,7 +13,16 @@ from typing import Any
 
 import numpy as np
 
-from kinertia.estimation.cycles import FORCES, UNITS, CycleCurve, Kind, Stage, cycle_curves, spread_evenly
+from kinertia.estimation.cycles import (
+    FORCES,
+    UNITS,
+    CycleCurve,
+    Kind,
+    Stage,
+    cycle_curves,
+    mean_of_measured,
+    spread_evenly,
+)
 from kinertia.estimation.mean_cycles import opposite_on_left
 from kinertia.estimation.result import Fit
 from kinertia.io.norms_file import Norm
@@ -181,7 +189,7 @@ def _estimate(curves: Sequence[CycleCurve], word: str, colour: str) -> Iterator[
         yield {**band(mean - spread, mean + spread, style.faded(colour, _SD_OPACITY)), "name": f"{word}, mean ± SD"}
     sds = [one.sd for one in curves if np.isfinite(one.sd).any()]
     if sds:
-        half = INTERVAL_SD * _over_strides(np.nanmean, np.array(sds))
+        half = INTERVAL_SD * mean_of_measured(np.array(sds))
         name = f"{word}, 95 % of the estimate"
         yield {**band(mean - half, mean + half, style.faded(colour, _BAND_OPACITY)), "name": name}
     if spread is not None:
@@ -194,7 +202,7 @@ def _estimate(curves: Sequence[CycleCurve], word: str, colour: str) -> Iterator[
 
 def mean_curve(curves: Sequence[CycleCurve]) -> np.ndarray:
     """(101,) of the strides that were measured there; NaN where none was."""
-    return _over_strides(np.nanmean, np.array([one.value for one in curves]))
+    return mean_of_measured(np.array([one.value for one in curves]))
 
 
 def usual_mean(usual: Sequence[CycleCurve], estimate: Sequence[CycleCurve]) -> np.ndarray:
@@ -205,7 +213,7 @@ def usual_mean(usual: Sequence[CycleCurve], estimate: Sequence[CycleCurve]) -> n
     nowhere = np.zeros(len(PERCENT), dtype=bool)
     same = np.array([known.get((one.trial, one.stride.number), nowhere) for one in usual])
     values = np.array([one.value for one in usual])
-    return _over_strides(np.nanmean, np.where(same | ~same.any(axis=0), values, np.nan))
+    return mean_of_measured(np.where(same | ~same.any(axis=0), values, np.nan))
 
 
 def _spread(curves: Sequence[CycleCurve]) -> np.ndarray | None:
@@ -217,12 +225,6 @@ def _spread(curves: Sequence[CycleCurve]) -> np.ndarray | None:
     spread = np.full(values.shape[1], np.nan)
     spread[several] = np.nanstd(values[:, several], axis=0, ddof=1)
     return spread
-
-
-def _over_strides(statistic: Any, values: np.ndarray) -> np.ndarray:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # of percents that no stride has
-        return np.asarray(statistic(values, axis=0))
 
 
 def mean_line(values: np.ndarray) -> dict[str, Any]:

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 EventKind = Literal["heel strike", "toe off"]
+
+SAME_EVENT_S = 0.15
+"""What a file and the forces have farther apart is another step."""
 
 
 class GaitEvent(NamedTuple):
@@ -14,6 +18,12 @@ class GaitEvent(NamedTuple):
     time_s: float
     side: str
     kind: EventKind
+
+
+def nearest_event(events: Iterable[GaitEvent], to: GaitEvent, within_s: float) -> GaitEvent | None:
+    """The event of the same foot and kind that is nearest in time, if it is near."""
+    alike = [event for event in events if event[1:] == to[1:] and abs(event.time_s - to.time_s) <= within_s]
+    return min(alike, key=lambda event: abs(event.time_s - to.time_s), default=None)
 
 
 @dataclass(frozen=True)
