@@ -29,9 +29,9 @@ def markers(
 ) -> Outcome:
     """Show the labels of a file against every marker-set preset, and draft a marker set from them.
 
-    A preset is recognised if a file has two thirds of its labels, or of those of pelvis, legs and feet. For any other
-    set give -o with the static trial: landmarks are found by their positions on the standing person, with the labels
-    as hints. Check the draft, and name it with --markers.
+    A preset fits if the file has at least two thirds of its labels, or of its labels on pelvis, legs and feet. For any
+    other set, give the static trial and -o: Kinertia finds landmarks by their positions on the standing person and
+    uses labels as hints. Check the draft, then pass it with --markers.
 
     [bold]Examples[/]
 

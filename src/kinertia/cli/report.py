@@ -32,8 +32,8 @@ def report(
 ) -> Outcome:
     """Write the report of a fit again, without the recordings: report.html in its folder is replaced.
 
-    With --norms, your laboratory's normal curves are grey bands behind those
-    over the gait cycle. Those of kinertia norms add the Gait Profile Score (gps.csv).
+    With --norms, gait-cycle figures show your laboratory's normative bands in
+    grey. Bands made by kinertia norms add the Gait Profile Score (gps.csv).
 
     [bold]Examples[/]
 
