@@ -63,6 +63,7 @@ def test_a_drafted_subject_file_needs_no_sex(lab):
     path = lab / "subject.toml"
     path.write_text(re.sub(r"(?m)^sex = .*\n", "", path.read_text()))
     assert run("check", path).status == 0
+    assert told(path)["fit_also_needs"] == ["sex"]
     assert "F191" in run("fit", path, "-o", lab / "out").err
 
 

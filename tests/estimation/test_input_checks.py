@@ -35,6 +35,12 @@ def test_nobody_states_it(field, quantity):
     assert (caught.value.finding.code, caught.value.finding.where.part) == ("S101", quantity)
 
 
+def test_all_that_nobody_states_is_said_at_once():
+    with pytest.raises(SubjectError) as caught:
+        complete_subject(Subject(name="a"), [WALK])
+    assert caught.value.finding.evidence["quantity"].value == "mass, stature, sex"
+
+
 def test_without_sex_there_is_no_table():
     with pytest.raises(SubjectError, match="S101") as caught:
         complete_subject(Subject(name="a", mass_kg=60.0, height_m=1.7), [WALK])

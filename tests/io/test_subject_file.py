@@ -374,6 +374,13 @@ def test_what_does_not_go_with_an_opensim_model(folder, old, new, line, code, ev
         read(folder, OWN.replace(old, new))
 
 
+def test_all_that_the_subject_lacks_is_said_at_once(folder):
+    """A C3D file may know mass and stature; a TRC file cannot."""
+    text = '[subject]\nname = "a"\n[model]\nstatic = "static.trc"\n[[trial]]\nmarkers = "static.trc"\n'
+    with refused("F191", 1, entry="[subject] lacks 'sex', 'mass_kg', 'height_m'"):
+        read(folder, text)
+
+
 def test_calibration_is_of_opensim_models(folder):
     with refused("F193", 8, one="calibrate"):
         read(folder, changed('markers = "plug-in-gait"', "calibrate = true"))

@@ -47,11 +47,12 @@ from kinertia.workflow.recording import RecordingCheck
 
 @dataclass(frozen=True, eq=False)
 class _Checked:
-    """Everything that was asked for, and which files each recording is from."""
+    """Everything that was asked for, which files each recording is from, and what a subject file lacks for a fit."""
 
     person: PersonCheck | None
     models: Sequence[ModelOverview]
     files: Mapping[str, str]
+    lacking: Sequence[str] = ()
 
     def facts(self, recording: RecordingCheck) -> list[tuple[str, str]]:
         """Which files it is from, and what is in them."""
@@ -150,6 +151,7 @@ def check(
             None if person is None else check_person(person.with_overrule(overrule)),
             [check_osim(one, who, overrule) for one in osim],
             read,
+            person.lacking if subjects and person is not None else (),
         )
     recordings = () if checked.person is None else checked.person.recordings
     page = None if output is None else save_check_page(checked.overviews, recordings, checked.models, output)
@@ -174,6 +176,7 @@ def _for_scripts(checked: _Checked) -> dict[str, Any]:
         "verdict": [one.verdict for one in checked.overviews],
         "rules_run": sum(one.rules for one in checked.overviews),
         "findings": findings,
+        "fit_also_needs": list(checked.lacking),
         "recordings": [{"name": one.context.name, "facts": dict(checked.facts(one))} for one in recordings],
         "models": [{"name": one.name, "facts": dict(one.facts.facts())} for one in checked.models],
     }
@@ -188,6 +191,8 @@ def _show(checked: _Checked, page: Path | None, verbose: bool) -> None:
         _show_model(model)
     for overview in checked.overviews:
         show_overview(overview, verbose)
+    if checked.lacking:
+        out.print(f"kinertia fit also needs, under [subject]: {', '.join(checked.lacking)}", soft_wrap=True)
     if page is not None:
         out.print(f"page in {page}", soft_wrap=True)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -54,23 +54,33 @@ def complete_subject(subject: Subject, recordings: Sequence[Recording], mass_onl
     Raises:
         SubjectError: neither the user nor a file gives mass or height, the user no sex, or a value cannot be true.
     """
-    values: dict[str, float] = {}
-    for field, quantity in (("mass_kg", "mass"), ("height_m", "stature")):
-        given = getattr(subject, field)
-        filed = [getattr(one, field) for one in recordings if getattr(one, field) is not None]
-        if given is not None or filed:
-            values[field] = filed[0] if given is None else given
-        elif field == "mass_kg" or not mass_only:
-            raise _missing(field, quantity)
-    if subject.sex is None and not mass_only:
-        raise _missing("sex", "sex")
-    check_subject(values["mass_kg"], values.get("height_m", 1.7), subject.sex or "male")
-    return subject.model_copy(update=values)
+    if missing := lacking(subject, recordings, mass_only):
+        quantities = ", ".join(missing.values())
+        found = finding("S101", Where(part=quantities), quantity=Quantity(quantities))
+        raise SubjectError(next(iter(missing)), None, problem_of(found)).with_finding(found)
+    values = {field: _filed(subject, field, recordings) for field in ("mass_kg", "height_m")}
+    completed = subject.model_copy(update={field: value for field, value in values.items() if value is not None})
+    check_subject(
+        known(completed.mass_kg), 1.7 if completed.height_m is None else completed.height_m, subject.sex or "male"
+    )
+    return completed
 
 
-def _missing(field: str, quantity: str) -> SubjectError:
-    found = finding("S101", Where(part=quantity), quantity=Quantity(quantity))
-    return SubjectError(field, None, problem_of(found)).with_finding(found)
+def lacking(subject: Subject, recordings: Sequence[Recording], mass_only: bool = False) -> dict[str, str]:
+    """What neither the user nor a file states of mass, stature and sex: the fields, and what they are called.
+
+    Args:
+        subject, recordings: what the user states, and the files.
+        mass_only: height and sex may stay unknown, as with an OpenSim model.
+    """
+    needed = {"mass_kg": "mass"} if mass_only else {"mass_kg": "mass", "height_m": "stature", "sex": "sex"}
+    return {field: name for field, name in needed.items() if _filed(subject, field, recordings) is None}
+
+
+def _filed(subject: Subject, field: str, recordings: Sequence[Recording]) -> Any:
+    """What the user states, else the first file that does; no file knows the sex."""
+    stated = [getattr(one, field, None) for one in (subject, *recordings)]
+    return next((value for value in stated if value is not None), None)
 
 
 def mass_by_force_kg(literature: BodySegmentParameters, foot_loads: np.ndarray, residual: np.ndarray) -> float:

@@ -150,7 +150,8 @@ def _subject_lines(c3d: Sequence[Path]) -> list[str]:
     recordings = [recording for recording in map(_recording, c3d) if recording]
     lines = [_entry(Subject, "sex", None, "female")]
     for key, example in (("mass_kg", 70.0), ("height_m", 1.7)):
-        value = next((getattr(recording, key) for recording in recordings if getattr(recording, key)), None)
+        filed = next((getattr(recording, key) for recording in recordings if getattr(recording, key)), None)
+        value = filed and float(f"{filed:.6g}")  # 32.1, not the 32.099998 of a C3D's single precision
         lines.append(_entry(Subject, key, value, example, " (from C3D)" if value else ""))
     return lines
 

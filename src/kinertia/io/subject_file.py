@@ -288,16 +288,29 @@ def _incomplete(
     A subject file without a static trial has forgotten it; a command without one may mean it (S207).
     """
     model = wanted.model
-    needed = (("model", "static", model.static, needs_static), ("subject", "sex", wanted.subject.sex, needs_sex))
-    for table, key, value, asked in needed:
-        if asked and value is None and model.osim is None:
-            return (table, key), _finding({"loc": (table, key), "type": "missing"})
+    if needs_static and model.static is None and model.osim is None:
+        return ("model", "static"), _finding({"loc": ("model", "static"), "type": "missing"})
+    if needs_sex and wanted.subject.sex is None and model.osim is None:
+        return ("subject", "sex"), _no_sex(wanted)
     if lack := _two_models(model.static, model.markers, model.osim, model.calibrate):
         return lack
     if model.osim is not None and wanted.settings.method == "two-level":
         two_level = 'method = "two-level" (which works on the built-in model only)'
         return ("settings", "method"), _conflict(two_level, "osim in [model]")
     return None
+
+
+def _no_sex(wanted: SubjectFile) -> Finding:
+    """That the sex is missing, and what else is, where no C3D file may know it."""
+    found = _finding({"loc": ("subject", "sex"), "type": "missing"})
+    files = [wanted.model.static, *(one.markers for one in wanted.trials)]
+    if any(one is not None and one.suffix.lower() == ".c3d" for one in files):
+        return found
+    more = [key for key in ("mass_kg", "height_m") if getattr(wanted.subject, key) is None]
+    if not more:
+        return found
+    entry = "[subject] lacks " + ", ".join(f"'{key}'" for key in ("sex", *more))
+    return replace(found, evidence={**found.evidence, "entry": Quantity(entry), "expected": Quantity("add them")})
 
 
 def expect_one_model(static: Path | None, markers: str | Path | None, osim: Path | None, calibrate: bool) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from kinertia.errors import BlockedError, KinertiaError, MarkerSetError, SubjectError
-from kinertia.estimation.input_checks import complete_subject
+from kinertia.estimation.input_checks import complete_subject, lacking
 from kinertia.findings.finding import Finding
 from kinertia.io.marker_set_file import marker_set_of, read_marker_set
 from kinertia.io.person_recordings import read_static, read_trial
@@ -72,11 +72,20 @@ class Person:
     @cached_property
     def completed(self) -> Subject | SubjectError:
         """What is stated, with what files add; the error where that is incomplete or cannot be true."""
-        recordings = [*([] if self.static is None else [self.static]), *self.recordings]
         try:
-            return complete_subject(self.subject, recordings, mass_only=True)
+            return complete_subject(self.subject, self._files, mass_only=True)
         except SubjectError as error:
             return error
+
+    @property
+    def lacking(self) -> list[str]:
+        """What a fit needs that neither the user nor a file states: mass, stature, sex."""
+        return list(lacking(self.subject, self._files, mass_only=self.model is not None).values())
+
+    @property
+    def _files(self) -> list[Recording]:
+        """All that may state mass and stature."""
+        return [*([] if self.static is None else [self.static]), *self.recordings]
 
     @cached_property
     def labels(self) -> MarkerSet | MarkerSetError:
