@@ -32,7 +32,9 @@ def range_findings(skeleton: Skeleton, ik: InverseKinematics) -> Iterator[Findin
     bounds, known = skeleton.bounds, np.isfinite(ik.q)
     at_limit = ((ik.q <= bounds.least) | (ik.q >= bounds.most)).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
     within = np.where(known, ik.q, bounds.clamped(np.zeros_like(ik.q)))
-    beyond = np.abs(bounds.beyond(within)).max(axis=0)
+    past_range = np.abs(bounds.beyond(within))
+    at_or_beyond = ((ik.q <= bounds.least) | (ik.q >= bounds.most) | (past_range > 0.0)).sum(axis=0)
+    beyond = past_range.max(axis=0)
     central = [skeleton.segments.index(foot) for foot in skeleton.feet]
     central += [k for k, segment in enumerate(skeleton.segments) if segment_of(segment) == "torso"]
     moves = set(skeleton.map.owner[skeleton.support[central].any(axis=0)].tolist())
@@ -45,5 +47,5 @@ def range_findings(skeleton: Skeleton, ik: InverseKinematics) -> Iterator[Findin
             clamped = Quantity(share, "1", limit=_CLAMPED, usual=usual)
             yield finding("O311", Where(part=name), share=clamped, range_rad=limits)
         if share > _AT_LIMIT or (past > _BEYOND_RAD and skeleton.rotational[c]):
-            beyond_rad = Quantity(past, unit, limit=_BEYOND_RAD)
-            yield finding("O312", Where(part=name), share=Quantity(share, "1", limit=_AT_LIMIT), beyond_rad=beyond_rad)
+            frames = Quantity(float(at_or_beyond[c]) / max(int(known[:, c].sum()), 1), "1", limit=_AT_LIMIT)
+            yield finding("O312", Where(part=name), share=frames, beyond_rad=Quantity(past, unit, limit=_BEYOND_RAD))
