@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -145,8 +146,15 @@ def main(
     people: Annotated[int, typer.Option(min=2, help="People in each laboratory.")] = 40,
     seed: Annotated[int, typer.Option(help="Of people and noise.")] = 1,
     workers: Annotated[int | None, typer.Option(help="Processes; one per core if left out.")] = None,
+    skin: Annotated[Path | None, typer.Option(help="File of measured skin: only that laboratory and its page.")] = None,
+    keep: Annotated[Path | None, typer.Option(help="Folder for its walks, which are used again.")] = None,
 ) -> None:
     """Run everything and write the page; what needs the measured trials is left out where they are absent."""
+    if skin:
+        from validation.skin_laboratory import measure  # needs OpenSim
+
+        measure(skin, people, keep, workers or 2)
+        return
     sections = {"people": str(people)}
     laboratories = run_accuracy(SCENARIOS, people, seed, workers)
     sections |= {"error_bars": accuracy_markdown(laboratories), "moments": moments_markdown(laboratories)}

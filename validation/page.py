@@ -13,11 +13,17 @@ _CODE = ("src", "validation", "pyproject.toml")
 """What results depend on; changed pages, for one, do not count."""
 
 
-def write_page(name: str, text: str) -> None:
-    """Write PAGES/NAME.md: the text with `made_by` below its title; also say where it is."""
+def write_page(name: str, text: str, command: str | None = None) -> None:
+    """Write PAGES/NAME.md: the text with `made_by` below its title; also say where it is.
+
+    Args:
+        name: of the page.
+        text: of the page.
+        command: what made it; the name if left out.
+    """
     title, _, rest = text.partition("\n")
     path = PAGES / f"{name}.md"
-    path.write_text(f"{title}\n\n{made_by(name)}\n{rest}", encoding="utf-8", newline="\n")
+    path.write_text(f"{title}\n\n{made_by(command or name)}\n{rest}", encoding="utf-8", newline="\n")
     print(f"written to {path}")
 
 
@@ -31,10 +37,10 @@ def write_part(name: str, text: str) -> None:
     print(f"written to {path}")
 
 
-def made_by(name: str) -> str:
+def made_by(command: str) -> str:
     """The line of a page: which command made it, when, and of which commit."""
     commit, day = made_at()
-    return f"*Made by `python -m validation {name}` on {day}, at commit {commit}; not edited by hand.*"
+    return f"*Made by `python -m validation {command}` on {day}, at commit {commit}; not edited by hand.*"
 
 
 @cache

@@ -27,6 +27,7 @@ from kinertia.io.sto import read_sto, write_sto
 from kinertia.io.trc import read_trc, write_trc
 from kinertia.trial.data import Markers
 from validation.measured_data import data_folder
+from validation.measured_skin import MeasuredSkin, on_measured_skin
 from validation.opensim_runs import inverse_dynamics, inverse_kinematics, quietly, radians, vector
 from validation.truth_person import SIDES, Person, array
 
@@ -294,8 +295,8 @@ def write_truth(person: Person, motion: Spline, forces: pd.DataFrame, bodies: di
     (folder / "truth.json").write_text(json.dumps({"bodies": bodies, "total_mass_kg": total}, indent=1))
 
 
-def make_trial(folder: Path, seed: int, faults: Faults, source: Source) -> None:
-    """Write one truth trial."""
+def make_trial(folder: Path, seed: int, faults: Faults, source: Source, skin: MeasuredSkin | None = None) -> None:
+    """Write one truth trial; markers of thighs and shanks move with measured skin if there is one."""
     (folder / "truth").mkdir(parents=True, exist_ok=True)
     rng = np.random.default_rng(seed)
     with quietly(folder / "opensim.log"):
@@ -313,7 +314,10 @@ def make_trial(folder: Path, seed: int, faults: Faults, source: Source) -> None:
         there = read_trc(source.markers).labels
         markers = model.getMarkerSet()
         names = [name for name in (markers.get(k).getName() for k in range(markers.getSize())) if name in there]
-        write_trc(folder / "walk.trc", markers_on_skin(person, motion, names, rng))
+        seen = markers_on_skin(person, motion, names, rng)
+        if skin is not None:
+            seen = on_measured_skin(seen, person, motion(seen.time)[0], forces, skin, seed)
+        write_trc(folder / "walk.trc", seen)
         write_model(source.model, folder / "model.osim", faults.hip_m)
         write_truth(person, motion, forces, bodies, folder / "truth")
     write_sto(folder / "walk_grf.mot", disturbed(forces, faults), False, "walk_grf")
