@@ -1,4 +1,4 @@
-"""Errors that a user can act on: what was found, where, what was expected, what to do.
+"""Defines errors that a user can act on: what was found, where, what was expected, what to do.
 
 Every error that Kinertia raises on purpose derives from `KinertiaError` and carries the data of its message as
 attributes. The command line prints the message as one line and exits with status 2.

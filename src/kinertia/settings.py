@@ -1,4 +1,4 @@
-"""Who walked, and how to estimate: `Subject` and `Settings`, tables of the subject file and arguments of functions."""
+"""Defines who walked and how to estimate: `Subject` and `Settings`, tables of the subject file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The command line: which commands there are, and where; each is loaded when it is asked for."""
+"""Lists the commands of the command line and loads the module of each when it is called."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`kinertia app`: the same in the browser, on this computer only."""
+"""Defines `kinertia app`: check, fit and reports in the browser, on this computer only."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`kinertia check`: what is in the files, and whether a fit can use them."""
+"""Defines `kinertia check`: what is in the files, and whether a fit can use them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`kinertia cohort`: everybody of a study, fitted in parallel, with one table for all."""
+"""Defines `kinertia cohort`: fits all people of a study in parallel, with one table of results."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`kinertia compare`: several finished fits side by side."""
+"""Defines `kinertia compare`: shows several finished fits side by side."""
 
 from __future__ import annotations
 

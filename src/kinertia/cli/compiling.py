@@ -1,4 +1,4 @@
-"""Compiling, once on a machine, before the first command that computes."""
+"""Compiles the numerical core once per machine, before the first command that computes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`kinertia demo`: a synthetic person whose truth is known, or a measured walk, which is downloaded."""
+"""Defines `kinertia demo`: fits a synthetic person of known truth, or a measured walk that is downloaded."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`kinertia explain`: what a code of the catalogue of findings means, and what to do about it."""
+"""Defines `kinertia explain`: what a finding's code means, and what to do about it."""
 
 from __future__ import annotations
 

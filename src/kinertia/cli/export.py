@@ -1,4 +1,4 @@
-"""`kinertia export`: tables of a fit, its trials' C3D files with results, and posterior draws, for other programs."""
+"""Defines `kinertia export`: tables, C3D files with results and posterior draws, for other programs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is left when Kinertia itself fails: one line, and a log file that its developers can use."""
+"""Reports an internal error: one line on the terminal, and a log file for the developers."""
 
 from __future__ import annotations
 

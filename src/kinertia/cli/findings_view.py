@@ -1,4 +1,4 @@
-"""Findings on a terminal: the verdict, at most three findings, and all of them with `--verbose`."""
+"""Prints findings on a terminal: the verdict, at most three findings, or all of them with `--verbose`."""
 
 from __future__ import annotations
 

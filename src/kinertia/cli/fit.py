@@ -1,4 +1,4 @@
-"""`kinertia fit`: from a subject file, or from options, to a folder of results."""
+"""Defines `kinertia fit`: from a subject file, or from options, to a folder of results."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a fit says on the terminal."""
+"""Prints the outcome of a fit on the terminal."""
 
 from __future__ import annotations
 

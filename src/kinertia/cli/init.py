@@ -1,4 +1,4 @@
-"""`kinertia init`: a first subject file."""
+"""Defines `kinertia init`: drafts a first subject file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`kinertia instruments`: what the trials of a session say of its plates and clock."""
+"""Defines `kinertia instruments`: plate and synchronisation errors that the trials of a session share."""
 
 from __future__ import annotations
 

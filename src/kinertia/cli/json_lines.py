@@ -1,4 +1,4 @@
-"""What a long run says to programs: one JSON object per line on standard output, as things happen."""
+"""Writes the progress of a long run for programs: one JSON object per line on standard output."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`kinertia markers`: which marker set a recording has, and a draft of one."""
+"""Defines `kinertia markers`: identifies the marker set of a recording, or drafts one."""
 
 from __future__ import annotations
 

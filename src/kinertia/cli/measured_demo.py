@@ -1,4 +1,4 @@
-"""`kinertia demo --measured`: OpenSim's gait2354 example, downloaded once, fitted as `kinertia fit` does."""
+"""Defines `kinertia demo --measured`: downloads OpenSim's gait2354 example once and fits it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The commands that lead on where a fit was refused because no marker set fits."""
+"""Suggests the next commands where a fit was refused because no marker set fits."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`kinertia norms`: normative bands of a laboratory from the fits of its controls."""
+"""Defines `kinertia norms`: normative bands of a laboratory from the fits of its controls."""
 
 from __future__ import annotations
 

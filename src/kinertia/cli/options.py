@@ -1,4 +1,4 @@
-"""Options that several commands share, and what they do at once."""
+"""Defines the options that several commands share, and what they do at once."""
 
 from __future__ import annotations
 

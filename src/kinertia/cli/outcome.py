@@ -1,4 +1,4 @@
-"""How a command ends: what it has for scripts, and its exit status. `--json` of all commands is here."""
+"""Ends a command: its results for scripts (`--json`), and its exit status."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The commands around a fit: `kinertia plan` (what to record) and `kinertia crossval` (does it hold elsewhere)."""
+"""Defines `kinertia plan` (what to record) and `kinertia crossval` (do the BSPs explain held-out trials?)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`kinertia population`: what the fits of a group teach about its people."""
+"""Defines `kinertia population`: learns the mean and spread of BSPs from the fits of a group."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The bar with the time left that a terminal shows."""
+"""Draws the progress bar of a terminal, with the time left."""
 
 from __future__ import annotations
 

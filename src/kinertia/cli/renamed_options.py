@@ -1,4 +1,4 @@
-"""Options that had another name in the version before, which still work, and commands that went elsewhere."""
+"""Keeps the names that options and commands had in the previous version working, with a notice."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`kinertia report`: the report of a fit again, from its results alone."""
+"""Defines `kinertia report`: writes the report of a fit again, from its results alone."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which folders hold results of people: of `kinertia fit`, of a cohort, or folders of such folders."""
+"""Finds folders of results: of `kinertia fit`, of a cohort, or folders that contain such folders."""
 
 from __future__ import annotations
 

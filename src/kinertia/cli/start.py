@@ -1,4 +1,4 @@
-"""The command `kinertia`: answers `--version` at once, and loads for everything else only what is asked for.
+"""Starts the command `kinertia`: answers `--version` at once, and loads only the command that is called.
 
 A terminal or pipe that is not UTF-8, as on Windows, gets a question mark for every letter that it lacks.
 """

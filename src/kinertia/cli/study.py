@@ -1,4 +1,4 @@
-"""`kinertia study ...`: studies on synthetic trials with known truth."""
+"""Defines `kinertia study ...`: studies on synthetic trials of known truth."""
 
 from __future__ import annotations
 

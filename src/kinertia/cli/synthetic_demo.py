@@ -1,4 +1,4 @@
-"""The demo's work: a synthetic person, measured by a synthetic laboratory, estimated, compared with the truth.
+"""Runs the demo: a synthetic person is measured, estimated and compared with the truth.
 
 The truth differs from the literature as people do and is known to nobody but the comparison at the end: the estimator
 reads the laboratory's files.

@@ -1,4 +1,4 @@
-"""What all commands share on a terminal: results on one stream, progress and errors on the other, plain tables.
+"""Sets up what commands share on a terminal: results on one stream, progress and errors on the other, tables.
 
 A command that is quiet does not load rich.
 """

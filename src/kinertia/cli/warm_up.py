@@ -1,4 +1,4 @@
-"""`kinertia warm-up`: compile beforehand what the first fit would compile."""
+"""Defines `kinertia warm-up`: compiles beforehand what the first fit would compile."""
 
 from __future__ import annotations
 

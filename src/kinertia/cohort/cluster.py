@@ -1,4 +1,4 @@
-"""The processes that fit a cohort: Dask's, on this computer or on a cluster that runs already (SLURM: `slurm`).
+"""Starts the processes that fit a cohort: Dask's, on this computer or on a running cluster (SLURM: `slurm`).
 
 What is to be done where, and again where a process was killed, is Dask's to say. One process works on one person at a
 time, with one thread of the linear algebra library, as Dask sets it for its workers.

@@ -1,4 +1,4 @@
-"""A laboratory's instruments over time, on the page of a cohort: what each day's people say of plates and clock."""
+"""Charts a laboratory's instrument errors over time, on the page of a cohort."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a cohort teaches its own people: subject files for a second fit, each person left out of what is taught.
+"""Teaches a cohort its own group prior: subject files for a second fit, each person left out of the prior.
 
 Of bodies it is the group's prior (`estimation.learnt_prior`), learnt for a tenth of the people at a time from all
 others. Of plates and clock it is what the people of one day say (`estimation.session`), out of which a fit leaves its

@@ -1,4 +1,4 @@
-"""What came of everybody in a cohort: verdicts counted, findings counted by code, and what was overruled in vain."""
+"""Summarises a cohort: verdicts, findings by code, and overruled findings that never occurred."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`cohort.html`: verdicts and findings of a cohort, what changed, who is far from the others, and the mean curves.
+"""Writes `cohort.html`: verdicts and findings of a cohort, changes, outliers, and mean curves.
 
 Made from the cohort's tables: of ten thousand people, curves are summed up piece by piece, and names held once.
 """

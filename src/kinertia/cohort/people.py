@@ -1,4 +1,4 @@
-"""Who is in a study: a folder with a folder per person, or a CSV file with a row per person."""
+"""Lists the people of a study: a folder with a folder per person, or a CSV file with a row per person."""
 
 from __future__ import annotations
 

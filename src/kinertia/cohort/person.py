@@ -1,4 +1,4 @@
-"""What a worker does with one person of a cohort: fit, results, and the person's rows of the cohort's tables."""
+"""Fits one person of a cohort in a worker, and writes results and rows of the cohort's tables."""
 
 from __future__ import annotations
 

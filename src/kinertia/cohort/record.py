@@ -1,4 +1,4 @@
-"""What is known of each person of a cohort from earlier runs, and who has to be fitted again.
+"""Records the state of each person of a cohort, and decides who has to be fitted again.
 
 A person's results and the record of what they are from appear in one folder at once (`people/NAME/person.json`); of a
 person who cannot be fitted there is only the record (`failed/NAME.json`). A record says by one SHA-256 what went into

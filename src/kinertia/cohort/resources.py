@@ -1,4 +1,4 @@
-"""What fits of a cohort take: seconds and memory of each person, in a log that every run goes on with."""
+"""Logs seconds and memory of each person's fit, to plan the next run."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Workers that SLURM starts, by dask-jobqueue: each a job with one core that fits one person at a time."""
+"""Starts workers by SLURM and dask-jobqueue: each a job with one core that fits one person at a time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""SLURM's jobs that end before their workers have reported: asked for again, and given up where no job ever reports.
+"""Replaces SLURM jobs that end before their workers report, and gives up where none ever does.
 
 A worker that it has seen and lost, dask-jobqueue replaces. Of a job that ends earlier (no such Python on the node, no
 way back to this computer, a node that fails) it hears nothing, and waits; SLURM's queue tells.

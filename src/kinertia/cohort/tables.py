@@ -1,4 +1,4 @@
-"""The tables of a cohort: a person's rows beside the person's results, and everybody's gathered from there.
+"""Writes the tables of a cohort: a person's rows beside the person's results, everybody's gathered from there.
 
 They are Parquet files: columns with types, compressed, of which programs read only what they ask for.
 """

@@ -1,4 +1,4 @@
-"""An end to a fit that has none: its process is ended from outside of Python, and a log says where it was.
+"""Ends a fit that takes too long: its process is killed from outside, and a log says where it was.
 
 A reader of files may hang in compiled code, which lets nothing else of its process run: neither the thread that Dask
 has for it, nor one that would watch. The watchdog of `faulthandler` needs neither. Dask starts another process in its

@@ -1,4 +1,4 @@
-"""What an axis is called: as the person moves, and as the laboratory's files have it."""
+"""Names an axis twice: as the person moves, and as the laboratory's files have it."""
 
 from __future__ import annotations
 

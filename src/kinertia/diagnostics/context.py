@@ -1,4 +1,4 @@
-"""What questions are asked of: one recording, or one person with all recordings, with evidence computed once."""
+"""Holds what questions are asked of, one recording or one person, with evidence computed once."""
 
 from __future__ import annotations
 

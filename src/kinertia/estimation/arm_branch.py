@@ -1,4 +1,4 @@
-"""Which way an elbow bends: what trials say where the static trial misleads.
+"""Decides which way an elbow bends, from the trials, where the static trial misleads.
 
 With one marker at an elbow, the static trial's plane of upper arm and forearm tells where the elbow's axis points. Of a
 nearly straight arm, as in a T-pose, that plane is chance, and the axis may be turned by more than a quarter turn about

@@ -1,4 +1,4 @@
-"""Do left and right differ? Each pair of limbs against the error bars of the difference.
+"""Compares left and right limbs with the error bars of their difference.
 
 The prior has left and right alike but not the same (correlation 0.9): a difference that the data do not show is that
 of the two sides' measured lengths, and its error bar says how much larger it may be.

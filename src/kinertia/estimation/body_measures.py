@@ -1,4 +1,4 @@
-"""Girths and lengths of the person: what they say of the body segment parameters, and how well.
+"""Turns girths and lengths of the person into a prior of the body segment parameters.
 
 They come from a sheet, as many as the laboratory had time for; lengths of thigh, shank and upper arm also from the
 joint centres of the static trial. The others are expected to be as in five people of the same build,

@@ -1,4 +1,4 @@
-"""Adapting a static model to the trials it will be used for: marker positions and coordinates that stand still.
+"""Adapts a static model to the trials: marker positions, and coordinates that are the same in all frames.
 
 A static trial shows where markers sit on a person who stands, often with raised arms; in gait the skin has moved (the
 acromia by up to 10 cm after a T-pose). Over a few frames of the trials, coordinates that move (one set per frame) and

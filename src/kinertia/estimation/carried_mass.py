@@ -1,4 +1,4 @@
-"""The scale, the body and the plates: who was weighed with what, and what the forces must carry."""
+"""Works out who was weighed with what, and which mass the forces must carry."""
 
 from __future__ import annotations
 

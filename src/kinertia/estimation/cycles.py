@@ -1,4 +1,4 @@
-"""Joint angles, moments, powers and ground reactions over 0 to 100 % of the gait cycle, stride by stride.
+"""Resamples angles, moments, powers and ground reactions to 0 to 100 % of each gait cycle.
 
 A curve belongs to the side whose heel strikes begin and end its stride. Where a trial was not measured it has a gap.
 """

@@ -1,4 +1,4 @@
-"""A `Fit` whose motion, parameters and calibration are one draw from the posterior of another."""
+"""Makes a `Fit` whose motion, parameters and calibration are one draw from the posterior of another."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which bodies of an OpenSim model are estimated; all others keep the model's own parameters."""
+"""Selects the bodies of an OpenSim model that are estimated; all others keep the model's parameters."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which figures of a fit there are, whoever draws them."""
+"""Names the figures of a fit, for whoever draws them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""In words: which ground reactions the joint moments of a trial are from, and why."""
+"""Says which ground reactions the joint moments of a trial are computed from, and why."""
 
 from __future__ import annotations
 

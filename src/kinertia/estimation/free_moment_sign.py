@@ -1,4 +1,4 @@
-"""Which sign the plates' free moments have: the one with which the whole estimate explains a person's trials better.
+"""Decides the sign of the plates' free moments: the one with which the whole estimate fits better.
 
 Files of whole laboratories have the vertical moments' sign wrong: the free moments are then off by twice themselves.
 The estimate with either sign says which is likelier, all trials of a person together (`simultaneous.evidence`). Of 28

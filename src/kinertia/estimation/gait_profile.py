@@ -1,4 +1,4 @@
-"""Gait Profile Score and Movement Analysis Profile: how far a gait is from normal, in degrees.
+"""Computes Gait Profile Score and Movement Analysis Profile: the distance from normal gait in degrees.
 
 Baker, McGinley, Schwartz et al. 2009, The Gait Profile Score and Movement Analysis Profile, Gait & Posture 30:265-269.
 Of nine kinematic variables the Gait Variable Score (GVS) is the root mean square difference, over the gait cycle,

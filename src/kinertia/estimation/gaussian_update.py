@@ -1,4 +1,4 @@
-"""What a linear measurement makes of a Gaussian."""
+"""Updates a Gaussian by a linear measurement."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What gait can show of body segment parameters: a word per parameter, and the combinations that motions show.
+"""Classifies each body segment parameter by what gait shows of it, and finds the combinations that it shows.
 
 Ground reactions see only combinations of the parameters, the base parameters: mass on the axis of a joint may be
 counted to either of the segments that it connects, and no motion tells (Gautier and Khalil 1990, IEEE T-RA 6:368).

@@ -1,4 +1,4 @@
-"""What can be wrong with a person's mass, height and trials: errors before any estimate."""
+"""Checks a person's mass, height, sex and trials before any estimate."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What many people teach: mean and spread of a group's body segment parameters, learnt from its fits (empirical Bayes).
+"""Learns the mean and spread of a group's body segment parameters from its fits (empirical Bayes).
 
 Each person's recordings say little about most parameters; all together they say much about *their* mean and spread. A
 fit's posterior is its prior times what the recordings say; taken apart, the latter of all people is joined with a

@@ -1,4 +1,4 @@
-"""A person's mean curves over the gait cycle, one per quantity and side, as norms and gait scores compare them.
+"""Averages a person's curves over the gait cycle, per quantity and side, for norms and gait scores.
 
 Angles are those of inverse kinematics, which knows the whole cycle; moments, powers and ground reactions are the
 estimate's. Quantities of pelvis and trunk that are opposite on the two sides (obliquity, rotation, lateral bending) are

@@ -1,4 +1,4 @@
-"""Normative bands from the fits of people who are taken as normal: mean and spread between people."""
+"""Computes normative bands from the fits of controls: mean and spread between people."""
 
 from __future__ import annotations
 

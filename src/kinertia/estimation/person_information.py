@@ -1,4 +1,4 @@
-"""What one person's recordings say of the body, the prior taken away.
+"""Separates what one person's recordings say of the body from the prior.
 
 Motion and forces are linear in the dynamic parameters: mass, first moment, inertia about the joint. They are not in
 mass, centre of mass and inertia about it: which combination of these a walk shows depends on the body itself (a heavy

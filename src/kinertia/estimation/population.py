@@ -1,4 +1,4 @@
-"""People whom the tables do not describe: how the literature's prior changes for children, old and obese people.
+"""Adapts the literature's prior to people whom its tables do not describe: children, old and obese people.
 
 The tables are of young adults of ordinary build (de Leva's men were 24 years old, body-mass index 24). Where numbers
 for others are known they go in, with their source; where they are not, nothing is invented: deviations are half as

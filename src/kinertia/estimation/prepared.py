@@ -1,4 +1,4 @@
-"""All that an estimator needs of a person: `Prepared`."""
+"""Holds all that an estimator needs of a person: `Prepared`."""
 
 from __future__ import annotations
 

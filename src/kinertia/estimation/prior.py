@@ -1,4 +1,4 @@
-"""How far a person's body segment parameters may be from the literature: the prior of the simultaneous estimate.
+"""Builds the prior of the simultaneous estimate: how far parameters may be from the literature.
 
 Standard deviations, and where they come from (4a, 4b: Zatsiorsky 2002, segment by segment, 4b after regression on mass
 and height; 4c: the spread between published methods):

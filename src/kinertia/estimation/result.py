@@ -1,4 +1,4 @@
-"""What an estimate gives back: `Fit`, with one `TrialFit` for every trial."""
+"""Defines the result of an estimate: `Fit`, with one `TrialFit` for every trial."""
 
 from __future__ import annotations
 

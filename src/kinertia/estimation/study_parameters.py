@@ -1,4 +1,4 @@
-"""The unknowns of the study's estimator: seven parameters of every segment, or of every pair of segments."""
+"""Defines the unknowns of the study's estimator: seven parameters of every segment or pair of segments."""
 
 from __future__ import annotations
 

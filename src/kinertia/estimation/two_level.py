@@ -1,4 +1,4 @@
-"""The study's estimator: pelvis correction (inner level) and body segment parameters (outer level).
+"""Implements the study's estimator: pelvis correction (inner level), body segment parameters (outer level).
 
 Inner level: equation (2) of `kinertia.motion.dynamics` gives the pelvis acceleration that needs no residual at the
 measured state; integrated twice by the trapezoid rule, with the two constants per coordinate that track the measured

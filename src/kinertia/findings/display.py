@@ -1,4 +1,4 @@
-"""SI quantities as people read them (mm, ms, degrees, %), and sentences with them filled in."""
+"""Formats SI quantities for people (mm, ms, degrees, %), and fills them into sentences."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One finding: what was found, where, with its size, what follows and what to do.
+"""Defines a finding: what was found, where, with its size, what follows and what to do.
 
 All quantities are SI; `kinertia.findings.display` makes them readable. A quantity about an instrument is its *error*,
 recorded minus true: positive means reads too much, lies too far along the positive axis, is turned counter-clockwise

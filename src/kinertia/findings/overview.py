@@ -1,4 +1,4 @@
-"""Many findings at a glance: the verdict in a line, what is open in order of importance, equal findings as one."""
+"""Summarises findings: the verdict, what is open in order of importance, equal findings as one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A measured quantity in SI units, with the limit that it exceeds."""
+"""Defines a measured quantity in SI units, with the limit that it exceeds."""
 
 from __future__ import annotations
 

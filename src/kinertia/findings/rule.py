@@ -1,4 +1,4 @@
-"""The catalogue of rules: `catalogue/*.toml`, a file per family, read when one of its codes is first asked for."""
+"""Reads the catalogue of rules: `catalogue/*.toml`, a file per family, when one of its codes is asked for."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where something was found: file, trial, plate, axis, markers, part of the body, time."""
+"""Defines where something was found: file, trial, plate, axis, markers, part of the body, time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Subjects of AddBiomechanics (`.b3d`): several trials in one file, read with nimblephysics where it is installed.
+"""Reads subjects of AddBiomechanics (`.b3d`): several trials in one file, by nimblephysics where it installs.
 
 Axes are OpenSim's (x forward, y up), lengths m, forces N. What is read is what the laboratory recorded, markers and
 force plates; AddBiomechanics' own model, motion and corrected forces stay in the file.

@@ -1,4 +1,4 @@
-"""Belt speed over time: a CSV table, or a column of a MOT or STO file."""
+"""Reads the speed of a belt over time: a CSV table, or a column of a MOT or STO file."""
 
 from __future__ import annotations
 

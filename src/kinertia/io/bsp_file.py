@@ -1,4 +1,4 @@
-"""Body segment parameters of an earlier estimate: a CSV file in the form of `bsp.csv`."""
+"""Reads body segment parameters of an earlier estimate: a CSV file in the form of `bsp.csv`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""C3D files: markers, force plates and the subject's measurements in one binary file, read through ezc3d.
+"""Reads C3D files: markers, force plates and the subject's measurements, through ezc3d.
 
 The parts of a C3D file that are only conventions are checked against the data: which axis is vertical,
 whether plates tell the force on the person or the force on the plate, whether a plate lies where its corners

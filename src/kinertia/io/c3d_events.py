@@ -1,4 +1,4 @@
-"""Events of a C3D file: foot strikes, foot offs and general ones, of the group EVENT."""
+"""Reads events of a C3D file: foot strikes, foot offs and general ones, of the group EVENT."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Joint angles, moments and powers in a C3D file that Vicon or another program computed."""
+"""Reads joint angles, moments and powers in a C3D file that Vicon or another program computed."""
 
 from __future__ import annotations
 

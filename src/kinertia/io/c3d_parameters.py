@@ -1,4 +1,4 @@
-"""The parameter section of a C3D file as a list of records, of which some change and all others keep their bytes.
+"""Edits the parameter section of a C3D file record by record; unchanged records keep their bytes.
 
 A record is an entry or the head of a group: length of the name (negative where locked), number of the group (negative
 for its head), name, distance to the next record, then type, shape and values of an entry, and a description

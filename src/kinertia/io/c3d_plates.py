@@ -1,4 +1,4 @@
-"""Force plates of a C3D file, from what ezc3d gives to loads about the ground origin.
+"""Reads force plates of a C3D file: from what ezc3d gives to loads about the ground origin.
 
 ezc3d gives each plate's force in lab axes and, for types 2 to 4, its moment about the middle of the plate's
 four corners, also in lab axes, in units made of POINT:UNITS. For type 1 the file holds the centre of pressure

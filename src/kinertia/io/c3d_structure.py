@@ -1,4 +1,4 @@
-"""The structure of a C3D file, looked at before ezc3d reads it: ezc3d believes every count and offset that it finds.
+"""Checks the structure of a C3D file before ezc3d reads it, which trusts every count and offset.
 
 One wrong byte in them ends its process, or never ends, or fills the memory. What cannot be read is an error here; what
 only contradicts itself is for a process that may end (`ezc3d_library`).

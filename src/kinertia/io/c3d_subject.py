@@ -1,4 +1,4 @@
-"""What a C3D file says of the person: mass, stature and body measures.
+"""Reads what a C3D file says of the person: mass, stature and body measures.
 
 The format has no place for them. Vicon's Plug-in Gait writes them to PROCESSING (`Bodymass` in kg, `Height` and
 `LKneeWidth` in mm), others to SUBJECTS or SUBJECT, in spellings and units of their own. Of a file with several people

@@ -1,4 +1,4 @@
-"""Force files of Cortex (Motion Analysis): `walk.forces` beside `walk.trc`.
+"""Reads force files of Cortex (Motion Analysis): `walk.forces` beside `walk.trc`.
 
 A text file: `[Force Data]`, `NumberOfForcePlates=2`, `SampleRate=1200.000000`, `NumberOfSamples=6000`, a line of
 columns `#Sample FX1 FY1 FZ1 X1 Y1 Z1 MZ1 FX2 ...`, and a row per sample. Of each plate force (N), centre of pressure

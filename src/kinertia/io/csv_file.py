@@ -1,4 +1,4 @@
-"""Tables that people write in a spreadsheet: CSV with a heading, as every country's programs save it.
+"""Reads tables that people write in a spreadsheet: CSV with a heading, in every country's form.
 
 Cells are separated by commas, semicolons or tabs. Where commas do not separate cells they may be decimal marks; where
 they do, one with one or two digits behind it in a quoted cell is one, too ("1,234" might be a thousand).

@@ -1,4 +1,4 @@
-"""Times of samples that were taken at a constant rate, and rounded when they were written."""
+"""Restores uniform sample times that were rounded when they were written."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The library that reads and writes C3D files, where it is missing and where it finds no file with an umlaut.
+"""Loads ezc3d and works around its limits: where it is missing, and for paths with umlauts.
 
 ezc3d has no wheel for Linux on ARM: Kinertia works there without it, on every file but C3D. On Windows its C++ reads
 the letters of a path in the machine's code page, so that it does not find `C:/Users/Müller/walk.c3d`: such a file

@@ -1,4 +1,4 @@
-"""A file that one process at a time holds, by filelock: no lock is ever stale, since the system takes it back."""
+"""Locks a file for one process at a time, by filelock: the system releases the lock of a dead process."""
 
 from __future__ import annotations
 

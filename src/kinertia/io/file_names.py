@@ -1,4 +1,4 @@
-"""Names of files and folders as every system has them: what Windows forbids, and its backslashes read elsewhere."""
+"""Makes names of files and folders valid on every system, and reads Windows paths elsewhere."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Put one folder in another's place, at once where the system can."""
+"""Exchanges two folders, at once where the system can."""
 
 from __future__ import annotations
 

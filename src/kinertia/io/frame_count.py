@@ -1,4 +1,4 @@
-"""How many frames a trial has, by its header: for estimates of time, without reading the trial."""
+"""Reads the number of frames from a trial's header, to estimate time."""
 
 from __future__ import annotations
 

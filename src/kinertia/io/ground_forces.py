@@ -1,4 +1,4 @@
-"""Ground reaction forces from MOT/STO files, with or without an OpenSim ExternalLoads file."""
+"""Reads ground reaction forces from MOT/STO files, with or without an ExternalLoads file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which axis of a laboratory is up, and the rotation to ground axes."""
+"""Finds which axis of a laboratory is up, and the rotation to ground axes."""
 
 from __future__ import annotations
 

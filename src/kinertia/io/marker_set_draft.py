@@ -1,4 +1,4 @@
-"""A first marker set from a recording of somebody who stands: what `kinertia markers` drafts.
+"""Drafts a first marker set from a standing person's recording: `kinertia markers`.
 
 Markers are placed by geometry, with their labels as hints. Where nobody stands, labels alone decide, by what they are
 called in the presets (`R.Knee`, `RKNE`, `r_knee_study`) or nearly so; what is left is listed to be placed by hand.

@@ -1,4 +1,4 @@
-"""Marker sets from TOML files: the presets come with the package, and a user's own has the same form.
+"""Reads marker sets from TOML files: the package's presets, and a user's own of the same form.
 
 Copy one from `src/kinertia/io/marker_sets/` and change it.
 """

@@ -1,4 +1,4 @@
-"""The sheet of girths and lengths: `kinertia init --measures` writes it, the laboratory fills it in, a fit reads it."""
+"""Writes and reads the sheet of girths and lengths that `kinertia init --measures` drafts."""
 
 from __future__ import annotations
 

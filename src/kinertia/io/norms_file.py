@@ -1,4 +1,4 @@
-"""Norms of a laboratory: mean and standard deviation of curves over the gait cycle, from a CSV file.
+"""Reads a laboratory's norms: mean and standard deviation of curves over the gait cycle, from CSV.
 
     quantity,percent,mean,sd
     knee_angle_angle,0,5.1,3.9

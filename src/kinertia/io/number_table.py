@@ -1,4 +1,4 @@
-"""Text files of numbers: the part that TRC and STO/MOT have in common."""
+"""Reads text files of numbers: the part that TRC and STO/MOT have in common."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Frozen dataclasses in one file that will still be readable when nobody has this program any more.
+"""Saves frozen dataclasses in one file that stays readable without this program.
 
 The file is a NumPy archive (`.npz`): a zip with one `.npy` member per array, named after its place
 ("fit.trials.0.motion.q"), and `structure.json` for everything else. Plain rather than netCDF or Parquet: a result is a

@@ -1,4 +1,4 @@
-"""Result folders that appear complete or not at all, and never among somebody else's files unasked."""
+"""Writes result folders that appear complete or not at all, and never overwrite other files unasked."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The recordings that a subject file names: the static trial, the motions by their names, and the marker set."""
+"""Reads the recordings that a subject file names: static trial, motions, and marker set."""
 
 from __future__ import annotations
 

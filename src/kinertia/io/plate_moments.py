@@ -1,4 +1,4 @@
-"""Moments of a plate's force about the laboratory's origin, where a file gives force, moment and centre of pressure.
+"""Computes moments of a plate's force about the laboratory's origin.
 
 Files do not say about which point their moments are: the middle of the plate, of its surface, or the origin. But the
 force at the centre of pressure has no horizontal moment about it. So the point c is the one for which

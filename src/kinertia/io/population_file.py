@@ -1,4 +1,4 @@
-"""What `kinertia population` learnt of a group: one TOML text, which the fits of others of the group start from.
+"""Writes and reads what `kinertia population` learnt of a group, as one TOML text.
 
 At its top stands, for people, what was learnt of each parameter. Below it are mean and covariance in relative
 parameters, and the files that they are from, so that nobody's recordings count twice.

@@ -1,4 +1,4 @@
-"""Where a result comes from: the command, the files with their hashes, and the versions that computed it."""
+"""Records where a result comes from: command, files with their hashes, and versions."""
 
 from __future__ import annotations
 

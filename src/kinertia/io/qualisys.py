@@ -1,4 +1,4 @@
-"""TSV files of Qualisys Track Manager: markers, and the force plates beside them.
+"""Reads TSV files of Qualisys Track Manager: markers, and the force plates beside them.
 
 QTM writes a trial's markers to `walk.tsv` and each plate to a file of its own, `walk_f_1.tsv`, `walk_f_2.tsv`
 (`walk_f.tsv` where there is one). Both begin with lines of a name and a value. Forces are in the laboratory's axes or

@@ -1,4 +1,4 @@
-"""One trial from its files, whatever their formats."""
+"""Reads one trial from its files, whatever their formats."""
 
 from __future__ import annotations
 

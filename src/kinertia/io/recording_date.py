@@ -1,4 +1,4 @@
-"""The day on which trials were recorded, where the subject file or the recordings themselves say so.
+"""Finds the day of a recording, in the subject file or in the recordings themselves.
 
 The date of a file on the disk is that of its export or copy, and the dates of processing that Nexus writes into C3D
 files are those of processing: neither is taken.

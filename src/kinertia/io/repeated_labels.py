@@ -1,4 +1,4 @@
-"""Labels that a file of markers gives to more than one trajectory."""
+"""Resolves labels that a file of markers gives to more than one trajectory."""
 
 from __future__ import annotations
 

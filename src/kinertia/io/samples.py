@@ -1,4 +1,4 @@
-"""The sample walk: OpenSim's gait2354 example, downloaded once with pooch.
+"""Downloads the sample walk, OpenSim's gait2354 example, once with pooch.
 
 A measured static trial, a walk, its ground reactions and an ExternalLoads file, from
 https://github.com/opensim-org/opensim-models (Apache License 2.0) at one commit, so that everyone has the same bytes.

@@ -1,4 +1,4 @@
-"""What `kinertia instruments` found about the plates and the clock of a session: one TOML text, for use in its fits.
+"""Writes and reads what `kinertia instruments` found of a session's plates and synchronisation.
 
 At its top stands, for people, what was found of all trials together. Below it is what each person's trials say, as
 information (inverse covariance) and right-hand side, so that a fit can add what the others say without its own.

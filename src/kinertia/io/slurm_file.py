@@ -1,4 +1,4 @@
-"""How to ask SLURM for workers: a TOML file that a laboratory adapts to its cluster once."""
+"""Reads how to ask SLURM for workers: a TOML file that a laboratory adapts to its cluster once."""
 
 from __future__ import annotations
 

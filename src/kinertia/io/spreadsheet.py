@@ -1,4 +1,4 @@
-"""Cells of CSV files as spreadsheet programs take them."""
+"""Formats cells of CSV files as spreadsheet programs take them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""STO and MOT files: OpenSim's tables of columns over time, as text."""
+"""Reads and writes STO and MOT files: OpenSim's tables of columns over time."""
 
 from __future__ import annotations
 

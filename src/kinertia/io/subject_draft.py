@@ -1,4 +1,4 @@
-"""A first subject file from the recordings in a folder: what `kinertia init` writes."""
+"""Drafts a first subject file from the recordings in a folder: `kinertia init`."""
 
 from __future__ import annotations
 

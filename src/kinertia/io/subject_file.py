@@ -1,4 +1,4 @@
-"""The subject file: one TOML text that says who walked, which files hold the trials, and how to estimate.
+"""Reads the subject file: one TOML text that says who walked, which files hold the trials, and how to estimate.
 
     [subject]
     sex = "female"                 # "male" or "female"

@@ -1,4 +1,4 @@
-"""Labels like `Anna:LASI`: Vicon puts the subject's name before the markers'."""
+"""Removes the subject's name that Vicon puts before labels, as in `Anna:LASI`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The text of a subject file from its entries, each with what it is: what drafts and forms write."""
+"""Writes the text of a subject file from its entries, each with its description."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What entries of a subject file may be: files that are there, names of trials, windows, speeds of belts."""
+"""Validates entries of a subject file: existing files, names of trials, windows, belt speeds."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Theia's C3D files: poses of segments in place of markers (group ROTATION), and virtual markers made of them.
+"""Reads Theia's C3D files: poses of segments (group ROTATION), and virtual markers made of them.
 
 Each segment has a frame at its proximal joint: x to the right, y forwards, z up along the segment; where the next
 segment's frame stands in it is constant but for noise, and tells where joints are. Every segment of the 27-DOF model

@@ -1,4 +1,4 @@
-"""TOML files that a person writes, with the line of every table and key: errors in them name the line."""
+"""Reads TOML with the line of every table and key, so that errors can name it."""
 
 from __future__ import annotations
 

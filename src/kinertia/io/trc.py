@@ -1,4 +1,4 @@
-"""TRC files: marker trajectories as text, as Motion Analysis defined them and OpenSim uses them."""
+"""Reads and writes TRC files: marker trajectories as text."""
 
 from __future__ import annotations
 

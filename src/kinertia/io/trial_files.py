@@ -1,4 +1,4 @@
-"""Where the files of a finished fit are now: results know them by their names and hashes, not by their places."""
+"""Finds the files of a finished fit again, by their names and hashes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""CSV and TXT files that Vicon Nexus exports as ASCII: sections of trajectories and of devices.
+"""Reads CSV and TXT files that Vicon Nexus exports as ASCII: sections of trajectories and devices.
 
 A section has a line with its name, one with its rate, one with what the columns belong to, one with the columns' names,
 one with units, and then a row per frame or, of devices, per sub frame. A force plate is three groups of a device:

@@ -1,4 +1,4 @@
-"""A hidden folder beside results in the making: locked as long as its process lives, swept by the next one otherwise.
+"""Makes a hidden folder beside results in the making, locked while its process lives.
 
 A killed process cleans up nothing, but the system takes its lock back: what nobody holds is what nobody needs.
 """

@@ -1,4 +1,4 @@
-"""A model's bodies put together as the segments of the anthropometric tables, in ISB axes, so that both compare.
+"""Combines a model's bodies into the segments of the anthropometric tables, in ISB axes.
 
 Bodies are told by their names (femur, tibia, ...; sides by `_r` and `_l`), segments are cut at the model's joint
 centres, in its pose at zero, which is upright in the models that OpenSim users have. Pelvis and torso meet where the

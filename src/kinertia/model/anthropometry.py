@@ -1,4 +1,4 @@
-"""Body segment parameters from the literature, for a person's mass, height, sex and measured segment lengths.
+"""Computes literature BSPs for a person's mass, height, sex and segment lengths.
 
 Two tables, both scaled by total mass and segment lengths:
 

@@ -1,4 +1,4 @@
-"""What the built-in model assumes in place of landmarks that a static trial does not show."""
+"""Replaces landmarks that a static trial does not show by assumptions of the built-in model."""
 
 from __future__ import annotations
 

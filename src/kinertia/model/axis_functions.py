@@ -1,4 +1,4 @@
-"""Functions by which a joint axis follows a coordinate, with three derivatives.
+"""Evaluates functions by which a joint axis follows a coordinate, with three derivatives.
 
 OpenSim's functions of one variable are piecewise polynomials, so one class holds them all; a coupled coordinate is a
 function of a function.

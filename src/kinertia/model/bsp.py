@@ -1,4 +1,4 @@
-"""Body segment parameters (BSPs): one table and its views.
+"""Defines body segment parameters (BSPs): one table and its views.
 
 A rigid segment has ten inertial parameters: mass, three coordinates of the centre of mass (CoM), six elements
 of the inertia tensor. Biomechanics states the tensor about the CoM, in the segment frame; the equations of

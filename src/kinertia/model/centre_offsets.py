@@ -1,4 +1,4 @@
-"""What calibration moved of a model: which joints, and how far those of an OpenSim model."""
+"""Reports how far calibration moved the joints of a model."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Functions that Numba compiles to machine code, once per machine: `kinertia warm-up`, or whatever runs first.
+"""Compiles functions to machine code by Numba, once per machine: `kinertia warm-up`, or the first run.
 
 What runs over the frames of a trial is compiled, and kept in a folder that names its sources: whoever changes a line
 of a compiled function, or installs another version, compiles anew and never runs what an older line gave. The folder

@@ -1,4 +1,4 @@
-"""From coordinates to the axes of the kinematic tree and back.
+"""Maps coordinates to the axes of the kinematic tree and back.
 
 An axis x follows one coordinate q by a function: x = f(q), xd = f' qd, xdd = f' qdd + f'' qd^2. Several axes may follow
 the same coordinate (a knee that rolls and slides, a patella coupled to it). By virtual work the generalised force of a

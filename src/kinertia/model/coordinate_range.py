@@ -1,4 +1,4 @@
-"""`Range`: between which values a coordinate moves.
+"""Defines `Range`: between which values a coordinate moves.
 
 A body has one pose but coordinates have several values for it: three angles turn a segment as three others do (a half
 turn more of the first and the last), and an arm that is turned by half a turn with the elbow bent backwards fits its

@@ -1,4 +1,4 @@
-"""The 14-segment, 27-DOF gait model, built from a static trial.
+"""Builds the 14-segment, 27-DOF gait model from a static trial.
 
 Four open chains leave the pelvis: hip (3), knee (1), ankle (2: talocrural and subtalar, with a massless talus
 between), back (3), shoulder (2), elbow (1). Twelve of the fourteen segments carry mass. Signs are OpenSim's

@@ -1,4 +1,4 @@
-"""Which of a trunk's markers are on the head: it turns by itself, while the model's trunk, neck and head are one."""
+"""Finds head markers among the trunk's: the head turns by itself, while the model joins both."""
 
 from __future__ import annotations
 

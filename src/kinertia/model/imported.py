@@ -1,4 +1,4 @@
-"""A model that was read from a file: its skeleton and masses, and what it takes to write it back."""
+"""Holds a model that was read from a file: its skeleton, masses, and what it takes to write it back."""
 
 from __future__ import annotations
 

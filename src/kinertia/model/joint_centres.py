@@ -1,4 +1,4 @@
-"""Joint centres, joint axes and segment frames of pelvis and legs, from the landmarks of a static trial.
+"""Computes joint centres, axes and segment frames of pelvis and legs from a static trial's landmarks.
 
 All points are in ground axes (m). Frames follow ISB: x anterior, y up or proximal, z right. Sources: hip Bell et al.
 (1990) or Harrington et al. (2007); knee and ankle midpoints of the epicondyles and malleoli, or Plug-in Gait's chord

@@ -1,4 +1,4 @@
-"""Joints as people name them, and the coordinates of each."""
+"""Names joints as people do, with the coordinates of each."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`KinematicTree`: a skeleton as plain arrays, axis by axis, and where it puts everything: the compiled core.
+"""Defines `KinematicTree`: a skeleton as plain arrays, axis by axis: the compiled core.
 
 Every moving axis has a frame of its own, which stands at a fixed place in that of the axis before it (its parent) and
 turns about, or slides along, a fixed direction. Parents come first. A segment stands at a fixed place in the frame of

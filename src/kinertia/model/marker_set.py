@@ -1,4 +1,4 @@
-"""`MarkerSet`: which of a laboratory's labels is which landmark, and which markers move with which segment.
+"""Defines `MarkerSet`: which labels are landmarks, and which markers move with which segment.
 
 Only this knows a laboratory's names. Marker sets come from files (`kinertia.io.marker_set_file`).
 """

@@ -1,4 +1,4 @@
-"""The measurements of a person that Yeadon's body is built from: what they are called, and how large they usually are.
+"""Names the measurements that Yeadon's body is built from, with their usual sizes.
 
 Yeadon (1990, J Biomech 23:67) builds the body from 95 of them, 58 where the two sides are taken as alike: 21 of trunk
 and head, 18 of an arm, 19 of a leg. A level (T0 to T8, A0 to A7, L0 to L9) is where one measures; the picture that

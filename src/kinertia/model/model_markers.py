@@ -1,4 +1,4 @@
-"""Which marker of an OpenSim model is on which segment."""
+"""Assigns the markers of an OpenSim model to segments."""
 
 from __future__ import annotations
 

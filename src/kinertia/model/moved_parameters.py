@@ -1,4 +1,4 @@
-"""How the ten dynamic parameters of a body change when they are taken in another frame."""
+"""Transforms the ten dynamic parameters of a body to another frame."""
 
 from __future__ import annotations
 

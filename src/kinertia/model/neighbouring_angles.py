@@ -1,4 +1,4 @@
-"""Which angles the skin of a segment is drawn along by: those of the joints at its ends."""
+"""Lists the joint angles that move the skin of a segment: those of the joints at its ends."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the joints of a model are, and how their axes point, with all coordinates at zero: people stand upright then.
+"""Locates a model's joints and their axes with all coordinates at zero, as in upright standing.
 
 Mirroring is across the plane between the sides: in ground axes, and in those of the bodies that carry the joints.
 """

@@ -1,4 +1,4 @@
-"""`RangeOfMotion`: how far healthy people's joints move, by the literature, and how much people differ.
+"""Defines `RangeOfMotion`: how far healthy people's joints move, by the literature, and how much people differ.
 
 Signs and zeros are OpenSim's: flexion of hips, knees and elbows, dorsiflexion, adduction, internal rotation, inversion
 and extension of the trunk are positive. Of arms and of the forearm's turn no range is known here: Cardan angles of a

@@ -1,4 +1,4 @@
-"""`Root`: the free joint between ground and the root segment.
+"""Defines `Root`: the free joint between ground and the root segment.
 
 Three translations, then three rotations about body-fixed axes that are square to one another: tilt (z), list (x),
 rotation (y) in the 27-DOF model, any such triple in an OpenSim model. "Residual" always means force (N) in ground axes

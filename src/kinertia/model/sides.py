@@ -1,4 +1,4 @@
-"""Which coordinates are one and the same on the right and on the left."""
+"""Pairs right and left coordinates, and those that both sides share."""
 
 from __future__ import annotations
 

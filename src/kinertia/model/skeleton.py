@@ -1,4 +1,4 @@
-"""`Skeleton`: segments, joints, coordinates and markers, and the kinematic tree they are.
+"""Defines `Skeleton`: segments, joints, coordinates, markers, and the kinematic tree that they form.
 
 A joint places its child segment in its parent by a constant placement followed by a list of single axes, each a
 rotation about or a translation along a fixed direction. Every axis follows one coordinate and

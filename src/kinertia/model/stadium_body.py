@@ -1,4 +1,4 @@
-"""The body as a stack of stadium solids (Yeadon 1990, J Biomech 23:67): masses, centres and inertias from measurements.
+"""Builds the body of stadium solids (Yeadon 1990, J Biomech 23:67): masses, centres, inertias from measurements.
 
 The package `yeadon` makes the solids; here they become the segments of the built-in model. A solid stands between two
 levels at which girth and width were measured. How they map:

@@ -1,4 +1,4 @@
-"""Joint centres and axes of trunk and arms of a person standing still, from the landmarks of a static trial.
+"""Computes joint centres and axes of trunk and arms of a standing person from landmarks.
 
 Points are in ground axes (m), frames follow ISB: x anterior, y up or proximal, z right. Sources: cervical joint Dumas
 et al. (2007); shoulder Rab et al. (2002). What the trial does not show is taken from stature and from an upright pose:

@@ -1,4 +1,4 @@
-"""One cutoff for the motion of a trial and its forces, before any estimate: what a colleague would smooth them with.
+"""Chooses one cutoff for motion and forces of a trial before any estimate.
 
 Generalised cross-validation takes everything for motion that is not white noise. Markers that were smoothed before they
 were exported have no white noise left, and skin motion is none: in half of the trials of other laboratories it chooses

@@ -1,4 +1,4 @@
-"""Angles that mean the same pose, and those among them that go on from frame to frame.
+"""Chooses, of angles that mean the same pose, those that continue from frame to frame.
 
 A full turn changes nothing. And three rotations a, b, c about axes of which each is square to the next turn a segment
 as a + pi, s - b, c + pi do: s is pi where the first axis is square to the third (Cardan angles) and 0 where they are

@@ -1,4 +1,4 @@
-"""Strides of a trial, from heel strike to the next heel strike of the same foot.
+"""Finds strides of a trial, from heel strike to the next heel strike of the same foot.
 
 Plates see few of the contacts that a stride needs. So heel strikes and toe offs are first read off the motion: a foot
 lands about when its heel is farthest in front of the pelvis, and leaves about when its toes are farthest behind it

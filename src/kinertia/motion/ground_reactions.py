@@ -1,4 +1,4 @@
-"""The ground reactions that joint moments are computed from: the plates' full rate, less what no motion can follow.
+"""Prepares the ground reactions of joint moments: at full rate, without what no motion can follow.
 
 Below the hip joint moments are forces times lever arms, and forces change within milliseconds where a foot lands or
 leaves; filtered like the motion they are wrong there by several N m. But not everything fast belongs into a joint

@@ -1,4 +1,4 @@
-"""Markers in their gaps: where the model has them, and as far off as they are before and after.
+"""Fills gaps of markers from the model, as far off as before and after the gap.
 
 Model and markers differ by millimetres to centimetres (skin, marker placement), so that a pose that is fitted to fewer
 markers is another one: where a marker vanishes for a frame, the joint jumps, and accelerations of the gap's edges are

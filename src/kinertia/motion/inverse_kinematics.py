@@ -1,4 +1,4 @@
-"""Inverse kinematics by global optimisation (Lu & O'Connor 1999): all coordinates on all visible markers, per frame.
+"""Solves inverse kinematics by global optimisation (Lu & O'Connor 1999), per frame.
 
 For every frame the sum of squared distances between measured and model markers is minimised over all coordinates at
 once, and joints pay beyond their ranges (`pose_fit`). Several poses may fit a frame nearly as well, and several sets of

@@ -1,4 +1,4 @@
-"""The whole load that a joint of a leg transmits, which generalised forces show along the joint's own axes only."""
+"""Computes the whole load of a leg joint; generalised forces show it along the joint's own axes only."""
 
 from __future__ import annotations
 

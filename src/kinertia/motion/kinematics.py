@@ -1,4 +1,4 @@
-"""From a trial to smooth coordinates: facing +X, inverse kinematics, smoothing splines, and ground reactions to match.
+"""Turns a trial into smooth coordinates: heading +X, inverse kinematics, splines, matching ground reactions.
 
 All coordinates and the ground reactions get the same cutoff, as `kinertia.motion.common_cutoff` finds it. With one for
 each coordinate what the pelvis and the hips make of one skin motion no longer cancels: the residual of the Rajagopal

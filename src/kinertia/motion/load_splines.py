@@ -1,4 +1,4 @@
-"""Natural cubic splines of loads between the samples of force plates, and their rates, in compiled code."""
+"""Interpolates loads between samples by natural cubic splines, with rates, in compiled code."""
 
 from __future__ import annotations
 

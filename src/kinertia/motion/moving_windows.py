@@ -1,4 +1,4 @@
-"""Averages and extremes of what is around every sample, along the first axis.
+"""Computes moving averages and extremes along the first axis.
 
 As `scipy.ndimage` has them, in the same order of additions: to load it takes as long as to load NumPy, and these few
 functions are all that is needed of it.

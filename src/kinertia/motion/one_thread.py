@@ -1,4 +1,4 @@
-"""One BLAS thread for computations on small matrices, of which those of a body are.
+"""Limits BLAS to one thread for computations on small matrices, as a body's are.
 
 Threads cost twice what they give there, and ten times on a busy machine. What computes for longer than a moment is
 decorated with `one_blas_thread`, each step on its own, so that it holds for whoever calls them one by one; the user's

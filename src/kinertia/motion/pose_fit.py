@@ -1,4 +1,4 @@
-"""The coordinates that fit the markers of single frames best: Gauss-Newton within the ranges of the model.
+"""Fits coordinates to the markers of single frames: Gauss-Newton within the ranges of the model.
 
 The sum of squared distances between measured and model markers is minimised frame by frame (`marker_sums` has the
 analytic derivatives). A coordinate with a clamped range stays within it, as in OpenSim. Beyond the range that anatomy

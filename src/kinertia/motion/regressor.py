@@ -1,4 +1,4 @@
-"""Load of every segment per unit of its ten dynamic parameters, frame by frame in compiled code."""
+"""Computes each segment's load per unit of its ten dynamic parameters, in compiled code."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Loads of moving bodies and their derivatives, frame by frame in compiled code; spatial vectors in ground axes.
+"""Computes loads of moving bodies and their derivatives, in compiled code; spatial vectors in ground axes.
 
 A body of mass m, first moment H and moments of inertia J about the ground origin has the spatial inertia
 

@@ -1,4 +1,4 @@
-"""The root equations and all their derivatives over deviations, frame by frame in compiled code.
+"""Computes the root equations and all their derivatives over deviations, in compiled code.
 
 They are what `residual_terms` and `root_regressor` of `dynamics` give, for coordinates that move, for some that do not,
 for the bodies and for the ground reactions, in one pass and without what nobody asks for.

@@ -1,4 +1,4 @@
-"""Quintic smoothing splines: smooth signals and their derivatives from noisy samples (Woltring 1986).
+"""Fits quintic smoothing splines: smooth signals and derivatives from noisy samples (Woltring 1986).
 
 Samples y_i at times t_i (any spacing; some may be missing) are replaced by the function s that minimises
 

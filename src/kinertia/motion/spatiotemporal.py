@@ -1,4 +1,4 @@
-"""Speed, cadence, lengths and times of strides: what gait reports have in their first table."""
+"""Computes speed, cadence, lengths and times of strides."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A standing pose out of a walk: what stands for a static trial that is missing.
+"""Extracts a standing pose from a walk, where a static trial is missing.
 
 No frame of a walk has both feet flat on the floor. But each foot is flat once in a stride, while the shank over it is
 upright. These two frames, one of each leg, are put on one pelvis: turned about the vertical and moved until the ASIS

@@ -1,4 +1,4 @@
-"""The trunk of somebody with too few markers on it: upright over the pelvis, facing where that does on average.
+"""Holds a trunk with too few markers upright over the pelvis, facing where that does on average.
 
 A walking trunk leans by a few degrees and turns against the pelvis, so this is known within some 10 degrees. It
 becomes three virtual markers of that uncertainty, so that the ground reactions may say better.

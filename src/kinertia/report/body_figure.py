@@ -1,4 +1,4 @@
-"""The body from the front and from both sides: where the estimate changed it, or what the data say about it.
+"""Draws the body from front and sides: where the estimate changed it, or what the data say about it.
 
 A segment is drawn as a capsule as long as it is, of the volume that its mass before the estimate takes in water. It is
 a sketch to find segments by, not a measurement of the person's shape.

@@ -1,4 +1,4 @@
-"""Figures of body segment parameters: changes with intervals, and what the data say about each."""
+"""Draws body segment parameters: changes with intervals, and what the data say about each."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Results of a trial in its own C3D file, as Vicon and Visual3D name and type model outputs."""
+"""Writes results of a trial into its C3D file, as Vicon and Visual3D name and type model outputs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pictures of a recording before any model: forces and contacts, centres of pressure on the plates."""
+"""Draws a recording before any model: forces and contacts, centres of pressure on the plates."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`check.html`: what `kinertia check` found, as one page that needs nothing else."""
+"""Writes `check.html`: what `kinertia check` found, as one self-contained page."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Several results side by side: what differs by more than the error bars say.
+"""Compares several results: what differs by more than the error bars.
 
 Sessions of one person, two methods or two models on one recording: rows are body segment parameters and strides,
 the first result is what the others are compared with.

@@ -1,4 +1,4 @@
-"""What gait reports call the coordinates, and which belong to the two sides of one panel."""
+"""Titles coordinates as gait reports do, and pairs those of the two sides."""
 
 from __future__ import annotations
 

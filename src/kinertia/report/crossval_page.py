@@ -1,4 +1,4 @@
-"""What `kinertia crossval` says: rows for the terminal, `crossval.json` and a page."""
+"""Writes what `kinertia crossval` found: rows for the terminal, `crossval.json` and a page."""
 
 from __future__ import annotations
 

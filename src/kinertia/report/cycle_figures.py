@@ -1,4 +1,4 @@
-"""Curves over the gait cycle: all strides of a person, right and left each from its own heel strike on.
+"""Draws curves over the gait cycle: all strides, right and left each from its own heel strike on.
 
 Strides are thin, their mean is thick with a band of one standard deviation around it; the estimate's own 95 % band is
 the darker one. What the usual pipeline gives is dotted. Where nothing was measured there is a gap.

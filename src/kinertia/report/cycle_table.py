@@ -1,4 +1,4 @@
-"""The table of strides: mean and standard deviation of the spatiotemporal measures, per side."""
+"""Tabulates strides: mean and standard deviation of the spatiotemporal measures, per side."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Curves and posterior draws of a fit as xarray Datasets, which netCDF files, ArviZ and many others take."""
+"""Converts curves and posterior draws of a fit to xarray Datasets, for netCDF, ArviZ and others."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Posterior draws of a `Fit` as OpenSim's files: models, motions and external loads that belong together."""
+"""Writes posterior draws of a `Fit` as OpenSim's files: models, motions and external loads."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""matplotlib, which draws the pictures of studies and figures for papers: the extra `plots`."""
+"""Loads matplotlib, of the extra `plots`, which draws studies and figures for papers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A figure as plain data: what plotly.js draws in a report, and what plotly's Python package shows in a notebook.
+"""Defines a figure as plain data, for plotly.js in a report and plotly's package in a notebook.
 
 A report loads no plotly for that: its own objects check every value against a schema, which took a fifth of a fit's
 time; here the tests do so once, for every figure that there is.

@@ -1,4 +1,4 @@
-"""Joint angles, moments and powers that the files hold already beside Kinertia's, in Plug-in Gait's convention."""
+"""Compares joint angles, moments and powers of the files with Kinertia's, in Plug-in Gait's convention."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Findings as pages show them: what to do next, by severity with their evidence, corrections in a table, explanations.
+"""Shows findings on pages: what to do next, by severity, corrections, explanations.
 
 One view for the report, for check.html and for the page in the browser, so that each says the same of a finding.
 """

@@ -1,4 +1,4 @@
-"""The Movement Analysis Profile and Gait Profile Score as the report shows them."""
+"""Shows Movement Analysis Profile and Gait Profile Score in the report."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The report's first part: for what a fit may be used, and beside that what the estimate changed, in words.
+"""Writes the report's first part: fitness for use, and what the estimate changed.
 
 Findings say what is wrong; `suitability` says what follows for each output, and here that is read for the purposes that
 people have.

@@ -1,4 +1,4 @@
-"""`fit.figure`: the report's figures as files for papers, drawn by matplotlib without a browser.
+"""Draws `fit.figure`: the report's figures as files for papers, by matplotlib.
 
 Two columns wide (180 mm), letters of 7 points, which stay letters in SVG and PDF files.
 """

@@ -1,4 +1,4 @@
-"""Figures of the markers: how far the model is from each, and when each was not seen."""
+"""Draws the markers' errors: how far the model is from each, and when each was not seen."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The labelled markers of a recording as a figure to turn, before there is any model."""
+"""Draws the labelled markers of a recording as a figure to turn, before there is any model."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where to measure a person: the picture beside the sheet of girths and lengths."""
+"""Draws where to measure a person: the picture beside the sheet of girths and lengths."""
 
 from __future__ import annotations
 

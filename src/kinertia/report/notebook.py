@@ -1,4 +1,4 @@
-"""How a `Fit` and its trials, a `Trial` and a `Recording` show themselves in a notebook."""
+"""Shows a `Fit`, its trials, a `Trial` and a `Recording` in a notebook."""
 
 from __future__ import annotations
 

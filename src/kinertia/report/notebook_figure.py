@@ -1,4 +1,4 @@
-"""A figure of plotly's that shows itself wherever a notebook is read; apart from others, since it loads plotly."""
+"""Shows a plotly figure wherever a notebook is read; apart from others, since it loads plotly."""
 
 from __future__ import annotations
 

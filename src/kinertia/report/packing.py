@@ -1,4 +1,4 @@
-"""Texts that a page carries compressed; `templates/unpack.js` reads them."""
+"""Compresses texts that a page carries; `templates/unpack.js` reads them."""
 
 from __future__ import annotations
 

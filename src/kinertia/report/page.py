@@ -1,4 +1,4 @@
-"""`report.html`: one self-contained file.
+"""Writes `report.html`: one self-contained file.
 
 plotly.js is in the page once, compressed; its policy (Content-Security-Policy) forbids every request.
 """

@@ -1,4 +1,4 @@
-"""Small multiples: many panels in one plotly figure, in as many columns as there is room for.
+"""Lays out small multiples: many panels in one plotly figure.
 
 The page lays the panels out anew for its width: `layout.meta.arrangements` holds, per number of columns and for
 "print", what plotly's `relayout` needs for it.

@@ -1,4 +1,4 @@
-"""What `kinertia plan` says: rows for the terminal, `plan.csv`, `plan.json` and a page."""
+"""Writes what `kinertia plan` found: rows for the terminal, `plan.csv`, `plan.json` and a page."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""plotly.js for reports: the script of the installed plotly package, compressed once per installation.
+"""Provides plotly.js for reports: the installed package's script, compressed once per installation.
 
 A report carries it, and unpacks it when it is opened, so that it stays one file that needs no network.
 """

@@ -1,4 +1,4 @@
-"""The figures of a fit, by the names that `fit.plot` and `fit.figure` share."""
+"""Names the figures that `fit.plot` and `fit.figure` share."""
 
 from __future__ import annotations
 

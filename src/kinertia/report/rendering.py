@@ -1,4 +1,4 @@
-"""Pages from the templates beside this module."""
+"""Renders pages from the templates beside this module."""
 
 from __future__ import annotations
 

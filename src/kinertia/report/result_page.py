@@ -1,4 +1,4 @@
-"""The page of a command that compares or studies: one template for all of them."""
+"""Renders the page of a command that compares or studies: one template for all of them."""
 
 from __future__ import annotations
 

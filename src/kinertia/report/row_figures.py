@@ -1,4 +1,4 @@
-"""Figures of the studies: a row per recording, trial or laboratory; dots that compare, or bars that add up."""
+"""Draws figures of the studies: a row per recording, trial or laboratory."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which quantities of two models are the same: names alone do not say it.
+"""Finds the quantities that two models share: names alone do not say it.
 
 The torso of a model without arms is torso and arms; the origin of a pelvis is where its maker put it; and a knee angle
 is flexion in one model and extension in another (gait2354).

@@ -1,4 +1,4 @@
-"""`load_fit`: a result from its folder, without the recordings that it was estimated from."""
+"""Loads a result from its folder, without the recordings that it was estimated from: `load_fit`."""
 
 from __future__ import annotations
 

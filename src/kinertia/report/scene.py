@@ -1,4 +1,4 @@
-"""What stands where in every frame of a 3-D view, and how a page carries it.
+"""Assembles what stands where in every frame of a 3-D view, and how a page carries it.
 
 `templates/scene_view.js` plays it: a small drawing of lines, dots and ellipses needs no 3-D library and stays smooth.
 """

@@ -1,4 +1,4 @@
-"""The sensitivity study on paper: a page, `sensitivity.md` with a picture, `sensitivity.json`, `sensitivity.csv`."""
+"""Writes the sensitivity study: a page, `sensitivity.md` with a picture, `sensitivity.json`, `sensitivity.csv`."""
 
 from __future__ import annotations
 

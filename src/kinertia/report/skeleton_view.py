@@ -1,4 +1,4 @@
-"""The skeleton walking, for the report's own 3-D view and as a plotly figure."""
+"""Shows the skeleton walking, in the report's own 3-D view and as a plotly figure."""
 
 from __future__ import annotations
 

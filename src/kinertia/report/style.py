@@ -1,4 +1,4 @@
-"""Colours and lines of all figures: Okabe and Ito's palette, which colour-blind people can tell apart, on white."""
+"""Defines colours and lines of all figures: Okabe and Ito's palette for colour-blind people, on white."""
 
 from __future__ import annotations
 

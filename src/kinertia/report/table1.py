@@ -1,4 +1,4 @@
-"""Table 1 on paper and screen: `table1.json`, `table1.csv`, a picture, `report.html`, and rows for the terminal."""
+"""Writes Table 1: `table1.json`, `table1.csv`, a picture, `report.html`, and rows for the terminal."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The variants of Table 1 on paper and screen: `variants.md` (means), `variants.csv` (draws) and a picture."""
+"""Writes the variants of Table 1: `variants.md` (means), `variants.csv` (draws) and a picture."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Everything that a result says in numbers, as tables: for Excel, MATLAB, R and scripts."""
+"""Makes all tables of a result's numbers: for Excel, MATLAB, R and scripts."""
 
 from __future__ import annotations
 

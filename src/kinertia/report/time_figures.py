@@ -1,4 +1,4 @@
-"""Figures over time: root residuals, coordinates and joint moments of a trial, the way gait reports draw them.
+"""Draws figures over time: root residuals, coordinates and joint moments of a trial.
 
 Frames that were not used are shaded; upright lines are gait events, solid where a foot lands, dashed where it leaves.
 """

@@ -1,4 +1,4 @@
-"""A synthetic person's truth beside the estimate: what was wrong before, and what is wrong after."""
+"""Compares the estimate with a synthetic person's truth: what was wrong before and after."""
 
 from __future__ import annotations
 

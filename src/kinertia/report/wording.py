@@ -1,4 +1,4 @@
-"""Words and digits in which the report speaks: what the estimate started from, and numbers as people read them."""
+"""Words starting points and numbers for the report."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Cross-validation: are body segment parameters from some trials better on another one than the literature's?
+"""Tests whether body segment parameters from some trials explain another one better than the literature's.
 
 Small residuals prove nothing on the trials that they were made small on. Here one trial after the other is held out;
 the parameters come from the rest, are frozen, and on the held-out trial only motion and calibration are estimated. The

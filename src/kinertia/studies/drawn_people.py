@@ -1,4 +1,4 @@
-"""People drawn from the literature's prior walk, are measured in a laboratory, and are estimated.
+"""Draws people from the literature's prior, lets a laboratory measure their walks, and estimates them.
 
 A draw depends on seed, scenario and its number only; people of one number are the same in every scenario.
 """

@@ -1,4 +1,4 @@
-"""Independent pieces of work in parallel processes, with results that do not depend on how many there are."""
+"""Runs independent work in parallel processes; results do not depend on their number."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What to record: the error bar that every body segment parameter would have after candidate motions.
+"""Predicts the error bar of every body segment parameter for candidate motions: what to record.
 
 Candidates are measured trials of a person, or the package's synthetic motions of its own person with skin motion of
 published size in the walk, up to twice that in the others. Nothing is estimated: deviations follow from the information

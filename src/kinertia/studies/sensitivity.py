@@ -1,4 +1,4 @@
-"""Which body segment parameters are not highly sensitive to noisy kinematics? The question that the study ended on.
+"""Finds the body segment parameters that are not highly sensitive to noisy kinematics: the study's open question.
 
 People drawn from the literature's prior walk and are estimated (`drawn_people`), with one thing changed at a
 time: amplitude and kind of the noise, number of strides, squats recorded besides. Per parameter the RMS error over

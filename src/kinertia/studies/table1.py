@@ -1,4 +1,4 @@
-"""The study's Table 1, repeated: which BSPs come back from gait, with and without noise and pelvis correction.
+"""Repeats the study's Table 1: which BSPs come back from gait, with and without noise and pelvis correction.
 
 Each draw takes a start (every one of the 49 parameters off by uniform +/-50 %) and, for the noisy conditions, the
 study's marker noise; noisy markers go through inverse kinematics and GCV smoothing with the true skeleton. The

@@ -1,4 +1,4 @@
-"""What the study behind Table 1 may have done otherwise than `kinertia.studies.table1`: one function per guess.
+"""Varies what the study behind Table 1 may have done differently: one function per guess.
 
 Its text does not say all that it did, and its tools had defaults. Each function stands in for one step of a `Setup`.
 """

@@ -1,4 +1,4 @@
-"""What makes the published pattern of Table 1? Its noisy half again, one thing changed at a time.
+"""Repeats the noisy half of Table 1 with one thing changed at a time, to explain its pattern.
 
 A `Variant` is one guess (`kinertia.studies.table1_guesses`) at what differed. All variants share their draws: the same
 seed and number give the same starts and, where it is not the noise that changes, the same noise. The conditions

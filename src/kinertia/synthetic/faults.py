@@ -1,4 +1,4 @@
-"""Synthetic walks measured by laboratories with given faults: what the accuracy study estimates from.
+"""Makes synthetic walks with given instrument faults, for the accuracy study.
 
 The truth is a `SyntheticTrial`; the laboratory has noisy markers, loads by its own plates, and its own idea of the
 skeleton. Only the latter three come out, as `Kinematics`; the estimator gets no more than from files.

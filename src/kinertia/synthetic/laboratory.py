@@ -1,4 +1,4 @@
-"""A synthetic trial as a laboratory would have measured it: cameras, skin, two force plates, and the files they leave.
+"""Measures a synthetic trial as a laboratory would: cameras, skin, two force plates, and files.
 
 The plates catch one right and one left contact; the steps before and after go unmeasured, as in a real laboratory.
 """

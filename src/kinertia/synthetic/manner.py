@@ -1,4 +1,4 @@
-"""How people walk differently: pace, and how trunk and arms are held and swung."""
+"""Varies how people walk: pace, and how trunk and arms are held and swung."""
 
 from __future__ import annotations
 

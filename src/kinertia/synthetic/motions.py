@@ -1,4 +1,4 @@
-"""Exactly consistent synthetic trials of five motions that a laboratory might record: what to plan with.
+"""Makes exactly consistent synthetic trials of five motions, for planning.
 
 The two walks are the package's, at its own pace and a third faster. The others are done standing, both feet on the
 ground, each foot carrying half of the load: squats, swinging arms, and a swaying trunk. Sizes and paces are those of an

@@ -1,4 +1,4 @@
-"""Measurement errors for synthetic trials: skin motion, cameras, force plates. Every function takes its own generator.
+"""Adds measurement errors to synthetic trials: skin motion, cameras, force plates; each takes its own generator.
 
 Markers: the study's sinusoids (`study_noise`), a soft-tissue artefact that moves with the neighbouring joints
 (`SkinMotion`), and white camera noise (`camera_noise`). Plates: white noise and a constant offset

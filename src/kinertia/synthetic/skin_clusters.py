@@ -1,4 +1,4 @@
-"""Skin motion that no joint angle explains: each segment's markers move as a rigid cluster, by harmonics of the stride.
+"""Moves each segment's markers as a rigid cluster, by harmonics of the stride that no joint angle explains.
 
 It contradicts the estimator's model of skin (`kinertia.estimation.simultaneous.skin`) on purpose: displacements along
 three axes and turns about three, each a sum of the stride's first harmonics with random phases. Sizes are those of

@@ -1,4 +1,4 @@
-"""A synthetic person and gait trial of which everything is known: BSPs, coordinates, ground reactions, markers.
+"""Makes a synthetic person and gait trial of which everything is known.
 
 Two ways to an exactly consistent trial, both with root residual P = 0 at every frame and a pelvis whose position and
 velocity are the trapezoid integrals of its acceleration (so that the study's pelvis correction, at the true BSPs, gives

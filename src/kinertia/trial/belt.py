@@ -1,4 +1,4 @@
-"""The belt of a treadmill whose speed is stated.
+"""Describes the belt of a treadmill whose speed is stated.
 
 Where it is not, standing feet tell it, as one speed for the whole trial: as good for a belt that keeps its speed, and
 wrong for one that starts, stops or follows the person.

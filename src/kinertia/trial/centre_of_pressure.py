@@ -1,4 +1,4 @@
-"""Where on the ground a foot's load acts."""
+"""Computes where on the ground a foot's load acts."""
 
 from __future__ import annotations
 

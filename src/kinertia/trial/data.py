@@ -1,4 +1,4 @@
-"""What the files of one trial hold, and what the estimators take from it.
+"""Defines what the files of one trial hold, and what the estimators take from it.
 
 `Recording` is what was read: markers, force plates and the subject's measurements, before anything is known
 about feet or models. `Trial` is what the estimators work on: the same markers, the loads sorted by foot, and

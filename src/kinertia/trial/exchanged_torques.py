@@ -1,4 +1,4 @@
-"""Free moments that are in another plate's columns: they come and go with its load, and not with their own.
+"""Finds free moments in another plate's columns: they come and go with that plate's load.
 
 A plate that nobody stands on has no free moment. While the other foot alone carries the person, sound force files have
 at most 0.2 times the free moment that they have while the own one does (RMS; filters and amplifiers leave some), those

@@ -1,4 +1,4 @@
-"""Events of a file next to those that forces show: how far they are apart, and whether they can be used."""
+"""Compares events of a file with those that forces show, and says whether they can be used."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`FileOutputs`: joint angles, moments and powers that other software left in the file of a trial."""
+"""Defines `FileOutputs`: joint angles, moments and powers that other software left in a trial's file."""
 
 from __future__ import annotations
 

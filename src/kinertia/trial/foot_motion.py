@@ -1,4 +1,4 @@
-"""How the markers of a foot move against the ground: how high they are over what it stands on, and how fast."""
+"""Measures how foot markers move against the ground: height above it, and speed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""For how long do forces overshoot beside a load? Filters that are far too strong spread it in time.
+"""Measures how long forces overshoot beside a load, as after filters that are far too strong.
 
 On 26 recordings of nine laboratories no plate reads less than nothing for more than 3 ms beside a load.
 """

@@ -1,4 +1,4 @@
-"""`GaitEvent` and `FileEvent`: a foot meets the ground or leaves it, as it was measured and as a file states it."""
+"""Defines `GaitEvent` and `FileEvent`: a foot strike or foot off, as measured and as a file states it."""
 
 from __future__ import annotations
 

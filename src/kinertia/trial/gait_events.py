@@ -1,4 +1,4 @@
-"""Heel strikes and toe offs, from the loads under the feet."""
+"""Finds heel strikes and toe offs from the loads under the feet."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""In which frames all ground contact is measured.
+"""Finds the frames in which all ground contact is measured.
 
 A foot without load is taken to be on the ground by the heights and speeds that the markers of this trial's
 feet have when a plate begins or ceases to be loaded.

@@ -1,4 +1,4 @@
-"""What a force plate reads while nobody stands on it, and the loads without it."""
+"""Subtracts what a force plate reads while nobody stands on it."""
 
 from __future__ import annotations
 

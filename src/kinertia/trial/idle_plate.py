@@ -1,4 +1,4 @@
-"""Which samples of a force plate are a load, how a load begins and ends, and how noisy the unloaded plate is.
+"""Separates load from idle samples of a force plate, and measures the idle noise.
 
 Below some 20 N the centre of pressure is a quotient of two noises, and all day long a plate reads a little of
 something. But a foot that lands or leaves passes through these small forces too: set to zero, they are missing from the

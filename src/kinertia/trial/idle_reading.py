@@ -1,4 +1,4 @@
-"""What a force plate reads while nobody stands on it, by the times at which its mean force hardly changes."""
+"""Finds what an idle force plate reads, by the times at which its mean force hardly changes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What can be said of markers before any model: gaps, which way is up, which way the person goes."""
+"""Judges markers before any model: gaps, which way is up, which way the person goes."""
 
 from __future__ import annotations
 

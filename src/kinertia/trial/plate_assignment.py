@@ -1,4 +1,4 @@
-"""Which foot stands on which plate, and in which frames all ground contact is measured.
+"""Assigns plates to feet, and finds the frames in which all ground contact is measured.
 
 Dynamics hold only where every foot on the ground stands on a plate that works. Both questions are answered from
 the data: a load belongs to the foot that is nearest to its centre of pressure, and a foot without load is on the

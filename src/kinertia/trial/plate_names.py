@@ -1,4 +1,4 @@
-"""What the plates of a trial are called when it is one of several.
+"""Names the plates of a trial when it is one of several.
 
 Plates of C3D files are the laboratory's, and have the same names in all trials. Columns of force files may be feet
 rather than plates: those of each trial are plates of their own, until somebody says that they are the same.

@@ -1,4 +1,4 @@
-"""Root mean squares, of values and of the lengths of vectors; what is NaN was not measured and does not count."""
+"""Computes root mean squares of values and of lengths of vectors; NaN does not count."""
 
 from __future__ import annotations
 

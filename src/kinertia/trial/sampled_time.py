@@ -1,4 +1,4 @@
-"""Times of samples: which of them are nearest, which lie within two others, and contiguous runs of what holds in them.
+"""Searches sample times: nearest ones, those between two others, contiguous runs.
 
 What a clock adds to times by its rounding decides nothing here.
 """

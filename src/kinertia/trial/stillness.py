@@ -1,4 +1,4 @@
-"""Does anybody move in a recording? By how fast the markers are."""
+"""Decides whether anybody moves in a recording, by how fast the markers are."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the torque columns of a force file hold: free moments, about the vertical, or something else.
+"""Finds out what the torque columns of a force file hold: free moments, about the vertical, or something else.
 
 A force file has a point of application beside each torque, and nothing but its maker sees to it that they go together.
 At the centre of pressure no torque is horizontal, by definition: in eleven sound force files the median is 0.0 mm times

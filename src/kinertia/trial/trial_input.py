@@ -1,4 +1,4 @@
-"""A recording of a motion, the window of it that the user vouches for, and what it is used for."""
+"""Holds a recording of a motion, the window that the user vouches for, and its use."""
 
 from __future__ import annotations
 

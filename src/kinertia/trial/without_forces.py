@@ -1,4 +1,4 @@
-"""A trial whose markers alone are used."""
+"""Makes a trial whose markers alone are used."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Things that are not body: a rucksack, a held weight, an orthosis, an exoskeleton, shoes.
+"""Adds what is not body: a rucksack, a held weight, an orthosis, an exoskeleton, shoes.
 
 Each becomes a segment of its own, welded to the one that it moves with: it enters the dynamics, the error bars and the
 exported model as every segment does. What its mass, place and size are known by is its prior. The motion cannot tell

@@ -1,4 +1,4 @@
-"""What `kinertia check` finds: of a person's recordings up to inverse kinematics, or of OpenSim models alone."""
+"""Runs `kinertia check`: a person's recordings up to inverse kinematics, or OpenSim models alone."""
 
 from __future__ import annotations
 

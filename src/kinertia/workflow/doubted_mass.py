@@ -1,4 +1,4 @@
-"""How well the stated mass is known where plates contradict it."""
+"""Widens the deviation of a stated mass that plates contradict."""
 
 from __future__ import annotations
 

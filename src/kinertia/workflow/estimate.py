@@ -1,4 +1,4 @@
-"""The whole way from recordings to body segment parameters: `estimate_bsp` and its steps."""
+"""Runs the whole way from recordings to body segment parameters: `estimate_bsp` and its steps."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which files make one recording, and what a person is of whom there are files only: for `kinertia check`."""
+"""Groups files into recordings and persons, for `kinertia check` without a subject file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Widths of knees, ankles and elbows: from the subject file, the static trial, or any other file of the person."""
+"""Finds the widths of knees, ankles and elbows: in the subject file, the static trial, or any other file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Inverse kinematics of all trials; a trial that cannot be solved is left out, unless none remains."""
+"""Runs inverse kinematics of all trials; one that cannot be solved is left out, unless none remains."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is known of this person's body besides the tables: measured segments, and the estimate of an earlier session.
+"""Collects what is known of this person's body besides the tables: measured segments, an earlier session.
 
 An earlier estimate takes the place of the literature's values and deviations; correlations stay the literature's, for
 a table of deviations has none. Measured parameters are then added as what they are, measurements with errors of their

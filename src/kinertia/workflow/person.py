@@ -1,4 +1,4 @@
-"""What is given of one person: recordings, marker set or model, what is stated, and what the user overrules."""
+"""Holds what is given of one person: recordings, marker set or model, statements, and what is overruled."""
 
 from __future__ import annotations
 

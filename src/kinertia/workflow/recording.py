@@ -1,4 +1,4 @@
-"""What one recording holds, beside what was found of it: facts for the terminal, the page and scripts."""
+"""Tabulates what one recording holds: facts for the terminal, the page and scripts."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Every question of the stages before inverse kinematics, asked of all recordings of a person at once.
+"""Asks every question of the stages before inverse kinematics, of all recordings of a person.
 
 `check` ends here and `fit` goes on from here, so that both ask the same questions. A trial with an open ERROR is left
 out; one of the person, or of the static trial, stops everything.

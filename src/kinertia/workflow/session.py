@@ -1,4 +1,4 @@
-"""Plates and clock of a session: what the trials of several people say of them, and what a fit makes of it."""
+"""Combines what the trials of several people say of a session's plates and synchronisation."""
 
 from __future__ import annotations
 

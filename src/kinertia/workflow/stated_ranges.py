@@ -1,4 +1,4 @@
-"""Ranges of motion that the user states of a person whose joints move farther than most, or less."""
+"""Applies ranges of motion that the user states of a person whose joints move more, or less, than most."""
 
 from __future__ import annotations
 

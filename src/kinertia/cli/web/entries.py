@@ -1,4 +1,4 @@
-"""The entries of a person's subject file: drafted from the files, corrected in a form, written for the command line."""
+"""Drafts, corrects and saves the entries of a person's subject file."""
 
 from __future__ import annotations
 

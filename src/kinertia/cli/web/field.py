@@ -1,4 +1,4 @@
-"""One entry of a form."""
+"""Describes one entry of a form."""
 
 from __future__ import annotations
 

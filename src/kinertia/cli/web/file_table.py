@@ -1,4 +1,4 @@
-"""What the files of a person are, as a table to correct: a row per file, and what it is used as.
+"""Lists the files of a person as a table to correct: a row per file, with its use.
 
 The table is another face of the subject file: `file_table` makes it of the entries, `with_uses` entries of it.
 """

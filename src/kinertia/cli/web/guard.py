@@ -1,4 +1,4 @@
-"""Who may ask: this browser, by the token in the address, and pages of this server only.
+"""Admits requests only from this browser, by the token in the address, and from pages of this server.
 
 Any web page may send requests to 127.0.0.1, and a name that leads there makes it read the answers too (DNS rebinding).
 So every request needs the token, the server's own name in `Host`, and no other site behind it.

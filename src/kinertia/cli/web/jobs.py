@@ -1,4 +1,4 @@
-"""Checks and fits at work: people wait in line, each is done in a process of its own, and says how far it is."""
+"""Queues checks and fits, runs each in a process of its own, and reports its progress."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The library: a folder of the user's with a folder for every person, which the command line reads as well.
+"""Manages the library: a folder with one folder per person, which the command line reads as well.
 
     Kinertia/
         Anna/

@@ -1,4 +1,4 @@
-"""Which marker is where on the body: as the marker set has it, to correct, and saved as a set of the person's own."""
+"""Shows where each marker is on the body, takes corrections, and saves them as a marker set."""
 
 from __future__ import annotations
 

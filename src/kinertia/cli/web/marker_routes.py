@@ -1,4 +1,4 @@
-"""The page of a person's markers: a figure to turn, what is missing, and a place for every label."""
+"""Serves the page of a person's markers: a figure to turn, what is missing, a place for every label."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The page of one person: what their files are, who they are, what the check found, and the results."""
+"""Assembles the page of one person: files, subject, findings of the check, results."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is missing in words of the page, for those who know no subject file."""
+"""Says in the page's words what a subject file lacks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Answers: pages from templates, files of results, and what a form said."""
+"""Makes responses: pages from templates, files of results, and errors of forms."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which address does what. Everything is a page, a form or a file; the state is in the library's folders."""
+"""Maps addresses to handlers. Everything is a page, a form or a file; the state is in the library's folders."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Entries of which a subject file has as many as there are, as rows of the form: measured segments, what is attached.
+"""Shows repeated entries of a subject file (measured segments, attached items) as rows of a form.
 
 What stands in a row is written as it was typed, numbers as numbers; what is wrong with it, `read_subject` says.
 """

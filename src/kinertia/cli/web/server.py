@@ -1,4 +1,4 @@
-"""The server behind `kinertia app`: on 127.0.0.1, for one browser, with a token in its address."""
+"""Runs the server behind `kinertia app`: on 127.0.0.1, for one browser, with a token in its address."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Files that are dropped on the page: their names made harmless, their size limited."""
+"""Accepts files that are dropped on the page: with harmless names, and of limited size."""
 
 from __future__ import annotations
 

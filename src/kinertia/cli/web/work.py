@@ -1,4 +1,4 @@
-"""Work in a process of its own: how far it is, when it will be done, and how it ended."""
+"""Runs work in a process of its own, with its progress, time left and outcome."""
 
 from __future__ import annotations
 

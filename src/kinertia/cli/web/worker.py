@@ -1,4 +1,4 @@
-"""A check or a fit of one person, in a process of its own: `python -m kinertia.cli.web.worker fit FOLDER`.
+"""Checks or fits one person in a process of its own: `python -m kinertia.cli.web.worker fit FOLDER`.
 
 With `prepare` alone it compiles what the first fit on a machine would compile.
 

@@ -1,4 +1,4 @@
-"""How fast the body is by its markers, and how fast the forces make it."""
+"""Computes the body's velocity by its markers, and as the horizontal forces would cause it."""
 
 from __future__ import annotations
 

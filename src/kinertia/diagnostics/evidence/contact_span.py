@@ -1,4 +1,4 @@
-"""Which part of a recording is measured: from the first load on a plate to the last, and a little around."""
+"""Finds the measured part of a recording: from the first load on a plate to the last, with a margin."""
 
 from __future__ import annotations
 

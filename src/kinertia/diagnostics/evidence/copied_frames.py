@@ -1,4 +1,4 @@
-"""Marker frames that repeat the one before them in all markers: lost frames that were filled with copies.
+"""Finds frames that repeat the one before in all markers: lost frames that were filled with copies.
 
 On 17 measured recordings of motions and ten synthetic ones no frame repeats the one before it.
 """

@@ -1,4 +1,4 @@
-"""Where the feet are and when they stand, from their markers alone: what loads on plates are compared with."""
+"""Follows feet by their markers: where they are, and when they stand."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Body mass by the vertical force, before inverse kinematics: by forces and markers alone.
+"""Computes body mass from vertical force and markers, before inverse kinematics.
 
 Over a window the mean vertical force is m (g + dv / T), where dv is how much faster upwards the body's centre moves at
 its end than at its beginning. The centre's velocity is that of the markers' centre, each segment at its usual share of

@@ -1,4 +1,4 @@
-"""Where the big toe is that has no marker: behind nothing else does a foot push off."""
+"""Estimates where the big toe is that has no marker, as the last point of push-off."""
 
 from __future__ import annotations
 

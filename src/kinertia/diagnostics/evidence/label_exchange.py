@@ -1,4 +1,4 @@
-"""Which labels fit a static trial or a model once they are exchanged?"""
+"""Finds the labels that fit a static trial or a model once they are exchanged."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where landmarks are, and which way feet and pelvis point: what tells a person's axes from the markers alone."""
+"""Locates landmarks and the heading of feet and pelvis: a person's axes from the markers alone."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What plates carry: how heavy the person is on them, and the samples under load."""
+"""Weighs the person on the plates, and lists the samples under load."""
 
 from __future__ import annotations
 

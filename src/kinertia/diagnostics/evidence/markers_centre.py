@@ -1,4 +1,4 @@
-"""Where the body is, by its markers alone: no model is fitted, so that nothing of ours can be wrong."""
+"""Approximates the body's centre by its markers alone, without a model."""
 
 from __future__ import annotations
 

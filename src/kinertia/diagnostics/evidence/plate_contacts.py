@@ -1,4 +1,4 @@
-"""Loads on plates while feet are near: when each begins and ends, and how far it is from both feet."""
+"""Pairs loads on plates with the feet near them: begin, end, and distance to both feet."""
 
 from __future__ import annotations
 

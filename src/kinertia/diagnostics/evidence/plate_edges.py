@@ -1,4 +1,4 @@
-"""What lies beyond the edges of the plates: centres of pressure, and parts of feet, whose load no plate measures."""
+"""Measures what lies beyond the edges of the plates: centres of pressure and parts of feet."""
 
 from __future__ import annotations
 

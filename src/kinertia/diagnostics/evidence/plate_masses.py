@@ -1,4 +1,4 @@
-"""How heavy the body is by each plate alone, while one foot stands on it and on nothing else."""
+"""Weighs the body on each plate alone, while one foot stands on it and nothing else is loaded."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Distances between markers of one segment, before and in a trial: they show whose body it is, and on which scale.
+"""Compares distances between markers of one segment: they show whose body it is, and the cameras' scale.
 
 Compared are pelvis, legs and feet: medians over the frames. The upper body is left out, whose skin moves with the arms.
 """

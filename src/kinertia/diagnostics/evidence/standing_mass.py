@@ -1,4 +1,4 @@
-"""How heavy a person is who stands still on plates, on one with both feet or on several."""
+"""Weighs a person who stands still on plates, on one with both feet or on several."""
 
 from __future__ import annotations
 

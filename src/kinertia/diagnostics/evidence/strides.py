@@ -1,4 +1,4 @@
-"""Whether a person takes strides while plates are stood on, and how long they last."""
+"""Finds out whether a person takes strides while plates are loaded, and how long they last."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Single trajectories that no body part makes: spikes, jumps, frozen markers, gaps filled with straight lines.
+"""Finds impossible trajectories: spikes, jumps, frozen markers, gaps filled with straight lines.
 
 A body is slow: from one frame to the next a marker goes nearly as far as it did before and will do after. By how much
 it does not, its step, is at most 12 mm on the fault-free trials at hand (60 frames a second and more, runs and jumps

@@ -1,4 +1,4 @@
-"""Does the body go up and down as the vertical forces make it: with a delay, an ever longer one, or other gains?
+"""Compares the vertical acceleration of the markers with the vertical force: delay, rate and gains.
 
 Vertical velocities tell these apart within two steps: a delay shifts them, a wrong rate shifts the last more than the
 first, and a wrong gain of one plate adds to them whenever that plate is stood on.

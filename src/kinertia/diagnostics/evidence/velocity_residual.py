@@ -1,4 +1,4 @@
-"""How far the velocity that horizontal forces cause is from the body's, as read and without one of some faults."""
+"""Compares the body's velocity with the one that forces cause, as read and without a supposed fault."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is asked of the labels of one recording."""
+"""Lists the questions about the labels of one recording."""
 
 from __future__ import annotations
 

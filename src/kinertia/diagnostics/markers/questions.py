@@ -1,4 +1,4 @@
-"""What is asked of the markers of one recording."""
+"""Lists the questions about the markers of one recording."""
 
 from __future__ import annotations
 

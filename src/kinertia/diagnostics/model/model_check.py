@@ -1,4 +1,4 @@
-"""A model's masses and inertias in tables, by segment next to the literature."""
+"""Tabulates a model's masses and inertias, by segment next to the literature."""
 
 from __future__ import annotations
 

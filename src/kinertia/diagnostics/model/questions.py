@@ -1,4 +1,4 @@
-"""Questions about OpenSim models, alone or with the trials of a person."""
+"""Lists the questions about OpenSim models, alone or with the trials of a person."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether feet are seen from heel to forefoot, and land on the heel: else loads are not where they are expected."""
+"""Finds out whether feet are seen from heel to forefoot and land on the heel, as loads are expected to."""
 
 from __future__ import annotations
 

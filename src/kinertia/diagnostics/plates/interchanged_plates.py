@@ -1,4 +1,4 @@
-"""Loads that lie where another plate is: channels, or corners, of two plates interchanged."""
+"""Finds loads that lie where another plate is: channels, or corners, of two plates interchanged."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Questions of where loads act, and of when: one competition of plates, rates and delays, and what depends on it."""
+"""Lists the questions of where loads act and when: plates, rates and delays compete as explanations."""
 
 from __future__ import annotations
 

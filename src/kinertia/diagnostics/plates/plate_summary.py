@@ -1,4 +1,4 @@
-"""What force plates show before any model: who stands on them and when."""
+"""Summarises each force plate before any model: who stands on it and when."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Plates that are rotated or mirrored in the file: one correction would put the centre of pressure under the feet.
+"""Finds plates that are rotated or mirrored in the file: undone, the centre of pressure is under the feet.
 
 A load goes from the heel to the ball of its foot. On fourteen fault-free trials it is 16 to 75 mm from there (RMS over
 a whole contact); about the middle of a rotated or mirrored plate, 106 mm and more.

@@ -1,4 +1,4 @@
-"""What is asked of the plates' signals, in static trials too, and of the loads once they are sorted by foot."""
+"""Lists the questions about the plates' signals, and about the loads once they are sorted by foot."""
 
 from __future__ import annotations
 

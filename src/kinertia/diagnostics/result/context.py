@@ -1,4 +1,4 @@
-"""What questions about a result are asked of: the fit, and the person that it was made of."""
+"""Holds what questions about a result are asked of: the fit, and the person that it was made of."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Errors of instruments that an estimate has put right, as findings: their size, and how sure their cause is.
+"""Reports instrument errors that an estimate has corrected: their size, and how sure their cause is.
 
 Where an error moves joint moments beyond their error bars and nothing contradicts it, the instrument is its cause. Else
 it may as well be the model's own: soft tissue that lags looks like late forces, a trunk that bends like a displaced

@@ -1,4 +1,4 @@
-"""Masses that an estimate found, against stated ones and against forces: S11, S40 and R10."""
+"""Compares estimated masses with stated ones and with the forces: S11, S40 and R10."""
 
 from __future__ import annotations
 

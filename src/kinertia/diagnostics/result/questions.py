@@ -1,4 +1,4 @@
-"""What is asked of an estimate, and of a result."""
+"""Lists the questions about an estimate, and about a result."""
 
 from __future__ import annotations
 

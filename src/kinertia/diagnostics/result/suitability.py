@@ -1,4 +1,4 @@
-"""What a result may be used for: a line per output, with its reason and a number.
+"""Rates the fitness of each output for its use, with a reason and a number.
 
 Findings judge the estimate as a whole; here follows from them what that means for each of the things that people take
 from it: an ERROR that affects it bars its use, a WARNING makes it one with care.

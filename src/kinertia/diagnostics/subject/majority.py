@@ -1,4 +1,4 @@
-"""Two recordings disagree: which of them is the odd one, by all others?"""
+"""Decides which of two recordings that disagree is the odd one, by all others."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Questions about a person: the static trial alone, and all recordings together."""
+"""Lists the questions about a person: the static trial alone, and all recordings together."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which ranges of motion are the user's word."""
+"""Reports the ranges of motion that the user states."""
 
 from __future__ import annotations
 

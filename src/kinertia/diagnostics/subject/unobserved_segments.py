@@ -1,4 +1,4 @@
-"""What it costs that markers do not show the upper body.
+"""Reports what it costs that markers do not show the upper body.
 
 The figures are differences of the joint moments (RMS over the window) with and without the markers of arms and head, or
 of all of the upper body, in the walks of gait2354 and of Rajagopal's model: 1 to 7 N m in the legs and 3 to 11 N m at

@@ -1,4 +1,4 @@
-"""Do forces keep time with how the body goes up and down? Where nobody takes strides, that decides of their times.
+"""Tests the timing of forces by the body's vertical acceleration; it decides where nobody takes strides.
 
 Who lands on the toes, sways or holds a foot in the air has markers of the feet that are slow, or quick, at other times
 than plates are loaded. But a landing changes the body's velocity by metres a second, so that a delay shows.

@@ -1,4 +1,4 @@
-"""Questions of timing: the belt and the events of one recording, and the forces of several."""
+"""Lists the questions of timing: belt and events of one recording, forces of several."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What bodies and loads make of the forces of axes and of their derivatives, frame by frame in compiled code.
+"""Computes the columns that bodies and loads give to the forces of axes, frame by frame in compiled code.
 
 A load f on a segment takes S . f off the force of every axis S that moves the segment.
 """

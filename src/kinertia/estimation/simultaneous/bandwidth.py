@@ -1,4 +1,4 @@
-"""Which bandwidth the motion of a trial has in the simultaneous estimate, and its forces.
+"""Chooses the bandwidth of a trial's motion, and that of its forces.
 
 The spacing of the motion's splines is a bandwidth: accelerations above it do not exist. What it must be is written in
 the ground reactions, whose sum is the body's mass times the acceleration of its centre of mass, and has none of the

@@ -1,4 +1,4 @@
-"""Triangular factors, solutions and products of matrices in place, by the BLAS and LAPACK that SciPy brings along.
+"""Factorises, solves and multiplies matrices in place, by the BLAS and LAPACK of SciPy.
 
 SciPy's own wrappers keep the interpreter to themselves while they run; these leave it to other threads. Matrices are
 row-wise (C order) and of one precision; BLAS takes them column by column, where each is its own transpose.

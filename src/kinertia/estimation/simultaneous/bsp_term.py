@@ -1,4 +1,4 @@
-"""Body segment parameters: their unknowns, and what they cost against the literature and the scale."""
+"""Adds body segment parameters: their unknowns, and their cost against the literature and the scale."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`CalibrationEntry`: one quantity that the estimate calibrates, in the terms of the table that users read."""
+"""Defines `CalibrationEntry`: one calibrated quantity, in the terms of the table that users read."""
 
 from __future__ import annotations
 

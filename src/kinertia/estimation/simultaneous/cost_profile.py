@@ -1,4 +1,4 @@
-"""The posterior of a trial's delay from the profile of the cost: everything else at its best for each delay.
+"""Integrates the posterior of a trial's delay over the profile of the cost: all else at its best for each delay.
 
 One linearisation says too much of the delay: how forces change over milliseconds goes with motion and body, and the
 second derivatives that Gauss and Newton leave out make the profile wider than they expect, by a fifth to a quarter in

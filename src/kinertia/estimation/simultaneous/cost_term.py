@@ -1,4 +1,4 @@
-"""A cost term of the simultaneous estimate: unknowns that it adds, what it costs, and what it reads from the solution.
+"""Defines a cost term: the unknowns that it adds, its cost, and what it reads from the solution.
 
 `terms.TERMS` lists them. The estimate knows no term by name; what terms have to do with one another goes through
 `FreedModel`, the unknowns' names in `Layout`, and the ground reactions (`GroundLoads`), which terms may change.

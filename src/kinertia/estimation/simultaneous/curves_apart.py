@@ -1,4 +1,4 @@
-"""How far apart the curves of estimates are that differ only in where knots lie (`knot_phases`)."""
+"""Measures how far apart curves of estimates are that differ only in where knots lie (`knot_phases`)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The motion of a trial eliminated from its normal equations, from both ends to the middle, stretch by stretch.
+"""Eliminates the motion of a trial from its normal equations, from both ends to the middle.
 
 Stretches are assembled and eliminated in turn; each passes its contribution to the block at which it ends on. Those
 before the middle begin with the first block, those after it with the last, in a thread of their own: they meet in one

@@ -1,4 +1,4 @@
-"""How likely a recording is beside the same one read otherwise: with free moments of the other sign, for instance.
+"""Computes the evidence for a recording against the same one read otherwise, as with reversed free moments.
 
 The evidence is the chance of the data with everything unknown integrated out: motion, body and calibration by the
 quadratic at the optimum (Laplace), instruments by their exact priors, sound or faulty in every combination. The lowest

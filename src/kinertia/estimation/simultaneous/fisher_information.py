@@ -1,4 +1,4 @@
-"""Error bars before any estimate: what trials tell at a given motion and given body segment parameters.
+"""Predicts error bars before any estimate: what trials tell at a given motion and body.
 
 The information of the simultaneous estimate (`simultaneous`) does not depend on the data but through the point at which
 it is taken. Taken at the literature's parameters it says beforehand what a recording will show; taken at the truth it

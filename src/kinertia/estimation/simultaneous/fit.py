@@ -1,4 +1,4 @@
-"""The simultaneous estimate on measured trials of one person: priors, observations, outcome in the user's terms."""
+"""Runs the simultaneous estimate on measured trials of one person: priors, observations, outcome."""
 
 from __future__ import annotations
 

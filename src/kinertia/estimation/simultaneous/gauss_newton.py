@@ -1,4 +1,4 @@
-"""The quadratic that Gauss and Newton put in place of the cost, at one point: which step answers a gradient."""
+"""Builds the Gauss-Newton quadratic of the cost at one point: which step answers a gradient."""
 
 from __future__ import annotations
 

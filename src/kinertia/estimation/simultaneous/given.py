@@ -1,4 +1,4 @@
-"""What the simultaneous estimate is given, and the model of the person as its unknowns have it."""
+"""Holds the inputs of the simultaneous estimate, and the person's model as its unknowns have it."""
 
 from __future__ import annotations
 

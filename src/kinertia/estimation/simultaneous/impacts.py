@@ -1,4 +1,4 @@
-"""Where ground reactions change faster than the motion can: there they say less of it.
+"""Finds where ground reactions change faster than the motion can, and weighs them less there.
 
 When a foot lands, soft parts of the body swing after its bones, and the sum of the forces has a part that splines of
 the motion's bandwidth cannot make. Which of it they can make depends on where the landing lies between two knots. Taken

@@ -1,4 +1,4 @@
-"""Errors of plates and synchronisation that an estimate found and put right, with what supports an accusation.
+"""Lists plate and synchronisation errors that were corrected, with what supports an accusation.
 
 Of any error beyond two prior and two posterior deviations the instrument is the likely cause only where it also moves
 a joint moment beyond that moment's own error bar and is contradicted by nobody (`instrument_support`). It may as well

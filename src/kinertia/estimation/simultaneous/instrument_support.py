@@ -1,4 +1,4 @@
-"""What supports an accusation of an instrument: that its error moves joint moments, and that no trial contradicts it.
+"""Tests what supports an accusation: the error moves joint moments, and no trial contradicts it.
 
 The estimate puts every instrument right by what it finds. Much of what it finds may be the model's own error: soft
 tissue that lags looks like late forces, a trunk that bends like a plate elsewhere. Whoever is told to check a plate

@@ -1,4 +1,4 @@
-"""Errors of force plates and synchronisation as a cost term: of the laboratory's in all trials, and of each trial."""
+"""Adds errors of force plates and synchronisation: the laboratory's in all trials, and each trial's."""
 
 from __future__ import annotations
 

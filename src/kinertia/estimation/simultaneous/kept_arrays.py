@@ -1,4 +1,4 @@
-"""Arrays kept in a temporary file, for what a long trial needs again and has no room for in memory."""
+"""Keeps the arrays of a long trial, for which memory is too small, in a temporary file."""
 
 from __future__ import annotations
 

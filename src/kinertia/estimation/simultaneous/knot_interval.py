@@ -1,4 +1,4 @@
-"""Terms of the frames of a knot interval, weighed with the splines that are active, in a trial's normal equations.
+"""Weighs the terms of a knot interval's frames with its active splines, in a trial's normal equations.
 
 The same six splines are active in all frames of an interval, and seven with the two frames after it.
 """

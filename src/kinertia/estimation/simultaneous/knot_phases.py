@@ -1,4 +1,4 @@
-"""What an estimate owes to where the knots of its splines lie, and its average over that.
+"""Averages an estimate over where the knots of its splines lie, and adds the spread to its covariance.
 
 Knots are a choice of ours. A trial that begins a frame later has them elsewhere, and what is barely seen (the clock,
 plates, single segments) then comes out otherwise, by up to several deviations where the motion has hardly anything

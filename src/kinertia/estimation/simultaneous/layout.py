@@ -1,4 +1,4 @@
-"""Where the unknowns that do not move stand in the vector of the simultaneous estimate."""
+"""Places the static unknowns in the vector of the simultaneous estimate."""
 
 from __future__ import annotations
 

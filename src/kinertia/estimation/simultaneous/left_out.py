@@ -1,4 +1,4 @@
-"""What unknowns change that are left out of the vector, since they only displace others for the data."""
+"""Adds the variance of unknowns that are left out of the vector, since they only displace others."""
 
 from __future__ import annotations
 

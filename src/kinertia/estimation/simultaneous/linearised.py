@@ -1,4 +1,4 @@
-"""A point of the estimate, and what the cost looks like there."""
+"""Holds a point of the estimate, and the linearised cost there."""
 
 from __future__ import annotations
 

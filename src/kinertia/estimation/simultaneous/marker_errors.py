@@ -1,4 +1,4 @@
-"""Errors of markers that are alike from frame to frame: their information, banded in time.
+"""Computes the information of marker errors that are alike from frame to frame, banded in time.
 
 The errors of a marker coordinate are a second-order autoregressive process with the poles r and s,
 

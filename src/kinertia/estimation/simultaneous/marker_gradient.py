@@ -1,4 +1,4 @@
-"""Where markers pull motion and what does not move: the gradient of `marker_terms` alone, in a tenth of the time."""
+"""Computes the gradient of `marker_terms` alone, in a tenth of the time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How noisy the markers of a trial are: deviations, and over how many frames and in how many markers errors are alike.
+"""Estimates marker noise: deviations, and over how many frames and markers errors are alike.
 
 Skin motion lasts for many frames. Its deviation and correlation length are read from the errors that inverse kinematics
 leaves, without what of them goes with the joints (`skin`). The deviation is inflated by the square root of the number

@@ -1,4 +1,4 @@
-"""Markers that sit a little elsewhere in each trial: skin is drawn along by the posture of a motion.
+"""Lets markers sit a little elsewhere in each trial, as the posture of a motion draws the skin.
 
 Squats carry the thigh's markers a centimetre from where a walk has them. Every trial therefore has its own displacement
 of each marker from its place in the segment, with a prior deviation that is read from how much the trials differ

@@ -1,4 +1,4 @@
-"""Where markers are in their segments, in all trials and how far from there in each."""
+"""Adds the positions of markers in their segments: one for all trials, and offsets in each."""
 
 from __future__ import annotations
 

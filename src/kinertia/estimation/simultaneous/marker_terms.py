@@ -1,4 +1,4 @@
-"""Terms of the markers in a trial's normal equations, for errors that are alike from frame to frame.
+"""Adds the markers to a trial's normal equations, for errors that are alike from frame to frame.
 
 With J the derivative of the markers by the coordinates that move, S that by what does not (static coordinates, marker
 positions, then coefficients of skin motion: `skin`), r = measured - model and W the information on the errors

@@ -1,4 +1,4 @@
-"""What the simultaneous estimate may move beside the segments of its prior, and what it leaves alone."""
+"""Decides what the simultaneous estimate may move beside the segments of its prior."""
 
 from __future__ import annotations
 

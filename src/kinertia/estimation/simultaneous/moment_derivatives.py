@@ -1,4 +1,4 @@
-"""Joint moments, and their and the ground reactions' derivatives by motion, body segment parameters and calibration."""
+"""Computes joint moments, and the derivatives of these and of ground reactions by all unknowns."""
 
 from __future__ import annotations
 

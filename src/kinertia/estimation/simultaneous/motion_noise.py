@@ -1,4 +1,4 @@
-"""How strong the markers' errors are where joint moments feel them.
+"""Measures how strong the markers' errors are where joint moments feel them.
 
 The process that stands for the errors (`marker_errors`) is true to the slowest of them, which tell most of what does
 not move, and to what is new from frame to frame. Between the two, where the body's accelerations are, it may have many

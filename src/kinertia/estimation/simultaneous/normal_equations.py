@@ -1,4 +1,4 @@
-"""Normal equations of a trial's motion and of what does not move, summed over frames knot interval by knot interval."""
+"""Sums the normal equations of a trial's motion and of static unknowns, knot interval by knot interval."""
 
 from __future__ import annotations
 

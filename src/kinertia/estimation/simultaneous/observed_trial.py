@@ -1,4 +1,4 @@
-"""What the simultaneous estimate takes of a trial and of a laboratory: see `observation` for where it comes from."""
+"""Holds the observations of a trial and of a laboratory: `observation` makes them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Is one side heavier than the other than people are? What a prosthesis, an orthosis, a cast or an ankle weight does.
+"""Tests whether one side is heavier than the other, as with a prosthesis, an orthosis or an ankle weight.
 
 People's left and right are alike (the prior's correlation is 0.9), so that a wrong mass of one leg pulls the sound leg
 along: the moves of the two sides look alike, the difference between them does not. So differences are what is judged,

@@ -1,4 +1,4 @@
-"""Outcome of the simultaneous estimate: where its search ended, in units and names of measured things."""
+"""Defines the outcome of the simultaneous estimate, in units and names of measured things."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Plate loads corrected for the plates' errors, and their derivatives by these errors, in compiled code.
+"""Corrects plate loads for the plates' errors, with derivatives by these errors, in compiled code.
 
 A load that somebody adds to a plate is first freed of the plate's zeros, then turned about the vertical through the
 plate's middle, moved to where the plate stands, given the vertical moment that crosstalk took, and multiplied by the

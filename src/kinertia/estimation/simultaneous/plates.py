@@ -1,4 +1,4 @@
-"""What force plates and clock may have wrong, and the ground reactions once that is put right.
+"""Defines the errors of force plates and synchronisation, and corrects ground reactions for them.
 
 Each plate may stand off its recorded place in the floor's plane, have a wrong gain, read a vertical moment that is not
 there, in proportion to the vertical force (crosstalk of its channels), and have a zero of its horizontal forces that is

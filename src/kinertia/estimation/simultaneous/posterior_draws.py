@@ -1,4 +1,4 @@
-"""Draws of motion, body segment parameters and calibration together, from the posterior of the simultaneous estimate.
+"""Draws motion, body segment parameters and calibration together from the posterior.
 
 A draw of the static unknowns is their covariance's root times independent normal numbers. The motion follows it through
 the border of the normal equations, and departs from it by what markers leave open: `Eliminated.motion_step` does both

@@ -1,4 +1,4 @@
-"""The simultaneous estimate as one cost of all unknowns: its normal equations and its gradient at a point.
+"""Sums the cost of all terms: normal equations and gradient at a point.
 
 The cost is the sum of its terms (`terms.TERMS`), each of which adds unknowns, what it costs and what it reads out of
 the solution. All derivatives are analytic. Frames are summed knot interval by knot interval: the normal matrix is

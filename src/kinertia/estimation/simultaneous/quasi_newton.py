@@ -1,4 +1,4 @@
-"""Steps of a quasi-Newton search: what gradients along the way show beyond a quadratic that is known (L-BFGS).
+"""Takes quasi-Newton steps (L-BFGS) on top of a known quadratic.
 
 Gauss and Newton leave out second derivatives of the residuals. Along a few nearly flat directions these are as large as
 what is left in: there their steps are up to twice too long, or half as long as they should be, again and again. A pair

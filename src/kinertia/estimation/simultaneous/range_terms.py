@@ -1,4 +1,4 @@
-"""Terms of the coordinates' ranges in a trial's normal equations: beyond its range a coordinate pays, within it not.
+"""Penalises coordinates beyond their ranges, in a trial's normal equations.
 
 Where markers hardly show a coordinate, the turn of a forearm above all, the estimate would send it through poses that
 no joint has, in long steps that do not end. What is paid is one-sided: the square of what is beyond, over a deviation,

@@ -1,4 +1,4 @@
-"""How often the marker errors of trials come back: with every stride, and in the other trials of the person.
+"""Estimates how much of the marker errors repeats with every stride, and in the person's other trials.
 
 Skin motion goes with the joints: it is the same in every stride, and in the next walk. Errors that come back do not
 average out. Neither do those of a rigid model, which go with the same strides. What so many strides and trials say

@@ -1,4 +1,4 @@
-"""Where the root equations pull motion and what does not move: the gradient of `root_columns` without its derivatives.
+"""Computes the gradient of the root equations alone, without the derivatives of `root_columns`.
 
 With L the residual over its variance, as a motion at the ground origin, and I, B, f, S, P, Q of `rigid_body`, the pull
 on an axis' place, rate and acceleration is

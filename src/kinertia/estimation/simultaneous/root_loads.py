@@ -1,4 +1,4 @@
-"""The root equations as a cost term: what the ground reactions leave unexplained of the body's motion."""
+"""Adds the root equations: what ground reactions leave unexplained of the body's motion."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The root equations at some frames of a trial: linearised, or where they pull, over their deviations."""
+"""Evaluates the root equations at some frames of a trial, linearised or as a gradient, over their deviations."""
 
 from __future__ import annotations
 

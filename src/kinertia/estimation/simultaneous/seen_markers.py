@@ -1,4 +1,4 @@
-"""Markers of a trial as compiled functions take them, and where they are in a frame."""
+"""Holds the visible markers of a trial for compiled functions, and their positions in a frame."""
 
 from __future__ import annotations
 

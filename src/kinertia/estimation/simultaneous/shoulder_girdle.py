@@ -1,4 +1,4 @@
-"""How far the shoulders move in the trunk: an error that all markers of an arm share.
+"""Models how far the shoulders move in the trunk: an error that all markers of an arm share.
 
 The models hold the shoulder's centre in the trunk. A person's hangs on the clavicle, which rises and goes back with the
 arm: by 6 and 16 degrees while the arm is raised by some 110 (Ludewig et al. 2009, J Bone Joint Surg Am 91:378). Elbow

@@ -1,4 +1,4 @@
-"""Skin that moves with the joints: what of the markers' errors the angles beside them tell.
+"""Predicts skin motion from joint angles: the part of markers' errors that these explain.
 
 Skin is drawn along by the joints at both ends of its segment (Camomilla et al. 2013, J Biomech 46:2328; Bonci et al.
 2014, J Biomech 47:2354). A marker m stands at

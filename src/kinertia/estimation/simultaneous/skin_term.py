@@ -1,4 +1,4 @@
-"""Skin that moves with the joints, as a cost term: the coefficients of what markers follow."""
+"""Adds skin that moves with the joints: the coefficients of what markers follow."""
 
 from __future__ import annotations
 

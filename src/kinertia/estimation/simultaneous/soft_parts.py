@@ -1,4 +1,4 @@
-"""How root errors grow while the body is accelerated: soft parts swing after its bones, and joints give way.
+"""Lets root errors grow while the body is accelerated: soft tissue swings after its bones.
 
 Trials of one person on the same plates contradicted one another about the clock, plates and masses, jumps most of all,
 as long as a frame of a jump counted as much as one of standing. What rigid segments leave out is in proportion to the

@@ -1,4 +1,4 @@
-"""Motion, body segment parameters and calibration in one maximum-a-posteriori estimate.
+"""Finds motion, body segment parameters and calibration in one maximum-a-posteriori estimate.
 
 Unknowns are the quintic spline coefficients of every coordinate (uniform knots; their spacing follows the cutoff), and
 what the cost terms add that does not move in time (`terms`), some of it displaced in each of several trials

@@ -1,4 +1,4 @@
-"""Prior of an instrument that is sound most of the time, and far off when it is not.
+"""Defines the prior of an instrument that is sound most of the time, and far off when it is not.
 
 A single Gaussian serves neither kind of laboratory. One wide enough for a plate that stands 20 mm off its recorded
 place lets a sound one wander by as much as skin motion says, and the joint moments with it; and the error of one plate

@@ -1,4 +1,4 @@
-"""Terms that tie the motion to its start, in a trial's normal equations: what no marker and no force shows stays there.
+"""Ties the motion to its start, where no marker and no force shows it.
 
 The outermost splines hardly touch the data, and markers may be missing for a while. A spline coefficient that nothing
 else asks about goes where its neighbours go: the move from the start may change from one coefficient to the next, by

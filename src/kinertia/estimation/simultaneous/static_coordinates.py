@@ -1,4 +1,4 @@
-"""Static coordinates: where joint centres are and how joint axes are tilted, the same in all trials."""
+"""Adds joint centres and tilts of joint axes, which are the same in all trials."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Information on the static unknowns, those that only the markers see eliminated: their positions and the skin.
+"""Eliminates unknowns that only markers see from the information on the static unknowns.
 
 These are many, and always have a prior that holds them. What is left, body and calibration, may come near the edge of
 what is physically possible, where the logarithm of a second moment tells nothing any more and the information on it may

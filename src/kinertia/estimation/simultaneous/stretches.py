@@ -1,4 +1,4 @@
-"""A trial in stretches: two halves for two threads, and of a long trial's normal equations only so much in memory.
+"""Splits a trial into stretches of frames: for two threads, and to bound the memory of a long one.
 
 Splines see only their neighbours. Those of one stretch can be eliminated as soon as all frames that touch them are
 summed, and what follows needs of them one block only (`elimination`). The frames of a stretch touch its own splines and

@@ -1,4 +1,4 @@
-"""How far the masses that a task shows are from those of another: what moves with the thigh depends on the task.
+"""Estimates how far masses depend on the task, such as what moves with the thigh in squats.
 
 A thigh has mass that follows the pelvis when the hip is bent (buttock, hamstrings), and soft parts that follow neither.
 Trials of one person agreed on the mass of a thigh within a task and not between tasks: 8.8 +- 0.7 kg walking, 6.9

@@ -1,4 +1,4 @@
-"""The cost terms of the simultaneous estimate. A new unknown is one more of them."""
+"""Lists the cost terms of the simultaneous estimate. A new unknown is one more of them."""
 
 from __future__ import annotations
 

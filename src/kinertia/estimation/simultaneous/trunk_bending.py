@@ -1,4 +1,4 @@
-"""How a trunk that bends departs from a rigid one: part of it stays upright while the trunk leans.
+"""Models how a bending trunk departs from a rigid one: part of it stays upright while the trunk leans.
 
 Markers on chest and shoulders lean with the upper trunk. Head, abdomen and spine follow them only in part, so that some
 mass is nearer to the vertical through the trunk's lowest joint than a rigid trunk has it. A mass m at the height h over

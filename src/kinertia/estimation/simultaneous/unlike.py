@@ -1,4 +1,4 @@
-"""Is the person unlike the prior? One number for all that the data say, where single parameters say little.
+"""Tests whether a person as a whole is unlike the prior, where single parameters say little.
 
 What the data show are combinations of parameters. Along each, the estimate's distance from the prior's mean is normal
 with the variance that the data took away from the prior's, if prior and model hold; over the combinations that the data

@@ -1,4 +1,4 @@
-"""The plane that parts a standing person into left and right, from the symmetry of the markers."""
+"""Finds the sagittal plane of a standing person from the symmetry of the markers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Points of a recording that nobody wore: bone axes, joint centres, projections and copies of other points."""
+"""Finds computed points of a recording: bone axes, joint centres, projections and copies."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the labels of markers hint at: the side, the landmark, the segment, and points that nobody wore."""
+"""Reads hints from marker labels: side, landmark, segment, and computed points."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Landmarks of pelvis, legs and feet of a standing person, from the pelvis down."""
+"""Finds landmarks of pelvis, legs and feet of a standing person, from the pelvis down."""
 
 from __future__ import annotations
 

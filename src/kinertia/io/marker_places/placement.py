@@ -1,4 +1,4 @@
-"""Which marker is where on somebody who stands: landmarks, segments, and why."""
+"""Assigns markers of a standing person to landmarks and segments, with the reason for each."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which segment the markers of a standing person move with, by the landmarks around them."""
+"""Assigns the markers of a standing person to segments, by the landmarks around them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The markers of somebody who stands, in body axes, with what their labels hint at."""
+"""Expresses the markers of a standing person in body axes, with the hints of their labels."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Landmarks of the trunk and the arms of a standing person; arms may be anywhere, and need the hints of labels more."""
+"""Finds landmarks of trunk and arms of a standing person; arms may be anywhere and rely more on labels."""
 
 from __future__ import annotations
 

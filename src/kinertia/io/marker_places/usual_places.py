@@ -1,4 +1,4 @@
-"""Where markers of people who stand upright are, as shares of the stature: forward, up and outward (x, y, z).
+"""Tabulates where markers of people who stand are, as shares of the stature: forward, up, outward (x, y, z).
 
 Means and deviations were set by hand from published standing trials of adults and children, with room for posture.
 """

@@ -1,4 +1,4 @@
-"""An OpenSim model file with other mass properties (and marker and joint places, where these were calibrated).
+"""Writes other mass properties, markers and joint places into an OpenSim model file.
 
 Only the numbers that change are replaced in the file's own text; everything else stays byte for byte.
 """

@@ -1,4 +1,4 @@
-"""A skeleton built here (the 27-DOF model) as an OpenSim model file.
+"""Writes a skeleton built here (the 27-DOF model) as an OpenSim model file.
 
 Every joint becomes a CustomJoint (or a WeldJoint) with the skeleton's own coordinate names. Locked coordinates are
 constants: those at the beginning and end of a joint place its frames in parent and child, those between moving axes

@@ -1,4 +1,4 @@
-"""Joints of an OpenSim file, format 3 or 4, as axes in order: translations first, then body-fixed rotations.
+"""Reads joints of an OpenSim file, format 3 or 4, as axes in order: translations, then body-fixed rotations.
 
 OpenSim's joints are all such lists; a CustomJoint says by which function of which coordinate each axis moves, the
 others have one coordinate per axis. Constant axes become locked coordinates of their own (`<joint>/<axis>`).

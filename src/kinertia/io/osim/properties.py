@@ -1,4 +1,4 @@
-"""Properties of an OpenSim file's elements as Python values, with the file's defaults; errors name the line."""
+"""Reads properties of an OpenSim file's elements as Python values, with defaults; errors name the line."""
 
 from __future__ import annotations
 

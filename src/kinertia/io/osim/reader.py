@@ -1,4 +1,4 @@
-"""OpenSim model files (.osim, formats 3 and 4): bodies, joints, coordinates and markers as a `Skeleton`.
+"""Reads OpenSim model files (.osim, formats 3 and 4): bodies, joints, coordinates, markers as a `Skeleton`.
 
 Muscles, wrapping, geometry and controllers are not read; `kinertia.io.osim.editor` hands them through untouched. What
 cannot be represented is an error that names it.

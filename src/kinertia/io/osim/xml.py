@@ -1,4 +1,4 @@
-"""XML elements with their line and their place in the file, so that a single value can be replaced.
+"""Parses XML with each element's line and place in the file, so that a single value can be replaced.
 
 OpenSim files go back to the user with everything byte for byte that Kinertia did not estimate; that rules out parsing
 and writing again.
