@@ -35,21 +35,25 @@ def test_norms_and_scores(fit, demo_run, controls, tmp_path):
     table = pd.read_csv(file)
     assert set(table.convention) == {"Kinertia gait27"}
     assert (table.n.max(), table.age_years_min[0], table.age_years_max[0]) == (3, 20.0, 40.0)
-    assert {"foot_progression_angle", "knee_angle_moment", "ground_force_upward"} <= set(table.quantity)
+    assert {"foot_progression_clinical", "knee_angle_moment", "ground_force_upward"} <= set(table.quantity)
     norm = read_norms(file)["knee_angle_angle"]
-    assert (norm.people, norm.convention) == (3, "Kinertia gait27")
+    assert (norm.people, norm.convention, norm.age_years) == (3, "Kinertia gait27", (20.0, 40.0))
+    assert "norms mix" not in outcome.out
     results = tmp_path / "out"
     results.mkdir()
     shutil.copy(demo_run[1] / FIT_FILE, results)
     outcome = run("report", results, "--norms", file)
     assert outcome.status == 0, outcome.err
     assert "Gait Profile Score" in outcome.out
-    assert "note" not in outcome.out
+    notes = [line for line in outcome.out.splitlines() if line.startswith("note: ")]
+    assert all("years" in line or "m/s" in line or "Age" in line for line in notes)
     page = (results / "report.html").read_text(encoding="utf-8")
     assert "Gait Profile Score" in page
     assert "norm, right" in json.dumps(figures_of(page), default=str)
     scores = list(csv.DictReader((results / "gps.csv").open(encoding="utf-8")))
     assert len(scores) == 21
+    cycles = pd.read_csv(results / "cycles.csv")
+    pd.testing.assert_frame_equal(fit.cycles(norms=file), cycles, rtol=1e-4, check_dtype=False)
     pd.testing.assert_frame_equal(fit.gps(file).table, pd.read_csv(results / "gps.csv"), rtol=1e-4, check_dtype=False)
 
 

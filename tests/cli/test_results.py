@@ -42,7 +42,8 @@ def test_the_report_with_norms(fit, results):
     grouped.reset_index().to_csv(file, index=False)
     outcome = run("report", results, "--norms", file)
     assert outcome.status == 0, outcome.err
-    assert "note" not in outcome.out
+    assert outcome.out.count("note") == 1
+    assert "note: The norms state no convention" in outcome.out
     figures = figures_of((results / "report.html").read_text(encoding="utf-8"))
     assert json.dumps(figures).count("norm, mean ") > 20
     file.write_text("quantity,percent,mean,sd\nknee_angle_moment,0,0,1\nkneecap,0,0,1\n")

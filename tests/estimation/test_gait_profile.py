@@ -3,17 +3,20 @@
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from kinertia.errors import KinertiaError
-from kinertia.estimation.gait_profile import gait_profile, variable_score
-from kinertia.estimation.gait_scores import FOOT_PROGRESSION, VARIABLES
-from kinertia.estimation.mean_cycles import convention_of, mean_curves, opposite_on_left
-from kinertia.estimation.normative_bands import Control, band_columns
+from kinertia.estimation.gait_profile import gait_profile, remarks
+from kinertia.estimation.gait_scores import variable_score, with_norms
+from kinertia.estimation.mean_cycles import convention_of, mean_curves
+from kinertia.estimation.normative_bands import Control, band_columns, mixture
 from kinertia.io.norms_file import Norm
+from kinertia.model.opposite_coordinates import opposite_on_left
+from kinertia.motion.clinical_angles import CLINICAL_ANGLES
 from kinertia.motion.gait_cycle import PERCENT, feet_under_pelvis
 
-OFFSETS = dict(zip(VARIABLES, (1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0), strict=True))
+OFFSETS = dict(zip(CLINICAL_ANGLES, (1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0), strict=True))
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +44,7 @@ def test_scores_are_root_mean_squares(fit, curves, sides):
     for name, offset in OFFSETS.items():
         assert profile.gvs_deg[name, side] == pytest.approx(offset)
     assert profile.gps_deg[side] == pytest.approx(np.sqrt(np.mean(np.square(list(OFFSETS.values())))))
-    assert (profile.norm_people, profile.convention) == (12, "Kinertia gait27")
+    assert profile.norm_people == 12
     table = profile.table
     assert len(table) == 21
     assert table[(table.score == "GPS") & (table.side == side)].degrees.item() == profile.gps_deg[side]
@@ -49,13 +52,13 @@ def test_scores_are_root_mean_squares(fit, curves, sides):
 
 def test_the_overall_score_has_the_pelvis_once_from_the_left(fit, curves, monkeypatch):
     """Fifteen scores: three of the pelvis in the left side's cycle, six of each side."""
-    flat = {name: np.zeros(101) for name in VARIABLES}
+    flat = {name: np.zeros(101) for name in CLINICAL_ANGLES}
     both = {(name, side): value for name, value in flat.items() for side in "rl"}
-    both |= {(name, "l"): np.full(101, 3.0) for name in list(VARIABLES)[:3]}
-    both |= {(name, "r"): np.full(101, 100.0) for name in list(VARIABLES)[:3]}
-    both["knee_angle_angle", "r"] = np.full(101, 6.0)
+    both |= {(name, "l"): np.full(101, 3.0) for name in list(CLINICAL_ANGLES)[:3]}
+    both |= {(name, "r"): np.full(101, 100.0) for name in list(CLINICAL_ANGLES)[:3]}
+    both["knee_flexion_clinical", "r"] = np.full(101, 6.0)
     monkeypatch.setattr("kinertia.estimation.gait_profile.mean_curves", lambda fit: both)
-    zero = {name: Norm(np.array([0.0, 100.0]), np.zeros(2), np.ones(2)) for name in VARIABLES}
+    zero = {name: Norm(np.array([0.0, 100.0]), np.zeros(2), np.ones(2)) for name in CLINICAL_ANGLES}
     profile = gait_profile(fit, zero)
     assert profile.overall_deg == pytest.approx(np.sqrt((3 * 3.0**2 + 6.0**2) / 15))
     assert profile.gps_deg["l"] == pytest.approx(np.sqrt(3 * 3.0**2 / 9))
@@ -76,7 +79,7 @@ def test_norms_of_another_convention_are_refused(fit, curves, sides):
     norms = norms_of(curves, min(sides), "Plug-in Gait")
     with pytest.raises(KinertiaError, match="the norms are of Plug-in Gait, this fit is of Kinertia gait27"):
         gait_profile(fit, norms)
-    del norms["ankle_angle_angle"]
+    del norms["ankle_dorsiflexion_clinical"]
     with pytest.raises(KinertiaError, match="lack ankle dorsiflexion"):
         gait_profile(fit, {name: replace(norm, convention="") for name, norm in norms.items()})
 
@@ -95,9 +98,65 @@ def test_foot_progression_follows_heel_and_toe_markers(fit, curves, sides):
         rows = np.searchsorted(feet.time, stride.time[5:50])
         along = (feet.toe[side] - feet.heel[side])[rows]
         markers = np.degrees(np.arctan2(-along[:, 2], along[:, 0])) * (1.0 if side == "r" else -1.0)
-        gap = curves[FOOT_PROGRESSION, side][5:50] - markers
+        gap = curves["foot_progression_clinical", side][5:50] - markers
         assert gap.std() < 2.0
         assert abs(gap.mean()) < 15.0
+
+
+def test_clinical_angles_are_the_coordinates_with_other_signs(fit, curves, sides):
+    """Against an oracle that is independent of the model's poses: the coordinates of inverse kinematics."""
+    cycles = fit.cycles("literature")
+    for side in sides:
+        rows = cycles[(cycles.side == side) & (cycles.stride == 1)].pivot(
+            index="percent", columns="quantity", values="value"
+        )
+        mirrored = 1.0 if side == "r" else -1.0
+        for ours, coordinate, sign in (
+            ("pelvis_tilt", "pelvis_tilt", -1.0),
+            ("pelvis_obliquity", "pelvis_list", -mirrored),
+            ("hip_flexion", "hip_flexion", 1.0),
+            ("hip_adduction", "hip_adduction", 1.0),
+            ("hip_rotation", "hip_rotation", 1.0),
+        ):
+            gap = rows[f"{ours}_clinical"] - sign * rows[f"{coordinate}_angle"]
+            assert gap.abs().max() < (1e-6 if ours.startswith("hip") else 1.0), ours
+        for ours, coordinate, least in (("knee_flexion", "knee_angle", 0.99), ("ankle_dorsiflexion", "ankle_angle", 0.9)):
+            # the foot turns about the subtalar axis as well, which is oblique
+            assert np.corrcoef(rows[f"{ours}_clinical"], rows[f"{coordinate}_angle"])[0, 1] > least
+
+
+def test_scores_of_each_stride_stand_in_the_table_of_cycles(fit, sides):
+    side = min(sides)
+    rows = fit.cycles()
+    columns = {name: rows[name].tolist() for name in rows}
+    level = Norm(np.array([0.0, 100.0]), np.zeros(2), np.ones(2), 3, convention_of(fit))
+    table = pd.DataFrame(
+        with_norms(columns, dict.fromkeys([*CLINICAL_ANGLES, "pelvis_list_angle"], level), fit.skeleton)
+    )
+    stride = table[(table.side == side) & (table.stride == 1)]
+    squares = []
+    for quantity in CLINICAL_ANGLES:
+        one = stride[stride.quantity == quantity]
+        squares.append(np.square(one.value).mean())
+        np.testing.assert_allclose(one.gvs, np.sqrt(squares[-1]))
+    np.testing.assert_allclose(stride.gps.dropna(), np.sqrt(np.mean(squares)))
+    assert table[table.quantity == "knee_angle_moment"].norm.isna().all()
+
+
+def test_norms_of_other_people_are_said_to_be(fit):
+    def said(age, **norm):
+        person = replace(fit, subject=fit.subject.model_copy(update={"age_years": age}))
+        one = Norm(np.zeros(1), np.zeros(1), np.zeros(1), 4, "Kinertia gait27", **norm)
+        return " ".join(remarks(person, one))
+
+    assert said(35.0, age_years=(20.0, 40.0), speed_m_s=(0.1, 9.0)) == ""
+    assert "35 years old, people in the norms 7 to 11" in said(35.0, age_years=(7.0, 11.0))
+    assert "mix children and adults (7 to 40 years)" in said(35.0, age_years=(7.0, 40.0))
+    assert "Age of the norms is not stated" in said(35.0)
+    assert "Age of this person is not stated" in said(None, age_years=(7.0, 11.0))
+    assert "m/s, people in the norms at 0.20 to 0.30" in said(35.0, age_years=(20.0, 40.0), speed_m_s=(0.2, 0.3))
+    stated = Norm(np.zeros(1), np.zeros(1), np.zeros(1))
+    assert "no convention" in " ".join(remarks(fit, stated))
 
 
 def control(name, offset, age=None, speed=1.2, convention="Kinertia gait27", known=101):
@@ -121,6 +180,12 @@ def test_bands_need_people_of_one_convention():
         band_columns([control("a", 0.0)])
     with pytest.raises(KinertiaError, match="different models"):
         band_columns([control("a", 0.0), control("b", 0.0, convention="OpenSim model")])
+
+
+def test_children_among_adults_are_said():
+    assert mixture([control("a", 0.0, 20.0), control("b", 0.0, 31.0)]) == ""
+    assert "1 children and 1 adults" in mixture([control("a", 0.0, 9.0), control("b", 0.0, 31.0)])
+    assert "age of 1 of 2 people not stated" in mixture([control("a", 0.0), control("b", 0.0, 31.0)])
 
 
 def test_without_strides_nobody_is_a_control(fit):

@@ -14,7 +14,7 @@ from kinertia.cli.outcome import Outcome
 from kinertia.cli.results_of_people import results_of_people
 from kinertia.cli.terminal import out, shown_progress
 from kinertia.errors import FileError, KinertiaError
-from kinertia.estimation.normative_bands import Control, band_columns
+from kinertia.estimation.normative_bands import Control, band_columns, mixture
 from kinertia.io.norms_file import read_norms
 from kinertia.io.output_folder import write_then_rename
 from kinertia.io.spreadsheet import inert
@@ -42,23 +42,30 @@ def norms(
     """
     own_file(output, read_norms, "kinertia norms")
     people: dict[str, Control] = {}
+    seen = set()
     folders = results_of_people(results)
     with shown_progress() as progress:
         for k, found in enumerate(folders):
             progress("reading", k / len(folders))
             fit = read_saved(found.folder).fit
-            name = found.name or fit.subject.name
-            if name in people:
-                raise FileError(found.folder, f"is a second fit of {name}: give one folder per person")
+            name, who = found.name or fit.subject.name, (fit.subject.name, fit.mass_kg, fit.subject.height_m)
+            if name in people or who in seen:
+                if who in seen:
+                    raise FileError(found.folder, f"is a second fit of {name}: give one folder per person")
+                name = found.folder.resolve().name  # trials of all people may have one name
+            seen.add(who)
             try:
                 people[name] = Control.of(fit)
             except KinertiaError as error:
                 out.print(f"left out: {error}", soft_wrap=True)
     columns = band_columns(list(people.values()))
     write_then_rename(output, _csv(columns))
+    if mixed := mixture(list(people.values())):
+        out.print(f"note: {mixed}", soft_wrap=True)
     spans = {name: columns[name][0] for name in columns if name.endswith(("_min", "_max"))}
     out.print(f"norms of {len(people)} people{_told(spans)} in {output}", soft_wrap=True)
-    return Outcome({"file": str(output), "people": sorted(people), "convention": columns["convention"][0], **spans})
+    told = {"file": str(output), "people": sorted(people), "convention": columns["convention"][0], "note": mixed}
+    return Outcome({**told, **spans})
 
 
 def _told(spans: dict[str, float | None]) -> str:

@@ -12,12 +12,14 @@ from kinertia.cli.options import Quiet
 from kinertia.cli.outcome import Outcome
 from kinertia.cli.terminal import out
 from kinertia.errors import FileError
+from kinertia.estimation.cycles import cycle_columns
 from kinertia.estimation.gait_profile import check_convention, gait_profile
-from kinertia.estimation.gait_scores import FOOT_PROGRESSION, VARIABLES
+from kinertia.estimation.gait_scores import with_norms
 from kinertia.estimation.result import Fit
 from kinertia.io.norms_file import Norm, read_norms
 from kinertia.io.output_folder import write_then_rename
-from kinertia.report.cycle_figures import quantities_of
+from kinertia.motion.clinical_angles import CLINICAL_ANGLES
+from kinertia.report.cycle_figures import MOST_STRIDES, quantities_of
 from kinertia.report.files import write_columns
 from kinertia.report.page import render
 from kinertia.report.saved_fit import read_saved
@@ -33,7 +35,8 @@ def report(
     """Write the report of a fit again, without the recordings: report.html in its folder is replaced.
 
     With --norms, gait-cycle figures show your laboratory's normative bands in
-    grey. Bands made by kinertia norms add the Gait Profile Score (gps.csv).
+    grey. Bands made by kinertia norms add the Gait Profile Score (gps.csv, and
+    of each stride in cycles.csv).
 
     [bold]Examples[/]
 
@@ -43,16 +46,21 @@ def report(
     """
     saved = read_saved(results)
     bands, without_curve = ({}, []) if norms is None else _norms_for(saved.fit, norms)
-    scores = gait_profile(saved.fit, bands).columns() if set(VARIABLES) <= set(bands) else None
+    profile = gait_profile(saved.fit, bands) if set(CLINICAL_ANGLES) <= set(bands) else None
     page = render(saved.fit, saved.provenance, saved.versions, bands, saved.truth)
     write_then_rename(results / "report.html", page)
     out.print(f"report in {results / 'report.html'}", soft_wrap=True)
+    if bands and any(trial.strides for trial in saved.fit.trials):
+        columns = cycle_columns(saved.fit.trials, saved.fit.mass_kg, "estimate", MOST_STRIDES)
+        write_columns(results / "cycles.csv", with_norms(columns, bands, saved.fit.skeleton), "%.6g")
     told: dict[str, Any] = {"report": str(results / "report.html"), "norms": list(bands)}
-    if scores:
-        write_columns(results / "gps.csv", scores, "%.6g")
-        overall = scores["degrees"][-1]
+    if profile:
+        write_columns(results / "gps.csv", profile.columns(), "%.6g")
+        overall = profile.overall_deg
         out.print(f"Gait Profile Score {score_text(overall)}; {results / 'gps.csv'}", soft_wrap=True)
-        told["gps_deg"] = overall if np.isfinite(overall) else None
+        for remark in profile.remarks:
+            out.print(f"note: {remark}", soft_wrap=True)
+        told |= {"gps_deg": overall if np.isfinite(overall) else None, "remarks": list(profile.remarks)}
     return Outcome({**told, "without_curve": without_curve})
 
 
@@ -65,7 +73,6 @@ def _norms_for(fit: Fit, path: Path) -> tuple[dict[str, Norm], list[str]]:
     """The norms in a file, and which of them this fit has no curve for."""
     norms, known = read_norms(path), quantities_of(fit)
     check_convention(fit, norms)
-    known |= {FOOT_PROGRESSION} if known else set()
     other = sorted(set(norms) - known)
     if len(other) == len(norms):
         expected = f"its names are those of cycles.csv, such as {min(known)}" if known else "there are no strides"

@@ -1,6 +1,7 @@
 """Resamples angles, moments, powers and ground reactions to 0 to 100 % of each gait cycle.
 
 A curve belongs to the side whose heel strikes begin and end its stride. Where a trial was not measured it has a gap.
+Clinical angles (`clinical_angles`) are of inverse kinematics, which knows whole strides: no estimate changes them.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from scipy.interpolate import make_interp_spline
 from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
 from kinertia.model.sides import by_side
 from kinertia.model.skeleton import GRAVITY_M_S2, Skeleton
+from kinertia.motion.clinical_angles import clinical_angles
 from kinertia.motion.dynamics import Motion
 from kinertia.motion.gait_cycle import PERCENT, Stride, feet_under_pelvis
 from kinertia.motion.ground_reactions import GroundReactions, measured_reactions
@@ -27,8 +29,14 @@ from kinertia.trial.sampled_time import nearest_samples
 
 Stage = Literal["estimate", "literature"]
 """As estimated; or as usual: inverse kinematics, smoothed, and inverse dynamics with the parameters before."""
-Kind = Literal["angle", "moment", "power", "force"]
-UNITS: Mapping[Kind, str] = {"angle": "deg", "moment": "N m/kg", "power": "W/kg", "force": "% body weight"}
+Kind = Literal["angle", "moment", "power", "force", "clinical"]
+UNITS: Mapping[Kind, str] = {
+    "angle": "deg",
+    "moment": "N m/kg",
+    "power": "W/kg",
+    "force": "% body weight",
+    "clinical": "deg",
+}
 FORCES = ("ground_force_forward", "ground_force_upward", "ground_force_medial")
 _ROOT_COORDINATES = 6
 _Interpolation: TypeAlias = Callable[[np.ndarray, np.ndarray], Callable[[np.ndarray], np.ndarray]]
@@ -77,8 +85,9 @@ class CycleCurve:
     Attributes:
         trial: its name.
         stride: its side, number and times.
-        kind: "angle" (deg), "moment" (N m/kg, internal), "power" (W/kg) or "force" (ground reaction, % body weight).
-        quantity: "hip_flexion_angle", "knee_angle_moment", ..., "ground_force_upward".
+        kind: "angle" (deg), "moment" (N m/kg, internal), "power" (W/kg), "force" (ground reaction, % body weight) or
+            "clinical" (deg).
+        quantity: "hip_flexion_angle", "knee_angle_moment", ..., "ground_force_upward", "knee_flexion_clinical".
         value: (101,) at 0, 1, ..., 100 %; NaN where nothing was measured.
         sd: (101,) standard deviation of the estimate; NaN where there is none.
     """
@@ -108,7 +117,8 @@ def cycle_curves(
     source, skeleton = _Source(trial, stage), trial.skeleton
     sides = by_side(skeleton.coordinates)
     paths = travelled(feet_under_pelvis(skeleton, trial.kinematics), chosen, trial.kinematics.trial.belt)
-    for stride, path in zip(chosen, paths, strict=True):
+    clinical = _clinical(source, skeleton, chosen, paths)
+    for stride, path, angles in zip(chosen, paths, clinical, strict=True):
         time, curve = stride.time, partial(CycleCurve, trial.name, stride)
         angle, speed, moment = source.angle(time), source.speed(time), source.moment(time) / mass_kg
         sd = source.deviations(time)
@@ -130,12 +140,21 @@ def cycle_curves(
         ground = share * source.force(time)[:, foot] @ directions.T
         ground_sd = share * np.sqrt(np.square(sd.ground_forces[:, foot]) @ np.square(directions).T)
         curves += [curve("force", *each) for each in zip(FORCES, ground.T, ground_sd.T, strict=True)]
+        curves += [curve("clinical", *each, np.full(len(PERCENT), np.nan)) for each in angles.items()]
         yield from (one for one in curves if np.isfinite(one.value).any())
 
 
-def coordinates_at(trial: Estimated, stage: Stage, time: np.ndarray) -> np.ndarray:
-    """(n, c) rad, m: coordinates of a stage at any times (n,), NaN where they are not known."""
-    return _Source(trial, stage).angle(time)
+def _clinical(
+    source: _Source, skeleton: Skeleton, strides: Sequence[Stride], paths: np.ndarray
+) -> list[dict[str, np.ndarray]]:
+    """Clinical angles (101,) of each stride by quantity."""
+    q = source.tracked(np.concatenate([stride.time for stride in strides]), 0)
+    heading = np.repeat(np.arctan2(-paths[:, 2], paths[:, 0]), len(PERCENT))
+    by_side = {side: clinical_angles(skeleton, q, heading, side) for side in {stride.side for stride in strides}}
+    return [
+        {name: values.reshape(-1, len(PERCENT))[k] for name, values in by_side[stride.side].items()}
+        for k, stride in enumerate(strides)
+    ]
 
 
 def _directions(path: np.ndarray, side: str) -> np.ndarray:
@@ -187,6 +206,10 @@ class _Source:
     def _coordinates(self, time: np.ndarray, derivative: int) -> np.ndarray:
         if self.stage == "estimate":
             return self._measured(time, [partial(curve, derivative=derivative) for curve in self.motion])
+        return self.tracked(time, derivative)
+
+    def tracked(self, time: np.ndarray, derivative: int) -> np.ndarray:
+        """(n, c) coordinates by inverse kinematics, smoothed, or derivatives of these."""
         ik, spline = self.kinematics.ik, self.kinematics.spline
         within = (time >= spline.time[0]) & (time <= spline.time[-1])
         known = within[:, None] & np.isfinite(ik.q[nearest_samples(ik.time, time)])
@@ -239,14 +262,6 @@ def spatiotemporal_columns(trials: Sequence[Estimated]) -> dict[str, list[Any]]:
     measured = [field.name for field in fields(Spatiotemporal)]
     names = ["trial", "side", "stride", "start_s", "end_s", "toe_off_s", *measured, "on_plates"]
     return {name: [row[name] for row in rows] for name in names}
-
-
-def mean_of_measured(values: np.ndarray) -> np.ndarray:
-    """(101,) mean of the curves (n, 101) that were measured there; NaN where none was."""
-    known = np.isfinite(values)
-    count = known.sum(axis=0)
-    total = np.where(known, values, 0.0).sum(axis=0)
-    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
 
 
 def spread_evenly(strides: Sequence[Stride], most: int | None) -> list[Stride]:

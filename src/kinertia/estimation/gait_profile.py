@@ -6,29 +6,27 @@ between a person's curve and the mean of people without pathology; the GVS toget
 The Gait Profile Score of a side is the root mean square of its nine GVS; that of the person is of fifteen: those of
 hip, knee, ankle and foot of both sides, and the pelvis's once, of the left side's cycle.
 
-The paper's angles are Plug-in Gait's; these are the coordinates of the fit, and scores compare with norms of the same
-convention only.
+Angles are the clinical ones, as in the paper, by inverse kinematics.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from kinertia.errors import KinertiaError
-from kinertia.estimation.gait_scores import VARIABLES, GaitProfile
-from kinertia.estimation.mean_cycles import convention_of, mean_curves
+from kinertia.estimation.gait_scores import GaitProfile, rms_deg, variable_score
+from kinertia.estimation.mean_cycles import MeanCurves, convention_of, mean_curves
+from kinertia.estimation.normative_bands import ADULT_YEARS, mean_speed_m_s
 from kinertia.estimation.result import Fit
 from kinertia.io.norms_file import Norm
+from kinertia.motion.clinical_angles import CLINICAL_ANGLES
 from kinertia.motion.gait_cycle import PERCENT
 from kinertia.trial.data import FEET
 
-_PELVIS = tuple(VARIABLES)[:3]
+_PELVIS = tuple(CLINICAL_ANGLES)[:3]
 _PELVIS_SIDE = "l"
-_LEAST_MEASURED = 0.95
-"""Share of the cycle that must be known of a curve."""
 
 
 def gait_profile(fit: Fit, norms: Mapping[str, Norm]) -> GaitProfile:
@@ -41,25 +39,57 @@ def gait_profile(fit: Fit, norms: Mapping[str, Norm]) -> GaitProfile:
     Raises:
         KinertiaError: norms lack a variable or are of another convention, or there are no strides.
     """
-    check_convention(fit, norms)
-    if lacking := [title for quantity, title in VARIABLES.items() if quantity not in norms]:
-        raise KinertiaError(
-            f"the norms lack {', '.join(lacking)}, which the Gait Profile Score needs: make them with kinertia norms"
-        )
+    check_convention(fit, {name: norm for name, norm in norms.items() if name in CLINICAL_ANGLES})
+    expect_all_nine(norms)
     curves = mean_curves(fit)
     if not curves:
         raise KinertiaError("no trial has a stride, and without strides there is no Gait Profile Score")
+    if not set(CLINICAL_ANGLES) & {quantity for quantity, _ in curves}:
+        legs = "legs are not hip, knee and ankle with axes forward, up and right"
+        raise KinertiaError(f"there are no clinical angles of the model {fit.skeleton.name}: its {legs}")
+    return scores(curves, norms, remarks(fit, norms[_PELVIS[0]]))
+
+
+def expect_all_nine(norms: Mapping[str, Norm]) -> None:
+    """Raise a KinertiaError where norms lack a variable of the score."""
+    if lacking := [one.title for quantity, one in CLINICAL_ANGLES.items() if quantity not in norms]:
+        raise KinertiaError(
+            f"the norms lack {', '.join(lacking)}, which the Gait Profile Score needs: make them with kinertia norms"
+        )
+
+
+def scores(curves: MeanCurves, norms: Mapping[str, Norm], said: Sequence[str] = ()) -> GaitProfile:
+    """Scores of a person's mean curves against norms of all nine variables."""
     unknown = np.full(len(PERCENT), np.nan)
     gvs = {
         (quantity, side): variable_score(curves.get((quantity, side), unknown), norms[quantity])
-        for quantity in VARIABLES
+        for quantity in CLINICAL_ANGLES
         for side in FEET
     }
-    of_sides = {side: _rms([gvs[quantity, side] for quantity in VARIABLES]) for side in FEET}
+    of_sides = {side: rms_deg([gvs[quantity, side] for quantity in CLINICAL_ANGLES]) for side in FEET}
     fifteen = [gvs[quantity, _PELVIS_SIDE] for quantity in _PELVIS]
-    fifteen += [gvs[quantity, side] for quantity in VARIABLES if quantity not in _PELVIS for side in FEET]
-    people = norms[_PELVIS[0]].people
-    return GaitProfile(gvs, of_sides, _rms(fifteen), people, convention_of(fit))
+    fifteen += [gvs[quantity, side] for quantity in CLINICAL_ANGLES if quantity not in _PELVIS for side in FEET]
+    return GaitProfile(gvs, of_sides, rms_deg(fifteen), norms[_PELVIS[0]].people, tuple(said))
+
+
+def remarks(fit: Fit, norm: Norm) -> tuple[str, ...]:
+    """In which way norms are not of people like this one, in sentences."""
+    found, age, speed = [], fit.subject.age_years, mean_speed_m_s(fit)
+    if norm.age_years is not None:
+        low, high = norm.age_years
+        if low < ADULT_YEARS <= high:
+            found.append(f"The norms mix children and adults ({low:g} to {high:g} years).")
+        if age is not None and not low <= age <= high:
+            found.append(f"This person is {age:g} years old, people in the norms {low:g} to {high:g}.")
+    if not norm.convention:
+        found.append("The norms state no convention: constant offsets between models count in full.")
+    elif norm.age_years is None or age is None:
+        found.append(f"Age {'of the norms' if norm.age_years is None else 'of this person'} is not stated.")
+    if norm.speed_m_s is not None and np.isfinite(speed):
+        low, high = norm.speed_m_s
+        if not low <= round(speed, 3) <= high:
+            found.append(f"This person walks at {speed:.2f} m/s, people in the norms at {low:.2f} to {high:.2f}.")
+    return tuple(found)
 
 
 def check_convention(fit: Fit, norms: Mapping[str, Norm]) -> None:
@@ -71,19 +101,3 @@ def check_convention(fit: Fit, norms: Mapping[str, Norm]) -> None:
                 f"the norms are of {norm.convention}, this fit is of {own}: angles and signs differ; make norms from "
                 "fits with the same model"
             )
-
-
-def variable_score(curve: np.ndarray, norm: Norm) -> float:
-    """Gait Variable Score (deg) of a curve (101,); NaN where too little of the cycle is known.
-
-    >>> variable_score(np.full(101, 3.0), Norm(np.array([0.0, 100.0]), np.zeros(2), np.ones(2)))
-    3.0
-    """
-    known = np.isfinite(curve)
-    if known.mean() < _LEAST_MEASURED:
-        return float("nan")
-    return _rms(curve[known] - np.interp(PERCENT, norm.percent, norm.mean)[known])
-
-
-def _rms(values: Any) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))

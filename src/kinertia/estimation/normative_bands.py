@@ -9,13 +9,16 @@ from typing import Any
 import numpy as np
 
 from kinertia.errors import KinertiaError
-from kinertia.estimation.cycles import mean_of_measured, spatiotemporal_columns
+from kinertia.estimation.common_strides import mean_of_common
+from kinertia.estimation.cycles import spatiotemporal_columns
 from kinertia.estimation.mean_cycles import convention_of, mean_curves
 from kinertia.estimation.result import Fit
 from kinertia.motion.gait_cycle import PERCENT
 from kinertia.trial.data import FEET
 
 FEWEST_PEOPLE = 2
+ADULT_YEARS = 18.0
+"""From then on."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +30,7 @@ class Control:
         curves: by quantity (101,), mean of both sides.
         age_years: as stated, if it was.
         speed_m_s: mean over all strides; NaN where unknown.
-        convention: of the coordinates.
+        convention: of all quantities.
     """
 
     name: str
@@ -49,10 +52,26 @@ class Control:
         curves = {}
         for quantity in dict.fromkeys(name for name, _ in by_side):
             sides = np.array([by_side[quantity, side] for side in FEET if (quantity, side) in by_side])
-            curves[quantity] = mean_of_measured(sides)
-        speeds = np.array(spatiotemporal_columns(fit.trials)["speed_m_s"], dtype=float)
-        speed = float(np.nanmean(speeds)) if np.isfinite(speeds).any() else float("nan")
-        return cls(fit.subject.name, curves, fit.subject.age_years, speed, convention_of(fit))
+            curves[quantity] = mean_of_common(sides)
+        return cls(fit.subject.name, curves, fit.subject.age_years, mean_speed_m_s(fit), convention_of(fit))
+
+
+def mean_speed_m_s(fit: Fit) -> float:
+    """Over all strides; NaN where it is not known."""
+    speeds = np.array(spatiotemporal_columns(fit.trials)["speed_m_s"], dtype=float)
+    return float(np.nanmean(speeds)) if np.isfinite(speeds).any() else float("nan")
+
+
+def mixture(people: Sequence[Control]) -> str:
+    """Whether children and adults are among these, in words; empty if not."""
+    ages = [one.age_years for one in people]
+    stated = [age for age in ages if age is not None]
+    children = sum(age < ADULT_YEARS for age in stated)
+    if 0 < children < len(stated):
+        return f"{children} children and {len(stated) - children} adults in one band: make norms of each"
+    if unknown := len(ages) - len(stated):
+        return f"age of {unknown} of {len(ages)} people not stated: children and adults may be mixed"
+    return ""
 
 
 def band_columns(people: Sequence[Control]) -> dict[str, list[Any]]:

@@ -13,6 +13,7 @@ import numpy as np
 from kinertia.estimation.asymmetry import asymmetries, asymmetry_columns
 from kinertia.estimation.cycles import Kind, Stage, cycle_columns, spatiotemporal_columns
 from kinertia.estimation.fit_pictures import FitPictures
+from kinertia.estimation.gait_scores import GaitProfile, with_norms
 from kinertia.estimation.identifiability import evidence
 from kinertia.estimation.input_checks import known
 from kinertia.estimation.simultaneous.calibration_entry import calibration_columns
@@ -20,6 +21,7 @@ from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
 from kinertia.estimation.simultaneous.fit import Posterior
 from kinertia.findings.finding import Finding, Severity
 from kinertia.findings.overview import Overview
+from kinertia.io.norms_file import read_norms
 from kinertia.model.anthropometry import SEGMENTS
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.imported import OsimModel
@@ -34,8 +36,6 @@ from kinertia.trial import display
 if TYPE_CHECKING:
     import pandas as pd
     from xarray import Dataset
-
-    from kinertia.estimation.gait_scores import GaitProfile
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -215,17 +215,18 @@ class Fit:
         of_posterior = {name: getattr(self.posterior, name).ravel() for name in ("prior_sd", "sd", "information")}
         return {**columns, **of_posterior, "evidence": [evidence(value) for value in of_posterior["information"]]}
 
-    def cycles(self, stage: Stage = "estimate") -> pd.DataFrame:
+    def cycles(self, stage: Stage = "estimate", norms: str | Path | None = None) -> pd.DataFrame:
         """Curves over the gait cycle, one row per trial, side, stride, percent (0 to 100) and quantity.
 
         Columns: trial, side ("r", "l": whose heel strikes begin and end the stride), stride (from 1), percent,
         quantity, value, sd. Quantities: "..._angle" (deg), "..._moment" (N m/kg, internal, positive as the angle
         grows), "..._power" (W/kg), each of a coordinate without its side; "ground_force_forward", "..._upward",
-        "..._medial" (% body weight; along the stride, up, towards the other foot). Where nothing was measured `value`
-        is NaN. `sd` is the posterior deviation.
+        "..._medial" (% body weight; along the stride, up, towards the other foot); "..._clinical": Plug-in Gait's nine
+        angles (deg). Where nothing was measured `value` is NaN. `sd` is the posterior deviation.
 
         Args:
             stage: "estimate", or "literature": what inverse kinematics and inverse dynamics give without the estimate.
+            norms: CSV file of norms; adds the columns norm, norm_sd, gvs and gps, the stride's scores (deg; see `gps`).
 
         Examples:
             >>> cycles = fit.cycles()
@@ -236,7 +237,8 @@ class Fit:
         """
         import pandas as pd
 
-        return pd.DataFrame(cycle_columns(self.trials, self.mass_kg, stage))
+        columns = cycle_columns(self.trials, self.mass_kg, stage)
+        return pd.DataFrame(columns if norms is None else with_norms(columns, read_norms(norms), self.skeleton))
 
     @property
     def spatiotemporal(self) -> pd.DataFrame:
@@ -306,7 +308,7 @@ class Fit:
         not measured is NaN. `to_netcdf` writes it.
 
         Args:
-            kind: "angle" (deg), "moment" (N m/kg; over time N m), "power" (W/kg) or "force" (% body weight).
+            kind: "angle", "clinical" (deg), "moment" (N m/kg; over time N m), "power" (W/kg), "force" (% body weight).
             over: "percent" of the gait cycle, or "time" (s; angles and moments).
 
         Raises:

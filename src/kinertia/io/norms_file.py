@@ -5,7 +5,7 @@
     knee_angle_angle,1,6.0,4.1
 
 Names and units of the quantities are those of `cycles.csv`. Percents may be coarser than there. `kinertia norms` adds
-the number of people (n), spans of age and speed, and the convention of the angles.
+the number of people (n), spans of age and speed, and the convention of each quantity.
 """
 
 from __future__ import annotations
@@ -21,6 +21,9 @@ from kinertia.findings.quantity import Quantity
 from kinertia.io.csv_file import Row, read_csv
 
 COLUMNS = ("quantity", "percent", "mean", "sd")
+Span = tuple[float, float]
+"""Least and largest."""
+_SPANS = ("age_years", "speed_m_s")
 _LARGEST_SHARE = 1.0
 """A file whose percents all stay below is one of shares."""
 
@@ -33,7 +36,8 @@ class Norm:
         percent: (n,) of the gait cycle, ascending.
         mean, sd: (n,) in the quantity's unit.
         people: how many, where the file says; the fewest at any percent.
-        convention: what the coordinates mean, where the file says.
+        convention: what the quantity means, where the file says.
+        age_years, speed_m_s: spans of these people, where the file says.
     """
 
     percent: np.ndarray
@@ -41,6 +45,8 @@ class Norm:
     sd: np.ndarray
     people: int | None = None
     convention: str = ""
+    age_years: Span | None = None
+    speed_m_s: Span | None = None
 
 
 def read_norms(path: str | Path) -> dict[str, Norm]:
@@ -49,24 +55,21 @@ def read_norms(path: str | Path) -> dict[str, Norm]:
     Raises:
         FileError: the file is missing or not text, lacks a column, or has a row that cannot be; with the line.
     """
-    rows: dict[str, dict[float, tuple[float, float]]] = {}
-    people: dict[str, int] = {}
-    conventions: dict[str, str] = {}
+    curves: dict[str, dict[float, tuple[float, float]]] = {}
+    stated: dict[str, list[Row]] = {}
     for row in read_csv(Path(path), COLUMNS, "a row per quantity and percent: " + ",".join(COLUMNS)):
         quantity = row.cells["quantity"]
         percent, mean, sd = (row.number(name) for name in COLUMNS[1:])
         _expect_sound(row, percent, sd)
-        curve = rows.setdefault(quantity, {})
+        curve = curves.setdefault(quantity, {})
         if percent in curve:
             raise _wrong(row.path, row.line, f"{quantity} at {percent:g} % is there twice")
         curve[percent] = (mean, sd)
-        conventions[quantity] = row.cells.get("convention", "")
-        if row.cells.get("convention") and row.cells.get("n"):
-            people[quantity] = min(int(row.number("n")), people.get(quantity, int(row.number("n"))))
-    if rows and 0.0 < max(map(max, rows.values())) <= _LARGEST_SHARE:
-        largest = Quantity(max(map(max, rows.values())), "1")
+        stated.setdefault(quantity, []).append(row)
+    if curves and 0.0 < max(map(max, curves.values())) <= _LARGEST_SHARE:
+        largest = Quantity(max(map(max, curves.values())), "1")
         raise _wrong(Path(path), None, "percent is at most 1; multiply the column by 100", percent=largest)
-    return {name: _norm(curve, people.get(name), conventions[name]) for name, curve in rows.items()}
+    return {name: _norm(curve, stated[name]) for name, curve in curves.items()}
 
 
 def _expect_sound(row: Row, percent: float, sd: float) -> None:
@@ -80,7 +83,15 @@ def _wrong(path: Path, line: int | None, problem: str, **evidence: Quantity) -> 
     return FileError.found(path, "F187", line, **evidence, problem=Quantity(problem))
 
 
-def _norm(curve: Mapping[float, Sequence[float]], people: int | None, convention: str) -> Norm:
-    percent = sorted(curve)
+def _norm(curve: Mapping[float, Sequence[float]], rows: Sequence[Row]) -> Norm:
+    percent, last = sorted(curve), rows[-1]
     mean, sd = np.array([curve[one] for one in percent]).T
-    return Norm(np.array(percent), mean, sd, people, convention)
+    convention = last.cells.get("convention", "")
+    counts = [int(row.number("n")) for row in rows if convention and row.cells.get("n")]
+    spans = (_span(last, name) if convention else None for name in _SPANS)
+    return Norm(np.array(percent), mean, sd, min(counts, default=None), convention, *spans)
+
+
+def _span(row: Row, name: str) -> Span | None:
+    ends = (f"{name}_min", f"{name}_max")
+    return (row.number(ends[0]), row.number(ends[1])) if all(row.cells.get(end) for end in ends) else None

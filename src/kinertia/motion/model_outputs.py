@@ -109,7 +109,7 @@ def model_outputs(
     wrenches = joint_wrenches(skeleton, bsp, motion, foot_loads)
     pose, clinical = skeleton.pose(motion.q), convention == "plug-in-gait"
     spread = _NoDeviations(motion.q) if deviations is None else deviations
-    found = _of_pelvis_and_feet(skeleton, pose, clinical)
+    found = _of_pelvis_and_feet(skeleton, pose, clinical, np.eye(3))
     for joint, wrench in wrenches.items():
         child, parent = _rotation(skeleton, pose, joint.child), _rotation(skeleton, pose, joint.parent)
         columns, signs = joint.columns(skeleton), _signs(joint)
@@ -129,6 +129,27 @@ def model_outputs(
         sd = np.sqrt(np.square(spread.powers[:, columns]).sum(axis=1)) / mass_kg
         found.append(ModelOutput(joint.name, joint.side, "POWERS", _third(power), _third(sd)))
     return found
+
+
+def plug_in_gait_angles(skeleton: Skeleton, q: np.ndarray, heading_rad: np.ndarray) -> dict[str, np.ndarray]:
+    """(n, 3) deg by Vicon's name, "LHipAngles": as `model_outputs` has them, without deviations, and those of pelvis
+    and feet against the direction of gait; nothing of a model whose legs it gives no outputs of.
+
+    Args:
+        skeleton: the model.
+        q: (n, c) coordinates, rad and m.
+        heading_rad: (n,) where the person goes, from ground's X axis to the left.
+    """
+    joints = leg_joints(skeleton)
+    if not joints or not _alike(skeleton, joints):
+        return {}
+    pose = skeleton.pose(q)
+    found = _of_pelvis_and_feet(skeleton, pose, True, Rotation.from_euler("Y", heading_rad[:, None]).as_matrix())
+    angles = {one.name: one.values for one in found}
+    for joint in joints:
+        parent, child = (_rotation(skeleton, pose, segment) for segment in (joint.parent, joint.child))
+        angles[f"{joint.side.upper()}{joint.name}Angles"] = np.degrees(_signs(joint) * _cardan(parent, child))
+    return angles
 
 
 class _NoDeviations:
@@ -208,10 +229,11 @@ def _as_vicon(joint: LegJoint, force: np.ndarray) -> np.ndarray:
     return np.column_stack([-y, -z, x] if joint.name == "Ankle" else [x, -z, y])
 
 
-def _of_pelvis_and_feet(skeleton: Skeleton, pose: Pose, clinical: bool) -> list[ModelOutput]:
-    """Angles against the ground, without deviations: those of pelvis and foot lie in several coordinates together."""
+def _of_pelvis_and_feet(skeleton: Skeleton, pose: Pose, clinical: bool, ground: np.ndarray) -> list[ModelOutput]:
+    """Angles against axes (3, 3) or (n, 3, 3) forward, up and right in columns, without deviations: those of pelvis and
+    foot lie in several coordinates together.
+    """
     found = []
-    ground = np.broadcast_to(np.eye(3), (len(pose.rotation), 3, 3))
     for side, foot in zip(FEET, skeleton.feet, strict=True):
         mirrored = 1.0 if side == "r" else -1.0
         pelvis = np.degrees(_cardan(ground, _rotation(skeleton, pose, skeleton.segments[0])))

@@ -1,7 +1,8 @@
 """Draws curves over the gait cycle: all strides, right and left each from its own heel strike on.
 
-Strides are thin, their mean is thick with a band of one standard deviation around it; the estimate's own 95 % band is
-the darker one. What the usual pipeline gives is dotted. Where nothing was measured there is a gap.
+Strides are thin; the mean of those that are complete, or were measured longest (`common_strides`), is thick with a band
+of one standard deviation around it; the estimate's own 95 % band is the darker one. What the usual pipeline gives is
+dotted. Where nothing was measured there is a gap.
 """
 
 from __future__ import annotations
@@ -13,20 +14,13 @@ from typing import Any
 
 import numpy as np
 
-from kinertia.estimation.cycles import (
-    FORCES,
-    UNITS,
-    CycleCurve,
-    Kind,
-    Stage,
-    cycle_curves,
-    mean_of_measured,
-    spread_evenly,
-)
-from kinertia.estimation.mean_cycles import opposite_on_left
+from kinertia.estimation.common_strides import common_strides, mean_of, mean_of_common
+from kinertia.estimation.cycles import FORCES, UNITS, CycleCurve, Kind, Stage, cycle_curves, spread_evenly
 from kinertia.estimation.result import Fit
 from kinertia.io.norms_file import Norm
+from kinertia.model.opposite_coordinates import opposite_on_left
 from kinertia.model.skeleton import Skeleton
+from kinertia.motion.clinical_angles import CLINICAL_ANGLES
 from kinertia.motion.gait_cycle import PERCENT
 from kinertia.report import style
 from kinertia.report.coordinate_titles import load_title, panels_of, power_title
@@ -41,6 +35,23 @@ MOST_STRIDES = 100
 _MOST_DRAWN = 5
 """Of a side; mean and bands are of all."""
 _SD_OPACITY, _BAND_OPACITY, _STRIDE_OPACITY = 0.13, 0.25, 0.45
+_CLINICAL_TITLES = dict(
+    zip(
+        CLINICAL_ANGLES,
+        (
+            "Pelvic tilt, anterior +",
+            "Pelvic obliquity, this side up +",
+            "Pelvic rotation, this side forward +",
+            "Hip flexion +",
+            "Hip adduction +",
+            "Hip internal rotation +",
+            "Knee flexion +",
+            "Ankle dorsiflexion +",
+            "Foot progression, toes inward +",
+        ),
+        strict=True,
+    )
+)
 _FORCE_TITLES = dict(zip(FORCES, ("Forward +", "Upward +", "Towards the other foot +"), strict=True))
 
 Curves = Mapping[tuple[str, str], Sequence[CycleCurve]]
@@ -82,6 +93,8 @@ def titled_quantities(skeleton: Skeleton, kind: Kind) -> list[tuple[str, str]]:
     """
     if kind == "force":
         return list(_FORCE_TITLES.items())
+    if kind == "clinical":
+        return list(_CLINICAL_TITLES.items())
     coordinates = [one for one in panels_of(skeleton) if one.rotational]
     if kind == "angle":
         return [(f"{one.name}_angle", one.title) for one in coordinates]
@@ -123,7 +136,7 @@ class _Drawn:
             word, colour = style.SIDES[side]
             if curves:
                 yield from _estimate(curves, word, colour)
-            if usual:
+            if usual and quantity not in CLINICAL_ANGLES:  # which no estimate changes
                 line = {"color": colour, "dash": "dot", "width": 1.6}
                 yield {**mean_line(usual_mean(usual, curves)), "name": f"{word}, {usual_name}", "line": line}
 
@@ -150,12 +163,12 @@ class _Drawn:
             "moment": "Joint moments",
             "power": "Joint powers",
             "force": "Ground reactions",
+            "clinical": "Clinical angles",
         }
         counts = [sum(stride.side == side for trial in self.fit.trials for stride in trial.strides) for side in FEET]
-        return (
-            f"{names[kind]} ({UNITS[kind]}) over the gait cycle, estimate against {self._usual_name(kind)}; strides: "
-            f"{counts[0]} right, {counts[1]} left."
-        )
+        against = "by inverse kinematics" if kind == "clinical" else f"estimate against {self._usual_name(kind)}"
+        strides = f"strides: {counts[0]} right, {counts[1]} left"
+        return f"{names[kind]} ({UNITS[kind]}) over the gait cycle, {against}; {strides}."
 
 
 def _norm(norm: Norm, opposite: bool) -> Iterator[dict[str, Any]]:
@@ -184,47 +197,41 @@ def _leg_coordinates(skeleton: Skeleton) -> set[int]:
 
 def _estimate(curves: Sequence[CycleCurve], word: str, colour: str) -> Iterator[dict[str, Any]]:
     """Bands below, strides, and their mean on top."""
-    mean, spread = mean_curve(curves), _spread(curves)
+    values = np.array([one.value for one in curves])
+    common = common_strides(values)
+    mean, spread = mean_of(values[common]), _spread(values[common])
     if spread is not None:
         yield {**band(mean - spread, mean + spread, style.faded(colour, _SD_OPACITY)), "name": f"{word}, mean ± SD"}
-    sds = [one.sd for one in curves if np.isfinite(one.sd).any()]
-    if sds:
-        half = INTERVAL_SD * mean_of_measured(np.array(sds))
+    half = INTERVAL_SD * mean_of(np.array([one.sd for one in curves])[common])
+    if np.isfinite(half).any():
         name = f"{word}, 95 % of the estimate"
         yield {**band(mean - half, mean + half, style.faded(colour, _BAND_OPACITY)), "name": name}
-    if spread is not None:
+    if len(curves) > 1:
         shown = [curves[k] for k in np.unique(np.linspace(0, len(curves) - 1, _MOST_DRAWN).round().astype(int))]
         line = {"color": style.faded(colour, _STRIDE_OPACITY), "width": 0.8}
         yield {**_strides(shown), "name": f"{word}, strides", "line": line}
-    name = "one stride" if len(curves) < 2 else "strides joined" if spread is None else "mean"
+    name = "mean" if spread is not None else "one stride" if len(curves) < 2 else "longest stride"
     yield {**mean_line(mean), "name": f"{word}, {name}", "line": {"color": colour, "width": 2.2}}
 
 
 def mean_curve(curves: Sequence[CycleCurve]) -> np.ndarray:
-    """(101,) of the strides that were measured there; NaN where none was."""
-    return mean_of_measured(np.array([one.value for one in curves]))
+    """(101,) of the strides that are complete, or were measured longest; NaN where one of these has a gap."""
+    return mean_of_common(np.array([one.value for one in curves]))
 
 
 def usual_mean(usual: Sequence[CycleCurve], estimate: Sequence[CycleCurve]) -> np.ndarray:
-    """(101,) of the strides that the estimate's mean is of there, so that they differ by the method alone; of all
-    where that has a gap.
-    """
-    known = {(one.trial, one.stride.number): np.isfinite(one.value) for one in estimate}
-    nowhere = np.zeros(len(PERCENT), dtype=bool)
-    same = np.array([known.get((one.trial, one.stride.number), nowhere) for one in usual])
-    values = np.array([one.value for one in usual])
-    return mean_of_measured(np.where(same | ~same.any(axis=0), values, np.nan))
+    """(101,) of the strides that the estimate's mean is of, so that they differ by the method alone."""
+    if not estimate:
+        return mean_curve(usual)
+    common = common_strides(np.array([one.value for one in estimate]))
+    same = {(one.trial, one.stride.number) for one, taken in zip(estimate, common, strict=True) if taken}
+    values = [one.value for one in usual if (one.trial, one.stride.number) in same]
+    return mean_of(np.array(values).reshape(-1, len(PERCENT)))
 
 
-def _spread(curves: Sequence[CycleCurve]) -> np.ndarray | None:
-    """(101,) standard deviation between strides, NaN where fewer than two were measured; None if so everywhere."""
-    values = np.array([one.value for one in curves])
-    several = np.isfinite(values).sum(axis=0) > 1
-    if not several.any():
-        return None
-    spread = np.full(values.shape[1], np.nan)
-    spread[several] = np.nanstd(values[:, several], axis=0, ddof=1)
-    return spread
+def _spread(values: np.ndarray) -> np.ndarray | None:
+    """(101,) standard deviation between the strides (n, 101) of a mean; None of one."""
+    return np.std(values, axis=0, ddof=1) if len(values) > 1 else None
 
 
 def mean_line(values: np.ndarray) -> dict[str, Any]:

@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from kinertia.estimation.gait_profile import gait_profile
-from kinertia.estimation.gait_scores import VARIABLES
 from kinertia.estimation.result import Fit
 from kinertia.io.norms_file import Norm
+from kinertia.motion.clinical_angles import CLINICAL_ANGLES
 from kinertia.trial.data import FEET
 
 
@@ -31,26 +31,26 @@ class ProfileView:
         rows: of the nine variables, then of each side's score.
         overall: of the person, degrees.
         norm_people: how many people the norms are of, if the file says so.
-        convention: of the angles.
+        remarks: in which way the norms are not of people like this one, in sentences.
     """
 
     rows: tuple[ScoreRow, ...]
     overall: str
     norm_people: int | None
-    convention: str
+    remarks: tuple[str, ...]
 
 
 def profile_view(fit: Fit, norms: Mapping[str, Norm]) -> ProfileView | None:
     """Scores against these norms; None where they lack one of the nine variables."""
-    if not set(VARIABLES) <= set(norms):
+    if not set(CLINICAL_ANGLES) <= set(norms):
         return None
     profile = gait_profile(fit, norms)
     rows = [
-        ScoreRow(title, *(_degrees(profile.gvs_deg[quantity, side]) for side in FEET))
-        for quantity, title in VARIABLES.items()
+        ScoreRow(one.title, *(_degrees(profile.gvs_deg[quantity, side]) for side in FEET))
+        for quantity, one in CLINICAL_ANGLES.items()
     ]
     rows.append(ScoreRow("Gait Profile Score", *(_degrees(profile.gps_deg[side]) for side in FEET)))
-    return ProfileView(tuple(rows), _degrees(profile.overall_deg), profile.norm_people, profile.convention)
+    return ProfileView(tuple(rows), _degrees(profile.overall_deg), profile.norm_people, profile.remarks)
 
 
 def _degrees(value: float) -> str:

@@ -17,6 +17,7 @@ from kinertia.estimation.result import Fit, TrialFit
 from kinertia.estimation.simultaneous.calibration_entry import SHOWN_UNIT, item_text, quantity_text
 from kinertia.io.provenance import Provenance, versions
 from kinertia.model.bsp import PARAMETERS
+from kinertia.motion.clinical_angles import CLINICAL_ANGLES
 from kinertia.report.body_figure import body_figure
 from kinertia.report.bsp_figures import (
     MAIN,
@@ -134,12 +135,14 @@ def _cycle(fit: Fit, norms: Norms) -> dict[str, Any] | None:
     figures = cycle_figures(fit, norms)
     if not figures:
         return None
+    clinical = figures.pop("clinical")
     strides = [stride for trial in fit.trials for stride in trial.strides]
     return {
         "rows": stride_rows(fit),
         "most": MOST_STRIDES,
         "norms": bool(norms),
         "profile": profile_view(fit, norms),
+        "clinical": written(clinical) if set(CLINICAL_ANGLES) & set(norms) else None,
         "spread": has_spread(figures["moment"]),
         "strides": len(strides),
         "on_plates": sum(stride.on_plates for stride in strides),
