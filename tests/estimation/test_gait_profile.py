@@ -120,7 +120,10 @@ def test_clinical_angles_are_the_coordinates_with_other_signs(fit, curves, sides
         ):
             gap = rows[f"{ours}_clinical"] - sign * rows[f"{coordinate}_angle"]
             assert gap.abs().max() < (1e-6 if ours.startswith("hip") else 1.0), ours
-        for ours, coordinate, least in (("knee_flexion", "knee_angle", 0.99), ("ankle_dorsiflexion", "ankle_angle", 0.9)):
+        for ours, coordinate, least in (
+            ("knee_flexion", "knee_angle", 0.99),
+            ("ankle_dorsiflexion", "ankle_angle", 0.9),
+        ):
             # the foot turns about the subtalar axis as well, which is oblique
             assert np.corrcoef(rows[f"{ours}_clinical"], rows[f"{coordinate}_angle"])[0, 1] > least
 
