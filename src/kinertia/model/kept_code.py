@@ -10,6 +10,7 @@ from typing import Any
 
 from llvmlite import binding as llvm
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
+from numba.core.runtime import rtsys
 
 
 class _MachineCode(CompileResultCacheImpl):  # type: ignore[misc]
@@ -26,3 +27,12 @@ class KeptCode(FunctionCache):  # type: ignore[misc]
     """The files of one function that Python calls."""
 
     _impl_class = _MachineCode
+
+    def load_overload(self, signature: Any, target: Any) -> Any:
+        """As Numba has it, but only what compiles gets to know all that Numba can compile: longer than to load code."""
+        rtsys.initialize(target)
+        with self._guard_against_spurious_io_errors():
+            kept = self._load_overload(signature, target)
+            if kept is not None:
+                return kept
+        return super().load_overload(signature, target)

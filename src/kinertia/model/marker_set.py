@@ -138,7 +138,8 @@ def spelled_as(marker_set: MarkerSet, labels: Sequence[str]) -> MarkerSet:
 
 def _matched(names: Mapping[str, set[str]], labels: Sequence[str]) -> dict[str, str]:
     """Label of a set -> the one of these labels that is among its names (folded), where no other set's label has it."""
-    fitting = {label: [one for one in labels if folded(one) in own] for label, own in names.items()}
+    known = [(one, folded(one)) for one in labels]
+    fitting = {label: [one for one, name in known if name in own] for label, own in names.items()}
     claims = Counter(one for found in fitting.values() for one in found)
     return {label: found[0] for label, found in fitting.items() if len(found) == 1 and claims[found[0]] == 1}
 
