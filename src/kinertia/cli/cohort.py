@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -35,7 +35,9 @@ from kinertia.cohort.resources import note_resources
 from kinertia.cohort.slurm import slurm_cluster
 from kinertia.cohort.tables import write_tables
 from kinertia.errors import SettingsError
+from kinertia.estimation.gait_profile import expect_all_nine
 from kinertia.io.file_lock import sole_use
+from kinertia.io.norms_file import Norm, read_norms
 from kinertia.io.slurm_file import SlurmFile, read_slurm
 
 _LOCK = ".kinertia-cohort.lock"
@@ -67,6 +69,9 @@ def cohort(
         ),
     ] = False,
     csv: Annotated[bool, typer.Option("--csv", help="Write all tables as CSV, too.")] = False,
+    norms: Annotated[
+        Path | None, typer.Option(help="File of kinertia norms: adds Gait Profile Scores to tables and page.")
+    ] = None,
     json_lines: Annotated[
         bool, typer.Option("--json-lines", help="Print what happens as JSON, an object per line, and nothing else.")
     ] = False,
@@ -113,6 +118,9 @@ def cohort(
     where = _Where(scheduler, None if slurm is None else read_slurm(slurm))
     lines = JsonLines(json_lines)
     be_quiet(quiet or json_lines)
+    wanted = _Wanted(csv, {} if norms is None else read_norms(norms))
+    if norms is not None:
+        expect_all_nine(wanted.norms)
     people = people_of(study, output)
     if dry_run:
         everybody = _standing(people, output, lines)
@@ -124,9 +132,9 @@ def cohort(
     results_folder(output, overwrite)
     output.mkdir(parents=True, exist_ok=True)
     with sole_use(output / _LOCK, "the folder of this cohort"):
-        outcomes = _run(people, output, where, csv, lines)
+        outcomes = _run(people, output, where, wanted, lines)
         if learn:
-            outcomes += _run_again(people, outcomes, output, where, csv, lines)
+            outcomes += _run_again(people, outcomes, output, where, wanted, lines)
     fitted = [{**_ended(record), "fitted": record.fitted} for record in outcomes]
     return Outcome({"folder": str(output), "people": fitted}, int(any(record.status for record in outcomes)))
 
@@ -184,7 +192,15 @@ class _Where:
         return local_size(people).workers if self.slurm is None else min(self.slurm.workers, people)
 
 
-def _run(people: Sequence[Person], output: Path, where: _Where, csv: bool, lines: JsonLines) -> list[Record]:
+@dataclass(frozen=True)
+class _Wanted:
+    """Of the tables: whether as CSV, too, and norms to score gaits against."""
+
+    csv: bool
+    norms: Mapping[str, Norm]
+
+
+def _run(people: Sequence[Person], output: Path, where: _Where, wanted: _Wanted, lines: JsonLines) -> list[Record]:
     """Fit who is due, and write tables and page of everybody."""
     prepare_folder(output)
     everybody = _standing(people, output, lines)
@@ -193,7 +209,7 @@ def _run(people: Sequence[Person], output: Path, where: _Where, csv: bool, lines
     outcomes = [one.outcome(records.get(one.person.name), output) for one in everybody]
     with shown_progress() as shown:
         progress = lines.with_progress(shown)
-        write_tables(output, _each(outcomes, "tables", progress), csv)
+        write_tables(output, _each(outcomes, "tables", progress), wanted.csv, wanted.norms)
         progress("page", 0.0)
         write_cohort_page(output)
     _report(outcomes, output)
@@ -203,7 +219,7 @@ def _run(people: Sequence[Person], output: Path, where: _Where, csv: bool, lines
 
 
 def _run_again(
-    people: Sequence[Person], outcomes: Sequence[Record], output: Path, where: _Where, csv: bool, lines: JsonLines
+    people: Sequence[Person], outcomes: Sequence[Record], output: Path, where: _Where, wanted: _Wanted, lines: JsonLines
 ) -> list[Record]:
     """The same with what those who were fitted teach each other."""
     there = {record.person for record in outcomes if record.fitted}
@@ -211,7 +227,7 @@ def _run_again(
         taught = [person for person in people if person.name in there]
         second, notes = write_second_study(output, taught, lines.with_progress(shown))
     _say_notes(notes, lines)
-    return _run(second, output / LEARNT, where, csv, lines)
+    return _run(second, output / LEARNT, where, wanted, lines)
 
 
 def _say_notes(notes: Sequence[str], lines: JsonLines) -> None:

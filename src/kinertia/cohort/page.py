@@ -15,6 +15,7 @@ import numpy as np
 from kinertia.cohort.instruments import COLUMNS, drift
 from kinertia.cohort.outcomes import FINDINGS, PEOPLE, lead, outcome_parts, report_of
 from kinertia.cohort.record import AGAINST
+from kinertia.cohort.score_parts import score_parts
 from kinertia.estimation.cycles import UNITS, Kind
 from kinertia.io.output_folder import write_then_rename
 from kinertia.model.bsp import PARAMETERS
@@ -49,7 +50,7 @@ def write_cohort_page(folder: Path) -> None:
     parts = list(outcome_parts(people, _read(folder, "findings", FINDINGS)))
     if (people["status"] <= AGAINST).any():
         bsp = _read(folder, "cohort", ("person", "segment", "parameter", "literature", "estimate", "sd"))
-        parts += [*_changes(bsp), _residuals(folder), _outliers(bsp), *_mean_curves(folder)]
+        parts += [*_changes(bsp), _residuals(folder), _outliers(bsp), *score_parts(folder), *_mean_curves(folder)]
         parts += drift(_read(folder, "instruments", COLUMNS))
     write_then_rename(folder / PAGE, render_parts("Cohort", lead(people), parts))
 

@@ -12,21 +12,26 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import asdict
 from datetime import date
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from kinertia.cohort.cluster import expect_extra
 from kinertia.cohort.record import AGAINST, PASSED, Place, Record
 from kinertia.errors import FileError, KinertiaError, findings_of
 from kinertia.estimation.cycles import UNITS, cycle_columns
+from kinertia.estimation.gait_profile import gait_profile
+from kinertia.estimation.gait_scores import OVERALL
 from kinertia.estimation.result import Fit
 from kinertia.estimation.simultaneous.calibration_entry import calibration_columns
 from kinertia.findings.finding import Finding, Severity
 from kinertia.findings.overview import Overview
 from kinertia.io.csv_file import read_csv
+from kinertia.io.norms_file import Norm
 from kinertia.io.spreadsheet import inert
 from kinertia.io.working_folder import working_folder
 from kinertia.report.cycle_figures import MOST_STRIDES, titled_quantities
 from kinertia.report.files import summary
+from kinertia.report.saved_fit import load_fit
 
 if TYPE_CHECKING:
     import pyarrow
@@ -67,6 +72,11 @@ _COLUMNS: Mapping[str, Mapping[str, str]] = {
         "moved": "double",
         "contradicted_by": "string",
         "with_session": "bool",
+    },
+    "scores": {
+        **dict.fromkeys(("person", "score", "variable", "side"), "string"),
+        "degrees": "double",
+        "remarks": "string",
     },
     "people": {
         "person": "string",
@@ -115,10 +125,13 @@ def _write_rows(path: Path, name: str, person: str, columns: Mapping[str, Any]) 
     parquet.write_table(_table(name, {"person": [person] * rows, **columns}), path)
 
 
-def write_tables(cohort: Path, records: Iterable[Record], with_csv: bool) -> None:
+def write_tables(
+    cohort: Path, records: Iterable[Record], with_csv: bool, norms: Mapping[str, Norm] = MappingProxyType({})
+) -> None:
     """Write everybody's rows, in the order of the records, into the folder of the cohort; each table at once.
 
     In memory is one piece at a time, however many people there are. The list of people is a CSV file, too, always.
+    Scores are against the norms; without any there are none.
     """
     from pyarrow import parquet
 
@@ -129,6 +142,8 @@ def write_tables(cohort: Path, records: Iterable[Record], with_csv: bool) -> Non
                 folder = Place(cohort, record.person).results
                 for name in OF_A_PERSON:
                     tables[name].add(parquet.read_table(folder / f"{name}.parquet"))
+                if norms:
+                    tables["scores"].add(_table("scores", _scores(record.person, folder, norms)))
             elif record.inputs and (path := Place(cohort, record.person).findings).is_file():
                 tables["findings"].add(parquet.read_table(path))
 
@@ -158,7 +173,7 @@ def read_cohort(folder: str | Path) -> dict[str, Any]:
 
     Returns:
         by name: "cohort" (body segment parameters), "trials", "findings", "cycles", "instruments" (plates and
-        synchronisation), and "people", who is in it and how it ended.
+        synchronisation), "scores" (of gait, against norms), and "people", who is in it and how it ended.
 
     Raises:
         FileError: no cohort is there.
@@ -238,6 +253,18 @@ def _instruments(fit: Fit, day: date | None, with_session: bool) -> dict[str, An
     columns = {name: values for name, values in calibration_columns(errors).items() if name in _COLUMNS["instruments"]}
     said = {"date": None if day is None else day.isoformat(), "with_session": with_session}
     return {**{name: [value] * len(errors) for name, value in said.items()}, **columns}
+
+
+def _scores(person: str, folder: Path, norms: Mapping[str, Norm]) -> dict[str, Any]:
+    """Gait scores of a person's result; one row that says why, if there are none."""
+    try:
+        profile = gait_profile(load_fit(folder), norms)
+    except KinertiaError as error:
+        why = {"score": "GPS", "variable": OVERALL, "side": "both", "degrees": None, "remarks": str(error)}
+        return {name: [cell] for name, cell in {"person": person, **why}.items()}
+    columns = profile.columns()
+    rows = len(columns["score"])
+    return {"person": [person] * rows, **columns, "remarks": [" ".join(profile.remarks)] * rows}
 
 
 def _table(name: str, columns: Mapping[str, Any]) -> pyarrow.Table:

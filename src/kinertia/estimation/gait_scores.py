@@ -17,6 +17,8 @@ from kinertia.motion.gait_cycle import PERCENT
 if TYPE_CHECKING:
     import pandas as pd
 
+OVERALL = "all fifteen"
+"""What the person's score is of."""
 _LEAST_MEASURED = 0.95
 """Share of the cycle that must be known of a curve."""
 
@@ -52,7 +54,7 @@ class GaitProfile:
             ("GVS", CLINICAL_ANGLES[quantity].title, side, value) for (quantity, side), value in self.gvs_deg.items()
         ]
         rows += [("GPS", "all nine", side, value) for side, value in self.gps_deg.items()]
-        rows.append(("GPS", "all fifteen", "both", self.overall_deg))
+        rows.append(("GPS", OVERALL, "both", self.overall_deg))
         names = ("score", "variable", "side", "degrees")
         return dict(zip(names, (list(column) for column in zip(*rows, strict=True)), strict=True))
 
