@@ -73,7 +73,7 @@ def _told(spans: dict[str, float | None]) -> str:
     for name, unit in (("age_years", "years"), ("speed_m_s", "m/s")):
         low, high = spans[f"{name}_min"], spans[f"{name}_max"]
         if low is not None and high is not None:
-            words.append(f"{low:g} to {high:g} {unit}")
+            words.append(f"{low:g} {unit}" if low == high else f"{low:g} to {high:g} {unit}")
     return f" ({', '.join(words)})" if words else ""
 
 
