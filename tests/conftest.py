@@ -22,7 +22,7 @@ from kinertia.estimation.result import Fit
 from kinertia.io import samples
 from kinertia.io.provenance import sha256
 from kinertia.io.recording import read_recording
-from kinertia.report import extras
+from kinertia.report import matplotlib_extra
 from kinertia.settings import Settings, Subject
 from kinertia.trial.data import Recording
 from kinertia.trial.trial_input import TrialInput
@@ -329,7 +329,7 @@ def without(monkeypatch):
                 raise ImportError(wanted)
             return real_import(wanted, *args, **kwargs)
 
-        monkeypatch.setattr(extras, "find_spec", spec)
+        monkeypatch.setattr(matplotlib_extra, "find_spec", spec)
         monkeypatch.setattr(builtins, "__import__", imported)
 
     return remove

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kinertia.model.imported import OsimModel
+from kinertia.model.imported_model import OsimModel
 from kinertia.motion.dynamics import Motion, inverse_dynamics
 from recordings import here
 

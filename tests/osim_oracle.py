@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import opensim as osim
 
-from kinertia.model.imported import OsimModel
+from kinertia.model.imported_model import OsimModel
 
 osim.Logger.removeFileSink()
 osim.Logger.setLevelString("Off")

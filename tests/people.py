@@ -12,7 +12,7 @@ from kinertia.diagnostics.context import PersonContext, RecordingContext
 from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.findings.finding import Finding
 from kinertia.model.bsp import BodySegmentParameters
-from kinertia.model.imported import OsimModel
+from kinertia.model.imported_model import OsimModel
 from kinertia.model.marker_set import MarkerSet
 from kinertia.model.skeleton import Skeleton
 from kinertia.settings import Attached, Subject

@@ -57,7 +57,7 @@ if TYPE_CHECKING:
     from kinertia.model.anthropometry import BodyGeometry as BodyGeometry
     from kinertia.model.anthropometry import literature_bsp as literature_bsp
     from kinertia.model.bsp import BodySegmentParameters as BodySegmentParameters
-    from kinertia.model.imported import OsimModel as OsimModel
+    from kinertia.model.imported_model import OsimModel as OsimModel
     from kinertia.model.marker_set import MarkerSet as MarkerSet
     from kinertia.model.skeleton import Skeleton as Skeleton
     from kinertia.motion.dynamics import Motion as Motion
@@ -149,7 +149,7 @@ _HOMES = {name: module for module, names in _ROOMS.items() for name in names.spl
 __all__ = sorted(_HOMES)
 
 # data know nothing of reports: what shows and saves them is loaded when it is first asked for
-display.shown_by("kinertia.report.registration")
+display.shown_by("kinertia.report.display_registration")
 
 
 if not TYPE_CHECKING:  # a type checker is to know the names above, and no others

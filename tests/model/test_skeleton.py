@@ -6,7 +6,7 @@ from kinertia.estimation.calibration import marker_jacobian
 from kinertia.model.anthropometry import literature_bsp
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.gait27 import ARM_ROTATIONS, SHOULDER_OFFSETS
-from kinertia.model.moved_parameters import moved_parameters
+from kinertia.model.inertia_transform import transformed_parameters
 from kinertia.model.skeleton import Axis, Joint, Marker, Skeleton
 from kinertia.motion.dynamics import Motion, inverse_dynamics, root_regressor
 from kinertia.motion.rigid_body import axis_force_derivatives
@@ -107,7 +107,7 @@ def test_moved_parameters_are_pinocchios():
     rng = np.random.default_rng(0)
     place = pin.SE3.Random()
     inertia = pin.Inertia(2.0, rng.normal(size=3), np.diag([0.3, 0.4, 0.5]))
-    moved = moved_parameters(np.array([place.homogeneous]))[0] @ inertia.toDynamicParameters()
+    moved = transformed_parameters(np.array([place.homogeneous]))[0] @ inertia.toDynamicParameters()
     np.testing.assert_allclose(moved, place.act(inertia).toDynamicParameters(), atol=1e-12)
 
 

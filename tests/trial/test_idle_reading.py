@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from kinertia.trial.data import PlateLoads
-from kinertia.trial.idle_plate import largest_n, with_idle_levels, without_idle
+from kinertia.trial.plate_loading import largest_n, with_idle_levels, without_idle
 
 RATE_HZ = 1000.0
 TIME = np.arange(3000) / RATE_HZ

@@ -12,7 +12,7 @@ from kinertia.io.osim.reader import read_osim
 from kinertia.io.trc import read_trc
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.centre_offsets import centre_offsets
-from kinertia.model.imported import OsimModel
+from kinertia.model.imported_model import OsimModel
 from kinertia.motion.inverse_kinematics import solve_ik
 from kinertia.settings import Settings, Subject
 from kinertia.trial.trial_input import TrialInput

@@ -22,7 +22,7 @@ from kinertia.io.subject_file import SubjectFile, read_subject, with_settings
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.motion.dynamics import inverse_dynamics
 from kinertia.report.files import save_fit
-from kinertia.report.truth import Truth
+from kinertia.report.truth_comparison import Truth
 from kinertia.synthetic.laboratory import LabNoise, record, write_lab
 from kinertia.synthetic.walk import SyntheticTrial, unlike_literature, walk, walking_subject
 from kinertia.workflow.estimate import estimate_bsp

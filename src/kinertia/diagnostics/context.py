@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 
 from kinertia.diagnostics.axes import Axes, AxisNames
-from kinertia.diagnostics.evidence.caused_velocity import CausedVelocity, VelocityChanges, caused_velocities
 from kinertia.diagnostics.evidence.contact_span import contact_span_s
 from kinertia.diagnostics.evidence.copied_frames import FEWEST_FRAMES, without_copied_frames
 from kinertia.diagnostics.evidence.foot_trajectories import FootTrajectory, foot_trajectories
 from kinertia.diagnostics.evidence.force_mass import ForceMass, force_mass
 from kinertia.diagnostics.evidence.hallux import halluces
+from kinertia.diagnostics.evidence.horizontal_velocity import CausedVelocity, VelocityChanges, caused_velocities
 from kinertia.diagnostics.evidence.landmarks import CLEAR, cosine, headings, landmark_positions, most_forwards
 from kinertia.diagnostics.evidence.loaded_plates import adult_share
 from kinertia.diagnostics.evidence.marker_precision import MarkerPrecision
@@ -29,7 +29,7 @@ from kinertia.errors import KinertiaError
 from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.findings.finding import Finding, Severity
 from kinertia.findings.where import Where
-from kinertia.model.imported import OsimModel
+from kinertia.model.imported_model import OsimModel
 from kinertia.model.marker_set import MarkerSet
 from kinertia.motion.kinematics import FEWEST_FRAMES as FEWEST_MEASURED
 from kinertia.settings import Subject

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.interpolate import make_interp_spline
 
 from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
-from kinertia.model.sides import by_side
+from kinertia.model.shared_coordinates import by_side
 from kinertia.model.skeleton import GRAVITY_M_S2, Skeleton
 from kinertia.motion.clinical_angles import clinical_angles
 from kinertia.motion.dynamics import Motion

@@ -17,7 +17,7 @@ import numpy as np
 from kinertia.model.bsp import MIRROR_SIGNS, PARAMETERS, BodySegmentParameters, block_diagonal, dynamic_by_table
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion, root_regressor
-from kinertia.motion.frames_at_once import pieces
+from kinertia.motion.frame_chunks import pieces
 
 MEASURED, INFORMED = 0.75, 0.25
 """Information from which a parameter counts as measured, as informed."""

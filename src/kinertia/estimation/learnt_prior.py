@@ -35,7 +35,7 @@ from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.io.population_file import PopulationFile
 from kinertia.model.bsp import BodySegmentParameters
-from kinertia.model.sides import by_side
+from kinertia.model.shared_coordinates import by_side
 
 BETWEEN, WITHIN = 0.4, 1.0
 """Variances of a group's mean about the tables, and of its people about their mean, over the literature's."""

@@ -11,7 +11,7 @@ from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.simultaneous.model_uncertainty import ModelUncertainty
 from kinertia.findings.finding import Finding
 from kinertia.model.bsp import BodySegmentParameters
-from kinertia.model.imported import OsimModel
+from kinertia.model.imported_model import OsimModel
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.kinematics import Kinematics
 from kinertia.settings import Attached, Overrule, Settings, Subject

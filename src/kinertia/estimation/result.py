@@ -24,7 +24,7 @@ from kinertia.findings.overview import Overview
 from kinertia.io.norms_file import read_norms
 from kinertia.model.anthropometry import SEGMENTS
 from kinertia.model.bsp import BodySegmentParameters
-from kinertia.model.imported import OsimModel
+from kinertia.model.imported_model import OsimModel
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion
 from kinertia.motion.gait_cycle import Stride, strides_of

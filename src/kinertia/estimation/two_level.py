@@ -31,7 +31,7 @@ from kinertia.motion.dynamics import (
     root_derivatives,
     root_regressor,
 )
-from kinertia.motion.one_thread import one_blas_thread
+from kinertia.motion.single_blas_thread import one_blas_thread
 from kinertia.trial.sampled_time import span_s
 
 MAX_STRETCH_S = 1.1

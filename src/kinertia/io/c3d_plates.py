@@ -22,8 +22,8 @@ from kinertia.io.ezc3d_library import parameter_values
 from kinertia.io.plate_moments import MOMENTS_FIT
 from kinertia.io.trc import METRES_PER_UNIT
 from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads
-from kinertia.trial.idle_plate import largest_n, without_idle
 from kinertia.trial.impossible_data import impossible_load
+from kinertia.trial.plate_loading import largest_n, without_idle
 
 _CORNER_LIMIT_M = 50.0
 _EDGE_LIMITS_M = (0.1, 10.0)

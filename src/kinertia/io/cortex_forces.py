@@ -18,9 +18,9 @@ from kinertia.findings.finding import Finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.io.c3d_plates import LabPlates, to_ground_plates
-from kinertia.io.even_times import uneven
 from kinertia.io.number_table import mismatch, read_lines, read_rows
 from kinertia.io.sto import header_entry, other_count
+from kinertia.io.uniform_times import uneven
 from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads
 
 _TITLE, _COLUMNS = "[Force Data]", "#Sample"

@@ -14,13 +14,13 @@ from kinertia.errors import FileError
 from kinertia.findings.finding import Finding, finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
-from kinertia.io.even_times import even_times
 from kinertia.io.file_names import path_from
 from kinertia.io.number_table import expect_file, mismatch
 from kinertia.io.sto import TimeTable, read_table
+from kinertia.io.uniform_times import uniform_times
 from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads
-from kinertia.trial.idle_plate import PlateLoad, largest_n, without_idle
 from kinertia.trial.impossible_data import impossible_load
+from kinertia.trial.plate_loading import PlateLoad, largest_n, without_idle
 from kinertia.trial.torque_columns import torque_columns
 
 _FOOT_WORDS = {"r": "r", "right": "r", "l": "l", "left": "l"}
@@ -46,7 +46,7 @@ def read_forces(mot_path: str | Path | None, loads_path: str | Path | None = Non
     with the point `..._px` and the torque `..._mx`, `ground_torque_...x` or `ground_moment_...mx`.
 
     Below `LOAD_THRESHOLD_N` of vertical force the point of application is garbage: such samples are set to zero, unless
-    they are how a load begins or ends (`idle_plate`). Where no torque is given, the free moment is zero.
+    they are how a load begins or ends (`plate_loading`). Where no torque is given, the free moment is zero.
     Times that were rounded when written are put back on the even grid they came from. `read_forces_with_findings` has
     what was assumed.
 
@@ -81,7 +81,7 @@ def read_forces_with_findings(
         findings += more
         table = read_table(path)
         _expect_columns(groups, table, path, loads_path)
-    time, time_findings = even_times(path, table.time)
+    time, time_findings = uniform_times(path, table.time)
     table = replace(table, time=time, values=table.values[: len(time)])
     turn = np.eye(3) if turn is None else turn
     wrenches = [_wrench(path, table, group, turn) for group in groups]

@@ -13,7 +13,7 @@ from kinertia.io.recording import read_recording
 from kinertia.io.subject_file import SubjectFile, TrialFiles
 from kinertia.model.marker_set import MarkerSet
 from kinertia.trial.data import Recording
-from kinertia.trial.idle_plate import with_idle_levels
+from kinertia.trial.plate_loading import with_idle_levels
 from kinertia.trial.plate_names import with_plates_of_trial
 from kinertia.trial.trial_input import TrialInput
 

@@ -13,12 +13,12 @@ from kinertia.errors import FileError
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
-from kinertia.io.even_times import rounding_s, times_rounded, uneven
 from kinertia.io.number_table import malformed, mismatch, read_lines, read_rows
 from kinertia.io.output_folder import write_then_rename
 from kinertia.io.repeated_labels import first_with_data
 from kinertia.io.sto import header_entry, other_count
 from kinertia.io.subject_prefix import without_prefixes
+from kinertia.io.uniform_times import rounding_s, times_rounded, uneven
 from kinertia.trial.data import BoolArray, FloatArray, Markers, Recording
 
 METRES_PER_UNIT = {"m": 1.0, "cm": 0.01, "mm": 0.001}

@@ -22,12 +22,12 @@ from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.io.c3d_plates import LabPlates, contradicting_moments, plate_left_out, to_ground_plates
-from kinertia.io.even_times import uneven
 from kinertia.io.lab_axes import to_ground
 from kinertia.io.number_table import malformed, mismatch, read_lines, wrong_cells
 from kinertia.io.plate_moments import PlateMoments
 from kinertia.io.sto import header_entry
 from kinertia.io.trc import METRES_PER_UNIT, seen_positions, unknown_unit
+from kinertia.io.uniform_times import uneven
 from kinertia.trial.data import FloatArray, Markers, Recording
 
 _HEADER_LINES = 5

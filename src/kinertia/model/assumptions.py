@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from kinertia.model.joint_centres import Landmarks, medial_by_the_other_side
 from kinertia.model.marker_set import in_words
-from kinertia.model.sides import mirrored
+from kinertia.model.shared_coordinates import mirrored
 from kinertia.model.upper_body import arm_is_known
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from kinertia.errors import OsimError
 from kinertia.model.anatomy import segment_of
-from kinertia.model.imported import OsimModel
+from kinertia.model.imported_model import OsimModel
 from kinertia.model.marker_set import MarkerSet
 from kinertia.trial.data import Markers
 

@@ -24,8 +24,8 @@ from kinertia.model.axis_functions import AxisFunction
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.coordinate_map import CoordinateMap
 from kinertia.model.coordinate_range import ANYTHING, Bounds, Range
+from kinertia.model.inertia_transform import transformed_parameters
 from kinertia.model.kinematic_tree import KinematicTree, poses
-from kinertia.model.moved_parameters import moved_parameters
 from kinertia.model.root_joint import Root
 
 GRAVITY_M_S2 = 9.80665
@@ -307,7 +307,7 @@ class Skeleton:
     def _parameter_places(self) -> np.ndarray:
         """(s, 10, 10) dynamic parameters of each segment to those in its carrier's frame."""
         tree = self.tree
-        return moved_parameters(np.array([*map(placed, tree.segment_rotation, tree.segment_translation)]))
+        return transformed_parameters(np.array([*map(placed, tree.segment_rotation, tree.segment_translation)]))
 
 
 def placed(rotation: np.ndarray, translation: np.ndarray) -> np.ndarray:

@@ -16,7 +16,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from kinertia.model.skeleton import Skeleton
-from kinertia.motion.frames_at_once import pieces
+from kinertia.motion.frame_chunks import pieces
 from kinertia.motion.kinematics import LONGEST_BRIDGE_S, Kinematics
 from kinertia.motion.moving_windows import gaussian_mean
 from kinertia.trial.data import FEET

@@ -19,7 +19,7 @@ from functools import cached_property
 
 import numpy as np
 
-from kinertia.motion.frames_at_once import pieces
+from kinertia.motion.frame_chunks import pieces
 from kinertia.motion.kinematics import Kinematics
 from kinertia.motion.load_splines import loads_and_rates
 from kinertia.motion.moving_windows import gaussian_mean

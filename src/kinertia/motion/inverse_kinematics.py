@@ -4,8 +4,8 @@ For every frame the sum of squared distances between measured and model markers 
 once, and joints pay beyond their ranges (`pose_fit`). Several poses may fit a frame nearly as well, and several sets of
 angles mean the same pose: an arm turned by half a turn with the elbow bent backwards, a foot upside down. So frames a
 tenth of a second apart are solved first; of equally good poses each takes the one that goes on from its neighbour,
-outwards from the frame that fits best, and of equal angles those that do not jump (`equal_angles`). All other frames
-start from there.
+outwards from the frame that fits best, and of equal angles those that do not jump (`angle_continuity`). All other
+frames start from there.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from scipy.interpolate import PchipInterpolator
 
 from kinertia.errors import MarkerSetError, TrialError
 from kinertia.model.skeleton import Skeleton
-from kinertia.motion.equal_angles import EqualAngles
-from kinertia.motion.frames_at_once import pieces
-from kinertia.motion.held_errors import HeldErrors
+from kinertia.motion.angle_continuity import EqualAngles
+from kinertia.motion.frame_chunks import pieces
+from kinertia.motion.marker_gaps import HeldErrors
 from kinertia.motion.marker_sums import variances
-from kinertia.motion.one_thread import one_blas_thread
 from kinertia.motion.pose_fit import PoseFit, Stop, fit_poses
+from kinertia.motion.single_blas_thread import one_blas_thread
 from kinertia.trial.data import Markers
 from kinertia.trial.rms import rms
 
@@ -130,7 +130,7 @@ def solve_ik(
 
 
 def _hold_in_gaps(model: Skeleton, measured: np.ndarray, placed: np.ndarray, q: np.ndarray, stop: Stop) -> None:
-    """Solve frames that lack markers again, with these as far off the model as before and after (`held_errors`)."""
+    """Solve frames that lack markers again, with these as far off the model as before and after (`marker_gaps`)."""
     gaps = HeldErrors(measured, placed)
     for _ in range(_ROUNDS):
         for some in (gaps.frames[piece] for piece in pieces(len(gaps.frames))):

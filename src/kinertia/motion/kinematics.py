@@ -24,7 +24,7 @@ from kinertia.model.skeleton import Skeleton
 from kinertia.motion.common_cutoff import Cutoff, common_cutoff
 from kinertia.motion.dynamics import Motion
 from kinertia.motion.inverse_kinematics import InverseKinematics, solve_ik
-from kinertia.motion.one_thread import one_blas_thread
+from kinertia.motion.single_blas_thread import one_blas_thread
 from kinertia.motion.smoothing import SmoothedSpline, SmoothingError, smooth
 from kinertia.trial.data import Markers, Trial
 from kinertia.trial.foot_motion import AROUND_LOAD_S

@@ -59,7 +59,7 @@ from scipy.linalg import lapack
 from scipy.optimize import minimize_scalar
 
 from kinertia.errors import KinertiaError
-from kinertia.motion.frames_at_once import pieces
+from kinertia.motion.frame_chunks import pieces
 
 Array = NDArray[np.float64]
 

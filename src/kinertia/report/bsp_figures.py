@@ -65,7 +65,7 @@ def change_figure(fit: Fit, columns: Sequence[int] = MAIN, truth: BodySegmentPar
     """Change of these parameters by the estimate, in kg, mm and kg m2: a panel per parameter, a row per segment.
 
     With 95 % intervals of prior and estimate, where there are any (not after two-level). Segments that are held are
-    left out. `truth`: of a synthetic person, as diamonds.
+    left out. `truth_comparison`: of a synthetic person, as diamonds.
     """
     posterior, start = fit.posterior, expected_of(fit)
     shown, rows = _rows(fit)

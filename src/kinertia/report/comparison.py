@@ -24,7 +24,7 @@ from kinertia.report.figure import Figure, written
 from kinertia.report.file_outputs import beside_summary, beside_view
 from kinertia.report.panels import Panel, plain, small_multiples
 from kinertia.report.rendering import rendered
-from kinertia.report.same_quantities import same_segment, same_sign
+from kinertia.report.shared_quantities import same_segment, same_sign
 from kinertia.report.time_figures import MOST_FRAMES
 from kinertia.report.wording import INTERVAL_SD, decimals, fixed, read_in
 from kinertia.trial.data import FEET

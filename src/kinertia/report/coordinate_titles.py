@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinertia.model.sides import by_side
+from kinertia.model.shared_coordinates import by_side
 from kinertia.model.skeleton import Skeleton
-from kinertia.report.same_quantities import sign_along, turning
+from kinertia.report.shared_quantities import sign_along, turning
 from kinertia.trial.data import FEET
 
 _GAIT27 = {

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from kinertia.report.packing import packed
+from kinertia.report.compressed_text import packed
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,7 @@ from kinertia.report.cycle_figures import MOST_STRIDES
 from kinertia.report.ground_reactions_file import write_ground_reactions
 from kinertia.report.page import render
 from kinertia.report.saved_fit import FIT_FILE, write_fit
-from kinertia.report.truth import Truth
+from kinertia.report.truth_comparison import Truth
 from kinertia.report.wording import asymmetry_sentences
 from kinertia.trial.rms import rms, rms_length
 

@@ -16,8 +16,8 @@ import numpy as np
 
 from kinertia.errors import FileError, KinertiaError
 from kinertia.estimation.result import Fit
-from kinertia.report.extras import expect_matplotlib
 from kinertia.report.figure import Figure
+from kinertia.report.matplotlib_extra import expect_matplotlib
 from kinertia.report.plots import FitFigures
 from kinertia.trial.sampled_time import runs
 

@@ -49,7 +49,7 @@ from kinertia.report.time_figures import (
     moment_figure,
     residual_figure,
 )
-from kinertia.report.truth import Truth, truth_rows
+from kinertia.report.truth_comparison import Truth, truth_rows
 from kinertia.report.wording import INTERVAL_SD, asymmetry_sentences, decimals, expected_of, fixed, read_in, start_of
 from kinertia.trial.gait_events import gait_events
 from kinertia.trial.rms import rms_length

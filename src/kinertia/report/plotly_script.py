@@ -12,7 +12,7 @@ from pathlib import Path
 from kinertia.errors import FileError
 from kinertia.io.output_folder import write_then_rename
 from kinertia.model.compiled import cache_folder
-from kinertia.report.packing import packed
+from kinertia.report.compressed_text import packed
 
 TRACE_TYPES = ("bar", "scatter", "scatter3d")
 """Types of traces that figures have; the last one in notebooks only."""

@@ -26,14 +26,14 @@ from kinertia.io.provenance import VERSION, Provenance, versions
 from kinertia.model.axis_functions import Composed, PiecewisePolynomial
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.coordinate_range import Range
-from kinertia.model.imported import Coupling, OsimCoordinate, OsimJoint, OsimModel
+from kinertia.model.imported_model import Coupling, OsimCoordinate, OsimJoint, OsimModel
 from kinertia.model.skeleton import Axis, Joint, Marker, Skeleton
 from kinertia.motion.dynamics import Motion
 from kinertia.motion.ground_reactions import GroundReactions
 from kinertia.motion.inverse_kinematics import InverseKinematics
 from kinertia.motion.kinematics import Kinematics
 from kinertia.motion.smoothing import SmoothedSpline
-from kinertia.report.truth import Truth
+from kinertia.report.truth_comparison import Truth
 from kinertia.settings import Overrule, Settings, Subject
 from kinertia.trial.belt import Belt
 from kinertia.trial.data import FootLoads, Markers, Trial

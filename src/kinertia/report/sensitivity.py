@@ -11,7 +11,7 @@ import pandas as pd
 
 from kinertia.io.output_folder import complete_folder
 from kinertia.io.provenance import VERSION
-from kinertia.report.extras import has_matplotlib
+from kinertia.report.matplotlib_extra import has_matplotlib
 from kinertia.report.result_page import Part, drawing, render_parts
 from kinertia.studies.sensitivity import (
     AMPLITUDES,

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from kinertia.io.output_folder import complete_folder
-from kinertia.report.extras import has_matplotlib
+from kinertia.report.matplotlib_extra import has_matplotlib
 from kinertia.report.result_page import Part, drawing, render_parts
 from kinertia.report.table1 import QUANTITIES, short
 from kinertia.studies.table1 import PUBLISHED, Errors, Table1

@@ -127,7 +127,7 @@ def moment_figure(
 ) -> Figure:
     """Joint moments (N m/kg) with the values before on the measured motion, and as estimated, with its 95 % band.
 
-    `truth` (w, c) N m: of a synthetic person, dashed.
+    `truth_comparison` (w, c) N m: of a synthetic person, dashed.
     """
     axis, thin = time_axis(trial.kinematics), _thin(len(trial.time), most_frames)
     unused, events = _unused(trial.kinematics, axis), _shown_events(trial.kinematics)

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kinertia.model.neighbouring_angles import neighbouring_angles
 from kinertia.model.skeleton import Skeleton
+from kinertia.model.skin_angles import skin_angles
 from kinertia.trial.data import LOAD_THRESHOLD_N, Markers, PlateLoads
 
 STUDY_AMPLITUDE_M, STUDY_RATE_RAD_S = 0.01, 25.0
@@ -82,7 +82,7 @@ class SkinMotion:
         for segment in skeleton.segments:
             if not any(marker.segment == segment for marker in skeleton.markers):
                 continue
-            columns = neighbouring_angles(skeleton, segment)
+            columns = skin_angles(skeleton, segment)
             directions = rng.standard_normal((len(columns), 3))
             low, high = artefact_range(segment)
             walking, overall = (np.linalg.norm(np.ptp(each[:, columns] @ directions, axis=0)) for each in (q, every))
@@ -97,7 +97,7 @@ class SkinMotion:
         for segment, slopes in self.slopes.items():
             labels = [marker.label for marker in skeleton.markers if marker.segment == segment]
             columns = [markers.labels.index(label) for label in labels if label in markers.labels]
-            local = (q - self.reference)[:, neighbouring_angles(skeleton, segment)] @ slopes
+            local = (q - self.reference)[:, skin_angles(skeleton, segment)] @ slopes
             turned = pose.rotation[:, skeleton.segments.index(segment)] @ local[..., None]
             positions[:, columns] += turned[:, None, :, 0]
         return replace(markers, positions=positions)

@@ -41,7 +41,7 @@ LOAD_THRESHOLD_N = 20.0
 
 Below it the centre of pressure is a quotient of two noises (346 m off the origin in one published trial), so
 the readers set force and moment of such samples to zero, but for those with which a load begins or ends
-(`kinertia.trial.idle_plate`).
+(`kinertia.trial.plate_loading`).
 """
 
 

@@ -1,7 +1,7 @@
-"""How data are shown and saved, for whoever holds them. Data ask here and know nothing of reports.
+"""Shows and saves data by functions that are registered for their types; data know nothing of reports.
 
-What knows how registers itself (`kinertia.report.registration`) for each type; it is loaded when something is first
-shown or saved, by the name that the package's top has given with `shown_by`.
+`kinertia.report.display_registration` registers them; it is loaded when something is first shown or saved, by the name
+that the package's top has given with `shown_by`.
 """
 
 from __future__ import annotations

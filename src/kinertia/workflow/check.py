@@ -10,7 +10,7 @@ from kinertia.diagnostics.model.model_check import ModelCheck, check_model
 from kinertia.diagnostics.runner import asked, explained, overruled, rules_of
 from kinertia.findings.finding import Finding
 from kinertia.findings.overview import Overview
-from kinertia.model.imported import OsimModel
+from kinertia.model.imported_model import OsimModel
 from kinertia.model.marker_set import MarkerSet
 from kinertia.settings import Overrule, Subject
 from kinertia.trial.data import Recording

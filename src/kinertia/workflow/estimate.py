@@ -22,13 +22,13 @@ from kinertia.estimation.simultaneous.model_uncertainty import ModelUncertainty
 from kinertia.estimation.two_level import Window, correct_pelvis, estimate_two_level, stretches
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.gait27 import VIRTUAL_TRUNK
-from kinertia.model.imported import OsimModel
+from kinertia.model.imported_model import OsimModel
 from kinertia.model.marker_set import MarkerSet
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion, inverse_dynamics, joined, residual
 from kinertia.motion.ground_reactions import GroundReactions, ground_reactions, measured_reactions
 from kinertia.motion.kinematics import Kinematics
-from kinertia.motion.one_thread import one_blas_thread
+from kinertia.motion.single_blas_thread import one_blas_thread
 from kinertia.motion.smoothing import interpolate
 from kinertia.settings import Attached, Overrule, Settings, Subject
 from kinertia.trial.data import Recording

@@ -48,7 +48,7 @@ from kinertia.model.skeleton import Skeleton
 from kinertia.model.upper_body import ARM_SEGMENTS
 from kinertia.motion.inverse_kinematics import InverseKinematics
 from kinertia.motion.kinematics import facing
-from kinertia.motion.one_thread import one_blas_thread
+from kinertia.motion.single_blas_thread import one_blas_thread
 from kinertia.motion.stance_pose import stance_pose
 from kinertia.motion.upright_trunk import shows_trunk, with_upright_trunk
 from kinertia.settings import Attached, Overrule, Settings, Subject

@@ -27,9 +27,9 @@ from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.model.anatomy import segment_of
 from kinertia.model.bsp import BodySegmentParameters, impossible_segments
-from kinertia.model.imported import OsimModel
+from kinertia.model.imported_model import OsimModel
 from kinertia.model.skeleton import Axis, Skeleton
-from kinertia.motion.one_thread import one_blas_thread
+from kinertia.motion.single_blas_thread import one_blas_thread
 from kinertia.settings import Attached, Overrule, Settings, Subject
 from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow.doubted_mass import with_doubted_mass

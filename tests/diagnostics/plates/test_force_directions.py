@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.evidence.caused_velocity import caused_velocities
+from kinertia.diagnostics.evidence.horizontal_velocity import caused_velocities
 from kinertia.diagnostics.plates.force_directions import force_directions
 from kinertia.io.marker_set_file import choose_marker_set, read_marker_set
 from kinertia.trial.data import PlateLoads

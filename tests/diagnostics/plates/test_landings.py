@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.evidence.caused_velocity import caused_velocities
+from kinertia.diagnostics.evidence.horizontal_velocity import caused_velocities
 from kinertia.diagnostics.plates.place_questions import PLACE_QUESTIONS
 from kinertia.diagnostics.plates.signal_questions import LOADED_QUESTIONS
 from kinertia.diagnostics.runner import asked
-from kinertia.diagnostics.timing.keeps_time import keeps_time
+from kinertia.diagnostics.timing.acceleration_timing import forces_keep_time
 from kinertia.findings.finding import Severity
 from kinertia.model.marker_set import MarkerSet
 from kinertia.model.skeleton import GRAVITY_M_S2
@@ -58,7 +58,7 @@ def test_drop_landings_of_another_laboratory(recording_of, name):
 def test_forces_of_a_drop_jump_that_are_late(recording_of, late_s):
     recording = recording_of(*DROP_JUMP)
     late = replace(recording, plates=replace(recording.plates, time=recording.plates.time + late_s))
-    assert keeps_time(context_of(late)) is (late_s == 0.0)
+    assert forces_keep_time(context_of(late)) is (late_s == 0.0)
     found = error_of(late)
     assert (found is None) is (late_s == 0.0)
     assert found is None or found.code in ("T211", "T212")

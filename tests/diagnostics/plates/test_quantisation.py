@@ -10,7 +10,7 @@ from kinertia.diagnostics.plates.quantisation import quantisation
 from kinertia.diagnostics.plates.signals import signals
 from kinertia.trial.data import PlateLoads
 from kinertia.trial.force_resolution import ringing_s
-from kinertia.trial.idle_plate import without_idle
+from kinertia.trial.plate_loading import without_idle
 from plate_findings import plates_alone
 
 TIME = np.arange(2000) / 1000

@@ -9,7 +9,7 @@ from kinertia.diagnostics.plates.signal_questions import SIGNAL_QUESTIONS
 from kinertia.diagnostics.runner import asked, explained
 from kinertia.findings.finding import Severity
 from kinertia.trial.data import PlateLoads
-from kinertia.trial.idle_plate import with_idle_levels, without_idle
+from kinertia.trial.plate_loading import with_idle_levels, without_idle
 from plate_findings import codes, plates_alone
 
 TIME = np.arange(3000) / 1000

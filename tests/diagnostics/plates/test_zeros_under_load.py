@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from kinertia.diagnostics.plates.zeros_under_load import zeros_under_load
 from kinertia.trial.data import IdleReading, Markers
-from kinertia.trial.idle_plate import with_idle_levels, without_idle
+from kinertia.trial.plate_loading import with_idle_levels, without_idle
 from plate_findings import codes, context_of, found_in, with_force
 from recordings import LONG_WALKS, WALKS, here
 

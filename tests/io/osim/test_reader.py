@@ -5,7 +5,7 @@ import pytest
 
 from kinertia.errors import FileError, OsimError
 from kinertia.io.osim.reader import read_osim
-from kinertia.model.imported import OsimModel
+from kinertia.model.imported_model import OsimModel
 from kinertia.motion.dynamics import Motion
 from osim_comparison import (
     MODELS,

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kinertia.diagnostics.evidence.markers_centre import bridged_way
+from kinertia.diagnostics.evidence.body_centre import bridged_way
 from kinertia.trial.belt import Belt
 from kinertia.trial.data import FEET, BoolArray, FloatArray, Markers
 from kinertia.trial.ground_contact import bridged

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kinertia.diagnostics.evidence.markers_centre import markers_centre
+from kinertia.diagnostics.evidence.body_centre import body_centre
 from kinertia.diagnostics.evidence.strides import periods
 from kinertia.model.skeleton import GRAVITY_M_S2
 from kinertia.motion.smoothing import MIN_SAMPLES, smooth
@@ -93,7 +93,7 @@ def force_mass(segment_of_label: Mapping[str, str], trial: Trial, standing: bool
         return None
     start, end = trial.carried_windows()[0]
     around, time = trial.markers.cut(start - _AROUND_S, end + _AROUND_S), trial.markers.cut(start, end).time
-    place = markers_centre(segment_of_label, around) if len(time) >= _FEWEST_FRAMES else None
+    place = body_centre(segment_of_label, around) if len(time) >= _FEWEST_FRAMES else None
     loads = trial.loads
     inside = within(loads.time, start, end)
     if place is None or inside.sum() < MIN_SAMPLES:

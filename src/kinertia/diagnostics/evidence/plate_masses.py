@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from kinertia.diagnostics.evidence.markers_centre import markers_centre
+from kinertia.diagnostics.evidence.body_centre import body_centre
 from kinertia.model.skeleton import GRAVITY_M_S2
 from kinertia.motion.smoothing import SmoothingError, smooth
 from kinertia.trial.data import FloatArray, Markers, PlateLoads, Trial
@@ -34,7 +34,7 @@ def plate_masses(
     markers = markers.cut(
         min(start for start, _ in windows) - AROUND_LOAD_S, max(end for _, end in windows) + AROUND_LOAD_S
     )
-    place = markers_centre(segment_of_label, markers)
+    place = body_centre(segment_of_label, markers)
     if place is None:
         return {}
     try:

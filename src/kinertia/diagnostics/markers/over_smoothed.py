@@ -14,7 +14,7 @@ from itertools import combinations
 import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.evidence.markers_centre import bridged_way
+from kinertia.diagnostics.evidence.body_centre import bridged_way
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.trial.data import Markers

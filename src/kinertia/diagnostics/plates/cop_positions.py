@@ -19,8 +19,8 @@ from kinertia.diagnostics.evidence.plate_contacts import FAR_M, PlateContact, di
 from kinertia.diagnostics.plates.heel_landing import goes_forwards, lands_on_heels, shows_whole_feet
 from kinertia.diagnostics.plates.interchanged_plates import interchanged_plates
 from kinertia.diagnostics.plates.rotated_plates import rotated_plates
+from kinertia.diagnostics.timing.acceleration_timing import forces_keep_time
 from kinertia.diagnostics.timing.contact_delays import contact_delays, stance_durations
-from kinertia.diagnostics.timing.keeps_time import keeps_time
 from kinertia.diagnostics.timing.rate_and_delay import fitted_rate_or_delay
 from kinertia.findings.finding import Finding, Severity, finding, with_evidence
 from kinertia.findings.quantity import Quantity
@@ -50,7 +50,7 @@ def loads_and_feet(context: RecordingContext) -> Iterator[Finding]:
     if not shows_whole_feet(context):
         return
     feet = context.foot_trajectories
-    timely = keeps_time(context)
+    timely = forces_keep_time(context)
     hypotheses = list(
         chain(
             () if timely else fitted_rate_or_delay(context),

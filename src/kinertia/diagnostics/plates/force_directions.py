@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.evidence.caused_velocity import LEAST_CHANGE_M_S, CausedVelocity, VelocityChanges
-from kinertia.diagnostics.evidence.velocity_residual import (
+from kinertia.diagnostics.evidence.horizontal_velocity import LEAST_CHANGE_M_S, CausedVelocity, VelocityChanges
+from kinertia.diagnostics.evidence.horizontal_velocity_residual import (
     CLEARLY_BEST,
     DISTINGUISHABLE,
     HORIZONTAL,

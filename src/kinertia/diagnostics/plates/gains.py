@@ -12,9 +12,14 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.evidence.caused_velocity import CausedVelocity
-from kinertia.diagnostics.evidence.ups_and_downs import ups_and_downs_of
-from kinertia.diagnostics.evidence.velocity_residual import CLEARLY_BEST, HORIZONTAL, Scaled, VelocityResidual
+from kinertia.diagnostics.evidence.horizontal_velocity import CausedVelocity
+from kinertia.diagnostics.evidence.horizontal_velocity_residual import (
+    CLEARLY_BEST,
+    HORIZONTAL,
+    Scaled,
+    VelocityResidual,
+)
+from kinertia.diagnostics.evidence.vertical_acceleration import vertical_match_of
 from kinertia.findings.finding import Finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.trial.data import PlateLoads
@@ -66,10 +71,10 @@ def _by_vertical_velocity(context: RecordingContext, plates: PlateLoads) -> Find
     for part in context.velocities if len(plates.names) > 1 else ():
         if span_s(part.time) < _LEAST_WINDOW_S:
             continue
-        read, rate = ups_and_downs_of(part), ups_and_downs_of(part, growing=True)
+        read, rate = vertical_match_of(part), vertical_match_of(part, growing=True)
         own = [part.by(plates.time, vertical) for vertical in plates.force[..., 1].T]
         used = [p for p, caused in enumerate(own) if np.ptp(caused) > 0.0]
-        by_plate = {p: found for p in used if (found := ups_and_downs_of(part, own[p]))}
+        by_plate = {p: found for p in used if (found := vertical_match_of(part, own[p]))}
         if not read or len(by_plate) < 2:
             continue
         best = min(by_plate, key=lambda p: sum(each.left for each in by_plate[p]))

@@ -12,8 +12,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.evidence.caused_velocity import CausedVelocity
-from kinertia.diagnostics.evidence.velocity_residual import CLEARLY_BEST, HORIZONTAL, VelocityResidual
+from kinertia.diagnostics.evidence.horizontal_velocity import CausedVelocity
+from kinertia.diagnostics.evidence.horizontal_velocity_residual import CLEARLY_BEST, HORIZONTAL, VelocityResidual
 from kinertia.findings.finding import Finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.rule import rule

@@ -19,7 +19,7 @@ import numpy as np
 
 from kinertia.diagnostics.context import PersonContext
 from kinertia.diagnostics.evidence.force_mass import MISSING, ForceMass
-from kinertia.diagnostics.subject.majority import odd_ones
+from kinertia.diagnostics.subject.odd_recording import odd_ones
 from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.quantity import Quantity

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.evidence.ups_and_downs import MOST_LEFT, ups_and_downs_of
+from kinertia.diagnostics.evidence.vertical_acceleration import MOST_LEFT, vertical_match_of
 from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.trial.sampled_time import span_s
@@ -59,11 +59,11 @@ def _growing_delays(context: RecordingContext) -> Iterator[Finding]:
     for part in context.velocities:
         if span_s(part.time) < _LEAST_WINDOW_S:
             continue
-        found = ups_and_downs_of(part, growing=True)
+        found = vertical_match_of(part, growing=True)
         if not found or max(one.left for one in found) > MOST_LEFT:
             continue
         # with another gain under one foot the body seems to be pushed ever earlier, or later, within two steps
-        gains = ups_and_downs_of(part, own=part.by(trial.loads.time, trial.loads.force[:, 0, 1]))
+        gains = vertical_match_of(part, own=part.by(trial.loads.time, trial.loads.force[:, 0, 1]))
         if any(one.left > other.left for one, other in zip(found, gains, strict=False)):
             continue
         delay, growth = np.array([one.delay_s for one in found]), np.array([one.growth for one in found])

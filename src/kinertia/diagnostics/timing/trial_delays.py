@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kinertia.diagnostics.context import PersonContext, RecordingContext
-from kinertia.diagnostics.evidence.ups_and_downs import MOST_LEFT, ups_and_downs_of
+from kinertia.diagnostics.evidence.vertical_acceleration import MOST_LEFT, vertical_match_of
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
@@ -48,7 +48,7 @@ def trial_delay(context: RecordingContext) -> TrialDelay | None:
     for part in context.velocities:
         if span_s(part.time) < _LEAST_WINDOW_S:
             continue
-        both = ups_and_downs_of(part)
+        both = vertical_match_of(part)
         if both and max(one.left for one in both) <= MOST_LEFT:
             found.append([one.delay_s for one in both])
             spans.append(span_s(part.time))

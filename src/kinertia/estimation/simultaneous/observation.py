@@ -29,7 +29,7 @@ from kinertia.estimation.simultaneous.shoulder_girdle import girdle_variance
 from kinertia.estimation.simultaneous.skin import SkinPatterns, skin_patterns
 from kinertia.estimation.simultaneous.soft_parts import swing_factors
 from kinertia.model.skeleton import GRAVITY_M_S2, Skeleton
-from kinertia.motion.frames_at_once import pieces
+from kinertia.motion.frame_chunks import pieces
 from kinertia.motion.ground_reactions import ground_reactions
 from kinertia.motion.kinematics import AROUND_WINDOW_S, Kinematics
 from kinertia.motion.smoothing import smooth

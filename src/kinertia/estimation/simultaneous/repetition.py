@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.fft import next_fast_len, rfft
 
-from kinertia.motion.frames_at_once import pieces
+from kinertia.motion.frame_chunks import pieces
 
 _UNLIKE, _REPEATING = 0.05, 0.3
 """Correlations below which errors count as unlike, and above which they count as coming back."""

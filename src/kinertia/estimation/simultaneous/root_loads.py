@@ -9,7 +9,7 @@ from kinertia.estimation.simultaneous.given import BSP, FreedModel
 from kinertia.estimation.simultaneous.normal_equations import Gradient, NormalEquations
 from kinertia.estimation.simultaneous.root_terms import RootFrames, add_root, columns_of
 from kinertia.motion.dynamics import Motion
-from kinertia.motion.frames_at_once import pieces
+from kinertia.motion.frame_chunks import pieces
 
 
 class RootLoads(CostTerm):

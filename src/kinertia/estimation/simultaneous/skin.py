@@ -23,8 +23,8 @@ from functools import cached_property
 import numpy as np
 
 from kinertia.model.anatomy import segment_of
-from kinertia.model.neighbouring_angles import neighbouring_angles
 from kinertia.model.skeleton import Skeleton
+from kinertia.model.skin_angles import skin_angles
 
 EXPECTED_SD_M = {"thigh": 0.004, "shank": 0.003, "foot": 0.0015}
 """Over a stride, RMS along each axis, by segment (Peters et al. 2010, Gait Posture 31:1); others:
@@ -122,7 +122,7 @@ def skin_patterns(skeleton: Skeleton, trials: Sequence[np.ndarray]) -> tuple[Ski
 
 def _directions(skeleton: Skeleton, segment: str, away: np.ndarray, varying: np.ndarray) -> np.ndarray:
     """(c, p) m/rad from the coordinates to the patterns of a segment."""
-    angles = [i for i in neighbouring_angles(skeleton, segment) if varying[i] > _STILL_RAD]
+    angles = [i for i in skin_angles(skeleton, segment) if varying[i] > _STILL_RAD]
     if not angles:
         return np.zeros((len(varying), 0))
     kind = (segment_of(segment) or "").rpartition("_")[0]

@@ -43,7 +43,7 @@ from kinertia.estimation.simultaneous.sound_or_faulty import ErrorPriors, Gaussi
 from kinertia.estimation.simultaneous.static_information import StaticInformation
 from kinertia.estimation.simultaneous.terms import TERMS
 from kinertia.model.skeleton import Skeleton
-from kinertia.motion.one_thread import one_blas_thread
+from kinertia.motion.single_blas_thread import one_blas_thread
 
 CONVERGED = 1e-3
 """Promised decrease of half the sum of squares below which a step is the last of the search: with the one at the end of

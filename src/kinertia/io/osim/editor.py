@@ -16,7 +16,7 @@ from kinertia.io.osim.exporter import body_text, weld_text
 from kinertia.io.osim.reader import INERTIA_TAGS, body_elements, marker_elements
 from kinertia.io.osim.xml import Element, parse, replaced
 from kinertia.model.bsp import BodySegmentParameters
-from kinertia.model.imported import OsimModel
+from kinertia.model.imported_model import OsimModel
 from kinertia.model.skeleton import Marker
 
 if TYPE_CHECKING:

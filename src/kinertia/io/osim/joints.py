@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 from kinertia.io.osim.properties import Values
 from kinertia.io.osim.xml import Element
 from kinertia.model.axis_functions import AxisFunction, Composed, constant, constant_value, unit_slope
-from kinertia.model.imported import OsimCoordinate
+from kinertia.model.imported_model import OsimCoordinate
 from kinertia.model.skeleton import Axis
 
 _X, _Y, _Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)

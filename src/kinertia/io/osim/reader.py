@@ -22,7 +22,7 @@ from kinertia.io.osim.properties import Values
 from kinertia.io.osim.xml import Element, XmlError, parse
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.coordinate_range import Range
-from kinertia.model.imported import Coupling, OsimJoint, OsimModel
+from kinertia.model.imported_model import Coupling, OsimJoint, OsimModel
 from kinertia.model.skeleton import Axis, Joint, Marker, Skeleton
 
 NEWEST_VERSION = 40600

@@ -20,7 +20,7 @@ def owners_of(skeleton: Skeleton) -> dict[str, str]:
     return {marker.label: segment_of(marker.segment) or "" for marker in skeleton.markers}
 
 
-def markers_centre(owners: Mapping[str, str], markers: Markers) -> FloatArray | None:
+def body_centre(owners: Mapping[str, str], markers: Markers) -> FloatArray | None:
     """(n, 3) m, the markers' centre, each segment at its share of the body's mass; None without a pelvis.
 
     Args:

@@ -7,7 +7,7 @@ import numpy as np
 from kinertia.model.bsp import inertia_of, second_moments
 
 
-def moved_parameters(places: np.ndarray) -> np.ndarray:
+def transformed_parameters(places: np.ndarray) -> np.ndarray:
     """(s, 10, 10) linear maps of dynamic parameters from frames to the one in which they stand at these places.
 
     The pseudo-inertia of a body moves as J' = T J T^T (Wensing, Kim and Slotine 2018); the parameters are linear in J.

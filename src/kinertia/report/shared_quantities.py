@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from kinertia.model.sides import by_side
+from kinertia.model.shared_coordinates import by_side
 from kinertia.model.skeleton import Skeleton
 from kinertia.trial.data import FEET
 

@@ -1,7 +1,7 @@
 import numpy as np
 
 from kinertia.trial.data import LOAD_THRESHOLD_N
-from kinertia.trial.idle_plate import LONGEST_TAIL_S, without_idle
+from kinertia.trial.plate_loading import LONGEST_TAIL_S, without_idle
 
 RATE_HZ = 1000.0
 PLACE = np.array([0.4, 0.0, -0.2])

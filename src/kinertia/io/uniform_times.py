@@ -35,7 +35,7 @@ def rounding_s(time: FloatArray) -> float:
     return 0.0
 
 
-def even_times(path: Path, time: FloatArray) -> tuple[FloatArray, tuple[Finding, ...]]:
+def uniform_times(path: Path, time: FloatArray) -> tuple[FloatArray, tuple[Finding, ...]]:
     """Times (k,) s of forces as they are, or on the even grid that they were rounded from, with what was found.
 
     Nothing tells the rate but the times: the grid is the straight line through them (T102). At 2000 Hz and in whole

@@ -9,7 +9,7 @@ def by_side(names: Sequence[str]) -> dict[str, dict[str, int]]:
     """Name without its side -> side -> index in `names`; the side is "" where the other one is not there too.
 
     Examples:
-        >>> from kinertia.model.sides import by_side
+        >>> from kinertia.model.shared_coordinates import by_side
         >>> by_side(["pelvis_tilt", "knee_angle_r", "knee_angle_l"])
         {'pelvis_tilt': {'': 0}, 'knee_angle': {'r': 1, 'l': 2}}
     """
@@ -25,7 +25,7 @@ def mirrored(name: str) -> str:
     """The name of what is on the other side; of what has no side, its own.
 
     Examples:
-        >>> from kinertia.model.sides import mirrored
+        >>> from kinertia.model.shared_coordinates import mirrored
         >>> mirrored("knee_r"), mirrored("c7")
         ('knee_l', 'c7')
     """

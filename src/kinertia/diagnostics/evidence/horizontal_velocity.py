@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinertia.diagnostics.evidence.markers_centre import markers_centre
+from kinertia.diagnostics.evidence.body_centre import body_centre
 from kinertia.model.skeleton import GRAVITY_M_S2
 from kinertia.motion.smoothing import SmoothingError, smooth
 from kinertia.trial.data import FloatArray, Trial
@@ -83,7 +83,7 @@ def caused_velocities(trial: Trial, owners: Mapping[str, str]) -> list[CausedVel
         min(start for start, _ in windows) - AROUND_LOAD_S, max(end for _, end in windows) + AROUND_LOAD_S
     )
     worn = [label for label in markers.labels if owners.get(label) == "pelvis"]
-    whole = markers_centre(owners, markers)
+    whole = body_centre(owners, markers)
     if not worn or whole is None:
         return []
     place = markers.select(worn).positions.mean(axis=1)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from kinertia.model.skeleton import Skeleton
 
 
-def neighbouring_angles(skeleton: Skeleton, segment: str) -> list[int]:
+def skin_angles(skeleton: Skeleton, segment: str) -> list[int]:
     """Columns of the angles of the joints at both ends of a segment; a segment without markers in between (a patella,
     a talus) belongs to the joint. The root's are none of them: they turn the whole body.
     """

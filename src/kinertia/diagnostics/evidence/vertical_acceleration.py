@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinertia.diagnostics.evidence.caused_velocity import CausedVelocity
+from kinertia.diagnostics.evidence.horizontal_velocity import CausedVelocity
 from kinertia.trial.data import FloatArray
 
 MOST_LEFT = 0.22
@@ -35,7 +35,7 @@ class UpsAndDowns:
     left: float
 
 
-def ups_and_downs(
+def vertical_match(
     part: CausedVelocity, shown: FloatArray, own: FloatArray | None = None, growing: bool = False
 ) -> UpsAndDowns | None:
     """By Gauss-Newton; None where the velocities do not follow the forces.
@@ -70,9 +70,9 @@ def ups_and_downs(
     return UpsAndDowns(delay, growth, gain, left)
 
 
-def ups_and_downs_of(
+def vertical_match_of(
     part: CausedVelocity, own: FloatArray | None = None, growing: bool = False
 ) -> Sequence[UpsAndDowns]:
     """By the pelvis and by the markers' centre; empty where either does not follow the forces."""
-    found = [ups_and_downs(part, shown, own, growing) for shown in (part.pelvis, part.centre)]
+    found = [vertical_match(part, shown, own, growing) for shown in (part.pelvis, part.centre)]
     return [one for one in found if one is not None] if all(found) else []

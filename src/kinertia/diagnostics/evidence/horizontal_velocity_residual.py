@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinertia.diagnostics.evidence.caused_velocity import CausedVelocity, without_trend
+from kinertia.diagnostics.evidence.horizontal_velocity import CausedVelocity, without_trend
 from kinertia.findings.quantity import Quantity
 from kinertia.trial.data import FloatArray
 
