@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kinertia.model.sides import by_side
+from kinertia.model.shared_coordinates import by_side
 from kinertia.model.skeleton import Skeleton
 
 
