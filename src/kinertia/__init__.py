@@ -114,7 +114,7 @@ _ROOMS = {
     "trial.trial_input": "TrialInput",
     "model.anthropometry": "BodyGeometry literature_bsp",
     "model.bsp": "BodySegmentParameters",
-    "model.imported": "OsimModel",
+    "model.imported_model": "OsimModel",
     "model.marker_set": "MarkerSet",
     "model.skeleton": "Skeleton",
     "motion.dynamics": "Motion inverse_dynamics residual",
