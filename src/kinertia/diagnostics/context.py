@@ -20,7 +20,7 @@ from kinertia.diagnostics.evidence.landmarks import CLEAR, cosine, headings, lan
 from kinertia.diagnostics.evidence.loaded_plates import adult_share
 from kinertia.diagnostics.evidence.marker_precision import MarkerPrecision
 from kinertia.diagnostics.evidence.plate_contacts import PlateContact, contacts_of
-from kinertia.diagnostics.evidence.plate_edges import FootPoints, Overhang, overhangs
+from kinertia.diagnostics.evidence.plate_edges import LITTLE_BEYOND_M, FootPoints, Overhang, overhangs
 from kinertia.diagnostics.evidence.plate_masses import plate_masses
 from kinertia.diagnostics.evidence.standing_mass import StandingMass, standing_mass
 from kinertia.diagnostics.evidence.strides import periods, swing_in_turn
@@ -285,6 +285,17 @@ class RecordingContext:
         if self.plates is None or self.trial is None:
             return {}
         return plate_masses(self.plates, self.trial, self.all_markers, self.segment_of_label)
+
+    @property
+    def plates_reached_beyond(self) -> frozenset[str]:
+        """Names of plates that a foot reaches beyond by so much that a part of its load is elsewhere."""
+        names = () if self.plates is None else self.plates.names
+        return frozenset(names[one.plate] for one in self.overhangs if one.overhang_m > LITTLE_BEYOND_M)
+
+    @property
+    def whole_plate_masses(self) -> Mapping[str, float]:
+        """`plate_masses` of the other plates."""
+        return {name: kg for name, kg in self.plate_masses.items() if name not in self.plates_reached_beyond}
 
     def at(self, **where: Any) -> Where:
         """A place in this recording: `at(plate="plate 1", **self.along(2))`."""

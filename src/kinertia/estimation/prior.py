@@ -20,7 +20,7 @@ and right differ less than either from the literature: a person is nearly symmet
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -117,6 +117,16 @@ class BspPrior:
     def on_scale(self) -> np.ndarray:
         """(s,) 1 of segments that the scale weighed, 0 of others."""
         return np.ones(len(self.mean.segments)) if self.weighed is None else np.array(self.weighed, dtype=float)
+
+    def at_mass(self, mass_kg: float, sd_kg: float) -> BspPrior:
+        """The prior of a person of the same build who weighs this much, known to this deviation."""
+        factor = mass_kg / self.mass_kg
+        rows = np.where(np.isin(PARAMETERS, ("com_x", "com_y", "com_z")), 1.0, factor)
+        each = np.tile(rows, len(self.mean.segments))
+        mean = BodySegmentParameters.from_table(self.mean.segments, self.mean.table() * rows)
+        return replace(
+            self, mean=mean, covariance=self.covariance * np.outer(each, each), mass_kg=mass_kg, mass_sd_kg=sd_kg
+        )
 
     def given_scale(self) -> tuple[np.ndarray, np.ndarray]:
         """(10 s,) mean and (10 s, 10 s) covariance of the table rows once the scale has said `mass_kg`."""

@@ -1,27 +1,45 @@
-"""Widens the deviation of a stated mass that plates contradict."""
+"""Moves the prior to the mass of the plates, where they contradict the stated one."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
 
+from kinertia.estimation.common_gain import at_common_gain, common_gain
+from kinertia.estimation.prepared import Prepared
 from kinertia.estimation.prior import BspPrior
+from kinertia.estimation.simultaneous.fit import SimultaneousFit
 from kinertia.findings.finding import Finding, Severity
 
 _DOUBTED = "S111"
+_FEWEST = 2
+"""So many occasions or plates that agree are likelier than the number that somebody wrote down."""
 
 
 def with_doubted_mass(prior: BspPrior, findings: Sequence[Finding]) -> BspPrior:
-    """Widen the deviation of the total mass to what several occasions on plates contradict it by.
+    """The prior at the mass of the plates, where several occasions or plates agree that the stated one is wrong.
 
-    Two plates and a static trial that agree are likelier than the number that somebody wrote down: they are not scaled
-    to it. Whoever ignores the finding keeps the stated mass.
+    They are not scaled to it. Whoever ignores the finding keeps the stated mass.
     """
     for one in findings:
-        agreed = one.code == _DOUBTED and one.where.trial is None and one.severity is Severity.WARNING
-        if agreed and one.is_open:
-            by_force, stated = (one.evidence[name].value for name in ("mass_by_force_kg", "stated_kg"))
-            assert isinstance(by_force, float)
-            assert isinstance(stated, float)
-            return replace(prior, mass_sd_kg=max(prior.mass_sd_kg, abs(by_force - stated)))
+        if one.code != _DOUBTED or one.severity is not Severity.WARNING or not one.is_open:
+            continue
+        by_force, stated, agreeing = (one.evidence[name] for name in ("mass_by_force_kg", "stated_kg", "agreeing"))
+        assert isinstance(by_force.value, float)
+        assert isinstance(stated.value, float)
+        if agreeing.value >= _FEWEST:
+            return prior.at_mass(
+                prior.mass_kg + by_force.value - stated.value, max(prior.mass_sd_kg, by_force.sd or 0.0)
+            )
     return prior
+
+
+def at_mass_of_plates(ready: Prepared, fitted: SimultaneousFit) -> Prepared | None:
+    """The person at the mass that all plates agree on in an estimate; None where they contradict the stated one in
+    nothing alike, where something was attached, or the user ignores it.
+    """
+    gain = common_gain(fitted.posterior.instrument_errors)
+    ignored = any(_DOUBTED.startswith(code) for code in ready.overrule.ignore)
+    if gain is None or ignored or ready.attached:
+        return None
+    return replace(ready, prior=at_common_gain(ready.prior, fitted.bsp.total_mass_kg, gain))

@@ -11,7 +11,7 @@ import numpy as np
 from kinertia.diagnostics.result.context import ResultContext
 from kinertia.diagnostics.result.questions import ESTIMATE_QUESTIONS, RESULT_QUESTIONS, judged
 from kinertia.diagnostics.runner import explained, overruled, rules_of
-from kinertia.estimation.free_moment_sign import with_likelier_sign
+from kinertia.estimation.free_moment_sign import Signed, with_likelier_sign
 from kinertia.estimation.prepared import Prepared, Progress
 from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.result import Fit, TrialFit
@@ -34,6 +34,7 @@ from kinertia.settings import Attached, Overrule, Settings, Subject
 from kinertia.trial.data import Recording
 from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow.attached import with_attached
+from kinertia.workflow.doubted_mass import at_mass_of_plates
 from kinertia.workflow.prepare import prepare
 
 
@@ -190,6 +191,9 @@ def _simultaneous(ready: Prepared, settings: Settings, started: float, progress:
         )
 
     signed = with_likelier_sign(ready, fit)
+    reweighed = at_mass_of_plates(signed.ready, signed.fitted)
+    if reweighed is not None:
+        signed = Signed(fit(reweighed, ()), reweighed)
     fitted, ready = signed.fitted, signed.ready
     result = fitted.result
     parts = (

@@ -296,6 +296,22 @@ def test_a_foot_beyond_its_plate_leaves_the_other_plate(lab):
     (found,) = stated_mass(context)
     assert (found.code, found.evidence["mass_by_force_kg"].value) == ("S111", 72.6)
     assert found.where.trial == walked.name
+    assert found.evidence["agreeing"].value == 1
+
+
+def test_how_many_agree(lab):
+    """Plates on one occasion, unless another occasion has the stated mass; else occasions."""
+    walked, static, marker_set = lab
+    stood = standing_on_plates(static, walked, 72.6)
+
+    def agreeing(factors, static, mass_kg):
+        (found,) = stated_mass(person([by_plate(walked, *factors)], static, marker_set, mass_kg=mass_kg))
+        return found.evidence["agreeing"].value
+
+    assert agreeing((1.0, 1.0), None, 67.5) == 2
+    assert agreeing((1.0, 0.85), None, 72.6) == 1, "plates differ"
+    assert agreeing((0.93, 0.93), stood, 72.6) == 1, "standing, it is the stated mass"
+    assert agreeing((1.0, 1.0), stood, 79.0) == 2
 
 
 def test_trials_of_different_masses(lab):

@@ -13,6 +13,8 @@ from kinertia.trial.sampled_time import within
 
 OVERHANG_M, HALLUX_M = 0.01, 0.02
 """Markers stand off the skin by as much; so well is the place of the big toe known that has none."""
+LITTLE_BEYOND_M = 0.03
+"""So little of a heel bears no load to speak of."""
 _TOE_M = 0.05
 """Nothing but toes is so short."""
 _LIFTED_M = 0.01

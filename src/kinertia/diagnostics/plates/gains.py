@@ -40,7 +40,8 @@ def gains(context: RecordingContext) -> Iterator[Finding]:
     if plates is None or context.trial is None:
         return
     weights = _by_single_support(context) or _by_vertical_velocity(context, plates)
-    if weights is not None:
+    # a light plate lacks what a foot has beyond its edge
+    if weights is not None and weights.evidence["other"].value not in context.plates_reached_beyond:
         yield weights
     long = [part for part in context.velocities if span_s(part.time) >= _LEAST_WINDOW_S]
     for axis in HORIZONTAL if long else ():

@@ -36,9 +36,9 @@ _REPEATED = 0.005
 """By which a mass by the same plates differs from one occasion to another, SD as a share."""
 _SAME_PLACE_M = 1e-3
 """Corners of the same plate in two files."""
-_LITTLE_BEYOND_M, _SINGLE_SUPPORT = 0.03, 0.04
-"""So little of a heel bears no load to speak of; SD of a mass by one single support, as a share: velocities of the
-markers' centre at its ends are known to 0.14 m/s."""
+_SINGLE_SUPPORT = 0.04
+"""SD of a mass by one single support, as a share: velocities of the markers' centre at its ends are known to 0.14
+m/s."""
 _LOAD_KG = 2.0
 """From which on a surplus may be something that was worn or carried."""
 _POUND, _UNIT_OFF = 0.45359, 0.1
@@ -138,11 +138,11 @@ def _by_plates(context: PersonContext) -> list[_Occasion]:
         weighed = one.force_mass
         if one.plates is None or (weighed is not None and weighed.sd_kg < _SINGLE_SUPPORT * weighed.mass_kg):
             continue
-        beyond = {one.plates.names[each.plate] for each in one.overhangs if each.overhang_m > _LITTLE_BEYOND_M}
-        masses_kg = [mass_kg for name, mass_kg in one.plate_masses.items() if name not in beyond]
-        if beyond and masses_kg:
+        masses_kg = [*one.whole_plate_masses.values()]
+        if masses_kg and one.plates_reached_beyond:
             mass_kg = float(np.mean(masses_kg))
-            found.append(_Occasion(one.name, mass_kg, _SINGLE_SUPPORT * mass_kg, "single support"))
+            sd_kg = _SINGLE_SUPPORT * mass_kg / len(masses_kg) ** 0.5
+            found.append(_Occasion(one.name, mass_kg, sd_kg, "single support"))
     return found
 
 
@@ -203,7 +203,7 @@ def _contradiction(
             yield finding("P202", where, unit=Quantity(unit), ratio=Quantity(ratio, "1"))
     by_plate: dict[str, float] = {}
     for trial in context.trials:
-        by_plate |= trial.plate_masses if one.trial in (None, trial.name) else {}
+        by_plate |= trial.whole_plate_masses if one.trial in (None, trial.name) else {}
     causes, action = _causes(one, total.total_kg, by_plate, witnesses)
     heavier = one.mass_kg > total.total_kg
     limit = total.total_kg + (1.0 if heavier else -1.0) * one.allowed_kg(total, WARNING_SHARE)
@@ -211,6 +211,7 @@ def _contradiction(
         "mass_by_force_kg": Quantity(one.mass_kg, "kg", limit=limit, sd=one.sd_kg),
         "stated_kg": Quantity(total.total_kg, "kg", sd=total.sd_kg),
         "attached_kg": Quantity(total.total_kg - total.body_kg, "kg"),
+        "agreeing": Quantity(_agreeing(one, total.total_kg, by_plate, witnesses), "1"),
         "method": Quantity(f"markers' centre of mass over {one.over}"),
         "action": Quantity(action),
     }
@@ -220,6 +221,15 @@ def _contradiction(
         evidence["plates_kg"] = Quantity(tuple(by_plate.values()), "kg")
     severity = Severity.ERROR if one.differs(total, one.error_share) else Severity.WARNING
     yield finding("S111", where, severity, causes, **evidence)
+
+
+def _agreeing(one: _Occasion, stated_kg: float, by_plate: Mapping[str, float], witnesses: Sequence[_Occasion]) -> int:
+    """How many occasions agree, or how many plates on a single one that no other occasion speaks against."""
+    if one.count > 1 or not by_plate:
+        return one.count
+    alike = max(by_plate.values()) <= (1.0 + _SAME) * min(by_plate.values())
+    against = any(abs(each.mass_kg - stated_kg) < abs(each.mass_kg - one.mass_kg) for each in witnesses)
+    return len(by_plate) if alike and not against else 1
 
 
 def _causes(
