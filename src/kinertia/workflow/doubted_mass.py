@@ -24,13 +24,11 @@ def with_doubted_mass(prior: BspPrior, findings: Sequence[Finding]) -> BspPrior:
     for one in findings:
         if one.code != _DOUBTED or one.severity is not Severity.WARNING or not one.is_open:
             continue
-        by_force, stated, agreeing = (one.evidence[name] for name in ("mass_by_force_kg", "stated_kg", "agreeing"))
-        assert isinstance(by_force.value, float)
-        assert isinstance(stated.value, float)
-        if agreeing.value >= _FEWEST:
-            return prior.at_mass(
-                prior.mass_kg + by_force.value - stated.value, max(prior.mass_sd_kg, by_force.sd or 0.0)
-            )
+        evidence = (one.evidence[name] for name in ("mass_by_force_kg", "stated_kg", "agreeing"))
+        by_force, stated, agreeing = (float(each.value) for each in evidence if not isinstance(each.value, tuple))
+        if agreeing >= _FEWEST:
+            sd_kg = one.evidence["mass_by_force_kg"].sd or 0.0
+            return prior.at_mass(prior.mass_kg + by_force - stated, max(prior.mass_sd_kg, sd_kg))
     return prior
 
 
