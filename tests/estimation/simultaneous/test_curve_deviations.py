@@ -81,15 +81,28 @@ def curves(problem, coefficients: np.ndarray, static: np.ndarray) -> dict[str, n
     }
 
 
+def derivatives_at(problem, coefficients: np.ndarray, static: np.ndarray, late_sd_s: float):
+    """The motion at the dynamic frames, and `moment_derivatives` there."""
+    frames = np.flatnonzero(problem.trials[0].dynamic)
+    motion = [part[frames] for part in problem.model.full(problem.bases[0].evaluate(coefficients), static)]
+    reactions = problem.loads.reactions(0, static)
+    return motion, moment_derivatives(problem, 0, motion, static, reactions, frames, late_sd_s)
+
+
+def late_sd_s(problem, covariance: np.ndarray) -> float:
+    """Deviation of the delay of the forces, from the covariance (S, S) of the static unknowns."""
+    late = problem.loads.late(0)
+    return float(np.sqrt(covariance[np.ix_(late, late)].sum()))
+
+
 def dense_derivatives(
-    problem, coefficients: np.ndarray, static: np.ndarray, shares=(1.0, 1.0, 1.0)
+    problem, coefficients: np.ndarray, static: np.ndarray, shares=(1.0, 1.0, 1.0), late_sd_s=0.0
 ) -> dict[str, np.ndarray]:
     """(d, ..., unknowns) derivatives of `curves` by all coefficients and static unknowns; with these shares of what
     places, rates and accelerations do.
     """
     basis, frames = problem.bases[0], np.flatnonzero(problem.trials[0].dynamic)
-    motion = [part[frames] for part in problem.model.full(basis.evaluate(coefficients), static)]
-    by = moment_derivatives(problem, 0, motion, static, problem.loads.reactions(0, static), frames)
+    motion, by = derivatives_at(problem, coefficients, static, late_sd_s)
     d, (size, c) = len(frames), coefficients.shape
     nothing, same = np.zeros((d, c, c)), np.tile(np.eye(c), (d, 1, 1))
     still, zero = by.static, np.zeros_like(by.static)
@@ -160,12 +173,15 @@ def test_deviations_are_those_of_the_dense_covariance(estimate, noise):
     noise_n = problem.loads.reactions(0, static).noise_n * (
         curves(problem, coefficients, static)["ground_forces"] != 0.0
     )
+    late = late_sd_s(problem, full[n:, n:])
+    left = derivatives_at(problem, coefficients, static, late)[1]
     more = {
-        "moments": impacts,
-        "powers": impacts * speed**2,
-        "ground_forces": noise_n**2,
+        "moments": impacts + left.left,
+        "powers": (impacts + left.left) * speed**2,
+        "ground_forces": noise_n**2 + left.ground_left,
     }
-    by, by_noise = (dense_derivatives(problem, coefficients, static, each) for each in (np.ones(3), np.sqrt(noise)))
+    shares = np.ones(3), np.sqrt(noise)
+    by, by_noise = (dense_derivatives(problem, coefficients, static, each, late) for each in shares)
     for name, derivative in by.items():
         expected = np.einsum("dri,ij,drj->dr", derivative, full, derivative, optimize=True) + more.get(name, 0.0)
         for sign, shaken in ((1.0, by_noise[name][..., :n]), (-1.0, derivative[..., :n])):
@@ -204,17 +220,19 @@ def test_deviations_of_two_trials_are_those_of_one_dense_matrix(estimate, noise)
     assert answered @ model.step(answered) == pytest.approx(right @ covariance @ right, rel=1e-4)
 
     in_trial = pair.in_trial(0, here.point)
-    by = dense_derivatives(pair, coefficients, in_trial)["moments"]
+    late = late_sd_s(pair, chains[0] @ covariance @ chains[0].T)
+    by = dense_derivatives(pair, coefficients, in_trial, late_sd_s=late)["moments"]
     n = coefficients.size
     normal = pair.normal(0, coefficients, in_trial)
     motion = inverse(dense_band(normal.band))
     carried = -motion @ normal.border.reshape(n, s)
     through = by[..., n:] + by[..., :n] @ carried
-    shaken = dense_derivatives(pair, coefficients, in_trial, np.sqrt(noise))["moments"][..., :n]
+    shaken = dense_derivatives(pair, coefficients, in_trial, np.sqrt(noise), late)["moments"][..., :n]
     expected = np.einsum("dri,ij,drj->dr", shaken, motion / 2.0, shaken, optimize=True)
     of_static = chains[0] @ covariance @ chains[0].T
     expected += np.einsum("dri,ij,drj->dr", through, of_static, through, optimize=True)
-    expected = np.sqrt(expected + of_impacts(pair, coefficients, in_trial))
+    left = derivatives_at(pair, coefficients, in_trial, late)[1].left
+    expected = np.sqrt(expected + of_impacts(pair, coefficients, in_trial) + left)
     np.testing.assert_allclose(sds[0].moments, expected, rtol=1e-3)
 
 

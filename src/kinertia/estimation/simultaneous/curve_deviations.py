@@ -6,8 +6,9 @@ that come back (`repetition`) make the motion no vaguer, only what many frames s
 of the motion if that were known is that of the errors alone. Of the coefficients' covariance only the blocks near the
 diagonal are needed, since six splines are active in any frame; they come from the block-banded factor
 (`BlockBand.inverse_blocks`) and the static unknowns. They count by what is seen of the errors that they are from
-(`motion_noise`). Added is what of the forces is faster than the motion (`GroundReactions.impact`), as a moving mean
-square: whether it acts on the joints or is spent on segments that slow down is unknown.
+(`motion_noise`). Of the delay of the forces the whole distribution counts (`late_loads`): where a foot lands they
+change faster than it is known. Added is what of the forces is faster than the motion (`GroundReactions.impact`), as a
+moving mean square: whether it acts on the joints or is spent on segments that slow down is unknown.
 """
 
 from __future__ import annotations
@@ -79,6 +80,7 @@ def curve_deviations(
     """
     basis, frames = problem.bases[k], np.flatnonzero(problem.trials[k].dynamic)
     size = (len(frames), coefficients.shape[1])
+    late_sd_s = float(np.linalg.norm(root[problem.loads.late(k)].sum(axis=0)))
     curves = _Curves(
         problem,
         k,
@@ -88,6 +90,7 @@ def curve_deviations(
         # errors that come back count more often only for what does not move
         np.sqrt(motion_noise(problem, k, coefficients, static) / problem.trials[k].repeats),
         frames,
+        late_sd_s,
         CurveDeviations.filled(*size, 0.0),
         np.empty(size),
         np.empty(size),
@@ -115,6 +118,7 @@ class _Curves:
         reactions: loads for the joint moments.
         shares: as `_Seen` has them.
         frames: (d,) those that are dynamic.
+        late_sd_s: deviation of the delay of the forces.
         variance: of the curves.
         impact: (d, c) as `MomentDerivatives` has it.
         speed: (d, c) of the coordinates.
@@ -127,6 +131,7 @@ class _Curves:
     reactions: GroundReactions
     shares: np.ndarray
     frames: np.ndarray
+    late_sd_s: float
     variance: CurveDeviations
     impact: np.ndarray
     speed: np.ndarray
@@ -143,12 +148,15 @@ class _Curves:
         problem, basis, chosen = self.problem, self.problem.bases[self.k], self.frames[rows]
         in_root = problem.layout.in_root
         motion = problem.model.full(basis.evaluate(self.coefficients, chosen), self.static)
-        by = moment_derivatives(problem, self.k, motion, self.static, self.reactions, chosen)
+        by = moment_derivatives(problem, self.k, motion, self.static, self.reactions, chosen, self.late_sd_s)
         self.impact[rows], self.speed[rows] = by.impact, motion[1][:, problem.moving]
         seen = _Seen.of(by, self.speed[rows], basis.first[chosen], basis.values[:, chosen], self.shares)
         spread.variances(seen, root[in_root, in_root], self.variance, rows)
         loaded = self.reactions.at(problem.trials[self.k].time[chosen])[..., :3] != 0.0
         self.variance.ground_forces[rows] += np.square(self.reactions.noise_n * loaded)
+        self.variance.ground_forces[rows] += by.ground_left.reshape(-1, 2, 3)
+        self.variance.moments[rows] += by.left
+        self.variance.powers[rows] += by.left * np.square(self.speed[rows])
 
 
 @dataclass(frozen=True)

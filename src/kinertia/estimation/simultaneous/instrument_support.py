@@ -52,19 +52,26 @@ def instrument_support(
         gaussian: in place of the priors of the instruments.
         curves: deviations of the trials' curves.
     """
-    moved = [moved_moments(model.problem, k, point, each) for k, each in enumerate(curves)]
+    root, late = model.static.root_of_covariance(), model.problem.loads.late
+    late_sd_s = [float(np.linalg.norm(root[late(k)].sum(axis=0))) for k in range(len(curves))]
+    each_trial = enumerate(zip(curves, late_sd_s, strict=True))
+    moved = [moved_moments(model.problem, k, point, *each) for k, each in each_trial]
     return InstrumentSupport(np.max(moved, axis=0), trials_apart(model, gaussian))
 
 
-def moved_moments(problem: MapProblem, k: int, point: Point, curves: CurveDeviations) -> np.ndarray:
-    """(k,) `InstrumentSupport.moved` in one trial, by the derivatives of its joint moments while the motion stays."""
+def moved_moments(
+    problem: MapProblem, k: int, point: Point, curves: CurveDeviations, late_sd_s: float = 0.0
+) -> np.ndarray:
+    """(k,) `InstrumentSupport.moved` in one trial, by the derivatives of its joint moments while the motion stays;
+    those by the delay are averaged over its deviation.
+    """
     dynamic, instruments = np.flatnonzero(problem.trials[k].dynamic), problem.layout.errors
     if not len(dynamic):
         return np.zeros(instruments.stop - instruments.start)
     some = np.unique(np.linspace(0, len(dynamic) - 1, min(_MOST_FRAMES, len(dynamic))).astype(int))
     frames, static = dynamic[some], problem.in_trial(k, point)
     motion = problem.model.full(problem.bases[k].evaluate(point.coefficients[k], frames), static)
-    by = moment_derivatives(problem, k, motion, static, problem.loads.reactions(k, static), frames)
+    by = moment_derivatives(problem, k, motion, static, problem.loads.reactions(k, static), frames, late_sd_s)
     change = np.abs(by.static[:, _ROOT:, instruments])
     result: np.ndarray = (change / (INTERVAL_SD * curves.moments[some][:, _ROOT:, None])).max(axis=(0, 1))
     return result

@@ -9,6 +9,7 @@ import numpy as np
 
 from kinertia.estimation.simultaneous.axis_columns import add_bodies, take_load
 from kinertia.estimation.simultaneous.given import BSP, STILL
+from kinertia.estimation.simultaneous.late_loads import LateLoads, late_loads
 from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.model.log_cholesky import by_body, dynamic_jacobian
 from kinertia.motion.dynamics import Motion, axis_motion
@@ -27,6 +28,7 @@ class MomentDerivatives:
         static: (d, c, s) by the static unknowns that root equations depend on.
         impact: (d, c) what impacts would add.
         ground: (d, 6, s) derivative of the ground reactions on the right foot, then the left (N).
+        left, ground_left: (d, c), (d, 6) mean squares of what the delay of the forces does besides (`LateLoads.left`).
     """
 
     value: np.ndarray
@@ -36,6 +38,8 @@ class MomentDerivatives:
     static: np.ndarray
     impact: np.ndarray
     ground: np.ndarray
+    left: np.ndarray
+    ground_left: np.ndarray
 
 
 def moment_derivatives(
@@ -45,6 +49,7 @@ def moment_derivatives(
     static: np.ndarray,
     reactions: GroundReactions,
     frames: np.ndarray,
+    late_sd_s: float = 0.0,
 ) -> MomentDerivatives:
     """Derivatives of `dynamics.inverse_dynamics` at d frames of trial k.
 
@@ -55,6 +60,7 @@ def moment_derivatives(
         static: the estimate.
         reactions: `GroundLoads.reactions` there.
         frames: (d,) indices.
+        late_sd_s: deviation of the delay of the forces, over which derivatives by it are averaged.
     """
     skeleton, layout = problem.model.placed(static), problem.layout
     q, qd, qdd = motion
@@ -71,12 +77,15 @@ def moment_derivatives(
     shown = regressor(skeleton.tree, skeleton.gravity_m_s2, *state, np.zeros((len(q), 3)))[:, :, carrying]
     shown = by_body(shown.reshape(len(q), 6, -1), dynamic_jacobian(static[layout[BSP]]))
     add_bodies(*axes, skeleton.support[carrying], shown, by_static)
-    loads, by_load = _loads(problem, k, static, reactions, frames)
+    late = late_loads(reactions, problem.trials[k].time[frames], late_sd_s)
+    loads, by_load = _loads(problem, k, static, reactions, frames, late)
     fast = reactions.impact_at(problem.trials[k].time[frames])
+    left = np.zeros((len(late.left), *tau.shape))
     for foot, name in enumerate(skeleton.feet):
         moved = np.flatnonzero(skeleton.support[skeleton.segments.index(name)])
         take_load(*axes, moved, loads[foot], by_load[foot], layout.errors.start, tau, dq, by_static)
         impact[:, moved] -= (pose.axes[:, moved] @ fast[:, foot, :, None])[..., 0]
+        left[..., moved] -= np.einsum("dai,mdi->mda", pose.axes[:, moved], late.left[:, :, foot])
     by_q, by_qd, by_qdd = (
         skeleton.map.to_coordinates(part.transpose(0, 2, 1), pose.slopes).transpose(0, 2, 1)
         for part in skeleton.map.derivatives_to_coordinates((dq, dv, da), q, qd, qdd)
@@ -87,18 +96,21 @@ def moment_derivatives(
     by_q, by_qd, by_qdd = (part[:, moving[:, None], moving] for part in (by_q, by_qd, by_qdd))
     value, impact = (skeleton.map.to_coordinates(each, pose.slopes)[:, moving] for each in (tau, impact))
     ground = by_load[:, :, :3].transpose(1, 0, 2, 3).reshape(len(q), -1, layout.in_root.stop)
-    return MomentDerivatives(value, by_q, by_qd, by_qdd, by_static, impact, ground)
+    of_delays = [np.square(skeleton.map.to_coordinates(each, pose.slopes)[:, moving]) for each in left]
+    squares = np.sum(of_delays, axis=0) if of_delays else np.zeros(value.shape)
+    of_ground = np.square(late.left[..., :3]).sum(axis=0).reshape(len(q), -1)
+    return MomentDerivatives(value, by_q, by_qd, by_qdd, by_static, impact, ground, squares, of_ground)
 
 
 def _loads(
-    problem: MapProblem, k: int, static: np.ndarray, reactions: GroundReactions, frames: np.ndarray
+    problem: MapProblem, k: int, static: np.ndarray, reactions: GroundReactions, frames: np.ndarray, late: LateLoads
 ) -> tuple[np.ndarray, np.ndarray]:
     """(2, d, 6) loads on the feet, and (2, d, 6, s) their derivatives by the static unknowns."""
     time = problem.trials[k].time[frames]
-    loads, rates = reactions.with_rate(time)
+    loads = late.loads
     by_load = np.zeros((loads.shape[1], len(time), 6, problem.layout.in_root.stop))
     for by, add in problem.loads.by_errors(k, static, loads, reactions.loaded_at(time), frames):
         for foot, own in enumerate(by_load):
             add(own, by[:, foot])
-    by_load[..., problem.loads.late(k)] = rates.transpose(1, 0, 2)[..., None]
+    by_load[..., problem.loads.late(k)] = late.slope.transpose(1, 0, 2)[..., None]
     return np.ascontiguousarray(loads.transpose(1, 0, 2)), by_load
