@@ -46,12 +46,12 @@ def table_jacobian(theta: np.ndarray) -> np.ndarray:
     jacobian = np.zeros((len(rows), 10, 10))
     jacobian[:, 0, 0] = np.exp(rows[:, 0])
     jacobian[:, [1, 2, 3], [1, 2, 3]] = 1.0
+    change = np.zeros((6, *lower.shape))
     for entry, (i, j) in enumerate(zip(_ROWS, _COLUMNS, strict=True)):
-        change = np.zeros_like(lower)
-        change[:, i, j] = lower[:, i, j] if i == j else 1.0
-        product = change @ lower.transpose(0, 2, 1)
-        inertia = inertia_of(product + product.transpose(0, 2, 1))
-        jacobian[:, 4:, 4 + entry] = inertia[:, [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+        change[entry, :, i, j] = lower[:, i, j] if i == j else 1.0
+    product = change @ lower.transpose(0, 2, 1)
+    inertia = inertia_of(product + product.transpose(0, 1, 3, 2))
+    jacobian[:, 4:, 4:] = inertia[..., [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]].transpose(1, 2, 0)
     return jacobian
 
 

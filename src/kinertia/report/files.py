@@ -101,12 +101,15 @@ def write_columns(path: Path, columns: Mapping[str, Sequence[Any] | np.ndarray],
 def _cells(values: Sequence[Any] | np.ndarray, digits: str) -> list[Any]:
     """What a column has in a file."""
     cells = values.tolist() if isinstance(values, np.ndarray) else list(values)
-    if all(isinstance(cell, float) for cell in cells):
+    kinds = set(map(type, cells))
+    if all(issubclass(kind, float) for kind in kinds):
         texts = (" ".join([digits] * len(cells)) % tuple(cells)).split()
-        return [None if text == "nan" else text for text in texts]
-    if all(isinstance(cell, str) for cell in cells):  # names, of which long tables have few
+        return [None if text == "nan" else text for text in texts] if "nan" in texts else texts
+    if all(issubclass(kind, str) for kind in kinds):  # names, of which long tables have few
         words = {cell: inert(cell) for cell in set(cells)}
         return [words[cell] for cell in cells]
+    if kinds == {int}:
+        return cells
     return [None if cell != cell else inert(cell) for cell in cells]
 
 

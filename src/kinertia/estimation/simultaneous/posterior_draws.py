@@ -269,15 +269,13 @@ def _bodies(problem: MapProblem, point: Point, departures: np.ndarray) -> np.nda
     first. Where that is not physically possible it is made so.
     """
     theta, estimate = point.static[problem.layout[BSP]], problem.model.bsp(point.static)
-    by_unknown, tables = dynamic_jacobian(theta), []
-    for each in departures.reshape(len(departures), -1, 10):
-        dynamic = estimate.dynamic_parameters().reshape(-1, 10)
-        moved = np.einsum("sij,sj->si", by_unknown, each)
-        least = np.maximum(moved[:, 0], (_LEAST_MASS - 1.0) * dynamic[:, 0])
-        moved *= (least / np.where(moved[:, 0] == 0.0, 1.0, moved[:, 0]))[:, None]
-        drawn = BodySegmentParameters.from_dynamic_parameters(estimate.segments, dynamic + moved)
-        tables.append(nearest_consistent(drawn).table())
-    return np.array(tables)
+    dynamic, each = estimate.dynamic_parameters().reshape(-1, 10), departures.reshape(len(departures), -1, 10)
+    moved = np.einsum("sij,nsj->nsi", dynamic_jacobian(theta), each)
+    least = np.maximum(moved[..., 0], (_LEAST_MASS - 1.0) * dynamic[:, 0])
+    moved *= (least / np.where(moved[..., 0] == 0.0, 1.0, moved[..., 0]))[..., None]
+    names = tuple(f"{name} {k}" for k in range(len(each)) for name in estimate.segments)
+    drawn = BodySegmentParameters.from_dynamic_parameters(names, (dynamic + moved).reshape(-1, 10))
+    return nearest_consistent(drawn).table().reshape(each.shape)
 
 
 def _trial_draws(

@@ -73,7 +73,9 @@ class SkinPatterns:
 
     def cut(self, frames: slice) -> SkinPatterns:
         """At these frames."""
-        return replace(self, values=self.values[frames])
+        result = replace(self, values=self.values[frames])
+        vars(result).update(begin=self.begin, _by_segment=self._by_segment)  # worked out once
+        return result
 
     def displaced(self, coefficients: np.ndarray) -> np.ndarray:
         """(n, m, 3) m, how far skin with these coefficients carries the markers along the axes of their segments."""

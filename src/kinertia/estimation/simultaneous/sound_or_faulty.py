@@ -23,6 +23,8 @@ _MOST_WAYS = 1024
 _MOST_NUMBERS = 2**21
 """In the covariances of these ways: of a hundred instruments and more, fewer ways are looked at."""
 _FEWEST_WAYS = 32
+_AT_ONCE = 2**15
+"""Of these numbers are changed: larger arrays of them would leave the processor's cache."""
 _UNLIKELY = -15.0
 """Logarithm of a way's chance over that of the likeliest: where none with as many faults has more, the search ends."""
 
@@ -237,12 +239,15 @@ class _Ways:
         log_weight -= 0.5 * (np.log(left) + change / left * np.square(self.centres))
         log_weight[self.off] = -np.inf
         before, fault = self._likeliest(log_weight, min(_MOST_WAYS, max(_FEWEST_WAYS, _MOST_NUMBERS // k**2)))
-        column, share = self.spread[before, :, fault], (change / left)[before, fault]
+        column, share = self.spread[before, :, fault], (change / left)[before, fault][:, None]
+        spread, scaled, each = self.spread[before], share * column, 1 + _AT_ONCE // k**2
+        for some in (slice(first, first + each) for first in range(0, len(before), each)):
+            spread[some] -= scaled[some, :, None] * column[some, None, :]
         return _Ways(
             self.off[before] | np.eye(k, dtype=bool)[fault],
             log_weight[before, fault],
-            self.centres[before] - (share * self.centres[before, fault])[:, None] * column,
-            self.spread[before] - share[:, None, None] * column[:, :, None] * column[:, None, :],
+            self.centres[before] - share * self.centres[before, fault][:, None] * column,
+            spread,
         )
 
     def _likeliest(self, log_weight: np.ndarray, most: int) -> tuple[np.ndarray, np.ndarray]:
@@ -254,10 +259,17 @@ class _Ways:
         order = np.argpartition(log_weight, n * k - met, axis=None)[n * k - met :]
         order = order[log_weight.ravel()[order] > log_weight.max() + _UNLIKELY]
         before, fault = np.divmod(order[np.argsort(-log_weight.ravel()[order])], k)
-        faulty = np.packbits(self.off[before] | np.eye(k, dtype=bool)[fault], axis=1)
-        words = np.ascontiguousarray(np.pad(faulty, ((0, 0), (0, -faulty.shape[1] % 8)))).view(np.uint64)
+        words = _in_words(self.off)[before] | _in_words(np.eye(k, dtype=bool))[fault]
         same = np.lexsort(words.T)
         new = np.ones(len(same), dtype=bool)
         new[1:] = (words[same[1:]] != words[same[:-1]]).any(axis=1)
         once = np.sort(same[new])[:most]
         return before[once], fault[once]
+
+
+def _in_words(off: np.ndarray) -> np.ndarray:
+    """(n, w) the same (n, k) with 64 instruments in each number."""
+    faulty = np.packbits(off, axis=1)
+    words = np.zeros((len(off), -(-off.shape[1] // 64)), np.uint64)
+    words.view(np.uint8)[:, : faulty.shape[1]] = faulty
+    return words
