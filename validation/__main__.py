@@ -21,6 +21,7 @@ EVIDENCE = (
     "peers",
     "measured-trials",
     "field-trials",
+    "functional-trials",
     "held-out",
     "sessions",
     "osim-models",

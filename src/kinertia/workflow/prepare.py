@@ -102,9 +102,11 @@ def calibrate(
     """The skeleton of the 27-DOF model as the static trial gives it, adapted to the trials.
 
     Markers of pelvis, legs and feet are held to the static trial by a deviation of 10 mm, those of torso and arms and
-    the shoulder centres by 40 mm, free axes of knees and ankles by 5 degrees. Where arms have turned the torso under
-    its markers, since the model's shoulders lack an axis, the rest of the body is adapted without them. Markers on the
-    head are left out where three others show the trunk, which the acromia (labels), that move with the arms, do not.
+    the shoulder centres by 40 mm, free axes of knees and ankles by 5 degrees. Axes are adapted to all trials, markers
+    to those with forces: a squat draws skin, and with it ankles, 5 mm away from where a walk's joint moments need them.
+    Where arms have turned the torso under its markers, since the model's shoulders lack an axis, the rest of the body
+    is adapted without them. Markers on the head are left out where three others show the trunk, which the acromia
+    (labels), that move with the arms, do not.
     """
     skeleton, poses = with_elbows_that_bend_forwards(model.skeleton, trials)
     complete = without_partly_shown(skeleton, poses, ARM_COORDINATES)
@@ -121,7 +123,8 @@ def calibrate(
         ARM_ROTATIONS, _ARM_ROTATION_SD_RAD
     )
     if free_axes:
-        coordinate_sd |= dict.fromkeys(LEG_AXIS_TILTS, JOINT_AXIS_SD_RAD)
+        skeleton = _with_axes(skeleton, trials, poses, marker_sd, coordinate_sd)
+    trials, poses = _of_forces(trials, poses)
     adapted = adapt(skeleton, trials, poses, marker_sd, coordinate_sd)
     torso_rad: float | None = turn_about("torso", skeleton.markers, adapted.skeleton.markers)
     if torso_rad is not None and torso_rad > _TURNED_RAD:
@@ -129,6 +132,27 @@ def calibrate(
     else:
         torso_rad = None
     return Calibrated(adapted.skeleton, found, adapted.moved_m, elbows, torso_rad, head)
+
+
+def _with_axes(
+    skeleton: Skeleton,
+    trials: Sequence[Trial],
+    poses: Sequence[InverseKinematics],
+    marker_sd_m: Mapping[str, float],
+    coordinate_sd: Mapping[str, float],
+) -> Skeleton:
+    """The skeleton with the axes of knees and ankles as all trials show them; all else stays."""
+    free = {**coordinate_sd, **dict.fromkeys(LEG_AXIS_TILTS, JOINT_AXIS_SD_RAD)}
+    found = adapt(skeleton, trials, poses, marker_sd_m, free).coordinates
+    return skeleton.lock({name: found[name] for name in LEG_AXIS_TILTS})
+
+
+def _of_forces(
+    trials: Sequence[Trial], poses: list[InverseKinematics]
+) -> tuple[Sequence[Trial], list[InverseKinematics]]:
+    """Trials whose forces are used, and their poses; all where there are none."""
+    used = [k for k, trial in enumerate(trials) if trial.loads.plates] or range(len(trials))
+    return [trials[k] for k in used], [poses[k] for k in used]
 
 
 def _arms_last(

@@ -70,6 +70,12 @@ def test_trials_share_their_patterns(trial):
     assert first.first.tolist() == second.first.tolist() == both.first.tolist()
 
 
+def test_skin_is_at_rest_where_the_markers_were_adapted(trial):
+    adapted, other = skin_patterns(trial.skeleton, [trial.motion.q[:40], trial.motion.q[60:100]], [True, False])
+    np.testing.assert_allclose(adapted.values.mean(axis=0), 0.0, atol=1e-12)
+    assert np.abs(other.values.mean(axis=0)).max() > 1e-3
+
+
 def test_a_motionless_trial_has_no_patterns(trial):
     (of_still,) = skin_patterns(trial.skeleton, [np.tile(trial.motion.q[:1], (20, 1))])
     assert of_still.size == 0

@@ -78,7 +78,7 @@ def observe(
     """
     errors = [_errors(skeleton, each) for each in trials]
     rates = [each.trial.markers.rate_hz for each in trials]
-    skin = skin_patterns(skeleton, [each.smooth for each in errors])
+    skin = skin_patterns(skeleton, [each.smooth for each in errors], [bool(each.trial.loads.plates) for each in trials])
     usual = [root_mean_square(each.varying) for each in errors]
     frames = [frames_alike(each.varying, sd) for each, sd in zip(errors, usual, strict=True)]
     places = np.stack([each.displaced for each in errors])

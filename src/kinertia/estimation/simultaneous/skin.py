@@ -107,10 +107,21 @@ class SkinPatterns:
         return [(markers, places.reshape(len(markers), -1, 3)) for markers, places in result]
 
 
-def skin_patterns(skeleton: Skeleton, trials: Sequence[np.ndarray]) -> tuple[SkinPatterns, ...]:
-    """What the skin under the markers of a skeleton may follow in trials of one person, of coordinates (n, c) each."""
+def skin_patterns(
+    skeleton: Skeleton, trials: Sequence[np.ndarray], adapted: Sequence[bool] | None = None
+) -> tuple[SkinPatterns, ...]:
+    """What the skin under the markers of a skeleton may follow in trials of one person.
+
+    Args:
+        skeleton: with these markers.
+        trials: coordinates (n, c) of each.
+        adapted: which of the trials the skeleton's markers are adapted to: in their mean posture skin is at rest. All
+            where none is.
+    """
     every = np.concatenate(trials)
-    away, varying = every - every.mean(axis=0), np.std(every, axis=0)
+    own = [q for q, counts in zip(trials, adapted or [True] * len(trials), strict=True) if counts]
+    rest = np.concatenate(own) if own else every
+    away, varying = every - rest.mean(axis=0), np.std(every, axis=0)
     turns, first, last = [np.zeros((every.shape[1], 0))], {}, {}
     for segment in np.unique(skeleton.marker_segments):
         directions = _directions(skeleton, skeleton.segments[segment], away, varying)
