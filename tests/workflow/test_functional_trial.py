@@ -6,13 +6,17 @@ import numpy as np
 import pytest
 
 from kinertia import Settings, Subject, TrialInput, estimate, prepare
-from kinertia.errors import SettingsError
+from kinertia.errors import BlockedError, SettingsError
 from kinertia.estimation.simultaneous.calibration_entry import AXIS
 from kinertia.synthetic.laboratory import LabNoise, record
 from kinertia.synthetic.motions import squat
 from kinertia.synthetic.noise import SkinMotion, camera_noise
 from kinertia.synthetic.walk import walk, walking_subject
 from kinertia.trial.data import Recording
+from kinertia.workflow.check import check_person
+from kinertia.workflow.person import Person
+from kinertia.workflow.prepare import prepared
+from kinertia.workflow.screening import screen
 
 TILTS_DEG = {"knee_tilt_1_r": 5.0, "knee_tilt_2_r": -4.0, "knee_tilt_1_l": -5.0, "knee_tilt_2_l": 3.0}
 SUBJECT = Subject(sex="male")
@@ -60,6 +64,7 @@ def test_its_markers_alone_count(fit):
     assert not [one for one in fit.posterior.calibration if one.trial == "squat"]
     assert not fit.left_out
     assert fit.converged
+    assert fit.overview.line.endswith("1 of 1 trials, and the markers of 1 more")
 
 
 def test_axes_of_knees_are_found(fit):
@@ -91,6 +96,54 @@ def test_forces_of_such_a_trial_are_not_used(lab):
     assert [one.trial.name for one in ready.functional] == ["again"]
     assert ready.functional[0].trial.loads.plates == ()
     assert [one.trial.name for one in ready.kinematics] == ["walk"]
+
+
+def with_empty_plates(recording, name):
+    zero = np.zeros_like(recording.plates.force)
+    return replace(recording, name=name, plates=replace(recording.plates, force=zero, moment=zero))
+
+
+def test_a_trial_whose_forces_are_refused_gives_its_markers(lab):
+    measured, _ = lab
+    inputs = [TrialInput(measured.walk), TrialInput(with_empty_plates(measured.walk, "empty"))]
+    screened = screen(Person(SUBJECT, inputs, measured.static))
+    assert screened.left_out == ("empty",)
+    assert [one.name for one in screened.usable] == ["walk", "empty"]
+    assert [(one.where.trial, one.severity.name) for one in screened.findings if one.code == "P283"] == [
+        ("empty", "WARNING")
+    ]
+    ready = prepared(screened, Settings())
+    assert [one.trial.name for one in ready.kinematics] == ["walk"]
+    assert [one.trial.name for one in ready.functional] == ["empty"]
+    assert ready.left_out == ("empty",)
+    assert check_person(screened.person).overview.line.endswith("1 of 2 trials, and the markers of 1 more")
+
+
+def test_check_counts_it_as_a_fit_does(lab):
+    measured, squats = lab
+    inputs = [TrialInput(measured.walk), TrialInput(squats, use="kinematics")]
+    line = check_person(Person(SUBJECT, inputs, measured.static)).overview.line
+    assert line.endswith("1 of 1 trials, and the markers of 1 more")
+
+
+def test_its_markers_must_be_sound(lab):
+    measured, _ = lab
+    markers = measured.walk.markers
+    other = {"R": "L", "L": "R"}
+    mirrored = [other.get(label[0], label[0]) + label[1:] if label[1] == "." else label for label in markers.labels]
+    swapped = replace(with_empty_plates(measured.walk, "empty"), markers=replace(markers, labels=tuple(mirrored)))
+    screened = screen(Person(SUBJECT, [TrialInput(measured.walk), TrialInput(swapped)], measured.static))
+    assert [one.name for one in screened.usable] == ["walk"]
+    assert not [one for one in screened.findings if one.code == "P283"]
+
+
+def test_of_no_trial_with_forces_none_joins(lab):
+    measured, _ = lab
+    inputs = [TrialInput(with_empty_plates(measured.walk, name)) for name in ("one", "two")]
+    screened = screen(Person(SUBJECT, inputs, measured.static))
+    assert not screened.markers_only
+    with pytest.raises(BlockedError):
+        screened.usable  # noqa: B018
 
 
 @pytest.mark.slow

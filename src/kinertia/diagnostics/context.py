@@ -53,6 +53,7 @@ class RecordingContext:
         static: the static trial that goes with it; None for the static trial itself, and without one.
         is_static: it is given as the static trial, or the only one in which the person stands.
         without_forces: its markers alone are used.
+        forces_refused: because its forces cannot be.
         window_s: the window that the user vouches for.
         height_m: stature, where it is known.
         mass_kg: stated mass, where it is known.
@@ -66,6 +67,7 @@ class RecordingContext:
     height_m: float | None = None
     mass_kg: float | None = None
     without_forces: bool = False
+    forces_refused: bool = False
 
     @property
     def name(self) -> str:

@@ -25,8 +25,8 @@ class Overview:
     Attributes:
         findings: all of them, muted and overruled ones included.
         rules: how many rules were asked.
-        trials: how many trials there are.
-        left_out: names of the trials that were not used.
+        trials: how many trials there are, without those of which markers alone were asked for.
+        left_out: names of the trials that were not used, or of which the markers alone were.
 
     Examples:
         >>> from kinertia.findings.overview import Overview
@@ -87,8 +87,15 @@ class Overview:
             (len(self.waived), "waived", "waived"),
         ]
         found = ", ".join(f"{count} {one if count == 1 else many}" for count, one, many in counts if count)
-        used = self.trials - len(self.left_out)
-        return f"{self.verdict}: {found or 'nothing found'}; {self.rules} rules, {used} of {self.trials} trials"
+        used, by_markers = self.trials - len(self.left_out), len(self.markers_only)
+        more = f", and the markers of {by_markers} more" if by_markers else ""
+        return f"{self.verdict}: {found or 'nothing found'}; {self.rules} rules, {used} of {self.trials} trials{more}"
+
+    @property
+    def markers_only(self) -> set[str | None]:
+        """Names of the trials whose markers alone are used: as asked for (P280), or since forces are refused (P283)."""
+        asked, refused = ({one.where.trial for one in self.findings if one.code == code} for code in ("P280", "P283"))
+        return asked - set(self.left_out) | refused
 
 
 def in_order(findings: Iterable[Finding]) -> list[Finding]:

@@ -48,7 +48,9 @@ class PersonCheck:
         trials = len(self.screened.person.trials) + len(
             {one.where.trial for one in self.screened.person.unread if one.where.trial}
         )
-        return Overview(self.findings, self.screened.rules, trials, self.screened.left_out)
+        left_out = self.screened.left_out
+        asked = [one for one in self.screened.context.trials if one.without_forces and one.name not in left_out]
+        return Overview(self.findings, self.screened.rules, trials - len(asked), left_out)
 
 
 def check_person(person: Person) -> PersonCheck:

@@ -231,7 +231,7 @@ def prepared(screened: Screened, settings: Settings, progress: Progress = lambda
     free_axes = settings.joint_axes or bool(without_static) or functional
     calibrated = calibrate(model, [one.trial for one in turned], acromia, free_axes)
     found = [*screened.findings, *without_static, *calibrated.findings]
-    left = _unblocked(turned, screened.overruled(found))
+    left = _unblocked(turned, screened, found)
     if len(left) < len(turned):  # the skeleton is adapted to those that are used
         calibrated = calibrate(model, [one.trial for one in left], acromia, free_axes)
     turned, skeleton = left, calibrated.skeleton
@@ -314,17 +314,17 @@ def _adapted(calibrated: Calibrated) -> Iterator[Finding]:
         yield finding("M174", Where(markers=calibrated.head))
 
 
-def _unblocked(trials: Sequence[Turned], findings: Sequence[Finding]) -> list[Turned]:
-    """Those that can go on.
+def _unblocked(trials: Sequence[Turned], screened: Screened, found: Sequence[Finding]) -> list[Turned]:
+    """Those that can go on after all that was found.
 
     Raises:
         BlockedError: none can.
     """
-    errors = blocking(findings)
-    stopped = {one.where.trial for one in errors}
+    findings = screened.overruled(found)
+    stopped = screened.stopped_by(findings)
     left = [one for one in trials if one.trial.name not in stopped]
-    if not left:
-        raise BlockedError(findings, errors)
+    if not any(one.trial.loads.plates for one in left):
+        raise BlockedError(findings, blocking(findings))
     return left
 
 

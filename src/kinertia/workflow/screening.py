@@ -14,6 +14,7 @@ from kinertia.diagnostics.context import PersonContext, RecordingContext
 from kinertia.diagnostics.labels import questions as labels
 from kinertia.diagnostics.markers import questions as markers
 from kinertia.diagnostics.model import questions as model
+from kinertia.diagnostics.plates.ground_contact import complete_contact
 from kinertia.diagnostics.plates.place_questions import PLACE_QUESTIONS
 from kinertia.diagnostics.plates.signal_questions import LOADED_QUESTIONS, SIGNAL_QUESTIONS, STANDING_QUESTIONS
 from kinertia.diagnostics.runner import Question, asked, blocking, explained, overruled, rules_of
@@ -46,6 +47,8 @@ PERSON_QUESTIONS: tuple[Question[PersonContext], ...] = (
     *model.PERSON_QUESTIONS,
     *timing.PERSON_QUESTIONS,
 )
+_OF_FORCES = ("P", "T211", "T212")
+"""ERRORs that say nothing against the markers."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,11 +59,13 @@ class Screened:
         person: as given.
         context: what the questions were asked of: every recording, also those that are left out.
         findings: all of them, with what explains and what overrules them.
+        markers_only: trials that are left out for their forces; their markers can be used beside the others.
     """
 
     person: Person
     context: PersonContext
     findings: tuple[Finding, ...]
+    markers_only: tuple[RecordingContext, ...] = ()
 
     @property
     def rules(self) -> int:
@@ -81,7 +86,7 @@ class Screened:
 
     @cached_property
     def left_out(self) -> tuple[str, ...]:
-        """Names of the trials that cannot be used."""
+        """Names of the trials that have no results."""
         return self.left_out_by(self.findings)
 
     def left_out_by(self, findings: Sequence[Finding]) -> tuple[str, ...]:
@@ -91,13 +96,18 @@ class Screened:
             dict.fromkeys([*sorted(self._unread), *(one.name for one in self.context.trials if one.name in names)])
         )
 
+    def stopped_by(self, findings: Sequence[Finding]) -> set[str | None]:
+        """Names of the trials of which nothing is used, by these findings."""
+        names = {one.name for one in self.markers_only}
+        return {one.where.trial for one in blocking(findings) if one.where.trial not in names or not _of_forces(one)}
+
     def overruled(self, findings: Sequence[Finding]) -> list[Finding]:
         """Findings, those here or more of them, with what explains and what overrules each."""
         return overruled(explained(findings), self.person.overrule, self.person.overrule_of)
 
     @cached_property
     def usable(self) -> list[RecordingContext]:
-        """The trials that can be used.
+        """The trials that can be used, and those whose markers alone can.
 
         Raises:
             BlockedError: none can, or something stops everything.
@@ -105,7 +115,7 @@ class Screened:
         trials = [one for one in self.context.trials if one.name not in self.left_out]
         if self.stops or not trials:
             raise BlockedError(self.findings, blocking(self.findings))
-        return trials
+        return [*trials, *self.markers_only]
 
 
 def screen(person: Person) -> Screened:
@@ -122,8 +132,41 @@ def screen(person: Person) -> Screened:
     if unmatched is not None and unmatched.code not in {one.code for one in found}:
         found.append(unmatched)
     found += _of_person(context, found)
-    findings = overruled(explained(found), person.overrule, person.overrule_of)
-    return Screened(person, context, tuple(findings))
+    screened = Screened(person, context, tuple(overruled(explained(found), person.overrule, person.overrule_of)))
+    markers_only = _markers_only(screened)
+    if not markers_only:
+        return screened
+    found += [one for trial in markers_only for one in complete_contact(trial)]
+    return replace(screened, findings=tuple(screened.overruled(found)), markers_only=markers_only)
+
+
+def _markers_only(screened: Screened) -> tuple[RecordingContext, ...]:
+    """Trials that are left out for nothing but their forces, beside others with forces; none of them if their markers
+    raise an ERROR of their own.
+    """
+    context, left_out = screened.context, screened.left_out
+    if screened.stops or not any(not one.without_forces for one in context.trials if one.name not in left_out):
+        return ()
+    against = blocking(screened.findings)
+    markers_only = tuple(
+        replace(one, without_forces=True, forces_refused=True)
+        for one in context.trials
+        if one.name in left_out and all(_of_forces(each) for each in against if each.where.trial == one.name)
+    )
+    names = {one.name for one in markers_only}
+    found = [one for one in screened.findings if one.where.trial not in names]
+    for trial in markers_only:
+        found += _of_recording(trial, MOTION_QUESTIONS)
+    trials = [one for one in context.trials if one.name not in names]
+    found += _of_person(replace(context, trials=[*trials, *markers_only]), found)
+    more = [one for one in blocking(screened.overruled(found)) if one not in against]
+    bad = {one.where.trial for one in more}
+    return () if bad - names else tuple(one for one in markers_only if one.name not in bad)
+
+
+def _of_forces(one: Finding) -> bool:
+    """Whether it says something of forces alone."""
+    return one.code.startswith(_OF_FORCES)
 
 
 def person_context(person: Person) -> PersonContext:

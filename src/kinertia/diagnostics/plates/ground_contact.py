@@ -29,12 +29,13 @@ marker it is up to 0.19 of the way to the other foot, which stands on the floor.
 
 def complete_contact(context: RecordingContext) -> Iterator[Finding]:
     """T104, P271, P278: no trial can be made of the recording; P279: it has too few frames with complete contact; P273,
-    P274, P275, P277: how its loads were sorted by foot; P280: its markers alone are used.
+    P274, P275, P277: how its loads were sorted by foot; P280, P283: its markers alone are used, as asked for or since
+    its forces cannot be.
     """
     if context.is_static:
         return
     if context.without_forces:
-        yield finding("P280", context.at())
+        yield finding("P283" if context.forces_refused else "P280", context.at())
         return
     if context.plates is None:
         yield no_forces(context.recording).in_trial(context.name)
