@@ -1,4 +1,4 @@
-"""Compare joint axes and joint moments of synthetic people, knee axes off, with and without a functional trial."""
+"""Compare fits with and without a functional trial."""
 
 from __future__ import annotations
 

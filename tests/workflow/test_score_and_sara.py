@@ -13,7 +13,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from kinertia import Settings, Subject, TrialInput, estimate, prepare
-from kinertia.model.neighbouring_angles import neighbouring_angles
+from kinertia.model.skin_angles import skin_angles
 from kinertia.synthetic.laboratory import PERFECT, record
 from kinertia.synthetic.noise import SkinMotion, camera_noise
 from kinertia.synthetic.walk import walk, walking_subject
@@ -69,7 +69,7 @@ def on_skin(skeleton, q, others, rng):
     def seen(markers, q):
         pose, positions = skeleton.pose(q), markers.positions.copy()
         for marker in skeleton.markers:
-            angles = (q - common.reference)[:, neighbouring_angles(skeleton, marker.segment)]
+            angles = (q - common.reference)[:, skin_angles(skeleton, marker.segment)]
             drawn = angles @ (common.slopes[marker.segment] + draws[marker.label]) / np.sqrt(2.0)
             turn = pose.rotation[:, skeleton.segments.index(marker.segment)]
             positions[:, markers.labels.index(marker.label)] += (turn @ drawn[..., None])[..., 0]
