@@ -7,7 +7,7 @@ import pytest
 
 from kinertia.motion.dynamics import Motion, inverse_dynamics
 from kinertia.motion.joint_wrench import joint_wrenches, leg_joints
-from kinertia.motion.model_outputs import model_outputs
+from kinertia.motion.model_outputs import Departures, model_outputs
 from kinertia.synthetic.walk import walk, walking_subject
 
 MASS_KG = 70.0
@@ -89,6 +89,35 @@ def test_powers_are_those_of_the_coordinates(walked):
         tolerance = 0.03 if leg.name == "Ankle" else 1e-9  # the subtalar axis does not pass the ankle centre
         np.testing.assert_allclose(one.values[:, 2], expected, atol=tolerance)
         np.testing.assert_allclose(one.sd[:, 2], 14.0 / MASS_KG * np.sqrt(len(columns)), rtol=1e-9)
+
+
+def test_errors_of_a_joints_axes_go_together_as_motions_by_chance_do(walked):
+    """Talocrural and subtalar angles that make up for each other: SDs of the ankle, against many motions."""
+    rng, count = np.random.default_rng(3), 3000
+    columns = [walked.skeleton.coordinates.index(f"{name}_angle_r") for name in ("ankle", "subtalar")]
+    sd, together = np.array([0.02, 0.03]), np.array([[1.0, -0.8], [-0.8, 1.0]])
+    apart = np.zeros((count, walked.motion.q.shape[1]))
+    apart[:, columns] = rng.multivariate_normal(np.zeros(2), sd[:, None] * together * sd, count)
+    frame = slice(30, 31)
+    q = walked.motion.q[frame] + apart
+    many = SimpleNamespace(**{**vars(walked), "foot_loads": np.zeros((count, 2, 6)), "deviations": None})
+    expected = of(many, "isb", Motion(q, 0 * q, 0 * q))["RAnkleAngles"].values.std(axis=0)
+    one = {name: np.repeat(getattr(walked.motion, name)[frame], 2, axis=0) for name in ("q", "qd", "qdd")}
+    spread = np.zeros(one["q"].shape)
+    spread[:, columns] = sd
+    drawn = np.repeat(apart[:, None], 2, axis=1)
+    deviations = SimpleNamespace(coordinates=spread, moments=spread, powers=spread)
+
+    def stated(departures):
+        loads = np.repeat(walked.foot_loads[frame], 2, axis=0)
+        told = walked.skeleton, walked.bsp, Motion(**one), loads, MASS_KG, "isb", deviations, departures
+        return {one.name: one.sd[0] for one in model_outputs(*told)}
+
+    joint, alone = stated(Departures(drawn, drawn, drawn)), stated(None)
+    np.testing.assert_allclose(joint["RAnkleAngles"], expected, rtol=0.05)
+    assert np.abs(alone["RAnkleAngles"] / expected - 1.0).max() > 0.15
+    assert joint["RAnklePower"][2] == pytest.approx(np.sqrt(sd @ together @ sd) / MASS_KG, rel=0.05)
+    assert alone["RAnklePower"][2] == pytest.approx(np.linalg.norm(sd) / MASS_KG)
 
 
 def test_both_sides_have_the_same_signs(walked):

@@ -63,6 +63,19 @@ class Deviations(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
+class Departures:
+    """What m possible motions have otherwise at n frames: how errors of a joint's axes go together.
+
+    Attributes:
+        coordinates, moments, powers: (m, n, c) as `Deviations` has them.
+    """
+
+    coordinates: np.ndarray
+    moments: np.ndarray
+    powers: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
 class ModelOutput:
     """One output over n frames.
 
@@ -71,7 +84,7 @@ class ModelOutput:
         side: "r" or "l".
         kind: what it is.
         values: (n, 3) in the convention's units.
-        sd: (n, 3) standard deviations; NaN where there is none. Errors of a joint's axes are taken as independent.
+        sd: (n, 3) standard deviations; NaN where there is none.
     """
 
     joint: str
@@ -94,6 +107,7 @@ def model_outputs(
     mass_kg: float,
     convention: Convention,
     deviations: Deviations | None = None,
+    departures: Departures | None = None,
 ) -> list[ModelOutput]:
     """All outputs of the legs and the pelvis; none of a model whose legs are not hip, knee and ankle in ISB's axes.
 
@@ -102,6 +116,7 @@ def model_outputs(
         mass_kg: of the body.
         convention: signs, axes and units.
         deviations: of coordinates, moments and powers, where there are any.
+        departures: tell correlations of a joint's axes; if None their errors are taken as independent.
     """
     joints = leg_joints(skeleton)
     if not joints or not _alike(skeleton, joints):
@@ -114,11 +129,13 @@ def model_outputs(
         child, parent = _rotation(skeleton, pose, joint.child), _rotation(skeleton, pose, joint.parent)
         columns, signs = joint.columns(skeleton), _signs(joint)
         by_angle, turning = _moved(skeleton, motion.q, joint, columns)
-        sd = np.degrees(_reached(by_angle, spread.coordinates[:, columns]))
+        together = None if departures is None else departures.coordinates[..., columns]
+        sd = np.degrees(_reached(by_angle, _covariance(spread.coordinates[:, columns], together)))
         found.append(ModelOutput(joint.name, joint.side, "ANGLES", np.degrees(signs * _cardan(parent, child)), sd))
         axes = child.swapaxes(1, 2)[:, [2, 0, 1]] if clinical else _joint_axes(parent, child)
         factor = (-1000.0 if clinical else 1.0) / mass_kg
-        sd = abs(factor) * _along(axes, turning, spread.moments[:, columns])
+        together = None if departures is None else departures.moments[..., columns]
+        sd = abs(factor) * _along(axes, turning, _covariance(spread.moments[:, columns], together))
         moment = factor * signs * np.einsum("nak,nk->na", axes, wrench[:, 3:])
         found.append(ModelOutput(joint.name, joint.side, "MOMENTS", moment, sd))
         force = np.einsum("nka,nk->na", child, wrench[:, :3]) / mass_kg
@@ -126,7 +143,8 @@ def model_outputs(
         found.append(ModelOutput(joint.name, joint.side, "FORCES", force, np.full(force.shape, np.nan)))
         rate = np.einsum("nka,na->nk", turning, motion.qd[:, columns])
         power = np.einsum("nk,nk->n", wrench[:, 3:], rate) / mass_kg
-        sd = np.sqrt(np.square(spread.powers[:, columns]).sum(axis=1)) / mass_kg
+        together = None if departures is None else departures.powers[..., columns]
+        sd = _root(_covariance(spread.powers[:, columns], together).sum(axis=(1, 2))) / mass_kg
         found.append(ModelOutput(joint.name, joint.side, "POWERS", _third(power), _third(sd)))
     return found
 
@@ -209,18 +227,37 @@ def _moved(skeleton: Skeleton, q: np.ndarray, joint: LegJoint, columns: Sequence
     return angles, turns
 
 
-def _reached(by_angle: np.ndarray, sd: np.ndarray) -> np.ndarray:
-    """(n, 3) deviations of angles from those of the coordinates (n, k); NaN of an angle that none of them turns."""
+def _covariance(sd: np.ndarray, departures: np.ndarray | None) -> np.ndarray:
+    """(n, k, k) of deviations (n, k), with the correlations of departures (m, n, k); diagonal without these."""
+    if departures is None:
+        alone: np.ndarray = np.eye(sd.shape[1]) * np.square(sd)[:, None]
+        return alone
+    products = np.einsum("mni,mnj->nij", departures, departures)
+    own = np.sqrt(np.maximum(np.einsum("nii->ni", products), np.finfo(float).tiny))
+    result: np.ndarray = products / (own[:, :, None] * own[:, None]) * sd[:, :, None] * sd[:, None]
+    return result
+
+
+def _root(variance: np.ndarray) -> np.ndarray:
+    result: np.ndarray = np.sqrt(np.maximum(variance, 0.0))
+    return result
+
+
+def _reached(by_angle: np.ndarray, covariance: np.ndarray) -> np.ndarray:
+    """(n, 3) deviations of angles from the coordinates' (n, k, k); NaN of an angle that none of them turns."""
     moved = np.abs(by_angle).sum(axis=2).max(axis=0) > _UNMOVED
-    return np.where(moved, np.sqrt(np.einsum("nak,nk->na", np.square(by_angle), np.square(sd))), np.nan)
+    variance = np.einsum("nai,nij,naj->na", by_angle, covariance, by_angle)
+    return np.where(moved, _root(variance), np.nan)
 
 
-def _along(axes: np.ndarray, turning: np.ndarray, sd: np.ndarray) -> np.ndarray:
-    """(n, 3) deviations of a moment along axes (n, 3, 3), from those about the free directions (n, 3, k)."""
+def _along(axes: np.ndarray, turning: np.ndarray, covariance: np.ndarray) -> np.ndarray:
+    """(n, 3) deviations of a moment along axes (n, 3, 3), from the covariance (n, k, k) about the free directions
+    (n, 3, k).
+    """
     shares = np.linalg.pinv(turning) @ axes.swapaxes(1, 2)
     rest = np.linalg.norm(turning @ shares - axes.swapaxes(1, 2), axis=1)
-    values = np.sqrt(np.einsum("nka,nk->na", np.square(shares), np.square(sd)))
-    return np.where(rest.max(axis=0) < _OUT_OF_REACH, values, np.nan)
+    variance = np.einsum("nia,nij,nja->na", shares, covariance, shares)
+    return np.where(rest.max(axis=0) < _OUT_OF_REACH, _root(variance), np.nan)
 
 
 def _as_vicon(joint: LegJoint, force: np.ndarray) -> np.ndarray:

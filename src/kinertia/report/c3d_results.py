@@ -22,6 +22,7 @@ from kinertia.model.bsp import PARAMETERS
 from kinertia.motion.gait_cycle import found_events
 from kinertia.motion.joint_wrench import leg_joints
 from kinertia.motion.model_outputs import CONVENTIONS, UNITS, Convention, ModelOutput, model_outputs
+from kinertia.report.drawn_departures import departures
 from kinertia.report.saved_fit import SavedFit
 from kinertia.trial.data import Recording
 
@@ -70,9 +71,9 @@ def usual_convention(fit: Fit) -> Convention:
 
 
 def outputs_of(fit: Fit, trial: TrialFit, convention: Convention) -> list[ModelOutput]:
-    """Model outputs of the estimate over the trial's measured frames."""
-    loads = trial.reactions.at(trial.time)
-    return model_outputs(trial.skeleton, fit.estimate, trial.motion, loads, fit.mass_kg, convention, trial.deviations)
+    """Model outputs of the estimate over the trial's measured frames; posterior draws tell how errors go together."""
+    loads, body, drawn = trial.reactions.at(trial.time), fit.estimate, departures(fit, trial)
+    return model_outputs(trial.skeleton, body, trial.motion, loads, fit.mass_kg, convention, trial.deviations, drawn)
 
 
 def new_file(recording: Recording, folder: Path) -> Path:
