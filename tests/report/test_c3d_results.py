@@ -10,6 +10,7 @@ import kinertia
 from command_line import fitted, run
 from kinertia.io.c3d_outputs import frames_of
 from kinertia.motion.joint_wrench import joint_wrenches
+from kinertia.motion.smoothing import smooth
 from kinertia.report.c3d_results import outputs_of, prefix_of, to_file, usual_convention
 from kinertia.report.saved_fit import load_fit
 from validation.measured_data import find
@@ -101,12 +102,33 @@ WALKS = {
 }
 
 
-NEAR = {("B", "RHipMoment"): 0.85}
-"""Where a moment about Vicon's own joint centre correlates less: nobody knows why."""
+RODS = {"Knee": ("Shank", "Foot"), "Hip": ("Thigh", "Shank", "Foot")}
+ENDS = {"Thigh": ("FEP", "FEO"), "Shank": ("FEO", "TIO"), "Foot": ("TIO", "TOE")}
+MASS_SHARE = {"Thigh": 0.1, "Shank": 0.0465, "Foot": 0.0145}
+GYRATION_SHARE = {"Thigh": 0.323, "Shank": 0.302, "Foot": 0.475}
+"""Of body mass and segment length: Dempster's, as Plug-in Gait's manual lists them."""
+TIMES_INERTIA = 3.0
+"""Moments of inertia in Vicon's own moments over those: while a foot swings its knee moments are, to 5 %, of Dempster's
+masses and three times his moments of inertia (regression over seven swings of four people: 1.0 and 2.9)."""
 
 
-def extension_about(fit, joint, side, path, centre):
-    """(w,) N m/kg extending moment of a joint about another point (w, 3), in the file's axes and units."""
+def more_inertia(points, side, joint, at, rate_hz):
+    """(w, 3) N m per kg of body mass, in the file's axes: what Vicon's larger moments of inertia add to a moment."""
+    result = np.zeros((len(at), 3))
+    frames = np.arange(max(at[0] - 30, 0), min(at[-1] + 30, points["LASI"].shape[1]))
+    for name in RODS[joint]:
+        ends = np.hstack([points[side + end][:, frames].T / 1000.0 for end in ENDS[name]])
+        spline = smooth(frames / rate_hz, ends, 15.0)
+        along, rate = (np.diff(spline(at / rate_hz, order).reshape(-1, 2, 3), axis=1)[:, 0] for order in (0, 2))
+        inertia = MASS_SHARE[name] * GYRATION_SHARE[name] ** 2 * np.cross(along, rate)
+        result += (TIMES_INERTIA - 1.0) * inertia
+    return result
+
+
+def extension_about(fit, joint, side, path, centre, more):
+    """(w,) N m/kg extending moment of a joint about another point (w, 3), with a moment (w, 3) more, in the file's axes
+    and units.
+    """
     (trial,) = fit.trials
     frames = frames_of(path)
     turn, origin = to_file(path, frames, trial, "")
@@ -115,7 +137,8 @@ def extension_about(fit, joint, side, path, centre):
     for leg, wrench in joint_wrenches(trial.skeleton, fit.estimate, trial.motion, loads).items():
         if (leg.name, leg.side.upper()) == (joint, side):
             arm = leg.centre(trial.skeleton, pose) - (centre - origin) @ np.linalg.inv(turn)
-            moment = wrench[:, 3:] + np.cross(arm, wrench[:, :3])
+            turned = more @ np.linalg.inv(turn / np.cbrt(abs(np.linalg.det(turn))))
+            moment = wrench[:, 3:] + np.cross(arm, wrench[:, :3]) + fit.mass_kg * turned
             axis = pose.rotation[:, trial.skeleton.segments.index(leg.child), :, 2]
             return (-1.0 if joint == "Hip" else 1.0) * np.einsum("nk,nk->n", axis, moment) / fit.mass_kg
     raise KeyError(joint, side)
@@ -136,7 +159,8 @@ def test_measured_files_come_back_with_vicons_signs(tmp_path, name):
     own_outputs = name != "UNIPD"
     path = tmp_path / "out" / find(walk).name
     points, at = expect_outputs(path, fit, "Kinertia" if own_outputs else "")
-    before, _ = points_of(find(walk))
+    before, file = points_of(find(walk))
+    rate_hz = file["header"]["points"]["frame_rate"]
     for label, values in before.items():
         np.testing.assert_array_equal(points[label], values)
     again = fitted(tmp_path / "again", path, *options)
@@ -149,7 +173,8 @@ def test_measured_files_come_back_with_vicons_signs(tmp_path, name):
                     ours = points[f"{side}{joint}{kind}Kinertia"][0, at]
                     agree = np.corrcoef(theirs, ours)[0, 1]
                     if kind == "Moment" and joint != "Ankle" and agree < 0.9:
-                        # their centres of hips and knees are up to 3 cm elsewhere: about these the moments agree
+                        # their centres are up to 3.5 cm elsewhere, and their moments of inertia three times ours
                         own = points[side + {"Hip": "FEP", "Knee": "FEO"}[joint]][:, at].T
-                        agree = np.corrcoef(theirs, extension_about(fit, joint, side, path, own))[0, 1]
-                    assert agree > NEAR.get((name, side + joint + kind), 0.9), (side, joint, kind, agree)
+                        more = more_inertia(points, side, joint, at, rate_hz)
+                        agree = np.corrcoef(theirs, extension_about(fit, joint, side, path, own, more))[0, 1]
+                    assert agree > 0.9, (side, joint, kind, agree)
