@@ -39,7 +39,7 @@ from kinertia.motion.smoothing import smooth
 from kinertia.settings import Subject
 from kinertia.trial.data import Markers, Recording
 from kinertia.trial.plate_assignment import build_trial
-from kinertia.workflow.prepare import calibrate
+from kinertia.workflow.built_in_model import calibrate
 from validation.command_speed import command_section
 from validation.core_speed import core_section
 from validation.estimate_speed import speed_section, timed

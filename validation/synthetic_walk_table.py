@@ -27,7 +27,7 @@ from kinertia.synthetic.walk import walking_subject
 from kinertia.trial.data import Recording, Trial
 from kinertia.trial.plate_assignment import build_trial
 from kinertia.trial.sampled_time import runs
-from kinertia.workflow.prepare import calibrate
+from kinertia.workflow.built_in_model import calibrate
 from validation.measured_data import data_folder
 
 HARMONICS = 8

@@ -90,13 +90,11 @@ if TYPE_CHECKING:
     from kinertia.workflow.check import check_recording as check_recording
     from kinertia.workflow.estimate import estimate as estimate
     from kinertia.workflow.estimate import estimate_bsp as estimate_bsp
-    from kinertia.workflow.estimate import estimate_bsp_of_model as estimate_bsp_of_model
     from kinertia.workflow.from_files import fit_subject as fit_subject
     from kinertia.workflow.from_files import prepare_subject as prepare_subject
     from kinertia.workflow.person import Person as Person
     from kinertia.workflow.person import read_person as read_person
     from kinertia.workflow.prepare import prepare as prepare
-    from kinertia.workflow.prepare_osim import prepare_osim as prepare_osim
     from kinertia.workflow.recording import RecordingCheck as RecordingCheck
 
 _ROOMS = {
@@ -129,10 +127,9 @@ _ROOMS = {
     "estimation.simultaneous.fit": "Posterior",
     "diagnostics.model.model_check": "ModelCheck check_model",
     "diagnostics.result.suitability": "Suitability suitability",
-    "workflow.estimate": "estimate estimate_bsp estimate_bsp_of_model",
+    "workflow.estimate": "estimate estimate_bsp",
     "workflow.from_files": "fit_subject prepare_subject",
     "workflow.prepare": "prepare",
-    "workflow.prepare_osim": "prepare_osim",
     "workflow.check": "PersonCheck check_person check_recording",
     "workflow.person": "Person read_person",
     "workflow.recording": "RecordingCheck",

@@ -7,7 +7,7 @@ from command_line import loaded_after, loaded_by
 PICTURES = {"plotly", "matplotlib"}
 SLOW = {*PICTURES, "scipy.stats", "scipy.signal"}
 SYNTHETIC = {"kinertia.studies", "kinertia.synthetic"}
-OSIM_MODELS = {"kinertia.io.osim.reader", "kinertia.workflow.prepare_osim"}
+OSIM_MODELS = {"kinertia.io.osim.reader", "kinertia.workflow.opensim_model"}
 C3D = {"ezc3d", "kinertia.io.c3d", "kinertia.io.c3d_plates"}
 SELDOM_NAMED = {
     "kinertia.workflow.known_body",

@@ -14,7 +14,7 @@ from kinertia.trial.ground_contact import bridged
 from kinertia.trial.sampled_time import nearest_samples, span_s
 from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow.check import check_recording
-from kinertia.workflow.estimate import estimate_bsp_of_model
+from kinertia.workflow.estimate import estimate_bsp
 from recordings import WALKS, named_here
 
 SUBJECT4 = ("subject4/walking1.trc", "subject4/walking1_grf.mot")
@@ -92,7 +92,7 @@ def test_the_same_estimate(file_of, recording_of, name):
     model_file, *files = OF_MODELS[name]
     model, walk = read_osim(file_of(model_file)), recording_of(*files)
     first, *others = (
-        estimate_bsp_of_model(Subject(mass_kg=MASS_KG[name]), model, [TrialInput(one)])
+        estimate_bsp(Subject(mass_kg=MASS_KG[name]), model, [TrialInput(one)])
         for one in (walk, later(walk, 5.0), later(walk, 10.0))
     )
     loads, sd = first.trials[0].joint_loads["estimate"], first.trials[0].deviations.moments

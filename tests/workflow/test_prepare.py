@@ -10,7 +10,7 @@ from kinertia.findings.finding import Severity, finding
 from kinertia.findings.where import Where
 from kinertia.settings import Subject
 from kinertia.trial.trial_input import TrialInput
-from kinertia.workflow import prepare as module
+from kinertia.workflow import built_in_model as module
 from kinertia.workflow.prepare import prepare
 
 

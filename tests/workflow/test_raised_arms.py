@@ -6,7 +6,7 @@ import pytest
 from generic_static import generic_model, smooth_motion
 from kinertia.model.anatomy import segment_of
 from kinertia.trial.data import FootLoads, Markers, Trial
-from kinertia.workflow.prepare import calibrate
+from kinertia.workflow.built_in_model import calibrate
 
 
 @pytest.fixture(scope="module")

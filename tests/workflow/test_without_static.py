@@ -7,8 +7,9 @@ from kinertia.io.recording import read_recording
 from kinertia.settings import Settings, Subject
 from kinertia.synthetic.walk import HEIGHT_M
 from kinertia.trial.trial_input import TrialInput
+from kinertia.workflow.built_in_model import WITHOUT_STATIC
 from kinertia.workflow.person import Person
-from kinertia.workflow.prepare import WITHOUT_STATIC, prepared
+from kinertia.workflow.prepare import prepared
 from kinertia.workflow.screening import screen
 
 

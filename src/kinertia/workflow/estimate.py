@@ -41,7 +41,7 @@ from kinertia.workflow.prepare import prepare
 @one_blas_thread
 def estimate_bsp(
     subject: Subject,
-    static: Recording,
+    source: Recording | OsimModel,
     inputs: Sequence[TrialInput],
     settings: Settings | None = None,
     marker_set: MarkerSet | None = None,
@@ -49,57 +49,30 @@ def estimate_bsp(
     prior: BspPrior | None = None,
     attached: Sequence[Attached] = (),
     overrule: Overrule | None = None,
-) -> Fit:
-    """Body segment parameters of a person from a static trial and one or more gait trials.
-
-    Args:
-        subject: mass and height may be None where a recording carries them.
-        static: the person standing.
-        inputs: the gait trials.
-        settings: defaults if None.
-        marker_set: found from the static trial's labels if None.
-        progress: called as the work goes on.
-        prior: of the body segment parameters, for the simultaneous estimate; the literature's if None.
-        attached: what the person wore or carried in all gait trials.
-        overrule: findings that do not block, or are not shown.
-
-    Raises:
-        KinertiaError: the subject, a marker set or a trial cannot be used; the message says why and what to do.
-    """
-    ready = prepare(subject, static, inputs, settings, marker_set, progress, attached, overrule)
-    return estimate(ready if prior is None else replace(ready, prior=prior), progress)
-
-
-@one_blas_thread
-def estimate_bsp_of_model(
-    subject: Subject,
-    model: OsimModel,
-    inputs: Sequence[TrialInput],
-    settings: Settings | None = None,
     calibrate: bool = False,
-    progress: Progress = lambda stage, share: None,
-    attached: Sequence[Attached] = (),
-    overrule: Overrule | None = None,
 ) -> Fit:
-    """Body segment parameters of a person whose scaled OpenSim model is known, by the simultaneous estimate.
+    """Body segment parameters of a person from one or more trials, with the built-in model or the person's own.
 
     Args:
-        subject: mass may be None where a recording carries it.
-        model: as `kinertia.io.osim.reader.read_osim` reads it.
+        subject: mass and height may be None where a recording carries them; height and sex with an OpenSim model.
+        source: of the model: the person standing, for the built-in one; or a scaled OpenSim model, as
+            `kinertia.io.osim.reader.read_osim` reads it, for the simultaneous estimate.
         inputs: the trials.
         settings: defaults if None.
-        calibrate: let markers and joint centres move; else they stay where the model has them.
+        marker_set: found from the static trial's labels if None; none with an OpenSim model.
         progress: called as the work goes on.
+        prior: of the body segment parameters, for the simultaneous estimate; the literature's, or around the OpenSim
+            model's, if None.
         attached: what the person wore or carried in all trials.
         overrule: findings that do not block, or are not shown.
+        calibrate: let markers and joint centres of an OpenSim model move; else they stay where it has them.
 
     Raises:
-        KinertiaError: the subject, the model or a trial cannot be used; the message says why and what to do.
+        KinertiaError: the subject, a marker set, the model or a trial cannot be used; the message says why and what to
+            do.
     """
-    from kinertia.workflow.prepare_osim import prepare_osim
-
-    ready = prepare_osim(subject, model, inputs, settings, calibrate, progress, attached, overrule)
-    return estimate(ready, progress)
+    ready = prepare(subject, source, inputs, settings, marker_set, progress, attached, overrule, calibrate)
+    return estimate(ready if prior is None else replace(ready, prior=prior), progress)
 
 
 @one_blas_thread
@@ -107,7 +80,7 @@ def estimate(ready: Prepared, progress: Progress = lambda stage, share: None) ->
     """Body segment parameters of a prepared person: the last step of `estimate_bsp`, with the settings of the others.
 
     Args:
-        ready: as `prepare` or `prepare_osim` makes it.
+        ready: as `prepare` makes it.
         progress: called as the work goes on.
 
     Raises:

@@ -49,7 +49,8 @@ def prepare_subject(
     _expect_no_mirrored_prosthesis(wanted)
     session = _session(wanted)
     measures = _measures(wanted)
-    ready = with_attached(_with_known_body(_prepared(wanted, progress, overrule or Overrule()), wanted, measures))
+    screened = screen(read_person(wanted, progress).with_overrule(overrule or Overrule()))
+    ready = with_attached(_with_known_body(prepared(screened, wanted.settings, progress), wanted, measures))
     if known.model_copy(update={"date": None, "zeroed": False}) == InstrumentsFiles():
         return ready
     if wanted.settings.method == "two-level":
@@ -136,15 +137,6 @@ def check_plates(wanted: SubjectFile) -> None:
             "column for each foot); if the same columns are the same plate in all files of the session, say so in the "
             "subject file: same_plates = true under [instruments]"
         )
-
-
-def _prepared(wanted: SubjectFile, progress: Progress, overrule: Overrule) -> Prepared:
-    screened = screen(read_person(wanted, progress).with_overrule(overrule))
-    if wanted.model.osim is None:
-        return prepared(screened, wanted.settings, progress)
-    from kinertia.workflow.prepare_osim import prepared_osim
-
-    return prepared_osim(screened, wanted.settings, progress)
 
 
 def fit_subject(

@@ -1,339 +1,115 @@
-"""From screened recordings to what an estimator needs, with the built-in model: calibrated skeleton, literature BSPs,
-smoothed kinematics.
+"""From screened recordings to what an estimator needs, with the built-in model or the user's own.
+
+The road is one: the trials that can be used, a model adapted to them, their kinematics. The two sources of a model
+(`built_in_model`, `opensim_model`) take the same and return the same, a `PersonModel`.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
+from collections.abc import Sequence
 
-from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.labels.swapped_markers import labels_by_model
-from kinertia.diagnostics.runner import blocking
 from kinertia.diagnostics.subject.stated_ranges import stated_ranges
-from kinertia.diagnostics.subject.unobserved_segments import unobserved_segments
-from kinertia.errors import BlockedError, MarkerSetError, SettingsError, TrialError
-from kinertia.estimation.arm_branch import elbow_rotations, with_elbows_that_bend_forwards
-from kinertia.estimation.calibration import Adaptation, adapt, hold_uninformed, turn_about, without_partly_shown
-from kinertia.estimation.carried_mass import CarriedMass
-from kinertia.estimation.input_checks import check_trials, complete_subject, known
-from kinertia.estimation.population import population_prior
+from kinertia.errors import SettingsError
+from kinertia.estimation.input_checks import check_trials
 from kinertia.estimation.prepared import Prepared, Progress
-from kinertia.estimation.prior import literature_prior
-from kinertia.estimation.simultaneous.model_uncertainty import (
-    GAIT27_UNCERTAINTY,
-    JOINT_AXIS_SD_RAD,
-    JOINT_CENTRE_SD_M,
-    MARKER_SD_M,
-    ModelUncertainty,
-)
-from kinertia.findings.finding import Finding, finding
-from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
-from kinertia.model.anthropometry import literature_bsp
-from kinertia.model.gait27 import (
-    ARM_COORDINATES,
-    ARM_ROTATIONS,
-    LEG_AXIS_TILTS,
-    SHOULDER_OFFSETS,
-    VIRTUAL_TRUNK,
-    Gait27,
-    build_gait27,
-)
-from kinertia.model.head_markers import without_head
+from kinertia.model.imported_model import OsimModel
 from kinertia.model.marker_set import MarkerSet
-from kinertia.model.skeleton import Skeleton
-from kinertia.model.upper_body import ARM_SEGMENTS
-from kinertia.motion.inverse_kinematics import InverseKinematics
-from kinertia.motion.kinematics import facing
 from kinertia.motion.single_blas_thread import one_blas_thread
-from kinertia.motion.stance_pose import stance_pose
-from kinertia.motion.upright_trunk import shows_trunk, with_upright_trunk
 from kinertia.settings import Attached, Overrule, Settings, Subject
-from kinertia.trial.data import Recording, Trial
+from kinertia.trial.data import Recording
 from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow.doubted_mass import with_doubted_mass
-from kinertia.workflow.joint_widths import with_widths
 from kinertia.workflow.kinematics import Turned, expect_forces, solved_trials, usable_trial
 from kinertia.workflow.person import Person
+from kinertia.workflow.person_model import PersonModel
 from kinertia.workflow.screening import Screened, screen
-from kinertia.workflow.stated_ranges import with_stated_ranges
-
-LOWER_BODY_SD_M = 0.01
-UPPER_BODY_SD_M = 0.04
-"""How far markers may sit from where the model has them."""
-WITHOUT_STATIC = 2.0
-"""Times as uncertain are joint centres and markers of a model that is made from a walk."""
-_STAYS_M = 1e-4
-"""Of markers that have been adapted already."""
-_FAR_M = 0.03
-_ARM_ROTATION_SD_RAD = 1.0
-_TURNED_RAD = 0.25
-"""The skin turns the markers about the torso by 2 to 6 degrees; shoulders without a third axis, in a run, by 38."""
-
-
-@dataclass(frozen=True, eq=False)
-class Calibrated:
-    """The adapted skeleton, and what adapting it showed.
-
-    Attributes:
-        skeleton: adapted to the trials.
-        findings: labels that contradict the static trial's model.
-        moved_m: per marker label, how far it sits from its position in the static trial.
-        elbow_rotations_rad: side -> by how much an elbow axis was turned, where it was.
-        torso_rotation_rad: by how much the torso would have turned under its markers, which were kept from it.
-        head: labels of the markers on the head, where they are left out.
-    """
-
-    skeleton: Skeleton
-    findings: list[Finding]
-    moved_m: Mapping[str, float]
-    elbow_rotations_rad: Mapping[str, float]
-    torso_rotation_rad: float | None
-    head: tuple[str, ...]
-
-
-@one_blas_thread
-def calibrate(
-    model: Gait27, trials: Sequence[Trial], acromia: Sequence[str] = (), free_axes: bool = False
-) -> Calibrated:
-    """The skeleton of the 27-DOF model as the static trial gives it, adapted to the trials.
-
-    Markers of pelvis, legs and feet are held to the static trial by a deviation of 10 mm, those of torso and arms and
-    the shoulder centres by 40 mm, free axes of knees and ankles by 5 degrees. Axes are adapted to all trials, markers
-    to those with forces: a squat draws skin, and with it ankles, 5 mm away from where a walk's joint moments need them.
-    Where arms have turned the torso under its markers, since the model's shoulders lack an axis, the rest of the body
-    is adapted without them. Markers on the head are left out where three others show the trunk, which the acromia
-    (labels), that move with the arms, do not.
-    """
-    skeleton, poses = with_elbows_that_bend_forwards(model.skeleton, trials)
-    complete = without_partly_shown(skeleton, poses, ARM_COORDINATES)
-    if complete.markers != skeleton.markers:
-        skeleton, poses = with_elbows_that_bend_forwards(complete, trials)
-    elbows = elbow_rotations(model.skeleton, skeleton)
-    skeleton, _ = hold_uninformed(skeleton, trials, poses, dict.fromkeys(ARM_COORDINATES, 0.0))
-    found = [one for trial in trials for one in labels_by_model(skeleton, trial)]
-    everywhere = set(model.skeleton.labels).intersection(*(trial.markers.labels for trial in trials))
-    skeleton, head = without_head(skeleton, acromia, everywhere)
-    upper = {"torso", *(f"{name}_{side}" for side in "rl" for name in ("upper_arm", "forearm"))}
-    marker_sd = {s: UPPER_BODY_SD_M if s in upper else LOWER_BODY_SD_M for s in model.skeleton.segments}
-    coordinate_sd = dict.fromkeys(SHOULDER_OFFSETS, UPPER_BODY_SD_M) | dict.fromkeys(
-        ARM_ROTATIONS, _ARM_ROTATION_SD_RAD
-    )
-    if free_axes:
-        skeleton = _with_axes(skeleton, trials, poses, marker_sd, coordinate_sd)
-    trials, poses = _of_forces(trials, poses)
-    adapted = adapt(skeleton, trials, poses, marker_sd, coordinate_sd)
-    torso_rad: float | None = turn_about("torso", skeleton.markers, adapted.skeleton.markers)
-    if torso_rad is not None and torso_rad > _TURNED_RAD:
-        adapted = _arms_last(skeleton, trials, poses, marker_sd, coordinate_sd)
-    else:
-        torso_rad = None
-    return Calibrated(adapted.skeleton, found, adapted.moved_m, elbows, torso_rad, head)
-
-
-def _with_axes(
-    skeleton: Skeleton,
-    trials: Sequence[Trial],
-    poses: Sequence[InverseKinematics],
-    marker_sd_m: Mapping[str, float],
-    coordinate_sd: Mapping[str, float],
-) -> Skeleton:
-    """The skeleton with the axes of knees and ankles as all trials show them; all else stays."""
-    free = {**coordinate_sd, **dict.fromkeys(LEG_AXIS_TILTS, JOINT_AXIS_SD_RAD)}
-    found = adapt(skeleton, trials, poses, marker_sd_m, free).coordinates
-    return skeleton.lock({name: found[name] for name in LEG_AXIS_TILTS})
-
-
-def _of_forces(
-    trials: Sequence[Trial], poses: list[InverseKinematics]
-) -> tuple[Sequence[Trial], list[InverseKinematics]]:
-    """Trials whose forces are used, and their poses; all where there are none."""
-    used = [k for k, trial in enumerate(trials) if trial.loads.plates] or range(len(trials))
-    return [trials[k] for k in used], [poses[k] for k in used]
-
-
-def _arms_last(
-    skeleton: Skeleton,
-    trials: Sequence[Trial],
-    poses: Sequence[InverseKinematics],
-    marker_sd_m: Mapping[str, float],
-    coordinate_sd: Mapping[str, float],
-) -> Adaptation:
-    """Adapt the body without the markers of its arms, and then the arms on a body that stays as it is."""
-    arms = {f"{name}_{side}" for side in "rl" for name in ARM_SEGMENTS}
-    worn = [marker for marker in skeleton.markers if marker.segment in arms]
-    armless = skeleton.with_markers([marker for marker in skeleton.markers if marker.segment not in arms])
-    body = adapt(armless, trials, poses, marker_sd_m, {})
-    whole = body.skeleton.with_markers([*body.skeleton.markers, *worn])
-    staying = {segment: sd if segment in arms else _STAYS_M for segment, sd in marker_sd_m.items()}
-    adapted = adapt(whole, trials, poses, staying, coordinate_sd)
-    return replace(adapted, moved_m={**adapted.moved_m, **body.moved_m})
 
 
 @one_blas_thread
 def prepare(
     subject: Subject,
-    static: Recording,
+    source: Recording | OsimModel,
     inputs: Sequence[TrialInput],
     settings: Settings | None = None,
     marker_set: MarkerSet | None = None,
     progress: Progress = lambda stage, share: None,
     attached: Sequence[Attached] = (),
     overrule: Overrule | None = None,
+    calibrate: bool = False,
 ) -> Prepared:
-    """Calibrated skeleton, literature BSPs and smoothed kinematics of all trials; the arguments are `estimate_bsp`'s.
+    """Calibrated skeleton, prior and smoothed kinematics of all trials; the arguments are `estimate_bsp`'s.
 
     Raises:
         BlockedError: findings leave no trial, with all of them.
-        KinertiaError: the subject or a marker set cannot be used.
+        KinertiaError: the subject, a marker set or the model cannot be used.
     """
-    person = Person(subject, inputs, static, marker_set=marker_set, attached=attached, overrule=overrule or Overrule())
+    static, model = (None, source) if isinstance(source, OsimModel) else (source, None)
+    person = Person(
+        subject,
+        inputs,
+        static,
+        marker_set=marker_set,
+        model=model,
+        calibrate=calibrate,
+        attached=attached,
+        overrule=overrule or Overrule(),
+    )
     return prepared(screen(person), settings or Settings(), progress)
 
 
 @one_blas_thread
 def prepared(screened: Screened, settings: Settings, progress: Progress = lambda stage, share: None) -> Prepared:
-    """A screened person with the built-in model.
+    """A screened person with a model on all trials that can be used.
 
     Raises:
         BlockedError: findings leave no trial, with all of them.
         KinertiaError: the subject cannot be used.
     """
-    person, context = screened.person, screened.context
+    person = screened.person
     if person.attached and settings.method == "two-level":
         raise SettingsError("two-level knows the body only; where something is attached, use the default method")
     check_trials(person.recordings)
     usable = screened.usable
-    marker_set = context.marker_set
-    if marker_set is None:
-        raise SettingsError("the built-in model needs a marker set (markers = ... under [model])")
-    statics = [] if context.static is None else [context.static.recording]
-    subject = complete_subject(person.subject, [*statics, *person.recordings])
     progress("calibration", 0.0)
     started = time.perf_counter()
     read_s = {item.recording.name: item.read_seconds for item in person.trials}
-    turned = [_turned(one, read_s[one.name]) for one in usable]
-    expect_forces([one.trial for one in turned])
-    height_m, sex = known(subject.height_m), known(subject.sex)
-    without_static: list[Finding] = []
-    if not statics:
-        walk = next(one for one in turned if one.trial.loads.plates)
-        statics, marker_set, without_static = _stance_of(person, walk, marker_set)
-    build = partial(build_gait27, statics[0], marker_set, height_m, sex, settings.hip_centre)
-    model = build(by_stature=bool(without_static))
-    model, turned = _with_trunk(model, turned)
-    model = replace(model, skeleton=with_stated_ranges(model.skeleton, subject))
-    acromia = [label for side in "rl" for label in marker_set.landmarks.get(f"acromion_{side}", ())]
-    functional = any(not one.trial.loads.plates for one in turned)
-    free_axes = settings.joint_axes or bool(without_static) or functional
-    calibrated = calibrate(model, [one.trial for one in turned], acromia, free_axes)
-    found = [*screened.findings, *without_static, *calibrated.findings]
-    left = _unblocked(turned, screened, found)
-    if len(left) < len(turned):  # the skeleton is adapted to those that are used
-        calibrated = calibrate(model, [one.trial for one in left], acromia, free_axes)
-    turned, skeleton = left, calibrated.skeleton
-    total = CarriedMass.of(known(subject.mass_kg), person.attached)
-    literature = literature_bsp(total.body_kg, height_m, sex, model.geometry, settings.bsp)
-    expected = population_prior(literature_prior(literature), subject, total.body_kg)
-    calibration_s = (time.perf_counter() - started) / len(turned)
-    solved = solved_trials(skeleton, turned, settings.cutoff_hz, calibration_s, progress)
-    found += [*_adapted(calibrated), *unobserved_segments(skeleton), *stated_ranges(subject), *solved.findings]
-    findings = screened.overruled(found)
+    trials = [Turned(usable_trial(one), 0.0, read_s[one.name]) for one in usable]
+    expect_forces([one.trial for one in trials])
+    model = _model(screened, trials, settings)
+    calibration_s = (time.perf_counter() - started) / len(model.trials)
+    solved = solved_trials(model.skeleton, model.trials, settings.cutoff_hz, calibration_s, progress)
+    found = [*model.findings, *stated_ranges(model.subject), *solved.findings, *model.assumed]
+    findings = screened.overruled([*screened.findings, *found])
     return Prepared(
-        subject=subject,
+        subject=model.subject,
         settings=settings,
-        skeleton=skeleton,
-        literature=expected.prior.mean,
-        prior=with_doubted_mass(expected.prior, screened.findings),
-        uncertainty=_uncertainty(free_axes, bool(without_static)),
-        file=None,
+        skeleton=model.skeleton,
+        literature=model.uncertainty.whole(model.prior.mean),
+        prior=with_doubted_mass(model.prior, screened.findings),
+        uncertainty=model.uncertainty,
+        file=person.model,
         kinematics=solved.with_forces.kinematics,
         seconds=solved.with_forces.seconds,
         findings=tuple(findings),
-        notes=(f"marker set: {marker_set.name}", *(note for k in solved.kinematics for note in k.notes)),
+        notes=(model.note, *(note for k in solved.kinematics for note in k.notes)),
         attached=tuple(person.attached),
         overrule=person.overrule,
         overrule_of=person.overrule_of,
         left_out=screened.left_out_by(findings),
         rules=screened.rules,
-        elbow_rotations_rad=calibrated.elbow_rotations_rad,
-        torso_rotation_rad=calibrated.torso_rotation_rad,
+        elbow_rotations_rad=model.elbow_rotations_rad,
+        torso_rotation_rad=model.torso_rotation_rad,
         functional=solved.without_forces,
     )
 
 
-def _stance_of(person: Person, walk: Turned, marker_set: MarkerSet) -> tuple[list[Recording], MarkerSet, list[Finding]]:
-    """A pose of the walk in place of a static trial, the marker set with the widths that are known, and S207.
+def _model(screened: Screened, trials: Sequence[Turned], settings: Settings) -> PersonModel:
+    """The person's model by its source; the only place that tells the two apart."""
+    if screened.person.model is None:
+        from kinertia.workflow.built_in_model import built_in_model
 
-    Raises:
-        SettingsError: no frame of the walk shows a pelvis over each flat foot.
-    """
-    pose = stance_pose(walk.trial.markers, marker_set)
-    if pose is None:
-        raise SettingsError(
-            "the built-in model needs a static trial (--static, or static = ... under [model]): no frames of "
-            f"{walk.trial.name} show pelvis, knee, ankle and foot of each leg while that foot is flat"
-        )
-    measured = next(one for one in person.recordings if one.name == walk.trial.name)
-    static, named = with_widths(
-        replace(measured, markers=pose, plates=None), person.recordings, marker_set, person.subject
-    )
-    found = finding("S207", Where(trial=walk.trial.name), centre_sd_m=Quantity(WITHOUT_STATIC * JOINT_CENTRE_SD_M, "m"))
-    return [static], named, [found]
+        return built_in_model(screened, trials, settings)
+    from kinertia.workflow.opensim_model import opensim_model
 
-
-def _uncertainty(free_axes: bool, without_static: bool) -> ModelUncertainty:
-    """How well joint centres, axes and markers of the built-in model are known."""
-    known_by = GAIT27_UNCERTAINTY
-    if without_static:
-        centres = {name: WITHOUT_STATIC * sd for name, sd in known_by.centres.items()}
-        known_by = replace(known_by, centres=centres, marker_sd_m=WITHOUT_STATIC * MARKER_SD_M)
-    return replace(known_by.with_axes(), before=dict.fromkeys(LEG_AXIS_TILTS, 0.0)) if free_axes else known_by
-
-
-def _with_trunk(model: Gait27, trials: Sequence[Turned]) -> tuple[Gait27, list[Turned]]:
-    """The model and its trials, with an upright trunk in those that show too few markers of it."""
-    lacking = [not shows_trunk(model.skeleton, one.trial) for one in trials]
-    if any(lacking) and VIRTUAL_TRUNK[0] not in model.skeleton.markers:
-        model = replace(model, skeleton=model.skeleton.with_markers([*model.skeleton.markers, *VIRTUAL_TRUNK]))
-    return model, [
-        replace(one, trial=with_upright_trunk(model.skeleton, one.trial)) if lacks else one
-        for one, lacks in zip(trials, lacking, strict=True)
-    ]
-
-
-def _adapted(calibrated: Calibrated) -> Iterator[Finding]:
-    """M173 of markers that sit far from their positions in the static trial, M174 of those on the head."""
-    for label, distance_m in calibrated.moved_m.items():
-        if distance_m > _FAR_M:
-            yield finding("M173", Where(markers=(label,)), distance_m=Quantity(distance_m, "m", limit=_FAR_M))
-    if calibrated.head:
-        yield finding("M174", Where(markers=calibrated.head))
-
-
-def _unblocked(trials: Sequence[Turned], screened: Screened, found: Sequence[Finding]) -> list[Turned]:
-    """Those that can go on after all that was found.
-
-    Raises:
-        BlockedError: none can.
-    """
-    findings = screened.overruled(found)
-    stopped = screened.stopped_by(findings)
-    left = [one for one in trials if one.trial.name not in stopped]
-    if not any(one.trial.loads.plates for one in left):
-        raise BlockedError(findings, blocking(findings))
-    return left
-
-
-def _turned(context: RecordingContext, read_seconds: float) -> Turned:
-    """The trial facing +X, without markers that no frame shows."""
-    trial, marker_set = usable_trial(context), context.marker_set
-    assert marker_set is not None
-    try:
-        rotation, angle = facing(trial.markers, marker_set)
-    except MarkerSetError as error:
-        raise TrialError(trial.name, str(error)) from error
-    return Turned(trial if angle == 0.0 else trial.rotated(rotation), angle, read_seconds)
+    return opensim_model(screened, trials, screened.person.model)

@@ -1,4 +1,4 @@
-"""From recordings and a user's own OpenSim model to what the simultaneous estimate needs.
+"""A user's own OpenSim model on a person and the trials.
 
 The model's scaling, markers and joints stay as they are unless calibration is asked for, and so does the laboratory's
 frame: the trial is not turned. The prior is around the model's own body segment parameters, at the mass on the scale.
@@ -6,20 +6,17 @@ frame: the trial is not turned. The prior is around the model's own body segment
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from kinertia.diagnostics.model.model_on_person import moved_markers
-from kinertia.diagnostics.subject.stated_ranges import stated_ranges
 from kinertia.estimation.calibration import adapt, first_poses, hold_uninformed
 from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.estimation.estimated_bodies import estimated_bodies
-from kinertia.estimation.input_checks import check_trials, complete_subject, known
+from kinertia.estimation.input_checks import complete_subject, known
 from kinertia.estimation.population import population_prior
-from kinertia.estimation.prepared import Prepared, Progress
 from kinertia.estimation.prior import SCALE_SD, BspPrior, literature_prior
 from kinertia.estimation.simultaneous.model_uncertainty import JOINT_CENTRE_SD_M, MARKER_SD_M, ModelUncertainty
 from kinertia.findings.finding import Finding, finding
@@ -29,99 +26,51 @@ from kinertia.model.anatomy import segment_of
 from kinertia.model.bsp import BodySegmentParameters, impossible_segments
 from kinertia.model.imported_model import OsimModel
 from kinertia.model.skeleton import Axis, Skeleton
-from kinertia.motion.single_blas_thread import one_blas_thread
-from kinertia.settings import Attached, Overrule, Settings, Subject
-from kinertia.trial.trial_input import TrialInput
-from kinertia.workflow.doubted_mass import with_doubted_mass
-from kinertia.workflow.kinematics import Turned, expect_forces, solved_trials, usable_trial
-from kinertia.workflow.person import Person
-from kinertia.workflow.prepare import LOWER_BODY_SD_M, UPPER_BODY_SD_M
-from kinertia.workflow.screening import Screened, screen
+from kinertia.workflow.kinematics import Turned
+from kinertia.workflow.person_model import LOWER_BODY_SD_M, UPPER_BODY_SD_M, PersonModel
+from kinertia.workflow.screening import Screened
 from kinertia.workflow.stated_ranges import with_stated_ranges
 
 _MASS_TOLERANCE = 0.002
 
 
-@one_blas_thread
-def prepare_osim(
-    subject: Subject,
-    model: OsimModel,
-    inputs: Sequence[TrialInput],
-    settings: Settings | None = None,
-    calibrate: bool = False,
-    progress: Progress = lambda stage, share: None,
-    attached: Sequence[Attached] = (),
-    overrule: Overrule | None = None,
-) -> Prepared:
-    """The model fitted to all trials; the arguments are `estimate_bsp_of_model`'s.
+def opensim_model(screened: Screened, trials: Sequence[Turned], model: OsimModel) -> PersonModel:
+    """A user's model on a person and the trials.
+
+    Args:
+        screened: the person.
+        trials: those that can be used, as recorded.
+        model: the person's.
 
     Raises:
-        BlockedError: findings leave no trial, with all of them.
-        KinertiaError: the subject cannot be used.
-    """
-    person = Person(
-        subject, inputs, model=model, calibrate=calibrate, attached=attached, overrule=overrule or Overrule()
-    )
-    return prepared_osim(screen(person), settings or Settings(), progress)
-
-
-@one_blas_thread
-def prepared_osim(screened: Screened, settings: Settings, progress: Progress = lambda stage, share: None) -> Prepared:
-    """A screened person with an OpenSim model.
-
-    Raises:
-        BlockedError: findings leave no trial, with all of them.
         KinertiaError: the subject cannot be used.
     """
     person = screened.person
-    model = person.model
-    assert model is not None
-    check_trials(person.recordings)
-    usable = screened.usable
     subject = complete_subject(person.subject, person.recordings, mass_only=True)
-    progress("calibration", 0.0)
-    started = time.perf_counter()
-    read_s = {item.recording.name: item.read_seconds for item in person.trials}
-    turned = [Turned(usable_trial(one), 0.0, read_s[one.name]) for one in usable]
-    trials = [one.trial for one in turned]
-    expect_forces(trials)
+    measured = [one.trial for one in trials]
     may_hold = {c.name: c.default for c in model.coordinates if c.name not in model.skeleton.coordinates[:6]}
     skeleton = with_stated_ranges(replace(model.skeleton, feet=_feet(model)), subject)
-    total = CarriedMass.of(known(subject.mass_kg), person.attached)
-    poses = first_poses(skeleton, trials)
-    skeleton, idle = hold_uninformed(skeleton, trials, poses, may_hold)
-    found: list[Finding] = []
+    poses = first_poses(skeleton, measured)
+    skeleton, idle = hold_uninformed(skeleton, measured, poses, may_hold)
+    moved: list[Finding] = []
     if person.calibrate:
-        skeleton = adapt(with_centre_offsets(model, skeleton), trials, poses, _marker_sd(skeleton), {}).skeleton
-        found += moved_markers(model.skeleton, skeleton, [trial.markers for trial in trials])
-    calibration_s = (time.perf_counter() - started) / len(trials)
-    own, factor = at_mass(model.bsp, total.body_kg)
+        skeleton = adapt(with_centre_offsets(model, skeleton), measured, poses, _marker_sd(skeleton), {}).skeleton
+        moved = list(moved_markers(model.skeleton, skeleton, [trial.markers for trial in measured]))
+    body_kg = CarriedMass.of(known(subject.mass_kg), person.attached).body_kg
+    own, factor = at_mass(model.bsp, body_kg)
     prior, held = parted(skeleton, own)
-    expected = population_prior(prior, subject.model_copy(update={"sex": None}), total.body_kg)
-    prior = expected.prior
     centres = {name: JOINT_CENTRE_SD_M for name in skeleton.locked if "/offset_" in name}
-    uncertainty = ModelUncertainty(centres, MARKER_SD_M if person.calibrate else None, held, "the model's own values")
-    solved = solved_trials(skeleton, turned, settings.cutoff_hz, calibration_s, progress)
-    found += [*stated_ranges(subject), *solved.findings, *_assumed(model, factor, own, idle, held)]
-    findings = screened.overruled([*screened.findings, *found])
-    return Prepared(
+    return PersonModel(
         subject=subject,
-        settings=settings,
+        note=f"OpenSim model: {model.path.name}",
+        trials=trials,
         skeleton=skeleton,
-        literature=uncertainty.whole(prior.mean),
-        prior=with_doubted_mass(prior, screened.findings),
-        uncertainty=uncertainty,
-        file=model,
-        kinematics=solved.with_forces.kinematics,
-        seconds=solved.with_forces.seconds,
-        findings=tuple(findings),
-        notes=(f"OpenSim model: {model.path.name}", *(note for k in solved.kinematics for note in k.notes)),
-        attached=tuple(person.attached),
-        overrule=person.overrule,
-        overrule_of=person.overrule_of,
-        left_out=screened.left_out_by(findings),
-        rules=screened.rules,
-        functional=solved.without_forces,
+        prior=population_prior(prior, subject.model_copy(update={"sex": None}), body_kg).prior,
+        uncertainty=ModelUncertainty(
+            centres, MARKER_SD_M if person.calibrate else None, held, "the model's own values"
+        ),
+        findings=moved,
+        assumed=_assumed(model, factor, own, idle, held),
     )
 
 
