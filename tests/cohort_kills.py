@@ -31,7 +31,7 @@ from cohort_faults import write_study
 from command_line import run
 from kinertia.cohort.resources import LOG
 from kinertia.estimation.result import Fit
-from kinertia.io.subject_file import SubjectFile
+from kinertia.io.subject_tables import SubjectFile
 from kinertia.workflow.from_files import fit_subject
 
 NAMES = ("Anna", "Ben")

@@ -17,7 +17,8 @@ from kinertia.findings.finding import Severity
 from kinertia.findings.overview import reported
 from kinertia.findings.rule import rule
 from kinertia.io.provenance import VERSION
-from kinertia.io.subject_file import SubjectFile, read_subject
+from kinertia.io.subject_file import read_subject
+from kinertia.io.subject_tables import SubjectFile
 from validation.fault_study import FaultOutcome, SoundWalk, run_faults, run_sound, sound_laboratories, synthetic_walk
 from validation.measured_data import data_folder
 from validation.page import write_page

@@ -52,8 +52,8 @@ if TYPE_CHECKING:
     from kinertia.io.marker_set_file import read_marker_set as read_marker_set
     from kinertia.io.osim.reader import read_osim as read_osim
     from kinertia.io.recording import read_recording as read_recording
-    from kinertia.io.subject_file import SubjectFile as SubjectFile
     from kinertia.io.subject_file import read_subject as read_subject
+    from kinertia.io.subject_tables import SubjectFile as SubjectFile
     from kinertia.model.anthropometry import BodyGeometry as BodyGeometry
     from kinertia.model.anthropometry import literature_bsp as literature_bsp
     from kinertia.model.bsp import BodySegmentParameters as BodySegmentParameters
@@ -120,7 +120,8 @@ _ROOMS = {
     "io.marker_set_file": "choose_marker_set read_marker_set",
     "io.osim.reader": "read_osim",
     "io.recording": "read_recording",
-    "io.subject_file": "SubjectFile read_subject",
+    "io.subject_file": "read_subject",
+    "io.subject_tables": "SubjectFile",
     "estimation.prepared": "Prepared",
     "estimation.prior": "BspPrior literature_prior",
     "estimation.result": "Fit TrialFit",

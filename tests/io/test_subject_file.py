@@ -6,14 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kinertia.errors import FileError, SettingsError
-from kinertia.io.subject_file import (
-    STUDY_FILE,
-    SubjectFile,
-    read_subject,
-    subject_file_in,
-    subject_from_options,
-    with_settings,
-)
+from kinertia.io.subject_file import STUDY_FILE, read_subject, subject_file_in, subject_from_options, with_settings
+from kinertia.io.subject_tables import SubjectFile
 from kinertia.io.toml_lines import TomlFile
 from kinertia.settings import Overrule, Settings, Subject
 from refusals import refused

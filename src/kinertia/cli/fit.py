@@ -37,7 +37,8 @@ from kinertia.errors import FileError, KinertiaError
 from kinertia.estimation.result import Fit
 from kinertia.io.file_names import same_folder
 from kinertia.io.provenance import command_line, provenance_of
-from kinertia.io.subject_file import SubjectFile, read_subject, subject_file_in, subject_from_options, with_settings
+from kinertia.io.subject_file import read_subject, subject_file_in, subject_from_options, with_settings
+from kinertia.io.subject_tables import SubjectFile
 from kinertia.report.files import save_fit, summary
 from kinertia.settings import Overrule, Settings
 from kinertia.workflow.from_files import fit_subject

@@ -17,7 +17,8 @@ from kinertia.estimation.simultaneous.calibration_entry import SHOWN_UNIT
 from kinertia.io.output_folder import write_then_rename
 from kinertia.io.provenance import VERSION, recordings
 from kinertia.io.session_file import read_session, session_text
-from kinertia.io.subject_file import InstrumentsFiles, SubjectFile, read_subject
+from kinertia.io.subject_file import read_subject
+from kinertia.io.subject_tables import InstrumentsFiles, SubjectFile
 from kinertia.workflow.from_files import check_plates, fit_subject
 from kinertia.workflow.session import SessionInstruments, person_instruments, session_instruments
 

@@ -29,7 +29,8 @@ from kinertia.io.population_file import population_text
 from kinertia.io.provenance import VERSION, recordings, sha256
 from kinertia.io.recording_date import session_date
 from kinertia.io.session_file import PersonInstruments, session_text
-from kinertia.io.subject_file import InstrumentsFiles, SubjectFile, read_subject
+from kinertia.io.subject_file import read_subject
+from kinertia.io.subject_tables import InstrumentsFiles, SubjectFile
 from kinertia.io.subject_text import subject_text
 from kinertia.io.toml_lines import read_toml
 from kinertia.report.saved_fit import read_saved

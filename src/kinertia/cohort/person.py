@@ -16,7 +16,8 @@ from kinertia.findings.finding import Severity
 from kinertia.io.output_folder import complete_folder, write_then_rename
 from kinertia.io.provenance import VERSION, command_line, provenance_of
 from kinertia.io.recording_date import session_date
-from kinertia.io.subject_file import SubjectFile, read_subject
+from kinertia.io.subject_file import read_subject
+from kinertia.io.subject_tables import SubjectFile
 from kinertia.report.files import save_fit
 from kinertia.workflow.from_files import fit_subject
 

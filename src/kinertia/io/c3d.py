@@ -30,11 +30,11 @@ from kinertia.io.c3d_subject import subject_data
 from kinertia.io.ezc3d_library import (
     C3dContent,
     C3dTrouble,
-    continued,
     expect_ezc3d,
     parameter_values,
     read_apart,
     read_content,
+    text_list,
 )
 from kinertia.io.lab_axes import to_ground
 from kinertia.io.number_table import expect_file
@@ -207,9 +207,9 @@ def _markers(path: Path, file: Any) -> tuple[tuple[str, ...], FloatArray, list[F
     for where in missing.values():
         positions[where] = np.nan
     seen = np.asarray(np.isfinite(positions).all(axis=2).any(axis=0))
-    labels = continued(file["parameters"], "POINT", "LABELS")[: positions.shape[1]]
+    labels = text_list(file["parameters"], "POINT", "LABELS")[: positions.shape[1]]
     labels += ["*"] * (positions.shape[1] - len(labels))
-    ours = set(continued(file["parameters"], OWN_GROUP, "LABELS"))
+    ours = set(text_list(file["parameters"], OWN_GROUP, "LABELS"))
     outputs = _outputs(file["parameters"], labels) - ours
     unnamed = [k for k, label in enumerate(labels) if not label or label.startswith("*")]
     kept = [k for k in range(len(labels)) if k not in set(unnamed) and labels[k] not in outputs | ours]
@@ -237,12 +237,12 @@ def _markers(path: Path, file: Any) -> tuple[tuple[str, ...], FloatArray, list[F
 def _file_outputs(file: Any, time: FloatArray) -> FileOutputs | None:
     parameters = file["parameters"]
     points = np.moveaxis(file["data"]["points"][:3], 0, 2).swapaxes(0, 1)
-    labels = continued(parameters, "POINT", "LABELS")[: points.shape[1]]
-    return file_outputs(parameters, labels, points, time, set(continued(parameters, OWN_GROUP, "LABELS")))
+    labels = text_list(parameters, "POINT", "LABELS")[: points.shape[1]]
+    return file_outputs(parameters, labels, points, time, set(text_list(parameters, OWN_GROUP, "LABELS")))
 
 
 def _outputs(parameters: Any, labels: list[str]) -> set[str]:
     groups = parameter_values(parameters, "POINT", "TYPE_GROUPS", [])
     lists = {*_OUTPUT_LISTS, *(str(name).strip() for name in list(groups)[::2])}
-    listed = {label for name in lists for label in continued(parameters, "POINT", name)}
+    listed = {label for name in lists for label in text_list(parameters, "POINT", name)}
     return {label for label in labels if label in listed or _OUTPUT_NAME.search(label)}

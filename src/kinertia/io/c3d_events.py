@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from kinertia.io.ezc3d_library import continued, parameter_values
+from kinertia.io.ezc3d_library import parameter_values, text_list
 from kinertia.trial.gait_event import EventKind, FileEvent
 
 _SIDES = {"right": "r", "left": "l", "r": "r", "l": "l"}
@@ -47,7 +47,7 @@ def file_events(parameters: Any, labels: Sequence[str] = ()) -> tuple[FileEvent,
 
 def _texts(parameters: Any, name: str, count: int) -> list[str]:
     """So many strings of a list of the group EVENT; empty ones where it is shorter."""
-    texts = continued(parameters, "EVENT", name)
+    texts = text_list(parameters, "EVENT", name)
     return (texts + [""] * count)[:count]
 
 

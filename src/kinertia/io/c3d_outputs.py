@@ -17,7 +17,7 @@ import numpy as np
 from kinertia.errors import FileError
 from kinertia.findings.quantity import Quantity
 from kinertia.io.c3d_event_writer import EventToWrite, add_events
-from kinertia.io.c3d_parameters import ParameterSection, Value
+from kinertia.io.c3d_parameters import ParameterSection, Value, continued
 from kinertia.io.c3d_structure import doubts_about, with_plain_samples
 
 OWN_GROUP = "KINERTIA"
@@ -227,13 +227,7 @@ def _texts(section: ParameterSection, name: str, group: str = "POINT") -> list[s
 
 def _listed(section: ParameterSection, name: str, group: str = "POINT") -> list[str]:
     """A list of texts that goes on in NAME2, NAME3."""
-    found: list[str] = []
-    for suffix in ["", *map(str, range(2, 100))]:
-        more = _texts(section, name + suffix, group)
-        if not more:
-            break
-        found += more
-    return found
+    return continued(lambda one: _texts(section, one, group), name)
 
 
 def _labels(parts: _Parts) -> list[str]:

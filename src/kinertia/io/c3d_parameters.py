@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,6 +24,17 @@ _TEXT = ("utf-8", "surrogateescape")
 
 Value = Sequence[str] | np.ndarray
 """Texts, or integers (16 bits) or floats (32 bits) of any shape."""
+
+
+def continued(entries: Callable[[str], Sequence[str]], name: str) -> list[str]:
+    """A list of texts that goes on in NAME2, NAME3 after 255 entries; `entries` gives those of one name."""
+    found: list[str] = []
+    for suffix in ["", *map(str, range(2, 100))]:
+        more = entries(name + suffix)
+        if not more:
+            break
+        found += more
+    return found
 
 
 class TooManyParameters(Exception):

@@ -26,6 +26,7 @@ import numpy as np
 
 from kinertia.errors import FileError
 from kinertia.findings.quantity import Quantity
+from kinertia.io.c3d_parameters import continued
 
 try:
     import ezc3d
@@ -144,15 +145,13 @@ def parameter_values(parameters: Any, group: str, name: str, default: Sequence[A
     return default
 
 
-def continued(parameters: Any, group: str, name: str) -> list[str]:
-    """A list of strings that goes on in NAME2, NAME3 after 255 entries."""
-    entries: list[str] = []
-    for suffix in ["", *map(str, range(2, 100))]:
-        more = parameter_values(parameters, group, name + suffix)
-        if not more:
-            break
-        entries += [str(entry).strip() for entry in more]
-    return entries
+def text_list(parameters: Any, group: str, name: str) -> list[str]:
+    """A list of strings, with all entries that go on under other names."""
+
+    def entries(one: str) -> list[str]:
+        return [str(entry).strip() for entry in parameter_values(parameters, group, one)]
+
+    return continued(entries, name)
 
 
 def read_apart(path: Path) -> C3dContent:

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from kinertia.errors import MarkerSetError
-from kinertia.io.marker_places.placement import place_markers
+from kinertia.io.marker_places.placement import Placement, place_markers
 from kinertia.io.marker_set_file import marker_set_of, nearest_preset, preset_names, read_marker_set
 from kinertia.io.toml_lines import quoted
 from kinertia.model.gait27 import build_gait27
@@ -56,11 +56,9 @@ def preset_of(static: Recording) -> MarkerSet | None:
 
 def draft_marker_set(recording: Recording, name: str) -> MarkerSetDraft:
     """A marker set for a recording, best a static trial, called by this name."""
-    placed = place_markers(recording)
+    placed = places_of(recording)
     labels = [label for label in recording.markers.labels if label not in placed.left_out]
     landmarks, segments = placed.landmarks, placed.segments
-    if not landmarks:
-        landmarks, segments = known_places(labels)
     heading = [
         "# Drafted by kinertia markers: check every line, complete those marked FILL IN, and name the file with",
         "# --markers or under [model] markers.",
@@ -90,10 +88,16 @@ def _widths(landmarks: Mapping[str, Sequence[str]], recording: Recording) -> dic
     return widths
 
 
-def known_places(labels: Sequence[str]) -> tuple[dict[str, list[str]], dict[str, list[str]]]:
-    """Landmarks and segments with those of the labels that are known by their names."""
+def places_of(recording: Recording) -> Placement:
+    """Where the markers are: by geometry, or of nobody who stands, by those of the labels that are known."""
+    placed = place_markers(recording)
+    if placed.landmarks:
+        return placed
+    labels = [label for label in recording.markers.labels if label not in placed.left_out]
     landmarks = _placed(labels, dict(_names("landmarks", labels)), single=True)
-    return landmarks, _placed(labels, dict(_names("segments", labels)), single=False)
+    return replace(
+        placed, landmarks=landmarks, segments=_placed(labels, dict(_names("segments", labels)), single=False)
+    )
 
 
 def marker_set_text(

@@ -10,7 +10,7 @@ from kinertia.errors import SettingsError
 from kinertia.io.belt_file import read_belt
 from kinertia.io.marker_set_file import read_marker_set
 from kinertia.io.recording import read_recording
-from kinertia.io.subject_file import SubjectFile, TrialFiles
+from kinertia.io.subject_tables import SubjectFile, TrialFiles
 from kinertia.model.marker_set import MarkerSet
 from kinertia.trial.data import Recording
 from kinertia.trial.plate_loading import with_idle_levels

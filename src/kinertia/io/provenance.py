@@ -14,7 +14,7 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path, PurePath
 
-from kinertia.io.subject_file import SubjectFile
+from kinertia.io.subject_tables import SubjectFile
 
 VERSION = version("kinertia")
 _COMPUTES = ("kinertia", "numpy", "scipy", "numba", "ezc3d")

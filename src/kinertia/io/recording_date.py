@@ -12,7 +12,7 @@ from pathlib import Path
 
 from kinertia.errors import FileError
 from kinertia.io import c3d_structure
-from kinertia.io.subject_file import SubjectFile
+from kinertia.io.subject_tables import SubjectFile
 
 _HEADING_BYTES = 4096
 _TIME_STAMP = re.compile(rb"^TIME_STAMP\t(\d{4})-(\d{2})-(\d{2})\b", re.MULTILINE)

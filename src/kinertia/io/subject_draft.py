@@ -17,7 +17,7 @@ from kinertia.io.marker_set_draft import draft_marker_set, preset_of
 from kinertia.io.measures_file import is_measures_sheet
 from kinertia.io.qualisys import plates_beside
 from kinertia.io.recording import CORTEX, MARKER_FILES, read_recording
-from kinertia.io.subject_file import Model, PriorFiles, TrialFiles
+from kinertia.io.subject_tables import Model, PriorFiles, TrialFiles
 from kinertia.io.subject_text import entry_line
 from kinertia.settings import Settings, Subject, Table
 from kinertia.trial.stillness import STILL_M_S, speed_m_s

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from kinertia.io.subject_file import TABLES
+from kinertia.io.subject_tables import TABLES
 from kinertia.io.toml_lines import quoted
 from kinertia.settings import KnownSegment, Table
 

@@ -15,7 +15,8 @@ from kinertia.estimation.result import Fit
 from kinertia.findings.finding import finding
 from kinertia.findings.quantity import Quantity
 from kinertia.io.provenance import command_line, recordings
-from kinertia.io.subject_file import InstrumentsFiles, PriorFiles, SubjectFile, read_subject
+from kinertia.io.subject_file import read_subject
+from kinertia.io.subject_tables import InstrumentsFiles, PriorFiles, SubjectFile
 from kinertia.settings import Overrule
 from kinertia.workflow.attached import with_attached
 from kinertia.workflow.estimate import estimate

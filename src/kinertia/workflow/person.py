@@ -13,7 +13,7 @@ from kinertia.estimation.input_checks import complete_subject, lacking
 from kinertia.findings.finding import Finding
 from kinertia.io.marker_set_file import marker_set_of, read_marker_set
 from kinertia.io.person_recordings import read_static, read_trial
-from kinertia.io.subject_file import SubjectFile
+from kinertia.io.subject_tables import SubjectFile
 from kinertia.model.imported_model import OsimModel
 from kinertia.model.marker_set import MarkerSet, check_marker_set
 from kinertia.model.model_markers import markers_of_model

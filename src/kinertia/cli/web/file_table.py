@@ -17,7 +17,7 @@ from kinertia.io.marker_set_file import preset_names
 from kinertia.io.measures_file import is_measures_sheet
 from kinertia.io.qualisys import is_plate_file
 from kinertia.io.subject_draft import STATIC_NAME, has_force_columns, holds_loads, is_capture
-from kinertia.io.subject_file import TABLES
+from kinertia.io.subject_tables import TABLES
 
 Content = dict[str, Any]
 """Entries of a subject file, as `tomllib` reads them."""

@@ -13,8 +13,7 @@ from kinertia.cli.web.entries import entries, write
 from kinertia.cli.web.library import Person
 from kinertia.diagnostics.labels.marker_set_match import match_labels
 from kinertia.errors import FileError, KinertiaError, SettingsError
-from kinertia.io.marker_places.placement import place_markers
-from kinertia.io.marker_set_draft import known_places, marker_set_text
+from kinertia.io.marker_set_draft import marker_set_text, places_of
 from kinertia.io.marker_set_file import preset_names, read_marker_set
 from kinertia.io.osim.reader import read_osim
 from kinertia.io.output_folder import write_then_rename
@@ -75,10 +74,8 @@ def marker_places(person: Person) -> MarkerPlaces:
     if used is not None:
         places = {name: dict(_owners(own)) for name, own in (("s", used.segments), ("l", used.landmarks))}
     else:
-        placed = place_markers(recording)
-        found = placed.landmarks, placed.segments
-        landmarks, segments = found if placed.landmarks else known_places(markers.labels)
-        places = {"s": dict(_owners(segments)), "l": dict(_owners(landmarks))}
+        placed = places_of(recording)
+        places = {"s": dict(_owners(placed.segments)), "l": dict(_owners(placed.landmarks))}
     here = set(markers.labels)
     return MarkerPlaces(
         path.name,

@@ -40,8 +40,6 @@ class SimultaneousResult:
         zeros_n: per trial, per plate what it reads too much (2,), in the order of ZERO_UNKNOWNS, and the posterior
             deviations (2,).
         gains: per trial, per plate its whole gain in it, and the posterior deviation.
-        trunks_kg_m: per trial how much the trunk bends (`trunk_bending`), and the posterior deviation; none without a
-            trunk.
         foot_loads: per trial (n, 2, 6) loads on the feet, of instruments put right, of the motion's bandwidth.
         reactions: per trial the loads for the joint moments, of instruments put right.
         motions: per trial q, qd, qdd at its frames.
@@ -66,7 +64,6 @@ class SimultaneousResult:
     delays_s: tuple[tuple[float, float], ...]
     zeros_n: tuple[dict[str, tuple[np.ndarray, np.ndarray]], ...]
     gains: tuple[dict[str, tuple[float, float]], ...]
-    trunks_kg_m: tuple[tuple[float, float], ...]
     foot_loads: tuple[np.ndarray, ...]
     reactions: tuple[GroundReactions, ...]
     motions: tuple[Motion, ...]
@@ -83,7 +80,7 @@ class SimultaneousResult:
 
     def of_first(self, count: int) -> SimultaneousResult:
         """The same with the first so many trials."""
-        of_trials = ("delays_s", "zeros_n", "gains", "trunks_kg_m", "foot_loads", "reactions", "motions")
+        of_trials = ("delays_s", "zeros_n", "gains", "foot_loads", "reactions", "motions")
         names = (*of_trials, "displacements_m", "curve_deviations")
         return replace(self, **{name: getattr(self, name)[:count] for name in names})
 

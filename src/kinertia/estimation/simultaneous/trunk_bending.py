@@ -130,7 +130,7 @@ class TrunkBending(CostTerm):
             for trial, (kappa, sd) in zip(self.given.trials, found, strict=False)
             if trial.ground.plates  # others show nothing of it
         ]
-        return {"trunks_kg_m": tuple(found), "calibration": tuple(entries)}
+        return {"calibration": tuple(entries)}
 
 
 def _upright(loads: np.ndarray, share_m: float) -> np.ndarray:
