@@ -94,10 +94,14 @@ def places_of(recording: Recording) -> Placement:
     if placed.landmarks:
         return placed
     labels = [label for label in recording.markers.labels if label not in placed.left_out]
+    landmarks, segments = known_places(labels)
+    return replace(placed, landmarks=landmarks, segments=segments)
+
+
+def known_places(labels: Sequence[str]) -> tuple[dict[str, list[str]], dict[str, list[str]]]:
+    """Landmarks and segments with those of the labels that are known by their names."""
     landmarks = _placed(labels, dict(_names("landmarks", labels)), single=True)
-    return replace(
-        placed, landmarks=landmarks, segments=_placed(labels, dict(_names("segments", labels)), single=False)
-    )
+    return landmarks, _placed(labels, dict(_names("segments", labels)), single=False)
 
 
 def marker_set_text(
