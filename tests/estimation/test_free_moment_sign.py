@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 
 from kinertia.diagnostics.result.free_moments import reversed_sign
-from kinertia.estimation.free_moment_sign import VERTICAL, left_moments_nm, left_without_offsets_nm
+from kinertia.estimation.free_moment_sign import (
+    VERTICAL,
+    left_moments_nm,
+    left_without_offsets_nm,
+    with_undisputed_plates,
+)
+from kinertia.estimation.simultaneous.calibration_entry import POSITION, CalibrationEntry
+from kinertia.estimation.simultaneous.instrument_errors import ANOTHER_TRIAL, OTHER_SIGN
+from kinertia.estimation.simultaneous.instruments import InstrumentPrior
 from kinertia.motion.dynamics import residual
 from kinertia.trial.centre_of_pressure import held_centre_of_pressure
 
@@ -68,3 +76,25 @@ def test_an_offset_under_one_foot_is_no_wrong_sign():
     assert turned_nm < 0.8 * as_is
     as_is, turned_nm = left_without_offsets_nm(left, loads)
     assert as_is < 1e-9 < 0.3 < turned_nm
+
+
+@pytest.mark.parametrize(("said_by", "disputed"), [(OTHER_SIGN, True), (ANOTHER_TRIAL, False), (None, False)])
+def test_a_plate_that_only_one_of_both_signs_displaces_stays(said_by, disputed):
+    """Its position keeps the deviation of all plates, and its errors count among the bars."""
+    prior = InstrumentPrior()
+    error = CalibrationEntry(
+        kind="plate",
+        plate="left",
+        quantity=POSITION,
+        axis="x",
+        value=-0.026,
+        prior_sd=0.0036,
+        sd=0.009,
+        unit="m",
+        contradicted_by=said_by,
+    )
+    known = with_undisputed_plates(prior, [error])
+    assert (known is not prior) == disputed
+    assert known.plate["x"].faulty_share == (0.0 if disputed else prior.plate["x"].faulty_share)
+    assert known.plate["x"].sd == pytest.approx(prior.plate["x"].sd)
+    assert known.plate["z"] == prior.plate["z"]
