@@ -1,7 +1,7 @@
 """What is found of where loads and feet are, and when."""
 
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.plates.place_questions import PLACE_QUESTIONS
+from kinertia.diagnostics.plates.questions import PLACE_QUESTIONS
 from kinertia.diagnostics.runner import asked, explained
 from kinertia.findings.finding import Severity
 from kinertia.io.marker_set_file import choose_marker_set

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.plates.signal_questions import LOADED_QUESTIONS, SIGNAL_QUESTIONS
+from kinertia.diagnostics.plates.questions import LOADED_QUESTIONS, SIGNAL_QUESTIONS
 from kinertia.diagnostics.runner import asked, explained
 from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.trial.centre_of_pressure import centre_of_pressure

@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 from kinertia.diagnostics.context import PersonContext, RecordingContext
 from kinertia.io.osim.reader import read_osim
+from kinertia.model.imported_model import markers_of_model
 from kinertia.model.marker_set import MarkerSet
-from kinertia.model.model_markers import markers_of_model
 from kinertia.settings import Subject
 from kinertia.trial.data import Recording
 from recordings import is_here

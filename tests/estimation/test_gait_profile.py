@@ -12,7 +12,7 @@ from kinertia.estimation.gait_scores import variable_score, with_norms
 from kinertia.estimation.mean_cycles import convention_of, mean_curves
 from kinertia.estimation.normative_bands import Control, band_columns, mixture
 from kinertia.io.norms_file import Norm
-from kinertia.model.opposite_coordinates import opposite_on_left
+from kinertia.model.shared_coordinates import opposite_on_left
 from kinertia.motion.clinical_angles import CLINICAL_ANGLES
 from kinertia.motion.gait_cycle import PERCENT, feet_under_pelvis
 

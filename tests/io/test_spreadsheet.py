@@ -2,7 +2,7 @@
 
 import pytest
 
-from kinertia.io.spreadsheet import inert
+from kinertia.io.csv_file import inert
 
 
 @pytest.mark.parametrize("cell", ["=cmd|' /C calc'!A0", "+1", "-1+2", "@SUM(A1)", "\t=1", "\r=1"])

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from kinertia.cohort.record import Record
-from kinertia.io.spreadsheet import inert
+from kinertia.io.csv_file import inert
 
 LOG = "resources.csv"
 _COLUMNS = ("ended", "person", "status", "seconds", "memory_mb", "worker")

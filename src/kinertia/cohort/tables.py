@@ -25,9 +25,8 @@ from kinertia.estimation.result import Fit
 from kinertia.estimation.simultaneous.calibration_entry import calibration_columns
 from kinertia.findings.finding import Finding, Severity
 from kinertia.findings.overview import Overview
-from kinertia.io.csv_file import read_csv
+from kinertia.io.csv_file import inert, read_csv
 from kinertia.io.norms_file import Norm
-from kinertia.io.spreadsheet import inert
 from kinertia.io.working_folder import working_folder
 from kinertia.report.cycle_figures import MOST_STRIDES, titled_quantities
 from kinertia.report.files import summary

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kinertia.io.norms_file import Norm
-from kinertia.model.opposite_coordinates import opposite_on_left
+from kinertia.model.shared_coordinates import opposite_on_left
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.clinical_angles import CLINICAL_ANGLES
 from kinertia.motion.gait_cycle import PERCENT

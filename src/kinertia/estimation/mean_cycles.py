@@ -14,8 +14,7 @@ import numpy as np
 from kinertia.estimation.common_strides import mean_of_common
 from kinertia.estimation.cycles import Stage, cycle_curves
 from kinertia.estimation.result import Fit
-from kinertia.model.opposite_coordinates import opposite_on_left
-from kinertia.model.shared_coordinates import by_side
+from kinertia.model.shared_coordinates import by_side, opposite_on_left
 
 _BUILT_IN = "gait27"
 _KINDS: Mapping[Stage, tuple[str, ...]] = {

@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 from kinertia.errors import FileError
 from kinertia.findings.quantity import Quantity
@@ -128,3 +128,15 @@ def read_csv(path: Path, columns: Sequence[str], expected: str) -> Iterator[Row]
         rows = {"rows": Quantity(0, "1")}
         found = Quantity(f"it has a heading and no rows, and is no {expected}")
         raise FileError.found(path, "F104", first + 1, **rows, found=found)
+
+
+T = TypeVar("T")
+_FORMULA = ("=", "+", "-", "@", "\t", "\r")
+
+
+def inert(cell: T) -> T | str:
+    """A cell that no spreadsheet program takes for a formula: such text gets an apostrophe in front, numbers stay.
+
+    Names come from files that others made: Excel would run a body called `=cmd|' /C calc'!A0`.
+    """
+    return f"'{cell}" if isinstance(cell, str) and cell.startswith(_FORMULA) else cell

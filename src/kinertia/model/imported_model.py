@@ -9,9 +9,13 @@ from pathlib import Path
 
 import numpy as np
 
+from kinertia.errors import OsimError
+from kinertia.model.anatomy import segment_of
 from kinertia.model.axis_functions import AxisFunction
 from kinertia.model.bsp import BodySegmentParameters
+from kinertia.model.marker_set import MarkerSet
 from kinertia.model.skeleton import Skeleton
+from kinertia.trial.data import Markers
 
 
 @dataclass(frozen=True)
@@ -105,3 +109,21 @@ class OsimModel:
         for coupling in self.couplings:
             known[coupling.dependent] = coupling.function(known[coupling.independent])
         return np.stack([known[coordinate.name] for coordinate in self.coordinates], axis=1)
+
+
+def markers_of_model(model: OsimModel) -> MarkerSet:
+    """The markers of an OpenSim model, by segment and in its default pose; without landmarks: no model is built.
+
+    Raises:
+        OsimError: there are none.
+    """
+    markers = model.skeleton.markers
+    if not markers:
+        raise OsimError.found(model.path, "O106")
+    owners = {marker.label: segment_of(marker.segment) or marker.segment for marker in markers}
+    names = dict.fromkeys(("foot_r", "foot_l", *owners.values()))
+    segments = {name: tuple(label for label, owner in owners.items() if owner == name) for name in names}
+    skeleton, defaults = model.skeleton, {c.name: c.default for c in model.coordinates}
+    q = np.array([[defaults[name] for name in skeleton.coordinates]])
+    places = Markers(np.zeros(1), skeleton.labels, skeleton.marker_positions(skeleton.pose(q)))
+    return MarkerSet(model.path.name, {}, segments, {}, places)

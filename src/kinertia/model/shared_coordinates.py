@@ -4,6 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
+from kinertia.model.skeleton import Skeleton
+
 
 def by_side(names: Sequence[str]) -> dict[str, dict[str, int]]:
     """Name without its side -> side -> index in `names`; the side is "" where the other one is not there too.
@@ -31,3 +35,12 @@ def mirrored(name: str) -> str:
     """
     base, _, side = name.rpartition("_")
     return f"{base}_{'l' if side == 'r' else 'r'}" if side in ("r", "l") else name
+
+
+def opposite_on_left(skeleton: Skeleton) -> frozenset[str]:
+    """Coordinates of pelvis and trunk that turn about an axis in the plane of symmetry."""
+    sideless = {name for name, columns in by_side(skeleton.coordinates).items() if "" in columns}
+    axes = [axis for joint in skeleton.joints for axis in joint.axes if axis.kind == "rotation"]
+    return frozenset(
+        axis.coordinate for axis in axes if axis.coordinate in sideless and abs(axis.direction[2]) < np.sqrt(0.5)
+    )

@@ -20,9 +20,8 @@ from kinertia.motion.frame_chunks import pieces
 from kinertia.motion.kinematics import LONGEST_BRIDGE_S, Kinematics
 from kinertia.motion.moving_windows import gaussian_mean
 from kinertia.trial.data import FEET
-from kinertia.trial.file_events import usable_events
 from kinertia.trial.gait_event import GaitEvent, nearest_event
-from kinertia.trial.gait_events import gait_events, load_edges
+from kinertia.trial.gait_events import gait_events, load_edges, usable_events
 from kinertia.trial.ground_contact import CONTACT_SLACK_S
 from kinertia.trial.sampled_time import TIME_TOLERANCE_S
 

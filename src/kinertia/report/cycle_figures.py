@@ -18,7 +18,7 @@ from kinertia.estimation.common_strides import common_strides, mean_of, mean_of_
 from kinertia.estimation.cycles import FORCES, UNITS, CycleCurve, Kind, Stage, cycle_curves, spread_evenly
 from kinertia.estimation.result import Fit
 from kinertia.io.norms_file import Norm
-from kinertia.model.opposite_coordinates import opposite_on_left
+from kinertia.model.shared_coordinates import opposite_on_left
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.clinical_angles import CLINICAL_ANGLES
 from kinertia.motion.gait_cycle import PERCENT

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from kinertia.report.compressed_text import packed
+from kinertia.report.plotly_script import packed
 
 
 @dataclass(frozen=True)

@@ -21,10 +21,10 @@ from kinertia.estimation.cycles import Stage, cycle_columns, spatiotemporal_colu
 from kinertia.estimation.forces_used import forces_before, forces_used
 from kinertia.estimation.identifiability import BaseParameters
 from kinertia.estimation.result import Fit, TrialFit
+from kinertia.io.csv_file import inert
 from kinertia.io.osim.exporter import export_osim
 from kinertia.io.output_folder import complete_folder, expect_own_folder
 from kinertia.io.provenance import VERSION, Provenance
-from kinertia.io.spreadsheet import inert
 from kinertia.io.sto import TimeTable, write_table
 from kinertia.model.centre_offsets import centre_offsets
 from kinertia.report.cycle_figures import MOST_STRIDES

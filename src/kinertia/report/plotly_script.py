@@ -5,6 +5,8 @@ A report carries it, and unpacks it when it is opened, so that it stays one file
 
 from __future__ import annotations
 
+import base64
+import gzip
 from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
@@ -12,7 +14,6 @@ from pathlib import Path
 from kinertia.errors import FileError
 from kinertia.io.output_folder import write_then_rename
 from kinertia.model.compiled import cache_folder
-from kinertia.report.compressed_text import packed
 
 TRACE_TYPES = ("bar", "scatter", "scatter3d")
 """Types of traces that figures have; the last one in notebooks only."""
@@ -40,3 +41,8 @@ def packed_script() -> str:
             older.unlink()
         write_then_rename(kept, text)
     return text
+
+
+def packed(text: bytes, level: int = 6) -> str:
+    """The text in gzip and base64; the same text gives the same letters, at a level from 1 (fast) to 9 (small)."""
+    return base64.b64encode(gzip.compress(text, level, mtime=0)).decode("ascii")

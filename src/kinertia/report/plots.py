@@ -23,13 +23,18 @@ from kinertia.report.wording import start_of
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
+from collections.abc import Iterator
+from itertools import chain, repeat
+
+import plotly.graph_objects as go
+import plotly.io as pio
 
 T = TypeVar("T")
 
 
 def as_plotly(figure: Figure) -> go.Figure:
     """The figure as plotly's object, which checks every name and value of it; plotly is loaded when it is needed."""
-    from kinertia.report.notebook_figure import NotebookFigure
+    from kinertia.report.plots import NotebookFigure
 
     return NotebookFigure(figure.data, figure.layout, figure.frames)
 
@@ -144,3 +149,26 @@ class FitFigures(Generic[T]):
         if figure is None:
             raise KinertiaError(f"the two-level method gives no error bars, which this figure is drawn from; {instead}")
         return self.drawn(figure)
+
+
+_JUPYTER = "plotly_mimetype"
+_library: Iterator[bool | str] = chain([True], repeat("cdn"))
+"""Where each figure's page gets plotly.js (5 MB) from: the first of a notebook carries it, for the others as well; they
+name plotly's server, too, for the case that the first is not kept."""
+
+
+class NotebookFigure(go.Figure):  # type: ignore[misc]  # plotly has no types
+    """As plotly's own, but drawn in pages that `nbconvert --to html` makes of a notebook, too.
+
+    In Jupyter plotly leaves in a cell what only Jupyter's extension draws, so that cells of such a page are empty. Here
+    HTML stands beside it, unless somebody has chosen another of plotly's renderers.
+    """
+
+    def _ipython_display_(self) -> None:
+        if not pio.renderers.render_on_display or pio.renderers.default != _JUPYTER:
+            super()._ipython_display_()
+            return
+        from IPython.display import display
+
+        page = self.to_html(full_html=False, include_plotlyjs=next(_library))
+        display({**self._repr_mimebundle_(), "text/html": page}, raw=True)  # type: ignore[no-untyped-call]

@@ -5,15 +5,22 @@ At the centre of pressure no torque is horizontal, by definition: in eleven soun
 the vertical force, the 99th percentile at most 10 mm (where forces are smallest). Torques about the middle of the plate
 are horizontal, too, by some 20 mm and more. Where the point stays in its place (at the plate's middle, at the origin),
 it is no centre of pressure, and force and torque are what acts there: nothing is wrong.
+
+Free moments may also be in another plate's columns: they come and go with that plate's load. A plate that nobody stands
+on has no free moment. While the other foot alone carries the person, sound force files have at most 0.2 times the free
+moment that they have while the own one does (RMS; filters and amplifiers leave some), those with exchanged columns at
+least 5 times. What a file holds while a plate is idle may also be a quotient of two noises, but that is as large while
+nobody stands on either plate, or jumps from sample to sample. Where both always carry something nothing is told.
 """
 
 from __future__ import annotations
 
+from itertools import combinations
+
 import numpy as np
 
 from kinertia.trial.centre_of_pressure import FIRM_LOAD_N
-from kinertia.trial.data import FloatArray, TorqueColumns
-from kinertia.trial.exchanged_torques import exchanged_torques
+from kinertia.trial.data import LOAD_THRESHOLD_N, BoolArray, FloatArray, TorqueColumns
 from kinertia.trial.rms import rms
 
 _FEWEST = 20
@@ -41,3 +48,44 @@ def torque_columns(force: FloatArray, point: FloatArray, torque: FloatArray) -> 
         x, y, z = (rms(values) for values in own.T)
         columns.append(TorqueColumns(arm, (x, y, z), elsewhere.get(p)))
     return tuple(columns)
+
+
+_FEWEST_ALONE = 10
+_SOME_NM, _LITTLE, _LONGEST_ARM_M = 0.2, 0.5, 0.034
+"""Of a free moment (RMS); of what is there meanwhile; a free moment over the vertical force (95th percentile)."""
+_JUMPS = 0.7
+"""RMS of the changes from sample to sample over that of the values: 1.4 of noise, 0.003 to 0.44 of free moments."""
+
+
+def exchanged_torques(vertical: FloatArray, torque: FloatArray) -> dict[int, int]:
+    """Plates with whose torques another plate's vertical force comes and goes, and the other way round: a to b, b to a.
+
+    Args:
+        vertical, torque: (k, p) N and N m about the vertical, as they stand in a file.
+    """
+    pairs: dict[int, int] = {}
+    for a, b in combinations(range(vertical.shape[1]), 2):
+        only_a, only_b = (
+            (vertical[:, own] > FIRM_LOAD_N) & (vertical[:, other] < LOAD_THRESHOLD_N)
+            for own, other in ((a, b), (b, a))
+        )
+        if min(only_a.sum(), only_b.sum()) < _FEWEST_ALONE:
+            continue
+        neither = (vertical[:, [a, b]] < LOAD_THRESHOLD_N).all(axis=1)
+        if _goes_with(torque[:, a], only_a | neither, only_b, vertical[:, b]) and _goes_with(
+            torque[:, b], only_b | neither, only_a, vertical[:, a]
+        ):
+            pairs |= {a: b, b: a}
+    return pairs
+
+
+def _goes_with(torque: FloatArray, without: BoolArray, other: BoolArray, vertical: FloatArray) -> bool:
+    """Whether a torque (k,) is next to nothing in samples `without`, and in samples `other` that load's free moment."""
+    torque = np.nan_to_num(torque)
+    meanwhile = rms(torque[other])
+    return (
+        meanwhile > _SOME_NM
+        and rms(torque[without]) < _LITTLE * meanwhile
+        and rms(np.diff(torque)[other[1:] & other[:-1]]) < _JUMPS * meanwhile
+        and float(np.percentile(np.abs(torque[other]) / vertical[other], 95)) < _LONGEST_ARM_M
+    )

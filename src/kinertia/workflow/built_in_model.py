@@ -49,9 +49,8 @@ from kinertia.trial.data import Recording, Trial
 from kinertia.workflow.joint_widths import with_widths
 from kinertia.workflow.kinematics import Turned
 from kinertia.workflow.person import Person
-from kinertia.workflow.person_model import LOWER_BODY_SD_M, UPPER_BODY_SD_M, PersonModel
+from kinertia.workflow.person_model import LOWER_BODY_SD_M, UPPER_BODY_SD_M, PersonModel, with_stated_ranges
 from kinertia.workflow.screening import Screened
-from kinertia.workflow.stated_ranges import with_stated_ranges
 
 WITHOUT_STATIC = 2.0
 """Times as uncertain are joint centres and markers of a model that is made from a walk."""

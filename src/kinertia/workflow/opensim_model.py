@@ -27,9 +27,8 @@ from kinertia.model.bsp import BodySegmentParameters, impossible_segments
 from kinertia.model.imported_model import OsimModel
 from kinertia.model.skeleton import Axis, Skeleton
 from kinertia.workflow.kinematics import Turned
-from kinertia.workflow.person_model import LOWER_BODY_SD_M, UPPER_BODY_SD_M, PersonModel
+from kinertia.workflow.person_model import LOWER_BODY_SD_M, UPPER_BODY_SD_M, PersonModel, with_stated_ranges
 from kinertia.workflow.screening import Screened
-from kinertia.workflow.stated_ranges import with_stated_ranges
 
 _MASS_TOLERANCE = 0.002
 

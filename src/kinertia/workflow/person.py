@@ -14,9 +14,8 @@ from kinertia.findings.finding import Finding
 from kinertia.io.marker_set_file import marker_set_of, read_marker_set
 from kinertia.io.person_recordings import read_static, read_trial
 from kinertia.io.subject_tables import SubjectFile
-from kinertia.model.imported_model import OsimModel
+from kinertia.model.imported_model import OsimModel, markers_of_model
 from kinertia.model.marker_set import MarkerSet, check_marker_set
-from kinertia.model.model_markers import markers_of_model
 from kinertia.settings import Attached, Overrule, Subject
 from kinertia.trial.data import Recording
 from kinertia.trial.trial_input import TrialInput

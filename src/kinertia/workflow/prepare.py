@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 
-from kinertia.diagnostics.subject.stated_ranges import stated_ranges
+from kinertia.diagnostics.subject.body_data import stated_ranges
 from kinertia.errors import SettingsError
 from kinertia.estimation.input_checks import check_trials
 from kinertia.estimation.prepared import Prepared, Progress

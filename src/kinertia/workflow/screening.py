@@ -15,8 +15,12 @@ from kinertia.diagnostics.labels import questions as labels
 from kinertia.diagnostics.markers import questions as markers
 from kinertia.diagnostics.model import questions as model
 from kinertia.diagnostics.plates.ground_contact import complete_contact
-from kinertia.diagnostics.plates.place_questions import PLACE_QUESTIONS
-from kinertia.diagnostics.plates.signal_questions import LOADED_QUESTIONS, SIGNAL_QUESTIONS, STANDING_QUESTIONS
+from kinertia.diagnostics.plates.questions import (
+    LOADED_QUESTIONS,
+    PLACE_QUESTIONS,
+    SIGNAL_QUESTIONS,
+    STANDING_QUESTIONS,
+)
 from kinertia.diagnostics.runner import Question, asked, blocking, explained, overruled, rules_of
 from kinertia.diagnostics.subject import questions as subject
 from kinertia.diagnostics.timing import questions as timing

@@ -7,8 +7,7 @@ import pytest
 
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.horizontal_velocity import caused_velocities
-from kinertia.diagnostics.plates.place_questions import PLACE_QUESTIONS
-from kinertia.diagnostics.plates.signal_questions import LOADED_QUESTIONS
+from kinertia.diagnostics.plates.questions import LOADED_QUESTIONS, PLACE_QUESTIONS
 from kinertia.diagnostics.runner import asked
 from kinertia.diagnostics.timing.acceleration_timing import forces_keep_time
 from kinertia.findings.finding import Severity

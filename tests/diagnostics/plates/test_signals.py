@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinertia.diagnostics.plates.signal_questions import SIGNAL_QUESTIONS
+from kinertia.diagnostics.plates.questions import SIGNAL_QUESTIONS
 from kinertia.diagnostics.runner import asked, explained
 from kinertia.findings.finding import Severity
 from kinertia.trial.data import PlateLoads

@@ -14,8 +14,8 @@ from kinertia.diagnostics.plates.vertical_moment import (
 )
 from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.io.osim.reader import read_osim
+from kinertia.model.imported_model import markers_of_model
 from kinertia.model.marker_set import MarkerSet
-from kinertia.model.model_markers import markers_of_model
 from kinertia.synthetic.walk import walk, walking_subject
 from kinertia.trial.data import FootLoads, PlateLoads, Recording
 from plate_findings import context_of

@@ -4,10 +4,9 @@ from dataclasses import replace
 
 import pytest
 
-from kinertia.diagnostics.result.delays import delays
+from kinertia.diagnostics.result.corrections import delays, zero_offsets
 from kinertia.diagnostics.result.free_moments import free_moments
 from kinertia.diagnostics.result.plate_positions import plate_positions
-from kinertia.diagnostics.result.zero_offsets import zero_offsets
 from kinertia.diagnostics.runner import explained
 from kinertia.estimation.simultaneous.evidence import FreeMomentSign
 from kinertia.findings.finding import Severity

@@ -18,8 +18,8 @@ from kinertia.io.marker_set_file import preset_names, read_marker_set
 from kinertia.io.osim.reader import read_osim
 from kinertia.io.output_folder import write_then_rename
 from kinertia.io.recording import read_recording
+from kinertia.model.imported_model import markers_of_model
 from kinertia.model.marker_set import LANDMARKS, SEGMENTS, MarkerSet
-from kinertia.model.model_markers import markers_of_model
 from kinertia.trial.data import FloatArray, Markers
 
 FILE = "markers.toml"

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+import os
+import re
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from starlette.requests import Request
 from starlette.responses import HTMLResponse
 
-from kinertia.cli.web.entries import USE, entries, fields, marker_set_field, trouble
+from kinertia.cli.web.entries import USE, entries, fields, label_of, marker_set_field, trouble
 from kinertia.cli.web.file_table import file_table
 from kinertia.cli.web.jobs import KINDS, Job, Jobs
 from kinertia.cli.web.library import Person
-from kinertia.cli.web.plain_words import told
 from kinertia.cli.web.responses import page, time_left
 from kinertia.cli.web.rows import rows as rows_of
 from kinertia.cli.web.uploads import LIMITS
@@ -171,3 +172,29 @@ def _result_files(person: Person) -> list[str]:
         return []
     paths = (path.relative_to(person.results) for path in person.results.rglob("*") if path.is_file())
     return sorted(path.as_posix() for path in paths if not path.name.startswith(".") and path.name != "outcome.json")
+
+
+_CHOOSE = "choose one in the table above, or add its file"
+_PLAIN = (
+    (re.compile(r"\[model\] lacks 'static'"), f"No file is used as the static trial: {_CHOOSE}."),
+    (
+        re.compile(r"\[\[trial\]\](: there is no such heading| lacks 'markers')"),
+        f"No file is used as a walk: {_CHOOSE}.",
+    ),
+)
+_MISSING = re.compile(r"\[subject\] lacks '(\w+)'")
+
+
+class Told(NamedTuple):
+    """A trouble: in plain words, empty where it is plain as it is; and as the command line says it."""
+
+    plain: str
+    exact: str
+
+
+def told(person: Person, trouble: str) -> Told:
+    """The trouble with a person's subject file, which is named without its folder."""
+    exact = trouble.replace(f"{person.folder}{os.sep}", "")
+    if missing := _MISSING.search(exact):
+        return Told(f"{label_of(missing[1])} is missing: fill it in, then save and check.", exact)
+    return Told(next((plain for pattern, plain in _PLAIN if pattern.search(exact)), ""), exact)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.labels.anatomy import anatomy
 from kinertia.diagnostics.labels.heading import direction_of_travel, heading
-from kinertia.diagnostics.labels.label_swaps import label_swaps
 from kinertia.diagnostics.labels.landmarks import landmarks
 from kinertia.diagnostics.labels.marker_set_match import labels_match
 from kinertia.diagnostics.labels.segment_rigidity import rigidity
+from kinertia.diagnostics.labels.swapped_markers import label_swaps
 from kinertia.diagnostics.runner import Question
 
 _AXES = ("M141", "M142")

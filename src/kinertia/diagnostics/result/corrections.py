@@ -7,13 +7,13 @@ plate. Such an error is called apparent, and no instrument need be checked for i
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
 from kinertia.diagnostics.result.context import ResultContext
-from kinertia.estimation.simultaneous.calibration_entry import CalibrationEntry
-from kinertia.findings.finding import Finding, Severity, with_evidence
+from kinertia.estimation.simultaneous.calibration_entry import DELAY, ZERO, CalibrationEntry
+from kinertia.findings.finding import Finding, Severity, finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 
@@ -58,3 +58,26 @@ def equal(errors: Sequence[CalibrationEntry], usual_sd: float = np.inf) -> bool:
     values = [one.value for one in errors]
     usual = _SD * np.sqrt(2) * min(usual_sd, *(one.prior_sd for one in errors))
     return min(values) * max(values) > 0.0 and max(values) - min(values) <= usual
+
+
+def delays(context: ResultContext) -> Iterator[Finding]:
+    """The delay of all forces, and how much more those of single trials are late."""
+    for one in context.errors:
+        if one.quantity == DELAY:
+            yield from corrected(context, "T214" if one.trial is None else "T215", "delay_s", [one])
+
+
+def zero_offsets(context: ResultContext) -> Iterator[Finding]:
+    """Zeros that were corrected, and those that all plates of a trial have alike: rather a force that none measures."""
+    zeros = [one for one in context.errors if one.quantity == ZERO]
+    yield from corrected(context, "P215", "zero_n", zeros)
+    for trial, axis in dict.fromkeys((one.trial, one.axis) for one in zeros):
+        own = [one for one in zeros if (one.trial, one.axis) == (trial, axis)]
+        if equal(own):
+            read_n = tuple(one.value for one in own)
+            yield finding(
+                "P214",
+                context.along(axis, trial),
+                force_n=Quantity(float(np.mean(read_n)), "N", sd=max(one.sd for one in own)),
+                zero_n=Quantity(read_n, "N", limit=2.0 * own[0].prior_sd),
+            )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from kinertia.diagnostics.result.basis import basis, filters
 from kinertia.diagnostics.result.context import ResultContext
-from kinertia.diagnostics.result.delays import delays
+from kinertia.diagnostics.result.corrections import delays, zero_offsets
 from kinertia.diagnostics.result.free_moments import free_moments
 from kinertia.diagnostics.result.gains import gains
 from kinertia.diagnostics.result.joint_angles import joint_angles
@@ -14,7 +14,6 @@ from kinertia.diagnostics.result.plate_positions import plate_positions
 from kinertia.diagnostics.result.residuals import residuals
 from kinertia.diagnostics.result.rotation import plate_rotation
 from kinertia.diagnostics.result.soundness import soundness
-from kinertia.diagnostics.result.zero_offsets import zero_offsets
 from kinertia.diagnostics.runner import Question, asked
 from kinertia.findings.finding import Finding
 

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from kinertia.diagnostics.context import PersonContext
 from kinertia.estimation.population import population_of
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
+from kinertia.settings import Subject
 
 _SAME = 0.01
 _QUANTITIES = {"mass_kg": ("mass", "kg"), "height_m": ("stature", "m")}
@@ -49,3 +52,10 @@ def absent_markers(context: PersonContext) -> Iterator[Finding]:
         absent = tuple(label for label in reference if label not in trial.all_markers.labels)
         if absent:
             yield finding("M105", Where(trial=trial.name, markers=absent), count=Quantity(len(absent), "1"))
+
+
+def stated_ranges(subject: Subject) -> Iterator[Finding]:
+    """S411 of each joint whose range the subject file states."""
+    for name, degrees in (subject.ranges_deg or {}).items():
+        low, high = np.radians(degrees).tolist()
+        yield finding("S411", Where(part=name), range_rad=Quantity((low, high), "rad"))

@@ -8,7 +8,7 @@ from kinertia.diagnostics.context import RecordingContext
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.trial.data import FEET, Trial
-from kinertia.trial.file_events import EVENT_LIMIT_S, contradicted_events, sides_exchanged
+from kinertia.trial.gait_events import EVENT_LIMIT_S, contradicted_events, sides_exchanged
 from kinertia.trial.plate_assignment import FOOT_NAMES
 
 

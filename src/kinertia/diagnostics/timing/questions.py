@@ -10,7 +10,7 @@ from kinertia.diagnostics.timing.interchanged_forces import interchanged_forces
 from kinertia.diagnostics.timing.trial_delays import trial_delays
 
 QUESTIONS: tuple[Question[RecordingContext], ...] = (Question("T30", belt_speed), Question("T31", file_events))
-"""Rates and delays compete with positions of plates: `diagnostics.plates.place_questions`."""
+"""Rates and delays compete with positions of plates: `diagnostics.plates.questions`."""
 
 PERSON_QUESTIONS: tuple[Question[PersonContext], ...] = (
     Question("S30", interchanged_forces),

@@ -1,13 +1,20 @@
-"""Lists the questions about the plates' signals, and about the loads once they are sorted by foot."""
+"""Lists the questions about plates: their signals, the loads sorted by foot, and where loads act and when.
+
+Plates, rates and delays compete as explanations.
+"""
 
 from __future__ import annotations
 
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.markers.over_smoothed import over_smoothed
 from kinertia.diagnostics.plates.axes_and_units import axes_and_units
+from kinertia.diagnostics.plates.cop_on_plate import cop_on_plate
+from kinertia.diagnostics.plates.cop_positions import loads_and_feet
+from kinertia.diagnostics.plates.cop_progression import cop_progression
 from kinertia.diagnostics.plates.force_directions import force_directions
 from kinertia.diagnostics.plates.free_moments import free_moments
 from kinertia.diagnostics.plates.gains import gains
+from kinertia.diagnostics.plates.ground_contact import both_feet, complete_contact, plate_edges
 from kinertia.diagnostics.plates.mains_interference import mains_interference
 from kinertia.diagnostics.plates.quantisation import quantisation
 from kinertia.diagnostics.plates.signals import signals
@@ -17,6 +24,17 @@ from kinertia.diagnostics.plates.zeros_under_load import zeros_under_load
 from kinertia.diagnostics.runner import Question
 from kinertia.diagnostics.timing.force_rate import force_rate
 
+_NOT_UNDER_FEET = ("P201", "P202", "P203", "P204", "P24", "T20", "T21")
+"""ERRORs after which it is not known where on a foot a load acts."""
+
+PLACE_QUESTIONS: tuple[Question[RecordingContext], ...] = (
+    Question("P24", loads_and_feet, unless=("P201", "P202", "P203", "P107")),
+    Question("P24", cop_on_plate, unless=("P204",)),
+    Question("P25", cop_progression, unless=_NOT_UNDER_FEET),
+    Question("P28", plate_edges, unless=_NOT_UNDER_FEET),
+    Question("P27", both_feet, unless=_NOT_UNDER_FEET),
+    Question("P27", complete_contact),
+)
 _OTHER_AXES = ("P201",)
 """Then there is no vertical force to judge by."""
 _NO_VELOCITY = ("L20", "M12", "M14", "P10", "P20", "P24", "T201", "T211", "T212")
