@@ -9,7 +9,7 @@ from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.trial.data import FootLoads, Markers, PlateLoads, Recording
 from kinertia.trial.ground_contact import CONTACT_MARGIN_S, CONTACT_SLACK_S, ground_contact
-from kinertia.trial.plate_assignment import assign_plates, build_trial, measured_frames
+from kinertia.trial.plate_assignment import assign_plates, build_trial
 from kinertia.trial.sampled_time import runs
 from recordings import is_here
 from walk_on_plates import ALL_STEPS, FEET, walk
@@ -275,7 +275,9 @@ def test_measured_frames_of_loads_that_are_sorted_already():
     recording = walk([("r", 0), ("l", 0)])
     loads, _ = assign_plates(recording, FEET)
     trial = build_trial(recording, FEET)
-    np.testing.assert_array_equal(measured_frames(recording.markers, loads, FEET), trial.measured)
+    np.testing.assert_array_equal(
+        ground_contact(recording.markers, loads, FEET).measured(recording.markers.time), trial.measured
+    )
 
 
 def test_what_is_missing_is_named():

@@ -8,6 +8,7 @@ from kinertia.cli.terminal import out, plain_table
 from kinertia.estimation.identifiability import evidence
 from kinertia.estimation.result import Fit
 from kinertia.report.files import summary
+from kinertia.report.wording import start_of
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -24,14 +25,14 @@ def report_tables(fit: Fit) -> None:
     person = ", ".join(filter(None, [f"{subject['mass_kg']:g} kg", height, subject["sex"]]))
     out.print(f"\n{subject['name']}: {person}; method {fit_summary['method']}; {fit.notes[0]}")
     for trial in fit_summary["trials"]:
-        _report_trial(trial, _before(fit))
+        _report_trial(trial, start_of(fit).word)
     out.print(_bsp_table(fit))
     if fit.posterior is not None:
         out.print(
             "** measured by the data, * informed by them, no mark: little information; about as uncertain as the "
             "prior, even where the value moved; sd: error bar\n"
         )
-    named = {"measured": "stated", "literature": _before(fit)}
+    named = {"measured": "stated", "literature": start_of(fit).word}
     masses = ", ".join(f"{named.get(source, source)} {value:.1f}" for source, value in mass.items())
     beside = f", {fit.attached_kg:.1f} of it not body" if fit.attached_kg else ""
     out.print(f"total mass (kg): {masses}{beside}\n")
@@ -42,11 +43,6 @@ def report_tables(fit: Fit) -> None:
     for trial in fit.trials:
         spent = ", ".join(f"{stage} {seconds:.1f}" for stage, seconds in trial.seconds.items())
         out.print(f"{trial.name}: seconds: {spent}")
-
-
-def _before(fit: Fit) -> str:
-    """What the parameters before the estimate are called: an OpenSim model brings its own."""
-    return "literature" if fit.file is None else "model"
 
 
 def _report_trial(trial: dict[str, Any], before: str) -> None:
@@ -80,7 +76,7 @@ def _bsp_table(fit: Fit) -> Table:
     for i, segment in enumerate(fit.literature.segments):
         if fit.posterior is None and fit.settings.symmetry and segment.endswith("_l"):
             continue
-        for source, bsp in ((_before(fit), fit.literature), ("estimate", fit.estimate)):
+        for source, bsp in ((start_of(fit).word, fit.literature), ("estimate", fit.estimate)):
             com = (f"{round(value * 1e3)}" for value in bsp.com_m[i])
             inertia = (f"{value:.4f}" for value in bsp.inertia_kgm2[i].diagonal())
             cells = [f"{bsp.mass_kg[i]:.2f}", *com, *inertia]

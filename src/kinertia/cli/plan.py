@@ -19,6 +19,7 @@ from kinertia.report.crossval_page import (
     save_crossval,
 )
 from kinertia.report.plan_page import PLAN_CAPTION, PLAN_HEADINGS, plan_rows, plan_summary, save_plan
+from kinertia.report.wording import start_of
 from kinertia.studies.cross_validation import cross_validate
 from kinertia.studies.plan import plan as plan_motions
 from kinertia.workflow.from_files import prepare_subject
@@ -76,7 +77,7 @@ def crossval(
     with shown_progress() as progress:
         ready = prepare_subject(wanted, progress)
         held_out = cross_validate(ready, wanted.settings.cutoff_hz, progress)
-    before = "literature" if ready.file is None else "model"
+    before = start_of(ready).word
     save_crossval(held_out, before, output)
     table = plain_table(*(heading.replace(" (", "\n(") for heading in CROSSVAL_HEADINGS))
     last = ""

@@ -42,9 +42,9 @@ def expect_file(path: Path, expected: str = "a file") -> None:
     raise FileError.found(path, "F101", **missing_file(path, str(path), expected))
 
 
-def wrong_kind(path: Path, given: str, what: str, expected: str, line: int | None = None) -> FileError:
+def wrong_kind(path: Path, given: str, what: str, expected: str) -> FileError:
     """The error that `given` "cannot {what}; expected {expected}"."""
-    return FileError.found(path, "F102", line, given=Quantity(given), what=Quantity(what), expected=Quantity(expected))
+    return FileError.found(path, "F102", given=Quantity(given), what=Quantity(what), expected=Quantity(expected))
 
 
 def mismatch(path: Path, kind: str, found: str, expected: str, line: int | None = None) -> FileError:

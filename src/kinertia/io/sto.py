@@ -88,10 +88,10 @@ def read_table(path: str | Path) -> TimeTable:
     return TimeTable(time, tuple(labels[1:]), values[:, 1:], in_degrees, findings)
 
 
-def write_sto(path: str | Path, table: pd.DataFrame, in_degrees: bool, name: str, remark: str = "") -> None:
+def write_sto(path: str | Path, table: pd.DataFrame, in_degrees: bool, name: str) -> None:
     """`write_table` of pandas' table, indexed by time (s)."""
     labels = tuple(map(str, table.columns))
-    write_table(path, TimeTable(table.index.to_numpy(float), labels, table.to_numpy(float), in_degrees), name, remark)
+    write_table(path, TimeTable(table.index.to_numpy(float), labels, table.to_numpy(float), in_degrees), name)
 
 
 def write_table(path: str | Path, table: TimeTable, name: str, remark: str = "") -> None:

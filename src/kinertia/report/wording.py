@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 from kinertia.estimation.asymmetry import Asymmetry, asymmetries
+from kinertia.estimation.prepared import Prepared
 from kinertia.estimation.result import Fit
 from kinertia.model.bsp import PARAMETERS, UNITS
 
@@ -40,9 +41,9 @@ MODEL = Start("model", "the model", "the model's", "the model's own values")
 PRIOR = Start("prior", "the prior", "the prior's", "prior values")
 
 
-def start_of(fit: Fit) -> Start:
+def start_of(person: Fit | Prepared) -> Start:
     """An OpenSim model brings its own parameters, the built-in one has the literature's."""
-    return LITERATURE if fit.file is None else MODEL
+    return LITERATURE if person.file is None else MODEL
 
 
 def expected_of(fit: Fit) -> Start:

@@ -42,28 +42,6 @@ FootMarkers = Mapping[str, Sequence[str]]
 """Labels of the markers on each foot (heel, toes, ankle), by "r" and "l"."""
 
 
-def measured_frames(markers: Markers, loads: FootLoads, feet: FootMarkers, belt: Belt | None = None) -> BoolArray:
-    """(n,) True where every foot on the ground stands on a loaded plate, so that all ground contact is known.
-
-    A loaded foot is on the ground by its load. A foot without load is on the ground while one of its markers
-    is as low and as slow against the ground as the markers of loaded feet are in this trial: it lands when
-    that speed falls to the speed seen where a plate starts to be loaded, and leaves when it rises to the
-    speed seen where a plate ceases to be. Up to `CONTACT_SLACK_S` of such ground contact right before or
-    after a load is the markers' inaccuracy; what remains is widened by `CONTACT_MARGIN_S`.
-
-    A foot without load that stands still, high above the ground or not, is on a step, a box or the frame of a
-    treadmill, if the plates carry less than usual meanwhile; from landing to leaving, as above.
-
-    Frames outside the forces' time are not measured. Frames in the air (no foot on the ground, no load) are
-    measured only between measured frames, for up to `LONGEST_FLIGHT_S`: then plates have seen both the
-    take-off and the landing. A foot whose markers are missing counts as on the ground.
-
-    Speeds are against the ground under the loaded feet, so that a treadmill's belt is no trouble; against the belt
-    where its speed is stated.
-    """
-    return ground_contact(markers, loads, feet, belt).measured(markers.time)
-
-
 @dataclass(frozen=True, eq=False)
 class GroundContact:
     """Ground contact by marker frame.
@@ -81,7 +59,7 @@ class GroundContact:
     together: BoolArray
 
     def measured(self, time: FloatArray) -> BoolArray:
-        """(n,) True where all ground contact is known, by the rules of `measured_frames`."""
+        """(n,) True where every foot on the ground stands on a loaded plate, so that all ground contact is known."""
         measured = self.inside & ~self.together & np.asarray(self.loaded | ~self.ground).all(axis=1)
         flight = measured & ~self.ground.any(axis=1)
         for first, last in runs(flight):
@@ -92,7 +70,24 @@ class GroundContact:
 
 
 def ground_contact(markers: Markers, loads: FootLoads, feet: FootMarkers, belt: Belt | None = None) -> GroundContact:
-    """Which foot is on the ground and which on a loaded plate, by the rules of `measured_frames`."""
+    """Which foot is on the ground, and which on a loaded plate.
+
+    A loaded foot is on the ground by its load. A foot without load is on the ground while one of its markers
+    is as low and as slow against the ground as the markers of loaded feet are in this trial: it lands when
+    that speed falls to the speed seen where a plate starts to be loaded, and leaves when it rises to the
+    speed seen where a plate ceases to be. Up to `CONTACT_SLACK_S` of such ground contact right before or
+    after a load is the markers' inaccuracy; what remains is widened by `CONTACT_MARGIN_S`.
+
+    A foot without load that stands still, high above the ground or not, is on a step, a box or the frame of a
+    treadmill, if the plates carry less than usual meanwhile; from landing to leaving, as above.
+
+    Frames outside the forces' time are not measured. Frames in the air (no foot on the ground, no load) are
+    measured only between measured frames, for up to `LONGEST_FLIGHT_S`: then plates have seen both the
+    take-off and the landing. A foot whose markers are missing counts as on the ground.
+
+    Speeds are against the ground under the loaded feet, so that a treadmill's belt is no trouble; against the belt
+    where its speed is stated.
+    """
     nearest = nearest_samples(loads.time, markers.time)
     inside = within(markers.time, loads.time[0], loads.time[-1])
     loaded = np.stack(

@@ -26,11 +26,10 @@ from kinertia.trial.ground_contact import (
     GroundContact,
     bridged,
     ground_contact,
-    measured_frames,
 )
 from kinertia.trial.sampled_time import TIME_TOLERANCE_S, nearest_samples, runs, span_s, windows, within
 
-__all__ = ["BRIDGED_GAP_S", "FootMarkers", "assign_plates", "build_trial", "measured_frames"]
+__all__ = ["BRIDGED_GAP_S", "FootMarkers", "assign_plates", "build_trial"]
 
 SHORTEST_CONTACT_S = 0.05
 """A load that lasts less than this within the recording is noise of an empty plate."""

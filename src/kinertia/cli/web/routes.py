@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 import traceback
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -31,7 +31,6 @@ from kinertia.io.output_folder import complete_folder, expect_own_folder
 from kinertia.io.samples import SIZE_MB
 from kinertia.report.measures_picture import measures_picture
 
-Action = Callable[[Request], Awaitable[Response]]
 Example = Callable[[Path], object]
 """Writes the files of a person to try the page with into a folder."""
 _STATIC = Path(__file__).with_name("static")

@@ -66,11 +66,11 @@ class ForceMass:
     time: FloatArray
     supported_kg: FloatArray
 
-    def unmeasured(self, total_kg: float, shortest_s: float = UNMEASURED_S) -> UnmeasuredSupport | None:
+    def unmeasured(self, total_kg: float) -> UnmeasuredSupport | None:
         """The longest time in which a part of the weight is on no plate though at other times none is."""
         share = self.supported_kg / total_kg - 1.0
         complete = float((np.abs(share) < _COMPLETE).mean())
-        spans = [(a, b) for a, b in runs(share < -MISSING) if span_s(self.time, a, b) >= shortest_s]
+        spans = [(a, b) for a, b in runs(share < -MISSING) if span_s(self.time, a, b) >= UNMEASURED_S]
         if complete < _MOSTLY or not spans:
             return None
         first, last = max(spans, key=lambda span: span[1] - span[0])
