@@ -86,11 +86,11 @@ def calibrated(disturbance: Disturbance, seed: int, duration_s: float = 2.5, com
     centres = dict.fromkeys(HIP_OFFSETS, LARGEST.hips_m)
     free = CalibrationPrior(centres, marker_sd, InstrumentPrior())
     result = estimate(free)
-    offsets, sds = result.plates["right foot"]
-    clock, clock_sd = result.clock_s
+    entries = {(one.plate, one.quantity, one.axis): one for one in result.calibration if one.trial is None}
+    plate, delay = entries["right foot", "position", "x"], entries[None, "delay", None]
     deviations = {
-        "right plate, x": (float(offsets[0] + disturbance.plate_m), float(sds[0])),
-        "clock": (clock - disturbance.clock_s, clock_sd),
+        "right plate, x": (disturbance.plate_m - plate.value, plate.sd),
+        "clock": (delay.value - disturbance.clock_s, delay.sd),
         "right hip, x": result.coordinates["hip_x_r"],
         "left hip, x": result.coordinates["hip_x_l"],
     }

@@ -190,10 +190,10 @@ def test_without_forces_only_markers_count(trial, prior, calibration):
     seen = replace(observation(trial, noise_m=0.003), dynamic=dynamic)
     result = estimate_simultaneous(trial.skeleton, prior, calibration, [seen])
     np.testing.assert_allclose(result.bsp.table(), prior.mean.table(), rtol=0, atol=1e-6)
-    assert result.clock_s == (pytest.approx(0.0, abs=1e-9), pytest.approx(0.005))
-    for values, sds in result.plates.values():
-        np.testing.assert_allclose(values, 0.0, atol=1e-9)
-        np.testing.assert_allclose(sds[: len(PLATES)], list(PLATES.values()))
+    errors = [one for one in result.calibration if one.kind in ("plate", "synchronisation")]
+    assert {one.kind for one in errors} == {"plate", "synchronisation"}
+    for one in errors:
+        assert (one.value, one.sd) == (pytest.approx(0.0, abs=1e-9), pytest.approx(one.prior_sd))
     np.testing.assert_allclose(result.motions[0].q[6:-6], trial.motion.q[6:-6], atol=0.08)
 
 

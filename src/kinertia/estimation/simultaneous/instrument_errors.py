@@ -48,7 +48,18 @@ _UNITS = {**PLATE_ERRORS, **ZERO_UNKNOWNS}
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class FoundErrors:
-    """Values that the estimate solved for, and deviations: `SimultaneousResult` says of what."""
+    """Values that the estimate solved for, and their posterior deviations.
+
+    Attributes:
+        plates: per plate what is wrong with it (5,), in the order of PLATE_ERRORS, and the posterior deviations (5,).
+        clock_s: the time offset and its posterior deviation, s.
+        delays_s: per trial how much later its forces are than by the clock of all, and the posterior deviation, s; none
+            of a single trial whose clock has been checked.
+        zeros_n: per trial, per plate what it reads too much (2,), in the order of ZERO_UNKNOWNS, and the posterior
+            deviations (2,).
+        gains: per trial, per plate its whole gain in it, and the posterior deviation.
+        instruments: what these trials say of plates and clock.
+    """
 
     plates: dict[str, tuple[np.ndarray, np.ndarray]]
     clock_s: tuple[float, float]

@@ -121,7 +121,7 @@ class InstrumentErrors(LoadTerm):
         return np.arange(first, first + each * len(self._own[k]))
 
     def read(self, solution: Solution) -> dict[str, Any]:
-        """All errors and their deviations, and entries of each with its support."""
+        """An entry of each error with its deviation and its support, and what others of the session may use."""
         trials, plates, values, sd = self.given.trials, self.given.plates, solution.static, solution.sd
         own = solution.covariance[self.layout[PLATES], self.layout[PLATES]]
         shape = len(plates), len(PLATE_ERRORS)
@@ -144,7 +144,7 @@ class InstrumentErrors(LoadTerm):
             (solution.moved, solution.contradicted),
             self.layout[DELAYS].start - first,
         )
-        return {**vars(found), "calibration": entries}
+        return {"calibration": entries, "instruments": found.instruments}
 
     def _gains(self, k: int, solution: Solution) -> dict[str, tuple[float, float]]:
         """The whole gains of a trial's plates in it, and their deviations."""

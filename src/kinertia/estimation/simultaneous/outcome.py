@@ -33,13 +33,6 @@ class SimultaneousResult:
         bsp_covariance: (10 s, 10 s) posterior covariance of its table rows, segment after segment.
         skeleton: with the estimated marker positions and static coordinates.
         coordinates: static coordinate -> (value, posterior deviation), rad or m.
-        plates: per plate what is wrong with it (5,), in the order of PLATE_ERRORS, and the posterior deviations (5,).
-        clock_s: the time offset and its posterior deviation, s.
-        delays_s: per trial how much later its forces are than by the clock of all, and the posterior deviation, s; none
-            of a single trial whose clock has been checked.
-        zeros_n: per trial, per plate what it reads too much (2,), in the order of ZERO_UNKNOWNS, and the posterior
-            deviations (2,).
-        gains: per trial, per plate its whole gain in it, and the posterior deviation.
         foot_loads: per trial (n, 2, 6) loads on the feet, of instruments put right, of the motion's bandwidth.
         reactions: per trial the loads for the joint moments, of instruments put right.
         motions: per trial q, qd, qdd at its frames.
@@ -59,11 +52,6 @@ class SimultaneousResult:
     bsp_covariance: np.ndarray
     skeleton: Skeleton
     coordinates: dict[str, tuple[float, float]]
-    plates: dict[str, tuple[np.ndarray, np.ndarray]]
-    clock_s: tuple[float, float]
-    delays_s: tuple[tuple[float, float], ...]
-    zeros_n: tuple[dict[str, tuple[np.ndarray, np.ndarray]], ...]
-    gains: tuple[dict[str, tuple[float, float]], ...]
     foot_loads: tuple[np.ndarray, ...]
     reactions: tuple[GroundReactions, ...]
     motions: tuple[Motion, ...]
@@ -80,8 +68,7 @@ class SimultaneousResult:
 
     def of_first(self, count: int) -> SimultaneousResult:
         """The same with the first so many trials."""
-        of_trials = ("delays_s", "zeros_n", "gains", "foot_loads", "reactions", "motions")
-        names = (*of_trials, "displacements_m", "curve_deviations")
+        names = ("foot_loads", "reactions", "motions", "displacements_m", "curve_deviations")
         return replace(self, **{name: getattr(self, name)[:count] for name in names})
 
 
