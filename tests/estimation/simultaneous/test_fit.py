@@ -449,17 +449,16 @@ def test_others_of_the_session_tell_what_a_plate_reads_and_the_clock(trial):
         instruments = replace(GAIT27_UNCERTAINTY.instruments, session=session)
         uncertainty = replace(GAIT27_UNCERTAINTY, instruments=instruments)
         prior = literature_prior(walking_subject().literature)
-        return fit_simultaneous(trial.skeleton, prior, [kinematics], uncertainty=uncertainty).result
+        return fit_simultaneous(trial.skeleton, prior, [kinematics], uncertainty=uncertainty)
 
     with threadpool_limits(1, user_api="blas"):
         alone, *others = (fit_of(seed) for seed in range(3))
-        helped = fit_of(0, tuple(other.instruments for other in others))
-    gains = [(each.plates["left foot"][0][2], each.plates["left foot"][1][2]) for each in (alone, helped)]
-    clocks = [each.clock_s for each in (alone, helped)]
-    for _, (value, sd), truth in ((*gains, 0.05), (*clocks, 0.01)):
-        assert value == pytest.approx(truth, abs=2.5 * sd)
+        helped = fit_of(0, tuple(other.result.instruments for other in others))
+    gain, clock = entry_of(helped, "gain", plate="left foot"), entry_of(helped, "delay")
+    for found, truth in ((gain, 1 / 1.05 - 1), (clock, 0.01)):
+        assert found.value == pytest.approx(truth, abs=2.5 * found.sd)
     # of a gain not: that in a trial may be another
-    assert clocks[1][1] < 0.7 * clocks[0][1]
+    assert clock.sd < 0.7 * entry_of(alone, "delay").sd
     # what a person says of the clock does not grow by what it was told
-    own = [np.diag(each.instruments.information)[10] for each in (alone, helped)]
+    own = [np.diag(each.result.instruments.information)[10] for each in (alone, helped)]
     assert own[1] == pytest.approx(own[0], rel=0.1)
