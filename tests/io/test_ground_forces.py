@@ -3,12 +3,17 @@ import pandas as pd
 import pytest
 
 from kinertia.findings.finding import Severity
-from kinertia.io.ground_forces import read_forces, read_forces_with_findings
+from kinertia.io.ground_forces import read_forces
 from kinertia.io.sto import write_sto
 from recordings import here, is_here
 from refusals import only, refused
 
 GRAVITY = 9.80665
+
+
+def plates_of(*files):
+    """Plates of a force file, whatever was assumed."""
+    return read_forces(*files)[0]
 
 
 def column_group(force, point, torque, stems=("vx", "px", "mx")):
@@ -78,8 +83,8 @@ REAL = {
 @pytest.mark.parametrize("name", [name for name in REAL if is_here(f"{name}.mot")])
 def test_whole_files_with_and_without_loads_file(file_of, name):
     xml, feet = REAL[name]
-    by_name = read_forces(file_of(f"{name}.mot"))
-    by_identifier = read_forces(file_of(f"{name}.mot"), file_of(xml))
+    by_name = plates_of(file_of(f"{name}.mot"))
+    by_identifier = plates_of(file_of(f"{name}.mot"), file_of(xml))
     np.testing.assert_array_equal(by_name.force, by_identifier.force)
     np.testing.assert_array_equal(by_name.moment, by_identifier.moment)
     assert by_identifier.declared_feet == feet
@@ -98,7 +103,7 @@ WEIGHTS = {
 @pytest.mark.parametrize("name", [name for name in WEIGHTS if is_here(f"{name}.mot")])
 def test_mean_vertical_force_is_body_weight(file_of, name):
     start, end, mass_kg = WEIGHTS[name]
-    plates = read_forces(file_of(f"{name}.mot"))
+    plates = plates_of(file_of(f"{name}.mot"))
     during = (plates.time >= start) & (plates.time <= end)
     mean = plates.force[during, :, 1].sum(axis=1).mean() / GRAVITY
     assert mean == pytest.approx(mass_kg, rel=0.02)
@@ -106,7 +111,7 @@ def test_mean_vertical_force_is_body_weight(file_of, name):
 
 @pytest.mark.parametrize("name", here(["synthetic/walk_grf.mot", "rajagopal_walk/grf_walk.mot"]))
 def test_point_of_application_is_kept_where_loaded(file_of, name):
-    plates = read_forces(file_of(name))
+    plates = plates_of(file_of(name))
     loaded = plates.force[:, 0, 1] > 100
     x = plates.moment[loaded, 0, 2] / plates.force[loaded, 0, 1]
     assert x.min() > -1.0
@@ -128,7 +133,7 @@ STEMS = {
 @pytest.mark.parametrize("case", STEMS)
 def test_column_names(write, case):
     *stems, foot = STEMS[case]
-    plates, findings = read_forces_with_findings(write(column_group(FORCE, POINT, TORQUE, stems)))
+    plates, findings = read_forces(write(column_group(FORCE, POINT, TORQUE, stems)))
     assert plates.declared_feet == (foot,)
     assert findings == ()
     np.testing.assert_allclose(plates.force[10:, 0], np.tile(FORCE, (90, 1)))
@@ -138,7 +143,7 @@ def test_column_names(write, case):
 
 def test_load_below_threshold_is_zero(write):
     group = column_group((1.0, 15.0, 1.0), (300.0, 0.0, 300.0), TORQUE, ("a_vx", "a_px", "a_mx"))
-    plates, findings = read_forces_with_findings(write(group))
+    plates, findings = read_forces(write(group))
     assert not plates.force.any()
     assert not plates.moment.any()
     assert findings == ()
@@ -147,9 +152,9 @@ def test_load_below_threshold_is_zero(write):
 def test_without_torque_the_free_moment_is_zero(write, write_xml):
     group = {name: values for name, values in named("A").items() if not name.startswith("fA_m")}
     for plates, findings in (
-        read_forces_with_findings(write(group)),
-        read_forces_with_findings(write(group), write_xml("A", replace=("fA_m", ""))),
-        read_forces_with_findings(write(group), write_xml("A", replace=("fA_m", "Unassigned"))),
+        read_forces(write(group)),
+        read_forces(write(group), write_xml("A", replace=("fA_m", ""))),
+        read_forces(write(group), write_xml("A", replace=("fA_m", "Unassigned"))),
     ):
         np.testing.assert_allclose(plates.moment[50, 0], np.cross(POINT, FORCE))
         assert findings == (), "P264 is seen in the loads themselves"
@@ -157,28 +162,28 @@ def test_without_torque_the_free_moment_is_zero(write, write_xml):
 
 def test_identifiers_say_which_column_is_what(write, write_xml):
     path = write(named("A"), named("B"))
-    plates = read_forces(path, write_xml("B", body="/bodyset/calcn_l"))
+    plates = plates_of(path, write_xml("B", body="/bodyset/calcn_l"))
     assert plates.names == ("B",)
     assert plates.declared_feet == ("l",)
-    assert read_forces(path, write_xml("A", body="pelvis")).declared_feet == (None,)
+    assert plates_of(path, write_xml("A", body="pelvis")).declared_feet == (None,)
 
 
 def test_datafile_is_used_only_without_a_force_file(write, write_xml, tmp_path):
     path = write(named("A"))
-    assert read_forces(None, write_xml("A")).names == ("A",)
-    assert read_forces(path, write_xml("A", datafile="gone.mot")).names == ("A",)
+    assert plates_of(None, write_xml("A")).names == ("A",)
+    assert plates_of(path, write_xml("A", datafile="gone.mot")).names == ("A",)
     with refused("F148", None, path="gone.mot", outcome="no file"):
-        read_forces(None, write_xml("A", datafile="gone.mot"))
+        plates_of(None, write_xml("A", datafile="gone.mot"))
     with refused("F148", None, path="''"):
-        read_forces(None, write_xml("A", datafile="Unassigned"))
+        plates_of(None, write_xml("A", datafile="Unassigned"))
     with pytest.raises(ValueError, match="force file or"):
-        read_forces(None)
+        plates_of(None)
 
 
 def test_datafile_as_windows_writes_it(write, write_xml, tmp_path):
     (tmp_path / "forces").mkdir()
     write(named("A")).rename(tmp_path / "forces" / "grf.mot")
-    plates, findings = read_forces_with_findings(None, write_xml("A", datafile=r"forces\grf.mot"))
+    plates, findings = read_forces(None, write_xml("A", datafile=r"forces\grf.mot"))
     assert plates.names == ("A",)
     assert findings == ()
 
@@ -188,21 +193,21 @@ def test_datafile_as_windows_writes_it(write, write_xml, tmp_path):
 )
 def test_datafile_of_another_computer_is_looked_for_beside_the_loads(write, write_xml, datafile):
     write(named("A"))
-    plates, findings = read_forces_with_findings(None, write_xml("A", datafile=datafile))
+    plates, findings = read_forces(None, write_xml("A", datafile=datafile))
     assert plates.names == ("A",)
     assert only(findings, "F148", path=datafile, outcome="grf.mot").severity is Severity.INFO
     with refused("F148", None, path=datafile.replace("grf", "gone")):
-        read_forces(None, write_xml("A", datafile=datafile.replace("grf", "gone")))
+        plates_of(None, write_xml("A", datafile=datafile.replace("grf", "gone")))
 
 
 @pytest.mark.parametrize("tag", ["<isDisabled> true </isDisabled>", "<appliesForce>false</appliesForce>"])
 def test_disabled_loads_are_left_out(write, write_xml, tag):
     xml = write_xml("A", "B", replace=('name="A">', f'name="A">{tag}'))
-    plates, findings = read_forces_with_findings(write(named("A"), named("B")), xml)
+    plates, findings = read_forces(write(named("A"), named("B")), xml)
     assert plates.names == ("B",)
     assert only(findings, "F147", load="A").severity is Severity.INFO
     with refused("F147", None, load="A"):
-        read_forces(write(named("A")), write_xml("A", replace=('name="A">', f'name="A">{tag}')))
+        plates_of(write(named("A")), write_xml("A", replace=('name="A">', f'name="A">{tag}')))
 
 
 XML_TROUBLE = {
@@ -220,7 +225,7 @@ XML_TROUBLE = {
 def test_loads_file_trouble(write, write_xml, case):
     replace, code, evidence = XML_TROUBLE[case]
     with refused(code, **evidence):
-        read_forces(write(named("A")), write_xml("A", replace=replace))
+        plates_of(write(named("A")), write_xml("A", replace=replace))
 
 
 CROSSED = {
@@ -236,10 +241,10 @@ CROSSED = {
 def test_identifiers_of_another_load(write, write_xml, case):
     replace, code, (one, other, identifier) = CROSSED[case]
     force_file = write(named("A"), named("B"))
-    assert read_forces(force_file, write_xml("A", "B")).names == ("A", "B")
+    assert plates_of(force_file, write_xml("A", "B")).names == ("A", "B")
     both = {"other": one, "load": other} if code == "F144" else {"load": one, "owner": other, "what": "torque"}
     with refused(code, None, identifier=identifier, **both) as caught:
-        read_forces(force_file, write_xml("A", "B", replace=replace))
+        plates_of(force_file, write_xml("A", "B", replace=replace))
     assert caught.value.path.name == "loads.xml"
 
 
@@ -247,44 +252,44 @@ def test_torques_that_nobody_measured_may_be_one_column(write, write_xml):
     still = {f"none_{axis}": np.zeros(100) for axis in "xyz"}
     xml = write_xml("A", "B", replace=("fA_m", "none_"))
     xml.write_text(xml.read_text().replace("fB_m", "none_"))
-    assert read_forces(write(named("A"), named("B"), still), xml).names == ("A", "B")
+    assert plates_of(write(named("A"), named("B"), still), xml).names == ("A", "B")
 
 
 def test_missing_column_lists_those_that_exist(write, write_xml):
     with refused("F143", None, found="fB_vx, fB_vy") as caught:
-        read_forces(write(named("B")), write_xml("A"))
+        plates_of(write(named("B")), write_xml("A"))
     assert caught.value.path.name == "grf.mot"
 
 
 def test_no_force_columns(write):
     with refused("F141", None, columns="knee_x, knee_y, knee_z"):
-        read_forces(write({f"knee_{axis}": np.zeros(100) for axis in "xyz"}))
+        plates_of(write({f"knee_{axis}": np.zeros(100) for axis in "xyz"}))
     with refused("F142", None, force="a_vx", expected="a_px"):
-        read_forces(write({f"a_v{axis}": np.zeros(100) for axis in "xyz"}))
+        plates_of(write({f"a_v{axis}": np.zeros(100) for axis in "xyz"}))
 
 
 def test_nan_in_loaded_rows(write):
     with refused("F172", None, what="fA_pz", time_s=0.02):
-        read_forces(write(named("A"), fA_pz=(20, np.nan)))
+        plates_of(write(named("A"), fA_pz=(20, np.nan)))
     with refused("F172", None, what="fA_vx", time_s=0.002):
-        read_forces(write(named("A"), fA_vx=(2, np.nan)))
-    assert read_forces(write(named("A"), fA_pz=(2, np.nan))).force.any()
+        plates_of(write(named("A"), fA_vx=(2, np.nan)))
+    assert plates_of(write(named("A"), fA_pz=(2, np.nan))).force.any()
 
 
 def test_force_that_points_down(write):
     with refused("F157", None, force_n=-700.0, column="fA_vy"):
-        read_forces(write(column_group((0, -700, 0), POINT, TORQUE, ("fA_vx", "fA_px", "fA_mx"))))
+        plates_of(write(column_group((0, -700, 0), POINT, TORQUE, ("fA_vx", "fA_px", "fA_mx"))))
 
 
 def test_uneven_time(write, tmp_path):
     path = write(named("A"))
     path.write_text(path.read_text().replace("\n0.050000000000000003\t", "\n0.04\t"))
     with refused("T101", None, time_s=0.049, after="0.04 s", usual_s=0.001):
-        read_forces(path)
+        plates_of(path)
     lines = write(named("A")).read_text().replace("nRows=100", "nRows=90").split("\n")
     path.write_text("\n".join(lines[:50] + lines[60:]))
     with refused("T101", None):
-        read_forces(path)
+        plates_of(path)
 
 
 def forces_at(path, time):
@@ -299,7 +304,7 @@ def forces_at(path, time):
 @pytest.mark.parametrize(("rate_hz", "decimals"), [(2000, 3), (1200, 3), (960, 3), (600, 3), (1000, 2)])
 def test_rounded_times_are_put_back_on_their_grid(tmp_path, rate_hz, decimals):
     true = 1.23 + np.arange(3000) / rate_hz
-    loads, findings = read_forces_with_findings(forces_at(tmp_path / "grf.mot", true.round(decimals)))
+    loads, findings = read_forces(forces_at(tmp_path / "grf.mot", true.round(decimals)))
     np.testing.assert_allclose(loads.time, true, atol=0.3 * 10.0**-decimals)
     np.testing.assert_allclose(np.diff(loads.time), 1 / rate_hz, rtol=1e-4)
     rounded = only(findings, "T102", rounding_s=10.0**-decimals)
@@ -308,7 +313,7 @@ def test_rounded_times_are_put_back_on_their_grid(tmp_path, rate_hz, decimals):
 
 def test_exact_times_stay(tmp_path):
     true = np.arange(3000) / 1000
-    loads, findings = read_forces_with_findings(forces_at(tmp_path / "grf.mot", true.round(3)))
+    loads, findings = read_forces(forces_at(tmp_path / "grf.mot", true.round(3)))
     np.testing.assert_array_equal(loads.time, true.round(3))
     assert findings == ()
 
@@ -320,7 +325,7 @@ def test_samples_lost_and_repeated_though_times_are_rounded(tmp_path, rate_hz, d
     few = 1 if (rate_hz, decimals) == (1000, 3) else 40  # what is lost within one step of exact times is seen
     for kept in (np.delete(frames, slice(place, place + few)), np.insert(frames, place, frames[place : place + few])):
         with refused("T101", None):
-            read_forces(forces_at(tmp_path / "grf.mot", (kept / rate_hz).round(decimals)))
+            plates_of(forces_at(tmp_path / "grf.mot", (kept / rate_hz).round(decimals)))
 
 
 @pytest.mark.parametrize(("rate_hz", "decimals"), [(2000, 8), (2000, 3), (1000, 3)])
@@ -328,7 +333,7 @@ def test_samples_lost_and_repeated_though_times_are_rounded(tmp_path, rate_hz, d
 def test_a_last_sample_that_alone_is_off_is_left_out(tmp_path, rate_hz, decimals, off):
     time = np.arange(3000) / rate_hz
     time[-1] += off / rate_hz + (off == 1 and decimals == 3) * 0.002
-    loads, findings = read_forces_with_findings(forces_at(tmp_path / "grf.mot", time.round(decimals)))
+    loads, findings = read_forces(forces_at(tmp_path / "grf.mot", time.round(decimals)))
     assert len(loads.time) == len(loads.force) == 2999
     np.testing.assert_allclose(np.diff(loads.time), 1 / rate_hz, rtol=1e-4)
     assert only(findings, "T105").severity is Severity.CORRECTED
@@ -337,14 +342,14 @@ def test_a_last_sample_that_alone_is_off_is_left_out(tmp_path, rate_hz, decimals
 @pytest.mark.parametrize("last", [[0.0], [0.0, 0.001], [5.0, 5.001]])
 def test_of_few_samples_or_of_two_at_the_end_nobody_knows_which_are_off(tmp_path, last):
     with refused("T101", None):
-        read_forces(forces_at(tmp_path / "grf.mot", np.array([0.0, 0.001, *last])))
+        plates_of(forces_at(tmp_path / "grf.mot", np.array([0.0, 0.001, *last])))
     if len(last) > 1:
         with refused("T101", None):
-            read_forces(forces_at(tmp_path / "grf.mot", np.concatenate((np.arange(3000) / 1000, last))))
+            plates_of(forces_at(tmp_path / "grf.mot", np.concatenate((np.arange(3000) / 1000, last))))
 
 
 def test_times_that_do_not_go_on(tmp_path):
     with refused("T101", None, time_s=0.0, after="0 s"):
-        read_forces(forces_at(tmp_path / "grf.mot", np.zeros(100)))
+        plates_of(forces_at(tmp_path / "grf.mot", np.zeros(100)))
     with refused("T101", None):  # whole seconds are too coarse to tell the rate
-        read_forces(forces_at(tmp_path / "grf.mot", (np.arange(3000) / 1000).round()))
+        plates_of(forces_at(tmp_path / "grf.mot", (np.arange(3000) / 1000).round()))

@@ -11,7 +11,7 @@ import pytest
 from scipy.interpolate import make_interp_spline
 
 from command_line import fitted
-from kinertia.io.ground_forces import read_forces_with_findings
+from kinertia.io.ground_forces import read_forces
 from kinertia.io.sto import TimeTable, read_sto, write_table
 from kinertia.io.subject_file import read_subject
 from kinertia.report.ground_reactions_file import FORCES_FILE, LOADS_FILE
@@ -120,7 +120,7 @@ def test_opensim_finds_our_moments_up_to_the_ends_of_measured_stretches(opensim,
     """
     laboratory = tmp_path / "lab"
     shutil.copytree(demo_run[0].subject_file.parent, laboratory)
-    loads, _ = read_forces_with_findings(laboratory / "walk_grf.mot")
+    loads, _ = read_forces(laboratory / "walk_grf.mot")
     wrench = np.concatenate([loads.force, loads.moment], axis=2).sum(axis=1)
     point = centre_of_pressure(wrench)
     torque = wrench[:, 3:] - np.cross(point, wrench[:, :3])
@@ -146,7 +146,7 @@ def test_opensim_finds_our_moments_up_to_the_ends_of_measured_stretches(opensim,
 def test_our_reader_takes_the_ground_reactions_as_they_are(folder_of, name):
     """Forces and their moments where there is load; each on the foot that it is named for."""
     folder = folder_of(CASES[name])
-    loads, findings = read_forces_with_findings(folder / FORCES_FILE, folder / LOADS_FILE)
+    loads, findings = read_forces(folder / FORCES_FILE, folder / LOADS_FILE)
     table = read_sto(folder / FORCES_FILE)
     assert loads.names == ("right_foot", "left_foot")
     assert loads.declared_feet == ("r", "l")

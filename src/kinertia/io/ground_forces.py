@@ -37,7 +37,9 @@ class _Columns:
     foot: str | None
 
 
-def read_forces(mot_path: str | Path | None, loads_path: str | Path | None = None) -> PlateLoads:
+def read_forces(
+    mot_path: str | Path | None, loads_path: str | Path | None = None, turn: FloatArray | None = None
+) -> tuple[PlateLoads, tuple[Finding, ...]]:
     """Read force plates from a MOT or STO file: force and point of application in ground axes, N, m, N m.
 
     With an ExternalLoads file its identifiers say which column is what and its bodies which foot it claims (a
@@ -47,24 +49,18 @@ def read_forces(mot_path: str | Path | None, loads_path: str | Path | None = Non
 
     Below `LOAD_THRESHOLD_N` of vertical force the point of application is garbage: such samples are set to zero, unless
     they are how a load begins or ends (`plate_loading`). Where no torque is given, the free moment is zero.
-    Times that were rounded when written are put back on the even grid they came from. `read_forces_with_findings` has
-    what was assumed.
+    Times that were rounded when written are put back on the even grid they came from.
+
+    Args:
+        mot_path, loads_path: the files.
+        turn: rotation (3, 3) from the axes of the file to ground axes, where they are others.
+
+    Returns:
+        the plates, and what was assumed while reading.
 
     Raises:
         FileError: a file is missing or broken, a column that is needed is not there, a load is not expressed
             in ground, time does not grow, a loaded sample is NaN, or the forces point down.
-    """
-    return read_forces_with_findings(mot_path, loads_path)[0]
-
-
-def read_forces_with_findings(
-    mot_path: str | Path | None, loads_path: str | Path | None = None, turn: FloatArray | None = None
-) -> tuple[PlateLoads, tuple[Finding, ...]]:
-    """`read_forces` and what was assumed while reading.
-
-    Args:
-        mot_path, loads_path: as there.
-        turn: rotation (3, 3) from the axes of the file to ground axes, where they are others.
     """
     findings: tuple[Finding, ...] = ()
     if loads_path is None:

@@ -11,7 +11,7 @@ from kinertia.errors import FileError, TrialError
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
-from kinertia.io.ground_forces import read_forces_with_findings
+from kinertia.io.ground_forces import read_forces
 from kinertia.io.lab_axes import upright_along_z
 from kinertia.io.number_table import expect_file, wrong_kind
 from kinertia.io.trc import read_trc_recording
@@ -83,7 +83,7 @@ def _forces(
 ) -> tuple[PlateLoads, tuple[Finding, ...]]:
     """Plates of a file of forces, and what was found of them."""
     if path is None or Path(path).suffix.lower() != CORTEX:
-        return read_forces_with_findings(path, loads_path, turn)
+        return read_forces(path, loads_path, turn)
     if loads_path is not None:
         raise wrong_kind(Path(loads_path), "An ExternalLoads file", f"explain a {CORTEX} file", "a .mot or .sto file")
     from kinertia.io.cortex_forces import read_cortex_forces

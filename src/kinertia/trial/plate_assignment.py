@@ -21,15 +21,12 @@ from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.trial.data import FEET, BoolArray, FloatArray, FootLoads, Markers, Recording, Trial
 from kinertia.trial.ground_contact import (
-    BRIDGED_GAP_S,
     FootMarkers,
     GroundContact,
     bridged,
     ground_contact,
 )
 from kinertia.trial.sampled_time import TIME_TOLERANCE_S, nearest_samples, runs, span_s, windows, within
-
-__all__ = ["BRIDGED_GAP_S", "FootMarkers", "assign_plates", "build_trial"]
 
 SHORTEST_CONTACT_S = 0.05
 """A load that lasts less than this within the recording is noise of an empty plate."""

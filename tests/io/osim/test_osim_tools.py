@@ -80,7 +80,7 @@ def test_inverse_dynamics_of_a_walk_is_opensims(opensim, file_of, tmp_path, name
     write_sto(tmp_path / "q.mot", table, True, "q")
 
     forces, loads_file = file_of(walk.forces), file_of(walk.loads)
-    plates = read_forces(forces, loads_file)
+    plates, _ = read_forces(forces, loads_file)
     loads = np.concatenate([plates.force, plates.moment], axis=-1)
     loads[plates.force[..., 1] < LOAD_THRESHOLD_N] = 0.0
     at = np.stack([np.interp(time, plates.time, column) for column in loads.reshape(len(loads), -1).T], axis=1)
