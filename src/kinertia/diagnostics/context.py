@@ -13,7 +13,7 @@ from kinertia.diagnostics.axes import Axes, AxisNames
 from kinertia.diagnostics.evidence.contact_span import contact_span_s
 from kinertia.diagnostics.evidence.copied_frames import FEWEST_FRAMES, without_copied_frames
 from kinertia.diagnostics.evidence.foot_trajectories import FootTrajectory, foot_trajectories
-from kinertia.diagnostics.evidence.force_mass import ForceMass, force_mass
+from kinertia.diagnostics.evidence.force_mass import ForceMass, ForeignLoad, force_mass
 from kinertia.diagnostics.evidence.hallux import halluces
 from kinertia.diagnostics.evidence.horizontal_velocity import CausedVelocity, VelocityChanges, caused_velocities
 from kinertia.diagnostics.evidence.landmarks import CLEAR, cosine, headings, landmark_positions, most_forwards
@@ -241,8 +241,8 @@ class RecordingContext:
 
     @cached_property
     def trial_on_plates(self) -> Trial | None:
-        """The trial without frames in which a foot bears load beyond its plate, unless the user vouches for a window;
-        None where it is impossible, or hardly any frames are left.
+        """The trial without frames in which a foot bears load beyond its plate, or somebody else stands on one, unless
+        the user vouches for a window; None where it is impossible, or hardly any frames are left.
         """
         trial = self.trial
         if trial is None or self.window_s is not None:
@@ -250,7 +250,27 @@ class RecordingContext:
         measured = trial.measured.copy()
         for one in self.overhangs:
             measured &= True if one.unmeasured_s is None else ~within(trial.markers.time, *one.unmeasured_s)
+        for contact in self.foreign_contacts:
+            measured &= ~within(trial.markers.time, contact.time[0], contact.time[-1])
         return replace(trial, measured=measured) if measured.sum() >= FEWEST_MEASURED else None
+
+    @cached_property
+    def foreign_load(self) -> ForeignLoad | None:
+        """What plates bear beside the person for a while; None where that is nothing, or no mass is stated."""
+        if self.trial is None or self.mass_kg is None or self.is_static:
+            return None
+        weighed = force_mass(self.segment_of_label, self.trial, self.travel.kind == "stands still")
+        return None if weighed is None else weighed.foreign(self.mass_kg)
+
+    @cached_property
+    def foreign_contacts(self) -> Sequence[PlateContact]:
+        """Loads on the plate that bears most while there is a foreign load."""
+        if self.foreign_load is None or self.plates is None:
+            return ()
+        start_s, end_s = self.foreign_load.span_s
+        most = int(np.argmax(self.plates.force[within(self.plates.time, start_s, end_s), :, 1].mean(axis=0)))
+        own = [one for one in self.contacts if one.plate == most]
+        return [one for one in own if one.time[0] <= end_s and one.time[-1] >= start_s]
 
     @cached_property
     def adult_share(self) -> float:
@@ -296,8 +316,10 @@ class RecordingContext:
 
     @property
     def whole_plate_masses(self) -> Mapping[str, float]:
-        """`plate_masses` of the other plates."""
-        return {name: kg for name, kg in self.plate_masses.items() if name not in self.plates_reached_beyond}
+        """`plate_masses` of plates that bear all of the person, and nobody else."""
+        names = () if self.plates is None else self.plates.names
+        other = self.plates_reached_beyond | {names[one.plate] for one in self.foreign_contacts}
+        return {name: kg for name, kg in self.plate_masses.items() if name not in other}
 
     def at(self, **where: Any) -> Where:
         """A place in this recording: `at(plate="plate 1", **self.along(2))`."""
