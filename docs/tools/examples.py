@@ -1,6 +1,6 @@
 """Examples in the pages: take them apart, compare what they show with what happens, renew their numbers.
 
-    PYTHONPATH=. python docs/tools/examples.py
+    PYTHONPATH=.:tests python docs/tools/examples.py
 
 runs every command shown behind `$` (with measured files, where the page names them) and puts the
 numbers of now into the pages. Words that have changed are told, and to be mended by hand. The tests of the pages use
@@ -15,6 +15,7 @@ import subprocess
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 
 from kinertia.cli.measured_demo import write_measured_lab
@@ -26,6 +27,8 @@ PAGES = (
     *sorted((ROOT / "docs" / "validation").glob("*.md")),
     ROOT / "README.md",
 )
+SYNTHETIC = "qualisys"
+"""Mark of examples that run beside a synthetic laboratory's files (`tests/qualisys_lab.py`)."""
 MEASURED = ("pig_c3d", "rajagopal_walk")
 """Marks of examples that run beside the files of this folder among the measured data; others run in an empty folder."""
 
@@ -160,6 +163,8 @@ def main() -> None:
                 folders[block.folder] = Path(tempfile.mkdtemp(prefix="kinertia-examples-"))
                 if block.folder in MEASURED:
                     link_measured(block.folder, folders[block.folder])
+                if block.folder == SYNTHETIC:
+                    import_module("qualisys_lab").write_qualisys_lab(folders[block.folder])
             if block.file:
                 (folders[block.folder] / block.file).write_text(block.text, encoding="utf-8")
                 continue

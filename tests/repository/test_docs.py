@@ -13,7 +13,7 @@ import findings
 import house
 import reference
 from command_line import run
-from examples import MEASURED, PAGES, ROOT, blocks, difference, link_measured, renewed
+from examples import MEASURED, PAGES, ROOT, SYNTHETIC, blocks, difference, link_measured, renewed
 from kinertia.cli.app import application
 from kinertia.io.marker_set_file import read_marker_set
 from kinertia.io.samples import NAME, SHA256
@@ -41,6 +41,8 @@ def workshop(tmp_path, monkeypatch, request):
         if name in MEASURED:
             request.getfixturevalue("measured_folder")
             link_measured(name, tmp_path)
+        if name == SYNTHETIC:
+            pytest.importorskip("qualisys_lab", exc_type=ImportError).write_qualisys_lab(tmp_path)
         monkeypatch.chdir(tmp_path)
         return tmp_path
 

@@ -15,6 +15,7 @@ from kinertia.cli.results_of_people import results_of_people
 from kinertia.cli.terminal import out, shown_progress
 from kinertia.errors import FileError, KinertiaError
 from kinertia.estimation.normative_bands import Control, band_columns, mixture
+from kinertia.estimation.result import Fit
 from kinertia.io.csv_file import inert
 from kinertia.io.norms_file import read_norms
 from kinertia.io.output_folder import write_then_rename
@@ -42,18 +43,17 @@ def norms(
     """
     own_file(output, read_norms, "kinertia norms")
     people: dict[str, Control] = {}
-    seen = set()
+    seen: set[str] = set()
     folders = results_of_people(results)
     with shown_progress() as progress:
         for k, found in enumerate(folders):
             progress("reading", k / len(folders))
-            fit = read_saved(found.folder).fit
-            name, who = found.name or fit.subject.name, (fit.subject.name, fit.mass_kg, fit.subject.height_m)
-            if name in people or who in seen:
-                if who in seen:
-                    raise FileError(found.folder, f"is a second fit of {name}: give one folder per person")
-                name = found.folder.resolve().name  # trials of all people may have one name
-            seen.add(who)
+            saved = read_saved(found.folder)
+            fit, name = saved.fit, found.name or _name(saved.fit, found.folder)
+            files = set() if saved.provenance is None else set(saved.provenance.files.values())
+            if name in people or files & seen:
+                raise FileError(found.folder, f"is a second fit of {name}: give one folder per person")
+            seen |= files
             try:
                 people[name] = Control.of(fit)
             except KinertiaError as error:
@@ -66,6 +66,11 @@ def norms(
     out.print(f"norms of {len(people)} people{_told(spans)} in {output}", soft_wrap=True)
     told = {"file": str(output), "people": sorted(people), "convention": columns["convention"][0], "note": mixed}
     return Outcome({**told, **spans})
+
+
+def _name(fit: Fit, folder: Path) -> str:
+    """The person's; of the folder where the fit took that of a trial, which all people's may have."""
+    return folder.resolve().name if fit.subject.name in {trial.name for trial in fit.trials} else fit.subject.name
 
 
 def _told(spans: dict[str, float | None]) -> str:
