@@ -66,6 +66,17 @@ def test_one_folder_per_person(controls, tmp_path):
     assert "is a second fit of anna" in " ".join(outcome.err.split())
 
 
+def test_people_whose_fits_are_named_after_their_trials_are_told_by_their_folders(fit, tmp_path):
+    """Each child's trial is called "straight", and so is the fit."""
+    for number, name in enumerate(("HC030A", "HC032A")):
+        drawn = drawn_fit(fit, number)
+        (tmp_path / name).mkdir()
+        subject = fit.subject.model_copy(update={"name": drawn.trials[0].name})
+        write_fit(replace(drawn, subject=subject), None, tmp_path / name / FIT_FILE)
+    outcome = run("norms", tmp_path / "HC030A", tmp_path / "HC032A", "-o", tmp_path / "n.csv", "--json")
+    assert json.loads(outcome.out)["people"] == ["HC030A", "HC032A"], outcome.err
+
+
 def test_too_few_people_and_other_files_are_refused(controls, tmp_path):
     outcome = run("norms", controls / "anna", "-o", tmp_path / "n.csv")
     assert outcome.status == 2
