@@ -8,9 +8,11 @@ import pytest
 from c3d_writer import plate_parameters, write_c3d
 from kinertia.errors import FileError
 from kinertia.io.c3d import read_c3d
+from kinertia.io.c3d_analysis import Measure
 from kinertia.io.c3d_outputs import OutputPoint, frames_of, with_outputs
 from kinertia.io.c3d_parameters import ParameterSection
 from kinertia.io.c3d_structure import doubts_about
+from kinertia.io.provenance import VERSION
 from recordings import here
 
 MAKERS = (
@@ -125,6 +127,32 @@ def test_files_of_integers_become_floats(tmp_path):
     np.testing.assert_array_equal(before.plates.wrench, after.plates.wrench)
     section, *_ = sections(new.read_bytes())
     assert section.get("POINT", "SCALE")[0] < 0
+
+
+def test_measures_of_strides_are_added_where_a_file_states_none(tmp_path):
+    """As Vicon has them; an earlier export's are replaced, a file's own stay; the file says who changed it."""
+    ezc3d = pytest.importorskip("ezc3d")
+    speeds = [Measure(side, "Walking Speed", "m/s", value) for side, value in (("Left", 1.25), ("Right", 1.5))]
+
+    def exported(source, target, measures):
+        frames = frames_of(source)
+        target.write_bytes(with_outputs(frames, outputs(20), "", UNITS, {}, (), measures))
+        return ezc3d.c3d(str(target))["parameters"]
+
+    once = exported(
+        person(tmp_path / "plain.c3d"), tmp_path / "once.c3d", [Measure("Left", "Cadence", "steps/min", 1.0)]
+    )
+    assert once["ANALYSIS"]["NAMES"]["value"] == ["Cadence"]
+    twice = exported(tmp_path / "once.c3d", tmp_path / "twice.c3d", speeds)["ANALYSIS"]
+    assert twice["USED"]["value"] == [2]
+    assert (twice["CONTEXTS"]["value"], twice["UNITS"]["value"]) == (["Left", "Right"], ["m/s", "m/s"])
+    np.testing.assert_array_equal(twice["VALUES"]["value"], [1.25, 1.5])
+    own = {"NAMES": ["Cadence"], "DESCRIPTIONS": [""], "VALUES": np.array([120.0]), "USED": np.array([1], np.int16)}
+    clinic = person(tmp_path / "clinic.c3d", parameters={"ANALYSIS": own, "MANUFACTURER": {"EDITED": ["Mokka"]}})
+    kept = exported(clinic, tmp_path / "kept.c3d", speeds)
+    assert (kept["ANALYSIS"]["NAMES"]["value"], kept["ANALYSIS"]["VALUES"]["value"]) == (["Cadence"], [120.0])
+    assert kept["MANUFACTURER"]["EDITED"]["value"] == ["Mokka", f"Kinertia {VERSION}"]
+    assert once["KINERTIA"]["__METADATA__"]["DESCRIPTION"].startswith("Results of Kinertia")
 
 
 def test_more_points_than_a_list_has_room_for(tmp_path):

@@ -60,6 +60,11 @@ def test_a_walk_in_trc_gets_a_new_file(fit, demo_run, tmp_path):
     masses = dict(zip(own["SEGMENTS"]["value"], own["MASS"]["value"], strict=True))
     assert masses == pytest.approx(dict(zip(fit.estimate.segments, fit.estimate.mass_kg, strict=True)), rel=1e-6)
     assert len(own["SHA256"]["value"]) == len(own["FILES"]["value"]) > 1
+    written = ezc3d.c3d(str(path))["parameters"]["ANALYSIS"]
+    speeds = fit.spatiotemporal.groupby("side").speed_m_s.mean()
+    for side, name, value in zip(*(written[key]["value"] for key in ("CONTEXTS", "NAMES", "VALUES")), strict=True):
+        assert name != "Walking Speed" or value == pytest.approx(speeds[side[0].lower()], rel=1e-6)
+    assert written["NAMES"]["value"].count("Walking Speed") == len(speeds)
     events = ezc3d.c3d(str(path))["parameters"]["EVENT"]
     assert {"Kinertia: force plate"} <= set(events["DESCRIPTIONS"]["value"])
     strikes = events["TIMES"]["value"][1][[label == "Foot Strike" for label in events["LABELS"]["value"]]]

@@ -2,7 +2,8 @@
 
 ezc3d would write the whole file anew: header, order and width of parameters, analog samples by their scales. Here the
 bytes of markers, analog samples, events and all parameters but the lists of points stay as they are. Files of integers
-become files of floats, since no angle fits the steps of markers; their numbers stay.
+become files of floats, as Vicon's own do when it adds model outputs: in the markers' steps of a tenth of a unit moments
+would end at 3276 and powers be rounded to 0.1. Their numbers stay.
 """
 
 from __future__ import annotations
@@ -16,12 +17,16 @@ import numpy as np
 
 from kinertia.errors import FileError
 from kinertia.findings.quantity import Quantity
+from kinertia.io.c3d_analysis import Measure, add_analysis
 from kinertia.io.c3d_event_writer import EventToWrite, add_events
 from kinertia.io.c3d_parameters import ParameterSection, Value, continued
 from kinertia.io.c3d_structure import doubts_about, with_plain_samples
+from kinertia.io.provenance import VERSION
 
 OWN_GROUP = "KINERTIA"
 """Its LABELS are the points that Kinertia wrote."""
+_EDITOR = "Kinertia "
+"""Begins our entry of the list of programs that changed a file (MANUFACTURER:EDITED, c3d.org)."""
 _BLOCK = 512
 _ORDERS = {84: "<", 86: ">"}
 _MOST_IN_LIST = 255
@@ -106,6 +111,7 @@ def with_outputs(
     units: Mapping[str, str],
     own: Mapping[str, tuple[Value, tuple[int, ...] | None]],
     events: Sequence[EventToWrite] = (),
+    measures: Sequence[Measure] = (),
 ) -> bytes:
     """The file with these points behind its own, which it lists by type, and the group KINERTIA.
 
@@ -116,6 +122,7 @@ def with_outputs(
         units: of the types, for a file that states none.
         own: entries of the group KINERTIA by name: value, and shape as `ParameterSection.put` has it.
         events: of which those are added that the file does not state.
+        measures: of strides, for a file that states none.
 
     Raises:
         TooManyParameters: they do not fit.
@@ -142,6 +149,9 @@ def with_outputs(
     for key, (value, shape) in own.items():
         section.put(OWN_GROUP, key, value, shape)
     add_events(section, events, prefix.removesuffix(":"))
+    add_analysis(section, measures, prefix.removesuffix(":"))
+    edited = [text for text in _texts(section, "EDITED", "MANUFACTURER") if not text.startswith(_EDITOR)]
+    section.put("MANUFACTURER", "EDITED", [*edited, f"{_EDITOR}{VERSION}"])
     return _together(parts, np.concatenate([_four(one.values) for one in outputs], axis=1))
 
 

@@ -18,6 +18,13 @@ _BLOCK = 512
 _MOST_BLOCKS = 255
 _MOST = 255
 """Entries of a list, and characters of an entry: both are counted in one byte."""
+_DESCRIPTIONS = {
+    "KINERTIA": "Results of Kinertia, and what they are from",
+    "ANALYSIS": "Measures of the gait cycle",
+    "EVENT": "Events of the trial",
+    "MANUFACTURER": "Who made and changed this file",
+}
+"""Of groups that are made here."""
 _NUMBERS = {1: "i1", 2: "i2", 4: "f4"}
 _TEXT = ("utf-8", "surrogateescape")
 """Bytes that are no UTF-8 come back as they were."""
@@ -162,6 +169,7 @@ class ParameterSection:
             if one.group < 0 and one.name == name:
                 return -one.group
         number = 1 + max((abs(one.group) for one in self.records), default=0)
-        encoded = name.encode("ascii")
-        self.records.append(Record(-number, name, struct.pack("bb", len(encoded), -number) + encoded, b"\0"))
+        encoded, told = name.encode("ascii"), _DESCRIPTIONS.get(name, "").encode("ascii")
+        head = struct.pack("bb", len(encoded), -number) + encoded
+        self.records.append(Record(-number, name, head, bytes([len(told)]) + told))
         return number

@@ -24,6 +24,7 @@ from kinertia.motion.joint_wrench import leg_joints
 from kinertia.motion.model_outputs import CONVENTIONS, UNITS, Convention, ModelOutput, model_outputs
 from kinertia.report.drawn_departures import departures
 from kinertia.report.saved_fit import SavedFit
+from kinertia.report.stride_measures import stride_measures
 from kinertia.trial.data import Recording
 
 SUFFIX = "Kinertia"
@@ -116,7 +117,8 @@ def c3d_with_results(
     known = found_events(trial.skeleton, trial.kinematics)
     events = [EventToWrite(one.event, one.source) for one in known if one.source != "file"]
     try:
-        return with_outputs(frames, points, prefix, units, _own(fit, convention, files, units), events)
+        own, measures = _own(fit, convention, files, units), stride_measures(trial)
+        return with_outputs(frames, points, prefix, units, own, events, measures)
     except TooManyParameters:
         raise too_many(source) from None
 
