@@ -16,9 +16,9 @@ from typing import Any
 
 from kinertia.cohort.people import Person
 from kinertia.errors import KinertiaError
-from kinertia.io.frame_count import frame_count
 from kinertia.io.output_folder import write_then_rename
 from kinertia.io.provenance import VERSION, sha256
+from kinertia.io.recording import frame_count
 from kinertia.io.subject_file import read_subject
 from kinertia.io.subject_tables import SubjectFile
 from kinertia.io.working_folder import sweep

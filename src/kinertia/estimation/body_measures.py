@@ -27,8 +27,7 @@ from itertools import product, zip_longest
 import numpy as np
 
 from kinertia.errors import PriorError, problem_of
-from kinertia.estimation.gaussian_update import updated
-from kinertia.estimation.prior import BspPrior
+from kinertia.estimation.prior import BspPrior, updated
 from kinertia.findings.finding import Finding, Severity, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where

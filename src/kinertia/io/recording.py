@@ -178,3 +178,13 @@ def _expect_overlap(recording: Recording) -> None:
 
 def _span(time: FloatArray) -> Quantity:
     return Quantity(f"{time[0]:.3f} to {time[-1]:.3f} s")
+
+
+def frame_count(path: Path) -> int:
+    """Frames that the header of a .c3d or .trc file announces; 0 where it does not say: reading it will tell why."""
+    from kinertia.io import c3d_structure, trc
+
+    try:
+        return c3d_structure.header_frames(path) if path.suffix.lower() == ".c3d" else trc.header_frames(path)
+    except (FileError, OSError):
+        return 0

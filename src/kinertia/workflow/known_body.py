@@ -16,11 +16,10 @@ import numpy as np
 from kinertia.errors import PriorError
 from kinertia.estimation.body_measures import with_measures
 from kinertia.estimation.carried_mass import body_sd_kg
-from kinertia.estimation.gaussian_update import updated
 from kinertia.estimation.input_checks import known as known_value
 from kinertia.estimation.learnt_prior import LearntPrior
 from kinertia.estimation.prepared import Prepared
-from kinertia.estimation.prior import BspPrior, literature_prior, with_symmetry
+from kinertia.estimation.prior import BspPrior, literature_prior, updated, with_symmetry
 from kinertia.findings.display import shown
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity

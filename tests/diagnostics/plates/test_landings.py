@@ -7,9 +7,9 @@ import pytest
 
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.horizontal_velocity import caused_velocities
+from kinertia.diagnostics.plates.cop_positions import forces_keep_time
 from kinertia.diagnostics.plates.questions import LOADED_QUESTIONS, PLACE_QUESTIONS
 from kinertia.diagnostics.runner import asked
-from kinertia.diagnostics.timing.acceleration_timing import forces_keep_time
 from kinertia.findings.finding import Severity
 from kinertia.model.marker_set import MarkerSet
 from kinertia.model.skeleton import GRAVITY_M_S2

@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinertia.estimation.gaussian_update import updated
-from kinertia.estimation.prior import literature_prior
+from kinertia.estimation.prior import literature_prior, updated
 from kinertia.estimation.simultaneous.unlike import unlikeness
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.synthetic.walk import walking_subject

@@ -3,6 +3,9 @@
 On fault-free trials, measured in six laboratories and made by OpenSim, loads act within 40 mm of the line from heel to
 toe (median over the load), and right and left are off that line by the same outwards, within 8 mm (26 mm with one plate
 20 mm off).
+
+Who lands on the toes, sways or holds a foot in the air has markers of the feet that are slow, or quick, at other times
+than plates are loaded. But a landing changes the body's velocity by metres a second, so that a delay shows.
 """
 
 from __future__ import annotations
@@ -16,10 +19,10 @@ import numpy as np
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.contact_fit import Hypothesis
 from kinertia.diagnostics.evidence.plate_contacts import FAR_M, PlateContact, displaced
+from kinertia.diagnostics.evidence.vertical_acceleration import MOST_LEFT, vertical_match_of
 from kinertia.diagnostics.plates.heel_landing import goes_forwards, lands_on_heels, shows_whole_feet
 from kinertia.diagnostics.plates.interchanged_plates import interchanged_plates
 from kinertia.diagnostics.plates.rotated_plates import rotated_plates
-from kinertia.diagnostics.timing.acceleration_timing import forces_keep_time
 from kinertia.diagnostics.timing.contact_delays import contact_delays, stance_durations
 from kinertia.diagnostics.timing.rate_and_delay import fitted_rate_or_delay
 from kinertia.findings.finding import Finding, Severity, finding, with_evidence
@@ -181,3 +184,15 @@ def _excess_of_both(begin_m: float, end_m: float) -> float:
 def _origin(context: RecordingContext, offset: Quantity, contacts: int, method: str, **measured: Quantity) -> Finding:
     how = {"contacts": Quantity(contacts, "1"), "method": Quantity(method)}
     return with_evidence("P243", context.at(), {"offset_m": offset, **measured, **how})
+
+
+_DELAY_S = 0.03
+"""Pelvis and markers' centre follow the forces of fault-free trials within this."""
+
+
+def forces_keep_time(context: RecordingContext) -> bool:
+    """Whether a recording without strides shows, by vertical velocities, that its forces are neither late nor early."""
+    if context.has_strides:
+        return False
+    found = [one for part in context.velocities for one in vertical_match_of(part) if one.left <= MOST_LEFT]
+    return bool(found) and max(abs(one.delay_s) for one in found) < _DELAY_S
