@@ -13,6 +13,7 @@ from kinertia.estimation.simultaneous.linearised import Point
 from kinertia.estimation.simultaneous.moment_derivatives import moment_derivatives
 from kinertia.estimation.simultaneous.outcome import Ended
 from kinertia.estimation.simultaneous.problem import MapProblem
+from kinertia.estimation.simultaneous.skin_blocks import block_growth
 from kinertia.estimation.simultaneous.solver import _deviations, _roots_in_trials
 from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior
 from kinertia.estimation.simultaneous.static_information import StaticInformation
@@ -96,10 +97,10 @@ def late_sd_s(problem, covariance: np.ndarray) -> float:
 
 
 def dense_derivatives(
-    problem, coefficients: np.ndarray, static: np.ndarray, shares=(1.0, 1.0, 1.0), late_sd_s=0.0
+    problem, coefficients: np.ndarray, static: np.ndarray, shares=(1.0, 1.0, 1.0), late_sd_s=0.0, grown=1.0
 ) -> dict[str, np.ndarray]:
     """(d, ..., unknowns) derivatives of `curves` by all coefficients and static unknowns; with these shares of what
-    places, rates and accelerations do.
+    places, rates and accelerations do, and times `grown` (d, c, 1) what they do to moments.
     """
     basis, frames = problem.bases[0], np.flatnonzero(problem.trials[0].dynamic)
     motion, by = derivatives_at(problem, coefficients, static, late_sd_s)
@@ -107,10 +108,11 @@ def dense_derivatives(
     nothing, same = np.zeros((d, c, c)), np.tile(np.eye(c), (d, 1, 1))
     still, zero = by.static, np.zeros_like(by.static)
     speed, value = motion[1][:, problem.moving][..., None], by.value[..., None]
+    by_place, by_rate, by_acceleration = (grown * each for each in (by.q, by.qd, by.qdd))
     orders = {
         "coordinates": (same, nothing, nothing, zero),
-        "moments": (by.q, by.qd, by.qdd, still),
-        "powers": (speed * by.q, speed * by.qd + value * same, speed * by.qdd, speed * still),
+        "moments": (by_place, by_rate, by_acceleration, still),
+        "powers": (speed * by_place, speed * by_rate + value * same, speed * by_acceleration, speed * still),
         "ground_forces": (*(np.zeros((d, 6, c)),) * 3, by.ground),
     }
     result = {}
@@ -180,14 +182,20 @@ def test_deviations_are_those_of_the_dense_covariance(estimate, noise):
         "powers": (impacts + left.left) * speed**2,
         "ground_forces": noise_n**2 + left.ground_left,
     }
-    shares = np.ones(3), np.sqrt(noise)
-    by, by_noise = (dense_derivatives(problem, coefficients, static, each, late) for each in shares)
+    by = dense_derivatives(problem, coefficients, static, late_sd_s=late)
+    by_noise = dense_derivatives(problem, coefficients, static, np.sqrt(noise), late, grown(problem, static))
     for name, derivative in by.items():
         expected = np.einsum("dri,ij,drj->dr", derivative, full, derivative, optimize=True) + more.get(name, 0.0)
         for sign, shaken in ((1.0, by_noise[name][..., :n]), (-1.0, derivative[..., :n])):
             expected += sign * np.einsum("dri,ij,drj->dr", shaken, alone, shaken, optimize=True)
         found = getattr(sd, name).reshape(expected.shape)
         np.testing.assert_allclose(found, np.sqrt(expected), rtol=1e-3, err_msg=name)
+
+
+def grown(problem, static: np.ndarray) -> np.ndarray:
+    """(d, c, 1) by how much more the markers' errors make of moments where skin moves unseen."""
+    time = problem.trials[0].time[problem.trials[0].dynamic]
+    return block_growth(problem, 0, static, time)[..., None]
 
 
 def speeds(problem, coefficients: np.ndarray) -> np.ndarray:
@@ -227,7 +235,8 @@ def test_deviations_of_two_trials_are_those_of_one_dense_matrix(estimate, noise)
     motion = inverse(dense_band(normal.band))
     carried = -motion @ normal.border.reshape(n, s)
     through = by[..., n:] + by[..., :n] @ carried
-    shaken = dense_derivatives(pair, coefficients, in_trial, np.sqrt(noise), late)["moments"][..., :n]
+    larger = grown(pair, in_trial)
+    shaken = dense_derivatives(pair, coefficients, in_trial, np.sqrt(noise), late, larger)["moments"][..., :n]
     expected = np.einsum("dri,ij,drj->dr", shaken, motion / 2.0, shaken, optimize=True)
     of_static = chains[0] @ covariance @ chains[0].T
     expected += np.einsum("dri,ij,drj->dr", through, of_static, through, optimize=True)

@@ -6,9 +6,10 @@ that come back (`repetition`) make the motion no vaguer, only what many frames s
 of the motion if that were known is that of the errors alone. Of the coefficients' covariance only the blocks near the
 diagonal are needed, since six splines are active in any frame; they come from the block-banded factor
 (`BlockBand.inverse_blocks`) and the static unknowns. They count by what is seen of the errors that they are from
-(`motion_noise`). Of the delay of the forces the whole distribution counts (`late_loads`): where a foot lands they
-change faster than it is known. Added is what of the forces is faster than the motion (`GroundReactions.impact`), as a
-moving mean square: whether it acts on the joints or is spent on segments that slow down is unknown.
+(`motion_noise`), and in moments by more where skin moves unseen (`skin_blocks`). Of the delay of the forces the whole
+distribution counts (`late_loads`): where a foot lands they change faster than it is known. Added is what of the forces
+is faster than the motion (`GroundReactions.impact`), as a moving mean square: whether it acts on the joints or is spent
+on segments that slow down is unknown.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from kinertia.estimation.simultaneous.moment_derivatives import MomentDerivative
 from kinertia.estimation.simultaneous.motion_noise import motion_noise
 from kinertia.estimation.simultaneous.normal_equations import SPLINES_PER_BLOCK, by_splines
 from kinertia.estimation.simultaneous.problem import MapProblem
+from kinertia.estimation.simultaneous.skin_blocks import block_growth
 from kinertia.estimation.simultaneous.stretches import Stretch
 from kinertia.motion.ground_reactions import GroundReactions
 from kinertia.motion.moving_windows import even_mean
@@ -91,6 +93,7 @@ def curve_deviations(
         np.sqrt(motion_noise(problem, k, coefficients, static) / problem.trials[k].repeats),
         frames,
         late_sd_s,
+        block_growth(problem, k, static, problem.trials[k].time[frames]),
         CurveDeviations.filled(*size, 0.0),
         np.empty(size),
         np.empty(size),
@@ -119,6 +122,7 @@ class _Curves:
         shares: as `_Seen` has them.
         frames: (d,) those that are dynamic.
         late_sd_s: deviation of the delay of the forces.
+        grown: (d, c) times the deviations of the moments by these (`skin_blocks.block_growth`).
         variance: of the curves.
         impact: (d, c) as `MomentDerivatives` has it.
         speed: (d, c) of the coordinates.
@@ -132,6 +136,7 @@ class _Curves:
     shares: np.ndarray
     frames: np.ndarray
     late_sd_s: float
+    grown: np.ndarray
     variance: CurveDeviations
     impact: np.ndarray
     speed: np.ndarray
@@ -150,7 +155,8 @@ class _Curves:
         motion = problem.model.full(basis.evaluate(self.coefficients, chosen), self.static)
         by = moment_derivatives(problem, self.k, motion, self.static, self.reactions, chosen, self.late_sd_s)
         self.impact[rows], self.speed[rows] = by.impact, motion[1][:, problem.moving]
-        seen = _Seen.of(by, self.speed[rows], basis.first[chosen], basis.values[:, chosen], self.shares)
+        values = basis.values[:, chosen]
+        seen = _Seen.of(by, self.speed[rows], basis.first[chosen], values, self.shares, self.grown[rows])
         spread.variances(seen, root[in_root, in_root], self.variance, rows)
         loaded = self.reactions.at(problem.trials[self.k].time[chosen])[..., :3] != 0.0
         self.variance.ground_forces[rows] += np.square(self.reactions.noise_n * loaded)
@@ -171,7 +177,7 @@ class _Seen:
         shares: (3,) deviations of places, rates and accelerations by the markers' errors alone, over what the estimate
             expects of them.
         shaken: (d, c, 6 c) derivatives of the moments by the coefficients of the active splines, for what the markers'
-            errors make of the motion alone.
+            errors make of the motion alone; longer where skin moves unseen (`skin_blocks.block_growth`).
     """
 
     by: MomentDerivatives
@@ -183,10 +189,17 @@ class _Seen:
 
     @classmethod
     def of(
-        cls, by: MomentDerivatives, speed: np.ndarray, first: np.ndarray, values: np.ndarray, shares: np.ndarray
+        cls,
+        by: MomentDerivatives,
+        speed: np.ndarray,
+        first: np.ndarray,
+        values: np.ndarray,
+        shares: np.ndarray,
+        grown: np.ndarray,
     ) -> _Seen:
         orders = (by.q, by.qd, by.qdd)
-        shaken = by_splines(values, *(share * each for share, each in zip(shares, orders, strict=True)))
+        own = (share * each * grown[..., None] for share, each in zip(shares, orders, strict=True))
+        shaken = by_splines(values, *own)
         return cls(by, speed, first, values, shares, shaken.reshape(*by.q.shape[:2], -1))
 
 
