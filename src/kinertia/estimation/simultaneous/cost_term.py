@@ -96,7 +96,9 @@ class CostTerm:
         return root
 
     def left_out(self, static: np.ndarray) -> np.ndarray | None:
-        """(S,) by how much one more unknown of unit deviation, not in the vector, displaces the others for the data."""
+        """(S,) by how much one more unknown of unit deviation, not in the vector, displaces the others for the data; or
+        (S, u), by how much several do.
+        """
         return None
 
     def profiled(self) -> list[int]:

@@ -13,6 +13,7 @@ from kinertia.estimation.simultaneous.instruments import InstrumentInformation
 from kinertia.estimation.simultaneous.layout import Unknowns
 from kinertia.estimation.simultaneous.plate_loads import GAIN
 from kinertia.estimation.simultaneous.plates import PLATE_ERRORS, ZERO_UNKNOWNS, plates_with_floor
+from kinertia.estimation.simultaneous.plumb_line import TILT_SD_RAD, mean_loads_n
 from kinertia.estimation.simultaneous.sound_or_faulty import ErrorPriors, SoundOrFaulty
 
 PLATES, CLOCK, DELAYS, ZEROS, GAINS = "plates", "clock", "delays", "zeros", "gains"
@@ -67,6 +68,14 @@ class InstrumentErrors(LoadTerm):
         pull = shown.information @ own
         right[self.layout.laboratory] += shown.right - pull
         return float(own @ (pull - 2.0 * shown.right))
+
+    def left_out(self, static: np.ndarray) -> np.ndarray:
+        """Zeros along either axis that a tilt of all plates makes (`plumb_line`)."""
+        result = np.zeros((len(static), len(ZERO_UNKNOWNS)))
+        for k, trial in enumerate(self.given.trials):
+            for axis, places in enumerate(self.zeros_of(k).T):
+                result[places, axis] = TILT_SD_RAD * mean_loads_n(trial)
+        return result
 
     def late(self, k: int) -> list[int]:
         """The clock's delay and the trial's own."""

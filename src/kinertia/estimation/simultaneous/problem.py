@@ -114,7 +114,7 @@ class MapProblem:
     def left_out(self, static: np.ndarray) -> np.ndarray:
         """(S, u) by how much unknowns of unit deviation that are left out of the vector displace the others."""
         every = [each for term in self.terms if (each := term.left_out(static)) is not None]
-        return np.stack(every, axis=1) if every else np.zeros((self.layout.size, 0))
+        return np.column_stack(every) if every else np.zeros((self.layout.size, 0))
 
     def profiled(self) -> list[int]:
         """Places of errors of which the sum has its posterior from the profile of the cost; none of them or some."""

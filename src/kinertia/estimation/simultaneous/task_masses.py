@@ -23,6 +23,8 @@ that person are 0.2 apart (SD). Hips are bent by 0.4 rad in its walks, 1.7 in ju
 deviation in proportion to that makes them agree."""
 _MOST_OF_TIME = 95
 """Per cent of the frames in which hips are bent by less."""
+_MOST_FRAMES = 1000
+"""Looked at, evenly spaced."""
 
 
 def task_sd(bent_rad: float) -> float:
@@ -65,6 +67,11 @@ def task_direction(segments: Sequence[str], mass_kg: np.ndarray, sd: float) -> n
     return moved
 
 
+def _some(frames: int) -> np.ndarray:
+    """At most _MOST_FRAMES of so many."""
+    return np.unique(np.linspace(0, frames - 1, min(frames, _MOST_FRAMES)).astype(int))
+
+
 class TaskMasses(CostTerm):
     """What one task shows of the masses otherwise than another would: one more unknown, left out of the vector.
 
@@ -74,7 +81,10 @@ class TaskMasses(CostTerm):
     def left_out(self, static: np.ndarray) -> np.ndarray:
         """By which the data see the masses displaced."""
         given, result = self.given, np.zeros(len(static))
-        motions = (basis.evaluate(start)[0] for basis, start in zip(given.bases, given.start, strict=True))
-        sd = task_sd(float(np.mean([hips_bent_rad(given.skeleton, q) for q in motions])))
+        bent = [
+            hips_bent_rad(given.skeleton, basis.evaluate(start, _some(len(basis.first)))[0])
+            for basis, start in zip(given.bases, given.start, strict=True)
+        ]
+        sd = task_sd(float(np.mean(bent)))
         result[self.layout[BSP]] = task_direction(self.model.segments, self.model.bsp(static).mass_kg, sd)
         return result
