@@ -75,7 +75,7 @@ def _some(frames: int) -> np.ndarray:
 class TaskMasses(CostTerm):
     """What one task shows of the masses otherwise than another would: one more unknown, left out of the vector.
 
-    Of several trials it is one, too: their tasks are of the middle kind.
+    Of several trials it is one, too: that of the trial that bends the hips least, which knows thighs best.
     """
 
     def left_out(self, static: np.ndarray) -> np.ndarray:
@@ -85,6 +85,6 @@ class TaskMasses(CostTerm):
             hips_bent_rad(given.skeleton, basis.evaluate(start, _some(len(basis.first)))[0])
             for basis, start in zip(given.bases, given.start, strict=True)
         ]
-        sd = task_sd(float(np.mean(bent)))
+        sd = task_sd(min(bent))
         result[self.layout[BSP]] = task_direction(self.model.segments, self.model.bsp(static).mass_kg, sd)
         return result
