@@ -29,7 +29,10 @@ from validation.page import write_page
 from validation.truth_trials import Faults, gait2354, make_trial
 
 FIRST_SEED = 100
-INSTRUMENTS = {"sound": Faults(), "faulty": Faults(plate_m=0.020, lag_s=0.010, hip_m=0.010)}
+_FAULTY = Faults(plate_m=0.020, lag_s=0.010, hip_m=0.010)
+INSTRUMENTS = {"sound": Faults(), "faulty": _FAULTY, "calibrated": _FAULTY}
+OPTIONS = {"calibrated": ["--calibrate"]}
+"""Of `kinertia fit`, by kind of laboratory."""
 CUTOFFS_HZ = (6, 10, 12)
 MARGIN_S = 0.05
 LOADING = 0.12
@@ -73,7 +76,7 @@ def made(folder: Path, skin: Path, kind: str, seed: int) -> Walk:
     if not (folder / "fit" / "fit.json").exists():
         walk, forces, loads, model = (folder / n for n in ("walk.trc", "walk_grf.mot", "loads.xml", "model.osim"))
         words = ["fit", walk, "--forces", forces, "--loads", loads, "--model", model]
-        words += ["--mass", f"{truth['total_mass_kg']:.1f}", "-o", folder / "fit", "--quiet"]
+        words += ["--mass", f"{truth['total_mass_kg']:.1f}", "-o", folder / "fit", "--quiet", *OPTIONS.get(kind, [])]
         subprocess.run([sys.executable, "-m", "kinertia", *map(str, words)], capture_output=True, check=False)
     usual = _opensim(folder, truth["total_mass_kg"])
     return _compared(folder, usual)
@@ -215,9 +218,17 @@ Instruments: {sound}.
 
 ## Left plate 20 mm off, forces 10 ms late, hip centres 10 mm off
 
+The model as it is, which takes its hip centres for exact:
+
 {faulty_table}
 
 Instruments: {faulty}.
+
+With `--calibrate`, which lets joint centres and markers move:
+
+{calibrated_table}
+
+Instruments: {calibrated}.
 """
 
 
