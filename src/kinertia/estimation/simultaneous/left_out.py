@@ -23,6 +23,7 @@ def with_left_out(
     (array([-0.99]), array([[0.49]]))
     """
     carried = covariance @ data
-    left = np.eye(len(pull)) + directions.T @ data - data.T @ carried
-    root = np.linalg.solve(np.linalg.cholesky(left), carried.T).T
-    return -carried @ np.linalg.solve(left, pull), root
+    left, along = np.linalg.eigh(np.eye(len(pull)) + directions.T @ data - data.T @ carried)
+    # never below the prior's; rounding makes it so where other priors are next to exact
+    root = carried @ (along / np.sqrt(np.maximum(left, 1.0)))
+    return -root @ (along.T @ pull / np.sqrt(np.maximum(left, 1.0))), root
