@@ -14,7 +14,7 @@ from kinertia.findings.rule import all_rules, matching, rule
 
 
 def folder_of(info: ValidationInfo) -> Path:
-    """Folder that paths and names in a subject file count from; the current one without a file."""
+    """Return the folder that paths and names in a subject file are relative to; without a file, the current one."""
     result: Path = (info.context or {}).get("folder", Path.cwd())
     return result
 
@@ -35,7 +35,7 @@ _STATED = re.compile(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(?:\+-|\+/-|±)\s*([\
 
 
 def _stated(value: object) -> tuple[float, float]:
-    """Value and deviation of "8.9 +- 0.4"."""
+    """Parse "8.9 +- 0.4" into value and standard deviation."""
     if isinstance(value, tuple):  # of a table that exists
         return value
     match = _STATED.fullmatch(value) if isinstance(value, str) else None
@@ -60,11 +60,11 @@ StatedPositive = Annotated[tuple[float, float], BeforeValidator(_stated_positive
 
 
 _WEIGHED_SD = 0.01
-"""Relative deviation of a mass that is given without one."""
+"""Relative standard deviation of a mass that is given without one."""
 
 
 def _attached_mass(value: object) -> tuple[float, float] | None:
-    """Mass and deviation; None of an unknown one."""
+    """Parse the mass of an attached object into mass and standard deviation (kg); None if it is unknown."""
     if value is None or value == "unknown":
         return None
     if type(value) in (int, float) and 0 < value < float("inf"):  # type: ignore[operator]
@@ -112,17 +112,17 @@ Size = Annotated[tuple[float, float, float], BeforeValidator(_size)]
 
 
 def sex_of(value: object) -> object:
-    """ "male" or "female", of which one letter is enough; anything else as it is."""
+    """Expand an abbreviation to "male" or "female" (one letter is enough); return anything else unchanged."""
     known = ("male", "female")
     word = value.strip().lower() if isinstance(value, str) else ""
     return next((sex for sex in known if word and word in (sex, sex[0])), value)
 
 
 def number_of(text: str) -> float:
-    """A number that a person wrote, with a decimal point or a decimal comma.
+    """Parse a number written by hand, with a decimal point or a decimal comma.
 
     Raises:
-        ValueError: it is none.
+        ValueError: the text is not a number.
     """
     try:
         return float(text.replace(",", ".") if text.count(",") == 1 and "." not in text else text)
@@ -135,9 +135,9 @@ ForceCutoff = Annotated[float | Literal["auto", "none"], BeforeValidator(_force_
 
 
 class Table(BaseModel):
-    """A table of the subject file: unknown keys are errors, types are never converted, nothing changes afterwards.
+    """A table of the subject file: unknown keys are errors, types are not converted, and instances are immutable.
 
-    NumPy's numbers and arrays are those of Python.
+    NumPy numbers and arrays are accepted as Python's.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
@@ -151,7 +151,7 @@ class Table(BaseModel):
 
 
 class Subject(Table):
-    """Who walked. Mass (kg) and height (m) are None where the file leaves them to the C3D files.
+    """Describes the participant. Mass (kg) and height (m) are None where the file leaves them to the C3D files.
 
     With an OpenSim model neither sex nor height is needed.
 
@@ -196,7 +196,7 @@ class Subject(Table):
 
 
 class Settings(Table):
-    """How to estimate.
+    """Options of the estimate.
 
     Examples:
         >>> kinertia.Settings(cutoff_hz=6.0).method
@@ -228,7 +228,9 @@ class Settings(Table):
 
 
 class Instruments(Table):
-    """How well the laboratory knows its instruments; the literature's deviations for what it does not state.
+    """Standard deviations that the laboratory states for its instruments.
+
+    What it does not state is taken from the literature.
 
     Examples:
         >>> kinertia.Instruments(plate_sd_mm=2.0).clock_sd_ms is None
@@ -256,7 +258,7 @@ class Instruments(Table):
 
 
 class PriorSettings(Table):
-    """What the estimate starts from and leans on, besides the literature.
+    """Options of the prior, besides the choice of anthropometric tables.
 
     Examples:
         >>> kinertia.settings.PriorSettings(masses_kept=True).sides_correlation is None
@@ -273,10 +275,10 @@ class PriorSettings(Table):
 
 
 class KnownSegment(Table):
-    """What was measured of one segment: values with standard deviations, and where they are from.
+    """Measured parameters of one segment: values with standard deviations, and their source.
 
-    Centres of mass count along the axes of the segment, moments of inertia about the centre of mass and the same axes:
-    as in `bsp.csv`.
+    Centres of mass are given along the axes of the segment, moments of inertia about the centre of mass and the same
+    axes, as in `bsp.csv`.
 
     Examples:
         >>> kinertia.settings.KnownSegment(mass_kg="8.9 +- 0.4", source="DXA").parameters()
@@ -296,7 +298,7 @@ class KnownSegment(Table):
     source: str | None = Field(default=None, description="how it was measured; shown in the notes of a fit")
 
     def parameters(self) -> dict[str, tuple[float, float]]:
-        """Value and deviation by parameter (`PARAMETERS`), SI."""
+        """Return value and standard deviation of each stated parameter (a name of `PARAMETERS`), in SI units."""
         parameters = {}
         for key in type(self).model_fields:
             stated = getattr(self, key)
@@ -308,9 +310,9 @@ class KnownSegment(Table):
 
 
 class Attached(Table):
-    """Something that is not body and moves with a segment in all trials: a rucksack, a held weight, an orthosis, shoes.
+    """An object that moves with a segment in all trials and is not body: a rucksack, a held weight, an orthosis, shoes.
 
-    Places count along the axes of the segment from its origin, as centres of mass in `bsp.csv` do.
+    Positions are given along the axes of the segment from its origin, as centres of mass in `bsp.csv`.
 
     Examples:
         >>> pack = dict(name="rucksack", segment="torso", com_mm=[-200, 300, 0], on_scale=False)
@@ -335,7 +337,7 @@ class Attached(Table):
 
 @dataclass(frozen=True)
 class Overrule:
-    """What a user overrules: codes, questions or families.
+    """Findings that a user overrules, by code, question or family.
 
     Attributes:
         waive: ERRORs that do not block; shown as waived in every output.
@@ -373,7 +375,7 @@ def _waivable(value: object) -> tuple[str, ...]:
 
 
 class Diagnostics(Table):
-    """What of the findings is overruled, in a study, for one person or for one trial.
+    """Findings that are overruled for a study, for one person or for one trial.
 
     Examples:
         >>> kinertia.settings.Diagnostics(waive=["P244"], ignore=["M102", "R40"]).overrule
@@ -389,7 +391,7 @@ class Diagnostics(Table):
 
     @property
     def overrule(self) -> Overrule:
-        """The same as findings take it."""
+        """The codes to waive and to ignore, in the form that findings take."""
         return Overrule(self.waive, self.ignore)
 
     def __add__(self, other: Diagnostics) -> Diagnostics:

@@ -1,11 +1,11 @@
-"""Decides which way an elbow bends, from the trials, where the static trial misleads.
+"""Corrects elbow axes with the trials where the static trial makes an elbow bend backwards.
 
-With one marker at an elbow, the static trial's plane of upper arm and forearm tells where the elbow's axis points. Of a
-nearly straight arm, as in a T-pose, that plane is chance, and the axis may be turned by more than a quarter turn about
-the arm: the elbow then bends backwards in all that follows, if its range lets it. Trials in which it would are read
-again with upper arm and forearm free to turn about their own axes. The markers then show the turn or, with an elbow
-that bends backwards, half a turn more. The straighter the elbow, the less they do: a frame counts by the square of the
-sine of its flexion.
+With one marker at an elbow, the plane of upper arm and forearm in the static trial defines the direction of the elbow
+axis. If the arm is nearly straight, as in a T-pose, that plane is random, and the axis may be rotated by more than a
+quarter turn about the arm: the elbow then bends backwards in all trials, if its range allows it. Trials in which it
+would are solved again with upper arm and forearm free to rotate about their own axes. The markers then give the
+rotation or, with an elbow that bends backwards, half a turn more. The straighter the elbow, the less they determine it:
+a frame is weighted by the square of the sine of its flexion.
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ from kinertia.motion.inverse_kinematics import InverseKinematics
 from kinertia.trial.data import Trial
 
 _BACKWARDS_RAD = 0.05
-"""Beyond the end of the elbow's range, median over the frames."""
+"""Least angle beyond the end of the elbow's range, median over the frames."""
 
 
 def with_elbows_that_bend_forwards(
     skeleton: Skeleton, trials: Sequence[Trial]
 ) -> tuple[Skeleton, list[InverseKinematics]]:
-    """The skeleton, its arms turned as the trials show them where an elbow would bend backwards, and `first_poses`.
+    """Rotate the arms of the skeleton where an elbow would bend backwards in the trials; return it with `first_poses`.
 
     Args:
-        skeleton: of the 27-DOF model, from the static trial; the arms' turns about their own axes are locked.
-        trials: that it will be used for.
+        skeleton: of the 27-DOF model, from the static trial; the rotations of the arms about their own axes are locked.
+        trials: the trials it will be used for.
     """
     loose = skeleton.unbounded(ELBOWS)
     poses = first_poses(loose, trials)
@@ -47,9 +47,9 @@ def with_elbows_that_bend_forwards(
 
 
 def elbow_rotations(before: Skeleton, after: Skeleton) -> dict[str, float]:
-    """By how much `with_elbows_that_bend_forwards` has turned elbow axes about the upper arm: side -> rad.
+    """Return by how much `with_elbows_that_bend_forwards` has rotated elbow axes about the upper arm: side -> rad.
 
-    Sides that it has left alone are not in it.
+    Unchanged sides are left out.
     """
     names = {side: f"arm_rot_{side}" for side in "rl"}
     rotations = {side: after.locked.get(name, 0.0) - before.locked.get(name, 0.0) for side, name in names.items()}
@@ -57,7 +57,7 @@ def elbow_rotations(before: Skeleton, after: Skeleton) -> dict[str, float]:
 
 
 def _beyond(skeleton: Skeleton, poses: Sequence[InverseKinematics], elbow: str) -> np.ndarray:
-    """Rad by which an elbow is beyond its range, with the sign of the side, in all frames that show it."""
+    """Return the angle (rad) by which an elbow exceeds its range, signed, in all frames that show it."""
     angles, ends = _angles(poses, elbow), skeleton.ranges[elbow]
     angles = angles[np.isfinite(angles)]
     result: np.ndarray = angles - np.clip(angles, ends.low, ends.high)
@@ -65,7 +65,7 @@ def _beyond(skeleton: Skeleton, poses: Sequence[InverseKinematics], elbow: str) 
 
 
 def _mean_angle(poses: Sequence[InverseKinematics], name: str) -> float:
-    """Rad, on the circle, of a turn about an arm's axis with the elbow bent forwards; NaN where no frame shows it."""
+    """Return the circular mean (rad) of a rotation about an arm's axis, elbow flexed forwards; NaN without frames."""
     angles, flexion = _angles(poses, name), _angles(poses, f"elbow_flex_{name[-1]}")
     known = np.isfinite(angles) & np.isfinite(flexion)
     forwards = np.where(flexion < 0.0, angles + np.pi, angles)
@@ -74,7 +74,7 @@ def _mean_angle(poses: Sequence[InverseKinematics], name: str) -> float:
 
 
 def _angles(poses: Sequence[InverseKinematics], name: str) -> np.ndarray:
-    """Rad, of all frames; NaN where they do not show it."""
+    """Return the coordinate (rad) in all frames; NaN where it is not determined."""
     columns = [ik.q[:, ik.coordinates.index(name)] for ik in poses if name in ik.coordinates]
     result: np.ndarray = np.concatenate([np.empty(0), *columns])
     return result

@@ -1,7 +1,7 @@
-"""Compares left and right limbs with the error bars of their difference.
+"""Compares left and right limbs, with the uncertainty of their difference.
 
-The prior has left and right alike but not the same (correlation 0.9): a difference that the data do not show is that
-of the two sides' measured lengths, and its error bar says how much larger it may be.
+In the prior left and right are similar but not equal (correlation 0.9). A difference that the data do not show follows
+from the measured lengths of the two sides, and its uncertainty shows how much larger it may be.
 """
 
 from __future__ import annotations
@@ -13,18 +13,18 @@ import numpy as np
 from kinertia.model.bsp import MIRROR_SIGNS, PARAMETERS, BodySegmentParameters, partners
 
 BEYOND_SD = 2.81
-"""Deviations beyond which one of a pair's ten parameters differs: by chance in 5 % of pairs that are the same, at most
+"""Standard deviations beyond which one of a pair's ten parameters differs: by chance in at most 5 % of equal pairs
 (Bonferroni)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Asymmetry:
-    """One pair of segments.
+    """Difference between the two segments of a pair.
 
     Attributes:
         segment: without its side.
-        difference: (10,) right minus the left one's mirror image, in the table's order and units.
-        sd: (10,) posterior deviations of it.
+        difference: (10,) right minus mirrored left, in the order and units of the table.
+        sd: (10,) posterior standard deviations of the difference.
     """
 
     segment: str
@@ -33,17 +33,17 @@ class Asymmetry:
 
     @property
     def differing(self) -> tuple[int, ...]:
-        """Parameters, by their place in `PARAMETERS`, that differ beyond the error bars; the plainest first."""
+        """Indices into `PARAMETERS` of those that differ beyond their uncertainty, the most significant first."""
         away = np.abs(self.difference) / self.sd
         return tuple(int(k) for k in np.argsort(-away) if away[k] > BEYOND_SD)
 
 
 def asymmetries(bsp: BodySegmentParameters, covariance: np.ndarray) -> list[Asymmetry]:
-    """Every pair of segments whose right and left were estimated.
+    """Compute the difference of every pair of segments whose right and left were estimated.
 
     Args:
         bsp: the estimate.
-        covariance: (10 s, 10 s) posterior, of its table.
+        covariance: (10 s, 10 s) posterior covariance of its table.
     """
     table, pairs = bsp.table(), []
     for right, left in enumerate(partners(bsp.segments)):
@@ -59,7 +59,7 @@ def asymmetries(bsp: BodySegmentParameters, covariance: np.ndarray) -> list[Asym
 
 
 def asymmetry_columns(pairs: list[Asymmetry]) -> dict[str, list[object]]:
-    """One row per pair and parameter: segment, parameter, right_minus_left, sd, differs."""
+    """Return the columns of a table of pairs and parameters: segment, parameter, right_minus_left, sd, differs."""
     rows = [
         (pair.segment, name, float(pair.difference[k]), float(pair.sd[k]), k in pair.differing)
         for pair in pairs

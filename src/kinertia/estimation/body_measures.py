@@ -1,20 +1,20 @@
-"""Turns girths and lengths of the person into a prior of the body segment parameters.
+"""Turns measured girths and lengths of the person into a prior of the body segment parameters.
 
-They come from a sheet, as many as the laboratory had time for; lengths of thigh, shank and upper arm also from the
-joint centres of the static trial. The others are expected to be as in five people of the same build,
-`expected_measures`, and move with what was measured. Yeadon's body of all of them (`kinertia.model.stadium_body`) is
-then taken as a measurement of segment masses, of centres of mass along the segments and of moments of inertia, whose
-errors are
+They come from a form, as many as the laboratory had time for; lengths of thigh, shank and upper arm also come from the
+joint centres of the static trial. The other measurements are expected to be as in five people of the same build,
+`expected_measures`, and are correlated with the measured ones. Yeadon's geometric body built from all of them
+(`kinertia.model.stadium_body`) then counts as a measurement of segment masses, of centres of mass along the segments
+and of moments of inertia, with errors of
 
-- those of the measurements, and of the expectation where nothing was measured;
-- the densities': the spread between Chandler's, Clauser's and Dempster's, the three sets of the package;
-- the shape's: nobody is made of stadiums (5 % of a mass, 8 % more of a moment; set here. The one of the five people who
-  was weighed is 7 % lighter than his body of stadiums, with errors of all three kinds);
-- the cuts': where a segment ends is a matter of definition, in which the tables differ by 14-16 % of the mass of thigh
-  and upper arm; what one segment has more the next has less.
+- the measurements, and the expectation where nothing was measured;
+- the densities: the spread between Chandler's, Clauser's and Dempster's, the three sets of the package;
+- the shape: nobody is made of stadium solids (5 % of a mass, 8 % more of a moment; assumed here. The one of the five
+  people who was weighed is 7 % lighter than his geometric body, with errors of all three kinds);
+- the cuts: where a segment ends is a matter of definition, in which the tables differ by 14-16 % of the mass of thigh
+  and upper arm; what one segment gains the next loses.
 
-It says nothing of centres of mass across the segments, of products of inertia, and of differences between the sides; of
-the pelvis it says what mass it has together with the torso.
+It gives no information on centres of mass across the segments, products of inertia, or differences between the sides;
+for the pelvis, only on its mass together with the torso.
 """
 
 from __future__ import annotations
@@ -40,23 +40,23 @@ _DENSITY_SD = {
     **{"head": 0.027, "shoulders": 0.10, "thorax": 0.09, "abdomen": 0.10, "upper_arm": 0.033, "forearm": 0.036},
     **{"hand": 0.037, "thigh": 0.016, "shank": 0.006, "foot": 0.007},
 }
-"""Relative deviation between the three sets that Yeadon (1990) lists."""
+"""Relative standard deviation between the three sets that Yeadon (1990) lists."""
 _SHAPE_SD, _MOMENT_SD, _CENTRE_SD_M = 0.05, 0.08, 0.008
 _CUT_SD = 0.10
-"""Of the distal segment's mass, at hip, ankle and shoulder."""
+"""Relative to the distal segment's mass, at hip, ankle and shoulder."""
 _LUMBAR_CUT_SD_M = 0.04
-"""Of the torso's lower end: the tables cut in oblique planes, and not all at this joint."""
+"""Standard deviation of the torso's lower end: the tables cut in oblique planes, and not all at this joint."""
 _CUTS = (("thigh_r", "pelvis", 2.0), ("foot_r", "shank_r", 1.0), ("upper_arm_r", "torso", 2.0))
-"""Distal segment, the one that it is cut from, and how many of the first are."""
+"""Distal segment, the segment that it is cut from, and the number of distal segments."""
 _JOINT_LENGTH_SD_M = 0.01
 _SHRINKAGE = 0.5
-"""Share of the five people's correlations that is believed."""
+"""Share of the five people's correlations that is used."""
 _KINDS_OF_PART = {
     "s": ("pelvis", "torso"),
     "a": ("upper_arm_r", "forearm_r"),
     "j": ("thigh_r", "shank_r", "foot_r"),
 }
-"""By the letter of the package's keys."""
+"""Segments by the letter in the package's keys."""
 _STEP = 1e-4
 _TELLS = ("mass", "com", "ixx", "iyy", "izz")
 _FAR_SD = 4.0
@@ -65,13 +65,13 @@ _FEW = 3
 
 @dataclass(frozen=True, eq=False)
 class MeasuredBody:
-    """A body of stadiums, and how far each of its parameters may be off.
+    """Parameters of a geometric body built from measurements, and their uncertainty.
 
     Attributes:
         values: (7, 5) mass (kg), centre of mass along the segment (m) and moments of inertia (kg m2) of `KINDS`.
-        covariance: (35, 35) of their errors.
-        total_kg, total_sd_kg: the whole body's mass.
-        findings: one for each measurement that hardly goes with the others.
+        covariance: (35, 35) covariance of their errors.
+        total_kg, total_sd_kg: mass of the whole body, and its standard deviation.
+        findings: one for each measurement that is inconsistent with the others.
     """
 
     values: np.ndarray
@@ -82,11 +82,11 @@ class MeasuredBody:
 
 
 def expected_measures(mass_kg: float, height_m: float, mass_sd_kg: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-    """Mean (58,) and covariance (58, 58) of the logarithms of all measures (m) of a person.
+    """Return mean (58,) and covariance (58, 58) of the logarithms of all measurements (m) of a person of this build.
 
-    Lengths grow with stature, girths, widths and depths with the root of mass over stature, as those of similar bodies
-    of one density do; what is left between five people is their spread. Five are few: half of a variance is the
-    median of its kind's, and correlations are halved.
+    Lengths scale with stature, girths, widths and depths with the square root of mass over stature, as in geometrically
+    similar bodies of one density; the residuals of five people give the spread. Five are few: each variance is averaged
+    with the median of its kind, and correlations are halved.
     """
     shape, spread = _shape_and_spread()
     by_mass = (log_size(np.e, 1.0) - log_size(1.0, 1.0)) * mass_sd_kg / mass_kg
@@ -101,7 +101,7 @@ def _shape_and_spread() -> tuple[np.ndarray, np.ndarray]:
 
 
 def _total_kg(mass_kg: np.ndarray) -> float:
-    """Of a body of `KINDS` with two sides."""
+    """Return the total mass (kg) of a body with segments `KINDS`, counting two of those that have sides."""
     return float(mass_kg @ _HOW_MANY)
 
 
@@ -116,16 +116,16 @@ def measured_body(
     height_m: float,
     mass_sd_kg: float = 0.0,
 ) -> MeasuredBody:
-    """What measurements say of a person.
+    """Compute the parameters of a person's geometric body from measurements, with their uncertainty.
 
     Args:
-        stated: value and deviation (m) by name, of those that were made.
+        stated: value and standard deviation (m) of the measurements made, by name.
         lengths_m: by name, from joint centres.
         lumbar_m: height of the lumbar joint above the hip joint centres.
-        mass_kg, height_m, mass_sd_kg: of the person alone, and the mass' deviation.
+        mass_kg, height_m, mass_sd_kg: of the person alone, and the mass's standard deviation.
 
     Raises:
-        PriorError: the package yeadon is missing, or the measures cannot be of a person.
+        PriorError: the package yeadon is missing, or the measurements are impossible for a person.
     """
     expect_yeadon()
     names = [one.name for one in measures()]
@@ -139,7 +139,7 @@ def measured_body(
     try:
         return _with_errors(logs, left, lumbar_m, implausible)
     except PriorError as error:
-        if implausible:  # the likelier cause, and in the words of the sheet
+        if implausible:  # the likelier cause, in the words of the form
             blocking = [one.at(Severity.ERROR) for one in implausible]
             told = "; ".join(one.message for one in blocking[:_FEW])
             raise PriorError(f"no body has these girths and lengths: {told}").with_finding(blocking[0]) from error
@@ -149,7 +149,7 @@ def measured_body(
 def _implausible(
     stated: Mapping[str, tuple[float, float]], expected: np.ndarray, covariance: np.ndarray, values: np.ndarray
 ) -> tuple[Finding, ...]:
-    """S403: measurements that are far from what all others imply, and cross-sections that cannot be."""
+    """Make S403 for measurements that are far from what the others imply, and for impossible cross-sections."""
     information = np.linalg.inv(covariance)
     away = information @ (values - expected) / np.sqrt(np.diag(information))
     others = values - information @ (values - expected) / np.diag(information)
@@ -179,7 +179,7 @@ def _unlike(measure: str, value: Quantity, expected: Quantity, **by: Quantity) -
 
 
 def _with_errors(logs: np.ndarray, covariance: np.ndarray, lumbar_m: float, found: tuple[Finding, ...]) -> MeasuredBody:
-    """The body of measures whose logarithms have this mean and covariance."""
+    """Build the body of measurements whose logarithms have this mean and covariance."""
     middle = np.exp(logs)
     values = _told(middle, lumbar_m)
     by_measure = _slopes(middle, lumbar_m, values)
@@ -198,10 +198,10 @@ def _with_errors(logs: np.ndarray, covariance: np.ndarray, lumbar_m: float, foun
 
 
 def _slopes(measures_m: np.ndarray, lumbar_m: float, values: np.ndarray) -> np.ndarray:
-    """(35, 58) change of what a body tells with the logarithm of each measure.
+    """Return the derivatives (35, 58) of the body's parameters with respect to the logarithm of each measurement.
 
-    Trunk, arm and leg know nothing of one another, so that a measure of each is changed at a time; but the thigh begins
-    with the trunk's lowest cross-section.
+    Trunk, arm and leg do not depend on one another, so one measurement of each is changed at a time; but the thigh
+    begins with the lowest cross-section of the trunk.
     """
     keys = [one.key for one in measures()]
     hips = [k for k, key in enumerate(keys) if key.startswith("Ls0")]
@@ -220,7 +220,7 @@ def _slopes(measures_m: np.ndarray, lumbar_m: float, values: np.ndarray) -> np.n
 
 
 def _of_shapes_and_cuts(values: np.ndarray) -> list[np.ndarray]:
-    """(7, 5) each: an error's deviation."""
+    """Return the effects (7, 5) of the independent errors of shape and cuts, one standard deviation each."""
     columns = []
     extensive = np.array([1.0, 0.0, 1.0, 1.0, 1.0])
     for k in range(len(KINDS)):
@@ -241,7 +241,7 @@ def _of_shapes_and_cuts(values: np.ndarray) -> list[np.ndarray]:
 
 
 def _told(measures_m: np.ndarray, lumbar_m: float, density_kg_m3: Mapping[str, float] = DENSITY_KG_M3) -> np.ndarray:
-    """(7, 5) what a body of stadiums tells."""
+    """Return the parameters (7, 5) of a geometric body of stadium solids."""
     table = stadium_bsp(measures_m, lumbar_m, density_kg_m3).table()
     return table[np.arange(len(KINDS))[:, None], [[_column(kind, name) for name in _TELLS] for kind in KINDS]]
 
@@ -260,17 +260,17 @@ def with_measures(
     artificial: Collection[str] = (),
     mass_sd_kg: float = 0.0,
 ) -> tuple[BspPrior, MeasuredBody]:
-    """The prior of the built-in model once a person's measurements are known, and what they said.
+    """Update the prior of the built-in model with a person's measurements; return it with the geometric body.
 
     Args:
         prior, skeleton: of the person.
-        stated: value and deviation (m) by name, of the mean of both sides.
+        stated: value and standard deviation (m) by name, of the mean of both sides.
         mass_kg, height_m: of the person alone.
-        artificial: segments that are prostheses; of these nothing was measured.
-        mass_sd_kg: deviation of the mass, where something was weighed with the person.
+        artificial: segments that are prostheses, on which nothing was measured.
+        mass_sd_kg: standard deviation of the mass, where something was weighed with the person.
 
     Raises:
-        PriorError: another model, the package yeadon is missing, or the measures cannot be of a person.
+        PriorError: another model, the package yeadon is missing, or the measurements are impossible for a person.
     """
     names = prior.mean.segments
     if missing := [kind for kind in KINDS if kind not in names]:
@@ -287,7 +287,7 @@ def with_measures(
     kept = _with_whole_trunk()
     kept = kept[(kept @ seen).any(axis=1)]  # where both sides are prostheses nothing was measured
     seen, values, errors = kept @ seen, kept @ body.values.ravel(), kept @ body.covariance @ kept.T
-    # in deviations, for kilograms and kg m2 are far apart
+    # in standard deviations, since kilograms and kg m2 differ in magnitude
     own, off = prior.sd.ravel(), np.sqrt(np.diag(errors))
     moved, covariance = updated(
         np.zeros(len(own)),
@@ -301,10 +301,10 @@ def with_measures(
 
 
 def _with_whole_trunk() -> np.ndarray:
-    """(30, 35) from what a body of stadiums tells to what a prior can be compared with.
+    """Return the matrix (30, 35) from the geometric body's parameters to those that a prior can be compared with.
 
-    Where the trunk is cut makes no difference to the mass of pelvis and torso together. To the pelvis alone it does:
-    the tables' is half as heavy again as that between the levels of hip and lumbar joints.
+    The position of the cut does not change the mass of pelvis and torso together. It does change the mass of the
+    pelvis: that of the tables is 1.5 times the mass between the levels of hip and lumbar joints.
     """
     every = np.eye(len(KINDS) * len(_TELLS))
     pelvis, torso = (len(_TELLS) * KINDS.index(kind) for kind in ("pelvis", "torso"))
@@ -313,7 +313,7 @@ def _with_whole_trunk() -> np.ndarray:
 
 
 def _joint_lengths(skeleton: Skeleton) -> tuple[dict[str, float], np.ndarray, np.ndarray]:
-    """Lengths between joint centres, the mean of both sides, and the middle hip and lumbar joint in the pelvis."""
+    """Return the mean lengths between joint centres of both sides, and hip midpoint and lumbar joint in the pelvis."""
     at = {joint.child: joint.translation for joint in skeleton.joints}
     thigh, shank, arm = (
         float(np.mean([np.linalg.norm(at[f"{child}_{side}"]) for side in "rl"]))

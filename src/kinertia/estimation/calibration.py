@@ -1,10 +1,10 @@
 """Adapts a static model to the trials: marker positions, and coordinates that are the same in all frames.
 
-A static trial shows where markers sit on a person who stands, often with raised arms; in gait the skin has moved (the
+A static trial shows where markers are on a standing person, often with raised arms; in gait the skin has moved (the
 acromia by up to 10 cm after a T-pose). Over a few frames of the trials, coordinates that move (one set per frame) and
 calibration that does not (marker positions, and locked coordinates such as the shoulder centre) are estimated together
-by Gauss-Newton; the static trial is the prior, and a coordinate beyond its range pays (`range_terms`). Frames are
-eliminated one by one (Schur complement), so the cost grows linearly with their number.
+by Gauss-Newton; the static trial is the prior, and a coordinate beyond its range is penalised (`range_terms`). Frames
+are eliminated one by one (Schur complement), so the cost grows linearly with their number.
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ from kinertia.trial.data import Markers, Trial
 from kinertia.trial.sampled_time import span_s
 
 MARKER_NOISE_M = 0.01
-"""Deviation of one marker coordinate in one frame; the frames used stand 0.1 s apart and count as independent."""
+"""Standard deviation of one marker coordinate in one frame; the frames used are 0.1 s apart and count as independent.
+"""
 FRAME_SPACING_S = 0.1
 _MAX_FRAMES = 60
 _STEPS = 15
@@ -30,7 +31,7 @@ _TOLERANCE_M = 1e-5
 _ENOUGH_M2 = 1e-6
 """Square of a millimetre."""
 _FEWEST_TO_TURN = 3
-"""How many markers show a turn of their segment."""
+"""Fewest markers that determine a rotation of their segment."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,7 @@ class Adaptation:
 
     Attributes:
         skeleton: with adapted markers and locked coordinates.
-        moved_m: per marker label, how far it moved in its segment.
+        moved_m: per marker label, its displacement in its segment.
         coordinates: per adapted locked coordinate, its value (rad or m).
     """
 
@@ -49,7 +50,7 @@ class Adaptation:
 
 
 def first_poses(skeleton: Skeleton, trials: Sequence[Trial]) -> list[InverseKinematics]:
-    """Poses of the `sampled` frames of each trial, good to a millimetre: what `hold_uninformed` and `adapt` go by."""
+    """Solve the `sampled` frames of each trial to a millimetre, as needed by `hold_uninformed` and `adapt`."""
     return [solve_ik(skeleton, sampled(trial.markers), trial.name, gain_tolerance_m2=_ENOUGH_M2) for trial in trials]
 
 
@@ -65,9 +66,9 @@ def adapt(
     Args:
         skeleton: from the static trial.
         trials: the trials it will be used for.
-        poses: their `first_poses`; of coordinates that are locked by now no notice is taken.
-        marker_sd_m: per segment, prior deviation of its markers' positions (m, each axis).
-        coordinate_sd: per locked coordinate to adapt, its prior deviation (rad or m).
+        poses: their `first_poses`; coordinates that have been locked since are ignored.
+        marker_sd_m: per segment, prior standard deviation of its markers' positions (m, each axis).
+        coordinate_sd: per locked coordinate to adapt, its prior standard deviation (rad or m).
 
     Frames whose visible markers do not determine every coordinate are left out.
 
@@ -119,16 +120,16 @@ def adapt(
 def hold_uninformed(
     skeleton: Skeleton, trials: Sequence[Trial], poses: Sequence[InverseKinematics], may_hold: Mapping[str, float]
 ) -> tuple[Skeleton, tuple[str, ...]]:
-    """The skeleton with those coordinates held that no marker shows, and their names.
+    """Lock the coordinates that no marker determines; return the skeleton and their names.
 
     Args:
         skeleton: from the static trial.
         trials: the trials it will be used for.
         poses: their `first_poses`.
-        may_hold: the coordinates that need not be shown, and the values at which they are held.
+        may_hold: the coordinates that may be undetermined, and the values at which they are locked.
 
     Raises:
-        TrialError: a trial never shows another coordinate, or one that another trial shows.
+        TrialError: a trial never determines another coordinate, or one that another trial determines.
     """
     never = []
     for ik in poses:
@@ -143,14 +144,14 @@ def hold_uninformed(
 
 
 def without_partly_shown(skeleton: Skeleton, poses: Sequence[InverseKinematics], names: Collection[str]) -> Skeleton:
-    """The skeleton without the markers beyond a joint that some of the trials show and others never do.
+    """Remove the markers beyond joints that some of the trials determine and others never do.
 
-    What one trial cannot tell is then held in all of them, and nothing pulls at it.
+    A coordinate that one trial cannot determine is then locked in all of them, and no marker contradicts it.
 
     Args:
         skeleton: from the static trial.
         poses: `first_poses` of the trials it will be used for.
-        names: coordinates that may be held.
+        names: coordinates that may be locked.
     """
     shown = [{name for name, q in zip(ik.coordinates, ik.q.T, strict=True) if np.isfinite(q).any()} for ik in poses]
     partly = {name for name in names if any(name in one for one in shown) and not all(name in one for one in shown)}
@@ -173,7 +174,7 @@ def _not_shown(skeleton: Skeleton, markers: Markers, coordinates: Sequence[str])
 
 
 def sampled(markers: Markers) -> Markers:
-    """A few frames, FRAME_SPACING_S apart, from all over the trial (at most sixty)."""
+    """Select a few frames, FRAME_SPACING_S apart, from the whole trial (at most sixty)."""
     count = min(_MAX_FRAMES, len(markers.time), 1 + int(span_s(markers.time) / FRAME_SPACING_S * (1.0 + 1e-9)))
     every = -(-len(markers.time) // count)
     return Markers(markers.time[::every], markers.labels, markers.positions[::every])
@@ -189,10 +190,10 @@ def _relocated(markers: Sequence[Marker], positions: np.ndarray) -> list[Marker]
 def _in_segments(
     skeleton: Skeleton, measured: np.ndarray, q: np.ndarray, places: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Marker errors (n, m, 3) and their derivatives (n, m, 3, c) by the coordinates, in noise deviations.
+    """Return marker errors (n, m, 3) and their derivatives (n, m, 3, c) by the coordinates, in noise SDs.
 
-    Both are in the axes of the markers' segments, so that a marker's place (m, 3) in its segment moves it by itself.
-    What is not seen is NaN in the errors and zero in the derivatives.
+    Both are in the axes of the markers' segments, so that a marker's position in its segment (m, 3) affects only its
+    own error. Missing markers are NaN in the errors and zero in the derivatives.
     """
     pose = skeleton.pose(q)
     turned = pose.rotation[:, skeleton.marker_segments]
@@ -211,9 +212,10 @@ def _step(
     information: np.ndarray,
     ranges: RangeTerms,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """One Gauss-Newton step of the static unknowns (k,), still coordinates then places, and of the moving (n, c).
+    """Compute one Gauss-Newton step of the static unknowns (k,) and of the moving coordinates (n, c).
 
-    Takes what `_in_segments` gives, the prior's information (k, k), and what the moving coordinates pay.
+    Static unknowns are locked coordinates, then marker positions. It takes the output of `_in_segments`, the prior's
+    information (k, k), and the range terms of the moving coordinates.
     """
     n = len(residual)
     seen = np.isfinite(residual).reshape(n, -1)
@@ -226,7 +228,7 @@ def _step(
     across = np.concatenate([transposed @ by_still, transposed / MARKER_NOISE_M], axis=-1)
     gradient = transposed @ residual[..., None] + ranges.pull[..., None]
     solved = np.linalg.solve(normal, np.concatenate([across, gradient], axis=-1))
-    # S^T S and S^T r summed over frames; a place moves its own marker only
+    # S^T S and S^T r summed over frames; a position affects its own marker only
     k = by_still.shape[-1]
     square, right = information.copy(), prior_pull.copy()
     square[:k, :k] += np.einsum("nri,nrj->ij", by_still, by_still)
@@ -235,14 +237,14 @@ def _step(
     square[range(k, len(square)), range(k, len(square))] += seen.sum(axis=0) / MARKER_NOISE_M**2
     right[:k] += np.einsum("nri,nr->i", by_still, residual)
     right[k:] += residual.sum(axis=0) / MARKER_NOISE_M
-    # (M^T S)^T (M^T M)^-1 (M^T S) is taken off: the moving coordinates follow
+    # (M^T S)^T (M^T M)^-1 (M^T S) is subtracted: the moving coordinates adjust
     followed = across.reshape(-1, len(right)).T @ solved.reshape(-1, len(right) + 1)
     step = np.linalg.solve(square - followed[:, :-1], right - followed[:, -1])
     return step, solved[..., -1] - solved[..., :-1] @ step
 
 
 def turn_about(segment: str, before: Sequence[Marker], after: Sequence[Marker]) -> float:
-    """Rad: by how much a segment's markers have turned about it, by least squares; 0 with fewer than three."""
+    """Compute the angle (rad) of a segment's markers about it, by least squares; 0 with fewer than three markers."""
     moved = {marker.label: marker.position for marker in after}
     worn = [marker for marker in before if marker.segment == segment and marker.label in moved]
     if len(worn) < _FEWEST_TO_TURN:
@@ -255,7 +257,7 @@ def turn_about(segment: str, before: Sequence[Marker], after: Sequence[Marker]) 
 
 
 def marker_jacobian(skeleton: Skeleton, pose: Pose, positions: np.ndarray) -> np.ndarray:
-    """(n, m, 3, c): velocity of every marker, at these positions (n, m, 3) m, for each coordinate at unit rate."""
+    """Compute the velocity (n, m, 3, c) of every marker, at positions (n, m, 3) m, for each coordinate at unit rate."""
     columns = pose.axes.transpose(0, 2, 1)
     x, y, z = positions[..., None].transpose(2, 0, 1, 3)
     turn_x, turn_y, turn_z = columns[:, None, 3:].transpose(2, 0, 1, 3)

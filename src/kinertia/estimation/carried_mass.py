@@ -1,4 +1,4 @@
-"""Works out who was weighed with what, and which mass the forces must carry."""
+"""Computes the mass of the body alone, and the total mass that the forces support."""
 
 from __future__ import annotations
 
@@ -12,18 +12,19 @@ from kinertia.findings.where import Where
 from kinertia.settings import Attached
 
 UNKNOWN_SHARE, UNKNOWN_SHARE_SD = 0.10, 0.15
-"""Share of body mass that something of unknown mass is expected to have: anything up to 40 %."""
+"""Expected share of body mass of an object of unknown mass, and its standard deviation: anything up to 40 %."""
 _LIGHTEST_KG = 10.0
-"""What a person weighs at least (`check_subject`)."""
+"""Least plausible mass of a person (`check_subject`)."""
 
 
 @dataclass(frozen=True)
 class CarriedMass:
-    """Masses in kg.
+    """Mass of the body alone and total mass with all attached objects, in kg.
 
     Attributes:
         body_kg: of the person alone, for the tables.
-        total_kg, sd_kg: of the person and all that is attached, and how far that may be off besides the scale.
+        total_kg, sd_kg: of the person with all attached objects, and its standard deviation apart from the scale's
+            error.
 
     Examples:
         >>> pack = kinertia.Attached(
@@ -44,10 +45,10 @@ class CarriedMass:
 
     @classmethod
     def of(cls, scale_kg: float, attached: Sequence[Attached]) -> CarriedMass:
-        """What follows from the mass on the scale.
+        """Compute the masses from the stated mass.
 
         Raises:
-            PriorError: what was on the scale leaves nothing for the person.
+            PriorError: the objects weighed with the person leave no mass for the person.
         """
         masses = [(mass_of(one, scale_kg), one.on_scale) for one in attached]
         body = scale_kg - sum(mass for (mass, _), weighed in masses if weighed)
@@ -62,13 +63,13 @@ class CarriedMass:
 
 
 def body_sd_kg(scale_kg: float, attached: Sequence[Attached]) -> float:
-    """How far the body's own mass may be off besides the scale, by what was weighed with it."""
+    """Return the standard deviation of the body's mass due to objects weighed with it, without the scale's error."""
     variances = [mass_of(one, scale_kg)[1] ** 2 for one in attached if one.on_scale]
     return float(sum(variances) ** 0.5)
 
 
 def mass_of(attached: Attached, scale_kg: float) -> tuple[float, float]:
-    """Mass of one thing and its deviation, before any estimate."""
+    """Return the mass of one object and its standard deviation, kg, before any estimate."""
     if attached.mass_kg is None:
         return UNKNOWN_SHARE * scale_kg, UNKNOWN_SHARE_SD * scale_kg
     return attached.mass_kg

@@ -1,7 +1,7 @@
-"""Finds what all plates read too much alike: rather a wrong stated mass than two wrong plates.
+"""Finds a gain error common to all plates: a wrong stated mass is likelier than two wrong plates.
 
-The estimate knows a gain by the stated mass alone. Two plates have two amplifiers and two calibrations, and a person
-has one mass: where every plate seems to be off in the same direction, the mass is doubted first.
+The estimate determines gains only from the stated mass. Two plates have two amplifiers and two calibrations, and a
+person has one mass: if every plate has a gain error in the same direction, the mass is doubted first.
 """
 
 from __future__ import annotations
@@ -14,19 +14,19 @@ from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.simultaneous.calibration_entry import GAIN, CalibrationEntry
 
 _FEWEST, _ALIKE = 2, 0.5
-"""Plates, and the smallest of their gain errors as a share of the largest. A foot that reaches over the edge of one
-plate adds to its error: 8 and 11 % of a mass that is 12 % off."""
+"""Fewest plates, and the smallest of their gain errors as a share of the largest. A foot that reaches over the edge of
+one plate adds to its error: 8 and 11 % for a mass that is 12 % off."""
 _LEAST = 0.03
-"""Share of the mass from which on the estimated one is reported to differ."""
+"""Share of the mass from which the estimated mass is reported to differ."""
 _UNINFORMED = (0.1, 0.9)
-"""Of the prior SD: a plate that nobody stands on has no error and the prior's deviation."""
+"""Shares of the prior SD: an unloaded plate has no error and the prior's standard deviation."""
 
 
 def common_gain(errors: Sequence[CalibrationEntry]) -> tuple[float, float] | None:
-    """The gain error that all plates have in all trials, and its deviation; None where they have none in common.
+    """Return the gain error common to all plates in all trials, with its SD; None if there is none.
 
     Args:
-        errors: of instruments, found or not.
+        errors: of instruments, significant or not.
     """
     gains = [one for one in errors if one.quantity == GAIN]
     gains = [one for one in gains if one.trial is not None] or gains
@@ -42,7 +42,10 @@ def common_gain(errors: Sequence[CalibrationEntry]) -> tuple[float, float] | Non
 
 
 def at_common_gain(prior: BspPrior, total_kg: float, gain: tuple[float, float]) -> BspPrior:
-    """The prior at the mass by which plates with this common gain error, of a body estimated so heavy, are right."""
+    """Return the prior at the mass for which plates with this common gain error are right.
+
+    `total_kg` is the estimated mass of the body.
+    """
     error, sd = gain
     mass_kg = total_kg * (1.0 + error)
     return prior.at_mass(mass_kg, max(prior.mass_sd_kg, sd * mass_kg))

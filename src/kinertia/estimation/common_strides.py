@@ -1,18 +1,19 @@
-"""Which strides a mean curve is of: the same all along, since a mean of changing strides has steps that nobody made."""
+"""Selects the strides of a mean curve, the same over the whole cycle: a mean of changing strides has false steps."""
 
 from __future__ import annotations
 
 import numpy as np
 
 _AS_LONG = 0.9
-"""Of the longest curve: more strides are worth so much of the cycle."""
+"""Least length of the common part, relative to the longest curve: so much of the cycle may be given up for more
+strides."""
 
 
 def common_strides(values: np.ndarray) -> np.ndarray:
-    """Tell which of the curves (n, 101), NaN where they were not measured, to average: (n,) bool.
+    """Select the curves (n, 101), NaN where not measured, that are to be averaged: returns (n,) bool.
 
-    Complete ones where there are any. Else those that together were measured longest, counted in frames of all of them,
-    in at least nine tenths of what the longest alone covers.
+    Complete curves are used if there are any. Otherwise those are chosen that together have the most measured frames,
+    provided that their common part covers at least nine tenths of the longest curve.
 
     >>> common_strides(np.array([[1.0, 2.0, 3.0], [4.0, np.nan, np.nan], [3.0, 2.0, 1.0]])).tolist()
     [True, False, True]
@@ -30,13 +31,13 @@ def common_strides(values: np.ndarray) -> np.ndarray:
 
 
 def mean_of(values: np.ndarray) -> np.ndarray:
-    """(101,) mean of curves (n, 101), NaN where one of them was not measured; NaN everywhere of none."""
+    """Return the mean (101,) of curves (n, 101): NaN where one was not measured, and throughout without curves."""
     result: np.ndarray = values.mean(axis=0) if len(values) else np.full(values.shape[1], np.nan)
     return result
 
 
 def mean_of_common(values: np.ndarray) -> np.ndarray:
-    """(101,) mean of the curves (n, 101) that `common_strides` chooses.
+    """Return the mean (101,) of the curves (n, 101) that `common_strides` selects.
 
     >>> mean_of_common(np.array([[1.0, 2.0, 3.0], [4.0, np.nan, np.nan], [3.0, 2.0, 1.0]])).tolist()
     [2.0, 2.0, 2.0]

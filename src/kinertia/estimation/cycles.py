@@ -1,7 +1,8 @@
 """Resamples angles, moments, powers and ground reactions to 0 to 100 % of each gait cycle.
 
-A curve belongs to the side whose heel strikes begin and end its stride. Where a trial was not measured it has a gap.
-Clinical angles (`clinical_angles`) are of inverse kinematics, which knows whole strides: no estimate changes them.
+A curve belongs to the side whose heel strikes begin and end its stride. It has a gap where ground contact was not
+measured. Clinical angles (`clinical_angles`) come from inverse kinematics, which covers whole strides: no estimate
+changes them.
 """
 
 from __future__ import annotations
@@ -28,7 +29,8 @@ from kinertia.trial.data import FEET
 from kinertia.trial.sampled_time import nearest_samples
 
 Stage = Literal["estimate", "literature"]
-"""As estimated; or as usual: inverse kinematics, smoothed, and inverse dynamics with the parameters before."""
+"""As estimated; or conventional: smoothed inverse kinematics, and inverse dynamics with the parameters before the
+estimate."""
 Kind = Literal["angle", "moment", "power", "force", "clinical"]
 UNITS: Mapping[Kind, str] = {
     "angle": "deg",
@@ -43,39 +45,39 @@ _Interpolation: TypeAlias = Callable[[np.ndarray, np.ndarray], Callable[[np.ndar
 
 
 class Estimated(Protocol):
-    """What is needed of a fitted trial; its attributes are those of `TrialFit`."""
+    """Interface of a fitted trial that the curves need; its attributes are those of `TrialFit`."""
 
     @property
     def name(self) -> str:
-        """The trial's."""
+        """Name of the trial."""
 
     @property
     def kinematics(self) -> Kinematics:
-        """Before the estimate."""
+        """Kinematics before the estimate."""
 
     @property
     def skeleton(self) -> Skeleton:
-        """The model."""
+        """The calibrated model."""
 
     @property
     def motion(self) -> Motion:
-        """At the frames of the window."""
+        """Estimated motion at the frames of the measured windows."""
 
     @property
     def reactions(self) -> GroundReactions:
-        """That go with the estimate."""
+        """Ground reactions that belong to the estimate."""
 
     @property
     def joint_loads(self) -> Mapping[str, np.ndarray]:
-        """Per stage (w, c), N m."""
+        """Joint loads (w, c) N m, per stage."""
 
     @property
     def deviations(self) -> CurveDeviations | None:
-        """Of its curves, if there are any."""
+        """Standard deviations of the trial's curves, or None."""
 
     @property
     def strides(self) -> tuple[Stride, ...]:
-        """Of the whole trial."""
+        """Strides of the whole trial."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,12 +105,12 @@ class CycleCurve:
 def cycle_curves(
     trial: Estimated, mass_kg: float, stage: Stage = "estimate", strides: Sequence[Stride] | None = None
 ) -> Iterator[CycleCurve]:
-    """All curves of a trial, stride by stride; those that are nothing but a gap are left out.
+    """Yield all curves of a trial, stride by stride, except those that were measured nowhere.
 
     Args:
         trial: fitted.
         mass_kg: of the body; moments, powers and forces are divided by it.
-        stage: which.
+        stage: as estimated, or conventional.
         strides: of the trial; all if None.
     """
     chosen = trial.strides if strides is None else strides
@@ -147,7 +149,7 @@ def cycle_curves(
 def _clinical(
     source: _Source, skeleton: Skeleton, strides: Sequence[Stride], paths: np.ndarray
 ) -> list[dict[str, np.ndarray]]:
-    """Clinical angles (101,) of each stride by quantity."""
+    """Return the clinical angles (101,) of each stride, by quantity."""
     q = source.tracked(np.concatenate([stride.time for stride in strides]), 0)
     heading = np.repeat(np.arctan2(-paths[:, 2], paths[:, 0]), len(PERCENT))
     by_side = {side: clinical_angles(skeleton, q, heading, side) for side in {stride.side for stride in strides}}
@@ -158,14 +160,14 @@ def _clinical(
 
 
 def _directions(path: np.ndarray, side: str) -> np.ndarray:
-    """(3, 3) unit vectors in rows: along the stride, upward, towards the other foot."""
+    """Return unit vectors (3, 3) in rows: along the stride, upward, towards the other foot."""
     forward = path / max(float(np.linalg.norm(path)), 1e-9)
     medial = np.array([forward[2], 0.0, -forward[0]]) * (1.0 if side == "r" else -1.0)
     return np.array([forward, [0.0, 1.0, 0.0], medial])
 
 
 class _Source:
-    """A trial's quantities at any time, NaN where they were not measured."""
+    """Quantities of a trial at any time; NaN where they were not measured."""
 
     def __init__(self, trial: Estimated, stage: Stage) -> None:
         self.kinematics, self.stage = trial.kinematics, stage
@@ -177,29 +179,29 @@ class _Source:
         self.spread = None if spread is None else [self._by_stretch(linear, each) for each in vars(spread).values()]
 
     def angle(self, time: np.ndarray) -> np.ndarray:
-        """(n, c) coordinates; those of the usual pipeline wherever inverse kinematics knew them."""
+        """Return coordinates (n, c); those of IK + ID wherever inverse kinematics determined them."""
         return self._coordinates(time, 0)
 
     def speed(self, time: np.ndarray) -> np.ndarray:
-        """(n, c) derivatives of the coordinates."""
+        """Return derivatives (n, c) of the coordinates."""
         return self._coordinates(time, 1)
 
     def moment(self, time: np.ndarray) -> np.ndarray:
-        """(n, c) joint loads."""
+        """Return joint loads (n, c)."""
         return self._measured(time, self.loads)
 
     def deviations(self, time: np.ndarray) -> CurveDeviations:
-        """Standard deviations of all that; NaN where there are none."""
+        """Return standard deviations of all curves; NaN if there are none."""
         if self.spread is None:
             return CurveDeviations.filled(len(time), len(self.kinematics.ik.coordinates), np.nan)
         return CurveDeviations(*(self._measured(time, each) for each in self.spread))
 
     def force(self, time: np.ndarray) -> np.ndarray:
-        """(n, 2, 3) N on right and left foot."""
+        """Return the ground reaction force (n, 2, 3) N on right and left foot."""
         return self._measured(time, [lambda at: self.reactions.at(at)[..., :3]] * len(self.kinematics.windows_s))
 
     def _by_stretch(self, through: _Interpolation, values: np.ndarray) -> list[Callable[[np.ndarray], np.ndarray]]:
-        """Curves through the values (w, ...) of each stretch."""
+        """Make a curve through the values (w, ...) of each measured window."""
         time = self.kinematics.time
         return [through(time[part], values[part]) for part in self.kinematics.stretches]
 
@@ -209,14 +211,14 @@ class _Source:
         return self.tracked(time, derivative)
 
     def tracked(self, time: np.ndarray, derivative: int) -> np.ndarray:
-        """(n, c) coordinates by inverse kinematics, smoothed, or derivatives of these."""
+        """Return coordinates (n, c) of smoothed inverse kinematics, or their derivatives."""
         ik, spline = self.kinematics.ik, self.kinematics.spline
         within = (time >= spline.time[0]) & (time <= spline.time[-1])
         known = within[:, None] & np.isfinite(ik.q[nearest_samples(ik.time, time)])
         return np.where(known, spline(np.clip(time, spline.time[0], spline.time[-1]), derivative), np.nan)
 
     def _measured(self, time: np.ndarray, curves: Sequence[Callable[[np.ndarray], np.ndarray]]) -> np.ndarray:
-        """Values at these times of each stretch's curve; NaN outside."""
+        """Return values at these times from the curve of each measured window; NaN outside."""
         windows = self.kinematics.windows_s
         places = [inside(time, [window]) for window in windows]
         values = [
@@ -231,7 +233,7 @@ class _Source:
 def cycle_columns(
     trials: Sequence[Estimated], mass_kg: float, stage: Stage = "estimate", most_strides: int | None = None
 ) -> dict[str, Any]:
-    """The columns of `Fit.cycles`, by name; of at most so many strides per trial and side, evenly spread."""
+    """Return the columns of `Fit.cycles`, by name, from at most so many strides per trial and side, evenly spread."""
     curves = [
         one
         for trial in trials
@@ -250,7 +252,7 @@ def cycle_columns(
 
 
 def spatiotemporal_columns(trials: Sequence[Estimated]) -> dict[str, list[Any]]:
-    """The columns of `Fit.spatiotemporal`, by name."""
+    """Return the columns of `Fit.spatiotemporal`, by name."""
     rows: list[dict[str, Any]] = []
     for trial in trials:
         feet = feet_under_pelvis(trial.skeleton, trial.kinematics)
@@ -265,7 +267,7 @@ def spatiotemporal_columns(trials: Sequence[Estimated]) -> dict[str, list[Any]]:
 
 
 def spread_evenly(strides: Sequence[Stride], most: int | None) -> list[Stride]:
-    """At most so many strides of each side, evenly spread over the trial."""
+    """Select at most so many strides of each side, evenly spread over the trial."""
     kept = []
     for side in FEET:
         own = [stride for stride in strides if stride.side == side]

@@ -21,10 +21,10 @@ _DEGREE = 5
 
 
 def kept_draws(fit: Fit) -> PosteriorDraws:
-    """The draws that came with a fit.
+    """Return the posterior draws stored with a fit.
 
     Raises:
-        KinertiaError: it has none.
+        KinertiaError: the fit has none.
     """
     if fit.posterior is None:
         raise KinertiaError('the two-level method has no error bars to draw from: fit with method "simultaneous"')
@@ -34,10 +34,10 @@ def kept_draws(fit: Fit) -> PosteriorDraws:
 
 
 def chosen_draws(fit: Fit, count: int, seed: int = 0) -> list[int]:
-    """Which of the kept draws a seed chooses: so many different ones; with seed 0 the first.
+    """Select `count` different draws of those stored; with seed 0 the first ones.
 
     Raises:
-        KinertiaError: there are not so many.
+        KinertiaError: fewer draws are stored.
     """
     kept = kept_draws(fit).count
     if not 1 <= count <= kept:
@@ -48,14 +48,14 @@ def chosen_draws(fit: Fit, count: int, seed: int = 0) -> list[int]:
 
 
 def drawn_fit(fit: Fit, number: int) -> Fit:
-    """The fit as draw `number` (from 0) has it, without error bars of its own.
+    """Make the fit that corresponds to draw `number` (from 0), without uncertainty of its own.
 
-    Body segment parameters, joint centres, marker places, coordinates, ground reactions and the joint moments that
+    Body segment parameters, joint centres, marker positions, coordinates, ground reactions and the joint moments that
     follow from them all belong to one draw. Of `Fit` and `TrialFit` only these differ: `estimate`, `skeleton`, and
     each trial's `skeleton`, `motion`, `course`, `reactions` and `joint_loads["estimate"]`.
 
     Raises:
-        KinertiaError: no draws were kept.
+        KinertiaError: no draws are stored.
     """
     draws = kept_draws(fit)
     bsp = _bsp(fit.estimate, draws, number)
@@ -66,14 +66,14 @@ def drawn_fit(fit: Fit, number: int) -> Fit:
 
 
 def _bsp(estimate: BodySegmentParameters, draws: PosteriorDraws, number: int) -> BodySegmentParameters:
-    """With the segments that were held as they are."""
+    """Return the parameters of a draw; segments that were not estimated keep theirs."""
     table = estimate.table().copy()
     table[[estimate.segments.index(name) for name in draws.segments]] = draws.bsp[number]
     return BodySegmentParameters.from_table(estimate.segments, table)
 
 
 def _skeleton(fit: Fit, skeleton: Skeleton, draws: PosteriorDraws, number: int) -> Skeleton:
-    """Joint centres and axes moved, and markers, but those that stay where a model has them."""
+    """Move joint centres, axes and markers to those of a draw, except markers that are fixed in the model."""
     values = dict(zip(draws.coordinates, draws.coordinate_values[number].tolist(), strict=True))
     return skeleton.lock(values).with_places(skeleton.marker_locals + draws.places[number])
 
@@ -101,7 +101,10 @@ def _trial(
 
 
 def _reactions(estimate: GroundReactions, draws: TrialDraws, number: int) -> GroundReactions:
-    """Of plates and clock as drawn. What is put right already is put right by the departures: small ones add up."""
+    """Return the ground reactions with plate errors and delay as drawn.
+
+    The estimate's errors are corrected already, so only the differences from them are applied: small ones add up.
+    """
     departures = draws.plates[number].copy()
     departures[:, GAIN] /= 1.0 + draws.plate_gain
     standing = np.ascontiguousarray(estimate.loaded)

@@ -1,4 +1,4 @@
-"""Selects the bodies of an OpenSim model that are estimated; all others keep the model's parameters."""
+"""Selects the bodies of an OpenSim model that are estimated; the others keep the parameters of the model."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
 
 LIGHT_KG = 0.5
-"""Bodies that weigh less together than this move with their joints, but are not estimated."""
+"""Groups of bodies with less total mass than this move with their joints, but are not estimated."""
 
 
 def estimated_bodies(skeleton: Skeleton, own: BodySegmentParameters) -> set[str]:
-    """Of every group of bodies that move as one the heaviest is estimated; none of a group that is light altogether.
+    """Select the heaviest body of every group that moves as one; none of a group lighter than `LIGHT_KG` in total.
 
     Args:
-        skeleton: with the coordinates locked that no marker shows.
+        skeleton: with the coordinates locked that no marker determines.
         own: the model's own parameters, at the mass of the person.
     """
     mass = dict(zip(own.segments, own.mass_kg, strict=True))

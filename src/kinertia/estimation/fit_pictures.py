@@ -1,4 +1,4 @@
-"""Names the figures of a fit, for whoever draws them."""
+"""Declares the figures of a fit, for the modules that draw them."""
 
 from __future__ import annotations
 
@@ -12,55 +12,55 @@ if TYPE_CHECKING:
 
 
 class FitPictures(Protocol):
-    """Plotly figures of a fit; `Fit.figure` draws those of them that are for papers by the same names.
+    """Plotly figures of a fit; `Fit.figure` draws some of them for papers, by the same names.
 
-    Those over time are of one trial; its name left out, of the first.
+    Figures over time show one trial: the first if no name is given.
 
     Raises:
-        KinertiaError: no such trial, no strides or error bars to draw from (says which figure there is in its place).
+        KinertiaError: no such trial, no strides or no posterior to draw from (the message suggests another figure).
     """
 
     def moments(self, trial: str | None = None) -> Figure:
-        """Joint moments over the gait cycle, all trials; of a trial that is named, or without strides, over time."""
+        """Draw joint moments over the gait cycle, all trials; for a named trial, or without strides, over time."""
 
     def angles(self, trial: str | None = None) -> Figure:
-        """Joint angles over the gait cycle, all trials; of a trial that is named, or without strides, over time."""
+        """Draw joint angles over the gait cycle, all trials; for a named trial, or without strides, over time."""
 
     def powers(self) -> Figure:
-        """Joint powers over the gait cycle."""
+        """Draw joint powers over the gait cycle."""
 
     def forces(self) -> Figure:
-        """Ground reactions over the gait cycle."""
+        """Draw ground reactions over the gait cycle."""
 
     def cycles(self, kind: Kind = "moment", norms: str | Path | None = None) -> Figure:
-        """Angles, moments, powers or ground reactions ("force") over the gait cycle, in front of norms.
+        """Draw angles, moments, powers or ground reactions ("force") over the gait cycle, in front of norms.
 
         `norms` is a CSV file with mean and standard deviation of normal curves, which become grey bands.
         """
 
     def coordinates(self, trial: str | None = None) -> Figure:
-        """Every coordinate over time, by inverse kinematics and as estimated."""
+        """Draw every coordinate over time, by inverse kinematics and as estimated."""
 
     def residuals(self, trial: str | None = None) -> Figure:
-        """Root residual force and moment over time, stage by stage."""
+        """Draw root residual force and moment over time, for each stage."""
 
     def bsp(self) -> Figure:
-        """Changes of body segment parameters in kg, mm and kg m2, with intervals where there are any."""
+        """Draw changes of body segment parameters in kg, mm and kg m2, with intervals if there are any."""
 
     def departures(self) -> Figure:
-        """The same in prior SDs; not after two-level."""
+        """Draw changes of body segment parameters in prior SDs; not available after two-level."""
 
     def information(self) -> Figure:
-        """What the data say about each parameter; not after two-level."""
+        """Draw how much of each parameter's prior variance the data remove; not available after two-level."""
 
     def body(self, shown: Literal["mass", "information"] = "mass") -> Figure:
-        """The body, coloured by change of mass or by what the data say of it ("information"; not after two-level)."""
+        """Draw the body, coloured by change of mass or by "information" on each segment (not after two-level)."""
 
     def markers(self, trial: str | None = None) -> Figure:
-        """Distance between every measured and modelled marker."""
+        """Draw the distance between every measured and modelled marker."""
 
     def gaps(self, trial: str | None = None) -> Figure:
-        """When markers were not seen; a sentence where all always were."""
+        """Draw when markers were not visible; a sentence if there are no gaps."""
 
     def skeleton(self, trial: str | None = None) -> Figure:
-        """The skeleton in motion, with markers, centres of mass and ground reactions."""
+        """Draw the skeleton in motion, with markers, centres of mass and ground reactions."""

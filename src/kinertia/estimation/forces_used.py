@@ -1,4 +1,4 @@
-"""Says which ground reactions the joint moments of a trial are computed from, and why."""
+"""Describes which ground reactions the joint moments of a trial are computed from, and why."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from kinertia.motion.ground_reactions import GroundReactions
 from kinertia.settings import Settings
 
 NOTABLE_IMPACT_N = 0.5
-"""RMS below which impacts are not mentioned."""
+"""RMS below which impact transients are not mentioned."""
 
 
 class ForcesUsed(NamedTuple):
-    """Ground reactions of the joint moments.
+    """Description of the ground reactions used for joint moments.
 
     Attributes:
-        which: "as measured, ..."; in headers of files, so without an equals sign.
+        which: "as measured, ..."; used in headers of files, so without an equals sign.
         why: the rest of the sentence, with its punctuation in front; may be empty.
     """
 
@@ -24,10 +24,10 @@ class ForcesUsed(NamedTuple):
 
 
 def forces_used(reactions: GroundReactions, settings: Settings, motion_hz: float) -> ForcesUsed:
-    """What was done to the ground reactions of a trial before they went into joint moments.
+    """Describe what was done to the ground reactions of a trial before joint moments were computed from them.
 
     Args:
-        reactions: of the trial's joint moments.
+        reactions: used for the trial's joint moments.
         settings: as used.
         motion_hz: bandwidth of the motion.
     """
@@ -44,13 +44,13 @@ def forces_used(reactions: GroundReactions, settings: Settings, motion_hz: float
 
 
 def forces_before(reactions: GroundReactions, settings: Settings) -> str:
-    """The same of the joint moments before the estimate, of which no impact is taken."""
+    """Describe the ground reactions of the joint moments before the estimate, which include impact transients."""
     by_user = settings.method == "simultaneous" and not isinstance(settings.force_cutoff_hz, str)
     return "as measured" if by_user else _bandwidth(reactions, settings).which
 
 
 def full_bandwidth(reactions: GroundReactions) -> str:
-    """What residuals at the bandwidth of these ground reactions are called."""
+    """Return the label of residuals at the bandwidth of these ground reactions."""
     if reactions.cutoff_hz is None:
         return "forces at full bandwidth"
     return f"forces up to {reactions.cutoff_hz:.3g} Hz"

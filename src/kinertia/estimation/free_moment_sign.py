@@ -1,17 +1,18 @@
-"""Decides the sign of the plates' free moments: the one with which the whole estimate fits better.
+"""Determines the sign of the plates' free moments: the one with which the estimate fits better.
 
-Files of whole laboratories have the vertical moments' sign wrong: the free moments are then off by twice themselves.
-The estimate with either sign says which is likelier, all trials of a person together (`simultaneous.evidence`). Of 28
-measured trials from eight laboratories the logarithm of the odds for the other sign is between -50 and -2.6 where the
-sign is right. Where it is wrong, it is 12 to 59 in walks and squats; in drop jumps, which hardly tell, 1 and 5.
+In some laboratories, all files have the wrong sign of the vertical moments: the free moments are then off by twice
+their own size. The estimates with either sign show which is likelier, for all trials of a person together
+(`simultaneous.evidence`). For 28 measured trials from eight laboratories the log odds of the opposite sign are between
+-50 and -2.6 where the sign is right. Where it is wrong, they are 12 to 59 in walks and squats; in drop jumps, which
+contain little information, 1 and 5.
 
-Where the sign stays open, a plate that only one of both displaces is not taken as displaced: of a drop jump whose
-plates stand right to 1 mm, the wrong sign moves one by 26 mm.
+Where the sign stays undetermined, a plate that only one sign displaces does not count as displaced: in a drop jump
+whose plates are positioned correctly to 1 mm, the wrong sign displaces one by 26 mm.
 
-A second estimate takes as long as the first, so two looks come before it. What forces and measured motion leave of the
-vertical moment is 1.2 times as much and more with the sign turned in most sound trials, and 0.83 times and less in most
-spoilt ones, of which the turned sign is tried first. Then the quadratic at the optimum predicts the odds, mostly within
-1 of those that the second estimate finds, else in favour of the sign that was not tried.
+A second estimate takes as long as the first, so two quicker tests come first. The residual vertical moment of measured
+forces and motion is at least 1.2 times as large with the sign reversed in most fault-free trials, and at most 0.83
+times in most faulty ones, for which the reversed sign is tried first. Then the quadratic at the optimum predicts the
+odds, mostly within 1 of those that the second estimate gives, otherwise in favour of the sign that was not tried.
 """
 
 from __future__ import annotations
@@ -34,22 +35,23 @@ from kinertia.trial.centre_of_pressure import FIRM_LOAD_N, free_moment, with_tur
 from kinertia.trial.rms import rms
 
 _LARGE = 0.5
-"""Share of what is left, below which twice the free moments are too small for the measured motion to judge."""
+"""Share of the residual below which twice the free moments are too small for the measured motion to judge."""
 _PLAINLY = 1.2
-"""Times as much left with the sign turned: it is right. Where so much less is left, the turned one is tried first."""
+"""Ratio of the residuals, reversed over measured sign, above which the sign is right; below its inverse the reversed
+sign is tried first."""
 _NONE_NM = 0.2
-"""RMS of free moments that are as good as none: turned, they move no joint moment by more than twice that."""
+"""RMS below which free moments are negligible: reversed, they change no joint moment by more than twice that."""
 VERTICAL = 4
-"""Moment about the upward axis, among force and moment."""
+"""Index of the vertical moment in a wrench."""
 
 
 @dataclass(frozen=True, eq=False)
 class Signed:
-    """The estimate with the likelier sign.
+    """The estimate with the likelier sign of the free moments.
 
     Attributes:
-        fitted: the estimate; its posterior has the sign.
-        ready: the person with the free moments that it is from.
+        fitted: the estimate; its posterior holds the sign.
+        ready: the prepared person with the free moments used.
     """
 
     fitted: SimultaneousFit
@@ -57,11 +59,11 @@ class Signed:
 
 
 def with_likelier_sign(ready: Prepared, fit: Callable[[Prepared, Sequence[Kinematics]], SimultaneousFit]) -> Signed:
-    """Fit a person's trials with the free moments as they are, or turned where that is likelier.
+    """Fit a person's trials with the free moments as measured, or with reversed sign if that is likelier.
 
     Args:
         ready: the person.
-        fit: the simultaneous estimate of a person, and of the same trials read otherwise.
+        fit: the simultaneous estimate of a person, which also evaluates the same trials with other ground reactions.
     """
     rms_nm = rms(np.concatenate([_free_nm(k.foot_loads) for k in ready.kinematics]))
     left = _left_turned(ready) if rms_nm >= _NONE_NM else np.inf
@@ -93,10 +95,10 @@ def with_likelier_sign(ready: Prepared, fit: Callable[[Prepared, Sequence[Kinema
 
 
 def with_undisputed_plates(known: InstrumentPrior, errors: Sequence[CalibrationEntry]) -> InstrumentPrior:
-    """What is known of the plates, where only one of both signs displaces a plate along an axis: none is far off.
+    """Return the prior without large plate displacements along axes on which only one sign displaces a plate.
 
-    Both are as likely, and the plate is rather where the file has it. Its position keeps the deviation of all plates,
-    which then is in the error bars.
+    Both signs are equally likely, and the plate is rather where the file has it. Its position keeps the standard
+    deviation of all plates, which then enters the uncertainty of the moments.
     """
     disputed = {one.axis for one in errors if one.quantity == POSITION and one.contradicted_by == OTHER_SIGN}
     if not disputed:
@@ -110,8 +112,9 @@ def _with_sign(fitted: SimultaneousFit, sign: FreeMomentSign) -> SimultaneousFit
 
 
 def _left_turned(ready: Prepared) -> float:
-    """Of what forces and the measured motion leave with the literature's body, how many times as much it is with the
-    sign turned, on average over the trials.
+    """Return how many times as large the residual vertical moment is with the sign reversed, averaged over the trials.
+
+    It is the residual of forces and measured motion with literature parameters.
     """
     ratios = []
     for k in ready.kinematics:
@@ -122,11 +125,12 @@ def _left_turned(ready: Prepared) -> float:
 
 
 def left_moments_nm(left: np.ndarray, foot_loads: np.ndarray) -> tuple[float, float]:
-    """RMS about its mean of what forces and motion leave of the vertical moment, N m: as measured, and with the free
-    moments' sign turned. Both alike where the free moments are too small to tell.
+    """Return the RMS residual vertical moment (N m, mean removed), as measured and with the free moments reversed.
+
+    Both are equal where the free moments are too small to judge.
 
     Args:
-        left: (w,) N m, as measured.
+        left: (w,) N m, residual as measured.
         foot_loads: (w, 2, 6) on both feet.
     """
     free = _free_nm(foot_loads)
@@ -135,9 +139,9 @@ def left_moments_nm(left: np.ndarray, foot_loads: np.ndarray) -> tuple[float, fl
 
 
 def left_without_offsets_nm(left: np.ndarray, foot_loads: np.ndarray) -> tuple[float, float]:
-    """The same as `left_moments_nm`, each without what an error of either plate in proportion to its load explains.
+    """Return the results of `left_moments_nm`, less moment errors proportional to the load of either foot.
 
-    An offset under one foot is no wrong sign, though the turned moments may go with the motion better.
+    A displaced plate under one foot is not a wrong sign, although the reversed moments may fit the motion better.
     """
     free = _free_nm(foot_loads)
     loads = np.column_stack([foot_loads[..., 1], np.ones(len(left))])
@@ -152,7 +156,7 @@ def _left_nm(left: np.ndarray, free: np.ndarray) -> tuple[float, float]:
 
 
 def _free_nm(foot_loads: np.ndarray) -> np.ndarray:
-    """(w,) N m of both feet's loads (w, 2, 6)."""
+    """Return the sum (w,) N m of both feet's free moments, from loads (w, 2, 6)."""
     firm = foot_loads[..., 1] >= FIRM_LOAD_N
     result: np.ndarray = free_moment(np.where(firm[..., None], foot_loads, 0.0)).sum(axis=1)
     return result

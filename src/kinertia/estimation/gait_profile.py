@@ -1,12 +1,12 @@
 """Computes Gait Profile Score and Movement Analysis Profile: the distance from normal gait in degrees.
 
 Baker, McGinley, Schwartz et al. 2009, The Gait Profile Score and Movement Analysis Profile, Gait & Posture 30:265-269.
-Of nine kinematic variables the Gait Variable Score (GVS) is the root mean square difference, over the gait cycle,
-between a person's curve and the mean of people without pathology; the GVS together are the Movement Analysis Profile.
-The Gait Profile Score of a side is the root mean square of its nine GVS; that of the person is of fifteen: those of
-hip, knee, ankle and foot of both sides, and the pelvis's once, of the left side's cycle.
+The Gait Variable Score (GVS) of each of nine kinematic variables is the root mean square difference, over the gait
+cycle, between a person's curve and the mean of people without pathology; together, the GVS form the Movement Analysis
+Profile. The Gait Profile Score of a side is the root mean square of its nine GVS; the overall score uses fifteen: hip,
+knee, ankle and foot of both sides, and the pelvis once, over the left side's cycle.
 
-Angles are the clinical ones, as in the paper, by inverse kinematics.
+Angles are clinical angles, as in the paper, from inverse kinematics.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ _PELVIS_SIDE = "l"
 
 
 def gait_profile(fit: Fit, norms: Mapping[str, Norm]) -> GaitProfile:
-    """Scores of a fit against norms.
+    """Compute the scores of a fit against norms.
 
     Args:
         fit: with strides.
         norms: by quantity, as `kinertia norms` writes them.
 
     Raises:
-        KinertiaError: norms lack a variable or are of another convention, or there are no strides.
+        KinertiaError: norms lack a variable or have another convention, or there are no strides.
     """
     check_convention(fit, {name: norm for name, norm in norms.items() if name in CLINICAL_ANGLES})
     expect_all_nine(norms)
@@ -51,7 +51,7 @@ def gait_profile(fit: Fit, norms: Mapping[str, Norm]) -> GaitProfile:
 
 
 def expect_all_nine(norms: Mapping[str, Norm]) -> None:
-    """Raise a KinertiaError where norms lack a variable of the score."""
+    """Raise a KinertiaError if norms lack a variable of the score."""
     if lacking := [one.title for quantity, one in CLINICAL_ANGLES.items() if quantity not in norms]:
         raise KinertiaError(
             f"the norms lack {', '.join(lacking)}, which the Gait Profile Score needs: make them with kinertia norms"
@@ -59,7 +59,7 @@ def expect_all_nine(norms: Mapping[str, Norm]) -> None:
 
 
 def scores(curves: MeanCurves, norms: Mapping[str, Norm], said: Sequence[str] = ()) -> GaitProfile:
-    """Scores of a person's mean curves against norms of all nine variables."""
+    """Compute the scores of a person's mean curves against norms of all nine variables."""
     unknown = np.full(len(PERCENT), np.nan)
     gvs = {
         (quantity, side): variable_score(curves.get((quantity, side), unknown), norms[quantity])
@@ -73,7 +73,7 @@ def scores(curves: MeanCurves, norms: Mapping[str, Norm], said: Sequence[str] = 
 
 
 def remarks(fit: Fit, norm: Norm) -> tuple[str, ...]:
-    """In which way norms are not of people like this one, in sentences."""
+    """List the respects in which norms are not from people like this one, in sentences."""
     found, age, speed = [], fit.subject.age_years, mean_speed_m_s(fit)
     if norm.age_years is not None:
         low, high = norm.age_years
@@ -93,7 +93,7 @@ def remarks(fit: Fit, norm: Norm) -> tuple[str, ...]:
 
 
 def check_convention(fit: Fit, norms: Mapping[str, Norm]) -> None:
-    """Raise a KinertiaError where norms say that they are of another convention than a fit."""
+    """Raise a KinertiaError if norms state a different convention from a fit's."""
     own = convention_of(fit)
     for norm in norms.values():
         if norm.convention and norm.convention != own:

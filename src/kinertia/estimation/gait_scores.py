@@ -1,4 +1,4 @@
-"""Scores of a gait, variable by variable and stride by stride: what `gait_profile` gives."""
+"""Computes gait scores variable by variable and stride by stride, and defines `GaitProfile`."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ if TYPE_CHECKING:
 OVERALL = "all fifteen"
 """What the person's score is of."""
 _LEAST_MEASURED = 0.95
-"""Share of the cycle that must be known of a curve."""
+"""Least share of the cycle in which a curve must be known."""
 
 
 @dataclass(frozen=True, eq=False)
 class GaitProfile:
-    """Scores of one person, in degrees; NaN where a curve is not known over the cycle.
+    """Gait scores of one person, in degrees; NaN where a curve is not known over the cycle.
 
     Attributes:
         gvs_deg: Gait Variable Score by quantity and side ("r", "l"): the Movement Analysis Profile.
         gps_deg: Gait Profile Score by side.
-        overall_deg: of the person.
-        norm_people: how many people the norms are of; None where their file does not say.
-        remarks: in which way the norms are not of people like this one; empty if nothing is known of that.
+        overall_deg: overall Gait Profile Score of the person.
+        norm_people: number of people in the norms; None where their file does not state it.
+        remarks: respects in which the norms are not from people like this one; empty if none is known.
     """
 
     gvs_deg: Mapping[tuple[str, str], float]
@@ -43,13 +43,13 @@ class GaitProfile:
 
     @property
     def table(self) -> pd.DataFrame:
-        """A row per score: score ("GVS", "GPS"), variable, side ("r", "l", "both"), degrees."""
+        """Return a table with one row per score: score ("GVS", "GPS"), variable, side ("r", "l", "both"), degrees."""
         import pandas as pd
 
         return pd.DataFrame(self.columns())
 
     def columns(self) -> dict[str, list[Any]]:
-        """The columns of `table`, by name."""
+        """Return the columns of `table`, by name."""
         rows: list[tuple[str, str, str, float]] = [
             ("GVS", CLINICAL_ANGLES[quantity].title, side, value) for (quantity, side), value in self.gvs_deg.items()
         ]
@@ -60,7 +60,7 @@ class GaitProfile:
 
 
 def variable_score(curve: np.ndarray, norm: Norm) -> float:
-    """Gait Variable Score (deg) of a curve (101,); NaN where too little of the cycle is known.
+    """Compute the Gait Variable Score (deg) of a curve (101,); NaN if too little of the cycle is known.
 
     >>> variable_score(np.full(101, 3.0), Norm(np.array([0.0, 100.0]), np.zeros(2), np.ones(2)))
     3.0
@@ -72,13 +72,15 @@ def variable_score(curve: np.ndarray, norm: Norm) -> float:
 
 
 def rms_deg(values: np.ndarray | Sequence[float]) -> float:
-    """Root mean square; NaN where one of the values is."""
+    """Return the root mean square (deg); NaN if one of the values is NaN."""
     return float(np.sqrt(np.mean(np.square(values))))
 
 
 def with_norms(columns: Mapping[str, Any], norms: Mapping[str, Norm], skeleton: Skeleton) -> dict[str, Any]:
-    """The columns of `cycles.csv` with four more, NaN where there is none: norm, norm_sd (mean and SD of the norms),
-    gvs (Gait Variable Score of the stride's clinical angle) and gps (of the stride: root mean square of its nine).
+    """Add four columns to those of `cycles.csv`, NaN where undefined: norm, norm_sd, gvs and gps.
+
+    The first two are mean and SD of the norms; gvs is the Gait Variable Score of the stride's clinical angle, gps the
+    root mean square of the stride's nine scores.
     """
     flipped = {f"{name}_{kind}" for name in opposite_on_left(skeleton) for kind in ("angle", "moment")}
     size, rows = len(PERCENT), len(columns["value"])

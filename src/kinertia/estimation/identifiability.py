@@ -1,10 +1,10 @@
-"""Classifies each body segment parameter by what gait shows of it, and finds the combinations that it shows.
+"""Classifies each body segment parameter by how well gait determines it, and finds the determined combinations.
 
-Ground reactions see only combinations of the parameters, the base parameters: mass on the axis of a joint may be
-counted to either of the segments that it connects, and no motion tells (Gautier and Khalil 1990, IEEE T-RA 6:368).
-Which combinations those are follows from the root regressor over random motions; which ones a recorded motion shows,
-from the regressor over its frames, with columns in prior SDs of the parameters and rows in deviations of the
-noise.
+Ground reactions depend only on combinations of the parameters, the base parameters: mass on the axis of a joint can be
+assigned to either of the segments that it connects, and no motion distinguishes them (Gautier and Khalil 1990, IEEE
+T-RA 6:368). These combinations follow from the root regressor over random motions; those that a recorded motion
+determines follow from the regressor over its frames, with columns in prior SDs of the parameters and rows in standard
+deviations of the noise.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from kinertia.motion.dynamics import Motion, root_regressor
 from kinertia.motion.frame_chunks import pieces
 
 MEASURED, INFORMED = 0.75, 0.25
-"""Information from which a parameter counts as measured, as informed."""
+"""Variance reduction above which a parameter counts as well informed ("measured"), as partly informed ("informed")."""
 _RANDOM_STATES = 60
 _ROUNDING = 1e-8
-"""Share of the largest singular value below which one counts as zero."""
+"""Share of the largest singular value below which a singular value counts as zero."""
 _ENOUGH_FRAMES = 6000
-"""Longer motions are sampled at about this many frames: one of every few neighbours, weighted for all of them. Gains
-of synthetic walks of up to ten minutes change by less than 1 %."""
+"""Longer motions are sampled at about this many frames, one of every few neighbours, weighted for all of them. Gains of
+synthetic walks of up to ten minutes change by less than 1 %."""
 _LISTED = 6
 _NAMED_SHARE = 0.85
 _MOST_NAMES = 4
@@ -41,8 +41,9 @@ _PLURALS = {"foot": "feet", "calcn": "heels"}
 
 
 def evidence(information: float) -> str:
-    """What stands behind an estimate of this information (0 to 1): "measured", "informed" or "assumed"; "held" where it
-    is not a number, since the parameter was not estimated.
+    """Classify the variance reduction (0 to 1) of a parameter: "measured", "informed" or "assumed"; "held" if NaN.
+
+    NaN stands for a parameter that was not estimated.
     """
     if np.isnan(information):
         return "held"
@@ -51,13 +52,13 @@ def evidence(information: float) -> str:
 
 @dataclass(frozen=True)
 class Combination:
-    """Body segment parameters that a motion shows together.
+    """A combination of body segment parameters that a motion determines.
 
     Attributes:
-        words: what changes together, largest share first.
-        gain: prior SD of the combination over the deviation with which these frames would show it, were the
-            motion known exactly.
-        weights: "segment.parameter" -> share, in prior SDs; their squares add to one.
+        words: the parameters in it, largest share first.
+        gain: prior SD of the combination over the standard deviation with which these frames would determine it if the
+            motion were known exactly.
+        weights: "segment.parameter" -> share, in prior SDs; their squares sum to one.
     """
 
     words: str
@@ -67,14 +68,14 @@ class Combination:
 
 @dataclass(frozen=True)
 class BaseParameters:
-    """What root equations tell of body segment parameters.
+    """Combinations of body segment parameters that the root equations determine, and those that they cannot.
 
     Attributes:
-        count: combinations that some motion of the model shows.
-        shown: of them, those that this motion shows better than the prior (gain above one, motion known exactly).
+        count: number of combinations that some motion of the model determines.
+        shown: number of them that this motion determines better than the prior (gain above one, motion known exactly).
         condition: largest over smallest gain of the base parameters.
-        best: the best shown, best first.
-        never: what no motion of this model shows, one phrase each.
+        best: the best determined combinations, best first.
+        never: combinations that no motion of this model determines, one phrase each.
     """
 
     count: int
@@ -91,13 +92,13 @@ def base_parameters(
     motions: Sequence[Motion],
     root_sd: Sequence[np.ndarray],
 ) -> BaseParameters:
-    """What these motions show, and what no motion shows.
+    """Compute which combinations these motions determine, and which no motion determines.
 
     Args:
         skeleton, bsp: the model.
         prior_sd: (s, 10) prior SDs of the parameters, in the order of `BodySegmentParameters.table`.
         motions: frames whose ground contact is measured, one entry per trial.
-        root_sd: per trial (6,) deviations of the root load: N, N m.
+        root_sd: per trial (6,) standard deviations of the root load: N, N m.
     """
     scale = block_diagonal(dynamic_by_table(bsp.mass_kg, bsp.com_m)) * prior_sd.ravel()
     anything = _scaled_regressor(skeleton, bsp, _random_motion(len(skeleton.coordinates)), np.ones(6)) @ scale
@@ -125,7 +126,7 @@ def base_parameters(
 
 
 def _one_of(every: int, count: int) -> np.ndarray:
-    """One frame, drawn, of every so many neighbours of so many frames: even steps might meet a gait at few phases."""
+    """Draw one frame from every block of `every` neighbours: even steps might sample only few phases of a gait."""
     starts = np.arange(0, count - every + 1, every)
     return starts + np.random.default_rng(0).integers(0, every, len(starts))
 
@@ -145,14 +146,14 @@ def _random_motion(count: int) -> Motion:
 
 
 def _signed(vectors: np.ndarray) -> np.ndarray:
-    """The vectors (k, p) with their largest element positive."""
+    """Flip the signs of vectors (k, p) so that their largest element is positive."""
     largest = np.take_along_axis(vectors, np.abs(vectors).argmax(axis=1)[:, None], axis=1)
     result: np.ndarray = vectors * np.sign(largest)
     return result
 
 
 def _words(segments: Sequence[str], vector: np.ndarray) -> str:
-    """What changes together; a left and a right that change alike, or oppositely, as mirror images count as one."""
+    """Describe the parameters in a combination; equal or opposite (mirrored) changes of both sides count as one."""
     rows = vector.reshape(-1, len(PARAMETERS))
     terms: list[tuple[float, str]] = []
     for i, segment in enumerate(segments):
@@ -185,7 +186,7 @@ def _words(segments: Sequence[str], vector: np.ndarray) -> str:
 def _never(
     skeleton: Skeleton, segments: Sequence[str], anything: np.ndarray, count: int, rounding: float
 ) -> tuple[str, ...]:
-    """Phrases for the null space (columns of `anything`), joint by joint; singular values up to `rounding` are zero."""
+    """Describe the null space (columns of `anything`), joint by joint; singular values up to `rounding` are zero."""
     phrases, explained = [], 0
     for parent, child in _neighbours(skeleton, segments):
         columns = np.concatenate([10 * segments.index(name) + np.arange(10) for name in (parent, child)])
@@ -211,7 +212,7 @@ def _hidden_between(parent: str, child: str, hidden: int) -> str:
 
 
 def _neighbours(skeleton: Skeleton, segments: Sequence[str]) -> list[tuple[str, str]]:
-    """Pairs of segments with mass that a joint, or joints with massless segments between, connect."""
+    """Return pairs of segments with mass that are connected by a joint, or by joints with massless segments between."""
     parents = {joint.child: joint.parent for joint in skeleton.joints}
     pairs = []
     for child in segments:

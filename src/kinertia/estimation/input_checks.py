@@ -21,18 +21,18 @@ T = TypeVar("T")
 
 
 def known(value: T | None) -> T:
-    """The value of a field that the subject file or `complete_subject` has filled in."""
+    """Return the value of a field that the subject file or `complete_subject` has filled in."""
     if value is None:
         raise ValueError("complete_subject must come first")
     return value
 
 
 def check_trials(recordings: Sequence[Recording]) -> None:
-    """Raise unless there are trials, and several have names by which results can tell them apart.
+    """Raise an error unless there are trials, whose names distinguish their results.
 
     Raises:
-        SettingsError: there is none.
-        TrialError: a name that cannot be that of a folder beside the others'.
+        SettingsError: there is no trial.
+        TrialError: a name is not usable as a folder beside those of the other trials.
     """
     if not recordings:
         none = finding("S301")
@@ -45,14 +45,14 @@ def check_trials(recordings: Sequence[Recording]) -> None:
 
 
 def complete_subject(subject: Subject, recordings: Sequence[Recording], mass_only: bool = False) -> Subject:
-    """Mass and height from the files where the user gave none.
+    """Fill in mass and height from the files where the user gave none.
 
     Args:
         subject, recordings: what the user states, and the files.
         mass_only: height and sex may stay unknown.
 
     Raises:
-        SubjectError: neither the user nor a file gives mass or height, the user no sex, or a value cannot be true.
+        SubjectError: neither the user nor a file gives mass or height, the user no sex, or a value is impossible.
     """
     if missing := lacking(subject, recordings, mass_only):
         quantities = ", ".join(missing.values())
@@ -67,7 +67,7 @@ def complete_subject(subject: Subject, recordings: Sequence[Recording], mass_onl
 
 
 def lacking(subject: Subject, recordings: Sequence[Recording], mass_only: bool = False) -> dict[str, str]:
-    """What neither the user nor a file states of mass, stature and sex: the fields, and what they are called.
+    """Return which of mass, stature and sex neither the user nor a file states: the fields, and their names.
 
     Args:
         subject, recordings: what the user states, and the files.
@@ -78,13 +78,13 @@ def lacking(subject: Subject, recordings: Sequence[Recording], mass_only: bool =
 
 
 def _filed(subject: Subject, field: str, recordings: Sequence[Recording]) -> Any:
-    """What the user states, else the first file that does; no file knows the sex."""
+    """Return the value that the user states, or else the first file that does; no file states the sex."""
     stated = [getattr(one, field, None) for one in (subject, *recordings)]
     return next((value for value in stated if value is not None), None)
 
 
 def mass_by_force_kg(literature: BodySegmentParameters, foot_loads: np.ndarray, residual: np.ndarray) -> float:
-    """Body mass by the vertical ground reaction over a window, whatever the CoM's acceleration.
+    """Compute body mass (kg) from the vertical ground reaction over a window, whatever the CoM's acceleration.
 
     The residual of the uncorrected motion is P = m (a + g) - F with the literature's m, so the mass that leaves no
     mean vertical residual is m F / (F + P), with means over the window.

@@ -1,23 +1,22 @@
 """Learns the mean and spread of a group's body segment parameters from its fits (empirical Bayes).
 
-Each person's recordings say little about most parameters; all together they say much about *their* mean and spread. A
-fit's posterior is its prior times what the recordings say; taken apart, the latter of all people is joined with a
-prior of the group, and expectation-maximisation (Dempster, Laird & Rubin 1977, J R Stat Soc B 39:1) finds the mean and
-covariance of the group. Where the people say nothing, its error bars are wider than the literature's, which are those
-of a person of the tables.
+Each person's recordings contain little information on most parameters; together they contain much on the group's mean
+and spread. A fit's posterior is its prior times the information of the recordings. That information, from all people,
+is combined with a prior of the group, and expectation-maximisation (Dempster, Laird & Rubin 1977, J R Stat Soc B 39:1)
+finds the mean and covariance of the group. Where the people contribute nothing, the group's uncertainty is larger than
+the literature's, which applies to a person of the tables.
 
 The prior of the group:
 
 - its people are as far from their mean as the literature's are from the tables, which counts as much as 120 people;
-- its mean differs from the tables in some parameters much and in most of them little: Student's t with 3 degrees of
-  freedom, one draw for a parameter of both sides (Tipping 2001, J Mach Learn Res 1:211, does it for single weights). A
-  normal prior spreads a heavy trunk over whatever else would explain the trials, and many people are needed to
-  take that back;
-- a mean segment that is heavier has moments of inertia that are larger in proportion.
+- its mean differs from the tables much in some parameters and little in most: Student's t with 3 degrees of freedom,
+  one draw for a parameter of both sides (Tipping 2001, J Mach Learn Res 1:211, does it for single weights). A normal
+  prior spreads a heavy trunk over whatever else would explain the trials, and many people are needed to correct that;
+- a heavier mean segment has proportionally larger moments of inertia.
 
-All in relative parameters: distance from the person's own literature values, in the literature's deviations. What the
-recordings say is linear in the dynamic parameters (`person_information`); mean and spread of these are taken for those
-of masses, centres of mass and moments about them, which they are to first order.
+All parameters are relative: distance from the person's own literature values, in the literature's standard deviations.
+The information of the recordings is linear in the dynamic parameters (`person_information`); the mean and spread of
+these are used for those of masses, centres of mass and moments about them, which is correct to first order.
 """
 
 from __future__ import annotations
@@ -38,32 +37,33 @@ from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.shared_coordinates import by_side
 
 BETWEEN, WITHIN = 0.4, 1.0
-"""Variances of a group's mean about the tables, and of its people about their mean, over the literature's."""
+"""Variances of a group's mean about the tables, and of its people about their mean, relative to the literature's."""
 PSEUDO_PEOPLE = 120.0
-"""The literature's spread within a group counts as much as so many people: as many as a body has parameters, since the
-correlations of so many take more people than groups have."""
+"""The literature's spread within a group counts as much as so many people: as many as a body has parameters, since
+estimating the correlations of so many takes more people than groups have."""
 _FREEDOM = 3.0
-"""Degrees of freedom of Student's t of the mean."""
+"""Degrees of freedom of Student's t for the mean."""
 _TAILS = _FREEDOM / (_FREEDOM - 2.0)
 """Variance of Student's t over its squared scale."""
 _PSEUDO_SCALES = 4.0
-"""`BETWEEN` counts as much as so many parameters' means for the scale that they have in common."""
+"""`BETWEEN` counts as much as so many parameters' means in estimating the scale that they have in common."""
 FEWEST_PEOPLE = 5
 _ITERATIONS, _SETTLED = 200, 1e-3
 _NOTHING = 1e-12
-"""Eigenvalues of the information below this share of the largest are rounding."""
+"""Eigenvalues of the information below this share of the largest are rounding errors."""
 
 
 @dataclass(frozen=True, eq=False)
 class LearntPrior:
-    """A group's people in relative parameters.
+    """Mean and spread of a group's people, in relative parameters.
 
     Attributes:
         segments: names.
-        mean: (10 s,) of the group.
-        mean_sd: (10 s,) how well that is known.
-        covariance: (10 s, 10 s) of one more person of the group about `mean`: spread and what is not known of the mean.
-        people: how many it was learnt from.
+        mean: (10 s,) mean of the group.
+        mean_sd: (10 s,) its standard deviation.
+        covariance: (10 s, 10 s) of one more person of the group about `mean`: the group's spread plus the uncertainty
+            of the mean.
+        people: number of people it was learnt from.
     """
 
     segments: tuple[str, ...]
@@ -74,18 +74,18 @@ class LearntPrior:
 
     @property
     def learnt(self) -> np.ndarray:
-        """(10 s,) 1 - variance / that of a group of which nothing is known: 0 nothing learnt."""
+        """Variance reduction (10 s,), 1 - variance / variance of a group without data: 0 means nothing learnt."""
         result: np.ndarray = np.maximum(0.0, 1.0 - np.diag(self.covariance) / (BETWEEN + WITHIN))
         return result
 
     @classmethod
     def from_file(cls, file: PopulationFile) -> LearntPrior:
-        """What `kinertia population` wrote."""
+        """Read the prior from a file of `kinertia population`."""
         mean, mean_sd, covariance = (np.array(values) for values in (file.mean, file.mean_sd, file.covariance))
         return cls(file.segments, mean, mean_sd, covariance, len(file.people))
 
     def as_file(self, version: str, people: Sequence[str], files: Sequence[str]) -> PopulationFile:
-        """What is written of it: with the version, the people's names and the SHA-256 of their files."""
+        """Return the file to be written, with the version, the people's names and the SHA-256 of their files."""
         return PopulationFile(
             kinertia=version,
             people=tuple(people),
@@ -97,7 +97,7 @@ class LearntPrior:
         )
 
     def of(self, literature: BspPrior) -> BspPrior:
-        """The prior of a person of the group, around the person's own literature values.
+        """Return the prior of one person of the group, around the person's own literature values.
 
         Raises:
             PriorError: it was learnt with another model.
@@ -114,13 +114,13 @@ class LearntPrior:
 
 
 def learn(people: Sequence[PersonInformation]) -> LearntPrior:
-    """The group's prior.
+    """Learn the group's prior from its people.
 
     Args:
         people: of one group, at least `FEWEST_PEOPLE`.
 
     Raises:
-        PriorError: too few, or estimated with different models.
+        PriorError: there are too few people, or they were estimated with different models.
     """
     if len(people) < FEWEST_PEOPLE:
         reason = f"its mean and spread take at least {FEWEST_PEOPLE}"
@@ -128,7 +128,7 @@ def learn(people: Sequence[PersonInformation]) -> LearntPrior:
     segments = people[0].segments
     if other := next((one for one in people if one.segments != segments), None):
         raise unusable(other.name, f"estimated with another model than {people[0].name}")
-    # in coordinates in which the literature's people are uncorrelated, where nothing is close to singular
+    # in coordinates in which the literature's people are uncorrelated, so that nothing is nearly singular
     correlations = np.mean([_correlation(one.literature.covariance) for one in people], axis=0)
     root = np.linalg.cholesky(correlations)
     seen, means = _Seen.of(root, people), _Means.of(root, people)
@@ -157,10 +157,10 @@ def _correlation(covariance: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class _Means:
-    """Student's t of a group's mean, as normal with a squared scale for each parameter of both sides.
+    """Student's t prior of a group's mean, as a normal with one squared scale for each parameter of both sides.
 
     Attributes:
-        root: (k, k) of the coordinates in which the learning is done.
+        root: (k, k) defines the coordinates x used for learning: relative parameters = root x.
         correlation: (k, k) of the mean's relative parameters.
         blocks: rows of the parameters that share a scale.
     """
@@ -171,7 +171,7 @@ class _Means:
 
     @classmethod
     def of(cls, root: np.ndarray, people: Sequence[PersonInformation]) -> _Means:
-        """By the people's literature."""
+        """Build the prior from the people's literature values."""
         with_mass = np.mean([_moments_with_mass(one.literature) for one in people], axis=0)
         sides = by_side(people[0].segments)
         return cls(
@@ -185,7 +185,7 @@ class _Means:
         )
 
     def covariance(self, scales: np.ndarray) -> np.ndarray:
-        """(k, k) of the mean in the coordinates of `root`."""
+        """Return the covariance (k, k) of the mean in the coordinates of `root`."""
         each = np.empty(len(self.root))
         for rows, scale in zip(self.blocks, scales, strict=True):
             each[rows] = np.sqrt(scale)
@@ -194,7 +194,7 @@ class _Means:
         return result
 
     def scales(self, mean: np.ndarray, of_mean: np.ndarray, scales: np.ndarray) -> np.ndarray:
-        """What mean and covariance of the mean, in the coordinates of `root`, make of the squared scales."""
+        """Update the squared scales from mean and covariance of the mean, in the coordinates of `root`."""
         square = self.root @ (of_mean + np.outer(mean, mean)) @ self.root.T
         common = (len(scales) + _PSEUDO_SCALES) / (np.sum(1.0 / scales) + _PSEUDO_SCALES * _TAILS / BETWEEN)
         return np.array(
@@ -207,7 +207,7 @@ class _Means:
 
 
 def _moments_with_mass(literature: BspPrior) -> np.ndarray:
-    """(k, k) relative parameters from those at radii of gyration that do not change with the mass."""
+    """Return the matrix (k, k) to relative parameters from those in which radii of gyration are independent of mass."""
     values = literature.mean.table() / literature.sd
     result = np.eye(values.size)
     for row, each in enumerate(values):
@@ -217,21 +217,21 @@ def _moments_with_mass(literature: BspPrior) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class _Seen:
-    """What all people's recordings say: roots (p, k, r) of the information, and the right-hand sides (p, k)."""
+    """Information of all people's recordings: its roots (p, k, r), and the right-hand sides (p, k)."""
 
     roots: np.ndarray
     right: np.ndarray
 
     @classmethod
     def of(cls, root: np.ndarray, people: Sequence[PersonInformation]) -> _Seen:
-        """In the coordinates x of root x."""
+        """Transform the people's information to the coordinates x of root x."""
         values, vectors = np.linalg.eigh([root.T @ one.information @ root for one in people])
         most = int((values > _NOTHING * values.max()).sum(axis=1).max())
         roots = vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]
         return cls(roots[:, :, len(root) - most :], np.array([root.T @ one.right for one in people]))
 
     def mean(self, within: np.ndarray, between: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The group's mean and its covariance, given the spread within the group and that of means."""
+        """Compute the group's mean and its covariance, given the spread within the group and of group means."""
         inner = np.linalg.inv(np.eye(self.roots.shape[2]) + self._inner(within))
         of_all = (self.roots @ inner @ self.roots.transpose(0, 2, 1)).sum(axis=0)
         shown = self.right @ within
@@ -241,10 +241,10 @@ class _Seen:
         return covariance @ right.sum(axis=0), covariance
 
     def spread(self, within: np.ndarray, mean: np.ndarray, of_mean: np.ndarray) -> np.ndarray:
-        """(k, k) expected sum of squares of the people about their mean."""
+        """Return the expected sum of squares (k, k) of the people about their mean."""
         seen = within @ self.roots
         inner = np.linalg.inv(np.eye(self.roots.shape[2]) + self._inner(within))
-        # of each person: covariance given the mean, and how the expectation goes with the mean
+        # for each person: covariance given the mean, and how the expectation depends on the mean
         posterior = within - seen @ inner @ seen.transpose(0, 2, 1)
         with_mean = seen @ inner @ self.roots.transpose(0, 2, 1)
         away = np.einsum("pij,pj->pi", posterior, self.right) - with_mean @ mean

@@ -1,8 +1,8 @@
 """Averages a person's curves over the gait cycle, per quantity and side, for norms and gait scores.
 
-Angles are those of inverse kinematics, which knows the whole cycle; moments, powers and ground reactions are the
-estimate's. Coordinates of pelvis and trunk that are opposite on the two sides (obliquity, rotation, lateral bending)
-are mirrored on the left, so that one norm stands for both.
+Angles come from inverse kinematics, which covers the whole cycle; moments, powers and ground reactions from the
+estimate. Coordinates of pelvis and trunk that are opposite on the two sides (obliquity, rotation, lateral bending) are
+mirrored on the left, so that one norm applies to both.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ _KINDS: Mapping[Stage, tuple[str, ...]] = {
 }
 
 MeanCurves = Mapping[tuple[str, str], np.ndarray]
-"""By quantity and side (101,), in the units of `cycles.csv`; NaN where nothing was measured."""
+"""Mean curves (101,) by quantity and side, in the units of `cycles.csv`; NaN where nothing was measured."""
 
 
 def convention_of(fit: Fit) -> str:
-    """Which model a fit's curves are of, in words; those of another are off by degrees, clinical angles as well."""
+    """Describe the model that a fit's curves belong to; even clinical angles differ by degrees between models."""
     if fit.file is None:
         return f"Kinertia {_BUILT_IN}"
     return "OpenSim model with " + " ".join(sorted(by_side(fit.skeleton.coordinates)))
 
 
 def mean_curves(fit: Fit) -> MeanCurves:
-    """Mean over the strides of a fit; none without strides."""
+    """Average the curves of a fit over its strides; empty without strides."""
     found: dict[tuple[str, str], list[np.ndarray]] = {}
     flipped = {f"{name}_{kind}" for name in opposite_on_left(fit.skeleton) for kind in ("angle", "moment")}
     for stage, kinds in _KINDS.items():

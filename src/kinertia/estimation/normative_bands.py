@@ -1,4 +1,4 @@
-"""Computes normative bands from the fits of controls: mean and spread between people."""
+"""Computes normative bands from the fits of controls: mean and SD between people."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ from kinertia.trial.data import FEET
 
 FEWEST_PEOPLE = 2
 ADULT_YEARS = 18.0
-"""From then on."""
+"""Age from which a person counts as an adult."""
 
 
 @dataclass(frozen=True, eq=False)
 class Control:
-    """What norms take of one person.
+    """Data of one control for norms.
 
     Attributes:
         name: of the person.
         curves: by quantity (101,), mean of both sides.
-        age_years: as stated, if it was.
+        age_years: as stated, or None.
         speed_m_s: mean over all strides; NaN where unknown.
-        convention: of all quantities.
+        convention: of all quantities, as in `convention_of`.
     """
 
     name: str
@@ -41,7 +41,7 @@ class Control:
 
     @classmethod
     def of(cls, fit: Fit) -> Control:
-        """Of a fit.
+        """Extract the data from a fit.
 
         Raises:
             KinertiaError: it has no strides.
@@ -57,13 +57,13 @@ class Control:
 
 
 def mean_speed_m_s(fit: Fit) -> float:
-    """Over all strides; NaN where it is not known."""
+    """Return the mean speed (m/s) over all strides; NaN where it is not known."""
     speeds = np.array(spatiotemporal_columns(fit.trials)["speed_m_s"], dtype=float)
     return float(np.nanmean(speeds)) if np.isfinite(speeds).any() else float("nan")
 
 
 def mixture(people: Sequence[Control]) -> str:
-    """Whether children and adults are among these, in words; empty if not."""
+    """Report in words whether these controls mix children and adults, or may; empty if not."""
     ages = [one.age_years for one in people]
     stated = [age for age in ages if age is not None]
     children = sum(age < ADULT_YEARS for age in stated)
@@ -75,12 +75,12 @@ def mixture(people: Sequence[Control]) -> str:
 
 
 def band_columns(people: Sequence[Control]) -> dict[str, list[Any]]:
-    """The columns of a norms file, by name: a row per quantity and percent that two people and more have.
+    """Compute the columns of a norms file, by name: a row per quantity and percent that at least two people have.
 
     Every person counts once, however many strides were measured.
 
     Raises:
-        KinertiaError: fewer than two people, or people whose coordinates mean different things.
+        KinertiaError: there are fewer than two people, or their coordinates follow different conventions.
     """
     if len(people) < FEWEST_PEOPLE:
         raise KinertiaError(f"norms need at least {FEWEST_PEOPLE} different people; found {len(people)}")

@@ -1,10 +1,11 @@
-"""Separates what one person's recordings say of the body from the prior.
+"""Separates the information in one person's recordings from the prior.
 
-Motion and forces are linear in the dynamic parameters: mass, first moment, inertia about the joint. They are not in
-mass, centre of mass and inertia about it: which combination of these a walk shows depends on the body itself (a heavy
-shank shows its centre of mass better), and the mean of many people whose combinations go with their bodies is wrong by
-more than its error bar. So information is on the dynamic parameters, in coordinates that are, to first order about the
-literature's body, the relative parameters: distance from the literature in its deviations.
+Motion and forces are linear in the dynamic parameters: mass, first moment, inertia about the joint. They are not linear
+in mass, centre of mass and inertia about it: which combination of these a walk determines depends on the body itself (a
+heavy shank shows its centre of mass better), and the mean of many people whose combinations depend on their bodies is
+wrong by more than its uncertainty. So the information refers to the dynamic parameters, in coordinates that are, to
+first order about the literature's body, the relative parameters: distance from the literature in its standard
+deviations.
 """
 
 from __future__ import annotations
@@ -24,18 +25,18 @@ from kinertia.model.bsp import BodySegmentParameters, block_diagonal, dynamic_by
 
 _OWN_PRIOR = 1e-6
 _LEAST_SHARE = 0.01
-"""Of its prior variance that the recordings take away from a combination, or nothing is learnt from it: below, what the
-fit's curvature moves is more than what the recordings say, and all people's would add up."""
+"""Least share of a combination's prior variance that the recordings remove; below it nothing is learnt from it, since
+errors of the fit's curvature exceed the information of the recordings and would add up over people."""
 _STEPS, _SETTLED = 50, 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class PersonInformation:
-    """What one person's recordings say, the prior taken away.
+    """Information in one person's recordings, without the prior.
 
     Attributes:
-        name: whose.
-        literature: the prior of that person by the literature; its deviations are the units.
+        name: of the person.
+        literature: the person's prior from the literature; its standard deviations are the units.
         information: (10 s, 10 s) on the dynamic parameters, in relative coordinates.
         right: (10 s,) its right-hand side.
     """
@@ -47,11 +48,11 @@ class PersonInformation:
 
     @property
     def segments(self) -> tuple[str, ...]:
-        """Names, as in the tables."""
+        """Segment names, as in the tables."""
         return self.literature.mean.segments
 
     def with_prior(self, prior: BspPrior) -> tuple[BodySegmentParameters, np.ndarray]:
-        """The estimate that recordings and this prior make together, and the covariance (10 s, 10 s) of its table."""
+        """Combine the recordings with this prior: return the estimate and the covariance (10 s, 10 s) of its table."""
         sd, literature = self.literature.sd.ravel(), self.literature.mean.table().ravel()
         mean = (prior.mean.table().ravel() - literature) / sd
         before = np.linalg.inv(prior.covariance / np.outer(sd, sd))
@@ -81,8 +82,10 @@ class PersonInformation:
 
 
 def _relative(literature: BspPrior, body: BodySegmentParameters) -> tuple[np.ndarray, np.ndarray]:
-    """Derivative (10 s, 10 s) of the relative dynamic coordinates by the relative parameters at a body, and the
-    coordinates (10 s,) of the body."""
+    """Return the relative dynamic coordinates of a body, and their derivative with respect to the relative parameters.
+
+    The derivative (10 s, 10 s) comes first, then the coordinates (10 s,).
+    """
     sd, at = literature.sd.ravel(), literature.mean
     back = np.linalg.inv(block_diagonal(dynamic_by_table(at.mass_kg, at.com_m)))
     along = back @ block_diagonal(dynamic_by_table(body.mass_kg, body.com_m))
@@ -91,7 +94,7 @@ def _relative(literature: BspPrior, body: BodySegmentParameters) -> tuple[np.nda
 
 
 def unusable(person: str, reason: str, **evidence: Quantity) -> PriorError:
-    """S409: a person, or a group, from whom no prior can be learnt."""
+    """Make the error S409: no prior can be learnt from this person, or group."""
     found = with_evidence(
         "S409", Where(part=person), {**evidence, "person": Quantity(person), "reason": Quantity(reason)}
     )
@@ -99,10 +102,10 @@ def unusable(person: str, reason: str, **evidence: Quantity) -> PriorError:
 
 
 def information_of(fit: Fit) -> PersonInformation:
-    """What the recordings of a fit say.
+    """Extract the information in the recordings of a fit.
 
     Raises:
-        PriorError: it has no error bars, or leant on another prior than the literature's.
+        PriorError: the fit has no posterior, or used another prior than the literature's.
     """
     name = fit.subject.name
     if fit.posterior is None:
@@ -117,18 +120,19 @@ def information_of(fit: Fit) -> PersonInformation:
 def person_information(
     name: str, literature: BspPrior, own: BspPrior, estimate: BodySegmentParameters, covariance: np.ndarray
 ) -> PersonInformation:
-    """What recordings say by an estimate that leant on a prior of the literature's mean.
+    """Extract the information in recordings from an estimate whose prior had the literature's mean.
 
     Args:
-        name: whose.
-        literature: whose deviations are the units.
-        own: that the estimate leant on.
-        estimate, covariance: with the posterior covariance (10 s, 10 s) of its table.
+        name: of the person.
+        literature: the prior whose standard deviations are the units.
+        own: the prior that the estimate used.
+        estimate, covariance: the estimate, and the posterior covariance (10 s, 10 s) of its table.
     """
     sd = literature.sd.ravel()
     before, posterior = (each / np.outer(sd, sd) for each in (own.covariance, covariance))
     moved = (estimate.table() - literature.mean.table()).ravel() / sd
-    # in coordinates in which the estimate's prior is the unit matrix; what says next to nothing there is left out
+    # in coordinates in which the estimate's prior is the unit matrix; combinations with next to no information are left
+    # out
     root = np.linalg.cholesky(before)
     inverse = np.linalg.inv(root)
     left, vectors = np.linalg.eigh(inverse @ posterior @ inverse.T)
@@ -137,7 +141,7 @@ def person_information(
     back = (inverse.T @ vectors)[:, shown]
     information = (back * (1.0 / left[shown] - 1.0)) @ back.T
     score = back @ (along[shown] / left[shown]) - information @ moved
-    # of the relative parameters at the estimate; now of the dynamic ones
+    # so far on the relative parameters at the estimate; now on the dynamic ones
     derivative, dynamic = _relative(literature, estimate)
     to_dynamic = np.linalg.inv(derivative)
     information = to_dynamic.T @ information @ to_dynamic

@@ -1,19 +1,21 @@
-"""Adapts the literature's prior to people whom its tables do not describe: children, old and obese people.
+"""Adapts the literature's prior to people whom its tables do not describe: children, elderly and obese people.
 
-The tables are of young adults of ordinary build (de Leva's men were 24 years old, body-mass index 24). Where numbers
-for others are known they go in, with their source; where they are not, nothing is invented: deviations are half as
-large again. That is what one group shows whose numbers are known: together with the spread of people, the masses that
-Pavol found in the elderly are 1.58 times the tables' deviations from Dumas' values, and 1.33 times from de Leva's.
+The tables describe young adults of ordinary build (de Leva's men were 24 years old, body-mass index 24). Published
+numbers for other populations are used, with their source; where there are none, none are invented: standard deviations
+are multiplied by 1.5. The one group with known numbers supports this factor: including the spread of people, the masses
+that Pavol found in the elderly are 1.58 times the tables' standard deviations from Dumas' values, and 1.33 times from
+de Leva's.
 
-- elderly: segment masses by Pavol, Owings and Grabiner (2002, J Biomech 35:707), whose table could be read in one
-  transcription only; trunk and head together keep the tables' split between pelvis and torso, since trunks are cut in
-  other places. Deviations of masses stay, those of centres of mass and inertias grow.
+- elderly: segment masses by Pavol, Owings and Grabiner (2002, J Biomech 35:707), whose table was available in one
+  transcription only; trunk and head together keep the tables' split between pelvis and torso, since the trunk is cut
+  elsewhere in that study. Standard deviations of masses stay, those of centres of mass and inertias grow.
 - child: head and trunk are heavier, thighs, shanks and feet lighter than an adult's (Jensen 1986, J Biomech 19:359);
-  his coefficients could not be checked. Deviations grow.
-- other: anybody else whom the tables do not describe, pregnant or very muscular people, say. Deviations grow.
+  his coefficients could not be checked. Standard deviations grow.
+- other: anybody else whom the tables do not describe, for example pregnant or very muscular people. Standard deviations
+  grow.
 - obese: trunks are heavier, thighs and shanks lighter for the same mass (Chambers et al. 2010, Clin Biomech 25:131,
   people over 65); de Leva's masses were off by up to 60 % on average in a sample of working adults (Merrill et al.
-  2019). Deviations grow.
+  2019). Standard deviations grow.
 """
 
 from __future__ import annotations
@@ -30,29 +32,29 @@ from kinertia.model.bsp import BodySegmentParameters
 from kinertia.settings import Subject
 
 UNKNOWN_SPREAD = 1.5
-"""Factor on deviations for which no numbers are known."""
+"""Factor on standard deviations where no published numbers exist."""
 GROWN_UP_YEARS, OLD_YEARS = 18.0, 65.0
 OBESE_KG_M2 = 30.0
-"""Body-mass index from which on a person counts as obese (WHO)."""
+"""Body-mass index from which a person counts as obese (WHO)."""
 _SHORT_M = 1.4
-"""Below it a person without a stated age is likely a child, and in any case nobody of whom the tables are."""
+"""Stature below which a person without a stated age is likely a child, and in any case not described by the tables."""
 _PAVOL = {
     "male": {"thigh": 0.1127, "shank": 0.0441, "foot": 0.0127, "upper_arm": 0.0299, "forearm": 0.0175 + 0.0065},
     "female": {"thigh": 0.1162, "shank": 0.0456, "foot": 0.0123, "upper_arm": 0.0301, "forearm": 0.0141 + 0.0054},
 }
-"""Shares of body mass; the forearm with its hand."""
+"""Shares of body mass; forearm and hand together."""
 
 
 @dataclass(frozen=True)
 class Population:
-    """Which people the person is one of, why, and whether that was stated."""
+    """Population that the person belongs to, the reason, and whether the user stated it."""
 
     name: str
     reason: str
     stated: bool
 
     def finding(self, subject: Subject) -> Finding | None:
-        """S401 where the tables do not describe them."""
+        """Make S401 if the tables do not describe this population, else return None."""
         if self.name == "adult":
             return None
         evidence = {"population": Quantity(self.name), "reason": Quantity(self.reason)}
@@ -65,19 +67,19 @@ class Population:
 
 @dataclass(frozen=True, eq=False)
 class PopulationPrior:
-    """A prior, and what was assumed for it."""
+    """A prior, with findings about what was assumed for it."""
 
     prior: BspPrior
     findings: tuple[Finding, ...]
 
 
 def population_prior(prior: BspPrior, subject: Subject, body_kg: float | None = None) -> PopulationPrior:
-    """The prior for this person: as the subject states, or by age and body-mass index.
+    """Return the prior for this person's population, as stated or inferred from age and body-mass index.
 
     Args:
-        prior: the literature's, or that of a scaled model.
+        prior: from the literature or a scaled model.
         subject: mass and height may be unknown.
-        body_kg: of the body alone, where things were weighed with it; None: the mass of the subject.
+        body_kg: mass of the body alone, where objects were weighed with it; None: the mass of the subject.
     """
     population = population_of(subject, body_kg)
     if population.name == "elderly" and subject.sex is not None:
@@ -89,7 +91,10 @@ def population_prior(prior: BspPrior, subject: Subject, body_kg: float | None = 
 
 
 def population_of(subject: Subject, body_kg: float | None = None) -> Population:
-    """As stated, or by age, body-mass index and stature; arguments as of `population_prior`."""
+    """Return the stated population, or infer it from age, body-mass index and stature.
+
+    Arguments are as in `population_prior`.
+    """
     if subject.population is not None:
         return Population(subject.population, "the stated population", True)
     return Population(*_by_age_and_build(subject, body_kg or subject.mass_kg), False)
@@ -109,7 +114,7 @@ def _by_age_and_build(subject: Subject, mass_kg: float | None) -> tuple[str, str
 
 
 def _with_masses(prior: BspPrior, shares: dict[str, float]) -> BspPrior:
-    """The prior with these shares of body mass for the limbs; trunk and head have the rest. Shapes stay."""
+    """Return the prior with these shares of body mass for the limbs, and the rest for trunk and head; shapes stay."""
     mean = prior.mean
     kinds = [name.removesuffix("_r").removesuffix("_l") for name in mean.segments]
     total = mean.total_mass_kg

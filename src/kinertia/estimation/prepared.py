@@ -1,4 +1,4 @@
-"""Holds all that an estimator needs of a person: `Prepared`."""
+"""Defines `Prepared`: all input of an estimator for one person."""
 
 from __future__ import annotations
 
@@ -17,34 +17,34 @@ from kinertia.motion.kinematics import Kinematics
 from kinertia.settings import Attached, Overrule, Settings, Subject
 
 Progress = Callable[[str, float], None]
-"""Called with the stage's name and the share of it that is done (0 to 1)."""
+"""Called with the name of the stage and the share of it that is done (0 to 1)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """All that an estimator needs of a person: what recordings become before any estimate.
+    """All input of an estimator for one person: recordings, model and priors before any estimate.
 
     Attributes:
         subject: with mass and height filled in.
-        settings: those that it was prepared with, and is estimated with.
+        settings: used for preparation and estimate.
         skeleton: calibrated model.
-        literature: body segment parameters of its geometry; of an OpenSim model its own, at the person's mass.
-        prior: how far the person's may be from them.
-        uncertainty: what else the simultaneous estimate may move.
-        file: the OpenSim model that the skeleton is from, if it is.
+        literature: body segment parameters of its geometry; for an OpenSim model its own, at the person's mass.
+        prior: prior of the person's parameters around these.
+        uncertainty: what else the simultaneous estimate may change.
+        file: the OpenSim model that the skeleton is from, or None.
         kinematics: smoothed coordinates and ground reactions, one entry per trial.
         seconds: computing time by stage, one entry per trial.
         functional: kinematics of the trials whose markers alone are used.
-        findings: what was found so far, with what explains and what overrules each.
+        findings: all so far, with what explains and what overrules each.
         notes: how the trials were prepared, one sentence each.
-        attached: what the person wore or carried.
-        overrule, overrule_of: what the user overrules, everywhere and in single trials.
+        attached: objects that the person wore or carried.
+        overrule, overrule_of: findings that the user overrules, everywhere and in single trials.
         left_out: names of the trials that could not be used.
-        rules: how many rules were asked so far.
-        elbow_rotations_rad: side ("r", "l") -> by how much the trials turned an elbow axis of the static trial
+        rules: number of rules checked so far.
+        elbow_rotations_rad: side ("r", "l") -> rotation of the static trial's elbow axis by the trials
             (`arm_branch.elbow_rotations`).
-        torso_rotation_rad: by how much calibration would have turned the torso under its markers, which were kept from
-            it; None where it would not.
+        torso_rotation_rad: rotation of the torso under its markers that calibration would have made and that was
+            prevented; None if there was none.
 
     Examples:
         >>> ready = kinertia.prepare_subject("lab/subject.toml")
@@ -74,5 +74,5 @@ class Prepared:
 
     @property
     def carried(self) -> CarriedMass:
-        """What the scale says of the body, and of what the forces carry."""
+        """Mass of the body alone and total mass that the forces support, from the stated mass."""
         return CarriedMass.of(known(self.subject.mass_kg), self.attached)

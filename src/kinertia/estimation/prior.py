@@ -1,6 +1,6 @@
 """Builds the prior of the simultaneous estimate: how far parameters may be from the literature.
 
-Standard deviations, and where they come from (4a, 4b: Zatsiorsky 2002, segment by segment, 4b after regression on mass
+Standard deviations and their sources (4a, 4b: Zatsiorsky 2002, segment by segment, 4b after regression on mass
 and height; 4c: the spread between published methods):
 
 - mass: the larger of the between-subject residual deviation given mass and height (4b: thigh 7 %, shank 7 %, foot 10
@@ -9,12 +9,12 @@ and height; 4c: the spread between published methods):
 - CoM: 3.5 % of the segment's length along it (4a: 1.2-5.6 % of length), and 5 % of the length across it, or 8 mm (no
   source gives the transverse deviation; tables differ by that much from one another); 10 mm to the side for pelvis and
   torso, which are nearly symmetric (no source; organs are not);
-- inertia: 20 % on the second moment of the mass in every direction, half of the variance common to all directions;
-  moments of inertia come out at 16-20 % (4b: 12-24 %, much the same in all directions). They cannot vary independently:
-  with 20 % on each, hardly a person in a thousand would be physically possible.
+- inertia: 20 % on the second moment of the mass in every direction, half of the variance common to all directions; for
+  moments of inertia this amounts to 16-20 % (4b: 12-24 %, similar in all directions). They cannot vary independently:
+  with 20 % on each, hardly one draw in a thousand would be physically possible.
 
 Correlations: mass cut from the thigh goes to the trunk (the hip's cut plane is a matter of definition, 4c), and left
-and right differ less than either from the literature: a person is nearly symmetric, but not bound to be.
+and right differ less from each other than from the literature: people are nearly, but not exactly, symmetric.
 """
 
 from __future__ import annotations
@@ -45,30 +45,31 @@ MASS_SD = {
     "upper_arm": 0.16,
     "forearm": 0.10,
 }
-"""Relative deviation of the mass, by segment."""
+"""Relative standard deviation of the mass, by segment."""
 OTHER_MASS_SD = 0.15
-"""Of a segment that is none of these."""
+"""Relative standard deviation of the mass of any other segment."""
 COM_ALONG_SD, COM_ACROSS_SD, SMALLEST_COM_SD_M, MIDLINE_SD_M = 0.035, 0.05, 0.008, 0.010
 SECOND_MOMENT_SD, COMMON_SHARE = 0.20, 0.5
-"""Relative deviation of second moments, and the share of its variance that all directions have in common (size)."""
+"""Relative standard deviation of second moments, and the share of its variance common to all directions (size)."""
 SIDES_CORRELATION = 0.9
 THIGH_TRUNK_CORRELATION = -0.35
 SCALE_SD = 0.005
-"""Relative deviation of the body mass on the scale."""
+"""Relative standard deviation of the body mass on the scale."""
 
 
 @dataclass(frozen=True, eq=False)
 class BspPrior:
-    """Gaussian prior of body segment parameters, and the total mass by the scale.
+    """Gaussian prior of body segment parameters, with the total mass measured by the scale.
 
     Attributes:
         mean: need not be physically consistent (a start off by 50 % is not); estimates always are.
         covariance: (10 s, 10 s) of the table rows (mass, CoM, moments, products), segment after segment.
-        mass_kg, mass_sd_kg: the total mass by the scale, and its deviation.
-        weighed: (s,) which segments the scale weighed; None: all.
+        mass_kg, mass_sd_kg: the total mass by the scale, and its standard deviation.
+        weighed: (s,) whether the scale's mass includes each segment; None: all.
 
     Raises:
-        PriorError: the covariance has the wrong shape or is not positive definite, or a deviation is not positive.
+        PriorError: the covariance has the wrong shape or is not positive definite, or a standard deviation is not
+            positive.
 
     Examples:
         >>> from dataclasses import replace
@@ -110,16 +111,16 @@ class BspPrior:
 
     @property
     def sd(self) -> np.ndarray:
-        """(s, 10) prior SDs, in the table's order and units."""
+        """Prior SDs (s, 10), in the table's order and units."""
         return np.sqrt(np.diag(self.covariance)).reshape(-1, 10)
 
     @property
     def on_scale(self) -> np.ndarray:
-        """(s,) 1 of segments that the scale weighed, 0 of others."""
+        """Indicator (s,): 1 for segments included in the scale's mass, 0 for others."""
         return np.ones(len(self.mean.segments)) if self.weighed is None else np.array(self.weighed, dtype=float)
 
     def at_mass(self, mass_kg: float, sd_kg: float) -> BspPrior:
-        """The prior of a person of the same build who weighs this much, known to this deviation."""
+        """Return the prior of a person of the same build with this mass, known to this standard deviation."""
         factor = mass_kg / self.mass_kg
         rows = np.where(np.isin(PARAMETERS, ("com_x", "com_y", "com_z")), 1.0, factor)
         each = np.tile(rows, len(self.mean.segments))
@@ -129,7 +130,7 @@ class BspPrior:
         )
 
     def given_scale(self) -> tuple[np.ndarray, np.ndarray]:
-        """(10 s,) mean and (10 s, 10 s) covariance of the table rows once the scale has said `mass_kg`."""
+        """Return mean (10 s,) and covariance (10 s, 10 s) of the table rows, given that the scale showed `mass_kg`."""
         scale = np.zeros(self.covariance.shape[0])
         scale[::10] = self.on_scale
         with_total = self.covariance @ scale
@@ -138,7 +139,7 @@ class BspPrior:
         return mean, self.covariance - np.outer(with_total, with_total) / variance
 
     def draw(self, rng: np.random.Generator) -> BodySegmentParameters:
-        """A person of this prior whose scale said `mass_kg`; drawn again until every segment is physically possible."""
+        """Draw a person from this prior given the scale's `mass_kg`, until every segment is physically possible."""
         mean, covariance = self.given_scale()
         sd = np.sqrt(np.diag(covariance))
         root = sd[:, None] * np.linalg.cholesky(covariance / np.outer(sd, sd))
@@ -150,12 +151,12 @@ class BspPrior:
 
 
 def literature_prior(literature: BodySegmentParameters, kinds: Sequence[str] | None = None) -> BspPrior:
-    """The prior around literature values, or those of a scaled model, whose total mass is the scale's.
+    """Build the prior around literature values, or those of a scaled model, whose total mass is the scale's.
 
     Args:
         literature: the mean.
         kinds: per segment, a key of MASS_SD; a segment of any other kind gets OTHER_MASS_SD, and 5 % of its length in
-            all directions. The segments' own names if None.
+            all directions. None: the segments' own names.
     """
     table = literature.table()
     sd = np.zeros_like(table)
@@ -183,11 +184,11 @@ def literature_prior(literature: BodySegmentParameters, kinds: Sequence[str] | N
 
 
 def inertia_covariance(bsp: BodySegmentParameters) -> np.ndarray:
-    """(s, 6, 6) covariance of ixx, iyy, izz, ixy, ixz, iyz: second moments L (1 + E) L^T with E isotropic.
+    """Compute the covariance (s, 6, 6) of ixx, iyy, izz, ixy, ixz, iyz from isotropic changes of second moments.
 
-    E is a common number on the diagonal plus a symmetric matrix whose elements beside the diagonal vary 1 / sqrt(2) as
-    much as those on it: no choice of axes is special. To first order, deviations are measured by the affine-invariant
-    distance of Lee, Wensing and Park (2020, IEEE T-RO 36:182).
+    Second moments are L (1 + E) L^T. E is a common number on the diagonal plus a symmetric matrix whose off-diagonal
+    elements have 1 / sqrt(2) times the standard deviation of the diagonal ones, so that it is isotropic. To first
+    order, deviations are measured by the affine-invariant distance of Lee, Wensing and Park (2020, IEEE T-RO 36:182).
     """
     root = np.linalg.cholesky(second_moments(bsp.inertia_kgm2))
     own = SECOND_MOMENT_SD * np.sqrt(1.0 - COMMON_SHARE)
@@ -206,7 +207,7 @@ def inertia_covariance(bsp: BodySegmentParameters) -> np.ndarray:
 
 
 def with_symmetry(covariance: np.ndarray, segments: tuple[str, ...], correlation: float) -> np.ndarray:
-    """The covariance with this correlation between each right segment and the mirror image of its left one."""
+    """Return the covariance with this correlation between each right segment and the mirror image of its left one."""
     result = covariance.copy()
     for i, segment in enumerate(segments):
         if segment.endswith("_r") and f"{segment[:-2]}_l" in segments:
@@ -222,7 +223,9 @@ def with_symmetry(covariance: np.ndarray, segments: tuple[str, ...], correlation
 def updated(
     mean: np.ndarray, covariance: np.ndarray, seen: np.ndarray, values: np.ndarray, noise: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Mean (n,) and covariance (n, n) once `values` (m,) = `seen` (m, n) x, with errors of covariance `noise` (m, m).
+    """Return mean (n,) and covariance (n, n) given `values` (m,) = `seen` (m, n) x, measured with errors.
+
+    The errors have the covariance `noise` (m, m).
 
     >>> mean, covariance = updated(np.zeros(1), np.eye(1), np.eye(1), np.ones(1), np.eye(1))
     >>> float(mean[0]), float(covariance[0, 0])

@@ -27,8 +27,8 @@ class ParameterVector:
     """The study's unknowns theta: mass, com_x, com_y, com_z, ixx, iyy, izz of every segment or every pair.
 
     Principal axes lie along the segment axes: ixy, ixz, iyz are not in theta and keep the reference's values
-    (zero in the study). Under symmetry a pair counts once, as its right segment, and everything on the left
-    mirrors the right, the fixed ixy, ixz, iyz too. Twelve segments give 84 parameters, or 49 under symmetry.
+    (zero in the study). Under symmetry a pair counts once, as its right segment, and the left segment mirrors the right
+    one, including the fixed ixy, ixz, iyz. Twelve segments give 84 parameters, or 49 under symmetry.
 
     Attributes:
         reference: gives the segments, their order, and ixy, ixz, iyz.
@@ -60,7 +60,7 @@ class ParameterVector:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """`<segment>.<parameter>` for every element of theta; a pair drops its suffix ("thigh.mass")."""
+        """Names `<segment>.<parameter>` of all elements of theta; a pair drops its suffix ("thigh.mass")."""
         mirrored = set(self._group[self._is_left])
         groups = []
         for name, group, left in zip(self.reference.segments, self._group, self._is_left, strict=True):
@@ -79,7 +79,7 @@ class ParameterVector:
         return np.tile([0.0, -np.inf, -np.inf, -np.inf, 0.0, 0.0, 0.0], len(self.names) // _STUDY)
 
     def values(self, bsp: BodySegmentParameters) -> FloatArray:
-        """Theta of these body segment parameters; under symmetry the mean of the right and the mirrored left.
+        """Return theta of these body segment parameters; under symmetry the mean of the right and the mirrored left.
 
         Raises:
             ValueError: the segments are not those of the reference.
@@ -87,13 +87,13 @@ class ParameterVector:
         return self._symmetrised(bsp)[~self._is_left, :_STUDY].ravel()
 
     def bsp(self, theta: npt.ArrayLike) -> BodySegmentParameters:
-        """Body segment parameters with this theta; the left mirrors the right under symmetry."""
+        """Return body segment parameters with this theta; the left mirrors the right under symmetry."""
         table = self._own_table.copy()
         table[:, :_STUDY] = self._grouped(theta) * self._signs
         return BodySegmentParameters.from_table(self.reference.segments, table)
 
     def jacobian(self, theta: npt.ArrayLike) -> FloatArray:
-        """(10 s, len(names)) derivative of `bsp(theta).dynamic_parameters()` with respect to theta."""
+        """Compute the derivative (10 s, len(names)) of `bsp(theta).dynamic_parameters()` with respect to theta."""
         values = self._grouped(theta) * self._signs
         blocks = dynamic_by_table(values[:, 0], values[:, 1:4])[..., :_STUDY] * self._signs[:, None, :]
         jacobian = np.zeros((len(blocks), 10, len(self.names) // _STUDY, _STUDY))

@@ -1,13 +1,13 @@
 """Implements the study's estimator: pelvis correction (inner level), body segment parameters (outer level).
 
-Inner level: equation (2) of `kinertia.motion.dynamics` gives the pelvis acceleration that needs no residual at the
-measured state; integrated twice by the trapezoid rule, with the two constants per coordinate that track the measured
-pelvis best (linear least squares, closed form).
-Outer level: bounded nonlinear least squares on the residual P at the corrected motion, over all frames of all trials.
+Inner level: equation (2) of `kinertia.motion.dynamics` gives the pelvis acceleration without residual at the measured
+state. It is integrated twice by the trapezoid rule, with the two constants per coordinate that track the measured
+pelvis best (linear least squares, closed form). Outer level: bounded nonlinear least squares on the residual P at the
+corrected motion, over all frames of all trials.
 
-Deviations from the study: CoM coordinates are bounded to 1 m (a mass near zero would send its CoM anywhere); no finite
-differences (the derivative is chained through (2), the integration and the fit), and moments are divided by the body's
-radius of gyration about the pelvis, so that N and N m add up.
+Deviations from the study: CoM coordinates are bounded to 1 m (with a mass near zero the CoM would be undetermined); no
+finite differences (the derivative is chained through (2), the integration and the fit), and moments are divided by the
+body's radius of gyration about the pelvis, so that N and N m can be summed.
 """
 
 from __future__ import annotations
@@ -35,10 +35,10 @@ from kinertia.motion.single_blas_thread import one_blas_thread
 from kinertia.trial.sampled_time import span_s
 
 MAX_STRETCH_S = 1.1
-"""Longest stretch over which the pelvis is corrected by one double integration."""
+"""Longest integration interval, over which the pelvis is corrected by one double integration."""
 _FREE_EVALUATIONS, _MAX_EVALUATIONS = 200, 400
 _EXACT = 1e-20
-"""Share of the cost at the start that is rounding."""
+"""Share of the initial cost below which a cost is a rounding error."""
 _SMALLEST_POSITIVE, _FARTHEST_COM_M = 1e-9, 1.0
 """Bounds: masses and moments stay positive (kg, kg m2), each CoM coordinate within 1 m of the segment's origin."""
 _SMALLEST_SCALE = 0.005
@@ -47,7 +47,7 @@ _SMALLEST_SCALE = 0.005
 
 @dataclass(frozen=True)
 class Window:
-    """A stretch of a trial in which every contact is measured.
+    """A measured window of a trial, in which all ground contact is measured.
 
     Attributes:
         time: (n,) s, uniform.
@@ -61,15 +61,15 @@ class Window:
 
     @cached_property
     def integration(self) -> Integration:
-        """The double integration on this window's time base."""
+        """Double integration on this window's time base."""
         return Integration(self.time)
 
 
 def stretches(window: Window) -> list[Window]:
-    """The window in equal parts of at most MAX_STRETCH_S, about a stride.
+    """Divide the window into equal integration intervals of at most MAX_STRETCH_S, about a stride.
 
-    The two constants per coordinate hold the corrected pelvis near the measured one only for so long: literature BSPs
-    are off by some 10 N m, which over 2.4 s turns the pelvis away by 0.3 rad. The study's trials were one stride.
+    With two constants per coordinate the corrected pelvis stays near the measured one only for so long: literature BSPs
+    are off by some 10 N m, which rotates the pelvis by 0.3 rad within 2.4 s. The study's trials were one stride.
     """
     count = int(np.ceil(span_s(window.time) / MAX_STRETCH_S * (1.0 - 1e-9)))
     edges = np.linspace(0, len(window.time), max(count, 1) + 1).round().astype(int)
@@ -96,9 +96,9 @@ class Integration:
         return total.reshape(rate.shape)
 
     def track(self, acceleration: np.ndarray, measured: np.ndarray | float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-        """Position and velocity (n, ...) with this acceleration, nearest to the measured position.
+        """Return position and velocity (n, ...) with this acceleration, nearest to the measured position.
 
-        With `measured` zero it is the derivative of the result with respect to anything that moves the acceleration.
+        With `measured` zero it is the derivative of the result with respect to anything that changes the acceleration.
         """
         velocity = self._once(acceleration)
         position = self._once(velocity)
@@ -110,15 +110,15 @@ class Integration:
 
 @dataclass(frozen=True)
 class TwoLevelResult:
-    """Outcome of `estimate_two_level`.
+    """Result of `estimate_two_level`.
 
     Attributes:
         bsp: the estimate.
-        motions: per window, the motion it goes with (corrected, if correction was asked for).
+        motions: per window, the corresponding motion (corrected, if correction was requested).
         residuals: per window, (n, 6) root residual.
         cost: half the sum of squared, scaled residuals at start and end.
-        evaluations: of the residual.
-        converged: False where the iteration stopped at its limit.
+        evaluations: number of evaluations of the residual.
+        converged: False if the iteration stopped at its limit.
     """
 
     bsp: BodySegmentParameters
@@ -130,7 +130,7 @@ class TwoLevelResult:
 
 
 def correct_pelvis(skeleton: Skeleton, bsp: BodySegmentParameters, window: Window) -> Motion:
-    """Inner level: the motion with the pelvis that equation (2) asks for, nearest to the measured pelvis."""
+    """Inner level: return the motion with the pelvis acceleration of equation (2), nearest to the measured pelvis."""
     acceleration, _ = consistent_root_acceleration(skeleton, bsp, window.motion, window.wrench)
     position, velocity = window.integration.track(acceleration, window.motion.q[:, :6])
     return window.motion.with_root(position, velocity, acceleration)
@@ -146,15 +146,15 @@ def estimate_two_level(
     correct: bool = True,
     progress: Callable[[float], None] = lambda share: None,
 ) -> TwoLevelResult:
-    """Outer level: the BSPs that minimise the residual P over all frames of all windows.
+    """Outer level: find the BSPs that minimise the residual P over all frames of all windows.
 
     Args:
         skeleton: the model.
         start: initial BSPs; their products of inertia are kept (zero in the study).
-        windows: measured stretches of one or more trials of this person.
+        windows: measured windows of one or more trials of this person.
         symmetric: 49 parameters, left mirroring right, instead of 84.
         correct: with pelvis correction (equation 3) or without (equation 1 at the measured motion).
-        progress: called with the share of the evaluations' limit that is used up.
+        progress: called with the share of the evaluations' limit that has been used.
     """
     vector = ParameterVector(start, symmetric)
     length = radius_of_gyration(skeleton, start, windows)
@@ -169,13 +169,13 @@ def estimate_two_level(
 
 
 def vector_bounds(vector: ParameterVector) -> tuple[np.ndarray, np.ndarray]:
-    """Least and largest theta: masses and moments positive, CoM coordinates within 1 m."""
+    """Return lower and upper bounds of theta: masses and moments positive, CoM coordinates within 1 m."""
     positive = vector.lower_bounds == 0.0
     return np.where(positive, _SMALLEST_POSITIVE, -_FARTHEST_COM_M), np.where(positive, np.inf, _FARTHEST_COM_M)
 
 
 def trust_scale(theta: np.ndarray) -> np.ndarray:
-    """What counts as one unit of each parameter in the trust region."""
+    """Return the unit of each parameter in the trust region."""
     scale: np.ndarray = np.maximum(np.abs(theta), _SMALLEST_SCALE)
     return scale
 
@@ -187,11 +187,11 @@ def _minimise(
     exact: float,
     progress: Callable[[float], None],
 ) -> OptimizeResult:
-    """Least squares within bounds; a cost below `exact` is rounding.
+    """Solve least squares within bounds; a cost below `exact` is a rounding error.
 
-    Without bounds first: Levenberg-Marquardt crosses them on its way, and where the data are good it ends inside. Only
-    if it does not, the trust region method keeps to them from the start on; it may end on a bound short of the minimum.
-    Where it creeps along a valley until its limit, Levenberg-Marquardt goes on from there.
+    Levenberg-Marquardt runs first without bounds: it crosses them on its way, and ends inside if the data are good.
+    Otherwise the trust region method keeps to them from the start; it may end on a bound short of the minimum. If it
+    creeps along a valley until its limit, Levenberg-Marquardt continues from there.
     """
     scale = trust_scale(theta)
     free = _minimise_freely(problem, theta, scale, bounds, exact)
@@ -226,7 +226,7 @@ def _minimise_freely(
     bounds: tuple[np.ndarray, np.ndarray],
     exact: float,
 ) -> OptimizeResult | None:
-    """Levenberg-Marquardt without bounds; None unless it converges, or comes down to a cost of `exact`, inside them."""
+    """Run Levenberg-Marquardt without bounds; None unless it converges inside them, or to a cost below `exact`."""
     with suppress(np.linalg.LinAlgError, ValueError), np.errstate(all="ignore"):
         free = least_squares(
             problem.residuals,
@@ -248,7 +248,10 @@ def _minimise_freely(
 
 
 def radius_of_gyration(skeleton: Skeleton, bsp: BodySegmentParameters, windows: Sequence[Window]) -> float:
-    """Of the body about the pelvis in the first frame, m; moments divided by it add up with forces."""
+    """Return the body's radius of gyration (m) about the pelvis in the first frame.
+
+    Moments divided by it can be summed with forces.
+    """
     first = windows[0]
     one = Motion(first.motion.q[:1], first.motion.qd[:1], first.motion.qdd[:1])
     _, (mass,) = consistent_root_acceleration(skeleton, bsp, one, first.wrench[:1])
@@ -271,17 +274,17 @@ class TwoLevelProblem:
         return np.repeat([1.0, 1.0 / self.length], 3)
 
     def motion(self, bsp: BodySegmentParameters, window: Window) -> Motion:
-        """The motion that goes with these BSPs: corrected, or as measured."""
+        """Return the motion that corresponds to these BSPs: corrected, or as measured."""
         return correct_pelvis(self.skeleton, bsp, window) if self.correct else window.motion
 
     def residuals(self, theta: np.ndarray) -> np.ndarray:
-        """Scaled residuals of all frames of all windows, in one row."""
+        """Return scaled residuals of all frames of all windows, in one row."""
         bsp = self.vector.bsp(theta)
         parts = [residual(self.skeleton, bsp, self.motion(bsp, w), w.wrench) * self._scale for w in self.windows]
         return np.concatenate([part.ravel() for part in parts])
 
     def jacobian(self, theta: np.ndarray) -> np.ndarray:
-        """Derivative of `residuals` with respect to theta."""
+        """Return the derivative of `residuals` with respect to theta."""
         bsp = self.vector.bsp(theta)
         change = self.vector.jacobian(theta)
         if self.correct:
@@ -296,7 +299,7 @@ class TwoLevelProblem:
         return [root_regressor(self.skeleton, segments, window.motion) for window in self.windows]
 
     def _corrected_jacobian(self, bsp: BodySegmentParameters, change: np.ndarray, window: Window) -> np.ndarray:
-        """(n, 6, k) dP / dtheta: Y dphi, and what the moved pelvis adds."""
+        """Return dP / dtheta (n, 6, k): Y dphi plus the effect of the corrected pelvis motion."""
         acceleration, mass = consistent_root_acceleration(self.skeleton, bsp, window.motion, window.wrench)
         measured = window.motion
         balanced = measured.with_root(measured.q[:, :6], measured.qd[:, :6], acceleration)

@@ -1,8 +1,8 @@
 """Combines a model's bodies into the segments of the anthropometric tables, in ISB axes.
 
-Bodies are told by their names (femur, tibia, ...; sides by `_r` and `_l`), segments are cut at the model's joint
-centres, in its pose at zero, which is upright in the models that OpenSim users have. Pelvis and torso meet where the
-tables mean it, at L5/S1; the joint between them stands centimetres higher in many models.
+Bodies are identified by their names (femur, tibia, ...; sides by `_r` and `_l`), segments are cut at the model's joint
+centres, in its pose at zero, which is upright in the usual OpenSim models. Pelvis and torso meet at L5/S1, as in the
+tables; the joint between them is centimetres higher in many models.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ _WORDS = {
     "upper_arm": ("humerus", "upper_arm", "upperarm"),
     "forearm": ("ulna", "radius", "forearm", "lowerarm", "hand", "wrist"),
 }
-"""How the names of the bodies of each segment begin."""
+"""Beginnings of the names of each segment's bodies."""
 _LEAST_LENGTH_M = 0.01
-"""Joints closer together than this are a mistake in the model: they give neither length nor direction of a segment."""
+"""Joints closer together than this are an error in the model: they define neither length nor direction of a segment."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,8 +41,8 @@ class ModelSegments:
     Attributes:
         bsp: of the segments that have mass, in the order of `anthropometry.SEGMENTS`.
         bodies: names of the bodies that make up each of them.
-        unknown: bodies with mass whose names tell no segment.
-        geometry: joint centres and lengths of the model; None where a joint of the trunk or the legs was not found.
+        unknown: bodies with mass whose names belong to no segment.
+        geometry: joint centres and lengths of the model; None if a joint of the trunk or the legs was not found.
     """
 
     bsp: BodySegmentParameters
@@ -52,7 +52,7 @@ class ModelSegments:
 
 
 def segment_of(body: str) -> str | None:
-    """Segment of the anthropometric tables that a body belongs to by its name; None where the name does not tell."""
+    """Return the segment of the anthropometric tables that a body belongs to by its name; None if unknown."""
     name = body.lower()
     side = name[-2:] if name.endswith(("_r", "_l")) else ""
     for segment, words in _WORDS.items():
@@ -66,11 +66,11 @@ def segment_of(body: str) -> str | None:
 def model_segments(
     skeleton: Skeleton, bsp: BodySegmentParameters, height_m: float = 1.7, sex: str = "male"
 ) -> ModelSegments:
-    """Put the bodies of a model together by segment.
+    """Combine the bodies of a model into segments.
 
     Args:
         skeleton, bsp: of the model.
-        height_m, sex: for lengths that the model's joints do not tell (the torso's up to the neck, the foot's);
+        height_m, sex: for lengths that the model's joints do not define (the torso's up to the neck, the foot's);
             sex also for L5/S1.
     """
     pose = skeleton.pose(np.zeros((1, len(skeleton.coordinates))))
@@ -104,7 +104,7 @@ Place = tuple[np.ndarray, np.ndarray]
 
 
 def _joint_centres(skeleton: Skeleton, place: Mapping[str, Place]) -> tuple[dict[str, FloatArray], dict[str, str]]:
-    """Joint centres in ground, and the body that each segment begins with."""
+    """Return joint centres in ground, and the body that each segment begins with."""
     entrances = {"torso": "lumbar", "thigh": "hip", "shank": "knee", "foot": "ankle"}
     entrances |= {"upper_arm": "shoulder", "forearm": "elbow"}
     centres: dict[str, FloatArray] = {}
@@ -131,10 +131,10 @@ def _pelvis_rotation(place: Mapping[str, Place]) -> FloatArray:
 
 
 def _l5s1(hip_r: FloatArray, hip_l: FloatArray, pelvis: FloatArray, sex: str) -> FloatArray:
-    """L5/S1 in ground over the mid hip, as the 27-DOF model has it for a pelvis with hips this far apart.
+    """Locate L5/S1 in ground above the mid hip, as in the 27-DOF model for a pelvis with this distance between hips.
 
-    Pelvis width and height by Harrington et al. (2007); fore and aft by Bell et al. (1990), as Harrington's needs the
-    depth of the pelvis, which a model does not tell.
+    Pelvis width and height are by Harrington et al. (2007); fore and aft by Bell et al. (1990), since Harrington's
+    needs the depth of the pelvis, which a model does not contain.
     """
     at_zero, at_one = (hip_in_pelvis(width, 0.0, "harrington", "r")[2] for width in (0.0, 1.0))
     width = (float(np.linalg.norm(hip_r - hip_l)) / 2 - at_zero) / (at_one - at_zero)
@@ -150,7 +150,7 @@ def _centre(joint: Joint, place: Mapping[str, Place]) -> FloatArray:
 
 
 def _segment_frame(segment: str, body: Place, centres: Mapping[str, FloatArray]) -> Place:
-    """Rotation and origin of a segment's frame in ground: y from the distal to the proximal joint, z the body's own."""
+    """Return rotation and origin of a segment's frame in ground: y from distal to proximal joint, z the body's own."""
     rotation, origin = body
     side = segment[-2:]
     ends = {"thigh": ("hip", "knee"), "shank": ("knee", "ankle")}

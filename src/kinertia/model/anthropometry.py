@@ -40,7 +40,7 @@ _DELEVA_STATURE_M = {"male": 1.741, "female": 1.735}
 
 @dataclass(frozen=True)
 class BodyGeometry:
-    """What the tables need to know of a person's skeleton, measured in a static trial.
+    """Joint centres and segment lengths that the tables are scaled with, measured in a static trial.
 
     Attributes:
         lumbar_joint_m: (x, y, z) of the lumbar joint centre (L5/S1) in the pelvis frame (origin mid-ASIS), m.
@@ -76,7 +76,7 @@ class _Row:
 
 @dataclass(frozen=True)
 class _Part:
-    """A row placed in the frame of a model segment, as if a right one: CoM = origin + com * length."""
+    """A row placed in the frame of a model segment, as if on the right side: CoM = origin + com * length."""
 
     segment: str
     row: _Row
@@ -85,12 +85,12 @@ class _Part:
 
 
 _UNITS_OF_HEIGHT = {"millimetres": 300.0, "centimetres": 100.0, "inches": 20.0, "feet": 3.0}
-"""Least height in each."""
+"""Least height in each unit."""
 _OTHER_UNIT = "another unit"
 
 
 def check_subject(mass_kg: float, height_m: float, sex: str) -> None:
-    """Refuse a mass (kg), height (m) or sex ("male" or "female") that cannot be true.
+    """Reject a mass (kg), height (m) or sex ("male" or "female") that is impossible.
 
     Raises:
         SubjectError: mass outside 10-300 kg, height outside 0.5-2.5 m, or another sex.
@@ -111,9 +111,9 @@ def _implausible(field: str, quantity: str, value: object, shown: Quantity, unit
 
 
 def reference_lengths(height_m: float, sex: str) -> dict[str, float]:
-    """Segment lengths (m) of the tables' reference subjects, scaled by stature; names as in `BodyGeometry`.
+    """Return segment lengths (m) of the tables' reference subjects, scaled by stature; names as in `BodyGeometry`.
 
-    For what nobody measured. Torso and foot are Dumas', the rest de Leva's.
+    They are for lengths that nobody measured. Torso and foot are Dumas', the rest de Leva's.
     """
     dumas, deleva = _dumas_table(sex), _deleva_table(sex)
     torso = dumas["thorax"].length_m + dumas["abdomen"].length_m
@@ -127,7 +127,7 @@ def reference_lengths(height_m: float, sex: str) -> dict[str, float]:
 def literature_bsp(
     mass_kg: float, height_m: float, sex: str, geometry: BodyGeometry, source: str = "dumas"
 ) -> BodySegmentParameters:
-    """Body segment parameters of the 27-DOF model's twelve segments (`SEGMENTS`) from the literature.
+    """Compute body segment parameters of the 27-DOF model's twelve segments (`SEGMENTS`) from the literature.
 
     Segment frames are those of the model (ISB: x anterior, y up, z right; origin at the proximal joint
     centre): pelvis at mid-ASIS; torso at the lumbar joint, y to the cervical joint; limbs at the proximal
@@ -144,20 +144,20 @@ def literature_bsp(
       so that the total mass is exactly `mass_kg`.
     - Dumas: thorax and abdomen lie in line along the torso's y axis, thorax 334/477 (male) or 322/429
       (female) of its length, and the head stands upright along y above the cervical joint, 0.278/1.77 (male)
-      or 0.243/1.61 (female) of the stature high. In reality the thoracolumbar joint lies behind that line, so
-      that stacked in line their CoM would come 4 % of the torso's length too far forward: both are moved
-      together until it is where the 2007 table's one-piece torso has it. (Its tensor is not used: no source
-      for the female one; the one quoted from memory is not physically consistent.)
+      or 0.243/1.61 (female) of the stature high. In reality the thoracolumbar joint lies behind that line, so that
+      stacked in line their CoM would be 4 % of the torso's length too far forward: both are moved together until it is
+      where it is in the 2007 table's one-piece torso. (Its tensor is not used: no source for the female one; the one
+      quoted from memory is not physically consistent.)
     - de Leva: pelvis is the lower trunk (omphalion to mid hip), torso the middle trunk, upper trunk (from
       cervicale, taken as the height of the cervical joint) and head. Their lengths are the reference
       subject's, scaled by the height of the cervical joint over the mid hip when the torso stands upright on
       the pelvis (head: by stature). The lower trunk's axis is the vertical through the mid hip, the others'
-      is the torso's y axis. That the omphalion is above the lumbar joint, so that the pelvis owns a slice of
-      the belly, is de Leva's cut.
-    - de Leva's foot is measured from the heel, and no table gives the ankle's place between heel and toe tip.
-      The foot is placed so that for the reference feet its CoM is where Dumas has it in the sagittal plane:
-      the ankle is 0.17 (male) or 0.21 (female) of the foot's length before the heel, and the heel-toe axis
-      0.20 (male) or 0.31 (female) of `foot` below the ankle.
+      is the torso's y axis. In de Leva's cut the omphalion is above the lumbar joint, so that the pelvis includes a
+      slice of the belly.
+    - de Leva's foot is measured from the heel, and no table gives the ankle's position between heel and toe tip. The
+      foot is placed so that for the reference feet its CoM equals Dumas' in the sagittal plane: the ankle is 0.17
+      (male) or 0.21 (female) of the foot's length before the heel, and the heel-toe axis 0.20 (male) or 0.31 (female)
+      of `foot` below the ankle.
 
     Args:
         mass_kg: body mass, kg, 10-300.
@@ -167,7 +167,7 @@ def literature_bsp(
         source: "dumas" or "deleva".
 
     Raises:
-        SubjectError: an argument cannot be true, or a length that the source needs is missing.
+        SubjectError: an argument is impossible, or a length that the source needs is missing.
     """
     check_subject(mass_kg, height_m, sex)
     if source not in _SOURCES:
@@ -287,7 +287,7 @@ def _deleva_table(sex: str) -> dict[str, _Row]:
 
 
 def _read(name: str, sex: str) -> dict[str, dict[str, float]]:
-    """The numbers of the table's columns, by segment."""
+    """Read the numbers of the table's columns, by segment."""
     with files("kinertia.model").joinpath("data", name).open(encoding="utf-8") as file:
         rows = [row for row in csv.DictReader(line for line in file if not line.startswith("#")) if row["sex"] == sex]
     words = ("sex", "segment", "endpoints")

@@ -1,4 +1,4 @@
-"""Replaces landmarks that a static trial does not show by assumptions of the built-in model."""
+"""Replaces landmarks that are missing in a static trial by assumptions of the built-in model."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from kinertia.model.upper_body import arm_is_known
 
 @dataclass(frozen=True)
 class Assumption:
-    """One part of the model that stands on something else than its landmarks.
+    """One part of the model that is built without its landmarks.
 
     Attributes:
         part: of the body.
         lacking: landmarks that the trial does not show.
-        instead: what they are replaced by, as a clause.
+        instead: what replaces them, as a clause.
         of_leg: whether joint moments of the legs depend on it.
     """
 
@@ -29,7 +29,10 @@ class Assumption:
 
 
 def assumptions(marks: Landmarks) -> Iterator[Assumption]:
-    """Of a model that can be built; a trunk or an arm without any marker is none (the motion shows them neither)."""
+    """Yield the assumptions of a model that can be built.
+
+    A trunk or an arm without any marker is not an assumption, since its motion is not visible either.
+    """
     yield from _pelvis(marks)
     for side in "rl":
         yield from _hinges(marks, side)

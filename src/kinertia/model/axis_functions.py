@@ -1,4 +1,4 @@
-"""Evaluates functions by which a joint axis follows a coordinate, with three derivatives.
+"""Evaluates the functions by which a joint axis depends on a coordinate, with three derivatives.
 
 OpenSim's functions of one variable are piecewise polynomials, so one class holds them all; a coupled coordinate is a
 function of a function.
@@ -21,15 +21,15 @@ class AxisFunction(Protocol):
     """A function of one coordinate."""
 
     def __call__(self, q: np.ndarray, order: int = 0) -> np.ndarray:
-        """Values of the derivative of this order (0 to 3) at q (n,)."""
+        """Return values of the derivative of this order (0 to 3) at q (n,)."""
 
 
 @dataclass(frozen=True, eq=False)
 class PiecewisePolynomial:
-    """Polynomials between `knots` (k,); the first and the last one hold beyond the ends too.
+    """Polynomials between `knots` (k,); the first and the last one continue beyond the ends.
 
     Attributes:
-        knots: growing.
+        knots: increasing.
         coefficients: (degree + 1, k - 1), highest power first, of the distance from the knot on the left.
     """
 
@@ -42,24 +42,24 @@ class PiecewisePolynomial:
         return tuple(whole.derivative(order) if order else whole for order in range(HIGHEST_DERIVATIVE + 1))
 
     def __call__(self, q: np.ndarray, order: int = 0) -> np.ndarray:
-        """Values of the derivative of this order at q (n,)."""
+        """Return values of the derivative of this order at q (n,)."""
         result: np.ndarray = self._derivatives[order](q)
         return result
 
     def scaled(self, factor: float) -> PiecewisePolynomial:
-        """This function times a factor."""
+        """Return this function times a factor."""
         return PiecewisePolynomial(self.knots, self.coefficients * factor)
 
 
 @dataclass(frozen=True, eq=False)
 class Composed:
-    """outer(inner(q))."""
+    """The composition outer(inner(q))."""
 
     outer: AxisFunction
     inner: AxisFunction
 
     def __call__(self, q: np.ndarray, order: int = 0) -> np.ndarray:
-        """Values of the derivative of this order at q (n,), by the chain rule."""
+        """Return values of the derivative of this order at q (n,), by the chain rule."""
         at = self.inner(q)
         f = [self.outer(at, k) for k in range(order + 1)]
         g = [self.inner(q, k) for k in range(order + 1)]
@@ -76,22 +76,22 @@ class Composed:
 
 
 def polynomial(coefficients: ArrayLike) -> PiecewisePolynomial:
-    """Coefficients from the highest power to the constant, as OpenSim's PolynomialFunction has them."""
+    """Make a polynomial from coefficients, highest power first, as in OpenSim's PolynomialFunction."""
     return PiecewisePolynomial(np.array([0.0, 1.0]), np.array(coefficients, dtype=float)[:, None])
 
 
 def constant(value: float) -> PiecewisePolynomial:
-    """The same value everywhere."""
+    """Make a constant function."""
     return polynomial([value])
 
 
 def linear(slope: float, intercept: float = 0.0) -> PiecewisePolynomial:
-    """slope q + intercept."""
+    """Make the function slope q + intercept."""
     return polynomial([slope, intercept])
 
 
 def piecewise_linear(x: ArrayLike, y: ArrayLike) -> PiecewisePolynomial:
-    """Straight lines between points; the outer ones go on beyond the ends, as in OpenSim's PiecewiseLinearFunction.
+    """Connect points by straight lines, the outer ones extended, as in OpenSim's PiecewiseLinearFunction.
 
     Raises:
         ValueError: fewer than two points, or x does not grow.
@@ -101,7 +101,7 @@ def piecewise_linear(x: ArrayLike, y: ArrayLike) -> PiecewisePolynomial:
 
 
 def simm_spline(x: ArrayLike, y: ArrayLike) -> PiecewisePolynomial:
-    """OpenSim's SimmSpline: a cubic spline that goes on straight beyond its ends.
+    """Make OpenSim's SimmSpline: a cubic spline that continues as a straight line beyond its ends.
 
     Its third derivative at either end is that of the cubic through the four outer points (Forsythe, Malcolm and Moler
     1977), not the natural spline's zero curvature; with three points it is one parabola, with two a line.
@@ -125,7 +125,7 @@ def simm_spline(x: ArrayLike, y: ArrayLike) -> PiecewisePolynomial:
 
 
 def _sixths_of_curvature(knots: np.ndarray, gap: np.ndarray, slope: np.ndarray) -> np.ndarray:
-    """(k,) second derivatives at the knots over six, from the tridiagonal system of the spline."""
+    """Solve the spline's tridiagonal system for second derivatives at the knots over six (k,)."""
     count = len(knots)
     matrix = np.zeros((count, count))
     right = np.zeros(count)
@@ -151,7 +151,7 @@ def _points(x: ArrayLike, y: ArrayLike, fewest: int) -> tuple[np.ndarray, np.nda
 
 
 def unit_slope(function: AxisFunction) -> float | None:
-    """1 or -1 where the function is q or -q; None where it is anything else."""
+    """Return 1 or -1 if the function is q or -q; None if it is anything else."""
     if not isinstance(function, PiecewisePolynomial) or function.coefficients.shape[1] != 1:
         return None
     rest, slope, intercept = function.coefficients[:-2], function.coefficients[-2:-1], function.coefficients[-1]
@@ -161,7 +161,7 @@ def unit_slope(function: AxisFunction) -> float | None:
 
 
 def constant_value(function: AxisFunction) -> float | None:
-    """The value where the function is constant; None where it is not."""
+    """Return the value if the function is constant; None if it is not."""
     if not isinstance(function, PiecewisePolynomial) or function.coefficients[:-1].any():
         return None
     values = np.unique(function.coefficients[-1])

@@ -3,13 +3,12 @@
 A rigid segment has ten inertial parameters: mass, three coordinates of the centre of mass (CoM), six elements
 of the inertia tensor. Biomechanics states the tensor about the CoM, in the segment frame; the equations of
 motion are linear in another ten, the *dynamic parameters*: the first moment m c replaces the CoM, and the
-tensor is about the origin of the segment frame. `BodySegmentParameters` holds the former and shows the
-latter.
+tensor is about the origin of the segment frame. `BodySegmentParameters` holds the former and returns the latter.
 
 ixy, ixz and iyz are elements of the tensor, ixy = -integral of x y dm, as in OpenSim, URDF and Pinocchio, not
 "products of inertia" of the opposite sign.
 
-Left and right are told by the suffixes `_l` and `_r`. Axes are x anterior, y up, z to the body's right on
+Left and right are distinguished by the suffixes `_l` and `_r`. Axes are x anterior, y up, z to the body's right on
 both sides (ISB): the left segment is the right one mirrored in the x-y plane; com_z, ixz and iyz change sign.
 """
 
@@ -34,7 +33,7 @@ UNITS = ("kg", "m", "m", "m") + 6 * ("kg m2",)
 """Unit of each of `PARAMETERS`."""
 
 MIRROR_SIGNS = np.array([1.0, 1.0, 1.0, -1.0, 1.0, 1.0, 1.0, 1.0, -1.0, -1.0])
-"""Factor on each of `PARAMETERS` that turns a right segment into a left one."""
+"""Factor on each of `PARAMETERS` that converts a right segment into a left one."""
 
 _ROUNDING = 1e-6
 _ASYMMETRY = 1e-9
@@ -48,7 +47,7 @@ _CONDITIONS = (
     "triangle inequality izz + ixx > iyy violated by {excess:.4g} kg m2",
     "ixy, ixz, iyz are too large: triangle inequality of the principal moments violated by {excess:.4g} kg m2",
 )
-"""What is said of a segment that violates them; `BodySegmentParameters._margins` has a column for each."""
+"""Messages for a segment that violates a condition; `BodySegmentParameters._margins` has a column for each."""
 _TABLE_ROWS, _TABLE_COLUMNS = [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]  # ixx iyy izz ixy ixz iyz
 _PIN_ROWS, _PIN_COLUMNS = [0, 0, 1, 0, 1, 2], [0, 1, 1, 2, 2, 2]  # Ixx Ixy Iyy Ixz Iyz Izz
 
@@ -58,7 +57,7 @@ class BodySegmentParameters:
     """Inertial parameters of `s` segments, each in its own segment frame.
 
     Physically impossible values (a negative mass) are allowed, because an estimator passes through them;
-    `inconsistencies` names them.
+    `inconsistencies` lists them.
 
     Attributes:
         segments: unique names, `s` of them; a left/right pair is `<name>_l` and `<name>_r`.
@@ -67,7 +66,7 @@ class BodySegmentParameters:
         inertia_kgm2: (s, 3, 3) symmetric inertia tensors about the segment's CoM, kg m2.
 
     Raises:
-        ValueError: wrong shape, a name twice, a value that is not finite, or a tensor that is not symmetric.
+        ValueError: a shape is wrong, a name occurs twice, a value is not finite, or a tensor is not symmetric.
 
     Examples:
         >>> bsp = kinertia.BodySegmentParameters(
@@ -107,19 +106,19 @@ class BodySegmentParameters:
         return float(self.mass_kg.sum())
 
     def table(self) -> FloatArray:
-        """(s, 10) values in the order of `PARAMETERS`, SI units."""
+        """Return values (s, 10) in the order of `PARAMETERS`, SI units."""
         moments = self.inertia_kgm2[:, _TABLE_ROWS, _TABLE_COLUMNS]
         return np.column_stack([self.mass_kg, self.com_m, moments])
 
     @classmethod
     def from_table(cls, segments: Sequence[str], table: npt.ArrayLike) -> BodySegmentParameters:
-        """Inverse of `table`."""
+        """Make parameters from a table: the inverse of `table`."""
         values = _rows(segments, table)
         inertia = _tensors(values[:, 4:], _TABLE_ROWS, _TABLE_COLUMNS)
         return cls(tuple(segments), values[:, 0], values[:, 1:4], inertia)
 
     def dynamic_parameters(self) -> FloatArray:
-        """(10 s,) parameters in which the equations of motion are linear, segment after segment.
+        """Return parameters (10 s,) in which the equations of motion are linear, segment after segment.
 
         Pinocchio's order (`pin.Inertia.toDynamicParameters`): m, m c_x, m c_y, m c_z (kg m), then Ixx, Ixy,
         Iyy, Ixz, Iyz, Izz (kg m2) about the SEGMENT ORIGIN: I_origin = I_com + m (c.c 1 - c c^T).
@@ -130,10 +129,10 @@ class BodySegmentParameters:
 
     @classmethod
     def from_dynamic_parameters(cls, segments: Sequence[str], parameters: npt.ArrayLike) -> BodySegmentParameters:
-        """Inverse of `dynamic_parameters`; a segment without mass gets its CoM at its origin.
+        """Invert `dynamic_parameters`; a segment without mass gets its CoM at its origin.
 
         Raises:
-            ValueError: wrong number of parameters, or a first moment without a mass.
+            ValueError: the number of parameters is wrong, or there is a first moment without a mass.
         """
         values = _rows(segments, parameters)
         mass, first_moment = values[:, 0], values[:, 1:4]
@@ -145,13 +144,13 @@ class BodySegmentParameters:
         return cls(tuple(segments), mass, com, inertia)
 
     def to_frame(self) -> pd.DataFrame:
-        """Long table with columns segment, parameter, unit, value; ten rows per segment (`PARAMETERS`)."""
+        """Return a long table with columns segment, parameter, unit, value; ten rows per segment (`PARAMETERS`)."""
         import pandas as pd
 
         return pd.DataFrame(self.columns())
 
     def columns(self) -> dict[str, Any]:
-        """The columns of `to_frame`, by name."""
+        """Return the columns of `to_frame`, by name."""
         s = len(self.segments)
         return {
             "segment": np.repeat(np.array(self.segments, dtype=object), len(PARAMETERS)),
@@ -161,7 +160,7 @@ class BodySegmentParameters:
         }
 
     def _repr_html_(self) -> str:
-        """What a notebook shows: a row per segment, a column per parameter, in kg, m and kg m2."""
+        """Return the HTML table for a notebook: a row per segment, a column per parameter, in kg, m and kg m2."""
         import pandas as pd
 
         headings = [f"{name} ({unit})" for name, unit in zip(PARAMETERS, UNITS, strict=True)]
@@ -170,7 +169,7 @@ class BodySegmentParameters:
 
     @classmethod
     def from_frame(cls, frame: pd.DataFrame) -> BodySegmentParameters:
-        """Inverse of `to_frame`; rows may come in any order, segments keep the order of their first row.
+        """Invert `to_frame`; rows may be in any order, segments keep the order of their first row.
 
         Raises:
             ValueError: a column, segment parameter or unit is missing, unknown or given twice.
@@ -196,7 +195,7 @@ class BodySegmentParameters:
         return cls.from_table(tuple(values), [[row[p] for p in PARAMETERS] for row in values.values()])
 
     def pseudo_inertia(self) -> FloatArray:
-        """(s, 4, 4) pseudo-inertia matrices [[S, m c], [m c^T, m]]; S = integral of x x^T dm at the origin.
+        """Return pseudo-inertia matrices (s, 4, 4) [[S, m c], [m c^T, m]]; S = integral of x x^T dm at the origin.
 
         They are positive definite exactly when the parameters belong to a body of positive density (Wensing,
         Kim & Slotine 2018, IEEE RA-L 3:60). Units: kg m2 (S), kg m, kg.
@@ -209,15 +208,18 @@ class BodySegmentParameters:
         return pseudo
 
     def physically_consistent(self) -> npt.NDArray[np.bool_]:
-        """(s,) whether mass > 0 and pseudo-inertia positive definite: a body of positive density exists."""
+        """Return whether each segment (s,) has mass > 0 and a positive definite pseudo-inertia.
+
+        Then a body of positive density with these parameters exists.
+        """
         possible: npt.NDArray[np.bool_] = np.all(self._margins() > 0, axis=1)
         return possible
 
     def inconsistencies(self) -> list[str]:
-        """One sentence for each physical condition that a segment violates; empty if all are consistent."""
+        """Describe each physical condition that a segment violates, in a sentence; empty if all are consistent."""
         margins = self._margins()
         violated = ~(margins > 0)
-        # the principal moments say nothing new where those about the axes are impossible
+        # the principal moments add nothing where those about the axes are impossible
         violated[:, -1] &= ~violated[:, 1:-1].any(axis=1)
         return [
             f"{self.segments[i]}: {_CONDITIONS[k].format(value=margins[i, k], excess=-margins[i, k])}."
@@ -225,9 +227,9 @@ class BodySegmentParameters:
         ]
 
     def _margins(self) -> FloatArray:
-        """(s, 8) what must be positive for each of `_CONDITIONS`, kg and kg m2.
+        """Return the quantities (s, 8) that must be positive for each of `_CONDITIONS`, kg and kg m2.
 
-        Moments are about the CoM: the pseudo-inertia is positive definite about one point or else about none.
+        Moments are about the CoM: if the pseudo-inertia is positive definite about one point, it is about all.
         """
         moments = np.diagonal(self.inertia_kgm2, axis1=1, axis2=2)
         excess = moments - np.roll(moments, -1, axis=1) - np.roll(moments, -2, axis=1)
@@ -235,7 +237,7 @@ class BodySegmentParameters:
         return np.column_stack([self.mass_kg, moments, -excess[:, [2, 0, 1]], 2.0 * smallest])
 
     def mirrored(self) -> BodySegmentParameters:
-        """The body's mirror image, with the same names in the same order.
+        """Return the body's mirror image, with the same names in the same order.
 
         Every segment takes the values of its partner (`_r` <-> `_l`; a segment without partner is its own),
         with com_z, ixz and iyz changed in sign.
@@ -246,7 +248,7 @@ class BodySegmentParameters:
 def combine(
     mass_kg: npt.ArrayLike, com_m: npt.ArrayLike, inertia_kgm2: npt.ArrayLike
 ) -> tuple[float, FloatArray, FloatArray]:
-    """Join `n` bodies, given in one frame, rigidly into one.
+    """Combine `n` bodies, given in one frame, rigidly into one.
 
     Args:
         mass_kg: (n,) masses, kg.
@@ -268,10 +270,10 @@ def combine(
 
 
 def impossible_segments(bsp: BodySegmentParameters) -> list[str]:
-    """Segments that no distribution of mass can have.
+    """List the segments that no distribution of mass can have.
 
-    Bodies without mass and inertia, as OpenSim models have them, are not judged; a body without thickness (equality in
-    the triangle inequality, as rounded inertias have it) is let pass.
+    Bodies without mass and inertia, as in OpenSim models, are not judged; a body without thickness (equality in the
+    triangle inequality, as with rounded inertias) is accepted.
     """
     table, second = bsp.table(), np.linalg.eigvalsh(second_moments(bsp.inertia_kgm2))
     there = table[:, [0, *range(4, 10)]].any(axis=1)
@@ -280,19 +282,22 @@ def impossible_segments(bsp: BodySegmentParameters) -> list[str]:
 
 
 def second_moments(inertia: FloatArray) -> FloatArray:
-    """(..., 3, 3) integrals of x x^T dm from inertia tensors about the same point."""
+    """Return integrals (..., 3, 3) of x x^T dm from inertia tensors about the same point."""
     result: FloatArray = 0.5 * np.trace(inertia, axis1=-2, axis2=-1)[..., None, None] * np.eye(3) - inertia
     return result
 
 
 def inertia_of(second: FloatArray) -> FloatArray:
-    """(..., 3, 3) inertia tensors from integrals of x x^T dm about the same point: the inverse of `second_moments`."""
+    """Return inertia tensors (..., 3, 3) from integrals of x x^T dm about the same point; inverts `second_moments`."""
     result: FloatArray = np.trace(second, axis1=-2, axis2=-1)[..., None, None] * np.eye(3) - second
     return result
 
 
 def dynamic_by_table(mass: FloatArray, com: FloatArray) -> FloatArray:
-    """(s, 10, 10) derivative of each segment's dynamic parameters by its row of `BodySegmentParameters.table`."""
+    """Return the derivative (s, 10, 10) of each segment's dynamic parameters by its row of the table.
+
+    The table is `BodySegmentParameters.table`.
+    """
     derivative = np.zeros((len(mass), 10, 10))
     derivative[:, 0, 0] = 1.0
     derivative[:, 1:4, 0] = com
@@ -307,7 +312,7 @@ def dynamic_by_table(mass: FloatArray, com: FloatArray) -> FloatArray:
 
 
 def block_diagonal(blocks: FloatArray) -> FloatArray:
-    """(s k, s k) matrix of the blocks (s, k, k)."""
+    """Return the block-diagonal matrix (s k, s k) of the blocks (s, k, k)."""
     s, k, _ = blocks.shape
     result = np.zeros((s, k, s, k))
     result[np.arange(s), :, np.arange(s), :] = blocks
@@ -315,7 +320,7 @@ def block_diagonal(blocks: FloatArray) -> FloatArray:
 
 
 def partners(segments: Sequence[str]) -> npt.NDArray[np.intp]:
-    """(s,) index of each segment's `_l`/`_r` partner, or its own."""
+    """Return the index (s,) of each segment's `_l`/`_r` partner, or its own."""
     index = {name: i for i, name in enumerate(segments)}
     other = {"_r": "_l", "_l": "_r"}
     return np.array([index.get(name[:-2] + other.get(name[-2:], ""), i) for name, i in index.items()], dtype=np.intp)
@@ -335,7 +340,7 @@ def _tensors(moments: FloatArray, rows: list[int], columns: list[int]) -> FloatA
 
 
 def _point_mass_inertia(mass: FloatArray, position: FloatArray) -> FloatArray:
-    """(n, 3, 3) inertia about the origin of point masses (n,) at positions (n, 3)."""
+    """Return the inertia (n, 3, 3) about the origin of point masses (n,) at positions (n, 3)."""
     squares = np.einsum("ni,ni->n", position, position)
     result: FloatArray = mass[:, None, None] * (
         squares[:, None, None] * np.eye(3) - position[:, :, None] * position[:, None, :]

@@ -1,9 +1,9 @@
 """Compiles functions to machine code by Numba, once per machine: `kinertia warm-up`, or the first run.
 
-What runs over the frames of a trial is compiled, and kept in a folder that names its sources: whoever changes a line
-of a compiled function, or installs another version, compiles anew and never runs what an older line gave. The folder
-is beside this file or, where that cannot be written to, in the user's cache; if neither can, in the folder for
-temporary files.
+Functions over the frames of a trial are compiled, and stored in a folder whose name is a hash of their sources: if a
+line of a compiled function changes, or another version is installed, they are compiled again, and code of older lines
+never runs. The folder is beside this file or, if that is not writable, in the user's cache; if neither is, in the
+folder for temporary files.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ import platformdirs
 F = TypeVar("F", bound=Callable[..., Any])
 
 _COMPLETE = "complete"
-"""File that says so."""
+"""File that marks a complete folder."""
 SOURCES = (
     "model/compiled.py",
     "model/kept_code.py",
@@ -44,12 +44,13 @@ SOURCES = (
     "estimation/simultaneous/marker_gradient.py",
     "estimation/simultaneous/marker_terms.py",
 )
-"""Files of the package with compiled functions: those call one another."""
+"""Files of the package with compiled functions, which call one another."""
 
 
 def compiled(function: F) -> F:
-    """The function as machine code, which is kept; division by zero gives inf or nan, as NumPy has it. Only Python
-    calls it.
+    """Compile a function to machine code, which is stored; only Python may call it.
+
+    Division by zero gives inf or nan, as in NumPy.
     """
     from kinertia.model.kept_code import KeptCode  # brings numba
 
@@ -60,19 +61,20 @@ def compiled(function: F) -> F:
 
 
 def part(function: F) -> F:
-    """As `compiled`, for functions that only compiled ones call, with whose code theirs is kept: to let Python call
-    them takes longer to compile than many of them do.
+    """Compile a function that only compiled ones call, whose machine code is stored with theirs.
+
+    A wrapper for Python would take longer to compile than many of these functions.
     """
     return _compiled(function, no_cpython_wrapper=True)
 
 
 def inlined(function: F) -> F:
-    """As `part`, for small functions in inner loops: their code stands where they are called."""
+    """Compile as `part` does a small function of inner loops, with its code inserted where it is called."""
     return _compiled(function, no_cpython_wrapper=True, forceinline=True)
 
 
 def _compiled(function: F, **options: bool) -> F:
-    import numba  # so that commands which compute nothing do not load it
+    import numba  # imported here so that commands which compute nothing do not load it
 
     result: F = numba.njit(error_model="numpy", nogil=True, no_cfunc_wrapper=True, **options)(function)
     return result
@@ -80,7 +82,7 @@ def _compiled(function: F, **options: bool) -> F:
 
 @cache
 def cache_folder() -> Path:
-    """Where compiled functions are kept: a folder of its own for every state of their sources."""
+    """Return the folder of compiled functions: a separate one for every state of their sources."""
     package = Path(__file__).parents[1]
     text = hashlib.sha256()
     for name in SOURCES:
@@ -91,12 +93,12 @@ def cache_folder() -> Path:
 
 
 def is_compiled() -> bool:
-    """Whether everything has been compiled on this machine, in the present state of the sources."""
+    """Return whether everything has been compiled on this machine, in the present state of the sources."""
     return (cache_folder() / _COMPLETE).exists()
 
 
 def set_compiled() -> None:
-    """Note that everything has been compiled, and drop what earlier states of the sources left beside it."""
+    """Record that everything has been compiled, and delete what earlier states of the sources left beside it."""
     folder = cache_folder()
     with suppress(OSError):
         (folder / _COMPLETE).touch()
@@ -110,7 +112,7 @@ def _user_cache() -> Path:
 
 
 def _writable(folder: Path) -> bool:
-    """Whether functions can be kept there; tried, since permissions do not tell."""
+    """Return whether functions can be stored there, by trying, since permissions are not conclusive."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
@@ -121,7 +123,7 @@ def _writable(folder: Path) -> bool:
 
 @contextmanager
 def _kept_in(folder: Path) -> Iterator[None]:
-    """Numba reads the folder while it decorates a function; other packages' functions stay where they are."""
+    """Set Numba's folder while it decorates a function; functions of other packages keep their folder."""
     from numba.core import config
 
     before, config.CACHE_DIR = config.CACHE_DIR, str(folder)

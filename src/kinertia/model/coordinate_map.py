@@ -1,9 +1,9 @@
 """Maps coordinates to the axes of the kinematic tree and back.
 
-An axis x follows one coordinate q by a function: x = f(q), xd = f' qd, xdd = f' qdd + f'' qd^2. Several axes may follow
-the same coordinate (a knee that rolls and slides, a patella coupled to it). By virtual work the generalised force of a
-coordinate is the sum over its axes of f' times the axis' force. Where every axis is its own coordinate nothing is
-computed.
+An axis x depends on one coordinate q by a function: x = f(q), xd = f' qd, xdd = f' qdd + f'' qd^2. Several axes may
+depend on the same coordinate (a knee that rolls and slides, a patella coupled to it). By virtual work the generalised
+force of a coordinate is the sum over its axes of f' times the axis' force. If every axis is its own coordinate nothing
+is computed.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from kinertia.model.axis_functions import AxisFunction
 
 @dataclass(frozen=True, eq=False)
 class CoordinateMap:
-    """The functions of all moving axes.
+    """Functions from coordinates to all moving axes.
 
     Attributes:
         owner: (a,) index of each axis' coordinate.
@@ -35,7 +35,7 @@ class CoordinateMap:
     def of(
         cls, coordinates: Sequence[str], followed: Sequence[str], functions: Sequence[AxisFunction | None]
     ) -> CoordinateMap:
-        """The map of axes that follow these coordinates (one name per axis) by these functions."""
+        """Make the map of axes that depend on these coordinates (one name per axis) by these functions."""
         index = {name: i for i, name in enumerate(coordinates)}
         return cls(np.array([index[name] for name in followed], dtype=int), tuple(functions), len(coordinates))
 
@@ -46,12 +46,12 @@ class CoordinateMap:
 
     @cached_property
     def _sum(self) -> np.ndarray:
-        """(a, c) adds up the axes of every coordinate."""
+        """Matrix (a, c) that sums the axes of every coordinate."""
         result: np.ndarray = (self.owner[:, None] == np.arange(self.count)).astype(float)
         return result
 
     def _evaluated(self, q: np.ndarray, order: int) -> np.ndarray:
-        """(n, a) derivative of this order of every axis by its coordinate."""
+        """Return the derivative (n, a) of this order of every axis by its coordinate."""
         result = q[:, self.owner] if order == 0 else np.full((len(q), len(self.owner)), float(order == 1))
         for axis, function in enumerate(self.functions):
             if function is not None:
@@ -59,20 +59,20 @@ class CoordinateMap:
         return result
 
     def axes(self, q: np.ndarray) -> np.ndarray:
-        """(n, a) places of the axes at the coordinates q (n, c)."""
+        """Return the values (n, a) of the axes at the coordinates q (n, c)."""
         return q if self.identity else self._evaluated(q, 0)
 
     def slopes(self, q: np.ndarray) -> np.ndarray | None:
-        """(n, a) derivative of every axis by its coordinate; None where all are one and the axes the coordinates."""
+        """Return the derivative (n, a) of every axis by its coordinate; None if every axis is its coordinate."""
         return None if self.identity else self._evaluated(q, 1)
 
     def places_and_slopes(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """`axes` and `slopes` as the compiled functions take them: each (n, a), contiguous, ones for slopes of None."""
+        """Return `axes` and `slopes` for compiled functions: each (n, a), contiguous, with ones for slopes of None."""
         at, slopes = np.ascontiguousarray(self.axes(q)), self.slopes(q)
         return at, np.ones_like(at) if slopes is None else np.ascontiguousarray(slopes)
 
     def motion(self, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Places, rates and accelerations of the axes, each (n, a)."""
+        """Return values, rates and accelerations of the axes, each (n, a)."""
         if self.identity:
             return q, qd, qdd
         first, second = self._evaluated(q, 1), self._evaluated(q, 2)
@@ -80,10 +80,10 @@ class CoordinateMap:
         return self._evaluated(q, 0), first * rate, first * qdd[:, self.owner] + second * rate**2
 
     def bends(self, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> np.ndarray:
-        """(n, a, 3) how every axis follows its coordinate, as the compiled functions take it: its slope, and the
-        derivatives of the axis' rate and acceleration by the coordinate.
+        """Return the dependence (n, a, 3) of every axis on its coordinate, for compiled functions.
 
-        None of it, (0, a, 3), where every axis is its own coordinate.
+        It holds the axis' slope, and the derivatives of the axis' rate and acceleration by the coordinate; its shape is
+        (0, a, 3) if every axis is its own coordinate.
         """
         if self.identity:
             return np.empty((0, self.count, 3))
@@ -92,7 +92,7 @@ class CoordinateMap:
         return np.stack([first, second * v, second * a + third * v**2], axis=-1)
 
     def to_coordinates(self, columns: np.ndarray, slopes: np.ndarray | None) -> np.ndarray:
-        """(n, ..., c) from (n, ..., a): forces, or derivatives by axes, to those by coordinates.
+        """Convert (n, ..., a) to (n, ..., c): forces, or derivatives by axes, to those by coordinates.
 
         Args:
             columns: one column per axis.
@@ -106,9 +106,9 @@ class CoordinateMap:
         return result
 
     def turned_forces(self, forces: np.ndarray, q: np.ndarray) -> np.ndarray | float:
-        """(n, c) derivative of the generalised forces by their own coordinates that is due to the map alone.
+        """Return the derivative (n, c) of the generalised forces by their own coordinates due to the map alone.
 
-        Forces (n, a) of the axes are taken as constant; 0 where every axis is its own coordinate.
+        Forces (n, a) of the axes are constant; it is 0 if every axis is its own coordinate.
         """
         return 0.0 if self.identity else (forces * self._evaluated(q, 2)) @ self._sum
 
@@ -119,7 +119,7 @@ class CoordinateMap:
         qd: np.ndarray,
         qdd: np.ndarray,
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Derivatives (n, r, c) by q, qd and qdd from those (n, r, a) by the axes' places, rates and accelerations."""
+        """Convert derivatives (n, r, a) by axis values, rates and accelerations to (n, r, c) by q, qd and qdd."""
         if self.identity:
             return by_axes
         at, rate, acceleration = by_axes

@@ -1,9 +1,9 @@
-"""Defines `Range`: between which values a coordinate moves.
+"""Defines `Range`: the range of values of a coordinate.
 
-A body has one pose but coordinates have several values for it: three angles turn a segment as three others do (a half
-turn more of the first and the last), and an arm that is turned by half a turn with the elbow bent backwards fits its
-markers nearly as well. Ranges tell which is meant; and where markers err, a joint that leaves the range of motion that
-anatomy knows (`range_of_motion`) is less likely than a marker that sits elsewhere.
+A body has one pose, but coordinates have several values for it: three angles rotate a segment as three others do (half
+a turn more of the first and the last), and an arm that is rotated by half a turn with the elbow bent backwards fits its
+markers nearly as well. Ranges select one of them; and where markers have errors, a joint beyond the anatomical range of
+motion (`range_of_motion`) is less likely than a displaced marker.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ import numpy as np
 from kinertia.model.range_of_motion import RangeOfMotion, range_of_motion
 
 CLAMPED_SD = 0.01
-"""Rad or m beyond a range that the model clamps: half a degree."""
+"""Standard deviation (rad or m) beyond a range that the model clamps: half a degree."""
 SD = 0.35
-"""Rad or m beyond a range that anatomy does not know: 20 degrees. A shoulder may go there."""
+"""Standard deviation (rad or m) beyond a range that is not anatomical: 20 degrees. A shoulder may go there."""
 
 
 @dataclass(frozen=True)
@@ -28,8 +28,8 @@ class Range:
 
     Attributes:
         low, high: the ends.
-        clamped: inverse kinematics stays within; else it may go beyond where the markers say so.
-        stated: of this person, by who knows: in place of what anatomy knows of others.
+        clamped: inverse kinematics stays within; else it may go beyond if the markers require it.
+        stated: stated by the user for this person, in place of the anatomical range.
 
     Examples:
         >>> from kinertia.model.coordinate_range import Range
@@ -44,11 +44,11 @@ class Range:
 
     @property
     def middle(self) -> float:
-        """Halfway between the ends."""
+        """Midpoint of the range."""
         return (self.low + self.high) / 2
 
     def anatomical(self, coordinate: str) -> RangeOfMotion | None:
-        """What is known of a coordinate that has this range in the model; None where nothing is."""
+        """Return the known range of motion of a coordinate that has this range in the model; None if there is none."""
         if self.stated:
             return RangeOfMotion.exactly(self.low, self.high)
         return range_of_motion(coordinate, self.middle)
@@ -63,10 +63,10 @@ class Bounds:
     """The ranges of c coordinates as arrays; infinite where there is none.
 
     Attributes:
-        low, high: (c,) ends: anatomy's where it is known, but for clamped ranges that end before.
-        low_sd, high_sd: (c,) deviation beyond them, rad or m.
+        low, high: (c,) ends: anatomical where known, except for clamped ranges that end before.
+        low_sd, high_sd: (c,) standard deviation beyond them, rad or m.
         least, most: (c,) ends of the clamped ones.
-        anatomical: (c,) True where anatomy knows the range, or the user states it.
+        anatomical: (c,) True where the anatomical range is known, or the user states it.
     """
 
     low: np.ndarray
@@ -79,7 +79,7 @@ class Bounds:
 
     @classmethod
     def of(cls, coordinates: Sequence[str], ranges: Mapping[str, Range]) -> Bounds:
-        """Of these coordinates, in this order."""
+        """Collect the ranges of these coordinates, in this order."""
         own = [ranges.get(name, UNKNOWN) for name in coordinates]
         known = [one.anatomical(name) for one, name in zip(own, coordinates, strict=True)]
         ends = np.array([_ends(*each) for each in zip(own, known, strict=True)]).reshape(-1, 6)
@@ -89,7 +89,7 @@ class Bounds:
 
     @cached_property
     def ends(self) -> tuple[tuple[float, np.ndarray, np.ndarray], ...]:
-        """Side (1 or -1), value (c,) and deviation (c,) of all ends, those that are clamped farther out among them."""
+        """Side (1 or -1), value (c,) and SD (c,) of all ends, including clamped ends that are farther out."""
         clamped = np.full(len(self.low), CLAMPED_SD)
         return (
             (1.0, self.high, self.high_sd),
@@ -99,27 +99,27 @@ class Bounds:
         )
 
     def beyond(self, q: np.ndarray) -> np.ndarray:
-        """How far coordinates (n, c) lie beyond their ranges, with the sign of the side; NaN where unknown."""
+        """Return how far coordinates (n, c) are beyond their ranges, with the sign of the side; NaN where unknown."""
         result: np.ndarray = q - np.clip(q, self.low, self.high)
         return result
 
     def sd(self, q: np.ndarray) -> np.ndarray:
-        """(n, c) deviation that holds for coordinates (n, c) on their side of the range."""
+        """Return the standard deviation (n, c) that applies to coordinates (n, c) on their side of the range."""
         return np.where(q < self.low, self.low_sd, self.high_sd)
 
     def clamped(self, q: np.ndarray) -> np.ndarray:
-        """The nearest coordinates (n, c) that the clamped ranges allow."""
+        """Return the nearest coordinates (n, c) within the clamped ranges."""
         result: np.ndarray = np.clip(q, self.least, self.most)
         return result
 
     def held(self, q: np.ndarray, pull: np.ndarray) -> np.ndarray:
-        """(n, c) True at an end of a clamped range, with a pull (n, c) outwards."""
+        """Return the mask (n, c) of coordinates at a limit of a clamped range whose pull (n, c) is outwards."""
         result: np.ndarray = ((q <= self.least) & (pull < 0)) | ((q >= self.most) & (pull > 0))
         return result
 
 
 def _ends(own: Range, known: RangeOfMotion | None) -> tuple[float, float, float, float, float, float]:
-    """Low and high, their deviations, and the clamped ends, in the order of `Bounds`."""
+    """Return low and high, their SDs, and the clamped ends, in the order of `Bounds`."""
     least, most = (own.low, own.high) if own.clamped else (-np.inf, np.inf)
     if known is None:
         sd = CLAMPED_SD if own.clamped else SD

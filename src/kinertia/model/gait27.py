@@ -3,11 +3,11 @@
 Four open chains leave the pelvis: hip (3), knee (1), ankle (2: talocrural and subtalar, with a massless talus
 between), back (3), shoulder (2), elbow (1). Twelve of the fourteen segments carry mass. Signs are OpenSim's
 (Rajagopal): flexion of hip, knee and elbow, dorsiflexion, adduction, internal rotation and inversion are positive; hip,
-knee and shoulder angles are zero when segments are aligned, the ankle's when foot and shank are square.
+knee and shoulder angles are zero when segments are aligned, the ankle's when foot and shank are perpendicular.
 
-More axes are locked unless they are calibrated: the centres of hips, lumbar joint and shoulders in their parents, the
-directions of the axes of knees, ankles and elbows, and the axial rotation of the upper arm and of the forearm, which
-this model does not move but which differ between a T-pose and walking.
+Further axes are locked unless they are calibrated: the centres of hips, lumbar joint and shoulders in their parents,
+the directions of the axes of knees, ankles and elbows, and the axial rotation of the upper arm and of the forearm,
+which this model does not move but which differ between a T-pose and walking.
 """
 
 from __future__ import annotations
@@ -40,23 +40,23 @@ ARM_ROTATIONS = tuple(f"{name}_{side}" for side in "rl" for name in ("arm_rot", 
 ELBOWS = ("elbow_flex_r", "elbow_flex_l")
 
 ARM_COORDINATES = tuple(f"{name}_{side}" for side in "rl" for name in ("arm_flex", "arm_add", "elbow_flex"))
-"""Held still where no marker shows them, as with a lower-body marker set; all others a trial must show."""
+"""Locked where no marker shows them, as with a lower-body marker set; all others must be visible in a trial."""
 
 VIRTUAL_TRUNK = (
     Marker("(trunk, right)", "torso", np.array([0.0, 0.45, 0.3])),
     Marker("(trunk, left)", "torso", np.array([0.0, 0.45, -0.3])),
     Marker("(trunk, front)", "torso", np.array([0.3, 0.45, 0.0])),
 )
-"""Of a person who wears no marker on the torso, or too few; at the height of the shoulders."""
+"""Markers for a person without, or with too few, torso markers; at the height of the shoulders."""
 ENOUGH_TRUNK_MARKERS = 3
-"""Two and the lumbar joint may lie nearly in line."""
+"""Fewest torso markers: two of them and the lumbar joint may be nearly in line."""
 
 _USUAL_DEG = {"arm_flex": (-90.0, 150.0), "arm_add": (-120.0, 60.0)}
-"""How far people move, and somewhat more. These ranges only tell equal poses apart: a joint goes beyond where its
-markers do. Those of all other joints are anatomy's (`range_of_motion`)."""
+"""Typical ranges of motion, slightly extended. They only select between equivalent poses: a joint goes beyond if its
+markers do. The ranges of all other joints are anatomical (`range_of_motion`)."""
 _ELBOW_DEG = (-5.0, 159.7)
-"""Clamped: an arm without markers of its own that is turned by half a turn, with the elbow bent backwards, fits as
-well."""
+"""Clamped range: an arm without markers of its own that is rotated by half a turn, with the elbow bent backwards, fits
+as well."""
 
 _X, _Y, _Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
@@ -70,8 +70,8 @@ class Gait27:
     """The model of one person.
 
     Attributes:
-        skeleton: 27 free coordinates; markers at their places in the static trial.
-        geometry: what the anthropometric tables scale with.
+        skeleton: 27 free coordinates; markers at their positions in the static trial.
+        geometry: joint centres and lengths that the anthropometric tables are scaled with.
     """
 
     skeleton: Skeleton
@@ -86,20 +86,20 @@ def build_gait27(
     hip_centre: str = "bell",
     by_stature: bool = False,
 ) -> Gait27:
-    """Segment frames, joint centres and axes, and marker positions in their segments, from a static trial.
+    """Build segment frames, joint centres and axes, and marker positions in their segments, from a static trial.
 
     Args:
         static: a person standing; arms hanging or raised. Feet flat on the ground. Of trunk and arms any landmark may
             be missing (`assumptions`).
-        marker_set: which label is which landmark, and which marker moves with which segment.
+        marker_set: assignment of labels to landmarks, and of markers to segments.
         height_m: stature, for lengths that markers do not show (arms, and the torso without C7).
         sex: "male" or "female", for the lumbar and cervical joints.
         hip_centre: "bell" (1990) or "harrington" (2007).
         by_stature: place knees and ankles by stature where neither medial markers nor widths show them.
 
     Raises:
-        MarkerSetError: a landmark that a joint of pelvis or legs needs is missing (names the joint and the nearest
-            labels), or landmarks coincide or lie in line, so that they make no frame.
+        MarkerSetError: a landmark that a joint of pelvis or legs needs is missing (the message gives the joint and the
+            nearest labels), or landmarks coincide or lie in line, so that they define no frame.
     """
     with np.errstate(invalid="ignore", divide="ignore"):
         marks = jc.find_landmarks(static, marker_set)
@@ -134,7 +134,7 @@ def _built(marks: jc.Landmarks, height_m: float, sex: str, hip_centre: str) -> G
 
 
 def _expect_axes(marks: jc.Landmarks, joints: Sequence[Joint]) -> None:
-    """Raise S206 where landmarks coincide or lie in line, so that they make no frame."""
+    """Raise S206 if landmarks coincide or lie in line, so that they define no frame."""
     for joint in joints:
         directions = [axis.direction for axis in joint.axes]
         if not all(np.isfinite(part).all() for part in (joint.rotation, joint.translation, directions)):
@@ -144,7 +144,7 @@ def _expect_axes(marks: jc.Landmarks, joints: Sequence[Joint]) -> None:
 
 
 def _landmarks_of(marks: jc.Landmarks, joint: Joint) -> str:
-    """The landmarks whose labels are on the two segments of a joint."""
+    """Return the landmarks whose labels are on the two segments of a joint."""
     labels = {label for name in (joint.parent, joint.child) for label in marks.marker_set.segments.get(name, ())}
     return ", ".join(name for name, own in marks.marker_set.landmarks.items() if labels & set(own))
 
@@ -174,7 +174,7 @@ def _gimbal(prefix: str, names: list[str], suffix: str = "", side: str = "r") ->
 
 
 def _offsets(names: tuple[str, ...], side: str = "") -> tuple[Axis, ...]:
-    """Three translations that move a joint centre in its parent, for calibration."""
+    """Return three translations that move a joint centre in its parent, for calibration."""
     own = [name for name in names if name.endswith(side)]
     return tuple(Axis(name, "translation", d) for name, d in zip(own, (_X, _Y, _Z), strict=True))
 
@@ -185,14 +185,14 @@ def _turn(axis: np.ndarray, angle: float) -> np.ndarray:
 
 
 def _pin(parent: str, child: str, at: np.ndarray, relative: np.ndarray, axis: Axis, angle: float) -> Joint:
-    """A pin joint that puts the child at orientation `relative` in the parent when its coordinate is `angle`."""
+    """Return a pin joint that orients the child as `relative` in the parent when its coordinate is `angle`."""
     return Joint(parent, child, relative @ _turn(np.array(axis.direction), angle).T, at, _tiltable(axis))
 
 
 def _tiltable(axis: Axis) -> tuple[Axis, ...]:
-    """The axis with its direction open to calibration: turned by two small angles before, and back after it.
+    """Return the axis with its direction open to calibration: rotated by two small angles before, and back after it.
 
-    At coordinate zero the child stands as it did: only what the axis does as it turns changes.
+    At coordinate zero the child does not move: only the effect of the axis' rotation changes.
     """
     joint, _, side = axis.coordinate.split("_")
     main = np.array(axis.direction)
@@ -300,7 +300,7 @@ def _arm(
 
 
 def _markers(marks: jc.Landmarks, frames: dict[str, Frame]) -> tuple[Marker, ...]:
-    """Those that the trial shows, in their segments; not those of an arm whose pose it does not show."""
+    """Return the markers that the trial shows, in their segments, except those of an arm whose pose is unknown."""
     placed = []
     for segment, labels in marks.marker_set.segments.items():
         rotation, origin = frames[segment]

@@ -1,4 +1,4 @@
-"""Finds head markers among the trunk's: the head turns by itself, while the model joins both."""
+"""Finds head markers among the trunk's: the head moves independently, while the model joins both."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from kinertia.model.anatomy import segment_of
 from kinertia.model.skeleton import Skeleton
 
 _HEAD_M = 0.14
-"""Above the centres of the shoulders; the temples of a child of six are higher, with arms that hang."""
+"""Height above the shoulder centres; the temples of a child of six are higher, with hanging arms."""
 _TRUNK_M = 0.12
-"""C7 and the acromia are lower."""
+"""Height below which markers are on the trunk: C7 and the acromia are lower."""
 _GAP_M = 0.08
-"""Between the highest marker of the trunk and the lowest of the head."""
+"""Least distance between the highest marker of the trunk and the lowest of the head."""
 _SHOW_A_SEGMENT = 3
 
 
 def head_markers(skeleton: Skeleton) -> tuple[str, ...]:
-    """Labels of the markers on the head: far above the centres of the shoulders, and with a gap below them.
+    """Return the labels of head markers: far above the shoulder centres, and separated from those below by a gap.
 
     None is found where shoulders are raised, nor without shoulders.
     """
@@ -30,7 +30,7 @@ def head_markers(skeleton: Skeleton) -> tuple[str, ...]:
 
 
 def without_head(skeleton: Skeleton, arms: Collection[str], worn: Collection[str]) -> tuple[Skeleton, tuple[str, ...]]:
-    """The skeleton without the markers on the head, and their labels, where three others show the trunk.
+    """Remove the head markers from the skeleton if three others show the trunk; return it with their labels.
 
     Args:
         skeleton: with all markers.
@@ -45,7 +45,7 @@ def without_head(skeleton: Skeleton, arms: Collection[str], worn: Collection[str
 
 
 def _above_shoulders_m(skeleton: Skeleton) -> dict[str, float]:
-    """Height (m) above the middle of the shoulders' centres of each marker on the trunk, along the trunk."""
+    """Return the height (m) of each trunk marker above the middle of the shoulder centres, along the trunk."""
     shoulders = [
         float(joint.translation[1])
         for joint in skeleton.joints

@@ -1,4 +1,4 @@
-"""Holds a model that was read from a file: its skeleton, masses, and what it takes to write it back."""
+"""Holds a model that was read from a file: its skeleton, masses, and what is needed to write it back."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from kinertia.trial.data import Markers
 
 @dataclass(frozen=True)
 class OsimCoordinate:
-    """A coordinate as the file has it: rad or m.
+    """A coordinate as defined in the file, in rad or m.
 
     Attributes:
         name, joint: names.
-        default: its value before anything else is said.
+        default: its default value.
         range: smallest and largest value.
         clamped: whether OpenSim keeps it in its range.
-        locked: whether OpenSim holds it at its default.
+        locked: whether OpenSim fixes it at its default.
         angle: whether motion files give it in degrees; False for lengths and for OpenSim's "coupled" coordinates, which
             move axes by curves only and stay in rad or m.
     """
@@ -43,13 +43,13 @@ class OsimCoordinate:
 
 @dataclass(frozen=True)
 class OsimJoint:
-    """A joint as the file has it.
+    """A joint as defined in the file.
 
     Attributes:
         name: its name.
         coordinates: in the file's order.
         offset: byte span, in the file, of the element whose translation moves the joint in its parent's own axes; None
-            where there is none.
+            if there is none.
     """
 
     name: str
@@ -59,7 +59,7 @@ class OsimJoint:
 
 @dataclass(frozen=True)
 class Coupling:
-    """A coordinate that follows another by a CoordinateCouplerConstraint."""
+    """A coordinate that depends on another by a CoordinateCouplerConstraint."""
 
     dependent: str
     independent: str
@@ -68,15 +68,15 @@ class Coupling:
 
 @dataclass(frozen=True, eq=False)
 class OsimModel:
-    """A model file as Kinertia sees it.
+    """A model file as Kinertia represents it.
 
     Attributes:
         path, content: the file and its bytes.
-        skeleton: locked coordinates at their defaults; coupled coordinates follow their leaders.
+        skeleton: locked coordinates at their defaults; coupled coordinates depend on their independent ones.
         bsp: of all bodies, in the file's order; a body may be massless.
         joints: in the skeleton's order.
-        couplings: dependent coordinates, which the skeleton does not have.
-        marker_frames: per label, (3, 3) orientation of the frame that its location is given in, in its body.
+        couplings: dependent coordinates, which are not in the skeleton.
+        marker_frames: per label, (3, 3) orientation of the frame in which its location is given, in its body.
 
     Examples:
         >>> model = kinertia.read_osim("model.osim")  # as `kinertia demo` writes it
@@ -98,7 +98,7 @@ class OsimModel:
         return tuple(coordinate for joint in self.joints for coordinate in joint.coordinates)
 
     def all_coordinates(self, skeleton: Skeleton, q: np.ndarray) -> np.ndarray:
-        """(n, k) values of all `coordinates`, locked and coupled ones included.
+        """Return values (n, k) of all `coordinates`, including locked and coupled ones.
 
         Args:
             skeleton: the model's, possibly with more coordinates locked.
@@ -112,10 +112,12 @@ class OsimModel:
 
 
 def markers_of_model(model: OsimModel) -> MarkerSet:
-    """The markers of an OpenSim model, by segment and in its default pose; without landmarks: no model is built.
+    """Return the marker set of an OpenSim model, by segment and in its default pose.
+
+    It has no landmarks, since no model is built from it.
 
     Raises:
-        OsimError: there are none.
+        OsimError: the model has no markers.
     """
     markers = model.skeleton.markers
     if not markers:

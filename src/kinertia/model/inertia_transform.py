@@ -8,7 +8,7 @@ from kinertia.model.bsp import inertia_of, second_moments
 
 
 def transformed_parameters(places: np.ndarray) -> np.ndarray:
-    """(s, 10, 10) linear maps of dynamic parameters from frames to the one in which they stand at these places.
+    """Return linear maps (s, 10, 10) of dynamic parameters from frames to the one in which they are given (`places`).
 
     The pseudo-inertia of a body moves as J' = T J T^T (Wensing, Kim and Slotine 2018); the parameters are linear in J.
 
@@ -21,7 +21,7 @@ def transformed_parameters(places: np.ndarray) -> np.ndarray:
 
 
 def _unit_pseudo() -> np.ndarray:
-    """(10, 4, 4) pseudo-inertias of dynamic parameters that are one each (mass, first moments, xx xy yy xz yz zz)."""
+    """Return pseudo-inertias (10, 4, 4) of unit dynamic parameters (mass, first moments, xx xy yy xz yz zz)."""
     pseudo = np.zeros((10, 4, 4))
     pseudo[0, 3, 3] = 1.0
     for axis in range(3):
@@ -34,12 +34,12 @@ def _unit_pseudo() -> np.ndarray:
 
 
 def _from_pseudo(pseudo: np.ndarray) -> np.ndarray:
-    """(..., 10) dynamic parameters of pseudo-inertias (..., 4, 4)."""
+    """Return dynamic parameters (..., 10) of pseudo-inertias (..., 4, 4)."""
     inertia = inertia_of(pseudo[..., :3, :3])
     rows, columns = zip(*_INERTIA, strict=True)
     return np.concatenate([pseudo[..., 3, 3:], pseudo[..., :3, 3], inertia[..., rows, columns]], axis=-1)
 
 
 _INERTIA = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
-"""Order of the inertia among the dynamic parameters."""
+"""Order of the moments of inertia among the dynamic parameters."""
 _PSEUDO = _unit_pseudo()

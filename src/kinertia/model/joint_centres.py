@@ -2,8 +2,8 @@
 
 All points are in ground axes (m). Frames follow ISB: x anterior, y up or proximal, z right. Sources: hip Bell et al.
 (1990) or Harrington et al. (2007); knee and ankle midpoints of the epicondyles and malleoli, or Plug-in Gait's chord
-construction where there are no medial markers (Davis et al. 1991); talocrural and subtalar axes Inman (1976); lumbar
-joint Dumas et al. (2007).
+construction without medial markers (Davis et al. 1991); talocrural and subtalar axes Inman (1976); lumbar joint Dumas
+et al. (2007).
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from kinertia.trial.data import Recording
 
 MARKER_RADIUS_M = 0.007
 _WIDTHS_OF_STATURE = {"knee": 0.067, "ankle": 0.042}
-"""Mean of eight children and adults, whose widths are 15 % apart."""
+"""Mean of eight children and adults, whose widths differ by 15 %."""
 _TALOCRURAL_RIGHT = np.array([-0.105, -0.174, 0.979])
 _SUBTALAR_INCLINATION, _SUBTALAR_DEVIATION = np.radians(42.0), np.radians(23.0)
 _SUBTALAR_DROP_OF_FOOT = 0.018
@@ -33,14 +33,14 @@ _LUMBAR = {"male": np.array([-0.335, -0.032, 0.0]), "female": np.array([-0.340, 
 
 @dataclass(frozen=True)
 class Landmarks:
-    """Where the markers and landmarks of a static trial are.
+    """Positions of the markers and landmarks of a static trial.
 
     Attributes:
         markers: label -> (3,) m in ground axes, the median over the frames; only those that the trial shows.
         points: landmark -> (3,) m in ground axes; only those that the trial shows.
-        widths: joint -> width in m; only those that the trial carries.
-        marker_set: where the names come from.
-        stature_m: where given, knees and ankles that show neither medial marker nor wand are placed by it.
+        widths: joint -> width in m; only those stated in the trial.
+        marker_set: source of the names.
+        stature_m: if given, it places knees and ankles that have neither medial marker nor wand.
     """
 
     markers: Mapping[str, np.ndarray]
@@ -56,11 +56,11 @@ class Landmarks:
         return name in self.points
 
     def width(self, joint: str) -> float | None:
-        """Width of a joint, or of the other side's where only that was measured, m."""
+        """Return the width (m) of a joint, or of the other side's joint if only that was measured."""
         return self.widths.get(joint, self.widths.get(mirrored(joint)))
 
     def require(self, joint: str, *names: str) -> None:
-        """Raise MarkerSetError when a landmark that this joint needs is missing."""
+        """Raise MarkerSetError if a landmark that this joint needs is missing."""
         missing = [name for name in names if name not in self.points]
         if not missing:
             return
@@ -74,15 +74,15 @@ class Landmarks:
 def _missing(
     joint: str, landmark: str, missing: Sequence[str], nearest: Mapping[str, list[str]] | None = None
 ) -> MarkerSetError:
-    """L105: what the static trial lacks for a joint."""
+    """Make the error L105: what the static trial lacks for a joint."""
     found = finding("L105", Where(part=joint), landmark=Quantity(landmark))
     return MarkerSetError(problem_of(found), missing, dict(nearest or {})).with_finding(found)
 
 
 def find_landmarks(static: Recording, marker_set: MarkerSet) -> Landmarks:
-    """Median position of every marker and landmark over the frames of a static trial.
+    """Compute the median position of every marker and landmark over the frames of a static trial.
 
-    A landmark needs all its markers, but a wrist one of them.
+    A landmark needs all its markers, except a wrist, which needs one of them.
     """
     markers = static.markers
     seen = markers.seen
@@ -109,7 +109,7 @@ def find_landmarks(static: Recording, marker_set: MarkerSet) -> Landmarks:
 
 
 def frame(y: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """Rotation (3, 3) whose y axis is along y and whose z axis is as near to z as that allows."""
+    """Return the rotation (3, 3) whose y axis is along y and whose z axis is as near to z as possible."""
     y = y / np.linalg.norm(y)
     x = np.cross(y, z)
     x = x / np.linalg.norm(x)
@@ -117,9 +117,10 @@ def frame(y: np.ndarray, z: np.ndarray) -> np.ndarray:
 
 
 def pelvis_frame(marks: Landmarks) -> tuple[np.ndarray, np.ndarray, float, float]:
-    """Rotation, origin (mid ASIS), width (ASIS to ASIS) and depth (mid ASIS to mid PSIS, or to the sacral marker), m.
+    """Return the pelvis' rotation, origin (mid ASIS), width (ASIS to ASIS) and depth, m.
 
-    The plane of ASIS and PSIS, or of ASIS and sacrum, is Plug-in Gait's. One PSIS alone stands for both.
+    Depth is from mid ASIS to mid PSIS, or to the sacral marker. The plane of ASIS and PSIS, or of ASIS and sacrum, is
+    Plug-in Gait's. A single PSIS replaces both.
     """
     psis = [name for name in ("psis_r", "psis_l") if name in marks]
     sacral = "sacrum" in marks or ("sacrum" in marks.marker_set.landmarks and not psis)
@@ -134,7 +135,7 @@ def pelvis_frame(marks: Landmarks) -> tuple[np.ndarray, np.ndarray, float, float
 
 
 def hip_in_pelvis(width: float, depth: float, method: str, side: str) -> np.ndarray:
-    """Hip joint centre in the pelvis frame (mid ASIS), m: Bell et al. (1990) or Harrington et al. (2007)."""
+    """Return the hip centre in the pelvis frame (mid ASIS), m, by Bell et al. (1990) or Harrington et al. (2007)."""
     sign = 1.0 if side == "r" else -1.0
     if method == "bell":
         return width * np.array([-0.19, -0.30, sign * 0.36])
@@ -142,19 +143,19 @@ def hip_in_pelvis(width: float, depth: float, method: str, side: str) -> np.ndar
 
 
 def lumbar_in_pelvis(width: float, sex: str) -> np.ndarray:
-    """Lumbar joint centre (L5/S1) in the pelvis frame, m: Dumas et al. (2007)."""
+    """Return the lumbar joint centre (L5/S1) in the pelvis frame, m, by Dumas et al. (2007)."""
     return width * _LUMBAR[sex]
 
 
 def knee(marks: Landmarks, hip: np.ndarray, side: str) -> tuple[np.ndarray, np.ndarray]:
-    """Knee centre and flexion axis (unit, to the right)."""
+    """Return knee centre and flexion axis (unit, to the right)."""
     return _hinge(marks, f"knee_{side}", hip, f"thigh_wand_{side}", side)
 
 
 def ankle(marks: Landmarks, knee_centre: np.ndarray, shank: np.ndarray, side: str) -> tuple[np.ndarray, np.ndarray]:
-    """Ankle centre and talocrural axis (unit, to the right).
+    """Return ankle centre and talocrural axis (unit, to the right).
 
-    The axis runs through the malleoli where both are marked, else it is Inman's in the shank frame (3, 3).
+    The axis runs through the malleoli if both are marked, else it is Inman's in the shank frame (3, 3).
     """
     centre, across = _hinge(marks, f"ankle_{side}", knee_centre, f"shank_wand_{side}", side)
     if _medial(marks, "ankle", f"shank_wand_{side}", side) is not None:
@@ -163,19 +164,19 @@ def ankle(marks: Landmarks, knee_centre: np.ndarray, shank: np.ndarray, side: st
 
 
 def subtalar_axis(side: str) -> np.ndarray:
-    """Subtalar axis in the foot frame (unit; inversion is positive): Inman (1976), 42 deg up, 23 deg inward."""
+    """Return the subtalar axis in the foot frame (unit; inversion positive), Inman (1976): 42 deg up, 23 deg inward."""
     up, inward = _SUBTALAR_INCLINATION, _SUBTALAR_DEVIATION
     right = np.array([np.cos(up) * np.cos(inward), np.sin(up), -np.cos(up) * np.sin(inward)])
     return mirrored_axis(right, side)
 
 
 def subtalar_in_talus(foot_length: float) -> np.ndarray:
-    """A point of the subtalar axis below the ankle centre, m (Delp et al. 1990: 5 mm on a foot of 0.27 m)."""
+    """Return a point of the subtalar axis below the ankle centre, m (Delp et al. 1990: 5 mm on a foot of 0.27 m)."""
     return np.array([0.0, -_SUBTALAR_DROP_OF_FOOT * foot_length, 0.0])
 
 
 def mirrored_axis(right: np.ndarray, side: str) -> np.ndarray:
-    """A rotation axis of the right side, or its mirror image on the left with the same sense of rotation."""
+    """Return a rotation axis of the right side, or its mirror image on the left with the same sense of rotation."""
     return right if side == "r" else right * np.array([-1.0, -1.0, 1.0])
 
 
@@ -203,7 +204,7 @@ def _hinge(marks: Landmarks, joint: str, proximal: np.ndarray, wand: str, side: 
 
 
 def _medial(marks: Landmarks, joint: str, wand: str, side: str) -> np.ndarray | None:
-    """The medial marker of a knee or ankle, or its mirror image where width and wand do not show the joint either."""
+    """Return the medial marker of a knee or ankle, or the mirrored one of the other side without width and wand."""
     inner = marks.points.get(f"{joint}_medial_{side}")
     if inner is None and (marks.width(f"{joint}_{side}") is None or wand not in marks):
         inner = medial_by_the_other_side(marks, joint, side)
@@ -211,9 +212,7 @@ def _medial(marks: Landmarks, joint: str, wand: str, side: str) -> np.ndarray | 
 
 
 def medial_by_the_other_side(marks: Landmarks, joint: str, side: str) -> np.ndarray | None:
-    """Where the medial marker of a knee or ankle would be if the sides mirrored each other about the pelvis; None where
-    that is unknown.
-    """
+    """Return the medial marker of a knee or ankle by mirroring the other side's about the pelvis; None if unknown."""
     lateral, medial = (f"{joint}_{which}_{side}" for which in ("lateral", "medial"))
     if not all(name in marks for name in (lateral, mirrored(lateral), mirrored(medial), "asis_r", "asis_l")):
         return None
@@ -224,8 +223,10 @@ def medial_by_the_other_side(marks: Landmarks, joint: str, side: str) -> np.ndar
 
 
 def _chord(proximal: np.ndarray, lateral: np.ndarray, wand: np.ndarray, half: float) -> np.ndarray:
-    """Plug-in Gait's chord: the centre at distance `half` from the lateral marker, square to the line to the proximal
-    joint, in the plane of proximal joint, marker and wand, on the side away from the wand (Davis et al. 1991).
+    """Return the joint centre by Plug-in Gait's chord construction (Davis et al. 1991).
+
+    It is at distance `half` from the lateral marker, perpendicular to the line to the proximal joint, in the plane of
+    proximal joint, marker and wand, on the side away from the wand.
     """
     up = proximal - lateral
     distance = np.linalg.norm(up)
@@ -239,9 +240,9 @@ def _chord(proximal: np.ndarray, lateral: np.ndarray, wand: np.ndarray, half: fl
 
 
 def foot_frame(marks: Landmarks, side: str) -> tuple[np.ndarray, float]:
-    """Rotation of the foot standing flat (x from heel to toe, y up) and its length from heel to toe tip, m.
+    """Return the rotation of the flat foot (x from heel to toe, y up) and its length from heel to toe tip, m.
 
-    Without a marker on the toe tip the metatarsal heads are taken to be at 73 % of the foot's length.
+    Without a marker on the toe tip the metatarsal heads are assumed to be at 73 % of the foot's length.
     """
     marks.require(f"foot_{side}", f"heel_{side}", f"metatarsal_{side}")
     heel, tip = marks[f"heel_{side}"], f"toe_{side}"

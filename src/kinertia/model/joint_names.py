@@ -1,4 +1,4 @@
-"""Names joints as people do, with the coordinates of each."""
+"""Lists the joints' everyday names, with the coordinates of each."""
 
 from __future__ import annotations
 
@@ -13,4 +13,4 @@ JOINTS = {
     "lumbar rotation": ("lumbar_rotation",),
     "arms": ("arm", "elbow"),
 }
-"""How the coordinates of each joint, left and right, begin."""
+"""Beginnings of the names of each joint's coordinates, left and right."""

@@ -1,8 +1,8 @@
-"""Defines `KinematicTree`: a skeleton as plain arrays, axis by axis: the compiled core.
+"""Defines `KinematicTree`, a skeleton as plain arrays, axis by axis, for compiled functions.
 
-Every moving axis has a frame of its own, which stands at a fixed place in that of the axis before it (its parent) and
-turns about, or slides along, a fixed direction. Parents come first. A segment stands at a fixed place in the frame of
-the axis that carries it. Everything is worked out in ground axes.
+Every moving axis has a frame of its own, at a fixed position in the frame of the axis before it (its parent), and
+rotates about, or slides along, a fixed direction. Parents come first. A segment is at a fixed position in the frame of
+its carrier, the last axis that moves it. Everything is computed in ground axes.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ class KinematicTree(NamedTuple):
     """Axes and segments as arrays.
 
     Attributes:
-        parent: (a,) index of the axis before; -1 where that is the ground.
+        parent: (a,) index of the axis before; -1 for the ground.
         slides: (a,) True for a translation.
         direction: (a, 3) unit, in the axis' frame.
-        rotation, translation: (a, 3, 3) and (a, 3) m, place of the axis' frame in its parent's, at zero.
-        carrier: (s,) index of the axis that carries each segment; -1 for none.
-        segment_rotation, segment_translation: (s, 3, 3) and (s, 3) m, place of the segment in its carrier's frame.
+        rotation, translation: (a, 3, 3) and (a, 3) m, the axis' frame in its parent's, at zero.
+        carrier: (s,) index of the last axis that moves each segment; -1 for none.
+        segment_rotation, segment_translation: (s, 3, 3) and (s, 3) m, the segment's frame in its carrier's.
     """
 
     parent: np.ndarray
@@ -40,11 +40,11 @@ class KinematicTree(NamedTuple):
 def place_axes(
     tree: KinematicTree, at: np.ndarray, rotation: np.ndarray, translation: np.ndarray, axes: np.ndarray
 ) -> None:
-    """Frames of all axes, and the motion that each gives at unit rate, in one frame of a trial.
+    """Compute the frames of all axes, and their motion at unit rate, in one frame of a trial.
 
     Args:
         tree: the skeleton.
-        at: (a,) places of the axes, rad or m.
+        at: (a,) values of the axes, rad or m.
         rotation, translation: (a, 3, 3) and (a, 3) m, written: the axes' frames in ground.
         axes: (a, 6), written: motion in ground axes at the ground origin, linear first.
     """
@@ -92,7 +92,7 @@ def place_axes(
 
 @inlined
 def hand_down(parent: np.ndarray, sums: np.ndarray) -> None:
-    """Add to the sums (a, k) of every axis those of the axes that it carries."""
+    """Add to the sums (a, k) of every axis those of the axes beyond it."""
     for j in range(len(parent) - 1, -1, -1):
         before = parent[j]
         if before >= 0:
@@ -108,7 +108,7 @@ def place_segments(
     rotation: np.ndarray,
     translation: np.ndarray,
 ) -> None:
-    """Frames of all segments, written to `rotation` (s, 3, 3) and `translation` (s, 3), from those of the axes."""
+    """Compute the frames of all segments, `rotation` (s, 3, 3) and `translation` (s, 3), from those of the axes."""
     for s in range(len(tree.carrier)):
         j = tree.carrier[s]
         for r in range(3):
@@ -129,7 +129,7 @@ def place_segments(
 
 @compiled
 def poses(tree: KinematicTree, at: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Segment frames (n, s, 3, 3) and (n, s, 3), and motions of the axes (n, a, 6), at axes' places (n, a)."""
+    """Compute segment frames (n, s, 3, 3) and (n, s, 3), and axis motions (n, a, 6), at axis values (n, a)."""
     n, a = at.shape
     s = len(tree.carrier)
     rotation, translation, axes = np.empty((n, s, 3, 3)), np.empty((n, s, 3)), np.empty((n, a, 6))

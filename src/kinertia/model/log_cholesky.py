@@ -1,10 +1,10 @@
-"""Physically consistent inertial parameters by construction: log mass, CoM, and log-Cholesky second moments about the
-CoM.
+"""Parameterises inertial parameters so that they are always physically consistent.
 
-Ten free numbers per segment, any real values: log m; c; and the lower triangular L of the second moments about the CoM,
-Sigma = L L^T with logarithms on its diagonal. Mass is then positive and Sigma positive definite, which is what physical
-consistency of the pseudo-inertia means. It is the log-Cholesky form of Rucker and Wensing (2022, IEEE RA-L 7:2735)
-taken about the CoM instead of the origin: mass, CoM and inertia then stay apart, as in the anthropometric prior.
+There are ten free numbers per segment, any real values: log m; the CoM c; and the lower triangular L of the second
+moments about the CoM, Sigma = L L^T with logarithms on its diagonal. Mass is then positive and Sigma positive definite,
+which is equivalent to physical consistency of the pseudo-inertia. It is the log-Cholesky form of Rucker and Wensing
+(2022, IEEE RA-L 7:2735) taken about the CoM instead of the origin: mass, CoM and inertia then stay separate, as in the
+anthropometric prior.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _ROUNDING = 1e-9
 
 
 def to_log_cholesky(bsp: BodySegmentParameters) -> np.ndarray:
-    """(10 s,) parameters of physically consistent body segment parameters.
+    """Convert physically consistent body segment parameters to (10 s,) free parameters.
 
     Raises:
         numpy.linalg.LinAlgError: a segment is not physically consistent.
@@ -31,7 +31,7 @@ def to_log_cholesky(bsp: BodySegmentParameters) -> np.ndarray:
 
 
 def from_log_cholesky(segments: tuple[str, ...], theta: np.ndarray) -> BodySegmentParameters:
-    """Body segment parameters of (10 s,) parameters."""
+    """Convert (10 s,) free parameters to body segment parameters."""
     rows = theta.reshape(-1, 10)
     lower = _lower(rows)
     return BodySegmentParameters(
@@ -40,7 +40,10 @@ def from_log_cholesky(segments: tuple[str, ...], theta: np.ndarray) -> BodySegme
 
 
 def table_jacobian(theta: np.ndarray) -> np.ndarray:
-    """(s, 10, 10): derivative of each segment's table row (mass, CoM, ixx, iyy, izz, ixy, ixz, iyz) by its own ten."""
+    """Return the derivative (s, 10, 10) of each segment's table row by its own ten free parameters.
+
+    A row is mass, CoM, ixx, iyy, izz, ixy, ixz, iyz.
+    """
     rows = theta.reshape(-1, 10)
     lower = _lower(rows)
     jacobian = np.zeros((len(rows), 10, 10))
@@ -56,16 +59,17 @@ def table_jacobian(theta: np.ndarray) -> np.ndarray:
 
 
 def dynamic_jacobian(theta: np.ndarray) -> np.ndarray:
-    """(s, 10, 10): derivative of each segment's dynamic parameters, in their usual order, by its own ten."""
+    """Return the derivative (s, 10, 10) of each segment's dynamic parameters, in their usual order, by its own ten."""
     rows = theta.reshape(-1, 10)
     result: np.ndarray = dynamic_by_table(np.exp(rows[:, 0]), rows[:, 1:4]) @ table_jacobian(theta)
     return result
 
 
 def nearest_consistent(bsp: BodySegmentParameters, floor: float = 0.05) -> BodySegmentParameters:
-    """The same with physically consistent second moments about the CoM.
+    """Return the parameters with physically consistent second moments about the CoM.
 
-    Those of an inconsistent segment are raised to at least this share of its largest; consistent segments stay.
+    Second moments of an inconsistent segment are raised to at least this share of its largest; consistent segments are
+    unchanged.
     """
     values, vectors = np.linalg.eigh(second_moments(bsp.inertia_kgm2))
     largest = values[:, -1:]
@@ -81,8 +85,9 @@ def _lower(rows: np.ndarray) -> np.ndarray:
 
 
 def by_body(regressor: np.ndarray, chain: np.ndarray) -> np.ndarray:
-    """(d, r, 10 s) derivative by the body's unknowns, from a regressor (d, r, 10 s) and `chain` (s, 10, 10), the
-    derivative of each segment's parameters in it by the segment's own ten.
+    """Convert a regressor (d, r, 10 s) to derivatives (d, r, 10 s) by the body's unknowns.
+
+    `chain` (s, 10, 10) is the derivative of each segment's parameters in it by the segment's own ten.
     """
     d, r, wide = regressor.shape
     by_segment = regressor.reshape(d * r, len(chain), 10).transpose(1, 0, 2) @ chain

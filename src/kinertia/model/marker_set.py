@@ -1,6 +1,6 @@
-"""Defines `MarkerSet`: which labels are landmarks, and which markers move with which segment.
+"""Defines `MarkerSet`: the assignment of labels to landmarks, and of markers to segments.
 
-Only this knows a laboratory's names. Marker sets come from files (`kinertia.io.marker_set_file`).
+Only marker sets contain a laboratory's labels. They come from files (`kinertia.io.marker_set_file`).
 """
 
 from __future__ import annotations
@@ -48,9 +48,9 @@ LANDMARKS = (
     "head_top",
 )
 ENOUGH_LABELS = 2.0 / 3.0
-"""Share of a set's labels, or of those of its pelvis, legs and feet, from which on a recording has it, be the set named
-or a preset. Measured recordings that lack part of their own set have 0.76 and more; two of other laboratories' sets
-have up to 0.62 of the labels of Plug-in Gait, which mean something else there."""
+"""Least share of a set's labels, or of those of its pelvis, legs and feet, that a recording must have for the set,
+whether the user named it or it is a preset. Measured recordings that lack part of their own set have 0.76 and more; two
+of other laboratories' sets have up to 0.62 of the labels of Plug-in Gait, which mean something else there."""
 _COMPUTED_M = 1e-4
 _SIDES = {"r": "right", "l": "left"}
 _FOOT = ("heel", "metatarsal")
@@ -60,16 +60,16 @@ WIDTHS = tuple(f"{name}_{side}" for name in ("knee", "ankle", "elbow") for side 
 
 @dataclass(frozen=True)
 class MarkerSet:
-    """Landmarks and segment markers by a laboratory's labels.
+    """Landmarks and segment markers, by a laboratory's labels.
 
     Attributes:
         name: for messages.
-        landmarks: landmark -> the labels whose mean it is.
+        landmarks: landmark -> labels whose mean position it is.
         segments: segment -> labels of the markers that move with it.
         widths: joint -> name of a measurement (m) that comes with the static file.
-        in_model: one frame, where an OpenSim model has them in its default pose; None for a laboratory's.
-        respelled: label of the preset -> how a recording spells it, where that differs.
-        spellings: label -> what laboratories call the same marker otherwise.
+        in_model: one frame with the markers in an OpenSim model's default pose; None for a laboratory's.
+        respelled: label of the preset -> its spelling in a recording, if different.
+        spellings: label -> other labels that laboratories use for the same marker.
 
     Examples:
         >>> kinertia.read_marker_set("plug-in-gait").foot_labels()["r"]
@@ -91,11 +91,11 @@ class MarkerSet:
         return tuple(dict.fromkeys(named))
 
     def foot_labels(self) -> dict[str, list[str]]:
-        """Labels of the markers on the right ("r") and left ("l") foot."""
+        """Return the labels of the markers on the right ("r") and left ("l") foot."""
         return {side: list(self.segments[f"foot_{side}"]) for side in "rl"}
 
     def without(self, labels: Collection[str]) -> MarkerSet:
-        """The set without these labels, and without the landmarks that need one of them."""
+        """Return the set without these labels, and without the landmarks that need one of them."""
         return replace(
             self,
             landmarks={name: own for name, own in self.landmarks.items() if not set(own) & set(labels)},
@@ -106,11 +106,12 @@ class MarkerSet:
 
 
 def spelled_as(marker_set: MarkerSet, labels: Sequence[str]) -> MarkerSet:
-    """The set with the labels that these lack spelled as these are, where capitals and punctuation alone differ, or a
-    marker is known by several names; and one label only comes into question.
+    """Return the set with missing labels spelled as in the recording, if only one of its labels comes into question.
+
+    Spellings may differ in capitals and punctuation, or be another known name of the marker.
 
     Args:
-        marker_set: whose labels somebody may have typed anew, or a program has changed.
+        marker_set: its labels may have been retyped by hand or changed by a program.
         labels: of a recording.
     """
     wanted = [label for label in marker_set.labels if label not in labels]
@@ -137,7 +138,7 @@ def spelled_as(marker_set: MarkerSet, labels: Sequence[str]) -> MarkerSet:
 
 
 def _matched(names: Mapping[str, set[str]], labels: Sequence[str]) -> dict[str, str]:
-    """Label of a set -> the one of these labels that is among its names (folded), where no other set's label has it."""
+    """Map each label of a set to the one of these labels that is among its names (folded) and not claimed twice."""
     known = [(one, folded(one)) for one in labels]
     fitting = {label: [one for one, name in known if name in own] for label, own in names.items()}
     claims = Counter(one for found in fitting.values() for one in found)
@@ -145,7 +146,7 @@ def _matched(names: Mapping[str, set[str]], labels: Sequence[str]) -> dict[str, 
 
 
 def with_posterior_pelvis(marker_set: MarkerSet, labels: Sequence[str]) -> MarkerSet:
-    """The set without the sacral marker, or without the PSIS, where these labels show the other only.
+    """Return the set without the sacral marker, or without the PSIS, if the labels contain only the other.
 
     Plug-in Gait has either (Vicon, Plug-in Gait Reference Guide): the pelvis needs one of them, and whichever a
     laboratory does not use is not missing.
@@ -162,11 +163,11 @@ def with_posterior_pelvis(marker_set: MarkerSet, labels: Sequence[str]) -> Marke
 
 
 def without_computed_sacrum(marker_set: MarkerSet, markers: Markers) -> MarkerSet:
-    """The set without a sacral marker that a program wrote in the middle of the PSIS: it says nothing that they do not.
+    """Return the set without a sacral marker that a program computed as the middle of the PSIS: it is redundant.
 
     Args:
         marker_set: of the recording.
-        markers: (n frames); a marker of its own keeps no distance to the middle to a tenth of a millimetre.
+        markers: (n frames); a real marker's distance to the middle is not constant to a tenth of a millimetre.
     """
     names = ("sacrum", "psis_r", "psis_l")
     labels = [label for name in names for label in marker_set.landmarks.get(name, ())]
@@ -179,19 +180,19 @@ def without_computed_sacrum(marker_set: MarkerSet, markers: Markers) -> MarkerSe
 
 
 def check_marker_set(marker_set: MarkerSet, labels: Sequence[str]) -> None:
-    """Raise MarkerSetError when a marker set that the user named does not belong to these labels."""
+    """Raise MarkerSetError if a marker set that the user named does not match these labels."""
     if not is_worn(marker_set, labels):
         raise mismatch(marker_set, labels)
 
 
 def share_worn(marker_set: MarkerSet, labels: Sequence[str]) -> float:
-    """Share of the set's labels that are among these."""
+    """Return the share of the set's labels that are among these."""
     wanted = set(marker_set.labels)
     return len(wanted & set(labels)) / len(wanted)
 
 
 def is_worn(marker_set: MarkerSet, labels: Sequence[str]) -> bool:
-    """Whether these labels are the set's, hardly one of them missing: its own, or those of its pelvis, legs and feet.
+    """Decide whether these labels match the set: most of its own, or of those of its pelvis, legs and feet.
 
     Without trunk and arms a set still makes a model, without legs it does not.
     """
@@ -199,21 +200,22 @@ def is_worn(marker_set: MarkerSet, labels: Sequence[str]) -> bool:
 
 
 def fits_person(marker_set: MarkerSet, labels: Sequence[str]) -> bool:
-    """Whether a preset is worn, and has heels and metatarsals here, of which no foot can be made without: two
-    laboratories' sets may share most labels and not these.
+    """Decide whether a preset is used and has heels and metatarsals here, without which no foot can be built.
+
+    Two laboratories' sets may share most labels and not these.
     """
     sides = [[label for side in "rl" for label in marker_set.landmarks.get(f"{name}_{side}", ())] for name in _FOOT]
     return is_worn(marker_set, labels) and all(set(own) & set(labels) for own in sides if own)
 
 
 def _legs_worn(marker_set: MarkerSet, labels: Sequence[str]) -> float:
-    """Share of the labels of pelvis, legs and feet that are among these."""
+    """Return the share of the labels of pelvis, legs and feet that are among these."""
     legs = {label for name, own in marker_set.segments.items() if name.startswith(_LEGS) for label in own}
     return len(legs & set(labels)) / max(len(legs), 1)
 
 
 def mismatch(marker_set: MarkerSet, labels: Sequence[str]) -> MarkerSetError:
-    """The error that these labels are not the set's (L101), with what they lack of it."""
+    """Make the error that these labels do not match the set (L101), with the missing ones."""
     missing = [label for label in marker_set.labels if label not in labels]
     nearest = nearest_labels(missing, labels)
     found = no_marker_set(marker_set.name, len(marker_set.labels), nearest)
@@ -221,7 +223,7 @@ def mismatch(marker_set: MarkerSet, labels: Sequence[str]) -> MarkerSetError:
 
 
 def no_marker_set(name: str, count: int, missing: Mapping[str, Sequence[str]]) -> Finding:
-    """L101: too many labels of a set of so many are missing, each with those that look like it."""
+    """Make L101: too many of a set's labels are missing; each is listed with similar labels."""
     return finding(
         "L101",
         labels_found=Quantity(float(count - len(missing)), "1", limit=ENOUGH_LABELS * count),
@@ -232,12 +234,12 @@ def no_marker_set(name: str, count: int, missing: Mapping[str, Sequence[str]]) -
 
 
 def with_nearest(missing: Mapping[str, Sequence[str]]) -> str:
-    """The first of these labels, each with those that look most like it."""
+    """List the first of these labels, each with the most similar ones."""
     return first_few([f"{label} ({' or '.join(near)}?)" if near else label for label, near in missing.items()])
 
 
 def nearest_labels(missing: Sequence[str], labels: Sequence[str]) -> dict[str, list[str]]:
-    """For each missing label the labels that look most like it."""
+    """Return the most similar labels for each missing label."""
     known: dict[str, str] = {}
     for label in labels:
         known.setdefault(folded(label), label)
@@ -248,7 +250,7 @@ def nearest_labels(missing: Sequence[str], labels: Sequence[str]) -> dict[str, l
 
 
 def in_words(name: str) -> str:
-    """A landmark, joint or segment of one side as people call it.
+    """Return the everyday name of a landmark, joint or segment of one side.
 
     >>> in_words("knee_r")
     'right knee'
@@ -258,5 +260,5 @@ def in_words(name: str) -> str:
 
 
 def folded(label: str) -> str:
-    """Its letters and digits, in lower case."""
+    """Return the letters and digits of a label, in lower case."""
     return "".join(ch for ch in label.lower() if ch.isalnum())

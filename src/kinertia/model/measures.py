@@ -1,8 +1,8 @@
-"""Names the measurements that Yeadon's body is built from, with their usual sizes.
+"""Lists the measurements that Yeadon's body is built from, with their typical sizes.
 
-Yeadon (1990, J Biomech 23:67) builds the body from 95 of them, 58 where the two sides are taken as alike: 21 of trunk
-and head, 18 of an arm, 19 of a leg. A level (T0 to T8, A0 to A7, L0 to L9) is where one measures; the picture that
-`kinertia init --measures` draws shows it.
+Yeadon (1990, J Biomech 23:67) builds the body from 95 of them, 58 if the two sides are assumed equal: 21 of trunk and
+head, 18 of an arm, 19 of a leg. A level (T0 to T8, A0 to A7, L0 to L9) is the position of a measurement; the picture
+that `kinertia init --measures` draws shows it.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 from kinertia.model.bsp import FloatArray
 
 GIRTH_OVER_WIDTH = (2.0, np.pi)
-"""Least and most of any stadium; depths count as widths."""
+"""Least and greatest ratio in any stadium; depths count as widths."""
 
 
 @dataclass(frozen=True)
@@ -25,14 +25,15 @@ class Measure:
     """One measurement.
 
     Attributes:
-        name: as in the sheet.
-        key: as in the package `yeadon`, of limbs on the left.
-        level: where, as in the picture.
+        name: as in the form.
+        key: as in the package `yeadon`, for limbs on the left.
+        level: position, as in the picture.
         kind: "length", "girth", "width" or "depth".
-        sd_m: how far a careful measurement may be off: set here, about twice what trained people repeat (1 % of a
-            girth is the usual target of courses in anthropometry), and more where a joint centre must be guessed.
-        first: whether it is one of those that say most for the time that they take.
-        what: in words.
+        sd_m: standard deviation of a careful measurement: chosen here, about twice the repeatability of trained people
+            (1 % of a girth is the usual target of courses in anthropometry), and more if a joint centre must be
+            guessed.
+        first: whether it is one of the most informative for the time that it takes.
+        what: description.
     """
 
     name: str
@@ -45,20 +46,20 @@ class Measure:
 
     @property
     def keys(self) -> tuple[str, ...]:
-        """Its names in the package, of limbs on both sides."""
+        """Names of the measurement in the package, for limbs on both sides."""
         other = {"a": "b", "j": "k"}.get(self.key[1])
         return (self.key,) if other is None else (self.key, f"L{other}{self.key[2:]}")
 
 
 @dataclass(frozen=True, eq=False)
 class UsualBuild:
-    """What measures are of people of one stature and mass, and how they vary; all in the order of `measures`.
+    """Mean and variation of the measurements of people of one stature and mass, in the order of `measures`.
 
     Attributes:
         median_m: (n,) of the people behind the other figures.
         log_shape: (n,) mean of the logarithms of measures (m), less `log_size`.
-        log_sd: (n,) deviation between people of one size, and of the mean.
-        common: (n, k) what varies together, in principal components; the rows' squares sum to one.
+        log_sd: (n,) standard deviation between people of one size, and of the mean.
+        common: (n, k) correlated variation, in principal components; the rows' squares sum to one.
     """
 
     median_m: FloatArray
@@ -69,7 +70,7 @@ class UsualBuild:
 
 @cache
 def measures() -> tuple[Measure, ...]:
-    """All of them, from the hips up, then an arm and a leg downwards."""
+    """Return all measurements, from the hips up, then an arm and a leg downwards."""
     return tuple(
         Measure(row["name"], row["key"], row["level"], row["kind"], float(row["sd_mm"]) / 1e3, bool(row["first"]), text)
         for row in _rows("measures.csv")
@@ -79,14 +80,17 @@ def measures() -> tuple[Measure, ...]:
 
 @cache
 def girths_with_widths() -> tuple[tuple[int, int], ...]:
-    """Places in `measures` of each girth and of the width or depth of the same cross-section."""
+    """Return the indices in `measures` of each girth and of the width or depth of the same cross-section."""
     places = {measure.key: k for k, measure in enumerate(measures())}
     pairs = [(key, f"{key[:-1]}{other}") for key in places if key.endswith("p") for other in "wd"]
     return tuple((places[girth], places[width]) for girth, width in pairs if width in places)
 
 
 def log_size(mass_kg: float, height_m: float) -> FloatArray:
-    """(58,) logarithm of what each measure is in proportion to: the stature, or the root of mass over stature."""
+    """Return the logarithm (58,) of the size that each measurement is proportional to.
+
+    It is the stature, or the square root of mass over stature.
+    """
     along = np.array([one.kind == "length" for one in measures()])
     size: FloatArray = np.where(along, np.log(height_m), 0.5 * np.log(mass_kg / height_m))
     return size
@@ -94,7 +98,7 @@ def log_size(mass_kg: float, height_m: float) -> FloatArray:
 
 @cache
 def usual_build() -> UsualBuild:
-    """Fitted to the five people that come with the package `yeadon` (four men, a woman)."""
+    """Return the build fitted to the five people that come with the package `yeadon` (four men, a woman)."""
     rows = {row["name"]: row for row in _rows("usual_build.csv")}
     columns = {
         column: np.array([float(rows[one.name][column]) for one in measures()])

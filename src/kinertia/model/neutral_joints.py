@@ -1,6 +1,6 @@
 """Locates a model's joints and their axes with all coordinates at zero, as in upright standing.
 
-Mirroring is across the plane between the sides: in ground axes, and in those of the bodies that carry the joints.
+Mirroring is across the plane between the sides: in ground axes, and in the axes of the joints' parent bodies.
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ from kinertia.model.skeleton import Joint, Skeleton
 
 @dataclass(frozen=True)
 class NeutralJoints:
-    """Joints by the name of the body that each one carries.
+    """Joints by the name of their child body.
 
     Attributes:
         joints: as in the model.
         rotations: (3, 3) by body, its axes in ground.
         origins: (3,) m by body, its origin in ground.
         centres: (3,) m by body, the centre of its joint in ground.
-        turns: by body, by coordinate, (3,) the axis in ground about which the joint turns; those that turn nothing are
-            not there.
+        turns: by body, by coordinate, (3,) the axis in ground about which the joint rotates; translations are not
+            included.
     """
 
     joints: Mapping[str, Joint]
@@ -35,13 +35,13 @@ class NeutralJoints:
 
     @property
     def pairs(self) -> list[tuple[str, str]]:
-        """Bodies of the right and of the left that are each other's."""
+        """Pairs of corresponding bodies of the right and of the left side."""
         pairs = [(name, f"{name[:-2]}_l") for name in self.joints if name.endswith("_r")]
         return [(right, left) for right, left in pairs if left in self.joints]
 
     @property
     def sideways(self) -> int | None:
-        """The ground axis from left to right, 0 or 2 (x or z); None where the sides are not beside each other."""
+        """Ground axis from left to right, 0 or 2 (x or z); None if the sides are not beside each other."""
         across = sum((self.centres[right] - self.centres[left] for right, left in self.pairs), np.zeros(3))
         if not np.abs(across).any() or np.abs(across).argmax() == 1:
             return None
@@ -49,7 +49,7 @@ class NeutralJoints:
 
 
 def neutral_joints(skeleton: Skeleton) -> NeutralJoints:
-    """The joints of a model whose coordinates are all zero, but for those that are locked at another value."""
+    """Locate the joints of a model whose coordinates are zero, except for those that are locked at another value."""
     pose = skeleton.pose(np.zeros((1, len(skeleton.coordinates))))
     rotations = {name: pose.rotation[0, i] for i, name in enumerate(skeleton.segments)}
     origins = {name: pose.translation[0, i] for i, name in enumerate(skeleton.segments)}
@@ -73,12 +73,12 @@ def neutral_joints(skeleton: Skeleton) -> NeutralJoints:
 
 
 def mirrored(axis: int) -> FloatArray:
-    """(3, 3) reflection that turns this axis round."""
+    """Return the reflection (3, 3) that reverses this axis."""
     reflection = np.eye(3)
     reflection[axis, axis] = -1.0
     return reflection
 
 
 def angle_deg(one: FloatArray, other: FloatArray) -> float:
-    """Between two lines of these directions (unit): an axis and its opposite are the same line."""
+    """Return the angle between two lines of these directions (unit): an axis and its opposite are the same line."""
     return float(np.degrees(np.arccos(min(1.0, abs(float(one @ other))))))

@@ -1,8 +1,8 @@
-"""Defines `RangeOfMotion`: how far healthy people's joints move, by the literature, and how much people differ.
+"""Defines `RangeOfMotion`: the range of healthy people's joints from the literature, and its variation.
 
 Signs and zeros are OpenSim's: flexion of hips, knees and elbows, dorsiflexion, adduction, internal rotation, inversion
-and extension of the trunk are positive. Of arms and of the forearm's turn no range is known here: Cardan angles of a
-shoulder are not the goniometer's.
+and extension of the trunk are positive. No ranges are given for arms and forearm rotation: Cardan angles of a shoulder
+are not the goniometer's.
 """
 
 from __future__ import annotations
@@ -12,18 +12,18 @@ from dataclasses import dataclass
 import numpy as np
 
 TOLERANCE_DEG = 5.0
-"""What a static trial with joints that are bent a little makes of zero."""
+"""Error of zero angles in a static trial with slightly bent joints."""
 _SURE = 3.0
-"""SDs from the mean within which all people are taken to be."""
+"""Number of SDs from the mean that is assumed to include everybody."""
 
 
 @dataclass(frozen=True)
 class RangeOfMotion:
-    """Ends of a joint's range, rad.
+    """Limits of a joint's range, rad.
 
     Attributes:
-        low, high: where it ends, mean of healthy people.
-        low_sd, high_sd: by how much that differs between them.
+        low, high: mean limits of healthy people.
+        low_sd, high_sd: standard deviations between people.
 
     Examples:
         >>> from kinertia.model.range_of_motion import range_of_motion
@@ -39,29 +39,29 @@ class RangeOfMotion:
 
     @property
     def of_anybody(self) -> tuple[float, float]:
-        """Mean and three SDs."""
+        """Limits that include everybody: mean and three SDs."""
         return self.low - _SURE * self.low_sd, self.high + _SURE * self.high_sd
 
     @property
     def beyond_sd(self) -> tuple[float, float]:
-        """Deviation at the low and the high end of what is measured: people's, and the tolerance of zero."""
+        """Standard deviation at the low and the high limit: people's, and the tolerance of zero."""
         tolerance = np.radians(TOLERANCE_DEG)
         return float(np.hypot(self.low_sd, tolerance)), float(np.hypot(self.high_sd, tolerance))
 
     @property
     def reversed(self) -> RangeOfMotion:
-        """The same where the coordinate counts the other way."""
+        """The same range for a coordinate of opposite sign."""
         return RangeOfMotion(-self.high, self.high_sd, -self.low, self.low_sd)
 
     @classmethod
     def exactly(cls, low: float, high: float) -> RangeOfMotion:
-        """Of one person whose range is known, rad: the tolerance is three SDs."""
+        """Make the range of one person whose limits are known, rad: the tolerance is three SDs."""
         sd = float(np.radians(TOLERANCE_DEG)) / _SURE
         return cls(low, sd, high, sd)
 
 
 _HYPEREXTENSION = (-10.0, TOLERANCE_DEG / _SURE)
-"""Knees from which on joints count as hypermobile (Beighton et al. 1973, Ann Rheum Dis 32:413)."""
+"""Knee extension from which joints count as hypermobile (Beighton et al. 1973, Ann Rheum Dis 32:413)."""
 _DEGREES = {
     "hip_flexion": (-9.8 - 15.0, 6.8, 122.3 + 15.0, 6.1),
     "hip_adduction": (-45.9, 9.3, 26.9, 4.1),
@@ -80,15 +80,15 @@ trunk: American Academy of Orthopaedic Surgeons (1965), Joint motion, which give
 up to 15 degrees, which is added to flexion and extension of hips and trunk."""
 _OTHER_NAMES = {"hip_add": "hip_adduction", "hip_rot": "hip_rotation", "knee_flex": "knee_angle"}
 _COUNTED_BACKWARDS = ("knee_angle", "elbow_flex")
-"""In some models flexion is negative."""
+"""Coordinates whose flexion is negative in some models."""
 
 
 def range_of_motion(coordinate: str, middle: float = 0.0) -> RangeOfMotion | None:
-    """The range of a coordinate by its name, with or without side; None where none is known.
+    """Return the range of a coordinate by its name, with or without side; None if none is known.
 
     Args:
-        coordinate: as OpenSim's gait models call it.
-        middle: of the model's own range, rad: a knee whose middle is negative counts flexion so.
+        coordinate: its name in OpenSim's gait models.
+        middle: of the model's own range, rad: in a knee whose middle is negative, flexion is negative.
     """
     joint = coordinate.removesuffix("_r").removesuffix("_l")
     joint = _OTHER_NAMES.get(joint, joint)

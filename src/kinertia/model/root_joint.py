@@ -1,9 +1,8 @@
 """Defines `Root`: the free joint between ground and the root segment.
 
-Three translations, then three rotations about body-fixed axes that are square to one another: tilt (z), list (x),
-rotation (y) in the 27-DOF model, any such triple in an OpenSim model. "Residual" always means force (N) in ground axes
-and moment (N m) about the centre of these rotations (the pelvis origin, unless the model puts it elsewhere), in ground
-axes.
+It has three translations, then three rotations about body-fixed perpendicular axes: tilt (z), list (x), rotation (y) in
+the 27-DOF model, any such triple in an OpenSim model. "Residual" always means force (N) in ground axes and moment (N m)
+about the centre of these rotations (the pelvis origin, unless the model defines another point), in ground axes.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 @dataclass(frozen=True, eq=False)
 class Root:
-    """Where the free joint stands, and its axes.
+    """Position and axes of the free joint.
 
     Attributes:
         rotation, translation: (3, 3) and (3,) m, the joint's frame in ground.
@@ -34,13 +33,13 @@ class Root:
     child_translation: np.ndarray
 
     def centre(self, q: np.ndarray) -> np.ndarray:
-        """(n, 3) m, centre of the rotations in ground, at the root coordinates q (n, 6 or more)."""
+        """Return the centre (n, 3) m of the rotations in ground, at the root coordinates q (n, 6 or more)."""
         result: np.ndarray = self.translation + q[:, :3] @ self._slides.T
         return result
 
     @property
     def moves(self) -> np.ndarray:
-        """(3, 3): rows are the directions in ground in which the first three coordinates move the centre."""
+        """Directions (3, 3), in rows and in ground, in which the first three coordinates move the centre."""
         return np.ascontiguousarray(self._slides.T)
 
     @property
@@ -49,26 +48,26 @@ class Root:
         return result
 
     def axes(self, q: np.ndarray) -> np.ndarray:
-        """(n, 3, 3): columns are the axes of the three rotations in ground; omega = A * angle rates."""
+        """Return the axes (n, 3, 3) of the three rotations in ground, in columns; omega = A * angle rates."""
         first, second, third = (self.rotation @ self.turns).T
         c1, s1, c2, s2 = np.cos(q[:, 3, None]), np.sin(q[:, 3, None]), np.cos(q[:, 4, None]), np.sin(q[:, 4, None])
         about_2 = c1 * second + s1 * np.cross(first, second)
-        # the third axis, turned by the second angle, then by the first
+        # the third axis, rotated by the second angle, then by the first
         along = float(np.cross(second, third) @ first)
         about_3 = c2 * (c1 * third + s1 * np.cross(first, third)) + s2 * along * first
         return np.stack([np.broadcast_to(first, about_2.shape), about_2, about_3], axis=-1)
 
     def about_centre(self, q: np.ndarray, load: np.ndarray) -> np.ndarray:
-        """Load (n, 6: force, moment about the ground origin) taken about the centre."""
+        """Convert a load (n, 6: force, moment about the ground origin) to moments about the centre."""
         force, moment = load[:, :3], load[:, 3:]
         return np.concatenate([force, moment - np.cross(self.centre(q), force)], axis=1)
 
     def centre_moves(self, load: np.ndarray) -> np.ndarray:
-        """(n, 3, 3) d x force of a load (n, 6), one column for each direction d that a translation moves the centre."""
+        """Return d x force (n, 3, 3) of a load (n, 6), a column for each direction d of the centre's translation."""
         return np.stack([np.cross(direction, load[:, :3]) for direction in self._slides.T], axis=-1)
 
     def coordinates(self, rotation: np.ndarray, translation: np.ndarray) -> np.ndarray:
-        """(n, 6) root coordinates that place the root segment at these rotations (n, 3, 3) and translations (n, 3)."""
+        """Return root coordinates (n, 6) for these rotations (n, 3, 3) and translations (n, 3) of the root segment."""
         centre = translation + rotation @ self.child_translation
         turned = self.rotation.T @ rotation @ self.child_rotation
         with warnings.catch_warnings(action="ignore"):  # at gimbal lock one of the possible triples will do

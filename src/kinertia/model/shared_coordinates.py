@@ -10,7 +10,7 @@ from kinertia.model.skeleton import Skeleton
 
 
 def by_side(names: Sequence[str]) -> dict[str, dict[str, int]]:
-    """Name without its side -> side -> index in `names`; the side is "" where the other one is not there too.
+    """Group names by side: name without its side -> side -> index in `names`; the side is "" for unpaired names.
 
     Examples:
         >>> from kinertia.model.shared_coordinates import by_side
@@ -26,7 +26,7 @@ def by_side(names: Sequence[str]) -> dict[str, dict[str, int]]:
 
 
 def mirrored(name: str) -> str:
-    """The name of what is on the other side; of what has no side, its own.
+    """Return the corresponding name of the other side; names without a side are unchanged.
 
     Examples:
         >>> from kinertia.model.shared_coordinates import mirrored
@@ -38,7 +38,7 @@ def mirrored(name: str) -> str:
 
 
 def opposite_on_left(skeleton: Skeleton) -> frozenset[str]:
-    """Coordinates of pelvis and trunk that turn about an axis in the plane of symmetry."""
+    """Return the coordinates of pelvis and trunk that rotate about an axis in the plane of symmetry."""
     sideless = {name for name, columns in by_side(skeleton.coordinates).items() if "" in columns}
     axes = [axis for joint in skeleton.joints for axis in joint.axes if axis.kind == "rotation"]
     return frozenset(

@@ -1,13 +1,13 @@
 """Defines `Skeleton`: segments, joints, coordinates, markers, and the kinematic tree that they form.
 
-A joint places its child segment in its parent by a constant placement followed by a list of single axes, each a
-rotation about or a translation along a fixed direction. Every axis follows one coordinate and
-becomes one axis of the tree, so that `n_q = n_v` and a coordinate is an ordinary function of time. Locked axes are
-constants: they are folded into the placements, which is how a calibrated joint-centre offset (a coordinate that
-does not move in time) or an arm rotation that no marker shows enters the model.
+A joint places its child segment in its parent by a constant transform followed by a list of single axes, each a
+rotation about or a translation along a fixed direction. Every axis depends on one coordinate and becomes one axis of
+the tree, so that `n_q = n_v` and a coordinate is an ordinary function of time. Locked axes are constants: they become
+part of the transforms, which is how a calibrated joint-centre offset (a coordinate that does not move in time) or an
+arm rotation that no marker determines enters the model.
 
-In the 27-DOF model an axis is its coordinate. In an OpenSim model it may be a function of it, and several may follow
-the same one: `Skeleton.map` goes from coordinates to axes and back. The tree (`KinematicTree`) knows axes only.
+In the 27-DOF model an axis is its coordinate. In an OpenSim model it may be a function of it, and several may depend on
+the same one: `Skeleton.map` converts between coordinates and axes. The tree (`KinematicTree`) contains axes only.
 """
 
 from __future__ import annotations
@@ -49,9 +49,9 @@ class Axis:
 class Joint:
     """Places segment `child` in segment `parent` ("ground" for the root).
 
-    The joint frame stands at `translation` (m) with `rotation` (3, 3) in the parent's frame; the `axes` follow in
-    order; after the last one stands the joint's far frame, which is at `child_translation` with `child_rotation` in the
-    child's frame.
+    The joint frame is at `translation` (m) with `rotation` (3, 3) in the parent's frame; the `axes` follow in order;
+    after the last one comes the joint's far frame, which is at `child_translation` with `child_rotation` in the child's
+    frame.
     """
 
     parent: str
@@ -74,14 +74,14 @@ class Marker:
 
 @dataclass(frozen=True)
 class Pose:
-    """Where everything is at n frames.
+    """Positions of segments and axes at n frames.
 
     Attributes:
         rotation: (n, s, 3, 3) segment frames in ground.
         translation: (n, s, 3) m, segment origins in ground.
-        axes: (n, a, 6) the spatial velocity in ground axes, at the ground origin, that each axis at unit rate gives to
-            what it moves: linear first, then angular.
-        slopes: (n, a) derivatives of the axes by their coordinates; None where axes are coordinates.
+        axes: (n, a, 6) the spatial velocity in ground axes, at the ground origin, of the segments that each axis moves
+            at unit rate: linear first, then angular.
+        slopes: (n, a) derivatives of the axes by their coordinates; None if axes are coordinates.
     """
 
     rotation: np.ndarray
@@ -98,12 +98,12 @@ class Skeleton:
         name: the model's name.
         joints: parents before children.
         markers: all markers, in order.
-        locked: coordinates held at a constant value (rad or m).
+        locked: coordinates fixed at a constant value (rad or m).
         gravity_m_s2: downward, along -y.
         feet: the segments that the ground acts on, right and left.
-        start: coordinates from which inverse kinematics starts elsewhere than from zero (rad or m).
-        carried: parameters of segments that are given once and for all; `bodies` adds others to them.
-        ranges: between which values coordinates move (rad or m), where that is known.
+        start: nonzero coordinates from which inverse kinematics starts (rad or m).
+        carried: parameters of segments that are fixed; `bodies` adds others to them.
+        ranges: of coordinates (rad or m), where known.
 
     Examples:
         >>> skeleton = kinertia.walking_subject().skeleton
@@ -133,20 +133,20 @@ class Skeleton:
 
     @cached_property
     def rotational(self) -> np.ndarray:
-        """(c,) True where the coordinate is an angle (rad), False where it is a length (m)."""
+        """Mask (c,): True for angles (rad), False for lengths (m)."""
         angles = {axis.coordinate for axis in self._axes if axis.kind == "rotation"}
         return np.array([name in angles for name in self.coordinates])
 
     @cached_property
     def periodic(self) -> np.ndarray:
-        """(c,) True where the coordinate is an angle and a full turn changes nothing."""
+        """Mask (c,) of coordinates that are angles with a period of a full turn."""
         shaped = {axis.coordinate for axis in self._axes if axis.kind == "translation" or axis.function is not None}
         result: np.ndarray = self.rotational & np.array([name not in shaped for name in self.coordinates])
         return result
 
     @cached_property
     def bounds(self) -> Bounds:
-        """The ranges of the coordinates as arrays."""
+        """Ranges of the coordinates as arrays."""
         return Bounds.of(self.coordinates, self.ranges)
 
     @property
@@ -155,14 +155,14 @@ class Skeleton:
 
     @cached_property
     def map(self) -> CoordinateMap:
-        """From the coordinates to the axes of the tree."""
+        """Map from the coordinates to the axes of the tree."""
         moving = [axis for axis in self._axes if axis.coordinate not in self.locked]
         followed, functions = [axis.coordinate for axis in moving], [axis.function for axis in moving]
         return CoordinateMap.of(self.coordinates, followed, functions)
 
     @cached_property
     def root(self) -> Root:
-        """The free joint of the first segment: its first three coordinates slide, the next three turn."""
+        """The free joint of the first segment: its first three coordinates translate, the next three rotate."""
         joint = self.joints[0]
         directions = np.array([axis.direction for axis in joint.axes]).T
         return Root(
@@ -175,33 +175,33 @@ class Skeleton:
         )
 
     def lock(self, values: Mapping[str, float]) -> Skeleton:
-        """The same skeleton with these coordinates held at these values (rad or m)."""
+        """Return the skeleton with these coordinates fixed at these values (rad or m)."""
         self._check_names(values)
         return replace(self, locked={**self.locked, **values})
 
     def free(self, names: Iterable[str]) -> Skeleton:
-        """The same skeleton with these coordinates moving again."""
+        """Return the skeleton with these coordinates freed again."""
         names = set(names)
         self._check_names(names)
         return replace(self, locked={k: v for k, v in self.locked.items() if k not in names})
 
     def unbounded(self, names: Iterable[str]) -> Skeleton:
-        """The same skeleton with coordinates that may have any value, whatever model and anatomy say."""
+        """Return the skeleton with unlimited ranges of these coordinates, whatever model and anatomy state."""
         return replace(self, ranges={**self.ranges, **dict.fromkeys(names, ANYTHING)})
 
     def with_markers(self, markers: Sequence[Marker]) -> Skeleton:
-        """The same skeleton with other markers."""
+        """Return the skeleton with other markers."""
         other = replace(self, markers=tuple(markers))
         other.__dict__.update(tree=self.tree, map=self.map)  # markers move nothing
         return other
 
     def with_places(self, positions: np.ndarray) -> Skeleton:
-        """The same skeleton with its markers at these positions (m, 3) in their segments."""
+        """Return the skeleton with its markers at these positions (m, 3) in their segments."""
         rows = zip(self.markers, positions, strict=True)
         return self.with_markers([replace(marker, position=place) for marker, place in rows])
 
     def carrying(self, bsp: BodySegmentParameters | None) -> Skeleton:
-        """The same skeleton with these parameters given once and for all."""
+        """Return the skeleton with these fixed parameters of segments."""
         return replace(self, carried=bsp)
 
     def _check_names(self, names: Iterable[str]) -> None:
@@ -211,7 +211,7 @@ class Skeleton:
 
     @cached_property
     def tree(self) -> KinematicTree:
-        """The moving axes and the segments as arrays; locked axes are part of the places."""
+        """The moving axes and the segments as arrays; locked axes are part of the transforms."""
         parents, kinds, directions, places = [], [], [], []
         carrier, offset = {"ground": -1}, {"ground": np.eye(4)}
         for joint in self.joints:
@@ -243,15 +243,15 @@ class Skeleton:
 
     @cached_property
     def support(self) -> np.ndarray:
-        """(s, a) True where axis a moves segment s."""
+        """Mask (s, a): True where axis a moves segment s."""
         carrier = self.tree.carrier
         carried = np.vstack([self.above.T, np.zeros((1, len(self.above)), dtype=bool)])
-        result: np.ndarray = carried[carrier]  # the last row is that of segments which no axis carries
+        result: np.ndarray = carried[carrier]  # the last row is that of segments which no axis moves
         return result
 
     @cached_property
     def above(self) -> np.ndarray:
-        """(a, a) True where axis i is axis j or moves it (parents come first, so this is upper triangular)."""
+        """Mask (a, a): True where axis i is axis j or moves it (parents first, so it is upper triangular)."""
         count = len(self.tree.parent)
         above = np.eye(count, dtype=bool)
         for j, parent in enumerate(self.tree.parent):
@@ -261,18 +261,18 @@ class Skeleton:
 
     @cached_property
     def marker_segments(self) -> np.ndarray:
-        """(m,) index of each marker's segment."""
+        """Index (m,) of each marker's segment."""
         index = {name: i for i, name in enumerate(self.segments)}
         return np.array([index[marker.segment] for marker in self.markers], dtype=int)
 
     @cached_property
     def marker_locals(self) -> np.ndarray:
-        """(m, 3) marker positions in their segments' frames, m."""
+        """Marker positions (m, 3) in their segments' frames, m."""
         return np.array([marker.position for marker in self.markers]).reshape(-1, 3)
 
     @cached_property
     def carried_markers(self) -> tuple[np.ndarray, np.ndarray]:
-        """(m,) axis that carries each marker, and (m, 3) m the markers in the frames of these axes."""
+        """Last axis (m,) that moves each marker, and the markers (m, 3) m in the frames of these axes."""
         tree, segment = self.tree, self.marker_segments
         turned = (tree.segment_rotation[segment] @ self.marker_locals[:, :, None])[..., 0]
         return tree.carrier[segment], np.ascontiguousarray(turned + tree.segment_translation[segment])
@@ -283,17 +283,17 @@ class Skeleton:
         return tuple(marker.label for marker in self.markers)
 
     def pose(self, q: np.ndarray) -> Pose:
-        """Segment frames and axes at the coordinates q (n, c)."""
+        """Compute segment frames and axes at the coordinates q (n, c)."""
         return Pose(*poses(self.tree, np.ascontiguousarray(self.map.axes(q), dtype=float)), self.map.slopes(q))
 
     def marker_positions(self, pose: Pose) -> np.ndarray:
-        """(n, m, 3) m, model markers in ground at this pose."""
+        """Return model markers (n, m, 3) m in ground at this pose."""
         turned = pose.rotation[:, self.marker_segments] @ self.marker_locals[:, :, None]
         result: np.ndarray = turned[..., 0] + pose.translation[:, self.marker_segments]
         return result
 
     def bodies(self, bsp: BodySegmentParameters) -> np.ndarray:
-        """(a, 10) dynamic parameters of all that each axis itself bears, in its frame: these and those of `carried`."""
+        """Return dynamic parameters (a, 10) of bodies attached directly to each axis, in its frame, with `carried`."""
         total = np.zeros((len(self.tree.parent), 10))
         for part in (bsp, self.carried):
             if part is not None:
@@ -305,26 +305,26 @@ class Skeleton:
 
     @cached_property
     def _parameter_places(self) -> np.ndarray:
-        """(s, 10, 10) dynamic parameters of each segment to those in its carrier's frame."""
+        """Matrices (s, 10, 10) from dynamic parameters of each segment to those in its carrier's frame."""
         tree = self.tree
         return transformed_parameters(np.array([*map(placed, tree.segment_rotation, tree.segment_translation)]))
 
 
 def placed(rotation: np.ndarray, translation: np.ndarray) -> np.ndarray:
-    """(4, 4) homogeneous transform of a frame at this place."""
+    """Return the homogeneous transform (4, 4) of a frame."""
     result = np.eye(4)
     result[:3, :3], result[:3, 3] = rotation, translation
     return result
 
 
 def inverse(place: np.ndarray) -> np.ndarray:
-    """The transform back."""
+    """Return the inverse of a homogeneous transform."""
     rotation = place[:3, :3].T
     return placed(rotation, -rotation @ place[:3, 3])
 
 
 def placed_by(axis: Axis, value: float) -> np.ndarray:
-    """(4, 4) where an axis puts what follows it when its coordinate has this value (rad or m)."""
+    """Return the transform (4, 4) of an axis when its coordinate has this value (rad or m)."""
     direction = np.array(axis.direction)
     if axis.function is not None:
         value = float(axis.function(np.array([value]))[0])

@@ -6,8 +6,10 @@ from kinertia.model.skeleton import Skeleton
 
 
 def skin_angles(skeleton: Skeleton, segment: str) -> list[int]:
-    """Columns of the angles of the joints at both ends of a segment; a segment without markers in between (a patella,
-    a talus) belongs to the joint. The root's are none of them: they turn the whole body.
+    """Return the columns of the angles of the joints at both ends of a segment.
+
+    A segment without markers in between (a patella, a talus) belongs to the joint. The root's angles are excluded,
+    since they rotate the whole body.
     """
     ends = {marker.segment for marker in skeleton.markers} | {"ground"}
     names: set[str] = set()

@@ -1,13 +1,13 @@
 """Builds the body of stadium solids (Yeadon 1990, J Biomech 23:67): masses, centres, inertias from measurements.
 
-The package `yeadon` makes the solids; here they become the segments of the built-in model. A solid stands between two
-levels at which girth and width were measured. How they map:
+The package `yeadon` makes the solids; here they become the segments of the built-in model. A solid lies between two
+levels at which girth and width were measured. The segments are:
 
 - upper arm: shoulder to elbow joint centre (A0 to A2); forearm: elbow to finger nails (A2 to A7), the hand with it;
 - thigh: hip to knee joint centre (L0 to L3); shank: to the ankle (L3 to L5). All are cut across the limb's axis, which
-  is the segment's y axis; a centre of mass is on it, for Yeadon's limbs are round;
-- foot: L5 to L9. Yeadon's points its toes; turned about the ankle so that its axis is the foot's x axis and the instep
-  is up;
+  is the segment's y axis; a centre of mass is on it, since Yeadon's limbs are round;
+- foot: L5 to L9. Yeadon's points its toes; it is rotated about the ankle so that its axis is the foot's x axis and the
+  instep is up;
 - pelvis: the trunk from the level of the hip joint centres (T0) to that of the lumbar joint, whose height the static
   trial gives: the solid that it is in is cut there, between cross-sections that change linearly from level to level;
 - torso: all above, with neck and head.
@@ -36,7 +36,7 @@ from kinertia.model.bsp import BodySegmentParameters, FloatArray, combine
 from kinertia.model.measures import measures
 
 KINDS = ("pelvis", "torso", "thigh_r", "shank_r", "foot_r", "upper_arm_r", "forearm_r")
-"""Segments of a body whose sides are alike."""
+"""Segments of a body with equal sides."""
 DENSITY_KG_M3 = MappingProxyType(
     {
         "head": 1110.0,
@@ -51,7 +51,7 @@ DENSITY_KG_M3 = MappingProxyType(
         "foot": 1100.0,
     }
 )
-"""Dempster's, which the package takes unless told otherwise."""
+"""Dempster's densities, which are the package's default."""
 _TRUNK = ("abdomen", "abdomen", "thorax", "thorax", "shoulders", "head", "head", "head")
 _FOREARM = ("forearm", "forearm", "hand", "hand", "hand")
 _UPRIGHT = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [-1.0, 0.0, 0.0]])
@@ -60,7 +60,7 @@ _POINTED = np.array([[0.0, 0.0, -1.0], [0.0, -1.0, 0.0], [-1.0, 0.0, 0.0]])
 
 
 def expect_yeadon() -> None:
-    """Raise a PriorError that says how to install the package, unless it is there."""
+    """Raise a PriorError with installation instructions if the package yeadon is missing."""
     if find_spec("yeadon") is None:
         raise PriorError(
             "girths and lengths need the package yeadon, which is not installed; install it: "
@@ -71,10 +71,10 @@ def expect_yeadon() -> None:
 def stadium_bsp(
     measures_m: FloatArray, lumbar_m: float, density_kg_m3: Mapping[str, float] = DENSITY_KG_M3
 ) -> BodySegmentParameters:
-    """The segments `KINDS` of a person with these measurements.
+    """Compute the parameters of the segments `KINDS` of a person with these measurements.
 
-    The pelvis counts from the middle of the hip joint centres, upright; all others from where the model has them.
-    Centres of mass are on the segment's axis: girths say nothing of how far in front of it they are.
+    The pelvis is given from the middle of the hip joint centres, upright; all others from the model's origins. Centres
+    of mass are on the segment's axis: girths contain no information on how far in front of it they are.
 
     Args:
         measures_m: (58,) in the order of `measures`.
@@ -82,7 +82,7 @@ def stadium_bsp(
         density_kg_m3: of each part.
 
     Raises:
-        PriorError: the package is missing, a level is not beyond the one before, or the lumbar joint is not in the
+        PriorError: the package is missing, a level is not beyond the previous one, or the lumbar joint is not in the
             trunk below the nipples.
     """
     person = _person(tuple(measures_m.tolist()))
@@ -112,7 +112,10 @@ def stadium_bsp(
 
 @lru_cache(maxsize=1)
 def _person(measures_m: tuple[float, ...]) -> Any:
-    """The package's person, both sides alike; what it prints of cross-sections that cannot be is for us to say."""
+    """Make the package's person with equal sides; its output on impossible cross-sections is suppressed.
+
+    This package reports these cross-sections itself.
+    """
     expect_yeadon()
     from yeadon import Human
 
@@ -123,12 +126,12 @@ def _person(measures_m: tuple[float, ...]) -> Any:
 
 
 def _dense(solids: Sequence[Any], parts: Sequence[str], density_kg_m3: Mapping[str, float]) -> list[tuple[Any, float]]:
-    """Each solid with its density: the package's own may have been changed, for they belong to all of its people."""
+    """Pair each solid with its density: the package's own may have been changed, since all its people share them."""
     return [(solid, density_kg_m3[part]) for solid, part in zip(solids, parts, strict=True)]
 
 
 def _cut_at(trunk: Sequence[tuple[Any, float]], height_m: float) -> tuple[list[Any], list[Any]]:
-    """The solids below and above a height."""
+    """Return the solids below and above a height."""
     from yeadon.solid import Stadium, StadiumSolid
 
     bottom = 0.0
@@ -151,7 +154,7 @@ def _cut_at(trunk: Sequence[tuple[Any, float]], height_m: float) -> tuple[list[A
 
 
 def _impossible(measure: str, value: Quantity, expected: str) -> PriorError:
-    """S403 of measures that no body has."""
+    """Make the error S403 for measurements that no body has."""
     stated = {"measure": Quantity(measure), "value_m": value, "expected_m": Quantity(expected)}
     found = with_evidence("S403", Where(part=measure), stated, Severity.ERROR)
     return PriorError(problem_of(found)).with_finding(found)
@@ -167,7 +170,7 @@ def _downwards(stack: Sequence[tuple[Any, float]]) -> tuple[float, np.ndarray, n
 
 
 def _joined(stack: Sequence[tuple[Any, float]], bottoms_m: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
-    """One body of solids whose lower ends are at these heights."""
+    """Combine solids whose lower ends are at these heights into one body."""
     factors = np.array([density / solid.density for solid, density in stack])
     mass = factors * [solid.mass for solid, _ in stack]
     com = np.zeros((len(stack), 3))

@@ -1,7 +1,7 @@
 """Computes joint centres and axes of trunk and arms of a standing person from landmarks.
 
 Points are in ground axes (m), frames follow ISB: x anterior, y up or proximal, z right. Sources: cervical joint Dumas
-et al. (2007); shoulder Rab et al. (2002). What the trial does not show is taken from stature and from an upright pose:
+et al. (2007); shoulder Rab et al. (2002). What the trial does not show is replaced by stature and an upright pose:
 `assumptions` lists it.
 """
 
@@ -18,7 +18,7 @@ from kinertia.model.joint_centres import MARKER_RADIUS_M, Landmarks, frame
 
 _SHOULDER_DROP = 0.17
 _BIACROMIAL_OF_STATURE = 0.2
-"""Between the skin over the acromia, which lie 4 cm inside the shoulders' width of Drillis and Contini (1966)."""
+"""Distance between the skin over the acromia, 4 cm inside the shoulder width of Drillis and Contini (1966)."""
 _ELBOW_WIDTH_OF_STATURE = 0.04
 _CERVICAL_RAISED = {"male": np.radians(8.0), "female": np.radians(14.0)}
 _CERVICAL = {"male": 0.55, "female": 0.53}
@@ -27,7 +27,7 @@ ARM_SEGMENTS = ("upper_arm", "forearm")
 
 
 class Arm(NamedTuple):
-    """Centres (3,) m of elbow and wrist, and the elbow's flexion axis (unit, to the right when the arm hangs)."""
+    """Elbow and wrist centres (3,) m, and the elbow's flexion axis (unit, to the right when the arm hangs)."""
 
     elbow: np.ndarray
     wrist: np.ndarray
@@ -37,12 +37,12 @@ class Arm(NamedTuple):
 def torso_frame(
     marks: Landmarks, lumbar: np.ndarray, height_m: float, sex: str
 ) -> tuple[np.ndarray, float, dict[str, np.ndarray]]:
-    """Rotation of the torso (origin: lumbar joint), its length to the cervical joint (m), and the shoulder centres.
+    """Return the torso's rotation (origin: lumbar joint), length to the cervical joint (m), and shoulder centres.
 
     With C7 and sternal notch the cervical joint is Dumas' (2007). Otherwise the axis points to the middle of the
     acromia and the length is Dumas' share of the stature: acromia rise by up to 10 cm with raised arms, as in a T-pose.
-    Without acromia either, the torso stands upright over the pelvis. An acromion that is missing mirrors the other one
-    about the torso; without both, the shoulders are where stature has them.
+    Without acromia either, the torso is upright over the pelvis. A missing acromion is the mirror image of the other
+    one about the torso; without both, the shoulders are placed by stature.
     """
     acromia = {side: marks[f"acromion_{side}"] for side in "rl" if f"acromion_{side}" in marks}
     both = len(acromia) == len(_SIGNS)
@@ -67,7 +67,7 @@ def torso_frame(
 def _shoulders(
     acromia: Mapping[str, np.ndarray], rotation: np.ndarray, lumbar: np.ndarray, length: float, width: float
 ) -> dict[str, np.ndarray]:
-    """Both acromia: those known, the mirror image of a single one, or the ends of a width at the height of the neck."""
+    """Return both acromia: those known, a mirror image of a single one, or the ends of a width at neck height."""
     z = rotation[:, 2]
     if len(acromia) == 1:
         ((side, known),) = acromia.items()
@@ -78,18 +78,18 @@ def _shoulders(
 
 
 def arm_is_known(marks: Landmarks, side: str) -> bool:
-    """Whether an elbow or a wrist shows where the arm is."""
+    """Return whether an elbow or a wrist marker shows where the arm is."""
     return any(f"{name}_{side}" in marks for name in ("elbow_lateral", "elbow_medial", "wrist"))
 
 
 def arm(marks: Landmarks, shoulder: np.ndarray, torso: np.ndarray, height_m: float, sex: str, side: str) -> Arm:
-    """Joint centres of an arm.
+    """Compute the joint centres of an arm.
 
-    The elbow's axis runs through the epicondyles where both are marked; else it is square to the plane of upper arm and
-    forearm, or, with a straight elbow, the torso's z axis swung along with the arm. With one epicondyle the centre lies
-    half an elbow width (measured, or 4 % of the stature) from it. An arm without a wrist is straight, with a forearm by
-    stature; of one without an elbow, the elbow is on the line from shoulder to wrist. An arm that shows neither hangs
-    along the torso, as long as de Leva's (1996).
+    The elbow's axis runs through the epicondyles if both are marked; else it is perpendicular to the plane of upper arm
+    and forearm, or, with a straight elbow, the torso's z axis rotated with the arm. With one epicondyle the centre lies
+    half an elbow width (measured, or 4 % of the stature) from it. An arm without a wrist marker is straight, with a
+    forearm by stature; without an elbow marker, the elbow is on the line from shoulder to wrist. An arm with neither
+    hangs along the torso, with de Leva's (1996) length.
     """
     lateral, medial = (marks.points.get(f"elbow_{which}_{side}") for which in ("lateral", "medial"))
     wrist = marks.points.get(f"wrist_{side}")
@@ -117,7 +117,7 @@ def arm(marks: Landmarks, shoulder: np.ndarray, torso: np.ndarray, height_m: flo
 
 
 def _straight(shoulder: np.ndarray, elbow: np.ndarray, lengths: Mapping[str, float]) -> np.ndarray:
-    """The wrist of a forearm that continues the upper arm."""
+    """Return the wrist of a forearm that continues the upper arm."""
     upper = elbow - shoulder
     result: np.ndarray = elbow + lengths["forearm"] * upper / np.linalg.norm(upper)
     return result

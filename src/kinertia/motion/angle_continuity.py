@@ -1,9 +1,9 @@
-"""Chooses, of angles that mean the same pose, those that continue from frame to frame.
+"""Selects, among equivalent joint angles, those that are continuous from frame to frame.
 
-A full turn changes nothing. And three rotations a, b, c about axes of which each is square to the next turn a segment
-as a + pi, s - b, c + pi do: s is pi where the first axis is square to the third (Cardan angles) and 0 where they are
-the same (Euler's). Frame by frame inverse kinematics finds any of them; here each joint gets values that do not jump
-unless the segment does, and of these the ones within the coordinates' ranges.
+A full turn changes nothing. And three rotations a, b, c about successively perpendicular axes give the same orientation
+as a + pi, s - b, c + pi: s is pi where the first axis is perpendicular to the third (Cardan angles) and 0 where they
+are equal (Euler angles). Frame by frame inverse kinematics may find any of them; here each joint gets values that do
+not jump unless the segment does, and among these the ones within the coordinates' ranges.
 """
 
 from __future__ import annotations
@@ -22,31 +22,31 @@ _END_RAD = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class ThreeAngles:
-    """Three angles of one joint that have a twin.
+    """Three angles of one joint that have a second, equivalent solution.
 
     Attributes:
         columns: of the coordinates, in the order of the rotations.
-        middles: what the middle angle and its twin add up to, rad.
+        middles: sum of the middle angles of both solutions, rad.
     """
 
     columns: tuple[int, ...]
     middles: float
 
     def twins(self, angles: np.ndarray) -> np.ndarray:
-        """The other three angles (..., 3) for the same orientations."""
+        """Return the other three angles (..., 3) for the same orientations."""
         first, middle, last = np.moveaxis(angles, -1, 0)
         return np.stack([first + np.pi, self.middles - middle, last + np.pi], axis=-1)
 
 
 @dataclass(frozen=True, eq=False)
 class EqualAngles:
-    """Which coordinates of a skeleton have equals.
+    """Coordinates of a skeleton that have equivalent values.
 
     Attributes:
-        joints: those that turn about three axes, the root first.
-        single: columns of all other angles that a full turn does not change.
+        joints: joints that rotate about three axes, the root first.
+        single: columns of all other angles with a period of a full turn.
         bounds: of the coordinates.
-        neutral: (c,) a usual pose.
+        neutral: (c,) a typical pose.
     """
 
     joints: tuple[ThreeAngles, ...]
@@ -56,7 +56,7 @@ class EqualAngles:
 
     @classmethod
     def of(cls, model: Skeleton) -> EqualAngles:
-        """The equal angles of a skeleton."""
+        """Find the equivalent angles of a skeleton."""
         joints = tuple(angles for joint in model.joints if (angles := _three_angles(model, joint)) is not None)
         taken = {column for joint in joints for column in joint.columns}
         single = tuple(column for column in np.flatnonzero(model.periodic).tolist() if column not in taken)
@@ -64,7 +64,7 @@ class EqualAngles:
         return cls(joints, single, model.bounds, neutral)
 
     def nearest(self, q: np.ndarray, to: np.ndarray) -> np.ndarray:
-        """The equals of poses q (..., c) that are nearest to other poses (..., c)."""
+        """Return the equivalents of poses q (..., c) that are nearest to other poses (..., c)."""
         q = q.copy()
         for joint in self.joints:
             own, goal = q[..., joint.columns], to[..., joint.columns]
@@ -76,9 +76,9 @@ class EqualAngles:
         return q
 
     def continuous(self, q: np.ndarray) -> np.ndarray:
-        """The equals of the poses q (n, c) that do not jump; NaN stays.
+        """Return the equivalents of the poses q (n, c) that do not jump; NaN stays.
 
-        Where those would leave a clamped range, a joint keeps the values that it has.
+        Where these would leave a clamped range, a joint keeps its values.
         """
         q = q.copy()
         always = np.isfinite(q).all(axis=0)
@@ -92,18 +92,19 @@ class EqualAngles:
         return q
 
     def _one_branch(self, angles: np.ndarray, columns: Sequence[int], joint: ThreeAngles | None) -> np.ndarray:
-        """The equals of the angles (n, k) of one joint, or of k joints of one angle, that do not jump and leave their
-        ranges least.
+        """Return equivalents of angles (n, k) that do not jump and leave their ranges least.
+
+        They are the angles of one joint, or of k joints with one angle each.
         """
         paths = angles[None]
         if joint is not None:
             twins = joint.twins(angles)
             stay, change = (np.abs(within_half_a_turn(one[1:] - angles[:-1])).sum(axis=1) for one in (angles, twins))
-            # a change from twin to twin is as large as one between the angles themselves
+            # changes between second solutions are as large as between the angles themselves
             other = np.concatenate([[False], np.logical_xor.accumulate(change < stay)])[:, None]
             paths = np.stack([np.where(other, twins, angles), np.where(other, angles, twins)])
         choices = self._whole_turns(np.unwrap(paths, axis=1), columns)
-        # which twin is meant shows in the middle angle: the others may have come round
+        # the middle angle identifies the solution: the others may differ by full turns
         middle = self._from_neutral(choices, columns)[:, len(columns) // 2]
         best = choices[np.argmin(self._beyond(choices, columns).sum(axis=1) + middle)]
         low, high = self.bounds.least[list(columns)], self.bounds.most[list(columns)]
@@ -111,7 +112,7 @@ class EqualAngles:
         return np.where(leaves if joint is None else leaves.any(), angles, best)
 
     def _whole_turns(self, paths: np.ndarray, columns: Sequence[int]) -> np.ndarray:
-        """The same paths (p, n, k), every angle shifted by the whole turns that make it least strange."""
+        """Shift every angle of the paths (p, n, k) by the full turns that make it most plausible."""
         usual = np.round((np.median(paths, axis=1, keepdims=True) - self.neutral[list(columns)]) / (2 * np.pi))
         shifted = np.stack([paths - 2 * np.pi * (usual + turns) for turns in (0, 1, -1)])
         badness = self._beyond(shifted, columns) + self._from_neutral(shifted, columns)
@@ -119,25 +120,25 @@ class EqualAngles:
         return least
 
     def _beyond(self, path: np.ndarray, columns: Sequence[int]) -> np.ndarray:
-        """(..., k) how far angles (..., n, k) are out of their ranges, mean square."""
+        """Return the mean square excess (..., k) of angles (..., n, k) beyond their ranges."""
         low, high = self.bounds.low[list(columns)], self.bounds.high[list(columns)]
         result: np.ndarray = np.square(path - np.clip(path, low, high)).mean(axis=-2)
         return result
 
     def _from_neutral(self, path: np.ndarray, columns: Sequence[int]) -> np.ndarray:
-        """(..., k) a little for being far from neutral, which decides between equals within their ranges."""
+        """Return a small penalty (..., k) for the distance from neutral, which decides between values within range."""
         result: np.ndarray = 1e-3 * np.square(path - self.neutral[list(columns)]).mean(axis=-2)
         return result
 
 
 def within_half_a_turn(angles: np.ndarray) -> np.ndarray:
-    """The same angles between -pi and pi."""
+    """Return the same angles between -pi and pi."""
     result: np.ndarray = (angles + np.pi) % (2 * np.pi) - np.pi
     return result
 
 
 def _three_angles(model: Skeleton, joint: Joint) -> ThreeAngles | None:
-    """The joint's angles, if it turns about three free axes one after the other, each square to the next."""
+    """Return the joint's angles, if it rotates about three free axes in turn, each perpendicular to the next."""
     turns = [axis for axis in joint.axes if axis.kind == "rotation" and not _still(model, axis)]
     if len(turns) != 3 or len({axis.coordinate for axis in turns}) != 3:
         return None

@@ -1,8 +1,9 @@
-"""The nine angles of clinical gait analysis, with the axes, turns and signs of Plug-in Gait.
+"""Computes the nine angles of clinical gait analysis, with the axes, rotations and signs of Plug-in Gait.
 
-Signs are alike on both sides: anterior tilt, the side up, internal rotation, flexion, adduction and dorsiflexion are
-positive. Pelvis and foot are against the direction of the stride. Segments are the model's: next to Vicon's own angles,
-from markers frame by frame, curves have the same shape and constant offsets (flexion of the hip by up to 13 degrees).
+Signs are equal on both sides: anterior tilt, the side up, internal rotation, flexion, adduction and dorsiflexion are
+positive. Angles of pelvis and foot are relative to the direction of the stride. Segments are the model's: compared with
+Vicon's own angles, from markers frame by frame, curves have the same shape and constant offsets (flexion of the hip by
+up to 13 degrees).
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from kinertia.trial.data import FEET
 
 
 class ClinicalAngle(NamedTuple):
-    """One of the nine: its title, and which number of which of Vicon's outputs it is."""
+    """One of the nine angles: its title, and the joint and component of the Vicon output that it equals."""
 
     title: str
     joint: str
@@ -35,17 +36,18 @@ CLINICAL_ANGLES = {
     "ankle_dorsiflexion_clinical": ClinicalAngle("ankle dorsiflexion", "Ankle", 0),
     "foot_progression_clinical": ClinicalAngle("foot progression", "FootProgress", 2),
 }
-"""By the quantity of `cycles.csv` and of norms."""
+"""The nine angles by their quantity in `cycles.csv` and norms."""
 
 
 def clinical_angles(skeleton: Skeleton, q: np.ndarray, heading_rad: np.ndarray, side: str) -> dict[str, np.ndarray]:
-    """(n,) deg by quantity of a side, NaN where coordinates between ground and foot are; none without legs of hip, knee
-    and ankle in ISB's axes.
+    """Compute the clinical angles (n,) deg of a side, by quantity; NaN where coordinates from ground to foot are NaN.
+
+    Empty for a model without legs of hip, knee and ankle in ISB's axes.
 
     Args:
         skeleton: the model.
         q: (n, c) coordinates, rad and m.
-        heading_rad: (n,) of the strides, from ground's X axis to the left.
+        heading_rad: (n,) direction of the strides, from ground's X axis to the left.
         side: "r" or "l".
     """
     foot = skeleton.segments.index(skeleton.feet[FEET.index(side)])

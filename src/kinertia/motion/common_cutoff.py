@@ -1,10 +1,10 @@
-"""Chooses one cutoff for motion and forces of a trial before any estimate.
+"""Selects one cutoff for motion and forces of a trial before any estimate.
 
-Generalised cross-validation takes everything for motion that is not white noise. Markers that were smoothed before they
-were exported have no white noise left, and skin motion is none: in half of the trials of other laboratories it chooses
-no smoothing at all. How fast the body moves is written in the ground reactions, whose sum is its mass times the
-acceleration of its centre of mass: the search ends where they have hardly anything more, at 6 Hz in squats and a slow
-walk, 8 or 10 in a brisk one, 15 in runs and jumps.
+Generalised cross-validation takes everything that is not white noise for motion. Markers that were smoothed before
+export contain no white noise any more, and skin motion is not white: in half of the trials of other laboratories it
+chooses no smoothing at all. The bandwidth of the body's motion follows from the ground reactions, whose sum is its mass
+times the acceleration of its centre of mass: the search ends where they contain hardly anything faster, at 6 Hz in
+squats and slow walks, 8 or 10 Hz in brisk walks, 15 Hz in runs and jumps.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ from kinertia.trial.sampled_time import span_s, within
 LOWEST_HZ = 3.0
 ENDS_HZ = (6.0, 8.0, 10.0, 12.0, 15.0)
 LEFT_SHARE_OF_WEIGHT = 0.02
-"""RMS force that a cutoff may leave of the ground reactions, share of their mean vertical force. Of walks it makes the
-cutoffs that are usual."""
+"""Largest RMS residual of the ground reactions above the cutoff, as a share of their mean vertical force. For walks it
+yields the usual cutoffs."""
 _ENOUGH_HZ = 100.0
 _FEWEST = 20
 
 
 @dataclass(frozen=True)
 class Cutoff:
-    """Of motion and forces.
+    """Cutoff of motion and forces.
 
     Attributes:
-        hz: where the gain is 1/2.
-        sentence: how it was chosen; empty where the user did.
+        hz: frequency at which the gain is 1/2.
+        sentence: how it was chosen; empty if the user set it.
     """
 
     hz: float
@@ -40,7 +40,7 @@ class Cutoff:
 
 
 def common_cutoff(time: np.ndarray, pelvis: np.ndarray, trial: Trial) -> Cutoff:
-    """By cross-validation of the pelvis' translations (n, 3) m at these times (n,) s, up to what the forces need.
+    """Choose the cutoff by cross-validation of pelvis translations (n, 3) m at times (n,) s, up to what forces need.
 
     Raises:
         SmoothingError: a translation is known in too few frames.
@@ -62,13 +62,13 @@ def common_cutoff(time: np.ndarray, pelvis: np.ndarray, trial: Trial) -> Cutoff:
 
 
 def _motion_ends_hz(trial: Trial) -> float:
-    """The lowest of ENDS_HZ that leaves little of the ground reactions in the longest measured window."""
+    """Return the lowest of ENDS_HZ that leaves little of the ground reactions in the longest measured window."""
     loads, (start, end) = trial.loads, trial.windows()[0]
     inside = within(loads.time, start, end)
     time, force = loads.time[inside], loads.force[inside].sum(axis=1)
     if len(time) < _FEWEST:
         return ENDS_HZ[-1]
-    # what is faster than a cutoff at 15 Hz shows in means over a hundredth of a second just as well
+    # means over a hundredth of a second retain what is faster than a cutoff at 15 Hz
     together = max(1, int((len(time) - 1) / span_s(time) / _ENOUGH_HZ))
     count = len(time) // together
     time, force = (part[: count * together].reshape(count, together, -1).mean(axis=1) for part in (time, force))

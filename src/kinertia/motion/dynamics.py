@@ -40,17 +40,17 @@ class Motion:
     qdd: np.ndarray
 
     def with_root(self, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> Motion:
-        """The same motion with other root coordinates (each (n, 6))."""
+        """Return the motion with other root coordinates (each (n, 6))."""
         pairs = ((q, self.q), (qd, self.qd), (qdd, self.qdd))
         return Motion(*(np.hstack([root, every[:, 6:]]) for root, every in pairs))
 
     def cut(self, frames: slice | np.ndarray) -> Motion:
-        """The motion at these frames."""
+        """Return the motion at these frames."""
         return Motion(self.q[frames], self.qd[frames], self.qdd[frames])
 
 
 def joined(parts: Sequence[Motion]) -> Motion:
-    """Stretches of one motion, one after the other."""
+    """Concatenate parts of one motion."""
     return Motion(*(np.concatenate([getattr(part, name) for part in parts]) for name in ("q", "qd", "qdd")))
 
 
@@ -67,13 +67,13 @@ class RootDerivatives:
 
 
 def axis_motion(skeleton: Skeleton, motion: Motion) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Places, rates and accelerations of all axes, each (n, a), as the compiled functions take them."""
+    """Return values, rates and accelerations of all axes, each (n, a), as compiled functions take them."""
     x, v, a = skeleton.map.motion(motion.q, motion.qd, motion.qdd)
     return np.ascontiguousarray(x), np.ascontiguousarray(v), np.ascontiguousarray(a)
 
 
 def residual(skeleton: Skeleton, bsp: BodySegmentParameters, motion: Motion, wrench: np.ndarray) -> np.ndarray:
-    """Root residual P (n, 6), equation (1): inertial and gravity load minus the ground reactions.
+    """Compute the root residual P (n, 6), equation (1): inertial and gravity load minus the ground reactions.
 
     Args:
         skeleton, bsp: the model and its body segment parameters.
@@ -88,7 +88,7 @@ def residual(skeleton: Skeleton, bsp: BodySegmentParameters, motion: Motion, wre
 def residual_terms(
     skeleton: Skeleton, bsp: BodySegmentParameters, motion: Motion, wrench: np.ndarray
 ) -> tuple[np.ndarray, RootDerivatives]:
-    """P (n, 6) as in `residual`, and its derivatives by all coordinates; the centre moves along with the root."""
+    """Compute P (n, 6) as in `residual`, and its derivatives by all coordinates; the centre moves with the root."""
     root, state, about = skeleton.root, axis_motion(skeleton, motion), skeleton.root.centre(motion.q)
     load, by_axes = root_load(
         skeleton.tree, skeleton.gravity_m_s2, skeleton.bodies(bsp), *state, np.ascontiguousarray(about)
@@ -103,7 +103,7 @@ def residual_terms(
 def consistent_root_acceleration(
     skeleton: Skeleton, bsp: BodySegmentParameters, motion: Motion, wrench: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Root acceleration (n, 6) that zeroes P at the given state, equation (2), and its factor M_f (n, 6, 6)."""
+    """Compute the root acceleration (n, 6) for which P is zero, equation (2), and its factor M_f (n, 6, 6)."""
     load, mass = root_balance(
         skeleton.tree,
         skeleton.gravity_m_s2,
@@ -116,7 +116,10 @@ def consistent_root_acceleration(
 
 
 def root_regressor(skeleton: Skeleton, segments: Sequence[str], motion: Motion) -> np.ndarray:
-    """Y (n, 6, 10 s) with P = Y phi - ground load, phi the dynamic parameters of `segments` in their own frames."""
+    """Compute Y (n, 6, 10 s) with P = Y phi - ground load, phi the dynamic parameters of `segments`.
+
+    Parameters are in the segments' own frames.
+    """
     about = skeleton.root.centre(motion.q)
     every = regressor(skeleton.tree, skeleton.gravity_m_s2, *axis_motion(skeleton, motion), about)
     rows = [skeleton.segments.index(segment) for segment in segments]
@@ -127,7 +130,7 @@ def root_regressor(skeleton: Skeleton, segments: Sequence[str], motion: Motion) 
 def root_derivatives(
     skeleton: Skeleton, bsp: BodySegmentParameters, motion: Motion, wrench: np.ndarray
 ) -> RootDerivatives:
-    """Derivatives of P with respect to the root coordinates, velocities and accelerations."""
+    """Compute the derivatives of P with respect to the root coordinates, velocities and accelerations."""
     _, by = residual_terms(skeleton, bsp, motion, wrench)
     return RootDerivatives(by.q[:, :, :6], by.qd[:, :, :6], by.qdd[:, :, :6])
 
@@ -139,7 +142,7 @@ def inverse_dynamics(
     foot_loads: np.ndarray,
     feet: Sequence[str] | None = None,
 ) -> np.ndarray:
-    """Generalised forces (n, c) of all coordinates, N and N m, with the ground reactions acting on the feet.
+    """Compute generalised forces (n, c) of all coordinates, N and N m, with the ground reactions acting on the feet.
 
     Args:
         skeleton, bsp, motion: as in `residual`.

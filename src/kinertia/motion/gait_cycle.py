@@ -1,10 +1,10 @@
 """Finds strides of a trial, from heel strike to the next heel strike of the same foot.
 
-Plates see few of the contacts that a stride needs. So heel strikes and toe offs are first read off the motion: a foot
-lands about when its heel is farthest in front of the pelvis, and leaves about when its toes are farthest behind it
-(Zeni et al. 2008, Gait Posture 27:710). By how much that is early or late on average is learnt from the contacts that
-plates saw in the same trial; where a load begins or ends at such a time, its time is taken, else that of an event that
-the file states, unless the forces contradict one of these.
+Plates measure few of the contacts that strides consist of. So heel strikes and toe offs are first detected from the
+motion: a foot lands about when its heel is farthest in front of the pelvis, and leaves about when its toes are farthest
+behind it (Zeni et al. 2008, Gait Posture 27:710). The mean error of these times is derived from the contacts that
+plates measured in the same trial. If a load begins or ends at such a time, its time is used, else that of an event
+stated in the file, unless the forces contradict one of these.
 """
 
 from __future__ import annotations
@@ -26,16 +26,16 @@ from kinertia.trial.ground_contact import CONTACT_SLACK_S
 from kinertia.trial.sampled_time import TIME_TOLERANCE_S
 
 PERCENT = np.arange(101.0)
-"""Of the gait cycle, at which curves are given."""
+"""Percentages of the gait cycle at which curves are given."""
 _LEAST_SWING_M = 0.1
-"""A foot moves back and forth under the pelvis by at least this much; else nobody walks."""
+"""Least movement of a foot back and forth under the pelvis in gait."""
 _SAME_EVENT_S = 0.1
-"""Plates and motion may differ by this much over one event."""
+"""Largest difference between plates and motion for one event."""
 _SAME_STEP_S = 0.3
-"""Events of one foot and kind that are farther apart are of two steps."""
+"""Events of one foot and kind that are farther apart belong to different steps."""
 _STRIDE_S = (0.4, 3.0)
 _PHASE = (0.15, 0.85)
-"""Of a stride, where the other foot lands: not so in squats and jumps, where both feet move together."""
+"""Part of a stride in which the other foot lands: not so in squats and jumps, where both feet move together."""
 _HEADING_S = 0.25
 
 
@@ -47,9 +47,9 @@ class Stride:
         side: "r" or "l".
         number: counted from 1, per trial and side.
         start_s, end_s: heel strikes.
-        toe_off_s: between them; NaN where it was not found.
+        toe_off_s: between them; NaN if it was not found.
         opposite_toe_off_s, opposite_strike_s: of the other foot, between them; the first may be NaN.
-        on_plates: whether plates saw both heel strikes; else the motion told at least one.
+        on_plates: whether plates measured both heel strikes; else at least one comes from the motion.
 
     Examples:
         >>> stride = fit.strides[0]
@@ -68,21 +68,21 @@ class Stride:
 
     @property
     def time(self) -> np.ndarray:
-        """(101,) s at 0, 1, ..., 100 % of the cycle."""
+        """Times (101,) s at 0, 1, ..., 100 % of the cycle."""
         return self.start_s + PERCENT / 100.0 * (self.end_s - self.start_s)
 
     def percent(self, time_s: float) -> float:
-        """What share of the stride is over at this time, %."""
+        """Return the percentage of the stride completed at this time."""
         return 100.0 * (time_s - self.start_s) / (self.end_s - self.start_s)
 
 
 @dataclass(frozen=True, eq=False)
 class FeetUnderPelvis:
-    """Where heels, toes and pelvis are, by inverse kinematics.
+    """Positions of heels, toes and pelvis, from inverse kinematics.
 
     Attributes:
         time: (n,) s.
-        heading: (n, 3) unit, horizontal: where the pelvis faces, averaged over about a step.
+        heading: (n, 3) horizontal unit vectors: direction that the pelvis faces, averaged over about a step.
         pelvis: (n, 3) m.
         heel, toe: per side (n, 3) m, the rearmost and the foremost marker of the foot.
     """
@@ -94,12 +94,12 @@ class FeetUnderPelvis:
     toe: Mapping[str, np.ndarray]
 
     def ahead(self, points: np.ndarray) -> np.ndarray:
-        """(n,) m by which points (n, 3) are in front of the pelvis."""
+        """Return the distance (n,) m by which points (n, 3) are in front of the pelvis."""
         return np.asarray(((points - self.pelvis) * self.heading).sum(axis=1))
 
 
 def feet_under_pelvis(skeleton: Skeleton, kinematics: Kinematics) -> FeetUnderPelvis:
-    """Heels, toes and pelvis in all frames between the first and the last that inverse kinematics solved."""
+    """Compute heels, toes and pelvis in all frames between the first and the last that inverse kinematics solved."""
     time = kinematics.spline.time
     places = {side: _heel_and_toe(skeleton, segment) for side, segment in zip(FEET, skeleton.feet, strict=True)}
     rows = {side: skeleton.segments.index(segment) for side, segment in zip(FEET, skeleton.feet, strict=True)}
@@ -122,14 +122,14 @@ def feet_under_pelvis(skeleton: Skeleton, kinematics: Kinematics) -> FeetUnderPe
 
 
 def _heel_and_toe(skeleton: Skeleton, segment: str) -> tuple[np.ndarray, np.ndarray]:
-    """(3,) m each in the foot's frame; its origin where it bears no marker."""
+    """Return heel and toe (3,) m in the foot's frame: rearmost and foremost marker, or its origin without markers."""
     positions = [marker.position for marker in skeleton.markers if marker.segment == segment] or [np.zeros(3)]
     along = [position[0] for position in positions]
     return positions[int(np.argmin(along))], positions[int(np.argmax(along))]
 
 
 def found_events(skeleton: Skeleton, kinematics: Kinematics) -> list[FoundEvent]:
-    """All heel strikes and toe offs of a trial, in order of time."""
+    """Detect all heel strikes and toe offs of a trial, in order of time."""
     edges, stated = load_edges(kinematics.trial.loads), usable_events(kinematics.trial)
     told = [*edges, *stated]
     events = [
@@ -141,8 +141,9 @@ def found_events(skeleton: Skeleton, kinematics: Kinematics) -> list[FoundEvent]
 
 
 def _foot_is_shown(skeleton: Skeleton, kinematics: Kinematics, event: GaitEvent) -> bool:
-    """Whether the markers determine all coordinates from the ground to the foot around the event; short gaps count as
-    known. In longer ones the spline turns where no foot did.
+    """Decide whether markers determine all coordinates from the ground to the foot around the event.
+
+    Short gaps count as known. In longer ones the spline turns where no foot did.
     """
     foot = skeleton.segments.index(skeleton.feet[FEET.index(event.side)])
     columns = np.unique(skeleton.map.owner[skeleton.support[foot]])
@@ -156,7 +157,7 @@ def _foot_is_shown(skeleton: Skeleton, kinematics: Kinematics, event: GaitEvent)
 
 
 def strides_of(skeleton: Skeleton, kinematics: Kinematics) -> tuple[Stride, ...]:
-    """All strides of a trial, right foot first; none where nobody walks or runs."""
+    """Find all strides of a trial, right foot first; none if nobody walks or runs."""
     events = found_events(skeleton, kinematics)
     strikes = {side: [e for e in events if e.event.side == side and e.event.kind == "heel strike"] for side in FEET}
     offs = {side: [e.event.time_s for e in events if e.event[1:] == (side, "toe off")] for side in FEET}
@@ -182,7 +183,7 @@ def _between(times: Sequence[float], start: float, end: float) -> list[float]:
 
 
 def _only(times: Sequence[float]) -> float:
-    """The one time; NaN where there is none, or several."""
+    """Return the single time; NaN if there is none, or several."""
     return times[0] if len(times) == 1 else float("nan")
 
 
@@ -190,7 +191,7 @@ EventSource = Literal["force plate", "file", "motion"]
 
 
 class FoundEvent(NamedTuple):
-    """An event, and what tells its time: a force plate, an event of the file, or the motion of the feet."""
+    """An event, and the source of its time: a force plate, an event of the file, or the motion of the feet."""
 
     event: GaitEvent
     source: EventSource
@@ -207,7 +208,7 @@ def _from_motion(feet: FeetUnderPelvis) -> list[GaitEvent]:
 
 
 def turning_points(values: np.ndarray, least: float) -> list[int]:
-    """Indices of the maxima of values (n,) that rise above what is before and after them by at least so much."""
+    """Return indices of the maxima of values (n,) that exceed the values before and after by at least `least`."""
     maxima: list[int] = []
     high = low = 0
     rising = False
@@ -231,8 +232,9 @@ def _timed(
     edges: Sequence[GaitEvent],
     stated: Sequence[GaitEvent],
 ) -> list[FoundEvent]:
-    """The events at the plates' times (edges) where these saw them, else at the file's (stated), else moved by what the
-    motion is early on average (certain); and those of the file that the motion does not show.
+    """Set the times of events: from plates (edges), else the file (stated), else the corrected motion.
+
+    The correction is the mean error against certain events. Events of the file that the motion does not show are added.
     """
     early = {}
     for kind in ("heel strike", "toe off"):

@@ -1,14 +1,14 @@
-"""Prepares the ground reactions of joint moments: at full rate, without what no motion can follow.
+"""Prepares the ground reactions for joint moments: at full rate, without what no motion can follow.
 
-Below the hip joint moments are forces times lever arms, and forces change within milliseconds where a foot lands or
-leaves; filtered like the motion they are wrong there by several N m. But not everything fast belongs into a joint
-moment. What one foot loses the other gains: of that the motion shows nothing, since it cancels in the sum. An impact
-does not cancel: it slows down foot and shank, faster than markers can show, and put into equations of motion that lack
-this acceleration it appears as a spike at knee and hip (Bisseling and Hof 2006, J Biomech 39:2438; Kristianslund et al.
-2012, J Biomech 45:666).
+Below the hip, joint moments are forces times lever arms, and forces change within milliseconds where a foot lands or
+leaves; filtered like the motion they are wrong there by several N m. But not every fast force belongs in a joint
+moment. The load transferred from one foot to the other does not appear in the motion, since it cancels in the sum. An
+impact does not cancel: it decelerates foot and shank, faster than markers can show, and in equations of motion that
+lack this acceleration it appears as a spike at knee and hip (Bisseling and Hof 2006, J Biomech 39:2438; Kristianslund
+et al. 2012, J Biomech 45:666).
 
-So forces keep the bandwidth of the plates, and only the part of their sum that is faster than the motion is taken off,
-from the foot that makes it, where it is more than rigid segments leave anyway. Where forces and motion are of one
+So forces keep the bandwidth of the plates, and only the part of their sum that is faster than the motion is subtracted,
+from the foot that causes it, where it exceeds the usual error of rigid segments. If forces and motion have one
 bandwidth (the two-level estimate of the study), nothing is faster.
 """
 
@@ -32,14 +32,14 @@ from kinertia.trial.sampled_time import nearest_samples
 
 IMPACT_SHARE_OF_WEIGHT = 0.01
 """Forces faster than the motion that stay below this (RMS over about one period, share of the mean vertical force) are
-no impact: twice what rigid segments leave (`observation.FORCE_SD_OF_WEIGHT`)."""
+not an impact: twice the error of rigid segments (`observation.FORCE_SD_OF_WEIGHT`)."""
 FIRM_SHARE_OF_PEAK = 0.1
-"""Of the largest vertical force; below it a centre of pressure is too vague to carry an impact."""
+"""Share of the largest vertical force below which a centre of pressure is too uncertain for an impact to act there."""
 NOISE_LEFT_N = 1.0
-"""Deviation of the noise that may stay in the vertical force."""
+"""Standard deviation of the noise that may remain in the vertical force."""
 _FORGOTTEN = 40
-"""Samples from which on a natural cubic spline knows nothing of another one: each divides its weight by 3.7, so that
-this many leave less than rounding does."""
+"""Number of samples beyond which a sample does not affect a natural cubic spline: each divides its weight by 3.7, so
+that after this many it is below rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,11 +50,11 @@ class GroundReactions:
         time: (k,) s.
         wrench: (k, 2, 6) on right and left foot: force (N), moment about the ground origin (N m), ground axes.
         carrier: (k, 2) index of the plate that each foot stands on, among those of the trial's `FootLoads`.
-        impact: (k, 2, 6) what motion cannot follow, whether it was taken off or not: joint moments are that uncertain
-            for lack of the acceleration that goes with it.
-        cutoff_hz: low pass of the forces; None: as the plates gave them.
-        noise_n: deviation of the plates' noise that is left in the forces.
-        without_impact: whether the impact was taken off `wrench`.
+        impact: (k, 2, 6) part that motion cannot follow, whether it was subtracted or not: joint moments are uncertain
+            by its effect, since the corresponding acceleration is missing.
+        cutoff_hz: low-pass cutoff of the forces; None: as the plates gave them.
+        noise_n: standard deviation of the plates' noise that remains in the forces.
+        without_impact: whether the impact was subtracted from `wrench`.
     """
 
     time: np.ndarray
@@ -67,46 +67,47 @@ class GroundReactions:
 
     @property
     def whole(self) -> GroundReactions:
-        """The same with the impact: what pushes against the foot, whether the motion can follow it or not."""
+        """The ground reactions with the impact: the whole load on each foot, even if the motion cannot follow it."""
         if not self.without_impact:
             return self
         return replace(self, wrench=self.wrench + self.impact, without_impact=False)
 
     @property
     def impact_n(self) -> float:
-        """RMS length of the impact's force."""
+        """RMS magnitude of the impact's force, N."""
         return rms_length(self.impact[..., :3].sum(axis=1))
 
     @property
     def loaded(self) -> np.ndarray:
-        """(k, 2) 1 where somebody stands, else 0."""
+        """Indicator (k, 2): 1 where the foot is loaded, else 0."""
         return (self.wrench[..., 1] > LOAD_THRESHOLD_N).astype(float)
 
     @cached_property
     def point(self) -> np.ndarray:
-        """(k, 2, 3) m: centres of pressure, held where there is next to no load."""
+        """Centres of pressure (k, 2, 3) m, held where there is next to no load."""
         return _points(self.wrench)
 
     @property
     def torque(self) -> np.ndarray:
-        """(k, 2, 3) N m about `point`: the free moment, and next to nothing about the horizontal axes."""
+        """Moment (k, 2, 3) N m about `point`: the free moment, and next to nothing about the horizontal axes."""
         result: np.ndarray = self.wrench[..., 3:] - np.cross(self.point, self.wrench[..., :3])
         return result
 
     def at(self, time: np.ndarray) -> np.ndarray:
-        """(n, 2, 6) loads at these times: natural cubic splines of force, point and torque, as OpenSim's tools lay them
-        through the columns of the file that is written of them.
+        """Interpolate the loads (n, 2, 6) at these times by natural cubic splines of force, point and torque.
+
+        OpenSim's tools interpolate the columns of the exported file in the same way.
         """
         return self.with_rate(time)[0]
 
     def with_rate(self, time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The same, and its derivative by time (n, 2, 6), N/s and N m/s."""
+        """Interpolate the loads as `at` does, and their time derivatives (n, 2, 6), N/s and N m/s."""
         parts = [np.empty((2, 0, 2, 6)), *(self._with_rate(time[some]) for some in pieces(len(time)))]
         loads, rates = zip(*parts, strict=True)
         return np.concatenate(loads), np.concatenate(rates)
 
     def _with_rate(self, time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """From the samples around these times, as far as they can tell."""
+        """Interpolate from the samples around these times, as far as they have any effect."""
         first, last = np.searchsorted(self.time, (time.min(), time.max()))
         near = slice(max(int(first) - _FORGOTTEN, 0), int(last) + _FORGOTTEN)
         samples = self.time[near]
@@ -114,16 +115,16 @@ class GroundReactions:
         return loads_and_rates(samples, self.wrench[near], self.point[near], np.ascontiguousarray(time), interval)
 
     def impact_at(self, time: np.ndarray) -> np.ndarray:
-        """(n, 2, 6) `impact` at the samples nearest to these times."""
+        """Return `impact` (n, 2, 6) at the samples nearest to these times."""
         return self.impact[nearest_samples(self.time, time)]
 
     def loaded_at(self, time: np.ndarray) -> np.ndarray:
-        """(n, 2) `loaded` at the samples nearest to these times."""
+        """Return `loaded` (n, 2) at the samples nearest to these times."""
         return self.loaded[nearest_samples(self.time, time)]
 
 
 def measured_reactions(kinematics: Kinematics) -> GroundReactions:
-    """As the plates gave them, but for a low pass where they are noisy when unloaded."""
+    """Return the loads as the plates gave them, low-pass filtered only if the plates are noisy when unloaded."""
     loads, near = kinematics.trial.loads, kinematics.near_window
     time, wrench = loads.time[near], loads.wrench[near]
     rate_hz = (len(time) - 1) / (time[-1] - time[0])
@@ -136,17 +137,17 @@ def measured_reactions(kinematics: Kinematics) -> GroundReactions:
 
 
 def _noise_left(noise_n: float, rate_hz: float, cutoff_hz: float | None) -> float:
-    """White noise of deviation s, cut off at f, keeps s sqrt(2 f / rate)."""
+    """Return the standard deviation after filtering: white noise of SD s, cut off at f, keeps s sqrt(2 f / rate)."""
     return noise_n if cutoff_hz is None else noise_n * float(np.sqrt(min(2.0 * cutoff_hz / rate_hz, 1.0)))
 
 
 def ground_reactions(kinematics: Kinematics, motion_hz: float, wanted: ForceCutoff = "auto") -> GroundReactions:
-    """For the joint moments of a motion of this bandwidth.
+    """Prepare the ground reactions for joint moments of a motion with this bandwidth.
 
     Args:
         kinematics: of the trial.
-        motion_hz: what the motion can follow.
-        wanted: "auto" as this module says; "none", as the plates gave them; or a low pass, Hz.
+        motion_hz: bandwidth of the motion.
+        wanted: "auto" as described in this module; "none", as the plates gave them; or a low-pass cutoff, Hz.
     """
     measured = measured_reactions(kinematics)
     if not isinstance(wanted, str):
@@ -165,11 +166,11 @@ def _low_passed(time: np.ndarray, wrench: np.ndarray, cutoff_hz: float) -> np.nd
 
 
 def _impact(measured: GroundReactions, motion_hz: float, inside: np.ndarray) -> np.ndarray:
-    """(k, 2, 6): what of the sum of both feet's forces is faster than the motion, and more than rigid segments leave.
-    Each foot has it in proportion to the power of its own fast forces, at its own centre of pressure; while a foot
-    lands or leaves, at that of its nearest firm load, for an impact can be many times such a load.
+    """Compute the impact (k, 2, 6): summed force of both feet faster than the motion, beyond rigid segments' error.
 
-    The mean vertical force is that of the samples (k,) in which all ground contact is measured.
+    It is shared between the feet in proportion to the power of their own fast forces, and acts at each one's centre of
+    pressure; while a foot lands or leaves, at that of its nearest reliable load, since an impact can be many times such
+    a load. The mean vertical force is that of the samples (k,) in which all ground contact is measured.
     """
     force = measured.wrench[..., :3]
     fast = force - _low_passed(measured.time, force, motion_hz)
@@ -190,6 +191,6 @@ def _points(wrench: np.ndarray, least_n: float = LOAD_THRESHOLD_N) -> np.ndarray
 
 
 def _around(values: np.ndarray, step_s: float, motion_hz: float) -> np.ndarray:
-    """Mean over about half a period of the motion's cutoff."""
+    """Return the mean over about half a period of the motion's cutoff."""
     result: np.ndarray = gaussian_mean(values, 0.25 / motion_hz / step_s)
     return result

@@ -1,11 +1,11 @@
 """Solves inverse kinematics by global optimisation (Lu & O'Connor 1999), per frame.
 
 For every frame the sum of squared distances between measured and model markers is minimised over all coordinates at
-once, and joints pay beyond their ranges (`pose_fit`). Several poses may fit a frame nearly as well, and several sets of
-angles mean the same pose: an arm turned by half a turn with the elbow bent backwards, a foot upside down. So frames a
-tenth of a second apart are solved first; of equally good poses each takes the one that goes on from its neighbour,
-outwards from the frame that fits best, and of equal angles those that do not jump (`angle_continuity`). All other
-frames start from there.
+once, and joints beyond their ranges are penalised (`pose_fit`). Several poses may fit a frame nearly as well, and
+several sets of angles describe the same pose: an arm rotated by half a turn with the elbow bent backwards, a foot
+upside down. So frames a tenth of a second apart are solved first; among equally good poses each takes the one that
+continues its neighbour's, outwards from the frame that fits best, and among equivalent angles those that do not jump
+(`angle_continuity`). All other frames start from there.
 """
 
 from __future__ import annotations
@@ -28,20 +28,22 @@ from kinertia.trial.rms import rms
 
 _WARM_START_EVERY_S = 0.1
 _FAR_RAD_S, _FAR_RAD = 10.0, 0.2
-"""Rad or m between frames: faster than this, beyond a start, hardly anybody moves: the frame starts from its neighbour
-as well."""
+"""Rad or m between frames: hardly anybody moves faster than this, beyond an initial allowance, so the frame is also
+started from its neighbour."""
 _AS_GOOD, _AS_GOOD_M2 = 1.05, 1e-7
-"""A pose is as good as another if its squared distances are at most so many times the other's, and this much more."""
+"""A pose is as good as another if its sum of squared distances is at most this factor times the other's plus this
+constant."""
 MOST_STEPS = 60
 _ROUNDS = 6
-"""How often frames with gaps are solved again: each round leaves about half of what the pose was off."""
+"""Number of times that frames with gaps are solved again: each round leaves about half of the pose's error."""
 _DOUBTED_RAD, _ANEW_RAD = 0.5, 1.0
 _DOUBTED, _DOUBTED_M = 2.0, 0.005
-"""Frames that did not converge, are farther beyond a range than the first, or miss their markers by more than the third
-times what is usual in the trial and by more than the fourth (RMS), start anew with no joint farther than the second
-from its neutral angle."""
+"""Frames are solved again if they did not converge, exceed a range by more than the first, or have an RMS marker
+distance above the third times the trial's usual value and above the fourth. They restart with no joint farther than the
+second from its neutral angle."""
 _UNINFORMED_RAD_PER_M = 60.0
-"""A coordinate counts as not informed where 10 mm of white marker noise would give it more than 0.6 rad (or 0.6 m)."""
+"""A coordinate counts as undetermined if 10 mm of white marker noise would give it an SD of more than 0.6 rad (or 0.6
+m)."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +68,7 @@ class InverseKinematics:
 
     @property
     def marker_rms_m(self) -> float:
-        """Root mean square of the marker distances over all visible markers and frames."""
+        """Root mean square of the marker distances over all visible markers and frames, m."""
         return rms(self.errors_m)
 
 
@@ -79,16 +81,16 @@ def solve_ik(
     gain_tolerance_m2: float = 0.0,
     most_steps: int = MOST_STEPS,
 ) -> InverseKinematics:
-    """All coordinates at every frame, by least squares on all visible markers.
+    """Compute all coordinates at every frame, by least squares on all visible markers.
 
     Args:
         skeleton: the model; its markers and those of the trial are matched by label.
         markers: measured markers.
         name: the trial's, for messages.
         consecutive: neighbouring frames show nearly the same pose, so that one may start from the other.
-        gain_tolerance_m2: a step that would lower a frame's sum of squared distances by less is its last; what goes on
-            moving then is a coordinate that the markers hardly show.
-        most_steps: after so many, from one start, a frame counts as not converged.
+        gain_tolerance_m2: a step that would lower a frame's sum of squared distances by less is its last; only
+            coordinates that the markers hardly determine would still change.
+        most_steps: after so many steps from one start, a frame counts as not converged.
 
     Raises:
         MarkerSetError: fewer than three root markers of the skeleton are in the trial.
@@ -130,7 +132,7 @@ def solve_ik(
 
 
 def _hold_in_gaps(model: Skeleton, measured: np.ndarray, placed: np.ndarray, q: np.ndarray, stop: Stop) -> None:
-    """Solve frames that lack markers again, with these as far off the model as before and after (`marker_gaps`)."""
+    """Solve frames with missing markers again, with the offsets that these have before and after (`marker_gaps`)."""
     gaps = HeldErrors(measured, placed)
     for _ in range(_ROUNDS):
         for some in (gaps.frames[piece] for piece in pieces(len(gaps.frames))):
@@ -138,13 +140,13 @@ def _hold_in_gaps(model: Skeleton, measured: np.ndarray, placed: np.ndarray, q: 
 
 
 def _misses(model: Skeleton, measured: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """(n, m) m, distances between measured and model markers."""
+    """Return the distances (n, m) m between measured and model markers."""
     result: np.ndarray = np.linalg.norm(measured - model.marker_positions(model.pose(q)), axis=-1)
     return result
 
 
 def _best_fit(model: Skeleton, measured: np.ndarray, q: np.ndarray, stop: Stop) -> PoseFit:
-    """`fit_poses`, and once more from near neutral for frames whose outcome is doubtful; the better fit is kept."""
+    """Apply `fit_poses`, again from near neutral for doubtful frames, and keep the better fit."""
     poses = fit_poses(model, measured, q, stop)
     doubtful = np.flatnonzero(_doubtful(model, measured, poses))
     if doubtful.size:
@@ -171,10 +173,10 @@ def _as_good(cost: np.ndarray, other: np.ndarray) -> np.ndarray:
 def _carry_on(
     model: Skeleton, measured: np.ndarray, time: np.ndarray, poses: PoseFit, equal: EqualAngles, stop: Stop
 ) -> None:
-    """Start frames that lie far from their neighbours again from there, outwards from the best one and back.
+    """Solve frames that lie far from their neighbours again from there, outwards from the best one and back.
 
-    On the way out they keep what is as good, so that all frames are on the branch of the best; on the way back, what is
-    clearly better.
+    On the way out, frames keep a pose that is as good, so that all follow the solution of the best one; on the way
+    back, only one that is clearly better.
     """
     far = _far(equal, time, poses.q)
     if not far.any():
@@ -195,14 +197,14 @@ def _carry_on(
 
 
 def _far(equal: EqualAngles, time: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """(n - 1,) True where a person hardly moves from one of the poses q (n, c) to the next."""
+    """Return the mask (n - 1,) of frame pairs whose poses q (n, c) are farther apart than a person moves."""
     change = np.abs(equal.nearest(q[1:], q[:-1]) - q[:-1]).max(axis=1)
     result: np.ndarray = change > _FAR_RAD + _FAR_RAD_S * np.diff(time)
     return result
 
 
 def _strangeness(measured: np.ndarray, poses: PoseFit, equal: EqualAngles) -> np.ndarray:
-    """(n,) m2, mean squared marker distances, and one square centimetre per square rad away from neutral."""
+    """Return mean squared marker distances (n,) m2 plus one square centimetre per square rad away from neutral."""
     seen = np.isfinite(measured).all(axis=-1).sum(axis=1)
     away = np.square(
         equal.nearest(poses.q, np.broadcast_to(equal.neutral, poses.q.shape))[:, 6:] - equal.neutral[6:]
@@ -212,7 +214,7 @@ def _strangeness(measured: np.ndarray, poses: PoseFit, equal: EqualAngles) -> np
 
 
 def _place_root(model: Skeleton, measured: np.ndarray, name: str) -> tuple[np.ndarray, np.ndarray]:
-    """Root coordinates (n, 6) by fitting the root segment to its markers, and (n,) whether three were visible."""
+    """Fit the root segment to its markers: return root coordinates (n, 6), and (n,) whether three were visible."""
     root = np.flatnonzero(model.marker_segments == 0)
     if len(root) < 3:
         raise MarkerSetError(
@@ -234,6 +236,6 @@ def _place_root(model: Skeleton, measured: np.ndarray, name: str) -> tuple[np.nd
 
 
 def _uninformed(normal: np.ndarray) -> np.ndarray:
-    """(n, c) True where the visible markers do not determine the coordinate, from J^T J (n, c, c)."""
+    """Return the mask (n, c) of coordinates that visible markers do not determine, from J^T J (n, c, c)."""
     result: np.ndarray = np.sqrt(variances(normal, 1e-9)) > _UNINFORMED_RAD_PER_M
     return result

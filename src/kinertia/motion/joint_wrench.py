@@ -1,4 +1,4 @@
-"""Computes the whole load of a leg joint; generalised forces show it along the joint's own axes only."""
+"""Computes the whole load of a leg joint; generalised forces contain only its parts along the joint's own axes."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ class LegJoint:
     Attributes:
         name: "Hip", "Knee" or "Ankle".
         side: "r" or "l".
-        parent, child: segments that it moves against each other; of the ankle shank and foot, whatever is between.
-        joints: of the skeleton, one after the other: of the ankle talocrural and subtalar.
+        parent, child: segments that it connects; for the ankle shank and foot, whatever is between.
+        joints: its joints in the skeleton, in order: for the ankle talocrural and subtalar.
     """
 
     name: str
@@ -30,12 +30,12 @@ class LegJoint:
     joints: tuple[Joint, ...]
 
     def columns(self, skeleton: Skeleton) -> list[int]:
-        """Of its coordinates in q."""
+        """Return the columns of its coordinates in q."""
         own = {axis.coordinate for joint in self.joints for axis in joint.axes}
         return [k for k, name in enumerate(skeleton.coordinates) if name in own]
 
     def centre(self, skeleton: Skeleton, pose: Pose) -> np.ndarray:
-        """(n, 3) m in ground; of the ankle that of the joint next to the shank."""
+        """Return the joint centre (n, 3) m in ground; for the ankle that of the joint next to the shank."""
         first = self.joints[0]
         row = skeleton.segments.index(first.child)
         result: np.ndarray = pose.translation[:, row] + pose.rotation[:, row] @ first.child_translation
@@ -43,7 +43,7 @@ class LegJoint:
 
 
 def leg_joints(skeleton: Skeleton) -> tuple[LegJoint, ...]:
-    """Hip, knee and ankle of both legs, right first; empty where a leg has no three joints in a row."""
+    """Return hip, knee and ankle of both legs, right first; empty if a leg lacks three joints in a row."""
     by_child = {joint.child: joint for joint in skeleton.joints}
     found = []
     for side, foot in zip(FEET, skeleton.feet, strict=True):
@@ -62,8 +62,7 @@ def leg_joints(skeleton: Skeleton) -> tuple[LegJoint, ...]:
 def joint_wrenches(
     skeleton: Skeleton, bsp: BodySegmentParameters, motion: Motion, foot_loads: np.ndarray
 ) -> dict[LegJoint, np.ndarray]:
-    """(n, 6) per joint of the legs: force (N) of the proximal on the distal segment, and moment (N m) about the joint
-    centre, ground axes.
+    """Compute force (N) of the proximal on the distal segment and moment (N m) about joint centres (n, 6), ground axes.
 
     Args:
         skeleton, bsp, motion: as in `residual`.
@@ -87,7 +86,7 @@ def joint_wrenches(
 
 
 def _beyond(skeleton: Skeleton, joint: LegJoint) -> list[int]:
-    """Rows of the segments that a joint carries."""
+    """Return the rows of the segments distal to a joint."""
     carried = {joint.joints[0].child}
     for each in skeleton.joints:  # parents before children
         if each.parent in carried:

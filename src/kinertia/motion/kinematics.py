@@ -1,7 +1,7 @@
 """Turns a trial into smooth coordinates: heading +X, inverse kinematics, splines, matching ground reactions.
 
-All coordinates and the ground reactions get the same cutoff, as `kinertia.motion.common_cutoff` finds it. With one for
-each coordinate what the pelvis and the hips make of one skin motion no longer cancels: the residual of the Rajagopal
+All coordinates and the ground reactions have the same cutoff, chosen by `kinertia.motion.common_cutoff`. With a cutoff
+for each coordinate, the effects of one skin motion on pelvis and hips no longer cancel: the residual of the Rajagopal
 walk was 53 N with cutoffs of 10 to 15 Hz, 42 N with 10 for all and 48 N with 12.
 """
 
@@ -33,11 +33,11 @@ from kinertia.trial.sampled_time import TIME_TOLERANCE_S, runs, span_s, within
 LONGEST_BRIDGE_S = 0.1
 """The spline may bridge a coordinate that the visible markers do not determine for at most this long."""
 FEWEST_FRAMES = 11
-"""A window needs at least as many frames."""
+"""Fewest frames of a window."""
 AROUND_WINDOW_S = AROUND_LOAD_S
-"""Samples this near the measured window help to know what happens at its ends."""
+"""Samples this near the measured window help to determine the motion at its ends."""
 _END_PERIODS = 0.5
-"""The window keeps off the ends of the record by this share of the cutoff's period: accelerations are poor there.
+"""The window is this share of the cutoff's period away from the ends of the record, where accelerations are poor.
 
 On the gait2354 walk the residual is 57 N in these frames and 35 N in all others.
 """
@@ -48,15 +48,15 @@ class Kinematics:
     """A trial with its coordinates.
 
     Attributes:
-        trial: turned so that the person faces +X.
-        turned_deg: by how much, about the vertical.
+        trial: rotated so that the person faces +X.
+        turned_deg: angle of that rotation, about the vertical.
         ik: coordinates frame by frame.
         spline: smoothed coordinates over the frames that inverse kinematics solved.
         cutoff_hz: of the coordinates and the ground reactions.
-        windows_s: first and last time of every stretch in which all ground contact is measured and all coordinates are
+        windows_s: first and last time of every window in which all ground contact is measured and all coordinates are
             known, with accelerations; in order.
-        notes: assumptions made on the way.
-        findings: which frames are used, and where inverse kinematics did not converge; those of the trial are its own.
+        notes: assumptions made so far.
+        findings: which frames are used, and where inverse kinematics did not converge; the trial has its own findings.
     """
 
     trial: Trial
@@ -70,64 +70,64 @@ class Kinematics:
 
     @property
     def window_s(self) -> tuple[float, float]:
-        """First and last time of all stretches."""
+        """First time of the first and last time of the last measured window."""
         return self.windows_s[0][0], self.windows_s[-1][1]
 
     def inside(self, time: np.ndarray) -> np.ndarray:
-        """Which of these times (n,) lie in one of the stretches."""
+        """Return the mask of times (n,) that lie in a measured window."""
         return inside(time, self.windows_s)
 
     @cached_property
     def frames(self) -> np.ndarray:
-        """Indices of the marker frames inside the stretches."""
+        """Indices of the marker frames inside the measured windows."""
         return np.flatnonzero(self.inside(self.trial.markers.time))
 
     @cached_property
     def time(self) -> np.ndarray:
-        """(w,) s, the frames inside the stretches."""
+        """Times (w,) s of the frames inside the measured windows."""
         result: np.ndarray = self.trial.markers.time[self.frames]
         return result
 
     @property
     def course_time(self) -> np.ndarray:
-        """(f,) s, all frames from the first to the last of them."""
+        """Times (f,) s of all frames from the first to the last one inside the measured windows."""
         result: np.ndarray = self.trial.markers.time[self.frames[0] : self.frames[-1] + 1]
         return result
 
     @cached_property
     def stretches(self) -> tuple[slice, ...]:
-        """Of the w frames, those of each stretch."""
+        """Slices of the w frames, one per measured window."""
         starts = np.searchsorted(self.time, [start - TIME_TOLERANCE_S for start, _ in self.windows_s])
         return tuple(slice(a, b) for a, b in pairwise([*starts.tolist(), len(self.time)]))
 
     @cached_property
     def motion(self) -> Motion:
-        """Smoothed coordinates and derivatives inside the stretches."""
+        """Smoothed coordinates and derivatives inside the measured windows."""
         return Motion(*(self.spline(self.time, order) for order in range(3)))
 
     @cached_property
     def foot_loads(self) -> np.ndarray:
-        """(w, 2, 6) ground reactions on right and left foot in the stretches: force, moment about the ground origin."""
+        """Ground reactions (w, 2, 6) on right and left foot in the windows: force, moment about the ground origin."""
         return self.smoothed_loads(self.cutoff_hz)(self.time).reshape(-1, 2, 6)
 
     def smoothed_loads(self, cutoff_hz: float) -> SmoothedSpline:
-        """Ground reactions (12: right force and moment, left force and moment) as functions of time.
+        """Return ground reactions (12: right force and moment, left force and moment) as functions of time.
 
-        Samples between the stretches, and up to AROUND_WINDOW_S outside them, count: what a plate saw there may not be
-        all of the ground contact, but is how the load on that plate went on.
+        Samples between the windows, and up to AROUND_WINDOW_S outside them, are used: a plate may not have measured all
+        ground contact there, but its load still continues.
         """
         loads, near = self.trial.loads, self.near_window
         return smooth(loads.time[near], loads.wrench[near].reshape(-1, 12), cutoff_hz)
 
     @cached_property
     def near_window(self) -> np.ndarray:
-        """(k,) which samples of the ground reactions lie between first and last, or at most AROUND_WINDOW_S outside."""
+        """Mask (k,) of samples of the ground reactions at most AROUND_WINDOW_S before or after the windows."""
         time, (start, end) = self.trial.loads.time, self.window_s
         return within(time, start - AROUND_WINDOW_S, end + AROUND_WINDOW_S)
 
 
 def inside(time: np.ndarray, windows_s: Sequence[tuple[float, float]]) -> np.ndarray:
-    """Which of these times (n,) lie in one of the windows (first and last time, s)."""
+    """Return the mask of times (n,) that lie in one of the windows (first and last time, s)."""
     result = np.zeros(np.shape(time), dtype=bool)
     for first, last in windows_s:
         result |= within(time, first, last)
@@ -135,7 +135,7 @@ def inside(time: np.ndarray, windows_s: Sequence[tuple[float, float]]) -> np.nda
 
 
 def facing(markers: Markers, marker_set: MarkerSet) -> tuple[np.ndarray, float]:
-    """Rotation about the vertical, by a multiple of 90 degrees, that makes the person face +X; and that angle.
+    """Return the rotation about the vertical, a multiple of 90 degrees, that makes the person face +X; and its angle.
 
     Raises:
         MarkerSetError: the markers of the ASIS are not in the trial, or never visible together.
@@ -160,7 +160,7 @@ def facing(markers: Markers, marker_set: MarkerSet) -> tuple[np.ndarray, float]:
 def solve_kinematics(
     skeleton: Skeleton, trial: Trial, turned_deg: float, smoothing: float | Literal["gcv"]
 ) -> Kinematics:
-    """Inverse kinematics and smoothing of a trial that already faces +X.
+    """Apply inverse kinematics and smoothing to a trial that already faces +X.
 
     Raises:
         TrialError: R102, R103, a coordinate is known in too few frames to be smoothed, or in none; R104, P279, no
@@ -190,7 +190,7 @@ def solve_kinematics(
 
 
 def _bridged(known: np.ndarray, time: np.ndarray) -> np.ndarray:
-    """`known` (n, c) with gaps up to LONGEST_BRIDGE_S between known frames filled."""
+    """Fill gaps of up to LONGEST_BRIDGE_S between known frames in `known` (n, c)."""
     filled = known.copy()
     for c in range(known.shape[1]):
         for first, last in runs(~known[:, c]):
@@ -203,8 +203,9 @@ def _bridged(known: np.ndarray, time: np.ndarray) -> np.ndarray:
 def _long_enough(
     trial: Trial, usable: np.ndarray, known: np.ndarray
 ) -> tuple[tuple[tuple[float, float], ...], list[Finding]]:
-    """First and last time of the windows of usable frames (n,) that are long enough; P270 where there are several, or
-    some are left out.
+    """Return first and last time of the windows of usable frames (n,) that are long enough, and findings.
+
+    P270 if there are several, or some are left out.
     """
     time, where = trial.markers.time, Where(trial=trial.name)
     windows = runs(usable)

@@ -14,9 +14,9 @@ _EACH = 9
 def loads_and_rates(
     time: np.ndarray, wrench: np.ndarray, point: np.ndarray, at: np.ndarray, interval: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Loads (n, 2, 6) between samples, N and N m about the ground origin, and their derivatives by time.
+    """Interpolate loads (n, 2, 6) between samples, N and N m about the ground origin, with their time derivatives.
 
-    Splines go through force, centre of pressure and torque about it; beyond the ends their cubics go on.
+    Splines interpolate force, centre of pressure and torque about it; beyond the ends their cubics continue.
 
     Args:
         time: (k,) s, of at least two samples.
@@ -55,7 +55,7 @@ def loads_and_rates(
 
 @part
 def _columns(wrench: np.ndarray, point: np.ndarray) -> np.ndarray:
-    """(k, 18) what the splines go through: of each foot force, centre of pressure and torque about it."""
+    """Return the columns (k, 18) that are interpolated: for each foot force, centre of pressure and torque about it."""
     result = np.empty((wrench.shape[0], _EACH * wrench.shape[1]))
     for k in range(wrench.shape[0]):
         for foot in range(wrench.shape[1]):
@@ -71,7 +71,7 @@ def _columns(wrench: np.ndarray, point: np.ndarray) -> np.ndarray:
 
 @part
 def _second_derivatives(time: np.ndarray, columns: np.ndarray) -> np.ndarray:
-    """(k, c) second derivatives at the samples of the natural cubic splines through columns (k, c)."""
+    """Compute second derivatives (k, c) at the samples of the natural cubic splines through columns (k, c)."""
     count, wide = columns.shape
     result, above = np.zeros((count, wide)), np.zeros(count)
     for k in range(1, count - 1):

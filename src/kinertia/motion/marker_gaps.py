@@ -1,9 +1,9 @@
-"""Fills gaps of markers from the model, as far off as before and after the gap.
+"""Fills marker gaps from the model, with the offset that the marker has before and after the gap.
 
-Model and markers differ by millimetres to centimetres (skin, marker placement), so that a pose that is fitted to fewer
-markers is another one: where a marker vanishes for a frame, the joint jumps, and accelerations of the gap's edges are
-hundreds of times those of the body. A marker in a gap that keeps its error, in the axes of its segment, pulls nowhere
-and pushes nowhere: the pose goes on.
+Model and markers differ by millimetres to centimetres (skin, marker placement), so a pose that is fitted to fewer
+markers differs: where a marker vanishes for a frame, the joint jumps, and accelerations at the edges of the gap are
+hundreds of times those of the body. If a marker in a gap keeps its offset, in the axes of its segment, it has no effect
+on the pose, which stays continuous.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from kinertia.model.skeleton import Skeleton
 
 
 class HeldErrors:
-    """The gaps of a trial.
+    """Interpolated marker offsets in the gaps of a trial.
 
     Args:
         measured: (n, m, 3) m; NaN where not seen.
@@ -28,18 +28,18 @@ class HeldErrors:
         before = np.maximum.accumulate(np.where(seen, frames, -1), axis=0)
         after = np.minimum.accumulate(np.where(seen, frames, len(seen))[::-1], axis=0)[::-1]
         ever = seen.any(axis=0)
-        # before the first and after the last frame that shows a marker, the error is that of this frame
+        # before the first and after the last frame that shows a marker, the offset is that of this frame
         self._before = np.where(ever, np.where(before < 0, after, before), 0)
         self._after = np.where(ever, np.where(after >= len(seen), self._before, after), 0)
         self._gap = ~seen & ever & placed[:, None]
 
     @property
     def frames(self) -> np.ndarray:
-        """Those with a pose that lack a marker which others show."""
+        """Frames with a pose that lack a marker visible elsewhere in the trial."""
         return np.flatnonzero(self._gap.any(axis=1))
 
     def filled(self, model: Skeleton, q: np.ndarray, frames: np.ndarray) -> np.ndarray:
-        """(f, m, 3) m, the markers of these frames; those in gaps by the poses q (n, c) of all frames."""
+        """Return the markers (f, m, 3) m of these frames, gaps filled by the poses q (n, c) of all frames."""
         ends = [at[frames] for at in (self._before, self._after)]
         edges = np.unique(np.concatenate([end[self._gap[frames]] for end in ends]))
         local = self._errors(model, q, edges)
@@ -55,7 +55,7 @@ class HeldErrors:
         return result
 
     def _errors(self, model: Skeleton, q: np.ndarray, frames: np.ndarray) -> np.ndarray:
-        """(f, m, 3) m, measured less model markers of these frames, in the axes of their segments."""
+        """Return measured minus model markers (f, m, 3) m of these frames, in the axes of their segments."""
         pose = model.pose(q[frames])
         turned = pose.rotation[:, model.marker_segments].transpose(0, 1, 3, 2)
         result: np.ndarray = (turned @ (self._measured[frames] - model.marker_positions(pose))[..., None])[..., 0]

@@ -1,12 +1,12 @@
-"""Sums over the markers of a body, frame by frame in compiled code.
+"""Computes sums over the markers of a body, frame by frame in compiled code.
 
 A motion (l, w) at the ground origin moves a marker at x by l + w x x. The normal matrix of a tree of markers is the
 mass matrix of the same tree with a mass at every marker, and is built the same way: per axis, sums over all markers
-that it carries. For weights that go with two frames, in which a marker is at x and at y, they are
+that it moves. For weights that couple two frames, in which a marker is at x and at y, they are
 
     [0]      sum w                [1:4] sum w x        [4:7] sum w y        [7:16] sum w y x^T, row by row
 
-so that the motion S in the second frame meets, in the first, the generalised force
+so that the motion S in the second frame causes, in the first, the generalised force
 
     (sum w (l + w_ x y),  sum w x x (l + w_ x y)),    with  x x (w_ x y) = w_ (x . y) - y (x . w_).
 """
@@ -22,7 +22,7 @@ from kinertia.model.spatial import inner
 
 @inlined
 def add_marker(weight: float, x: np.ndarray, y: np.ndarray, sums: np.ndarray) -> None:
-    """Add a marker at x, and at y in the second frame, to the sums (16,) of the axis that carries it."""
+    """Add a marker at x, and at y in the second frame, to the sums (16,) of the axis that moves it."""
     sums[0] += weight
     sums[1] += weight * x[0]
     sums[4] += weight * y[0]
@@ -43,7 +43,7 @@ def add_marker(weight: float, x: np.ndarray, y: np.ndarray, sums: np.ndarray) ->
 
 @inlined
 def met_force(sums: np.ndarray, i: int, s: np.ndarray, j: int, out: np.ndarray) -> None:
-    """out[i] = force that the motion s[j] in the second frame meets in the first, with sums[i]."""
+    """Write the force that the motion s[j] in the second frame causes in the first, with sums[i], to out[i]."""
     w = sums[i, 0]
     lx, ly, lz, wx, wy, wz = s[j, 0], s[j, 1], s[j, 2], s[j, 3], s[j, 4], s[j, 5]
     square = sums[i, 7] + sums[i, 11] + sums[i, 15]
@@ -60,7 +60,7 @@ def met_force(sums: np.ndarray, i: int, s: np.ndarray, j: int, out: np.ndarray) 
 
 @part
 def swapped(sums: np.ndarray) -> np.ndarray:
-    """(a, 16) the sums with the two frames exchanged."""
+    """Return the sums (a, 16) with the two frames interchanged."""
     result = sums.copy()
     for j in range(len(sums)):
         for r in range(3):
@@ -72,7 +72,7 @@ def swapped(sums: np.ndarray) -> np.ndarray:
 
 @inlined
 def place_marker(rotation: np.ndarray, translation: np.ndarray, local: np.ndarray, out: np.ndarray) -> None:
-    """out = (3,) m, in ground."""
+    """Write the marker's position (3,) m in ground to `out`."""
     out[0] = translation[0] + rotation[0, 0] * local[0] + rotation[0, 1] * local[1] + rotation[0, 2] * local[2]
     out[1] = translation[1] + rotation[1, 0] * local[0] + rotation[1, 1] * local[1] + rotation[1, 2] * local[2]
     out[2] = translation[2] + rotation[2, 0] * local[0] + rotation[2, 1] * local[1] + rotation[2, 2] * local[2]
@@ -89,14 +89,14 @@ def normal_equations(
     measured: np.ndarray,
     count: int,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """J^T J (n, c, c), J^T r (n, c) and r^T r (n,) of the visible markers; r = measured - model.
+    """Compute J^T J (n, c, c), J^T r (n, c) and r^T r (n,) of the visible markers; r = measured - model.
 
     Args:
         tree: the skeleton.
         owner: (a,) the coordinate of each axis.
         slopes: (n, a) derivatives of the axes by their coordinates.
-        at: (n, a) places of the axes, rad or m.
-        carrier: (m,) the axis that carries each marker.
+        at: (n, a) values of the axes, rad or m.
+        carrier: (m,) the last axis that moves each marker.
         local: (m, 3) m, the markers in the frames of these axes.
         measured: (n, m, 3) m; NaN where not seen.
         count: number of coordinates, c.
@@ -149,7 +149,7 @@ def add_force(force: np.ndarray, at: np.ndarray, total: np.ndarray) -> None:
 
 @part
 def _factors(matrix: np.ndarray, added: float, least: float, upper: np.ndarray, diagonal: np.ndarray) -> None:
-    """Unit upper U and diagonal D (not below `least`, as rounding might have it) of matrix + added 1 = U^T D U."""
+    """Factorise matrix + added 1 = U^T D U: unit upper U, and diagonal D of at least `least` despite rounding."""
     upper[:] = matrix
     for j in range(len(matrix)):
         diagonal[j] = max(upper[j, j] + added, least)
@@ -163,7 +163,7 @@ def _factors(matrix: np.ndarray, added: float, least: float, upper: np.ndarray, 
 
 @compiled
 def damped_steps(normal: np.ndarray, gradient: np.ndarray, damping: np.ndarray) -> np.ndarray:
-    """(n, c) solutions of (normal + damping mean(diag) 1) step = gradient, frame by frame."""
+    """Solve (normal + damping mean(diag) 1) step = gradient for steps (n, c), frame by frame."""
     n, c = gradient.shape
     step, upper, diagonal = gradient.copy(), np.empty((c, c)), np.empty(c)
     for k in range(n):
@@ -181,12 +181,12 @@ def damped_steps(normal: np.ndarray, gradient: np.ndarray, damping: np.ndarray) 
 
 @compiled
 def variances(normal: np.ndarray, added: float) -> np.ndarray:
-    """(n, c) diagonals of the inverses of normal + added 1, frame by frame."""
+    """Return the diagonals (n, c) of the inverses of normal + added 1, frame by frame."""
     n, c = normal.shape[:2]
     result, upper, diagonal, column = np.zeros((n, c)), np.empty((c, c)), np.empty(c), np.empty(c)
     for k in range(n):
         _factors(normal[k], added, added, upper, diagonal)
-        for j in range(c):  # this column of the inverse of U^T
+        for j in range(c):  # column j of the inverse of U^T
             column[:] = 0.0
             column[j] = 1.0
             for m in range(j, c):

@@ -1,14 +1,13 @@
-"""Angles, moments, forces and powers of the legs as clinical software has them: three numbers each, signs alike on both
-sides.
+"""Computes angles, moments, forces and powers of the legs as in clinical software, with equal signs on both sides.
 
-"plug-in-gait" is Vicon's convention. Angles (deg): Cardan sequence flexion, adduction, rotation. Moments (N mm/kg) are
-internal, in the axes of the distal segment, positive where they extend, abduct or rotate externally; forces (N/kg) are
-of the proximal on the distal segment in its axes (forward, left, up; of the foot down, left, forward). Powers (W/kg)
-stand third.
+Every output has three components. "plug-in-gait" is Vicon's convention. Angles (deg): Cardan sequence flexion,
+adduction, rotation. Moments (N mm/kg) are internal, in the axes of the distal segment, positive where they extend,
+abduct or rotate externally; forces (N/kg) act from the proximal on the distal segment, in its axes (forward, left, up;
+for the foot down, left, forward). Powers (W/kg) are the third component.
 
-"isb" (Wu et al. 2002, J Biomech 35:543) has the same angles but for the pelvis, whose backward tilt and lower side are
-positive. Moments (N m/kg) are internal, about the axes that the angles turn about (flexion of the parent, floating,
-long axis of the child), and positive as the angles are; forces (N/kg) are in the distal segment's axes x, y, z.
+"isb" (Wu et al. 2002, J Biomech 35:543) has the same angles except for the pelvis, whose backward tilt and lower side
+are positive. Moments (N m/kg) are internal, about the axes of the angles (flexion of the parent, floating, long axis of
+the child), and have the signs of the angles; forces (N/kg) are in the distal segment's axes x, y, z.
 """
 
 from __future__ import annotations
@@ -34,40 +33,40 @@ UNITS: dict[Convention, dict[str, str]] = {
     "plug-in-gait": {"ANGLES": "deg", "FORCES": "N", "MOMENTS": "Nmm", "POWERS": "W"},
     "isb": {"ANGLES": "deg", "FORCES": "N", "MOMENTS": "Nm", "POWERS": "W"},
 }
-"""As Vicon writes them; forces, moments and powers are per kg of body mass."""
+"""Units as Vicon writes them; forces, moments and powers are per kg of body mass."""
 _BENDS = {"Hip": 1.0, "Knee": -1.0, "Ankle": 1.0}
 """Sign of flexion (dorsiflexion) about the axis to the right."""
 _STEP_RAD = 1e-5
 _APART_DEG = 45.0
 _UNMOVED = 0.2
-"""An angle that no coordinate turns by more has no deviation: the model holds it still."""
+"""An angle that no coordinate changes by more has no standard deviation: the model fixes it."""
 _OUT_OF_REACH = 0.5
-"""As little has a moment along a direction that is farther (sine) from the plane of the free axes: 30 degrees. Ankles'
-flexion is up to 20 degrees from it, directions that the model holds still are 45 and more."""
+"""A moment has no standard deviation either along a direction that is farther (sine) from the plane of the free axes:
+30 degrees. Ankle flexion is up to 20 degrees from it, directions that the model fixes are at 45 and more."""
 
 
 class Deviations(Protocol):
-    """Standard deviations at n frames, as `CurveDeviations` has them."""
+    """Interface of standard deviations at n frames, as in `CurveDeviations`."""
 
     @property
     def coordinates(self) -> np.ndarray:
-        """(n, c) rad, m."""
+        """Standard deviations (n, c) of coordinates, rad, m."""
 
     @property
     def moments(self) -> np.ndarray:
-        """(n, c) N m."""
+        """Standard deviations (n, c) of moments, N m."""
 
     @property
     def powers(self) -> np.ndarray:
-        """(n, c) W."""
+        """Standard deviations (n, c) of powers, W."""
 
 
 @dataclass(frozen=True, eq=False)
 class Departures:
-    """What m possible motions have otherwise at n frames: how errors of a joint's axes go together.
+    """Differences of m possible motions from the estimate at n frames, which show how a joint's errors are correlated.
 
     Attributes:
-        coordinates, moments, powers: (m, n, c) as `Deviations` has them.
+        coordinates, moments, powers: (m, n, c) as in `Deviations`.
     """
 
     coordinates: np.ndarray
@@ -77,12 +76,12 @@ class Departures:
 
 @dataclass(frozen=True, eq=False)
 class ModelOutput:
-    """One output over n frames.
+    """One output quantity over n frames.
 
     Attributes:
         joint: "Hip", "Knee", "Ankle", "Pelvis" or "FootProgress".
         side: "r" or "l".
-        kind: what it is.
+        kind: angles, forces, moments or powers.
         values: (n, 3) in the convention's units.
         sd: (n, 3) standard deviations; NaN where there is none.
     """
@@ -95,7 +94,7 @@ class ModelOutput:
 
     @property
     def name(self) -> str:
-        """As Vicon calls it: "LHipAngles"."""
+        """Vicon's name of the output: "LHipAngles"."""
         return f"{self.side.upper()}{self.joint}{_SINGULAR[self.kind]}"
 
 
@@ -109,14 +108,14 @@ def model_outputs(
     deviations: Deviations | None = None,
     departures: Departures | None = None,
 ) -> list[ModelOutput]:
-    """All outputs of the legs and the pelvis; none of a model whose legs are not hip, knee and ankle in ISB's axes.
+    """Compute all outputs of the legs and the pelvis; none unless the legs are hip, knee and ankle in ISB's axes.
 
     Args:
         skeleton, bsp, motion, foot_loads: as in `joint_wrenches`; the person faces +X.
         mass_kg: of the body.
         convention: signs, axes and units.
-        deviations: of coordinates, moments and powers, where there are any.
-        departures: tell correlations of a joint's axes; if None their errors are taken as independent.
+        deviations: standard deviations of coordinates, moments and powers, or None.
+        departures: show correlations of a joint's axes; if None, their errors are assumed independent.
     """
     joints = leg_joints(skeleton)
     if not joints or not _alike(skeleton, joints):
@@ -150,13 +149,15 @@ def model_outputs(
 
 
 def plug_in_gait_angles(skeleton: Skeleton, q: np.ndarray, heading_rad: np.ndarray) -> dict[str, np.ndarray]:
-    """(n, 3) deg by Vicon's name, "LHipAngles": as `model_outputs` has them, without deviations, and those of pelvis
-    and feet against the direction of gait; nothing of a model whose legs it gives no outputs of.
+    """Compute angles (n, 3) deg by Vicon's name, "LHipAngles", as in `model_outputs` without standard deviations.
+
+    Angles of pelvis and feet are relative to the direction of gait. Empty for a model for which `model_outputs` is
+    empty.
 
     Args:
         skeleton: the model.
         q: (n, c) coordinates, rad and m.
-        heading_rad: (n,) where the person goes, from ground's X axis to the left.
+        heading_rad: (n,) direction of gait, from ground's X axis to the left.
     """
     joints = leg_joints(skeleton)
     if not joints or not _alike(skeleton, joints):
@@ -171,14 +172,14 @@ def plug_in_gait_angles(skeleton: Skeleton, q: np.ndarray, heading_rad: np.ndarr
 
 
 class _NoDeviations:
-    """NaN everywhere."""
+    """Standard deviations that are NaN throughout."""
 
     def __init__(self, q: np.ndarray) -> None:
         self.coordinates = self.moments = self.powers = np.full(q.shape, np.nan)
 
 
 def _alike(skeleton: Skeleton, joints: Iterable[LegJoint]) -> bool:
-    """Whether the leg's segments have axes forward, up and right where all coordinates are zero."""
+    """Decide whether the leg's segments have axes forward, up and right where all coordinates are zero."""
     pose = skeleton.pose(np.zeros((1, len(skeleton.coordinates))))
     turns = [
         _rotation(skeleton, pose, one.parent).swapaxes(1, 2) @ _rotation(skeleton, pose, one.child) for one in joints
@@ -191,26 +192,29 @@ def _rotation(skeleton: Skeleton, pose: Pose, segment: str) -> np.ndarray:
 
 
 def _signs(joint: LegJoint) -> np.ndarray:
-    """(3,) of the turns about axes to the right, forward and up, that are flexion, adduction and internal rotation."""
+    """Return the signs (3,) of rotations about axes right, forward and up: flexion, adduction, internal rotation."""
     mirrored = 1.0 if joint.side == "r" else -1.0
     return np.array([_BENDS[joint.name], mirrored, mirrored])
 
 
 def _cardan(parent: np.ndarray, child: np.ndarray) -> np.ndarray:
-    """(n, 3) rad: turns about z of the parent, the floating axis x, and y of the child (n, 3, 3)."""
+    """Return rotations (n, 3) rad about z of the parent, the floating axis x, and y of the child (n, 3, 3)."""
     result: np.ndarray = Rotation.from_matrix(parent.swapaxes(-1, -2) @ child).as_euler("ZXY")
     return result
 
 
 def _joint_axes(parent: np.ndarray, child: np.ndarray) -> np.ndarray:
-    """(n, 3, 3) in rows: the axes that `_cardan` turns about, in ground."""
+    """Return the axes (n, 3, 3) of the rotations of `_cardan`, in rows, in ground."""
     first, last = parent[:, :, 2], child[:, :, 1]
     floating = np.cross(last, first)
     return np.stack([first, floating / np.linalg.norm(floating, axis=1, keepdims=True), last], axis=1)
 
 
 def _moved(skeleton: Skeleton, q: np.ndarray, joint: LegJoint, columns: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
-    """Per unit of the joint's own coordinates: (n, 3, k) its angles, and (n, 3, k) turn of the child in ground."""
+    """Return the change of the joint's angles (n, 3, k) and the rotation of the child in ground (n, 3, k).
+
+    Both are per unit of the joint's own coordinates.
+    """
     angles, turns = np.empty((len(q), 3, len(columns))), np.empty((len(q), 3, len(columns)))
     for k, column in enumerate(columns):
         step = np.zeros(q.shape[1])
@@ -228,7 +232,7 @@ def _moved(skeleton: Skeleton, q: np.ndarray, joint: LegJoint, columns: Sequence
 
 
 def _covariance(sd: np.ndarray, departures: np.ndarray | None) -> np.ndarray:
-    """(n, k, k) of deviations (n, k), with the correlations of departures (m, n, k); diagonal without these."""
+    """Return covariances (n, k, k) from SDs (n, k) and the correlations of departures (m, n, k), if there are any."""
     if departures is None:
         alone: np.ndarray = np.eye(sd.shape[1]) * np.square(sd)[:, None]
         return alone
@@ -244,15 +248,16 @@ def _root(variance: np.ndarray) -> np.ndarray:
 
 
 def _reached(by_angle: np.ndarray, covariance: np.ndarray) -> np.ndarray:
-    """(n, 3) deviations of angles from the coordinates' (n, k, k); NaN of an angle that none of them turns."""
+    """Return SDs (n, 3) of angles from the coordinates' covariance (n, k, k); NaN for an angle that none changes."""
     moved = np.abs(by_angle).sum(axis=2).max(axis=0) > _UNMOVED
     variance = np.einsum("nai,nij,naj->na", by_angle, covariance, by_angle)
     return np.where(moved, _root(variance), np.nan)
 
 
 def _along(axes: np.ndarray, turning: np.ndarray, covariance: np.ndarray) -> np.ndarray:
-    """(n, 3) deviations of a moment along axes (n, 3, 3), from the covariance (n, k, k) about the free directions
-    (n, 3, k).
+    """Return SDs (n, 3) of a moment along axes (n, 3, 3), from its covariance (n, k, k) in free directions.
+
+    The free directions are `turning` (n, 3, k).
     """
     shares = np.linalg.pinv(turning) @ axes.swapaxes(1, 2)
     rest = np.linalg.norm(turning @ shares - axes.swapaxes(1, 2), axis=1)
@@ -261,14 +266,15 @@ def _along(axes: np.ndarray, turning: np.ndarray, covariance: np.ndarray) -> np.
 
 
 def _as_vicon(joint: LegJoint, force: np.ndarray) -> np.ndarray:
-    """Components (n, 3) along x, y, z of a segment as Vicon orders and signs them; its foot points along z."""
+    """Return components (n, 3) along x, y, z of a segment in Vicon's order and signs; its foot points along z."""
     x, y, z = force.T
     return np.column_stack([-y, -z, x] if joint.name == "Ankle" else [x, -z, y])
 
 
 def _of_pelvis_and_feet(skeleton: Skeleton, pose: Pose, clinical: bool, ground: np.ndarray) -> list[ModelOutput]:
-    """Angles against axes (3, 3) or (n, 3, 3) forward, up and right in columns, without deviations: those of pelvis and
-    foot lie in several coordinates together.
+    """Compute angles of pelvis and feet relative to axes (3, 3) or (n, 3, 3): forward, up and right in columns.
+
+    They have no standard deviations, since they depend on several coordinates together.
     """
     found = []
     for side, foot in zip(FEET, skeleton.feet, strict=True):
@@ -284,5 +290,5 @@ def _of_pelvis_and_feet(skeleton: Skeleton, pose: Pose, clinical: bool, ground: 
 
 
 def _third(values: np.ndarray) -> np.ndarray:
-    """(n, 3) with a scalar where Vicon has it."""
+    """Return (n, 3) with a scalar in the third component, as in Vicon's files."""
     return np.column_stack([np.zeros(len(values)), np.zeros(len(values)), values])

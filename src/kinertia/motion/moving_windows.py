@@ -1,7 +1,7 @@
 """Computes moving averages and extremes along the first axis.
 
-As `scipy.ndimage` has them, in the same order of additions: to load it takes as long as to load NumPy, and these few
-functions are all that is needed of it.
+They equal those of `scipy.ndimage`, with the same order of additions: importing it takes as long as importing NumPy,
+and only these few functions are needed.
 """
 
 from __future__ import annotations
@@ -11,11 +11,11 @@ import numpy as np
 from kinertia.trial.data import BoolArray, FloatArray
 
 _DEVIATIONS = 4.0
-"""So many deviations to either side, a Gaussian weight ends."""
+"""Standard deviations to either side at which a Gaussian weight ends."""
 
 
 def gaussian_mean(values: FloatArray, deviation: float) -> FloatArray:
-    """Mean of values (n, ...) weighted by a Gaussian of this deviation (samples); the ends go on as they are.
+    """Compute the mean of values (n, ...) weighted by a Gaussian of this SD (samples); the ends are continued.
 
     Examples:
         >>> gaussian_mean(np.array([0.0, 0.0, 1.0, 0.0, 0.0]), 0.5).round(3).tolist()
@@ -32,7 +32,7 @@ def gaussian_mean(values: FloatArray, deviation: float) -> FloatArray:
 
 
 def even_mean(values: FloatArray, size: int) -> FloatArray:
-    """Mean of values (n, ...) over an odd number of samples; the ends go on as they are.
+    """Compute the mean of values (n, ...) over an odd number of samples; the ends are continued.
 
     Examples:
         >>> even_mean(np.array([0.0, 0.0, 3.0, 0.0, 0.0]), 3).tolist()
@@ -45,7 +45,7 @@ def even_mean(values: FloatArray, size: int) -> FloatArray:
 
 
 def greatest(values: FloatArray, size: int) -> FloatArray:
-    """Greatest of values (n, ...) over an odd number of samples.
+    """Compute the maximum of values (n, ...) over an odd number of samples.
 
     Examples:
         >>> greatest(np.array([0.0, 0.0, 3.0, 0.0, 1.0]), 3).tolist()
@@ -57,7 +57,7 @@ def greatest(values: FloatArray, size: int) -> FloatArray:
 
 
 def all_around(known: BoolArray, size: int) -> BoolArray:
-    """(n, ...) whether all of an odd number of samples are; beyond the ends none is.
+    """Return whether (n, ...) all of an odd number of samples are True; beyond the ends all are False.
 
     Examples:
         >>> all_around(np.array([True, True, True, True, False, True]), 3).tolist()

@@ -1,10 +1,10 @@
 """Fits coordinates to the markers of single frames: Gauss-Newton within the ranges of the model.
 
 The sum of squared distances between measured and model markers is minimised frame by frame (`marker_sums` has the
-analytic derivatives). A coordinate with a clamped range stays within it, as in OpenSim. Beyond the range that anatomy
-knows it pays: one deviation is as bad as a marker that is MARKER_M off, which keeps joints from making up for markers
-in ways that no joint can. Beyond another range it may be made to pay, too: that decides which of two poses is meant
-that fit the markers nearly as well.
+analytic derivatives). A coordinate with a clamped range stays within it, as in OpenSim. Beyond an anatomical range it
+is penalised: one standard deviation costs as much as a marker distance of MARKER_M, which prevents impossible joint
+angles from compensating for marker errors. Beyond other ranges it can be penalised, too: this decides between two poses
+that fit the markers nearly equally well.
 """
 
 from __future__ import annotations
@@ -19,19 +19,19 @@ from kinertia.motion import marker_sums
 from kinertia.motion.marker_sums import damped_steps
 
 _STEP_TOLERANCE = 1e-5
-"""Rad or m; the step below it is still taken and leaves an error several times smaller."""
+"""Rad or m; a smaller step is still taken and leaves an error several times smaller."""
 MARKER_M = 0.01
-"""By how much a marker errs where a coordinate errs by one deviation of its range."""
+"""Marker distance that costs as much as one standard deviation of a coordinate beyond its range."""
 
 
 @dataclass(frozen=True)
 class Stop:
-    """When to stop.
+    """Stopping criteria of the fit.
 
     Attributes:
         gain_tolerance_m2: a step that would lower a frame's sum of squared distances by less is its last.
         most_steps: after so many a frame counts as not converged.
-        choosing: whether ranges count that neither anatomy knows nor the model clamps.
+        choosing: whether ranges count that are neither anatomical nor clamped in the model.
     """
 
     gain_tolerance_m2: float
@@ -41,12 +41,12 @@ class Stop:
 
 @dataclass(frozen=True, eq=False)
 class PoseFit:
-    """Outcome of `fit_poses` for n frames.
+    """Result of `fit_poses` for n frames.
 
     Attributes:
         q: (n, c) rad and m.
         converged: (n,) False where the iteration stopped at its limit.
-        cost_m2: (n,) sum of squared marker distances, and what was paid for leaving ranges.
+        cost_m2: (n,) sum of squared marker distances and range penalties.
         normal: (n, c, c) J^T J of the visible markers.
     """
 
@@ -56,7 +56,7 @@ class PoseFit:
     normal: np.ndarray
 
     def put(self, rows: np.ndarray, other: PoseFit, kept: np.ndarray) -> None:
-        """Overwrite those of these rows that are `kept` (r,) by the rows of another outcome."""
+        """Overwrite those of these rows that are `kept` (r,) by the rows of another result."""
         for own, new in zip(self._arrays, other._arrays, strict=True):
             own[rows[kept]] = new[kept]
 
@@ -66,9 +66,9 @@ class PoseFit:
 
 
 def fit_poses(model: Skeleton, measured: np.ndarray, q: np.ndarray, stop: Stop) -> PoseFit:
-    """The poses nearest to markers measured (n, m, 3), each frame by itself, from these coordinates (n, c) on.
+    """Fit poses to measured markers (n, m, 3), each frame by itself, starting from these coordinates (n, c).
 
-    Steps are damped (Levenberg) per frame: a step that makes the fit worse is taken back and the damping raised.
+    Steps are damped (Levenberg) per frame: a step that worsens the fit is undone and the damping increased.
     """
     bounds = model.bounds
     q = bounds.clamped(q)
@@ -94,7 +94,7 @@ def fit_poses(model: Skeleton, measured: np.ndarray, q: np.ndarray, stop: Stop) 
         damping[active[~better]] *= 100.0
         step[active] = _steps(model, h, g, accepted[active], damping[active], stop.choosing)
         gain = np.einsum("nc,nc->n", step[active], g)
-        # a step that was cut at the end of a range may lead upwards: then the next one is shorter
+        # a step that was cut at a range limit may increase the cost: then the next one is shorter
         small = (np.abs(step[active]).max(axis=1) < _STEP_TOLERANCE) | ((gain >= 0) & (gain < stop.gain_tolerance_m2))
         done = active[small]
         converged[done] = True
@@ -109,7 +109,7 @@ def fit_poses(model: Skeleton, measured: np.ndarray, q: np.ndarray, stop: Stop) 
 
 
 def _price(bounds: Bounds, q: np.ndarray, choosing: bool) -> np.ndarray:
-    """(n, c) m per rad or m beyond a range; zero within."""
+    """Return the penalty (n, c) in m per rad or m beyond a range; zero within."""
     counts = (bounds.beyond(q) != 0) & (bounds.anatomical | choosing)
     result: np.ndarray = np.where(counts, MARKER_M / bounds.sd(q), 0.0)
     return result
@@ -118,7 +118,7 @@ def _price(bounds: Bounds, q: np.ndarray, choosing: bool) -> np.ndarray:
 def _steps(
     model: Skeleton, normal: np.ndarray, gradient: np.ndarray, q: np.ndarray, damping: np.ndarray, choosing: bool
 ) -> np.ndarray:
-    """(n, c) damped steps from q that keep within clamped ranges; the gradient has what is paid beyond the others."""
+    """Return damped steps (n, c) from q that keep within clamped ranges; the gradient includes the range penalties."""
     bounds, columns = model.bounds, np.arange(q.shape[1])
     price, held = _price(bounds, q, choosing), bounds.held(q, gradient)
     if price.any() or held.any():
@@ -132,7 +132,7 @@ def _steps(
 
 
 def normal_equations(model: Skeleton, measured: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """J^T J (n, c, c), J^T r (n, c) and r^T r (n,) of the visible markers (n, m, 3); r = measured - model."""
+    """Compute J^T J (n, c, c), J^T r (n, c) and r^T r (n,) of the visible markers (n, m, 3); r = measured - model."""
     tree, axes = model.tree, model.map
     carrier, local = model.carried_markers
     at, slopes = axes.places_and_slopes(q)

@@ -13,11 +13,11 @@ from kinertia.motion.rigid_body import empty_frame, move
 def regressor(
     tree: KinematicTree, gravity_m_s2: float, x: np.ndarray, v: np.ndarray, a: np.ndarray, about: np.ndarray
 ) -> np.ndarray:
-    """(n, 6, s, 10) load of every segment per unit of its ten parameters, in its own frame; moments about `about`.
+    """Compute the load (n, 6, s, 10) of every segment per unit of its ten parameters, in its own frame.
 
-    The arguments are those of `root_load`. With w, e and b the angular velocity, angular acceleration and acceleration
-    of the origin in the segment's axes, mass m, first moment h and inertia I need the force m b + e x h + w x (w x h)
-    and, about the segment's origin, the moment h x b + I e + w x (I w).
+    Moments are about `about`; the other arguments are those of `root_load`. With w, e and b the angular velocity,
+    angular acceleration and acceleration of the origin in the segment's axes, mass m, first moment h and inertia I
+    require the force m b + e x h + w x (w x h) and, about the segment's origin, the moment h x b + I e + w x (I w).
     """
     n, count = x.shape
     segments = len(tree.carrier)
@@ -48,7 +48,7 @@ def in_segment(
     e: np.ndarray,
     b: np.ndarray,
 ) -> None:
-    """Angular velocity w, angular acceleration e, and acceleration b of the origin, in the segment's axes."""
+    """Write angular velocity w, angular acceleration e and acceleration b of the origin, in the segment's axes."""
     vx, vy, vz, wx, wy, wz = velocity[0], velocity[1], velocity[2], velocity[3], velocity[4], velocity[5]
     ax, ay, az = acceleration[0], acceleration[1], acceleration[2]
     ex, ey, ez = acceleration[3], acceleration[4], acceleration[5]
@@ -69,7 +69,7 @@ def in_segment(
 
 @part
 def own_regressor(w: np.ndarray, e: np.ndarray, b: np.ndarray, out: np.ndarray) -> None:
-    """out = (6, 10) in the segment's axes, about its origin."""
+    """Write the regressor (6, 10) in the segment's axes, about its origin, to `out`."""
     out[:] = 0.0
     out[0, 0], out[1, 0], out[2, 0] = b[0], b[1], b[2]
     square = w[0] * w[0] + w[1] * w[1] + w[2] * w[2]
@@ -96,7 +96,7 @@ def own_regressor(w: np.ndarray, e: np.ndarray, b: np.ndarray, out: np.ndarray) 
 
 @part
 def to_ground(rotation: np.ndarray, at: np.ndarray, about: np.ndarray, own: np.ndarray, out: np.ndarray) -> None:
-    """out = (6, 10) the same in ground axes and about another point, for a segment whose origin is at `at`."""
+    """Write the regressor (6, 10) in ground axes and about another point to `out`; the segment's origin is at `at`."""
     x, y, z = at[0] - about[0], at[1] - about[1], at[2] - about[2]
     for c in range(10):
         for r in range(3):

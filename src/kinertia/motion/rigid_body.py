@@ -5,7 +5,7 @@ A body of mass m, first moment H and moments of inertia J about the ground origi
     I = [[m 1, -[H]], [[H], J]]          [H] x = H x x, the cross product as a matrix
 
 and, with velocity V = (v, w) and acceleration A (gravity included: the ground accelerates upwards), needs the load
-f = I A + V x* (I V) (Featherstone 2008, eq. 5.9). Summed over all that axis j carries, f, I and the matrix
+f = I A + V x* (I V) (Featherstone 2008, eq. 5.9). Summed over all bodies that axis j moves, f, I and the matrix
 
     B = V x* I - I (V x) + (x* (I V)) = [[0, -2 [p]], [0, K]],     I V = (p, l)
     K = [w] J - J [w] - [v] [H] - [H] [v] - [l]
@@ -17,9 +17,8 @@ derivative in closed form. With S_j the axis, V and A of its parent, P = V x S_j
     d f / d rate_j         = B S_j + 2 I P
     d f / d acceleration_j = I S_j
 
-The force of an axis is S_i . f_i. It answers to an axis j that it carries, or is, by the sums over what j carries; to
-an axis before it by the sums over what it carries itself, of which the term S x* f cancels, since its own direction
-turns along.
+The force of an axis is S_i . f_i. Its derivative by an axis j at or beyond it uses the sums over what j moves; by an
+axis before it, the sums over what it moves itself, less S x* f, which cancels as its own direction rotates.
 """
 
 from __future__ import annotations
@@ -34,18 +33,18 @@ from kinertia.model.spatial import force_cross, inner, motion_cross
 
 
 class Frame(NamedTuple):
-    """One frame of a trial, axis by axis.
+    """Quantities of one frame of a trial, axis by axis.
 
     Attributes:
-        rotation, translation, axes: as `place_axes` has them.
+        rotation, translation, axes: as in `place_axes`.
         velocity, acceleration: (a + 1, 6) of what the axis moves; the last row, -1, is the ground's.
         swept, turned: (a, 6) P and Q above.
-        momentum: (a, 6) I V above, of what the axis itself bears.
-        inertia: (a, 13) m, H and J above, J row by row, of all that the axis carries.
+        momentum: (a, 6) I V above, of bodies attached directly to the axis.
+        inertia: (a, 13) m, H and J above, J row by row, of all bodies that the axis moves.
         bias: (a, 12) p and K above, K row by row, of the same.
         force: (a, 6) f above, of the same.
-        column: (3, a, 6) derivatives of the force by the axis' place, rate and acceleration.
-        spare: (3, a, 6) room for what is needed on the way.
+        column: (3, a, 6) derivatives of the force by the axis' value, rate and acceleration.
+        spare: (3, a, 6) room for intermediate results.
     """
 
     rotation: np.ndarray
@@ -65,7 +64,7 @@ class Frame(NamedTuple):
 
 @part
 def empty_frame(a: int, gravity_m_s2: float) -> Frame:
-    """Room for one frame of this many axes."""
+    """Allocate one frame of this many axes."""
     six, more = (a, 6), (a + 1, 6)
     velocity, acceleration = np.zeros(more), np.zeros(more)
     acceleration[a, 1] = gravity_m_s2
@@ -77,7 +76,7 @@ def empty_frame(a: int, gravity_m_s2: float) -> Frame:
 
 @part
 def move(tree: KinematicTree, x: np.ndarray, v: np.ndarray, a: np.ndarray, frame: Frame) -> None:
-    """Places, velocities and accelerations in one frame, from places, rates and accelerations of the axes (a,)."""
+    """Compute positions, velocities and accelerations in one frame, from those of the axes (a,)."""
     axes, velocity, acceleration = frame.axes, frame.velocity, frame.acceleration
     swept, turned = frame.swept, frame.turned
     place_axes(tree, x, frame.rotation, frame.translation, axes)
@@ -95,7 +94,7 @@ def move(tree: KinematicTree, x: np.ndarray, v: np.ndarray, a: np.ndarray, frame
 
 @inlined
 def _place_inertia(j: int, bodies: np.ndarray, frame: Frame) -> None:
-    """Inertia of what axis j itself bears, at the ground origin, from its ten parameters in the axis' frame."""
+    """Compute the inertia of bodies attached directly to axis j, at the ground origin, from its ten parameters."""
     rotation, translation, inertia = frame.rotation, frame.translation, frame.inertia
     own, half, first = np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
     mass, x, y, z = bodies[j, 0], translation[j, 0], translation[j, 1], translation[j, 2]
@@ -109,7 +108,7 @@ def _place_inertia(j: int, bodies: np.ndarray, frame: Frame) -> None:
             half[r, c] = 0.0
             for k in range(3):
                 half[r, c] += rotation[j, r, k] * own[k, c]
-    # J + 2 (t . h) - h t^T - t h^T + m (t . t - t t^T), with h the first moment about the frame and t its place
+    # J + 2 (t . h) - h t^T - t h^T + m (t . t - t t^T), with h the first moment about the frame and t its position
     round_about = 2.0 * (x * first[0] + y * first[1] + z * first[2]) + mass * (x * x + y * y + z * z)
     inertia[j, 0] = mass
     for r in range(3):
@@ -124,7 +123,7 @@ def _place_inertia(j: int, bodies: np.ndarray, frame: Frame) -> None:
 
 @inlined
 def inertia_times(inertia: np.ndarray, j: int, s: np.ndarray, i: int, out: np.ndarray, k: int) -> None:
-    """out[k] = I_j s[i]."""
+    """Write I_j s[i] to out[k]."""
     m, x, y, z = inertia[j, 0], inertia[j, 1], inertia[j, 2], inertia[j, 3]
     lx, ly, lz, wx, wy, wz = s[i, 0], s[i, 1], s[i, 2], s[i, 3], s[i, 4], s[i, 5]
     out[k, 0] = m * lx - (y * wz - z * wy)
@@ -137,7 +136,7 @@ def inertia_times(inertia: np.ndarray, j: int, s: np.ndarray, i: int, out: np.nd
 
 @inlined
 def _bias_times(bias: np.ndarray, j: int, s: np.ndarray, i: int, out: np.ndarray, k: int) -> None:
-    """out[k] = B_j s[i]."""
+    """Write B_j s[i] to out[k]."""
     x, y, z = 2.0 * bias[j, 0], 2.0 * bias[j, 1], 2.0 * bias[j, 2]
     wx, wy, wz = s[i, 3], s[i, 4], s[i, 5]
     out[k, 0] = z * wy - y * wz
@@ -150,7 +149,7 @@ def _bias_times(bias: np.ndarray, j: int, s: np.ndarray, i: int, out: np.ndarray
 
 @inlined
 def times_bias(bias: np.ndarray, j: int, s: np.ndarray, i: int, out: np.ndarray, k: int) -> None:
-    """out[k] = s[i] B_j."""
+    """Write s[i] B_j to out[k]."""
     x, y, z = 2.0 * bias[j, 0], 2.0 * bias[j, 1], 2.0 * bias[j, 2]
     lx, ly, lz, wx, wy, wz = s[i, 0], s[i, 1], s[i, 2], s[i, 3], s[i, 4], s[i, 5]
     out[k, 0] = 0.0
@@ -163,7 +162,7 @@ def times_bias(bias: np.ndarray, j: int, s: np.ndarray, i: int, out: np.ndarray,
 
 @part
 def _place_bias(j: int, velocity: np.ndarray, inertia: np.ndarray, momentum: np.ndarray, bias: np.ndarray) -> None:
-    """B of what axis j itself bears."""
+    """Compute B of bodies attached directly to axis j."""
     x, y, z = velocity[j, 3], velocity[j, 4], velocity[j, 5]
     turn = np.empty((3, 3))
     turn[0, 0], turn[0, 1], turn[0, 2] = 0.0, -z, y
@@ -190,7 +189,7 @@ def _place_bias(j: int, velocity: np.ndarray, inertia: np.ndarray, momentum: np.
 
 @part
 def _columns(frame: Frame) -> None:
-    """The derivatives `column`, from all else in the frame."""
+    """Compute the derivatives `column` from everything else in the frame."""
     axes, swept, inertia, bias = frame.axes, frame.swept, frame.inertia, frame.bias
     (place, rate, acceleration), (by_swept, by_turned, twice) = frame.column, frame.spare
     for j in range(len(axes)):
@@ -207,7 +206,7 @@ def _columns(frame: Frame) -> None:
 
 @inlined
 def _bears(bodies: np.ndarray, j: int) -> bool:
-    """Whether axis j itself bears anything."""
+    """Decide whether a body is attached directly to axis j."""
     borne = False
     for k in range(10):
         borne = borne or bodies[j, k] != 0.0
@@ -216,8 +215,8 @@ def _bears(bodies: np.ndarray, j: int) -> bool:
 
 @part
 def fill(tree: KinematicTree, bodies: np.ndarray, x: np.ndarray, v: np.ndarray, a: np.ndarray, frame: Frame) -> None:
-    """Motion and forces of one frame, from bodies (a, 10) and places, rates and accelerations (a,) as `root_load` has
-    them; the inertia is of what each axis itself bears.
+    """Compute motion and forces of one frame, from bodies (a, 10) and x, v, a (a,) as in `root_load`.
+    The inertia is that of bodies attached directly to each axis.
     """
     move(tree, x, v, a, frame)
     inertia, momentum, force = frame.inertia, frame.momentum, frame.force
@@ -237,7 +236,7 @@ def fill(tree: KinematicTree, bodies: np.ndarray, x: np.ndarray, v: np.ndarray, 
 
 @part
 def carry(tree: KinematicTree, bodies: np.ndarray, frame: Frame) -> None:
-    """Inertia and bias of all that the axes carry, after `fill`."""
+    """Compute inertia and bias of all bodies that the axes move, after `fill`."""
     frame.bias[:] = 0.0
     for j in range(len(bodies)):
         if _bears(bodies, j):
@@ -248,7 +247,7 @@ def carry(tree: KinematicTree, bodies: np.ndarray, frame: Frame) -> None:
 
 @part
 def differentiate(tree: KinematicTree, bodies: np.ndarray, frame: Frame) -> None:
-    """The same, and the derivatives `column`."""
+    """Compute inertia and bias as `carry` does, and the derivatives `column`."""
     carry(tree, bodies, frame)
     _columns(frame)
 
@@ -263,17 +262,17 @@ def root_load(
     a: np.ndarray,
     about: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Load of the whole body and its derivatives.
+    """Compute the load of the whole body, and its derivatives.
 
     Args:
         tree: the skeleton.
         gravity_m_s2: downward, along -y.
-        bodies: (a, 10) parameters of what each axis itself bears, in its frame.
-        x, v, a: (n, a) places, rates and accelerations of the axes.
-        about: (n, 3) m, the point of the moment in the derivatives, which leave out that it moves with the axes.
+        bodies: (a, 10) parameters of bodies attached directly to each axis, in its frame.
+        x, v, a: (n, a) values, rates and accelerations of the axes.
+        about: (n, 3) m, the point of the moment in the derivatives, which ignore that it moves with the axes.
 
     Returns:
-        (n, 6) force, and moment about the ground origin, ground axes, as `axis_forces` has them; and (3, n, 6, a)
+        (n, 6) force, and moment about the ground origin, ground axes, as in `axis_forces`; and (3, n, 6, a)
         derivatives by x, v and a of the force, and of the moment about the other point.
     """
     n, count = x.shape
@@ -300,7 +299,7 @@ def root_balance(
     a: np.ndarray,
     about: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(n, 6) load as `root_load`, and (n, 6, 6) its derivatives by a of the first six axes, the root's, only."""
+    """Compute the load (n, 6) as `root_load`, and its derivatives (n, 6, 6) by a of the first six axes, the root's."""
     n, count = x.shape
     load, by = np.zeros((n, 6)), np.empty((n, 6, 6))
     frame = empty_frame(count, gravity_m_s2)
@@ -317,7 +316,7 @@ def root_balance(
 
 @inlined
 def taken_about(force: np.ndarray, about: np.ndarray, out: np.ndarray) -> None:
-    """out = (6,) a force, and its moment about another point than the ground origin."""
+    """Write a force, and its moment about another point than the ground origin, to `out` (6,)."""
     fx, fy, fz, x, y, z = force[0], force[1], force[2], about[0], about[1], about[2]
     out[0], out[1], out[2] = fx, fy, fz
     out[3], out[4], out[5] = force[3] - (y * fz - z * fy), force[4] - (z * fx - x * fz), force[5] - (x * fy - y * fx)
@@ -325,7 +324,7 @@ def taken_about(force: np.ndarray, about: np.ndarray, out: np.ndarray) -> None:
 
 @part
 def whole_load(parent: np.ndarray, force: np.ndarray, out: np.ndarray, k: int) -> None:
-    """out[k] = (6,) sum over the axes that stand on the ground."""
+    """Add the forces (6,) of the axes that are attached to the ground to out[k]."""
     for j in range(len(parent)):
         if parent[j] < 0:
             for r in range(6):
@@ -336,7 +335,7 @@ def whole_load(parent: np.ndarray, force: np.ndarray, out: np.ndarray, k: int) -
 def axis_forces(
     tree: KinematicTree, gravity_m_s2: float, bodies: np.ndarray, x: np.ndarray, v: np.ndarray, a: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(n, a) forces of all axes that move the bodies so, and (n, 6) their load at the ground origin; as `root_load`."""
+    """Compute forces (n, a) of all axes, and the bodies' load (n, 6) at the ground origin; inputs as in `root_load`."""
     n, count = x.shape
     tau, load = np.empty((n, count)), np.zeros((n, 6))
     frame = empty_frame(count, gravity_m_s2)
@@ -358,8 +357,9 @@ def axis_force_derivatives(
     a: np.ndarray,
     moving: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(n, a) as `axis_forces` and (3, n, a, a) their derivatives by x, v and a (columns); zero of forces of axes that
-    are not among those `moving` (a,), and by their v and a.
+    """Compute forces (n, a) as `axis_forces`, and their derivatives (3, n, a, a) by x, v and a (columns).
+
+    They are zero for forces of axes that are not among `moving` (a,), and by the v and a of these axes.
     """
     n, count = x.shape
     tau, by = np.empty((n, count)), np.zeros((3, n, count, count))
@@ -375,7 +375,7 @@ def axis_force_derivatives(
 
 @part
 def _through_axes(parent: np.ndarray, moving: np.ndarray, frame: Frame, by: tuple[np.ndarray, ...]) -> None:
-    """Derivatives (a, a) of the forces of axes, by places, rates and accelerations, from those of what they carry."""
+    """Compute derivatives (a, a) of axis forces by values, rates and accelerations, from those of the bodies moved."""
     axes, swept, turned, inertia, bias = frame.axes, frame.swept, frame.turned, frame.inertia, frame.bias
     (place, rate, acceleration), column, biased, borne = by, frame.column, frame.spare[0], frame.spare[1]
     for j in range(len(parent)):

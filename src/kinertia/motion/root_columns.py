@@ -1,7 +1,7 @@
-"""Computes the root equations and all their derivatives over deviations, in compiled code.
+"""Computes the root equations and all their derivatives over standard deviations, in compiled code.
 
-They are what `residual_terms` and `root_regressor` of `dynamics` give, for coordinates that move, for some that do not,
-for the bodies and for the ground reactions, in one pass and without what nobody asks for.
+They equal those of `residual_terms` and `root_regressor` of `dynamics`, for coordinates that move, for some that do
+not, for the bodies and for the ground reactions, but are computed in one pass and only as far as needed.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from kinertia.motion.rigid_body import Frame, differentiate, empty_frame, fill, 
 
 
 class Columns(NamedTuple):
-    """Where derivatives go.
+    """Columns to which derivatives are written.
 
     Attributes:
         moving: (a,) column of each axis' coordinate among those that move; -1 for none.
         still: (a,) column of each axis' coordinate among the static unknowns; -1 for none.
         segments: (b,) index of each body's segment; its ten unknowns are among the first of the static ones.
-        wide: how many coordinates move, c.
+        wide: number of coordinates that move, c.
         first, last: columns of the unknowns that the ground reactions depend on, last not included.
     """
 
@@ -49,19 +49,21 @@ def root_columns(
     columns: Columns,
     static: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Residuals (n, 6) of the root equations and their derivatives (3, n, 6, c) by coordinates, rates and
-    accelerations, over their deviations.
+    """Compute residuals (n, 6) of the root equations over their SDs, and derivatives (3, n, 6, c) by the coordinates.
+
+    The derivatives are by coordinates, rates and accelerations.
 
     Args:
-        tree, gravity_m_s2, bodies: as `root_load` has them.
-        motion: (n, a) places, rates and accelerations of the axes.
-        bends: (n, a, 3) of how axes follow their coordinates, `CoordinateMap.bends`; n is 0 where each is its own.
-        root: (n, 3) m, where moments are taken about, and (3, 3) directions in which the first three coordinates move
-            it, in rows.
+        tree, gravity_m_s2, bodies: as in `root_load`.
+        motion: (n, a) values, rates and accelerations of the axes.
+        bends: (n, a, 3) dependence of axes on their coordinates, `CoordinateMap.bends`; n is 0 if each axis is its
+            coordinate.
+        root: (n, 3) m, point about which moments are taken, and (3, 3) directions in which the first three coordinates
+            move it, in rows.
         wrench: (n, 6) ground reactions at the ground origin.
         chain: (b, 10, 10) derivatives of each body's parameters by its unknowns.
-        sd: (n, 6) deviations.
-        columns: where derivatives go.
+        sd: (n, 6) standard deviations.
+        columns: where derivatives are written.
         static: (n, 6, s) derivatives of the ground reactions by static unknowns; those of the residual are written.
     """
     (x, v, a), (about, slides) = motion, root
@@ -106,7 +108,7 @@ def root_columns(
 
 @part
 def _bend(column: np.ndarray, bend: np.ndarray) -> None:
-    """Derivatives (3, 6) by an axis' place, rate and acceleration to those by its coordinate's."""
+    """Convert derivatives (3, 6) by an axis' value, rate and acceleration to those by its coordinate's."""
     for r in range(6):
         place, rate, acceleration = column[0, r], column[1, r], column[2, r]
         column[0, r] = place * bend[0] + rate * bend[1] + acceleration * bend[2]
@@ -116,7 +118,7 @@ def _bend(column: np.ndarray, bend: np.ndarray) -> None:
 
 @part
 def _centre_moves(left: np.ndarray, slides: np.ndarray, by: np.ndarray) -> None:
-    """Take what the moment of a load (6,) changes because its centre moves off the derivatives (6, c)."""
+    """Subtract the change of a load's (6,) moment due to its moving centre from the derivatives (6, c)."""
     for c in range(3):
         x, y, z = slides[c, 0], slides[c, 1], slides[c, 2]
         by[3, c] -= y * left[2] - z * left[1]
@@ -126,7 +128,7 @@ def _centre_moves(left: np.ndarray, slides: np.ndarray, by: np.ndarray) -> None:
 
 @part
 def _by_ground(about: np.ndarray, first: int, last: int, static: np.ndarray) -> None:
-    """Derivatives of the ground reactions at the ground origin to those of the residual about the centre."""
+    """Convert derivatives of the ground reactions at the ground origin to those of the residual about the centre."""
     x, y, z = about[0], about[1], about[2]
     for k in range(first, last):
         fx, fy, fz = static[0, k], static[1, k], static[2, k]

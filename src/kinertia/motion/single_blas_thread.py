@@ -1,8 +1,8 @@
-"""Limits BLAS to one thread for computations on small matrices, as a body's are.
+"""Limits BLAS to one thread for computations on small matrices, such as those of a body.
 
-Threads cost twice what they give there, and ten times on a busy machine. What computes for longer than a moment is
-decorated with `one_blas_thread`, each step on its own, so that it holds for whoever calls them one by one; the user's
-setting is back afterwards.
+Threads double the time there, and multiply it by ten on a busy machine. Functions that compute for longer than a moment
+are decorated with `one_blas_thread`, each step separately, so that it also applies to callers of single steps; the
+user's setting is restored afterwards.
 """
 
 from __future__ import annotations
@@ -21,14 +21,14 @@ _held = False
 
 @cache
 def _libraries() -> ThreadpoolController:
-    """Those of NumPy and SciPy: to look for them takes as long as some of what they are held for."""
+    """Return the BLAS libraries of NumPy and SciPy: finding them takes as long as some of the computations."""
     import scipy.linalg  # noqa: F401  # brings its own
 
     return ThreadpoolController()
 
 
 def one_blas_thread(function: Callable[P, T]) -> Callable[P, T]:
-    """The same function, during which BLAS has one thread; within another such function nothing is left to do."""
+    """Wrap a function so that BLAS has one thread while it runs; nested wrappers have no further effect."""
 
     @wraps(function)
     def limited(*args: P.args, **kwargs: P.kwargs) -> T:

@@ -70,16 +70,16 @@ _STEP = 1e-30  # of the complex-step derivative: its square vanishes beside 1
 _BAND = 4  # diagonals on either side of the main one
 _ROWS_AT_ONCE = 20000
 _FORGOTTEN_PERIODS, _FORGOTTEN_SAMPLES = 13.0, 50
-"""Periods of the cutoff, and samples more, over which a sample loses all influence: exp(-pi) per period.
-Splines through samples forget by 0.43 per sample."""
+"""Periods of the cutoff, and additional samples, over which a sample loses all influence: exp(-pi) per period. The
+influence in interpolating splines decays by 0.43 per sample."""
 
 
 class SmoothingError(KinertiaError):
-    """A column has too few visible samples to be smoothed.
+    """Raised if a column has too few visible samples to be smoothed.
 
     Attributes:
         column: the column's index.
-        n_visible: how many samples of it are not NaN.
+        n_visible: number of its samples that are not NaN.
     """
 
     def __init__(self, column: int, n_visible: int) -> None:
@@ -93,14 +93,14 @@ class SmoothingError(KinertiaError):
 
 @dataclass(frozen=True)
 class SmoothedSpline:
-    """Natural quintic smoothing splines of c columns: call it to evaluate them at any time.
+    """Natural quintic smoothing splines of c columns; call it to evaluate them at any time.
 
     Attributes:
         time: (n,) s, the sample times, which are the knots.
         p: (c,) smoothing parameter of each column, s^5 (weight of the integral of the squared third
             derivative).
         cutoff_hz: (c,) Hz, frequency at which the equivalent filter's gain is 1/2.
-        sigma: (c,) residual deviation in the column's unit: sqrt(RSS / (n_visible - trace A)), Woltring's
+        sigma: (c,) residual standard deviation in the column's unit: sqrt(RSS / (n_visible - trace A)), Woltring's
             estimate of the noise's standard deviation; NaN where the spline interpolates (cutoff too high).
 
     For values given as (n,) instead of (n, c) the three last are arrays of shape ().
@@ -116,8 +116,8 @@ class SmoothedSpline:
     def __call__(self, t: ArrayLike, derivative: int = 0) -> Array:
         """Evaluate the splines, or one of their time derivatives.
 
-        Beyond the first and last sample the natural spline goes on as a parabola (quickly wrong: look a few
-        samples ahead at most).
+        Beyond the first and last sample the natural spline continues as a parabola, which is valid for a few samples at
+        most.
 
         Args:
             t: times in s, any shape.
@@ -195,7 +195,7 @@ def smooth(
 
 
 def interpolate(time: Array, values: Array) -> SmoothedSpline:
-    """Natural quintic splines through all samples (n, c), as OpenSim's tools lay them through the columns of a file."""
+    """Interpolate all samples (n, c) by natural quintic splines, as OpenSim's tools do with the columns of a file."""
     spacing = float((time[-1] - time[0]) / (len(time) - 1))
     nothing, everything = np.zeros(values.shape[1]), np.full(values.shape[1], np.inf)
     spline = _natural((time - time[0]) / spacing, values)
@@ -203,7 +203,7 @@ def interpolate(time: Array, values: Array) -> SmoothedSpline:
 
 
 def _natural(time: Array, values: Array) -> BSpline:
-    """Quintic splines through values (n, c) that go on as parabolas at either end; of long records in stretches."""
+    """Interpolate values (n, c) by quintic splines that continue as parabolas at either end; long records in parts."""
     n = len(time)
     if n <= 2 * _ROWS_AT_ONCE:
         ends = [(3, np.zeros(values.shape[1])), (4, np.zeros(values.shape[1]))]
@@ -211,7 +211,7 @@ def _natural(time: Array, values: Array) -> BSpline:
     coefficients = np.empty((n + 4, values.shape[1]))
     for own in pieces(n, _ROWS_AT_ONCE):
         near = slice(max(own.start - _FORGOTTEN_SAMPLES, 0), min(own.stop + _FORGOTTEN_SAMPLES, n))
-        # the splines stand two samples before those of the same index
+        # the splines are two samples before those of the same index
         kept = slice(own.start and own.start + 2, own.stop + (2 if own.stop < n else 4))
         part = _natural(time[near], values[near]).c
         coefficients[kept] = part[kept.start - near.start : kept.stop - near.start]
@@ -222,7 +222,7 @@ def _natural(time: Array, values: Array) -> BSpline:
 def _validated(
     time: ArrayLike, values: ArrayLike, smoothing: float | Literal["gcv"]
 ) -> tuple[Array, Array, tuple[int, ...]]:
-    """Time (n,), values as (n, c), and the shape of one row of the values as given."""
+    """Return time (n,), values as (n, c), and the shape of one row of the values as given."""
     time, values = np.array(time, float), np.asarray(values, float)
     if time.ndim != 1 or values.ndim not in (1, 2) or len(values) != len(time):
         raise ValueError(f"time must be (n,) and values (n,) or (n, c), got {time.shape} and {values.shape}")
@@ -240,7 +240,7 @@ def _validated(
 
 
 def columns_alike(visible: NDArray[np.bool_]) -> list[tuple[NDArray[np.bool_], NDArray[np.int_]]]:
-    """Each different column of `visible` (n, c), and which columns are like it."""
+    """Group equal columns of `visible` (n, c): return each different column, and the indices of columns equal to it."""
     groups: dict[bytes, list[int]] = {}
     for column, mask in enumerate(visible.T):
         groups.setdefault(mask.tobytes(), []).append(column)
@@ -248,7 +248,7 @@ def columns_alike(visible: NDArray[np.bool_]) -> list[tuple[NDArray[np.bool_], N
 
 
 def _filled(columns: Array, visible: NDArray[np.bool_]) -> Array:
-    """Columns with a number at missing samples: it has no weight, but a near one keeps rounding small."""
+    """Fill missing samples with an interpolated number: it has no weight, but a near one keeps rounding small."""
     if visible.all():
         return columns
     index = np.arange(len(visible))
@@ -256,7 +256,7 @@ def _filled(columns: Array, visible: NDArray[np.bool_]) -> Array:
 
 
 def _gcv_cutoffs(system: _System, y: Array, visible: NDArray[np.bool_], ends: Array) -> Array:
-    """Cutoff (c,), in cycles per mean spacing, that minimises GCV for each column of y (n, c) between two ends.
+    """Return the cutoff (c,), in cycles per mean spacing, that minimises GCV for each column of y (n, c) within limits.
 
     GCV is tabulated for all columns at once on the lattice f = 2^(k/8): first on half octaves, then on
     eighths around each column's least, where a cubic interpolant of its logarithm gives the minimum.
@@ -289,7 +289,7 @@ def _gcv_cutoffs(system: _System, y: Array, visible: NDArray[np.bool_], ends: Ar
 
 @dataclass(frozen=True)
 class _System:
-    """The banded matrices of one time base, its mean spacing scaled to 1.
+    """Banded matrices of one time base, its mean spacing scaled to 1.
 
     Attributes:
         differences: (n - 3, 4), row j of D: integral of N_j s''' = sum_m differences[j, m] s(t_{j+m}).
@@ -303,7 +303,7 @@ class _System:
 
     @classmethod
     def of(cls, t: Array) -> _System:
-        """A stretch at a time: row j of either knows of t[j] to t[j + 5] only."""
+        """Build the matrices part by part: row j of either depends on t[j] to t[j + 5] only."""
         parts = [_matrices(t[rows.start : rows.stop + 5].tobytes()) for rows in pieces(len(t) - 3, _ROWS_AT_ONCE)]
         rows = [slice(0, _ROWS_AT_ONCE)] * (len(parts) - 1) + [slice(None)]
         differences = [own[kept] for (own, _), kept in zip(parts, rows, strict=True)]
@@ -311,10 +311,10 @@ class _System:
         return cls(np.concatenate(differences), np.concatenate(gram, axis=1), float(np.diff(t).min()))
 
     def fit(self, y: Array, visible: NDArray[np.bool_], f: float) -> tuple[Array, Array, float]:
-        """Fitted values (n, c), residual sums of squares (c,), trace A for a cutoff of f cycles per spacing.
+        """Return fitted values (n, c), residual sums of squares (c,), trace A for a cutoff of f cycles per spacing.
 
-        Long records without gaps are fitted in pieces, with so much around each that it does not matter; what traces
-        have of samples that two pieces share is that of these samples by themselves, ends included.
+        Long records without gaps are fitted in parts with sufficient overlap; the trace of samples that two parts share
+        is that of these samples by themselves, ends included.
         """
         n, around = len(y), int(np.ceil(_FORGOTTEN_PERIODS / (f * self.least))) + _FORGOTTEN_SAMPLES
         most = max(_ROWS_AT_ONCE, 2 * around)
@@ -333,15 +333,15 @@ class _System:
         return fitted, rss, trace
 
     def _cut(self, samples: slice) -> _System:
-        """Of these samples."""
+        """Return the matrices of these samples."""
         rows = slice(samples.start, samples.stop - 3)
         return _System(self.differences[rows], self.gram[:, rows], self.least)
 
     def _fit(self, y: Array, visible: NDArray[np.bool_], f: float) -> tuple[Array, Array, float]:
-        """The same of all samples at once.
+        """Fit all samples at once, as `fit` does.
 
-        The unknown e_i stands at place 2 i, x_j at place 2 j + 3, between the e that it couples; the second
-        and the second last place are empty.
+        The unknown e_i is at index 2 i, x_j at index 2 j + 3, between the e that it couples; the second and the second
+        last index are empty.
         """
         n = len(y)
         places = 2 * np.arange(n - 3) + 3
@@ -350,7 +350,7 @@ class _System:
         diagonal = factors[2 * _BAND]
         trace = 1.5 + float((diagonal.imag / diagonal.real).sum()) / _STEP
         real = factors.real.copy(order="F")
-        del matrix, factors, diagonal  # of long records with gaps they are some hundred MB
+        del matrix, factors, diagonal  # for long records with gaps they take some hundred MB
         right = np.zeros((2 * n - 1, y.shape[1]), order="F")
         for m in range(4):
             right[places] += self.differences[:, m, None] * y[m : n - 3 + m]
@@ -359,7 +359,7 @@ class _System:
         return y - residual, np.einsum("nc,nc,n->c", residual, residual, visible.astype(float)), trace
 
     def _matrix(self, root: complex, visible: NDArray[np.bool_], places: NDArray[np.int_]) -> NDArray[np.complex128]:
-        """LAPACK band storage, element (r, c) at [2 _BAND + r - c, c], of the matrix for sqrt(m) = root."""
+        """Build LAPACK band storage, element (r, c) at [2 _BAND + r - c, c], of the matrix for sqrt(m) = root."""
         n = len(visible)
         main = 2 * _BAND
         matrix = np.zeros((3 * _BAND + 1, 2 * n - 1), complex, order="F")
@@ -378,7 +378,7 @@ class _System:
 
 @lru_cache(maxsize=4)
 def _matrices(times: bytes) -> tuple[Array, Array]:
-    """`differences` and `gram` of `_System` for sample times (n,): wanted again for each quantity of a trial."""
+    """Compute `differences` and `gram` of `_System` for sample times (n,); cached, since all quantities need them."""
     t = np.frombuffer(times)
     n = len(t)
     knots = np.stack([t[m : n - 3 + m] for m in range(4)], axis=1)

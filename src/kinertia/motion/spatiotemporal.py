@@ -12,27 +12,27 @@ from kinertia.trial.belt import Belt
 from kinertia.trial.data import FEET
 
 _TOES_STAND = (0.3, 0.5)
-"""Of stance: the toes are on the ground already, and not leaving it yet, whether somebody walks or runs. The heel of a
+"""Part of stance in which the toes are on the ground and not leaving it yet, in walking and running. The heel of a
 runner rises before."""
 _USUAL_STANCE = 0.6
-"""Of a stride, where toe off was not found."""
+"""Share of a stride that is stance, if toe off was not found."""
 _BELT_M_S = 0.2
-"""A standing foot slides by less than this; a belt is faster."""
+"""A foot in stance slides by less than this; a belt is faster."""
 
 
 @dataclass(frozen=True)
 class Spatiotemporal:
-    """Measures of one stride; NaN where an event that they need was not found.
+    """Spatiotemporal parameters of one stride; NaN if an event that they need was not found.
 
     Attributes:
         stride_time_s: from heel strike to heel strike.
         speed_m_s: stride length over stride time.
         cadence_steps_min: 120 over stride time.
-        stride_length_m: of the heel from heel strike to heel strike; on a treadmill against the belt.
-        step_length_m: from where the other heel landed to where the own one lands at the end of the stride, along the
-            stride; on a treadmill against the belt. The steps of both sides add up to the stride.
-        step_time_s: from the other foot's heel strike to that one.
-        step_width_m: between these places, across the stride.
+        stride_length_m: distance of the heel from heel strike to heel strike; on a treadmill relative to the belt.
+        step_length_m: from where the other heel landed to where this one lands at the end of the stride, along the
+            stride; on a treadmill relative to the belt. The steps of both sides add up to the stride.
+        step_time_s: from the other foot's heel strike to the end of the stride.
+        step_width_m: between these positions, across the stride.
         stance_percent: of the cycle, until toe off.
         double_support_percent: of the cycle, both feet on the ground; 0 in running.
 
@@ -55,15 +55,15 @@ class Spatiotemporal:
 def spatiotemporal(
     feet: FeetUnderPelvis, strides: Sequence[Stride], belt: Belt | None = None
 ) -> tuple[Spatiotemporal, ...]:
-    """The measures of each of these strides."""
+    """Compute the spatiotemporal parameters of each of these strides."""
     ground = _Ground.of(feet, strides, belt)
     return tuple(_measures(feet, ground, stride) for stride in strides)
 
 
 def travelled(feet: FeetUnderPelvis, strides: Sequence[Stride], belt: Belt | None = None) -> np.ndarray:
-    """(k, 3) m, horizontal: from heel strike to heel strike of each stride, on a treadmill against the belt.
+    """Return the horizontal displacement (k, 3) m of each stride; on a treadmill relative to the belt.
 
-    Standing feet tell its speed where it is not stated, and always its direction.
+    The belt's direction, and its speed unless stated, come from feet in stance.
     """
     ground = _Ground.of(feet, strides, belt)
     return np.array([_path(feet, ground, stride) for stride in strides]).reshape(-1, 3)
@@ -71,11 +71,11 @@ def travelled(feet: FeetUnderPelvis, strides: Sequence[Stride], belt: Belt | Non
 
 @dataclass(frozen=True, eq=False)
 class _Ground:
-    """A floor or belts.
+    """A floor, or the belts of a treadmill.
 
     Attributes:
-        velocity: per side (3,) m/s, of standing feet; zero on a floor.
-        belt: whose speed is stated, if it is.
+        velocity: per side (3,) m/s, of feet in stance; zero on a floor.
+        belt: the belt if its speed is stated, else None.
     """
 
     velocity: Mapping[str, np.ndarray]
@@ -83,11 +83,11 @@ class _Ground:
 
     @classmethod
     def of(cls, feet: FeetUnderPelvis, strides: Sequence[Stride], belt: Belt | None) -> _Ground:
-        """As standing feet tell it."""
+        """Determine the velocity of the ground from feet in stance."""
         return cls(_belt_velocities(feet, strides), belt)
 
     def way(self, side: str, start_s: float, end_s: float) -> np.ndarray:
-        """(3,) m: how far it carries a standing foot."""
+        """Return the displacement (3,) m of a foot in stance with the ground."""
         velocity = self.velocity[side]
         if self.belt is None:
             return velocity * (end_s - start_s)
@@ -124,7 +124,7 @@ def _measures(feet: FeetUnderPelvis, ground: _Ground, stride: Stride) -> Spatiot
 
 
 def _double_support(stride: Stride) -> float:
-    """% of the cycle with both feet on the ground, at its beginning and before toe off."""
+    """Return the % of the cycle with both feet on the ground, at its beginning and before toe off."""
     if stride.toe_off_s <= stride.opposite_strike_s:
         return 0.0
     first = stride.opposite_toe_off_s - stride.start_s
@@ -132,12 +132,12 @@ def _double_support(stride: Stride) -> float:
 
 
 def _at(feet: FeetUnderPelvis, values: np.ndarray, time_s: float) -> np.ndarray:
-    """(3,) values (n, 3) at this time."""
+    """Interpolate values (n, 3) at this time (3,)."""
     return np.array([np.interp(time_s, feet.time, column) for column in values.T])
 
 
 def _belt_velocities(feet: FeetUnderPelvis, strides: Sequence[Stride]) -> dict[str, np.ndarray]:
-    """By side: of both feet together, unless they stand on belts of different speeds."""
+    """Return the velocity by side: of both feet together, unless they are on belts of different speeds."""
     own = {side: _belt_velocity(feet, [one for one in strides if one.side == side]) for side in FEET}
     moving = all(velocity.any() for velocity in own.values())
     apart = np.linalg.norm(own["r"] - own["l"]) > _BELT_M_S
@@ -145,7 +145,7 @@ def _belt_velocities(feet: FeetUnderPelvis, strides: Sequence[Stride]) -> dict[s
 
 
 def _belt_velocity(feet: FeetUnderPelvis, strides: Sequence[Stride]) -> np.ndarray:
-    """(3,) m/s, horizontal: how fast the toes of standing feet go; zero on a floor."""
+    """Return the horizontal velocity (3,) m/s of the toes in stance; zero on a floor."""
     velocities = []
     for stride in strides:
         stance = stride.toe_off_s - stride.start_s

@@ -1,8 +1,8 @@
-"""Extracts a standing pose from a walk, where a static trial is missing.
+"""Extracts a standing pose from a walk, if there is no static trial.
 
 No frame of a walk has both feet flat on the floor. But each foot is flat once in a stride, while the shank over it is
-upright. These two frames, one of each leg, are put on one pelvis: turned about the vertical and moved until the ASIS
-coincide. Knees are bent by 10 to 20 degrees in it, which does not matter to a model that is made of segment frames.
+upright. These two frames, one of each leg, are put on one pelvis: rotated about the vertical and moved until the ASIS
+coincide. Its knees are flexed by 10 to 20 degrees, which does not matter to a model built from segment frames.
 """
 
 from __future__ import annotations
@@ -15,18 +15,18 @@ from kinertia.model.marker_set import MarkerSet
 from kinertia.trial.data import FloatArray, Markers
 
 _FLAT_M = 0.02
-"""How far heel and forefoot together may be above where they are at their lowest."""
+"""Largest height of heel and forefoot together above their lowest."""
 _LOWEST_PERCENT = 5
 _NEAR_S = 0.1
-"""A marker that is hidden in the frame is taken from one as near as this."""
+"""A marker that is hidden in the frame is taken from one within this time."""
 
 
 def stance_pose(markers: Markers, marker_set: MarkerSet) -> Markers | None:
-    """One frame in which the person stands on both feet; None where no frame shows a pelvis over a flat foot.
+    """Return one frame in which the person stands on both feet; None if no frame shows a pelvis over a flat foot.
 
     Args:
         markers: of a walk, in ground axes.
-        marker_set: which label is which landmark.
+        marker_set: assignment of labels to landmarks.
     """
     place = {name: _landmark(markers, labels) for name, labels in marker_set.landmarks.items()}
     if not {"asis_r", "asis_l"} <= place.keys():
@@ -57,7 +57,7 @@ _LEFT_LEG = ("thigh_l", "shank_l", "foot_l")
 
 
 def _landmark(markers: Markers, labels: tuple[str, ...]) -> FloatArray:
-    """(n, 3) m, the middle of those of the labels that the trial has; NaN without any."""
+    """Return the mean position (n, 3) m of those labels that the trial has; NaN without any."""
     own = [label for label in labels if label in markers.labels]
     if not own:
         return np.full((len(markers.time), 3), np.nan)
@@ -66,7 +66,7 @@ def _landmark(markers: Markers, labels: tuple[str, ...]) -> FloatArray:
 
 
 def _flat_frame(place: Mapping[str, FloatArray], pelvis: np.ndarray, side: str) -> int | None:
-    """The frame in which this foot is flat and the shank over it most upright."""
+    """Return the frame in which this foot is flat and the shank over it most upright."""
     names = [f"{name}_{side}" for name in ("heel", "metatarsal", "ankle_lateral", "knee_lateral")]
     if not set(names) <= place.keys():
         return None
@@ -83,7 +83,7 @@ def _flat_frame(place: Mapping[str, FloatArray], pelvis: np.ndarray, side: str) 
 
 
 def _turned(vector: FloatArray, angle_rad: float) -> FloatArray:
-    """A vector (3,) turned about the vertical."""
+    """Rotate a vector (3,) about the vertical."""
     cosine, sine = np.cos(angle_rad), np.sin(angle_rad)
     x, y, z = vector
     return np.array([cosine * x + sine * z, y, cosine * z - sine * x])

@@ -1,7 +1,7 @@
-"""Runs independent parts of a computation in two threads, where the machine has two cores for them.
+"""Runs independent parts of a computation in two threads, if the machine has two cores for them.
 
-Compiled functions, BLAS and NumPy's larger operations leave the interpreter to others while they run. How the work is
-shared out depends on the problem alone, never on the number of threads: results are the same bit for bit.
+Compiled functions, BLAS and NumPy's larger operations release the interpreter lock while they run. The division of the
+work depends on the problem alone, never on the number of threads: results are equal bit for bit.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ T = TypeVar("T")
 R = TypeVar("R")
 
 THREAD = "kinertia"
-"""How the name of the second thread begins."""
+"""Beginning of the name of the second thread."""
 _second = Lock()
-"""Held by whoever has the second thread: nobody makes a third."""
+"""Lock of the second thread: there is never a third."""
 
 
 def side_by_side(function: Callable[[T], R], items: Sequence[T]) -> list[R]:
@@ -58,7 +58,7 @@ def side_by_side(function: Callable[[T], R], items: Sequence[T]) -> list[R]:
 
 @cache
 def _cores() -> int:
-    """Cores that this process may use; one in a process that another one has started to share the machine."""
+    """Return the number of cores that this process may use; one in a child process, which shares the machine."""
     if parent_process() is not None:
         return 1
     if hasattr(os, "sched_getaffinity"):

@@ -1,7 +1,7 @@
-"""Holds a trunk with too few markers upright over the pelvis, facing where that does on average.
+"""Keeps a trunk with too few markers upright over the pelvis, with the pelvis's average heading.
 
-A walking trunk leans by a few degrees and turns against the pelvis, so this is known within some 10 degrees. It
-becomes three virtual markers of that uncertainty, so that the ground reactions may say better.
+A walking trunk leans by a few degrees and rotates against the pelvis, so this is known within some 10 degrees. The
+trunk is represented by three virtual markers with that uncertainty, so that the ground reactions can correct it.
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ from kinertia.motion.moving_windows import gaussian_mean
 from kinertia.trial.data import FloatArray, Markers, Trial
 
 TRUNK_SD_M = 0.08
-"""Of each coordinate of each: 10 degrees."""
+"""Standard deviation of each coordinate of each marker: 10 degrees."""
 _HEADING_S = 0.5
 
 
 def shows_trunk(skeleton: Skeleton, trial: Trial) -> bool:
-    """Whether any frame shows enough markers of the torso to tell how it leans and turns."""
+    """Decide whether any frame has enough torso markers to determine how it leans and rotates."""
     own = {marker.label for marker in skeleton.markers if marker.segment == "torso"}
     seen = trial.markers.seen[:, [label in own for label in trial.markers.labels]]
     return bool((seen.sum(axis=1) >= ENOUGH_TRUNK_MARKERS).any())
 
 
 def with_upright_trunk(skeleton: Skeleton, trial: Trial) -> Trial:
-    """The trial with the virtual markers of a trunk, in the frames that show three markers of the pelvis.
+    """Add virtual trunk markers to the trial, in the frames that show three markers of the pelvis.
 
     Args:
         skeleton: of the 27-DOF model, from a static trial.
@@ -49,12 +49,12 @@ def with_upright_trunk(skeleton: Skeleton, trial: Trial) -> Trial:
 
 
 def with_places(markers: Markers, labels: Sequence[str], positions: FloatArray) -> Markers:
-    """The markers with these (n, k, 3) m after them."""
+    """Append markers with these positions (n, k, 3) m."""
     return Markers(markers.time, (*markers.labels, *labels), np.concatenate([markers.positions, positions], axis=1))
 
 
 def rigid_motion(local: FloatArray, measured: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Rotation (n, 3, 3) and translation (n, 3) m that bring points (m, 3) nearest to those measured (n, m, 3).
+    """Compute rotation (n, 3, 3) and translation (n, 3) m that best map points (m, 3) to those measured (n, m, 3).
 
     NaN where fewer than three are seen (Kabsch 1976).
     """
@@ -74,7 +74,7 @@ def rigid_motion(local: FloatArray, measured: FloatArray) -> tuple[FloatArray, F
 
 
 def _facing(forward: FloatArray, rate_hz: float) -> FloatArray:
-    """(n, 3, 3) upright axes that face along directions (n, 3), averaged over about a stride."""
+    """Return upright axes (n, 3, 3) that face along directions (n, 3), averaged over about a stride."""
     known = np.asarray(np.isfinite(forward).all(axis=1))
     flat = np.where(known[:, None], forward, 0.0) * [1.0, 0.0, 1.0]
     if len(flat) > 1:

@@ -1,9 +1,9 @@
 """Tests whether body segment parameters from some trials explain another one better than the literature's.
 
-Small residuals prove nothing on the trials that they were made small on. Here one trial after the other is held out;
-the parameters come from the rest, are frozen, and on the held-out trial only motion and calibration are estimated. The
-objective that remains (half the sum of squares of markers, root residuals and calibration over their deviations) is
-compared with that of the literature's parameters, frozen in the same way.
+Small residuals prove nothing on the trials for which they were minimised. Here one trial after the other is held out;
+the parameters come from the rest and are fixed, and on the held-out trial only motion and calibration are estimated.
+The remaining objective (half the sum of squares of markers, root residuals and calibration over their standard
+deviations) is compared with that of the literature's parameters, fixed in the same way.
 """
 
 from __future__ import annotations
@@ -25,16 +25,16 @@ from kinertia.motion.single_blas_thread import one_blas_thread
 from kinertia.trial.rms import rms_length
 
 _FROZEN = 1e-3
-"""Deviation that is left to frozen parameters, share of the prior's."""
+"""Standard deviation of fixed parameters, as a share of the prior's."""
 
 
 @dataclass(frozen=True)
 class Explained:
-    """How well a trial is explained by frozen parameters.
+    """Fit of a trial with fixed parameters.
 
     Attributes:
-        objective: half the sum of squares that is left.
-        force_rms_n, moment_rms_nm: RMS length of the root residual.
+        objective: half the remaining sum of squares.
+        force_rms_n, moment_rms_nm: RMS magnitude of the root residual.
         marker_rms_m: RMS distance of the markers.
     """
 
@@ -70,13 +70,13 @@ def cross_validate(
 ) -> tuple[HeldOut, ...]:
     """Hold out every trial in turn.
 
-    The skeleton is calibrated on all trials at once, and so is the sign of free moments found, for both sets of
-    parameters alike.
+    The skeleton is calibrated on all trials at once, and the sign of free moments determined from all of them, for both
+    sets of parameters alike.
 
     Args:
         ready: the person, with two trials or more.
         cutoff_hz: as in `Settings`.
-        progress: called as the work goes on.
+        progress: called with the stage and the share done.
 
     Raises:
         KinertiaError: there are fewer than two trials.
@@ -107,7 +107,7 @@ def cross_validate(
 
 
 def frozen(prior: BspPrior, bsp: BodySegmentParameters) -> BspPrior:
-    """A prior that leaves these parameters where they are."""
+    """Return a prior that fixes these parameters."""
     return replace(prior, mean=bsp, covariance=_FROZEN**2 * prior.covariance, mass_kg=bsp.total_mass_kg)
 
 

@@ -1,4 +1,4 @@
-"""Draws people from the literature's prior, lets a laboratory measure their walks, and estimates them.
+"""Draws people from the literature's prior, simulates the measurement of their walks, and estimates them.
 
 A draw depends on seed, scenario and its number only; people of one number are the same in every scenario.
 """
@@ -32,8 +32,10 @@ _HELD_SD_M = 1e-4
 
 @dataclass(frozen=True)
 class Scenario:
-    """One kind of laboratory: its faults, whether the estimator calibrates, how long a walk was recorded, and which
-    other motions (`kinertia.synthetic.motions.MOTIONS`) besides.
+    """One kind of laboratory and its recordings.
+
+    Its faults, whether the estimator calibrates, the duration of the recorded walk, and other recorded motions
+    (`kinertia.synthetic.motions.MOTIONS`).
     """
 
     title: str
@@ -50,12 +52,12 @@ class EstimatedPerson:
     Attributes:
         person: the truth.
         prior: the literature's.
-        trials: what the person did.
-        skeleton, recorded: what a laboratory has of it.
-        calibration: how far skeleton and instruments may be off in the estimate.
-        seen: frames and loads that the estimate is made from.
+        trials: true trials of the person.
+        skeleton, recorded: the laboratory's skeleton and recordings.
+        calibration: prior of skeleton and instruments in the estimate.
+        seen: observations that the estimate is made from.
         result: the estimate.
-        rng: of the person's noise, after what the laboratory took of it.
+        rng: random generator of the person's noise, after its use by the laboratory.
     """
 
     person: SyntheticSubject
@@ -70,12 +72,12 @@ class EstimatedPerson:
 
     @property
     def errors(self) -> np.ndarray:
-        """(s, 10) estimate minus truth, in the order and units of `BodySegmentParameters.table`."""
+        """Estimate minus truth (s, 10), in the order and units of `BodySegmentParameters.table`."""
         return self.result.bsp.table() - self.person.bsp.table()
 
     @property
     def literature_errors(self) -> np.ndarray:
-        """(s, 10) literature minus truth."""
+        """Literature minus truth (s, 10)."""
         return self.prior.mean.table() - self.person.bsp.table()
 
 
@@ -95,7 +97,7 @@ def estimate_person(seed: int, case: tuple[Scenario, int]) -> EstimatedPerson:
 
 
 def held(skeleton: Skeleton) -> CalibrationPrior:
-    """Calibration switched off: skeleton and instruments count as exact."""
+    """Return the prior without calibration: skeleton and instruments count as exact."""
     places = np.full(len(skeleton.markers), _HELD_SD_M)
     exact = SoundOrFaulty.certain(_HELD_SD_M)
     plate, floor = (dict.fromkeys(names, exact) for names in (PLATE_UNKNOWNS, FLOOR_UNKNOWNS))

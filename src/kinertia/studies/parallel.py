@@ -16,7 +16,7 @@ from typing import TypeVar
 from threadpoolctl import threadpool_limits
 
 _MOST_ON_WINDOWS = 61
-"""More than these handles cannot be waited for there: `ProcessPoolExecutor` raises ValueError."""
+"""Largest number of handles that Windows can wait for: `ProcessPoolExecutor` raises ValueError above it."""
 
 Case = TypeVar("Case")
 Result = TypeVar("Result")
@@ -28,11 +28,11 @@ def in_parallel(
     workers: int | None = None,
     progress: Callable[[float], None] = lambda share: None,
 ) -> list[Result]:
-    """`task` of every case, in the order of the cases.
+    """Apply `task` to every case, and return the results in the order of the cases.
 
     Args:
         task: a function of a module, so that another process can import it.
-        cases: each with all that its result depends on, seeds included.
+        cases: each with everything that its result depends on, including seeds.
         workers: processes; as many as there are cores if None.
         progress: called with the share that is done.
     """
@@ -53,9 +53,9 @@ def in_parallel(
 
 @contextmanager
 def interrupted_later() -> Iterator[None]:
-    """Ctrl-C waits until processes have what they start from: of its lack they would complain with tracebacks.
+    """Delay Ctrl-C until started processes have their start data; without it they would end with tracebacks.
 
-    A terminal sends it to them, too: those of POSIX that are started here never get it.
+    A terminal sends Ctrl-C to them, too: those started here on POSIX never receive it.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -63,7 +63,7 @@ def interrupted_later() -> Iterator[None]:
     caught: list[tuple[int, FrameType | None]] = []
     before = signal.signal(signal.SIGINT, lambda number, frame: caught.append((number, frame)))
     let_through: set[int] = set()
-    if sys.platform != "win32":  # what threads and processes inherit that are started meanwhile
+    if sys.platform != "win32":  # inherited by threads and processes that are started meanwhile
         resource_tracker.ensure_running()  # which lets Ctrl-C through to whoever starts it
         let_through |= {signal.SIGINT} - signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
@@ -77,17 +77,17 @@ def interrupted_later() -> Iterator[None]:
 
 
 def process_count(wanted: int | None, cases: int) -> int:
-    """How many processes to start: as wanted, or one per core; never more than cases, nor than the system can await."""
+    """Return the number of processes: as wanted, or one per core; at most as many as cases or the system allows."""
     most = _MOST_ON_WINDOWS if sys.platform == "win32" else cases
     return max(1, min(wanted or os.cpu_count() or 1, cases, most))
 
 
 def _one_thread() -> None:
-    """Matrices here are small: threads of the linear algebra library would only get into each other's way.
+    """Limit the linear algebra library to one thread, since matrices are small, and ignore Ctrl-C.
 
-    Ctrl-C is for the process that waits.
+    Ctrl-C is handled by the waiting process.
     """
-    import scipy.linalg  # noqa: F401  # the libraries of NumPy and SciPy: only what is loaded can be limited
+    import scipy.linalg  # noqa: F401  # the libraries of NumPy and SciPy: only loaded ones can be limited
 
     threadpool_limits(1)
     signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -1,9 +1,9 @@
-"""Predicts the error bar of every body segment parameter for candidate motions: what to record.
+"""Predicts the uncertainty of every body segment parameter for candidate motions, to decide what to record.
 
 Candidates are measured trials of a person, or the package's synthetic motions of its own person with skin motion of
-published size in the walk, up to twice that in the others. Nothing is estimated: deviations follow from the information
-of each trial at the literature's parameters (`predicted.Information`), and those of several trials add up, but for
-errors that come back (`repetition`).
+published size in the walk, up to twice that in the others. Nothing is estimated: standard deviations follow from the
+information of each trial at the literature's parameters (`predicted.Information`), which is summed over several trials,
+except for errors that recur (`repetition`).
 """
 
 from __future__ import annotations
@@ -43,8 +43,8 @@ class Plan:
     Attributes:
         segments: names.
         prior_sd: (s, 10), in the order of `BodySegmentParameters.table`.
-        sd: set of candidates -> (s, 10) deviations after recording them; every candidate alone, and of each size up to
-            three the set that tells most.
+        sd: set of candidates -> (s, 10) standard deviations after recording them; every candidate alone, and the most
+            informative set of each size up to three.
 
     Examples:
         >>> plan = kinertia.Plan(("shank_r",), np.full((1, 10), 2.0), {("walk",): np.full((1, 10), 0.5)})
@@ -57,18 +57,18 @@ class Plan:
     sd: Mapping[tuple[str, ...], np.ndarray]
 
     def information(self, candidates: tuple[str, ...]) -> np.ndarray:
-        """(s, 10): 1 - predicted variance / prior variance."""
+        """Return the variance reduction (s, 10): 1 - predicted variance / prior variance."""
         result: np.ndarray = 1.0 - np.square(self.sd[candidates] / self.prior_sd)
         return result
 
     def counts(self, candidates: tuple[str, ...]) -> dict[str, int]:
-        """How many parameters these candidates would leave measured, informed, assumed."""
+        """Count the parameters that these candidates would leave measured, informed, assumed."""
         words = [evidence(value) for value in self.information(candidates).ravel()]
         return {word: words.count(word) for word in ("measured", "informed", "assumed")}
 
     @property
     def table(self) -> pd.DataFrame:
-        """One row per parameter: segment, parameter, unit, prior_sd, and a column of deviations per set ("a + b")."""
+        """Return one row per parameter: segment, parameter, unit, prior_sd, and a column of SDs per set ("a + b")."""
         s = len(self.segments)
         columns = {" + ".join(names): sd.ravel() for names, sd in self.sd.items()}
         return pd.DataFrame(
@@ -83,7 +83,7 @@ class Plan:
 
 
 def plan(ready: Prepared | None = None, cutoff_hz: float | Literal["gcv"] = "gcv") -> Plan:
-    """Error bars that every body segment parameter would have after candidate motions; estimates none.
+    """Predict the uncertainty of every body segment parameter after candidate motions, without any estimate.
 
     Args:
         ready: a person with the trials to choose from; the package's synthetic person and motions if None.
@@ -102,7 +102,7 @@ def plan_measured(
     cutoff_hz: float | Literal["gcv"],
     uncertainty: ModelUncertainty = GAIT27_UNCERTAINTY,
 ) -> Plan:
-    """Predicted standard deviations from measured trials of one person with different names; as `fit_simultaneous`."""
+    """Predict standard deviations from measured trials of one person with different names; as `fit_simultaneous`."""
     bandwidths = Bandwidth.of(trials, cutoff_hz)
     used = used_skeleton(skeleton, trials, uncertainty)
 
@@ -118,7 +118,7 @@ def plan_measured(
         max(combinations(everything, size), key=lambda chosen: _gain(whole, prior, chosen))
         for size in range(2, min(_LARGEST_SET, len(trials)) + 1)
     ]
-    # chosen by the errors of all trials; each set's own errors are what a fit of it would have
+    # chosen with the errors of all trials; a fit of each set would have the set's own errors
     of_sets = {chosen: whole if chosen == everything else information_of(chosen) for chosen in sets}
     predicted = {chosen: information.sd(range(len(chosen))) for chosen, information in of_sets.items()}
     names = [k.trial.name for k in trials]
@@ -128,7 +128,7 @@ def plan_measured(
 
 
 def plan_synthetic() -> Plan:
-    """Predicted standard deviations from the package's motions, each 5 s."""
+    """Predict standard deviations from the package's motions, each 5 s."""
     subject = walking_subject()
     prior = literature_prior(subject.literature)
     person = replace(subject, bsp=prior.mean)
@@ -139,5 +139,5 @@ def plan_synthetic() -> Plan:
 
 
 def _gain(information: Information, prior: BspPrior, chosen: tuple[int, ...]) -> float:
-    """Information on all parameters, summed."""
+    """Return the variance reduction summed over all parameters."""
     return float((1.0 - np.square(information.sd(chosen) / prior.sd)).sum())

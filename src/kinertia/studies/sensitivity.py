@@ -1,8 +1,8 @@
 """Finds the body segment parameters that are not highly sensitive to noisy kinematics: the study's open question.
 
 People drawn from the literature's prior walk and are estimated (`drawn_people`), with one thing changed at a
-time: amplitude and kind of the noise, number of strides, squats recorded besides. Per parameter the RMS error over
-people is told as a share of the literature's on the same people.
+time: amplitude and kind of the noise, number of strides, additional squats. The RMS error over people of each parameter
+is reported as a share of the literature's on the same people.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ CONDITIONS = {
     },
     WITH_SQUATS: Scenario("skin motion, two strides and two squats", Faults("artefact"), others=("squat",)),
 }
-"""Two strides (2.5 s) where not said otherwise."""
+"""Conditions, with two strides (2.5 s) unless stated otherwise."""
 SHOWN = PARAMETERS[:7]
 INSENSITIVE = 0.5
 """Share of the literature's error below which an error counts as small."""
@@ -59,12 +59,12 @@ class Sensitivity:
     seed: int
 
     def insensitive(self, kind: str) -> list[str]:
-        """Parameters whose error stays small up to twice the amplitude of this kind of noise, the smallest first."""
+        """Return the parameters whose error stays small up to twice this noise's amplitude, smallest error first."""
         worst = np.max([self.errors[f"{kind} x {amplitude:g}"] for amplitude in AMPLITUDES], axis=0)
         return [self.parameters[i] for i in np.argsort(worst) if worst[i] < INSENSITIVE]
 
     def never(self) -> list[str]:
-        """Parameters whose error is above 0.9 in every condition: what walking does not show even without noise."""
+        """Return the parameters whose error is above 0.9 in every condition: walking does not show them at all."""
         best = np.min(list(self.errors.values()), axis=0)
         return [name for name, value in zip(self.parameters, best, strict=True) if value > 0.9]
 
@@ -75,7 +75,7 @@ def run_sensitivity(
     workers: int | None = None,
     progress: Callable[[float], None] = lambda share: None,
 ) -> Sensitivity:
-    """The errors in all conditions, `draws` people each."""
+    """Compute the errors in all conditions, with `draws` people each."""
     cases = [(condition, number) for condition in CONDITIONS.values() for number in range(draws)]
     drawn = in_parallel(partial(_run_draw, seed), cases, workers, progress)
     by_condition = {key: drawn[i * draws : (i + 1) * draws] for i, key in enumerate(CONDITIONS)}
@@ -88,7 +88,7 @@ def run_sensitivity(
 
 @dataclass(frozen=True, eq=False)
 class _Draw:
-    """(s, 10) errors of the estimate and of the literature of one person, in prior deviations."""
+    """Errors (s, 10) of the estimate and of the literature of one person, in prior standard deviations."""
 
     errors: np.ndarray
     literature_errors: np.ndarray
@@ -100,7 +100,7 @@ def _run_draw(seed: int, case: tuple[Scenario, int]) -> _Draw:
 
 
 def _errors(draws: list[_Draw], segments: tuple[str, ...], names: list[str]) -> np.ndarray:
-    """(len(names) * 7,) RMS over people and sides, over that of the literature."""
+    """Return the RMS (len(names) * 7,) over people and sides, relative to the literature's."""
     own, before = (
         np.square([getattr(draw, kind) for draw in draws]).mean(axis=0)[:, : len(SHOWN)]
         for kind in ("errors", "literature_errors")

@@ -1,8 +1,8 @@
-"""Repeats the study's Table 1: which BSPs come back from gait, with and without noise and pelvis correction.
+"""Repeats the study's Table 1: which BSPs can be recovered from gait, with and without noise and pelvis correction.
 
 Each draw takes a start (every one of the 49 parameters off by uniform +/-50 %) and, for the noisy conditions, the
 study's marker noise; noisy markers go through inverse kinematics and GCV smoothing with the true skeleton. The
-two-level estimator never sees the truth. `Setup` has these steps, each of which may be another one
+two-level estimator never sees the truth. `Setup` holds these steps, each of which can be replaced
 (`kinertia.studies.table1_variants`).
 """
 
@@ -42,13 +42,13 @@ CONDITIONS = {
 """Key and heading of the four conditions, in the order of the published table."""
 START_SHARE = 0.5
 MARGIN_S = 0.1
-"""Splines are poor at their ends."""
+"""Time at either end that is not used, since splines are poor there."""
 _STRIDE_S = 1.24
 
 
 @dataclass(frozen=True)
 class Errors:
-    """One column of Table 1: errors of the estimated parameters, and the root residual that is left.
+    """One column of Table 1: errors of the estimated parameters, and the remaining root residual.
 
     RMS and largest magnitude over all parameters of a class (21 moments, 7 masses, 21 CoM coordinates), and over all
     frames and components of the pelvis force and torque.
@@ -86,9 +86,9 @@ class Draw:
     Attributes:
         number: of the draw; with the seed it determines everything.
         errors: per condition.
-        parameter_errors: per condition (k, 49), what was estimated minus the truth (kg, m, kg m2) on the way from the
-            start, first, to the estimate, last.
-        costs: per condition (k,), what was minimised, at the same places.
+        parameter_errors: per condition (k, 49), parameters minus truth (kg, m, kg m2) from the start, first, to the
+            estimate, last.
+        costs: per condition (k,), the cost at the same iterates.
         converged: per condition.
     """
 
@@ -100,7 +100,7 @@ class Draw:
 
     @property
     def start_errors(self) -> np.ndarray:
-        """Start minus truth (49)."""
+        """Start minus truth (49,)."""
         start: np.ndarray = next(iter(self.parameter_errors.values()))[0]
         return start
 
@@ -114,7 +114,7 @@ class Table1:
         truth: their true values.
         draws: in the order of their numbers.
         seed: of the study.
-        trial: where the motion comes from.
+        trial: source of the motion.
     """
 
     parameters: tuple[str, ...]
@@ -124,11 +124,11 @@ class Table1:
     trial: str
 
     def mean(self, condition: str) -> Errors:
-        """Mean of the errors over the draws that have this condition."""
+        """Return the mean of the errors over the draws that have this condition."""
         return Errors(*np.mean(self._values(condition), axis=0).tolist())
 
     def spread(self, condition: str) -> Errors:
-        """Standard deviation of the errors over the draws (zero for one draw)."""
+        """Return the standard deviation of the errors over the draws (zero for one draw)."""
         return Errors(*np.std(self._values(condition), axis=0, ddof=min(1, len(self.draws) - 1)).tolist())
 
     def _values(self, condition: str) -> np.ndarray:
@@ -139,38 +139,38 @@ class Table1:
 def two_level(
     skeleton: Skeleton, start: BodySegmentParameters, window: Window, correct: bool
 ) -> tuple[np.ndarray, np.ndarray, bool]:
-    """`estimate_two_level`: parameters (2, 49) and cost (2,) at start and end, and whether it converged."""
+    """Run `estimate_two_level`: return parameters (2, 49) and cost (2,) at start and end, and whether it converged."""
     result, vector = estimate_two_level(skeleton, start, [window], correct=correct), ParameterVector(start, True)
     return np.array([vector.values(start), vector.values(result.bsp)]), np.array(result.cost), result.converged
 
 
 def random_start(vector: ParameterVector, rng: np.random.Generator) -> np.ndarray:
-    """Every parameter of the vector's reference off by uniform +/-50 %."""
+    """Return the vector's reference with every parameter changed by uniform +/-50 %."""
     truth = vector.values(vector.reference)
     return truth * (1.0 + rng.uniform(-START_SHARE, START_SHARE, len(truth)))
 
 
 def noise_per_coordinate(trial: SyntheticTrial, rng: np.random.Generator) -> Markers:
-    """The markers with the study's noise."""
+    """Return the markers with the study's noise."""
     return study_noise(trial.markers, rng)
 
 
 def coordinates(trial: SyntheticTrial, markers: Markers) -> SmoothedSpline:
-    """Coordinates of the markers: inverse kinematics with the true skeleton, then GCV."""
+    """Compute coordinates from markers: inverse kinematics with the true skeleton, then GCV."""
     ik = solve_ik(trial.skeleton, markers)
     return smooth(ik.time, ik.q, "gcv")
 
 
 @dataclass(frozen=True)
 class Setup:
-    """What is done in a draw, step by step.
+    """Steps of a draw.
 
     Attributes:
         start: parameters (49) that the estimate starts from; the vector's reference is the truth.
         noise: noisy markers of a trial.
         spline: smooth coordinates of noisy markers.
         margin_s: frames this near the ends of the trial are smoothed but not used.
-        estimate: as `two_level`, perhaps with more on the way from the start to the end.
+        estimate: as `two_level`, possibly with further iterates between start and end.
     """
 
     start: Callable[[ParameterVector, np.random.Generator], np.ndarray] = random_start
@@ -184,17 +184,17 @@ TODAY = Setup()
 
 
 def symmetric_truth(bsp: BodySegmentParameters) -> BodySegmentParameters:
-    """The same with left mirroring right exactly, so that 49 parameters can describe it."""
+    """Make left mirror right exactly, so that 49 parameters can describe the body."""
     vector = ParameterVector(bsp, symmetric=True)
     return vector.bsp(vector.values(bsp))
 
 
 def study_trial(pace: float = 1.0, on_axes: bool = False) -> SyntheticTrial:
-    """One stride of the package's walk, with margins; left mirrors right exactly.
+    """Return one stride of the package's walk, with margins; left mirrors right exactly.
 
     Args:
-        pace: this many times as fast.
-        on_axes: with all CoMs moved onto the long axes of the segments.
+        pace: factor on the speed.
+        on_axes: move all CoMs onto the long axes of the segments.
     """
     subject = walking_subject()
     truth = symmetric_truth(subject.bsp)
@@ -205,11 +205,11 @@ def study_trial(pace: float = 1.0, on_axes: bool = False) -> SyntheticTrial:
 
 @one_blas_thread
 def measured_trial(wanted: SubjectFile, progress: Progress = lambda stage, share: None) -> tuple[SyntheticTrial, str]:
-    """The study's trial from a measured one, and what to call it.
+    """Make the study's trial from a measured one, and return it with its label.
 
     The first trial of the subject file goes through reading, calibration, inverse kinematics and smoothing; of its
     measured window, the middle `_STRIDE_S` (or all, if it is shorter) is made consistent with the literature BSPs; the
-    margins are inside it, because the pelvis goes astray with the square of the time.
+    margins are inside it, because errors of the pelvis grow with the square of the time.
 
     Raises:
         KinertiaError: the trial cannot be used, or no pelvis motion near the measured one balances its ground
@@ -240,7 +240,7 @@ def run_table1(
     workers: int | None = None,
     progress: Callable[[float], None] = lambda share: None,
 ) -> Table1:
-    """All four conditions for a number of independent draws, in parallel processes.
+    """Run all four conditions for a number of independent draws, in parallel processes.
 
     A draw depends on the seed and its own number only: not on how many there are, nor on the number of processes.
 
@@ -264,7 +264,7 @@ def run_draw(
     setup: Setup = TODAY,
     conditions: Iterable[str] = CONDITIONS,
 ) -> Draw:
-    """One draw: these conditions from the same start, the noisy ones with the same noise."""
+    """Run one draw: these conditions from the same start, the noisy ones with the same noise."""
     rng = np.random.default_rng([seed, number])
     vector = ParameterVector(trial.bsp, symmetric=True)
     truth, start = vector.values(trial.bsp), vector.bsp(setup.start(vector, rng))
@@ -289,7 +289,7 @@ def run_draw(
 
 
 def errors_by_class(parameters: np.ndarray, residual: np.ndarray) -> Errors:
-    """Errors of the parameters (49) by class, and of a residual (n, 6)."""
+    """Compute errors of the parameters (49) by class, and of a residual (n, 6)."""
     by_segment = parameters.reshape(-1, 7)
     groups = (by_segment[:, 4:], by_segment[:, :1], by_segment[:, 1:4], residual[:, :3], residual[:, 3:])
     values = [value for group in groups for value in (rms(group), np.abs(group).max())]
@@ -297,7 +297,7 @@ def errors_by_class(parameters: np.ndarray, residual: np.ndarray) -> Errors:
 
 
 def table1_json(table: Table1) -> dict[str, object]:
-    """The study as `table1.json` holds it: per condition the mean over draws, and every draw."""
+    """Return the study as stored in `table1.json`: per condition the mean over draws, and every draw."""
     return {
         "trial": table.trial,
         "seed": table.seed,

@@ -1,6 +1,6 @@
-"""Varies what the study behind Table 1 may have done differently: one function per guess.
+"""Varies what the study behind Table 1 may have done differently: one function per hypothesis.
 
-Its text does not say all that it did, and its tools had defaults. Each function stands in for one step of a `Setup`.
+Its text does not describe all steps, and its tools had defaults. Each function replaces one step of a `Setup`.
 """
 
 from __future__ import annotations
@@ -44,13 +44,13 @@ def trust_region(
     scaled: bool = True,
     subspace: bool = False,
 ) -> tuple[np.ndarray, np.ndarray, bool]:
-    """Every iterate of a trust region method, (k, 49), the cost at each, and whether it stopped by itself.
+    """Run a trust region method: return every iterate (k, 49), the cost at each, and whether it stopped by itself.
 
     Args:
-        skeleton, start, window, correct: as of `estimate_two_level`.
+        skeleton, start, window, correct: as in `estimate_two_level`.
         length_m: moments are divided by it; by the radius of gyration if None.
         about_ground: moments about the ground origin, instead of the (measured) pelvis.
-        every: only every so many frames count; the pelvis is still corrected at all.
+        every: only every so many frames count; the pelvis is still corrected in all.
         tolerance: relative, of cost and step; below it the method stops.
         most_iterations: the method stops there, too.
         differences: a Jacobian by forward differences instead of the exact one.
@@ -88,7 +88,7 @@ def trust_region(
 def error_signal(
     problem: TwoLevelProblem, about_ground: bool, every: int
 ) -> tuple[Callable[[np.ndarray], np.ndarray], Callable[[np.ndarray], np.ndarray]]:
-    """What is minimised of a problem's residuals, and its Jacobian; the arguments are those of `trust_region`."""
+    """Return the function of a problem's residuals that is minimised, and its Jacobian, as in `trust_region`."""
     place = problem.windows[0].motion.q[:, :3]
     weights = np.tile(np.eye(6), (len(place), 1, 1))
     if about_ground:
@@ -102,19 +102,19 @@ def error_signal(
 
 
 def fewer_markers() -> SyntheticTrial:
-    """The package's walk without the markers `LEFT_OUT`."""
+    """Return the package's walk without the markers `LEFT_OUT`."""
     trial = study_trial()
     worn = [marker for marker in trial.skeleton.markers if marker.label not in LEFT_OUT]
     return replace(trial, skeleton=trial.skeleton.with_markers(worn))
 
 
 def noise_per_marker(trial: SyntheticTrial, rng: np.random.Generator) -> Markers:
-    """One sinusoid per marker, along the diagonal of the ground axes."""
+    """Add one sinusoid per marker, along the diagonal of the ground axes."""
     return displaced(trial.markers, (len(trial.skeleton.markers), 1), rng)
 
 
 def noise_per_segment(trial: SyntheticTrial, rng: np.random.Generator) -> Markers:
-    """The markers of a segment move together, along each ground axis with a sinusoid of its own."""
+    """Move the markers of a segment together, along each ground axis with a sinusoid of its own."""
     moved, markers = trial.markers.positions.copy(), trial.skeleton.markers
     for segment in trial.skeleton.segments:
         on_it = [i for i, marker in enumerate(markers) if marker.segment == segment]
@@ -123,21 +123,21 @@ def noise_per_segment(trial: SyntheticTrial, rng: np.random.Generator) -> Marker
 
 
 def slower_noise(trial: SyntheticTrial, rng: np.random.Generator) -> Markers:
-    """Rates up to half as high."""
+    """Add noise with rates up to half as high."""
     return displaced(trial.markers, trial.markers.positions.shape[1:], rng, STUDY_RATE_RAD_S / 2)
 
 
 def markers_smoothed_first(trial: SyntheticTrial, markers: Markers) -> SmoothedSpline:
-    """GCV of marker coordinates, then inverse kinematics."""
+    """Smooth marker coordinates by GCV, then apply inverse kinematics."""
     flat = markers.positions.reshape(len(markers.time), -1)
     smoothed = smooth(markers.time, flat, "gcv")(markers.time).reshape(markers.positions.shape)
     return coordinates(trial, replace(markers, positions=smoothed))
 
 
 def known_variance(trial: SyntheticTrial, markers: Markers) -> SmoothedSpline:
-    """Least predicted mean squared error, RSS - 2 variance (n - trace A), for the true variance of each coordinate.
+    """Minimise the predicted mean squared error, RSS - 2 variance (n - trace A), with each coordinate's true variance.
 
-    Criterion 3 of Woltring's package (Craven and Wahba 1979); as GCV, it takes errors for independent.
+    It is criterion 3 of Woltring's package (Craven and Wahba 1979); like GCV, it assumes independent errors.
     """
     ik = solve_ik(trial.skeleton, markers)
     variance, fitted, risk = np.square(ik.q - trial.motion.q).mean(axis=0), [], []
@@ -151,14 +151,14 @@ def known_variance(trial: SyntheticTrial, markers: Markers) -> SmoothedSpline:
 
 
 def mass_of_scale(vector: ParameterVector, rng: np.random.Generator) -> np.ndarray:
-    """The usual start with all masses multiplied so that their sum is right."""
+    """Return the usual start with all masses multiplied so that their sum is right."""
     theta = random_start(vector, rng)
     theta[::7] *= vector.reference.total_mass_kg / vector.bsp(theta).total_mass_kg
     return theta
 
 
 def com_by_distance(vector: ParameterVector, rng: np.random.Generator) -> np.ndarray:
-    """The usual start, but every CoM coordinate off by up to half of the CoM's distance from the segment's origin."""
+    """Return the usual start, but with CoM errors of up to half of the CoM's distance from the segment's origin."""
     theta, com = random_start(vector, rng).reshape(-1, 7), vector.values(vector.reference).reshape(-1, 7)[:, 1:4]
     theta[:, 1:4] = com + (theta[:, 1:4] / com - 1.0) * np.linalg.norm(com, axis=1, keepdims=True)
     return theta.ravel()

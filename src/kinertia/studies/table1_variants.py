@@ -1,8 +1,8 @@
 """Repeats the noisy half of Table 1 with one thing changed at a time, to explain its pattern.
 
-A `Variant` is one guess (`kinertia.studies.table1_guesses`) at what differed. All variants share their draws: the same
-seed and number give the same starts and, where it is not the noise that changes, the same noise. The conditions
-without noise are run in the first draw: a guess that does not find the parameters there cannot be what the study did.
+A `Variant` is one hypothesis (`kinertia.studies.table1_guesses`) on what differed. All variants share their draws: the
+same seed and number give the same starts and, unless the noise is what changes, the same noise. The conditions without
+noise are run in the first draw: a hypothesis that does not recover the parameters there cannot be what the study did.
 """
 
 from __future__ import annotations
@@ -37,17 +37,17 @@ CLASSES = {
     "mass": ("mass_rms_kg", slice(0, 1)),
     "CoM": ("com_rms_m", slice(1, 4)),
 }
-"""Class of parameters: its error in `Errors`, and its place in the seven of a segment."""
+"""Class of parameters: its error in `Errors`, and its index in the seven of a segment."""
 
 
 @dataclass(frozen=True)
 class Variant:
-    """One guess at what the study did otherwise.
+    """One hypothesis on what the study did differently.
 
     Attributes:
         setup: of its draws.
         trial: its exactly consistent trial.
-        times: how many times as many draws it has.
+        times: factor on the number of its draws.
     """
 
     setup: Setup
@@ -56,7 +56,7 @@ class Variant:
 
 
 def _solved(times: int = 1, **options: Any) -> Variant:
-    """The trust region method with these options."""
+    """Make the variant of the trust region method with these options."""
     return Variant(Setup(estimate=partial(trust_region, **options)), times=times)
 
 
@@ -91,7 +91,7 @@ VARIANTS = {
     "moments about the ground, N and N m as they are": _solved(about_ground=True, length_m=1.0),
     "moments about the ground, tolerances 1e-4": _solved(about_ground=True, tolerance=1e-4, times=5),
 }
-"""By title, in the order of the table; the last is the combination that comes nearest to the published table."""
+"""Variants by title, in the order of the table; the last is the combination nearest to the published table."""
 
 
 def run_variants(
@@ -101,7 +101,7 @@ def run_variants(
     seed: int = 1,
     progress: Callable[[float], None] = lambda share: None,
 ) -> dict[str, Table1]:
-    """Every variant's draws, in parallel processes; with a measured trial made consistent, that as a variant, too."""
+    """Run every variant's draws in parallel processes; a measured trial made consistent is a variant, too."""
     if measured is not None:
         walks = {"the measured walk": {}, "the measured walk, moments about the ground": {"about_ground": True}}
         variants = {**variants, **{title: Variant(_solved(**o).setup, lambda: measured) for title, o in walks.items()}}
@@ -127,18 +127,18 @@ def _draw(case: tuple[SyntheticTrial, int, int, Setup, tuple[str, ...]]) -> Draw
 
 
 def helped(table: Table1) -> dict[str, float]:
-    """Share of the draws in which correction makes the error of each class smaller."""
+    """Return the share of the draws in which correction reduces the error of each class."""
     errors = [[asdict(draw.errors[condition]) for condition in NOISY] for draw in table.draws]
     return {name: float(np.mean([b[field] < a[field] for a, b in errors])) for name, (field, _) in CLASSES.items()}
 
 
 def distance(table: Table1) -> float:
-    """From the published table: a typical factor between means and its ten noisy RMS errors (1: the same)."""
+    """Return the typical factor between means and the ten noisy RMS errors of the published table (1: equal)."""
     means = [(asdict(table.mean(condition)), asdict(PUBLISHED[condition])) for condition in NOISY]
     return float(np.exp(rms(np.array([np.log(m[name] / p[name]) for m, p in means for name in m if "_rms_" in name]))))
 
 
 def stopped_by(costs: np.ndarray, tolerance: float) -> int:
-    """The first iterate (k) that lowers the cost by a smaller share than this; the last, if none does."""
+    """Return the first iterate (k) that lowers the cost by a smaller share than this; the last, if none does."""
     small = -np.diff(costs) < tolerance * costs[:-1]
     return int(np.argmax(small)) + 1 if small.any() else len(small)

@@ -1,7 +1,7 @@
 """Makes synthetic walks with given instrument faults, for the accuracy study.
 
-The truth is a `SyntheticTrial`; the laboratory has noisy markers, loads by its own plates, and its own idea of the
-skeleton. Only the latter three come out, as `Kinematics`; the estimator gets no more than from files.
+The truth is a `SyntheticTrial`; the laboratory has noisy markers, loads measured by its own plates, and its own
+skeleton. Only these three are returned, as `Kinematics`; the estimator gets no more than from files.
 """
 
 from __future__ import annotations
@@ -28,28 +28,29 @@ from kinertia.trial.data import LOAD_THRESHOLD_N, FootLoads, Markers, Trial
 
 CAMERA_SD_M = 0.0005
 LINEAR_SHARE = {"artefact": 1.0, "mixed": 2.0 / 3.0, "clusters": 0.0}
-"""Of the variance of skin motion, what goes with the joints."""
+"""Share of the variance of skin motion that follows the joints."""
 WOBBLE_HZ, WOBBLE_DAMPING = 10.0, 0.3
-"""Soft tissue of the thigh on its springs: natural frequency and damping ratio (Gruber et al. 1998, J Biomech 31)."""
+"""Thigh soft tissue on springs: natural frequency and damping ratio (Gruber et al. 1998, J Biomech 31)."""
 
 
 @dataclass(frozen=True)
 class Faults:
-    """What is wrong in a laboratory beside the noise of the markers.
+    """Faults of a laboratory, and the noise of the markers.
 
     Attributes:
-        noise: "study" (`noise.study_noise`); or skin and 0.5 mm of camera noise: "artefact" goes with the joints
-            (`noise.SkinMotion`), "clusters" with the stride (`skin_clusters.ClusterMotion`), of "mixed" two thirds of
-            the variance are the first and one third the second.
-        amplitude: factor on that noise, but for the cameras'.
-        calibration: joint centres, markers, plates and clock are off by errors drawn from the estimator's own prior.
-        instruments: what the laboratory states of plates and clock, which is then true of those errors.
+        noise: "study" (`noise.study_noise`); or skin and 0.5 mm of camera noise: "artefact" follows the joints
+            (`noise.SkinMotion`), "clusters" the stride (`skin_clusters.ClusterMotion`), "mixed" has two thirds of the
+            variance from the first and one third from the second.
+        amplitude: factor on that noise, except the cameras'.
+        calibration: joint centres, markers, plates and synchronisation have errors drawn from the estimator's own
+            prior.
+        instruments: what the laboratory states about plates and synchronisation, which then applies to those errors.
         axes_rad: the axes of knees, ankles and elbows are tilted by this much, each in its own direction.
-        hips_m: both hip centres are this far forward.
+        hips_m: both hip centres are too far forward by this.
         wobbling: share of the thighs' mass that wobbles on springs.
         gain: relative error of the right foot's plate.
-        plate_m: the left foot's plate reads this far forward.
-        late_s: forces are recorded late by this.
+        plate_m: the left foot's plate reads too far forward by this.
+        late_s: delay of the forces.
     """
 
     noise: Literal["study", "artefact", "clusters", "mixed"]
@@ -67,10 +68,10 @@ class Faults:
 def measured(
     trials: Sequence[SyntheticTrial], faults: Faults, rng: np.random.Generator
 ) -> tuple[Skeleton, list[Kinematics]]:
-    """The skeleton that the laboratory believes in, and the kinematics by that skeleton of all trials of one person.
+    """Return the skeleton that the laboratory assumes, and the kinematics by it of all trials of one person.
 
-    Skin that goes with the joints, skeleton, plates and clock are the same in all trials; the study's noise, zeros of
-    plates and delays of single trials are not. Sizes of skin motion are those of the first.
+    Skin motion that follows the joints, skeleton, plates and synchronisation are the same in all trials; the study's
+    noise, zero offsets of plates and trial delays are not. Sizes of skin motion are those of the first.
     """
     markers, skeleton = _disturbed(trials, faults, rng), trials[0].skeleton
     instruments, prior = _Instruments.with_faults(faults), InstrumentPrior.stated(faults.instruments)
@@ -94,7 +95,7 @@ def measured(
 
 
 def _disturbed(trials: Sequence[SyntheticTrial], faults: Faults, rng: np.random.Generator) -> list[Markers]:
-    """The markers of each trial with noise."""
+    """Add noise to the markers of each trial."""
     first, *others = (trial.motion.q for trial in trials)
     skin: list[tuple[float, SkinMotion | ClusterMotion]] = []
     if faults.noise in LINEAR_SHARE:
@@ -122,7 +123,7 @@ def _kinematics(skeleton: Skeleton, time: np.ndarray, markers: Markers, loads: n
 
 
 def _misplaced(skeleton: Skeleton, rng: np.random.Generator) -> Skeleton:
-    """The skeleton with joint centres and markers off by errors drawn from the prior of `fit_simultaneous`."""
+    """Displace joint centres and markers of the skeleton by errors drawn from the prior of `fit_simultaneous`."""
     centres = (*HIP_OFFSETS, *LUMBAR_OFFSETS, *SHOULDER_OFFSETS)
     skeleton = skeleton.lock({name: skeleton.locked[name] + rng.normal(0.0, JOINT_CENTRE_SD_M) for name in centres})
     places = skeleton.marker_locals + rng.normal(0.0, MARKER_SD_M, skeleton.marker_locals.shape)
@@ -131,8 +132,10 @@ def _misplaced(skeleton: Skeleton, rng: np.random.Generator) -> Skeleton:
 
 @dataclass(frozen=True, eq=False)
 class _Instruments:
-    """Plates and clock of a laboratory: how late forces are, and per foot's plate its offset (2, 3) m, gain (2, 1),
-    crosstalk (2,) to the free moment, and zero (2, 3) N; both are turned about the vertical.
+    """Plates and synchronisation of a laboratory.
+
+    The delay of the forces, and per foot's plate its offset (2, 3) m, gain (2, 1), crosstalk (2,) to the free moment,
+    and zero offset (2, 3) N; both are rotated about the vertical.
     """
 
     late_s: float
@@ -144,7 +147,7 @@ class _Instruments:
 
     @classmethod
     def draw(cls, rng: np.random.Generator, prior: InstrumentPrior) -> _Instruments:
-        """From a prior of `fit_simultaneous`."""
+        """Draw the errors from a prior of `fit_simultaneous`."""
         plates = np.array([[each.draw(rng) for each in prior.plate.values()] for _ in range(2)])
         x, z = (prior.floor[name].draw(rng) for name in "xz")
         offset = np.column_stack([plates[:, 0] + x, np.zeros(2), plates[:, 1] + z])
@@ -152,7 +155,7 @@ class _Instruments:
         return cls(late_s, offset, 1.0 + plates[:, 2:3], plates[:, 3], np.zeros((2, 3)), prior.floor["turn"].draw(rng))
 
     def in_trial(self, rng: np.random.Generator, prior: InstrumentPrior, one_of_several: bool) -> _Instruments:
-        """The same with what a trial has of its own: zeros, gains, and a delay if one of several or not checked."""
+        """Add what a trial has of its own: zero offsets, gains, and a delay if one of several or not checked."""
         zero = np.array([[prior.zero_n.draw(rng), 0.0, prior.zero_n.draw(rng)] for _ in range(2)])
         own = one_of_several or prior.clock_s.faulty_share > 0.0
         later_s = prior.delay_s.draw(rng) if own else 0.0
@@ -161,14 +164,14 @@ class _Instruments:
 
     @classmethod
     def with_faults(cls, faults: Faults) -> _Instruments | None:
-        """Those of a laboratory without calibration errors; None where they are sound."""
+        """Make the instruments of a laboratory without calibration errors; None if they are fault-free."""
         if not (faults.gain or faults.plate_m or faults.late_s):
             return None
         offset = np.array([[0.0, 0.0, 0.0], [faults.plate_m, 0.0, 0.0]])
         return cls(faults.late_s, offset, 1.0 + np.array([[faults.gain], [0.0]]), np.zeros(2), np.zeros((2, 3)))
 
     def read(self, time: np.ndarray, loads: np.ndarray) -> np.ndarray:
-        """What they make of true loads (n, 2, 6)."""
+        """Return the plates' readings of true loads (n, 2, 6)."""
         middles = plate_middles(FootLoads(time, loads[..., :3], loads[..., 3:]), np.arange(2))
         wrong = turned_loads(np.asarray(CubicSpline(time, loads)(time - self.late_s)), middles, self.turn_rad)
         wrong[..., 3:] += np.cross(self.offset_m, wrong[..., :3])
@@ -180,7 +183,7 @@ class _Instruments:
 
 
 def tilted(skeleton: Skeleton, angle_rad: float, rng: np.random.Generator) -> Skeleton:
-    """The skeleton with every joint of one rotation tilted by this angle, each in a random direction."""
+    """Tilt every joint of one rotation by this angle, each in a random direction."""
     joints = []
     for joint in skeleton.joints:
         moving = [axis for axis in joint.axes if axis.coordinate not in skeleton.locked]
@@ -195,10 +198,10 @@ def tilted(skeleton: Skeleton, angle_rad: float, rng: np.random.Generator) -> Sk
 
 
 def _wobbled(trial: SyntheticTrial, share: float) -> np.ndarray:
-    """Change of the foot loads (n, 2, 6) when this share of each thigh's mass hangs on springs at the thigh's CoM.
+    """Return the change of foot loads (n, 2, 6) if this share of each thigh's mass is on springs at the thigh's CoM.
 
-    The springs' own deflection under gravity belongs to the CoM; only what inertia adds counts. The change is divided
-    between the feet as the vertical forces are.
+    The springs' own deflection under gravity belongs to the CoM; only the effect of inertia counts. The change is
+    divided between the feet like the vertical forces.
     """
     step = trial.time[1] - trial.time[0]
     pose = trial.skeleton.pose(trial.motion.q)
@@ -219,8 +222,8 @@ def _wobbled(trial: SyntheticTrial, share: float) -> np.ndarray:
 
 
 def _oscillator(base: np.ndarray, step: float) -> np.ndarray:
-    """(n, 3) displacement x of x'' + 2 d w x' + w^2 x = -base, by the bilinear transform, from rest at balance."""
-    from scipy.signal import lfilter  # with scipy.stats, half a second: for whom nothing wobbles, too much
+    """Solve x'' + 2 d w x' + w^2 x = -base for x (n, 3), by the bilinear transform, from rest at equilibrium."""
+    from scipy.signal import lfilter  # with scipy.stats, half a second: too much if nothing wobbles
 
     w = 2.0 * np.pi * WOBBLE_HZ
     k = 2.0 / step

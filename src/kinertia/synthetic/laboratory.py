@@ -1,6 +1,6 @@
 """Measures a synthetic trial as a laboratory would: cameras, skin, two force plates, and files.
 
-The plates catch one right and one left contact; the steps before and after go unmeasured, as in a real laboratory.
+The plates measure one right and one left contact; the steps before and after are not measured, as in a real laboratory.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ PLATE_SIZE_M = (0.6, 0.4)
 
 @dataclass(frozen=True)
 class LabNoise:
-    """What goes wrong in measuring; the defaults are those of a careful laboratory.
+    """Measurement errors; the defaults are those of a careful laboratory.
 
     Attributes:
         skin: "artefact": moves with the joints, published magnitudes (`noise.SkinMotion`); "study": the
             study's sinusoids (`noise.study_noise`); "none".
         camera_sd_m: white noise of every marker coordinate, m.
         force_sd_n: white noise of every force component, N.
-        force_offset_sd_n: deviation of each plate's constant force offset, N.
+        force_offset_sd_n: standard deviation of each plate's constant force offset, N.
         moment_sd_nm: white noise of every moment component, N m.
     """
 
@@ -54,7 +54,7 @@ PERFECT = LabNoise("none", 0.0, 0.0, 0.0, 0.0)
 
 @dataclass(frozen=True, eq=False)
 class LabRecordings:
-    """What the laboratory measured: the person standing, and the walk with two force plates."""
+    """Recordings of the laboratory: the person standing, and the walk with two force plates."""
 
     static: Recording
     walk: Recording
@@ -70,14 +70,14 @@ def record(
     """Measure a subject and a trial.
 
     Args:
-        subject: who walks; its static trial is measured by the same cameras.
+        subject: the person; its static trial is measured by the same cameras.
         trial: at the plates' rate.
         noise: of skin, cameras and plates.
         rng: the random generator.
         samples_per_frame: samples of the plates to one frame of the cameras.
 
     Raises:
-        TrialError: the trial does not hold one whole contact of each foot.
+        TrialError: the trial does not contain one whole contact of each foot.
     """
     samples = len(trial.time) // samples_per_frame * samples_per_frame
     seen = slice(0, samples, samples_per_frame)
@@ -97,7 +97,7 @@ def record(
 
 
 def _plates(trial: SyntheticTrial, samples: int) -> PlateLoads:
-    """Two plates under two whole contacts of different feet that overlap, nearest to the middle of the trial."""
+    """Put two plates under two whole, overlapping contacts of different feet, nearest to the middle of the trial."""
     caught = _contacts(trial, samples)
     force, moment, corners = np.zeros((samples, 2, 3)), np.zeros((samples, 2, 3)), []
     for p, (foot, first, last) in enumerate(caught):
@@ -113,7 +113,7 @@ def _plates(trial: SyntheticTrial, samples: int) -> PlateLoads:
 
 
 def _contacts(trial: SyntheticTrial, samples: int) -> list[tuple[int, int, int]]:
-    """Foot (0 right, 1 left), first and last sample of the two contacts, in time order."""
+    """Return foot (0 right, 1 left), first and last sample of the two contacts, in order of time."""
     whole = [
         (foot, first, last)
         for foot in range(len(FEET))
@@ -130,7 +130,7 @@ def _contacts(trial: SyntheticTrial, samples: int) -> list[tuple[int, int, int]]
 
 
 def write_lab(folder: str | Path, recordings: LabRecordings, kind: Literal["trc", "c3d"] = "trc") -> Path:
-    """Write the files of a laboratory and a subject file that names them; returns the subject file's path.
+    """Write the files of a laboratory and a subject file that refers to them; return the subject file's path.
 
     "trc": `static.trc`, `walk.trc`, `walk_grf.mot`. "c3d": `static.c3d`, `walk.c3d`, with Z up and mm.
     """
@@ -148,7 +148,7 @@ def write_lab(folder: str | Path, recordings: LabRecordings, kind: Literal["trc"
 
 
 def force_table(plates: PlateLoads) -> pd.DataFrame:
-    """Columns as OpenSim's examples name them: force, its point of application on the ground, and torque there."""
+    """Return columns named as in OpenSim's examples: force, its point of application on the ground, torque there."""
     columns: dict[str, np.ndarray] = {}
     point = centre_of_pressure(plates.wrench)
     torque = plates.moment - np.cross(point, plates.force)

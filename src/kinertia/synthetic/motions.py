@@ -1,7 +1,7 @@
 """Makes exactly consistent synthetic trials of five motions, for planning.
 
-The two walks are the package's, at its own pace and a third faster. The others are done standing, both feet on the
-ground, each foot carrying half of the load: squats, swinging arms, and a swaying trunk. Sizes and paces are those of an
+The two walks are the package's, at its own pace and a third faster. In the others the person stands, both feet on the
+ground, each with half of the load: squats, swinging arms, and a swaying trunk. Amplitudes and paces are those of an
 unhurried adult.
 """
 
@@ -23,7 +23,7 @@ Angles = Mapping[str, np.ndarray]
 
 
 def squat(subject: SyntheticSubject) -> SyntheticTrial:
-    """Two squats to 95 degrees of knee flexion, arms forward."""
+    """Make two squats to 95 degrees of knee flexion, arms forward."""
     down = 0.5 * (1.0 - np.cos(_phase(0.4)))
     both = {"hip_flexion": 80.0, "knee_angle": 95.0, "ankle_angle": 30.0, "arm_flex": 60.0}
     angles = {f"{name}_{side}": size * down for name, size in both.items() for side in "rl"}
@@ -31,7 +31,7 @@ def squat(subject: SyntheticSubject) -> SyntheticTrial:
 
 
 def arm_swing(subject: SyntheticSubject) -> SyntheticTrial:
-    """Both arms in turn forward and backward, out to the side, elbows bending."""
+    """Make a trial of both arms swinging in turn forward and backward, out to the side, elbows bending."""
     swing, out, bend = np.sin(_phase(0.8)), 0.5 * (1.0 - np.cos(_phase(0.4))), 0.5 * (1.0 - np.cos(_phase(1.2)))
     angles: dict[str, np.ndarray] = {}
     for side, sign in (("r", 1.0), ("l", -1.0)):
@@ -41,7 +41,7 @@ def arm_swing(subject: SyntheticSubject) -> SyntheticTrial:
 
 
 def trunk_sway(subject: SyntheticSubject) -> SyntheticTrial:
-    """Bending to the sides, forward and back, and turning, each at its own pace."""
+    """Make a trial of the trunk bending to the sides, forward and back, and rotating, each at its own pace."""
     angles = {
         "lumbar_bending": 20.0 * np.sin(_phase(0.6)),
         "lumbar_extension": -15.0 + 20.0 * np.cos(_phase(0.4)),
@@ -69,7 +69,7 @@ def _phase(frequency_hz: float) -> np.ndarray:
 
 
 def _standing(subject: SyntheticSubject, angles_deg: Angles) -> SyntheticTrial:
-    """The trial of these angles over time (all others zero), with the feet where they are at the first frame."""
+    """Make the trial of these angles over time (all others zero), with the feet as in the first frame."""
     skeleton = subject.moving_skeleton
     time = _time()
     q = np.zeros((len(time), len(skeleton.coordinates)))
@@ -84,7 +84,7 @@ def _standing(subject: SyntheticSubject, angles_deg: Angles) -> SyntheticTrial:
 
 
 def _feet_stay(skeleton: Skeleton, q: np.ndarray) -> np.ndarray:
-    """(n, 3) pelvis translations that keep the middle of the feet in place, the lowest foot marker on the ground."""
+    """Return pelvis translations (n, 3) that keep the feet's middle in place, the lowest foot marker on the ground."""
     pose = skeleton.pose(q)
     feet = [skeleton.segments.index(f"foot_{side}") for side in "rl"]
     middle = pose.translation[:, feet].mean(axis=1)

@@ -1,4 +1,4 @@
-"""Adds measurement errors to synthetic trials: skin motion, cameras, force plates; each takes its own generator.
+"""Adds measurement errors to synthetic trials: skin motion, cameras, force plates; each has its own random generator.
 
 Markers: the study's sinusoids (`study_noise`), a soft-tissue artefact that moves with the neighbouring joints
 (`SkinMotion`), and white camera noise (`camera_noise`). Plates: white noise and a constant offset
@@ -24,7 +24,7 @@ OTHER_ARTEFACT_RANGE_M = (0.004, 0.009)
 
 
 def study_noise(markers: Markers, rng: np.random.Generator) -> Markers:
-    """The study's noise: A sin(w t + phi) on every marker coordinate.
+    """Add the study's noise: A sin(w t + phi) on every marker coordinate.
 
     Uniform 0 <= A <= 1 cm, 0 <= w <= 25 rad/s, 0 <= phi <= 2 pi, drawn once per marker coordinate and trial. 4.1 mm
     RMS, below 4 Hz: no low-pass filter removes it (Chèze et al. 1995).
@@ -35,11 +35,11 @@ def study_noise(markers: Markers, rng: np.random.Generator) -> Markers:
 def displaced(
     markers: Markers, shape: tuple[int, int], rng: np.random.Generator, most_rad_s: float = STUDY_RATE_RAD_S
 ) -> Markers:
-    """The markers moved by sinusoids of the study's amplitudes and phases.
+    """Move the markers by sinusoids of the study's amplitudes and phases.
 
     Args:
         markers: m of them.
-        shape: how many sinusoids are drawn: (m, 3) one per coordinate, (m, 1) one per marker, (1, 3) one per axis.
+        shape: number of sinusoids drawn: (m, 3) one per coordinate, (m, 1) one per marker, (1, 3) one per axis.
         rng: of amplitudes, rates and phases, in this order.
         most_rad_s: rates are uniform from 0 to this.
     """
@@ -51,20 +51,20 @@ def displaced(
 
 
 def artefact_range(segment: str) -> tuple[float, float]:
-    """Smallest and largest peak-to-peak displacement of a segment's markers over a step, m."""
+    """Return the smallest and largest peak-to-peak displacement (m) of a segment's markers over a step."""
     return ARTEFACT_RANGE_M.get(segment.rpartition("_")[0], OTHER_ARTEFACT_RANGE_M)
 
 
 @dataclass(frozen=True, eq=False)
 class SkinMotion:
-    """Skin motion of a person that goes with the joints: each segment's markers move together, linearly in the angles
-    of the joints at its two ends, and in every trial alike.
+    """Skin motion that follows the joints, the same in all trials of a person.
 
-    Form after Camomilla et al. (2013) and Bonci et al. (2014); magnitudes from the review of Peters et al. (2010).
+    Each segment's markers move together, linearly in the angles of the joints at its two ends. Form after Camomilla et
+    al. (2013) and Bonci et al. (2014); magnitudes from the review of Peters et al. (2010).
 
     Attributes:
         slopes: segment -> (k, 3) m/rad in the segment's frame, per angle of its joints.
-        reference: (c,) coordinates at which nothing is displaced.
+        reference: (c,) coordinates without displacement.
     """
 
     slopes: Mapping[str, np.ndarray]
@@ -74,9 +74,10 @@ class SkinMotion:
     def draw(
         cls, skeleton: Skeleton, q: np.ndarray, rng: np.random.Generator, others: Sequence[np.ndarray] = ()
     ) -> SkinMotion:
-        """Random directions per joint angle, and peak-to-peak sizes over the coordinates q (n, c) of a walk from
-        `ARTEFACT_RANGE_M`: 10-18 mm on the thigh, 7-17 mm on the shank, 4-9 mm elsewhere; less where the person's other
-        motions (each n, c) would draw the skin more than twice as far (no source).
+        """Draw random directions per joint angle, and peak-to-peak sizes over the coordinates q (n, c) of a walk.
+
+        Sizes are from `ARTEFACT_RANGE_M`: 10-18 mm on the thigh, 7-17 mm on the shank, 4-9 mm elsewhere; less where the
+        person's other motions (each n, c) would displace the skin more than twice as far (no source).
         """
         reference, slopes, every = q.mean(axis=0), {}, np.concatenate([q, *others])
         for segment in skeleton.segments:
@@ -91,7 +92,7 @@ class SkinMotion:
         return cls(slopes, reference)
 
     def moved(self, markers: Markers, skeleton: Skeleton, q: np.ndarray) -> Markers:
-        """The markers of a trial displaced; q (n, c) are its true coordinates at their frames."""
+        """Displace the markers of a trial; q (n, c) are its true coordinates at their frames."""
         pose = skeleton.pose(q)
         positions = markers.positions.copy()
         for segment, slopes in self.slopes.items():
@@ -104,17 +105,17 @@ class SkinMotion:
 
 
 def camera_noise(markers: Markers, sd_m: float, rng: np.random.Generator) -> Markers:
-    """White noise of this deviation (m) on every marker coordinate and frame."""
+    """Add white noise of this standard deviation (m) to every marker coordinate and frame."""
     return replace(markers, positions=markers.positions + rng.normal(0.0, sd_m, markers.positions.shape))
 
 
 def plate_noise(
     plates: PlateLoads, force_sd_n: float, offset_sd_n: float, moment_sd_nm: float, rng: np.random.Generator
 ) -> PlateLoads:
-    """White noise on forces (N) and moments (N m), and a constant force offset (N) per plate, on loaded samples.
+    """Add white noise to forces (N) and moments (N m), and a constant force offset (N) per plate, on loaded samples.
 
-    Errors of force act at the middle of the plate's corners (at the ground origin where they are unknown). Samples
-    below the load threshold are zero, as the readers of this package have them.
+    Force errors act at the middle of the plate's corners (at the ground origin if they are unknown). Samples below the
+    load threshold are zero, as from the readers of this package.
     """
     shape = plates.force.shape
     offset = rng.normal(0.0, offset_sd_n, (1, *shape[1:]))

@@ -1,8 +1,9 @@
 """Moves each segment's markers as a rigid cluster, by harmonics of the stride that no joint angle explains.
 
 It contradicts the estimator's model of skin (`kinertia.estimation.simultaneous.skin`) on purpose: displacements along
-three axes and turns about three, each a sum of the stride's first harmonics with random phases. Sizes are those of
-`kinertia.synthetic.noise.SkinMotion`. Turns are as large as displacements at `_ARM_M` from the middle of the markers.
+three axes and rotations about three, each a sum of the stride's first harmonics with random phases. Sizes are those of
+`kinertia.synthetic.noise.SkinMotion`. Rotations are as large as displacements at `_ARM_M` from the middle of the
+markers.
 """
 
 from __future__ import annotations
@@ -19,23 +20,23 @@ from kinertia.trial.data import Markers
 _HARMONICS = np.arange(1.0, 5.0)
 _ARM_M = 0.1
 STRIDE_S = 1.23
-"""Of the package's walk."""
+"""Duration of a stride of the package's walk."""
 
 
 @dataclass(frozen=True, eq=False)
 class ClusterMotion:
-    """Of a person, the same in every trial and stride.
+    """Motion of a person's marker clusters, the same in every trial and stride.
 
     Attributes:
-        waves: segment -> (2, 4, 6) cosines and sines of the harmonics of three displacements, m, and three turns, rad,
-            in the segment's frame.
+        waves: segment -> (2, 4, 6) cosines and sines of the harmonics of three displacements, m, and three rotations,
+            rad, in the segment's frame.
     """
 
     waves: Mapping[str, np.ndarray]
 
     @classmethod
     def draw(cls, skeleton: Skeleton, rng: np.random.Generator) -> ClusterMotion:
-        """Random phases; higher harmonics are smaller by their number."""
+        """Draw random phases; the amplitude of a harmonic is inversely proportional to its number."""
         waves = {}
         phase = 2.0 * np.pi * np.linspace(0.0, 1.0, 100)[:, None] * _HARMONICS
         for segment in dict.fromkeys(marker.segment for marker in skeleton.markers):
@@ -48,7 +49,7 @@ class ClusterMotion:
         return cls(waves)
 
     def moved(self, markers: Markers, skeleton: Skeleton, q: np.ndarray) -> Markers:
-        """The markers of a trial displaced; q (n, c) are its true coordinates at their frames."""
+        """Displace the markers of a trial; q (n, c) are its true coordinates at their frames."""
         pose, positions = skeleton.pose(q), markers.positions.copy()
         phase = 2.0 * np.pi * (markers.time / STRIDE_S)[:, None] * _HARMONICS
         for segment, (cosines, sines) in self.waves.items():

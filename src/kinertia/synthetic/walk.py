@@ -1,11 +1,11 @@
-"""Makes a synthetic person and gait trial of which everything is known.
+"""Makes a synthetic person and gait trial that are known completely.
 
-Two ways to an exactly consistent trial, both with root residual P = 0 at every frame and a pelvis whose position and
-velocity are the trapezoid integrals of its acceleration (so that the study's pelvis correction, at the true BSPs, gives
-back the motion itself):
+There are two ways to an exactly consistent trial, both with root residual P = 0 at every frame and a pelvis whose
+position and velocity are the trapezoid integrals of its acceleration (so that the study's pelvis correction, at the
+true BSPs, returns the motion itself):
 
-- `walk`: the walk that comes with the package, any length; the ground reactions are what the motion asks for, shared
-  out between the feet.
+- `walk`: the walk that comes with the package, any length; the ground reactions are those that the motion requires,
+  shared between the feet.
 - `consistent_trial`: as in the study, any measured window; the ground reactions are kept and the pelvis is modified
   until the residual is zero.
 """
@@ -37,25 +37,25 @@ MASS_KG, HEIGHT_M, SEX = 72.6, 1.803, "male"
 STATIC_ONLY = tuple(
     f"{side}.{joint}.{place}" for side in "RL" for joint in ("Knee", "Ankle") for place in ("Lat", "Med")
 )
-"""Markers that are taken off after the static trial, as in the measured walk; 41 remain."""
+"""Markers that are removed after the static trial, as in the measured walk; 41 remain."""
 UNLIKE_MASS, UNLIKE_COM_M, UNLIKE_INERTIA = 0.1, 0.01, 0.1
-"""How far people are from the literature: standard deviations of masses and moments (share), CoM coordinates (m)."""
+"""Variation of people about the literature: standard deviations of masses and moments (share), CoM coordinates (m)."""
 PACKAGE_MANNER = Manner()
 _MAX_ITERATIONS = 100
 _RESIDUAL_TOLERANCE = 1e-9
 _HANDOVER = 0.3
-"""Share of double support over which the shares of the load set in, and over which they end."""
+"""Share of double support over which the shares of the load begin, and over which they end."""
 
 
 @dataclass(frozen=True, eq=False)
 class SyntheticSubject:
-    """A person who does not exist.
+    """A synthetic person.
 
     Attributes:
-        static: standing, Cleveland Clinic markers.
-        marker_set: theirs.
+        static: standing, with Cleveland Clinic markers.
+        marker_set: of these markers.
         skeleton: the model of `static`.
-        literature: Dumas' values for this person; CoMs lie off the segment axes.
+        literature: Dumas' values for this person; CoMs are not on the segment axes.
         bsp: the truth.
 
     Examples:
@@ -107,19 +107,19 @@ class SyntheticTrial:
 
     @property
     def window(self) -> Window:
-        """What an estimator takes: exact coordinates and the sum of the ground reactions."""
+        """Input of the study's estimator: exact coordinates and the sum of the ground reactions."""
         return Window(self.time, self.motion, self.foot_loads.sum(axis=1))
 
 
 def without_products(bsp: BodySegmentParameters) -> BodySegmentParameters:
-    """The same with principal axes along the segment axes: products of inertia zero, moments as they are."""
+    """Set products of inertia to zero, so that principal axes are the segment axes; moments are unchanged."""
     table = bsp.table()
     table[:, 7:] = 0.0
     return BodySegmentParameters.from_table(bsp.segments, table)
 
 
 def walking_subject() -> SyntheticSubject:
-    """The person of the package's synthetic walk: 72.6 kg, 1.803 m, male.
+    """Return the person of the package's synthetic walk: 72.6 kg, 1.803 m, male.
 
     The truth is the literature with zero products of inertia: principal axes along the segment axes, as in the study.
     """
@@ -134,11 +134,11 @@ def walking_subject() -> SyntheticSubject:
 
 
 def unlike_literature(subject: SyntheticSubject, rng: np.random.Generator) -> SyntheticSubject:
-    """The same skeleton with a body that differs from the literature as people do, left mirroring right.
+    """Draw a body that differs from the literature as people do, left mirroring right, on the same skeleton.
 
-    Every mass off by 10 %, every CoM coordinate by 10 mm, every moment of inertia by 10 % (standard deviations of
-    normal draws); products of inertia change with their moments. The total mass stays, a scale tells it. Drawn again
-    until every segment is physically possible.
+    Every mass differs by 10 %, every CoM coordinate by 10 mm, every moment of inertia by 10 % (standard deviations of
+    normal draws); products of inertia change with their moments. The total mass is unchanged, since it is known from
+    the scale. The draw is repeated until every segment is physically possible.
     """
     bsp = subject.literature
     left = np.array([segment.endswith("_l") for segment in bsp.segments])
@@ -163,16 +163,16 @@ def walk(
     trapezoid: bool = True,
     manner: Manner = PACKAGE_MANNER,
 ) -> SyntheticTrial:
-    """The package's walk: 1.14 m/s, strides of 1.23 s, every stride the same; without the markers `STATIC_ONLY`.
+    """Make the package's walk: 1.14 m/s, equal strides of 1.23 s, without the markers `STATIC_ONLY`.
 
     Args:
-        subject: who walks.
+        subject: the person.
         duration_s: one stride if None.
         rate_hz: frames per second.
         start: share of the stride at which the trial begins (0: shortly before the left heel strikes).
         trapezoid: integrate the pelvis by the trapezoid rule, as the study's pelvis correction does; False keeps
             position and velocity that are exact integrals of the acceleration.
-        manner: what is another's than the package's walk.
+        manner: differences from the package's walk.
     """
     series = _WalkSeries.read().walked(manner)
     skeleton = subject.moving_skeleton
@@ -189,7 +189,7 @@ def walk(
 
 
 def balancing_wrench(skeleton: Skeleton, bsp: BodySegmentParameters, motion: Motion) -> np.ndarray:
-    """Ground reaction (n, 6) that leaves no residual: force (N), moment about the ground origin (N m)."""
+    """Compute the ground reaction (n, 6) without residual: force (N), moment about the ground origin (N m)."""
     at_pelvis = residual(skeleton, bsp, motion, np.zeros((len(motion.q), 6)))
     force = at_pelvis[:, :3]
     return np.hstack([force, at_pelvis[:, 3:] + np.cross(motion.q[:, :3], force)])
@@ -198,14 +198,14 @@ def balancing_wrench(skeleton: Skeleton, bsp: BodySegmentParameters, motion: Mot
 def consistent_trial(
     skeleton: Skeleton, bsp: BodySegmentParameters, time: np.ndarray, motion: Motion, foot_loads: np.ndarray
 ) -> SyntheticTrial:
-    """The trial of a measured window with the pelvis modified until P = 0 at every frame.
+    """Make a trial from a measured window by modifying the pelvis until P = 0 at every frame.
 
     Equation (2) gives the pelvis acceleration at the current pelvis motion; it is integrated twice by the trapezoid
-    rule, tracking the measured pelvis; and again, until nothing changes (Picard iteration; some 15 rounds for one
+    rule, tracking the measured pelvis; this is repeated until nothing changes (Picard iteration; some 15 rounds for one
     stride).
 
     Raises:
-        KinertiaError: the iteration does not settle; the window is longer than about two strides, or the BSPs are far
+        KinertiaError: the iteration does not converge: the window is longer than about two strides, or the BSPs are far
             off.
     """
     wrench = foot_loads.sum(axis=1)
@@ -249,7 +249,7 @@ class _WalkSeries:
         )
 
     def walked(self, manner: Manner) -> _WalkSeries:
-        """In another's manner."""
+        """Return the series in another manner."""
         table = self.table.copy()
         posture, swing = np.transpose([manner.of(coordinate) for coordinate in table.index])
         table.iloc[:, 1:] *= swing[:, None]
@@ -257,7 +257,7 @@ class _WalkSeries:
         return replace(self, table=table, period_s=self.period_s / manner.pace, speed_m_s=self.speed_m_s * manner.pace)
 
     def motion(self, coordinates: tuple[str, ...], time: np.ndarray) -> Motion:
-        """Coordinates and their derivatives at these times."""
+        """Compute coordinates and their derivatives at these times."""
         values = self.table.loc[list(coordinates)].to_numpy(float)
         mean, cosine, sine = values[:, 0], values[:, 1::2], values[:, 2::2]
         rate = 2 * np.pi / self.period_s * np.arange(1, cosine.shape[1] + 1)
@@ -272,8 +272,10 @@ class _WalkSeries:
         return Motion(q, qd, qdd)
 
     def support(self, time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Per frame: index of the foot that stands alone, or trails in double support (0 right, 1 left), and the
-        progress (0 to 1) through the double support; 0 in single support.
+        """Return the supporting foot, and the progress through double support, per frame.
+
+        The foot is that in single support, or trailing in double support (0 right, 1 left); the progress is 0 to 1, and
+        0 in single support.
         """
         phase = (time / self.period_s) % 1.0
         (start_r, end_r), (start_l, end_l) = self.contacts
@@ -292,11 +294,11 @@ def _between(phase: np.ndarray, start: float, end: float) -> np.ndarray:
 def _on_feet(
     skeleton: Skeleton, motion: Motion, wrench: np.ndarray, behind: np.ndarray, progress: np.ndarray
 ) -> np.ndarray:
-    """Share a wrench (n, 6) out to the feet (n, 2, 6): `behind` has it all but what the other takes over.
+    """Share a wrench (n, 6) between the feet (n, 2, 6): `behind` takes all but what the other foot takes over.
 
-    The shares of force follow from the lever between the trailing forefoot and the leading heel, handed over
-    smoothly. As the load passes on, the leading foot's first share acts at its heel and the trailing foot's last at
-    its forefoot, so that both centres of pressure stay under the feet. Only the sum is exact.
+    The shares of force follow from the lever between the trailing forefoot and the leading heel, with a smooth
+    transition. As the load is transferred, the leading foot's first share acts at its heel and the trailing foot's last
+    at its forefoot, so that both centres of pressure stay under the feet. Only the sum is exact.
     """
     force = wrench[:, :3]
     toe, heel = _foot_points(skeleton, motion, "metatarsal"), _foot_points(skeleton, motion, "heel")
@@ -323,7 +325,7 @@ def _smooth_step(x: np.ndarray) -> np.ndarray:
 
 
 def _foot_points(skeleton: Skeleton, motion: Motion, landmark: str) -> np.ndarray:
-    """(n, 2, 3) m, a landmark of the right and left foot, projected to the ground."""
+    """Return a landmark of the right and left foot (n, 2, 3) m, projected to the ground."""
     marker_set = read_marker_set("cleveland-clinic")
     positions = skeleton.marker_positions(skeleton.pose(motion.q))
     points = [

@@ -1,7 +1,7 @@
 """Describes the belt of a treadmill whose speed is stated.
 
-Where it is not, standing feet tell it, as one speed for the whole trial: as good for a belt that keeps its speed, and
-wrong for one that starts, stops or follows the person.
+Where it is not stated, one speed for the whole trial is measured from the feet in stance. That is as good for a belt of
+constant speed, and wrong for a belt that starts, stops or follows the person.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ _NO_WAY_M_S = 0.05
 
 @dataclass(frozen=True, eq=False)
 class Belt:
-    """Speed of a belt over time; of one that keeps its speed, a single time is enough.
+    """Speed of a treadmill belt over time; for a belt of constant speed a single time is enough.
 
     Attributes:
-        time: (k,) s, on the markers' clock.
-        speed_m_s: (k,); of two belts (k, 2), under the right and the left foot.
+        time: (k,) s, on the time base of the markers.
+        speed_m_s: (k,); with two belts (k, 2), under the right and the left foot.
 
     Examples:
         >>> belt = Belt(np.array([0.0, 2.0]), np.array([1.0, 2.0]))
@@ -35,17 +35,20 @@ class Belt:
     speed_m_s: np.ndarray
 
     def under(self, foot: int) -> Belt:
-        """The belt under the right (0) or the left foot (1)."""
+        """Return the belt under the right (0) or the left foot (1)."""
         return self if self.speed_m_s.ndim == 1 else Belt(self.time, self.speed_m_s[:, foot])
 
     def velocity(self, time: np.ndarray, along: np.ndarray) -> np.ndarray:
-        """(n, 3) m/s at these times, in the direction (3,) in which standing feet go; zero where they go nowhere."""
+        """Return the belt velocity (n, 3) m/s at these times, along the displacement (3,) m of feet in stance.
+
+        It is zero if the feet do not move.
+        """
         length = float(np.linalg.norm(along))
         direction = along / length if length > _NO_WAY_M_S else np.zeros(3)
         return np.asarray(np.interp(time, self.time, self.speed_m_s)[:, None] * direction)
 
     def way_m(self, start_s: float, end_s: float) -> float:
-        """How far it goes."""
+        """Return the distance (m) that the belt covers between two times (s)."""
         between = self.time[(self.time > start_s) & (self.time < end_s)]
         at = np.array([start_s, *between, end_s])
         return float(np.trapezoid(np.interp(at, self.time, self.speed_m_s), at))

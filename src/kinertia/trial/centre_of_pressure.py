@@ -9,13 +9,13 @@ import numpy as np
 from kinertia.trial.data import LOAD_THRESHOLD_N, FootLoads
 
 FIRM_LOAD_N = 5 * LOAD_THRESHOLD_N
-"""Below this a centre of pressure is too noisy to be judged."""
+"""Vertical force below which a centre of pressure is too noisy to be judged."""
 
 
 def centre_of_pressure(wrench: np.ndarray, height_m: float = 0.0) -> np.ndarray:
-    """(..., 3) m, where at this height (0: the ground) a wrench (..., 6) acts with no moment but a vertical one.
+    """Return the point (..., 3) m at this height (0: the ground) at which a wrench (..., 6) has no horizontal moment.
 
-    A wrench without vertical force has none: the point above the origin stands for it.
+    Without vertical force there is no such point: the point above the origin is returned.
     """
     upward = np.where(wrench[..., 1] == 0.0, np.inf, wrench[..., 1])
     x = (wrench[..., 5] + height_m * wrench[..., 0]) / upward
@@ -24,13 +24,13 @@ def centre_of_pressure(wrench: np.ndarray, height_m: float = 0.0) -> np.ndarray:
 
 
 def free_moment(wrench: np.ndarray) -> np.ndarray:
-    """(...) N m about the vertical through the centre of pressure of a wrench (..., 6)."""
+    """Return the moment (...) N m about the vertical through the centre of pressure of a wrench (..., 6)."""
     result: np.ndarray = (wrench[..., 3:] - np.cross(centre_of_pressure(wrench), wrench[..., :3]))[..., 1]
     return result
 
 
 def with_turned_free_moments(loads: FootLoads) -> FootLoads:
-    """The same loads with the other sign of the moment about the vertical through each centre of pressure."""
+    """Return the loads with the sign of the free moment about the vertical at each centre of pressure reversed."""
     carried = loads.force[..., 1] >= LOAD_THRESHOLD_N
     moment = loads.moment.copy()
     moment[..., 1] -= np.where(carried, 2.0 * free_moment(loads.wrench), 0.0)
@@ -38,8 +38,9 @@ def with_turned_free_moments(loads: FootLoads) -> FootLoads:
 
 
 def held_centre_of_pressure(wrench: np.ndarray, least_n: float = LOAD_THRESHOLD_N) -> np.ndarray:
-    """(k, 3) m over k samples of one foot's load (k, 6); where it is below `least_n`, that of the nearest sample that
-    is not. The origin for a foot that is never loaded.
+    """Return the centre of pressure (k, 3) m of one foot's load (k, 6); below `least_n` the nearest sample's above it.
+
+    For a foot that is never loaded it is the origin.
     """
     firm = np.flatnonzero(wrench[:, 1] >= least_n)
     if not len(firm):

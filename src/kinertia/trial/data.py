@@ -1,9 +1,9 @@
 """Defines what the files of one trial hold, and what the estimators take from it.
 
-`Recording` is what was read: markers, force plates and the subject's measurements, before anything is known
-about feet or models. `Trial` is what the estimators work on: the same markers, the loads sorted by foot, and
-for every marker frame whether all ground contact was measured. `kinertia.trial.plate_assignment` makes the second from
-the first.
+`Recording` holds what was read: markers, force plates and the subject's measurements, before anything is known about
+feet or models. `Trial` holds what the estimators use: the same markers, the loads assigned to feet, and for every
+marker frame whether all ground contact was measured. `kinertia.trial.plate_assignment` makes a `Trial` from a
+`Recording`.
 
 Everything is in SI units and in the ground frame: X forward, Y up, Z right.
 """
@@ -39,8 +39,8 @@ FEET = ("r", "l")
 LOAD_THRESHOLD_N = 20.0
 """A plate that carries less than this vertical force counts as unloaded.
 
-Below it the centre of pressure is a quotient of two noises (346 m off the origin in one published trial), so
-the readers set force and moment of such samples to zero, but for those with which a load begins or ends
+Below it the centre of pressure is a ratio of two noise signals (346 m from the origin in one published trial), so the
+readers set force and moment of such samples to zero, except where a load begins or ends
 (`kinertia.trial.plate_loading`).
 """
 
@@ -80,19 +80,19 @@ class Markers:
 
     @property
     def seen(self) -> BoolArray:
-        """(n, m) in which frames each marker was seen."""
+        """Visibility (n, m) of each marker in each frame, bool."""
         return np.asarray(np.isfinite(self.positions).all(axis=2))
 
     def cut(self, start_s: float, end_s: float) -> Markers:
-        """The frames with start_s <= time <= end_s."""
+        """Return the frames with start_s <= time <= end_s."""
         keep = within(self.time, start_s, end_s)
         return Markers(self.time[keep], self.labels, self.positions[keep])
 
     def select(self, labels: Sequence[str]) -> Markers:
-        """These markers only, in this order.
+        """Return these markers only, in this order.
 
         Raises:
-            MarkerSetError: L104, a label is not among the markers; names the ones that look most like it.
+            MarkerSetError: L104, a label is not among the markers; the most similar labels are listed.
         """
         missing = [label for label in labels if label not in self.labels]
         if missing:
@@ -106,7 +106,7 @@ class Markers:
         return Markers(self.time, tuple(labels), self.positions[:, columns])
 
     def arranged(self, labels: Sequence[str]) -> FloatArray:
-        """Positions (n, len(labels), 3) m in this order; NaN for a label that the trial does not have."""
+        """Return positions (n, len(labels), 3) m in the order of the labels; NaN for a label that is missing."""
         positions = np.full((len(self.time), len(labels), 3), np.nan)
         for column, label in enumerate(labels):
             if label in self.labels:
@@ -114,18 +114,18 @@ class Markers:
         return positions
 
     def rotated(self, rotation: FloatArray) -> Markers:
-        """The same markers in axes turned by `rotation` (3, 3): new = rotation @ old."""
+        """Return the same markers in axes rotated by `rotation` (3, 3): new = rotation @ old."""
         return replace(self, positions=self.positions @ rotation.T)
 
 
 class TorqueColumns(NamedTuple):
-    """What the torque columns of one plate held in its file, while the plate carried somebody.
+    """Content of the torque columns of one plate in its file, while the plate was loaded.
 
     Attributes:
         arm_m: median of the horizontal torque over the vertical force, m; NaN where the point of application does not
             move, or the plate was hardly loaded.
-        rms_nm: of the torque about X, Y and Z, N m.
-        belongs_to: index of the plate with whose load the torque comes and goes, where that is another.
+        rms_nm: RMS torque about X, Y and Z, N m.
+        belongs_to: index of the other plate whose load the torque follows; None if there is none.
     """
 
     arm_m: float
@@ -135,20 +135,19 @@ class TorqueColumns(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class PlateLoads:
-    """What p force plates (or column groups of a force file) measured.
+    """Loads measured by p force plates (or column groups of a force file).
 
     Attributes:
-        time: (k,) s, on the same clock as the markers.
+        time: (k,) s, on the time base of the markers.
         names: the p plate names.
         force: (k, p, 3) N, the force ON THE PERSON, in ground axes.
         moment: (k, p, 3) N m, its moment about the ground origin, in ground axes.
-        declared_feet: for each plate "r" or "l" where file or column names say so, else None. Only a claim:
-            the loads file may be wrong, `kinertia.trial.plate_assignment` decides by the data.
-        corners: (p, 4, 3) m, or None where the file does not tell.
-        noise_n: of each plate, deviation of its vertical force while nobody stands on it, N; None where it is unknown.
-        idle: of each plate, what it read while nobody stood on it, before that was taken away; None where it is
-            unknown.
-        torques: of each plate, what its torque columns held; None where the file has no points and torques.
+        declared_feet: for each plate "r" or "l" where file or column names state it, else None. The loads file may be
+            wrong: `kinertia.trial.plate_assignment` decides from the data.
+        corners: (p, 4, 3) m, or None where the file has none.
+        noise_n: standard deviation of each plate's vertical force while it is unloaded, N; None where it is unknown.
+        idle: reading of each plate while it was unloaded, before that was subtracted; None where it is unknown.
+        torques: content of each plate's torque columns; None where the file has no points and torques.
 
     Examples:
         >>> force, moment = np.zeros((5, 1, 3)), np.zeros((5, 1, 3))
@@ -181,32 +180,32 @@ class PlateLoads:
 
     @property
     def wrench(self) -> FloatArray:
-        """(k, p, 6) force and moment."""
+        """Force and moment of each plate (k, p, 6), N and N m."""
         return np.concatenate([self.force, self.moment], axis=-1)
 
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """What the files of one trial hold. Knows nothing of models or marker sets.
+    """Everything read from the files of one trial, independent of models and marker sets.
 
     Attributes:
         name: the trial's name, from the marker file.
         markers: the marker trajectories.
         plates: the force plates, or None where no forces were recorded (statics need none).
-        mass_kg: body mass if the file tells, else None.
-        height_m: body height if the file tells, else None.
+        mass_kg: body mass if the file states it, else None.
+        height_m: body height if the file states it, else None.
         measurements: further lengths of the subject in m, by the file's own keys (`LKneeWidth`).
-        findings: what was found and assumed while reading.
+        findings: what was detected and assumed while reading.
         length_unit: of the marker file ("mm"); everything here is in m.
         vertical: the marker file's axis that points up ("+Z"); here it is +Y.
-        virtual_sd_m: label -> deviation (m) of each coordinate, of markers that nobody wore: made of something else.
-        belt: of the treadmill, where its speed is stated.
-        events: that the file states, in order of time.
+        virtual_sd_m: label -> standard deviation (m) of each coordinate, for virtual markers: computed, not attached.
+        belt: the treadmill's, where its speed is stated.
+        events: gait events stated in the file, in order of time.
         outputs: angles, moments and powers that other software left in the file, if any.
 
     Raises:
-        TrialError: times that are no clock's, infinite places of markers, forces that are not numbers, two plates of
-            one name.
+        TrialError: times do not increase evenly, marker positions are infinite, forces are not numbers, or two plates
+            share a name.
 
     Examples:
         >>> recording = kinertia.read_recording("lab/walk.trc", "lab/walk_grf.mot")
@@ -238,17 +237,17 @@ class Recording:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What was assumed and corrected while reading, one sentence each."""
+        """Assumptions and corrections made while reading, one sentence each."""
         told = [one for one in self.findings if one.severity < Severity.WARNING]
         return tuple(f"{one.where.file or self.name}: {one.message}" for one in told)
 
     @property
     def left_out(self) -> tuple[str, ...]:
-        """Of plates that the file has and that cannot be used, why."""
+        """Reasons why plates in the file cannot be used, one per plate."""
         return tuple(one.message for one in self.findings if one.code == "F151")
 
     def without_empty_markers(self) -> Recording:
-        """The same without markers that no frame shows, and findings that name them (M101)."""
+        """Return the recording without markers that no frame shows, with a finding M101 for each of them."""
         seen = self.markers.seen
         labels = [label for column, label in enumerate(self.markers.labels) if seen[:, column].any()]
         if len(labels) == len(self.markers.labels):
@@ -261,25 +260,25 @@ class Recording:
         return replace(self, markers=self.markers.select(labels), findings=(*self.findings, *empty))
 
     def _repr_html_(self) -> str:
-        """What a notebook shows: frames, markers and their gaps, force plates, notes."""
+        """Return the HTML summary for a notebook: frames, markers and their gaps, force plates, notes."""
         return display.html(self)
 
 
 @dataclass(frozen=True, eq=False)
 class FootLoads:
-    """What the ground does to each foot.
+    """Ground reactions on each foot.
 
     Attributes:
-        time: (k,) s, on the same clock as the markers.
+        time: (k,) s, on the time base of the markers.
         force: (k, 2, 3) N on the person in ground axes; index 0 right foot, 1 left foot.
         moment: (k, 2, 3) N m about the ground origin, in ground axes.
         plates: names of the plates.
         on_plate: (k, 2) index of the plate that each foot stands on, or is nearest in time to standing on; left out
             where each foot has a plate of its own.
-        noise_n: deviation of the vertical force of the noisiest plate while nobody stands on it, N.
-        together: (k,) True where both feet stand on one plate, whose load goes to one of them; left out where they
-            never do.
-        corners: (p, 4, 3) m of every plate, or None where the files do not tell.
+        noise_n: standard deviation of the vertical force of the noisiest plate while unloaded, N.
+        together: (k,) True where both feet stand on one plate, whose load is assigned to one of them; left out where
+            they never do.
+        corners: (p, 4, 3) m of every plate, or None where the files have none.
 
     Examples:
         >>> loads = fit.trials[0].kinematics.trial.loads  # right foot, left foot
@@ -305,32 +304,32 @@ class FootLoads:
 
     @property
     def carrier(self) -> npt.NDArray[np.int_]:
-        """(k, 2) index of the plate that each foot stands on."""
+        """Index (k, 2) of the plate that each foot stands on."""
         return np.tile([0, 1], (len(self.time), 1)) if self.on_plate is None else self.on_plate
 
     @property
     def wrench(self) -> FloatArray:
-        """(k, 2, 6) force and moment."""
+        """Force and moment on each foot (k, 2, 6), N and N m."""
         return np.concatenate([self.force, self.moment], axis=-1)
 
     def rotated(self, rotation: FloatArray) -> FootLoads:
-        """The same loads in axes turned by `rotation` (3, 3): new = rotation @ old."""
+        """Return the same loads in axes rotated by `rotation` (3, 3): new = rotation @ old."""
         corners = None if self.corners is None else self.corners @ rotation.T
         return replace(self, force=self.force @ rotation.T, moment=self.moment @ rotation.T, corners=corners)
 
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """What the estimators take.
+    """One trial as the estimators use it.
 
     Attributes:
         name: the trial's name.
         markers: the marker trajectories, n frames.
         loads: the loads of the two feet, in their own (usually faster) time base.
         measured: (n,) True where every foot on the ground stood on a loaded plate.
-        notes: one sentence for each assumption made on the way here.
+        notes: one sentence for each assumption made so far.
         virtual_sd_m, belt, vertical, events, outputs: as the recording's.
-        findings: how its loads were sorted by foot.
+        findings: about the assignment of loads to feet.
 
     Examples:
         >>> recording = kinertia.read_recording("lab/walk.trc", "lab/walk_grf.mot")
@@ -357,23 +356,22 @@ class Trial:
         _expect_shape("measured", self.measured, (len(self.markers.time),))
 
     def windows(self) -> list[tuple[float, float]]:
-        """First and last time (s) of every contiguous run of measured frames, longest run first."""
+        """Return first and last time (s) of every contiguous run of measured frames, longest run first."""
         return windows(self.markers.time, self.measured)
 
     def carried_windows(self) -> list[tuple[float, float]]:
-        """The same of frames in which the sum of all loads is known: also where both feet stand on one plate."""
+        """Return windows (s) in which the sum of all loads is known, longest first; both feet may be on one plate."""
         if self.loads.together is None:
             return self.windows()
         together = self.loads.together[nearest_samples(self.loads.time, self.markers.time)]
         return windows(self.markers.time, self.measured | together)
 
     def _repr_html_(self) -> str:
-        """What a notebook shows: frames, markers and their gaps, measured windows, notes."""
+        """Return the HTML summary for a notebook: frames, markers and their gaps, measured windows, notes."""
         return display.html(self)
 
     def rotated(self, rotation: FloatArray) -> Trial:
-        """The same trial in axes turned about the vertical: new = rotation @ old, for markers and loads
-        alike.
+        """Return the trial, markers and loads alike, in axes rotated about the vertical: new = rotation @ old.
 
         Raises:
             ValueError: `rotation` is not a rotation about the vertical (Y) axis.

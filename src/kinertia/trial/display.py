@@ -15,16 +15,16 @@ _modules: list[str] = []
 
 
 def shown_by(module: str) -> None:
-    """Name the module that registers how things are shown; it is loaded when this is first needed."""
+    """Set the module that registers how things are shown; it is loaded when first needed."""
     _modules.append(module)
 
 
 @singledispatch
 def html(thing: object) -> str:
-    """What a notebook shows of `thing`.
+    """Return the HTML that a notebook shows for `thing`.
 
     Raises:
-        TypeError: nothing is registered for its type; so for all functions here.
+        TypeError: nothing is registered for its type; the same holds for all functions here.
     """
     _load(html, thing)
     return html(thing)
@@ -32,14 +32,14 @@ def html(thing: object) -> str:
 
 @singledispatch
 def pictures(thing: object) -> Any:
-    """Figures of `thing`, one method for each."""
+    """Return the figures of `thing`, one method for each."""
     _load(pictures, thing)
     return pictures(thing)
 
 
 @singledispatch
 def save(thing: object, folder: str | Path, force: bool = False) -> Path:
-    """Write `thing` into a folder, with `force` also among files of others, and return the folder."""
+    """Write `thing` into a folder, with `force` even if it holds other files, and return the folder."""
     _load(save, thing)
     return save(thing, folder, force=force)
 
@@ -53,21 +53,21 @@ def figure(thing: object, name: str, path: str | Path, trial: str | None = None)
 
 @singledispatch
 def dataset(thing: object, kind: str, over: str) -> Any:
-    """Curves of `thing` as an xarray Dataset."""
+    """Return curves of `thing` as an xarray Dataset."""
     _load(dataset, thing)
     return dataset(thing, kind, over)
 
 
 @singledispatch
 def draws(thing: object, count: int, seed: int) -> Any:
-    """Posterior draws of `thing` as an xarray Dataset."""
+    """Return posterior draws of `thing` as an xarray Dataset."""
     _load(draws, thing)
     return draws(thing, count, seed)
 
 
 @singledispatch
 def gait_profile(thing: object, norms: str | Path) -> Any:
-    """Scores of the gait of `thing` against norms in a file."""
+    """Compute gait scores of `thing` against norms in a file."""
     _load(gait_profile, thing)
     return gait_profile(thing, norms)
 

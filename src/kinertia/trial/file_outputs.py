@@ -13,7 +13,7 @@ FloatArray = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class FileOutputs:
-    """Model outputs of the legs, by the names and in the axes of Plug-in Gait.
+    """Model outputs of the legs, with the names and axes of Plug-in Gait.
 
     Attributes:
         time: (f,) s, all frames of the file.

@@ -16,18 +16,19 @@ from kinertia.trial.data import BoolArray, FloatArray, Markers
 from kinertia.trial.sampled_time import runs, span_s, within
 
 AROUND_LOAD_S = 0.25
-"""What happens so long before the first and after the last load is known to help with what happens under load."""
+"""Frames so long before the first and after the last load help to interpret frames under load."""
 _SPEED_SPAN_S = 0.01
 _FILLED_GAP_S, _SEEN_SHARE = 0.2, 0.5
 _STEP_M = 0.03
-"""Contacts whose heights differ by more stand on steps, boxes or a ramp; less is how a foot lands and rolls."""
+"""Contacts whose heights differ by more are on steps, boxes or a ramp; smaller differences come from how a foot lands
+and rolls."""
 _STILL_M_S, _STILL_SPAN_S, _STILL_S = 0.05, 0.1, 0.2
-"""A foot stands still whose markers are all so slow, as told over this span, for so long."""
+"""A foot stands still if all its markers are slower than this, measured over the second, for at least the third."""
 
 
 @dataclass(frozen=True, eq=False)
 class FootMotion:
-    """Height (n, m) m, velocity (n, m, 3) m/s of the markers of a foot, NaN where not seen, and where it stands still.
+    """Height (n, m) m and velocity (n, m, 3) m/s of the markers of a foot; NaN where they are not seen.
 
     Attributes:
         still: (n,) True where no marker moves, against the ground or, as beside a treadmill's belt, in the laboratory.
@@ -38,13 +39,13 @@ class FootMotion:
     still: BoolArray
 
     def slowest(self, clearance: float) -> FloatArray:
-        """(n,) m/s speed of the slowest marker not higher than this clearance; infinite where none is."""
+        """Return the speed (n,) m/s of the slowest marker not above this clearance (m); infinite without one."""
         speed = np.linalg.norm(self.velocity, axis=2)
         result: FloatArray = np.where(self.height <= clearance, speed, np.inf).min(axis=1)
         return result
 
     def planted(self, clearance: float, landing: float, leaving: float) -> BoolArray:
-        """(n,) True from landing to leaving, and where a marker is missing."""
+        """Return the mask (n,) of frames from landing to leaving, and of frames in which a marker is missing."""
         slowest = self.slowest(clearance)
         planted = np.zeros(len(slowest), dtype=bool)
         for first, last in runs(slowest <= leaving):
@@ -54,7 +55,7 @@ class FootMotion:
         return planted | np.isnan(self.height).any(axis=1)
 
     def over(self, first: int, last: int) -> FootMotion:
-        """The same with heights over where the markers are in these frames, of markers that are seen in them."""
+        """Return the motion with heights relative to the markers' level in these frames, for markers seen in them."""
         seen = np.isfinite(self.height[first : last + 1]).any(axis=0)
         if not seen.any():
             return self
@@ -63,12 +64,12 @@ class FootMotion:
 
 
 def foot_motions(feet: Sequence[Markers], loaded: BoolArray, belt: Belt | None = None) -> list[FootMotion]:
-    """Of the markers of both feet, which stand on loaded plates in these frames (n, 2).
+    """Compute the motion of the markers of both feet, which stand on loaded plates in the frames `loaded` (n, 2).
 
-    Heights are above what a foot may stand on: each marker's own lowest place under load, or, where plates stand at
-    several heights, that of the highest of them which it is not below. Velocities are against the ground under the
-    loaded feet: the median of the lowest marker's, zero on a floor, the belt's on a treadmill; this only
-    tells the direction of a belt whose speed is stated. A foot that is never loaded takes the other's.
+    Heights are above the surface that a foot may stand on: each marker's own lowest height under load or, where plates
+    stand at several heights, the highest of them that the marker is not below. Velocities are relative to the ground
+    under the loaded feet: the median velocity of the lowest marker, zero on a floor, the belt's on a treadmill. If the
+    speed of a belt is stated, this only gives its direction. A foot that is never loaded takes the other foot's value.
     """
     near = _near(feet[0].time, np.asarray(loaded.any(axis=1)))
     places = [_short_gaps_filled(markers, near) for markers in feet]
@@ -95,7 +96,7 @@ def foot_motions(feet: Sequence[Markers], loaded: BoolArray, belt: Belt | None =
 
 
 def _velocity(markers: Markers, place: FloatArray, span_s: float) -> FloatArray:
-    """(n, m, 3) m/s over this time before and after each frame."""
+    """Return the velocity (n, m, 3) m/s as a central difference over this time before and after each frame."""
     span = max(1, round(span_s * markers.rate_hz))
     frames = np.arange(len(place))
     after, before = np.minimum(frames + span, len(frames) - 1), np.maximum(frames - span, 0)
@@ -104,7 +105,7 @@ def _velocity(markers: Markers, place: FloatArray, span_s: float) -> FloatArray:
 
 
 def _above_lowest(height: FloatArray, loaded: BoolArray) -> FloatArray:
-    """(n, m) m above each marker's lowest under load; above its lowest of all where it is never seen under load."""
+    """Return heights (n, m) m above each marker's lowest under load, or its lowest of all if never seen under load."""
     stance = height[loaded]
     if not np.isfinite(stance).any() or not np.isfinite(stance).any(axis=0).all():
         stance = height
@@ -113,7 +114,7 @@ def _above_lowest(height: FloatArray, loaded: BoolArray) -> FloatArray:
 
 
 def _steps(heights: Sequence[FloatArray], loaded: BoolArray) -> list[float]:
-    """Heights (m) of what the loads stand on over the lowest of it, ascending."""
+    """Return the heights (m) of the surfaces that carry loads above the lowest of them, ascending."""
     lowest = []
     for foot, height in enumerate(heights):
         for first, last in runs(loaded[:, foot]):
@@ -128,14 +129,14 @@ def _steps(heights: Sequence[FloatArray], loaded: BoolArray) -> list[float]:
 
 
 def _over(steps: Sequence[float], height: FloatArray) -> FloatArray:
-    """Heights over the highest step that they are not below."""
+    """Return heights above the highest step that they are not below."""
     below = np.searchsorted(np.array(steps[1:]) - _STEP_M / 2, height, side="right")
     result: FloatArray = height - np.array(steps)[np.where(np.isnan(height), 0, below)]
     return result
 
 
 def _still(time: FloatArray, velocity: FloatArray) -> BoolArray:
-    """(n,) True in stretches in which no marker moves."""
+    """Return the mask (n,) of intervals in which no marker moves."""
     speed = np.linalg.norm(velocity, axis=2)
     slow = np.isfinite(speed).any(axis=1) & (np.where(np.isnan(speed), 0.0, speed) <= _STILL_M_S).all(axis=1)
     still = np.zeros(len(time), dtype=bool)
@@ -145,7 +146,7 @@ def _still(time: FloatArray, velocity: FloatArray) -> BoolArray:
 
 
 def _near(time: FloatArray, loaded: BoolArray) -> BoolArray:
-    """(n,) from the first to the last loaded frame (n,), and a little around; everywhere where none is loaded."""
+    """Return the mask (n,) from shortly before the first to shortly after the last loaded frame; all True if none."""
     frames = np.flatnonzero(loaded)
     if not frames.size:
         return np.ones(len(time), dtype=bool)
@@ -153,9 +154,9 @@ def _near(time: FloatArray, loaded: BoolArray) -> BoolArray:
 
 
 def _short_gaps_filled(markers: Markers, near: BoolArray) -> FloatArray:
-    """Positions of the markers seen in at least half of these frames (n,), short gaps bridged by a line.
+    """Return positions of the markers seen in at least half of these frames (n,), short gaps filled linearly.
 
-    Only for telling whether a foot is on the ground.
+    Use them only to decide whether a foot is on the ground.
     """
     seen = markers.seen
     share = seen[near].mean(axis=0)

@@ -1,6 +1,6 @@
-"""Measures how long forces overshoot beside a load, as after filters that are far too strong.
+"""Measures how long forces overshoot beside a load, as they do after far too strong filtering.
 
-On 26 recordings of nine laboratories no plate reads less than nothing for more than 3 ms beside a load.
+On 26 recordings of nine laboratories no plate reads below zero for more than 3 ms beside a load.
 """
 
 from __future__ import annotations
@@ -11,14 +11,15 @@ from kinertia.trial.data import LOAD_THRESHOLD_N, BoolArray, FloatArray
 from kinertia.trial.sampled_time import runs
 
 _PULLED_SHARE, _BESIDE_S, _WITHIN_S, _LONGEST_S, _FEWEST_BESIDE_S = 0.005, 0.04, 0.3, 0.2, 0.15
-"""Of a load's peak; how near to the load that begins; how far is looked, and for how long it lasts at most: a zero that
-is wrong, or the load of another plate, lasts longer."""
+"""Share of a load's peak; largest distance from the load at which it begins; search span; longest duration: a wrong
+zero, or the load of another plate, lasts longer."""
 _SHORTEST_LOAD_S, _LEAST_LOAD_N, _BRIDGED_S = 0.15, 200.0, 0.05
 
 
 def ringing_s(time: FloatArray, vertical: FloatArray) -> float:
-    """For how long a plate reads less than nothing just before feet land and just after they leave; 0 where it does not
-    do both: nobody pulls on a plate, but a filter without delay smears a load so.
+    """Return for how long (s) a plate reads below zero just before foot contact and just after foot off.
+
+    It is 0 unless both happen. Nobody pulls on a plate, but a zero-phase filter spreads a load in this way.
 
     Args:
         time, vertical: (k,) s and N, as read.
@@ -44,7 +45,7 @@ def ringing_s(time: FloatArray, vertical: FloatArray) -> float:
 
 
 def _pulled_s(beside: FloatArray, peak: float, step: float) -> float:
-    """How long values (k,) beside a load, from it outwards, are below zero; 0 where they stay so."""
+    """Return how long (s) values (k,) beside a load, ordered outwards, are below zero; 0 if they stay there."""
     pulled = runs(beside < -_PULLED_SHARE * peak)
     if not pulled or pulled[0][0] * step > _BESIDE_S or pulled[0][1] == len(beside) - 1:
         return 0.0
@@ -53,7 +54,7 @@ def _pulled_s(beside: FloatArray, peak: float, step: float) -> float:
 
 
 def _loads(loaded: BoolArray, bridged: float) -> list[tuple[int, int]]:
-    """Runs of loaded samples, those with fewer samples between them as one."""
+    """Return the runs of loaded samples, merging runs with fewer than `bridged` samples between them."""
     joined: list[tuple[int, int]] = []
     for first, last in runs(loaded):
         if joined and first - joined[-1][1] < bridged:

@@ -9,11 +9,11 @@ from typing import Literal, NamedTuple
 EventKind = Literal["heel strike", "toe off"]
 
 SAME_EVENT_S = 0.15
-"""What a file and the forces have farther apart is another step."""
+"""Events of a file and of the forces that are farther apart belong to different steps."""
 
 
 class GaitEvent(NamedTuple):
-    """A foot meets the ground ("heel strike") or leaves it ("toe off") at a time (s)."""
+    """A foot strike ("heel strike") or foot off ("toe off") at a time (s)."""
 
     time_s: float
     side: str
@@ -21,21 +21,21 @@ class GaitEvent(NamedTuple):
 
 
 def nearest_event(events: Iterable[GaitEvent], to: GaitEvent, within_s: float) -> GaitEvent | None:
-    """The event of the same foot and kind that is nearest in time, if it is near."""
+    """Return the event of the same foot and kind that is nearest in time, or None if none is within `within_s`."""
     alike = [event for event in events if event[1:] == to[1:] and abs(event.time_s - to.time_s) <= within_s]
     return min(alike, key=lambda event: abs(event.time_s - to.time_s), default=None)
 
 
 @dataclass(frozen=True)
 class FileEvent:
-    """An event that a file states.
+    """An event stated in a file.
 
     Attributes:
-        time_s: on the clock of the markers.
-        side: "r" or "l"; empty of a general event.
+        time_s: on the time base of the markers.
+        side: "r" or "l"; empty for a general event.
         label: as in the file: "Foot Strike", "Foot Off", the name of a general event.
-        subject: whose it is; empty where the file does not tell.
-        kind: what the foot does; None of a general event.
+        subject: the participant's name; empty where the file has none.
+        kind: what the foot does; None for a general event.
 
     Examples:
         >>> from kinertia.trial.gait_event import FileEvent
@@ -51,5 +51,5 @@ class FileEvent:
 
     @property
     def of_gait(self) -> GaitEvent | None:
-        """The same as a gait event; None of a general one."""
+        """The event as a `GaitEvent`; None for a general one."""
         return None if self.kind is None or not self.side else GaitEvent(self.time_s, self.side, self.kind)

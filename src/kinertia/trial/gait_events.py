@@ -1,4 +1,4 @@
-"""Finds gait events, heel strikes and toe offs, by the loads under the feet, and compares those of a file with them."""
+"""Detects heel strikes and toe offs from the loads under the feet, and compares events stated in a file with them."""
 
 from __future__ import annotations
 
@@ -14,14 +14,17 @@ from kinertia.trial.sampled_time import TIME_TOLERANCE_S, runs, span_s
 
 
 def gait_events(trial: Trial) -> list[GaitEvent]:
-    """All events between measured frames, in order: elsewhere a load also begins and ends with the plate."""
+    """Return all events between measured frames, in order of time.
+
+    Elsewhere a load may begin or end at the edge of a plate.
+    """
     frames, edges = trial.markers.time, load_edges(trial.loads)
     near = [np.abs(frames - event.time_s) <= BRIDGED_GAP_S + TIME_TOLERANCE_S for event in edges]
     return [event for event, around in zip(edges, near, strict=True) if around.any() and trial.measured[around].all()]
 
 
 def load_edges(loads: FootLoads) -> list[GaitEvent]:
-    """When the load under each foot begins and ends, in order: with the contact, or with the plate's edge."""
+    """Return when the load under each foot begins and ends, in order: at foot contact, or at the edge of a plate."""
     edges = []
     for foot, side in enumerate(FEET):
         loaded = bridged(loads.time, loads.force[:, foot, 1] > LOAD_THRESHOLD_N)
@@ -36,20 +39,21 @@ def load_edges(loads: FootLoads) -> list[GaitEvent]:
 
 
 EVENT_LIMIT_S = 0.03
-"""Events of 14 recordings, set by Vicon or by hand, are within 17 ms of the forces."""
+"""Largest accepted difference: events of 14 recordings, set by Vicon or by hand, are within 17 ms of the forces."""
 _PLAINLY = 2
-"""Times as many: where a foot leaves the plates and not the ground, a load may end with a step of the other."""
+"""Ratio of counts required: where a foot leaves the plates but not the ground, a load may end with a step of the other
+foot."""
 
 
 def contradicted_events(trial: Trial) -> list[tuple[FileEvent, GaitEvent]]:
-    """Events that are more than `EVENT_LIMIT_S` off what the forces show, each with that."""
+    """Return the stated events that are more than `EVENT_LIMIT_S` from the detected ones, in pairs."""
     shown = gait_events(trial)
     pairs = [(one, nearest_event(shown, one.of_gait, SAME_EVENT_S)) for one in trial.events if one.of_gait is not None]
     return [(one, near) for one, near in pairs if near is not None and abs(one.time_s - near.time_s) > EVENT_LIMIT_S]
 
 
 def sides_exchanged(trial: Trial) -> bool:
-    """Whether events come at the times of the other foot's loads, and hardly any at those of their own."""
+    """Decide whether the events coincide with the loads of the other foot and hardly with those of their own."""
     edges, stated = load_edges(trial.loads), _stated(trial)
     other = dict(zip(FEET, reversed(FEET), strict=True))
     exchanged = [one._replace(side=other[one.side]) for one in stated]
@@ -57,7 +61,7 @@ def sides_exchanged(trial: Trial) -> bool:
 
 
 def usable_events(trial: Trial) -> list[GaitEvent]:
-    """All gait events that the file states; none where forces contradict one of them."""
+    """Return all gait events that the file states, or none if forces contradict one of them."""
     if contradicted_events(trial) or sides_exchanged(trial):
         return []
     return _stated(trial)

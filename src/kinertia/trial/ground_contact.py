@@ -1,7 +1,7 @@
 """Finds the frames in which all ground contact is measured.
 
-A foot without load is taken to be on the ground by the heights and speeds that the markers of this trial's
-feet have when a plate begins or ceases to be loaded.
+A foot without load counts as on the ground by thresholds of this trial: the heights and speeds of foot markers when the
+load on a plate begins or ends.
 """
 
 from __future__ import annotations
@@ -18,25 +18,25 @@ from kinertia.trial.foot_motion import FootMotion, foot_motions
 from kinertia.trial.sampled_time import TIME_TOLERANCE_S, nearest_samples, runs, span_s, within
 
 BRIDGED_GAP_S = 0.02
-"""A load that vanishes for less than this is one contact."""
+"""Gaps in a load shorter than this are bridged: it counts as one contact."""
 
 CONTACT_SLACK_S = 0.04
-"""Largest error of the time that markers give for landing or leaving, seen against plates (usual 0.015 s)."""
+"""Largest error of landing and leaving times derived from markers, compared with plates (typically 0.015 s)."""
 
 CONTACT_MARGIN_S = 0.02
-"""Ground contact off the plates is widened by this on both sides: a missed first contact spoils dynamics."""
+"""Ground contact off the plates is extended by this on both sides: a missed first contact makes the dynamics wrong."""
 
 LONGEST_FLIGHT_S = 1.0
-"""Nobody is in the air for longer: then something else than the feet carries the person."""
+"""Longest plausible flight phase: beyond it something other than the feet supports the person."""
 
-# Below these, markers of a foot that stands still differ by noise only.
+# Below these, markers of a stationary foot differ by noise only.
 _LEAST_CLEARANCE_M = 0.01
 _LEAST_SPEED_M_S = 0.1
 _FEWEST_TO_JUDGE, _FAR_BEYOND = 3, 3.0
-"""Of so many landings, one that is so many times as fast as usual is none."""
+"""With at least so many landings, one that is so many times as fast as usual is excluded."""
 
 _ALL_CARRIED = 0.85
-"""While plates carry this share of what they usually do, a foot that is held still is held in the air."""
+"""While plates carry this share of their usual load, a foot that does not move is held in the air."""
 
 FootMarkers = Mapping[str, Sequence[str]]
 """Labels of the markers on each foot (heel, toes, ankle), by "r" and "l"."""
@@ -44,12 +44,12 @@ FootMarkers = Mapping[str, Sequence[str]]
 
 @dataclass(frozen=True, eq=False)
 class GroundContact:
-    """Ground contact by marker frame.
+    """Ground contact of each foot in each marker frame.
 
     Attributes:
         loaded: (n, 2) True where the right, left foot stands on a loaded plate.
         ground: (n, 2) True where the foot is on the ground, loaded or not.
-        inside: (n,) True within the forces' time.
+        inside: (n,) True within the recorded forces.
         together: (n,) True where one plate carries both feet, so that only the sum of their loads is known.
     """
 
@@ -59,7 +59,7 @@ class GroundContact:
     together: BoolArray
 
     def measured(self, time: FloatArray) -> BoolArray:
-        """(n,) True where every foot on the ground stands on a loaded plate, so that all ground contact is known."""
+        """Return the mask (n,) of frames with complete contact: every foot on the ground stands on a loaded plate."""
         measured = self.inside & ~self.together & np.asarray(self.loaded | ~self.ground).all(axis=1)
         flight = measured & ~self.ground.any(axis=1)
         for first, last in runs(flight):
@@ -70,23 +70,23 @@ class GroundContact:
 
 
 def ground_contact(markers: Markers, loads: FootLoads, feet: FootMarkers, belt: Belt | None = None) -> GroundContact:
-    """Which foot is on the ground, and which on a loaded plate.
+    """Determine which foot is on the ground, and which on a loaded plate.
 
-    A loaded foot is on the ground by its load. A foot without load is on the ground while one of its markers
+    A loaded foot is on the ground by definition. A foot without load is on the ground while one of its markers
     is as low and as slow against the ground as the markers of loaded feet are in this trial: it lands when
     that speed falls to the speed seen where a plate starts to be loaded, and leaves when it rises to the
     speed seen where a plate ceases to be. Up to `CONTACT_SLACK_S` of such ground contact right before or
     after a load is the markers' inaccuracy; what remains is widened by `CONTACT_MARGIN_S`.
 
-    A foot without load that stands still, high above the ground or not, is on a step, a box or the frame of a
-    treadmill, if the plates carry less than usual meanwhile; from landing to leaving, as above.
+    A foot without load that stands still, at whatever height, is on a step, a box or the frame of a treadmill if the
+    plates carry less than usual meanwhile; from landing to leaving, as above.
 
-    Frames outside the forces' time are not measured. Frames in the air (no foot on the ground, no load) are
-    measured only between measured frames, for up to `LONGEST_FLIGHT_S`: then plates have seen both the
-    take-off and the landing. A foot whose markers are missing counts as on the ground.
+    Frames outside the recorded forces are not measured. Frames in the air (no foot on the ground, no load) are measured
+    only between measured frames, for up to `LONGEST_FLIGHT_S`: then plates have measured both take-off and landing. A
+    foot whose markers are missing counts as on the ground.
 
-    Speeds are against the ground under the loaded feet, so that a treadmill's belt is no trouble; against the belt
-    where its speed is stated.
+    Speeds are relative to the ground under the loaded feet, so that the belt of a treadmill does no harm, or relative
+    to the belt where its speed is stated.
     """
     nearest = nearest_samples(loads.time, markers.time)
     inside = within(markers.time, loads.time[0], loads.time[-1])
@@ -111,9 +111,9 @@ def ground_contact(markers: Markers, loads: FootLoads, feet: FootMarkers, belt: 
 
 
 def _learned(moves: Sequence[FootMotion], loaded: BoolArray) -> tuple[float, float, float]:
-    """Clearance (m), landing and leaving speed (m/s) of this trial's loaded feet.
+    """Derive the clearance (m) and the landing and leaving speeds (m/s) from the loaded feet of this trial.
 
-    Where no contact begins (or ends) within the trial, the largest speed of a loaded foot stands in.
+    If no contact begins (or ends) within the trial, the largest speed of a loaded foot is used instead.
     """
     lowest = [np.fmin.reduce(move.height[loaded[:, foot]], axis=1) for foot, move in enumerate(moves)]
     clearance = _LEAST_CLEARANCE_M + max(0.0, _largest(np.concatenate(lowest)))
@@ -132,7 +132,7 @@ def _learned(moves: Sequence[FootMotion], loaded: BoolArray) -> tuple[float, flo
 
 
 def _halfway(unloaded: float, loaded: float) -> float:
-    """Speed between an unloaded frame and the loaded frame beside it."""
+    """Return the speed halfway between an unloaded frame and the adjacent loaded frame."""
     return (unloaded + loaded) / 2 if np.isfinite(unloaded) else loaded
 
 
@@ -142,7 +142,7 @@ def _largest(values: FloatArray) -> float:
 
 
 def _usual(speeds: Sequence[float]) -> float:
-    """The largest of speeds that is not far beyond the others: what was no landing must not teach how feet land."""
+    """Return the largest of the speeds that is not an outlier: what was not a landing must not set the threshold."""
     values = np.array(speeds)
     finite = values[np.isfinite(values)]
     if finite.size >= _FEWEST_TO_JUDGE:
@@ -151,7 +151,7 @@ def _usual(speeds: Sequence[float]) -> float:
 
 
 def _carried(loads: FootLoads, nearest: npt.NDArray[np.int_], loaded: BoolArray, resting: BoolArray) -> FloatArray:
-    """(n,) vertical force of all plates over what it usually is while nothing can rest (n,) beside them."""
+    """Return the vertical force (n,) of all plates, relative to its usual value while no foot can rest beside them."""
     force = loads.force[:, :, 1].sum(axis=1)[nearest]
     whole = loaded.any(axis=1) & ~resting
     result: FloatArray = force / np.median(force[whole if whole.any() else loaded.any(axis=1)])
@@ -159,7 +159,7 @@ def _carried(loads: FootLoads, nearest: npt.NDArray[np.int_], loaded: BoolArray,
 
 
 def _stand(planted: BoolArray, first: int, last: int) -> BoolArray:
-    """Of where a foot is planted, the stretches that reach into these frames."""
+    """Return the part of `planted` whose runs overlap these frames."""
     stands = np.zeros_like(planted)
     for start, end in runs(planted):
         if start <= last and end >= first:
@@ -168,7 +168,7 @@ def _stand(planted: BoolArray, first: int, last: int) -> BoolArray:
 
 
 def _off_plates(planted: BoolArray, loaded: BoolArray, time: FloatArray) -> BoolArray:
-    """`planted` without load: without the short stretches that touch a load, the others widened."""
+    """Return `planted` without load: without short intervals adjacent to a load, and with the others extended."""
     off, margin_s = np.zeros_like(planted), CONTACT_MARGIN_S + TIME_TOLERANCE_S
     for first, last in runs(planted & ~loaded):
         touches = (first > 0 and loaded[first - 1]) or (last < len(time) - 1 and loaded[last + 1])
@@ -178,7 +178,7 @@ def _off_plates(planted: BoolArray, loaded: BoolArray, time: FloatArray) -> Bool
 
 
 def bridged(time: FloatArray, loaded: BoolArray) -> BoolArray:
-    """The same mask with gaps below `BRIDGED_GAP_S` closed."""
+    """Return the mask with gaps below `BRIDGED_GAP_S` closed."""
     closed = loaded.copy()
     for first, last in runs(~loaded):
         within = first > 0 and last < len(time) - 1

@@ -1,4 +1,4 @@
-"""Finds what an idle force plate reads, by the times at which its mean force hardly changes."""
+"""Determines the reading of an unloaded force plate from the times at which its mean force hardly changes."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ from kinertia.trial.idle_level import IdleReading
 from kinertia.trial.sampled_time import runs, span_s
 
 _BLOCK_S, _FEWEST_BLOCKS = 0.1, 4
-"""Whole periods of the mains, of 50 and of 60 Hz: over them interference has no mean."""
+"""Block length in whole periods of the mains, of 50 and of 60 Hz, so that interference averages to zero."""
 _IDLE_N, _STEADY_N, _IDLE_SHARE, _LEAST_PEAK_N = 150.0, 7.5, 0.2, 100.0
-"""In a tenth of a second in which nobody steps on or off, a plate reads less than the first on average, and half a
-block earlier or later the same within the second. Of what it carries at its peak, if that is a load, it reads less than
-a fifth: half a child is 100 N."""
+"""While nobody steps on or off for a tenth of a second, a plate reads less than the first on average, and half a block
+earlier or later the same within the second. If its peak is a load, it reads less than a fifth of the peak: half the
+weight of a child is 100 N."""
 _CONSTANT_N, _CONSTANT_NM, _MOST_BLOCKS = 7.5, 5.0, 0.8
-"""Within these of its median is a constant level in most of the blocks."""
+"""A constant level is within these of its median in most of the blocks."""
 _RANGE_PERCENT, _RISING, _MOST_RISING, _SHORTEST_STEP_S = (1.0, 99.0), (0.2, 0.5), 0.2, 0.1
-"""Between 20 and 50 % of its peak a force under feet is for less than a tenth of the time, noise for two fifths."""
+"""A force under feet is between 20 and 50 % of its peak for less than a tenth of the time, noise for two fifths."""
 _SWAYS, _ROUGH, _FEWEST = 0.03, 0.1, 20
-"""Of the peak: deviation of the load of feet that stay, at least, and its largest change from sample to sample, at
-most; noise that makes a zero of some newtons deviate as much jumps by more."""
+"""Shares of the peak for feet that stay on the plate: least standard deviation of the load, and its largest change from
+sample to sample; noise about a zero offset of some newtons with the same standard deviation jumps by more."""
 
 
 def idle_reading(time: FloatArray, force: FloatArray, moment: FloatArray) -> IdleReading:
-    """Find what a plate reads while nobody stands on it.
+    """Determine the reading of a plate while nobody stands on it.
 
     Args:
         time: (k,) s.
@@ -59,21 +59,22 @@ def idle_reading(time: FloatArray, force: FloatArray, moment: FloatArray) -> Idl
 def _moment(
     force: FloatArray, moment: FloatArray, blocks: npt.NDArray[np.int_], level_n: FloatArray
 ) -> tuple[tuple[float, float, float], float]:
-    """N m, median moment about the ground origin in these blocks, and its largest component about where the plate is
-    loaded; where the file has none, that of a level (3,) N that acts there.
+    """Return the median moment (N m) about the ground origin in these blocks, and its largest part about the mean CoP.
+
+    If the file has no moment there, it is the moment of a level (3,) N acting at the mean centre of pressure.
     """
     moments = np.median(moment[blocks], axis=1)
     steady = bool((_deviation(moments) < _CONSTANT_NM).all())
     level_nm = np.median(moments, axis=0) if steady else np.zeros(3)
     there = np.cross(_mean_point(force - level_n, moment - level_nm), level_n)
-    # without a centre of pressure of the unloaded plate a file has zero there, and at most a torque
+    # a file without a centre of pressure for the unloaded plate has zero there, and at most a torque
     about = level_nm - (there if level_nm[[0, 2]].any() else 0.0)
     x, y, z = (float(value) for value in about + there)
     return (x, y, z), float(about[np.argmax(np.abs(about))])
 
 
 def idle_blocks(time: FloatArray, vertical: FloatArray) -> npt.NDArray[np.int_]:
-    """Samples (b, s) of the blocks in which a plate with this vertical force (k,) is idle."""
+    """Return the samples (b, s) of the blocks in which a plate with this vertical force (k,) is unloaded."""
     peak_n = float(np.abs(vertical).max(initial=0.0))
     every = max(2, round(_BLOCK_S / float(np.median(np.diff(time))))) if len(time) > 1 else 2
     count = len(time) // every
@@ -81,7 +82,7 @@ def idle_blocks(time: FloatArray, vertical: FloatArray) -> npt.NDArray[np.int_]:
     if not count:
         return blocks
     total = np.concatenate([[0.0], np.cumsum(vertical)])
-    mean = (total[every:] - total[:-every]) / every  # of the block that begins at each sample
+    mean = (total[every:] - total[:-every]) / every  # mean of the block that begins at each sample
     first = blocks[:, 0]
     near = [mean[np.clip(first + off, 0, len(mean) - 1)] for off in (0, -(every // 2), every // 2)]
     most = min(_IDLE_N, _IDLE_SHARE * peak_n) if peak_n > _LEAST_PEAK_N else _IDLE_N
@@ -91,13 +92,13 @@ def idle_blocks(time: FloatArray, vertical: FloatArray) -> npt.NDArray[np.int_]:
 
 
 def _deviation(levels: FloatArray) -> FloatArray:
-    """(3,), within which most of the levels (b, 3) are of their median."""
+    """Return the distances (3,) from their median within which most of the levels (b, 3) lie."""
     result: FloatArray = np.quantile(np.abs(levels - np.median(levels, axis=0)), _MOST_BLOCKS, axis=0)
     return result
 
 
 def _mean_point(force: FloatArray, moment: FloatArray) -> FloatArray:
-    """(3,) m, mean centre of pressure of the loads (k, 3); the origin where there are none."""
+    """Return the mean centre of pressure (3,) m of the loads (k, 3); the origin if there are none."""
     loaded: BoolArray = force[:, 1] > FIRM_LOAD_N
     if not loaded.any():
         return np.zeros(3)
@@ -106,11 +107,11 @@ def _mean_point(force: FloatArray, moment: FloatArray) -> FloatArray:
 
 
 def _like_steps(time: FloatArray, vertical: FloatArray) -> bool:
-    """Whether a force (k,) of whatever unit is like the load of feet: it pushes one way, is either next to nothing or
-    nearly all there, and stays so for a while; or it is always there and sways smoothly.
+    """Decide whether a force (k,) of whatever unit looks like the load of feet.
 
-    Noise, drift and hum go both ways or never back to zero, are in between as often as not, leave the upper half at
-    once, or are rough.
+    It does if it acts in one direction, is mostly either near zero or near its full size, and stays so for a while; or
+    if it is always present and sways smoothly. Noise, drift and mains interference have both signs or never return to
+    zero, are in between as often as not, leave the upper half at once, or are rough.
     """
     if len(time) < _FEWEST:
         return False

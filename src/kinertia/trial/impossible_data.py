@@ -1,5 +1,6 @@
-"""Data that no reader of files lets through, and that come from arrays of one's own: times that are no clock's, numbers
-that are none.
+"""Rejects impossible data, such as times that do not increase or values that are not numbers.
+
+No file reader lets them through; they come from arrays that a user passes.
 """
 
 from __future__ import annotations
@@ -13,11 +14,11 @@ from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 
 _UNEVEN = 0.5
-"""Of a usual step between frames, by which others may differ: clocks of cameras jitter."""
+"""Share of a usual step between frames by which other steps may differ: camera clocks jitter."""
 
 
 def impossible_markers(time: np.ndarray, labels: Sequence[str], positions: np.ndarray) -> Finding | None:
-    """What is impossible in the times (n,) and positions (n, m, 3) of markers; None if nothing is."""
+    """Return the finding for impossible times (n,) or positions (n, m, 3) m of markers; None if there is none."""
     if wrong := _not_growing(time):
         return wrong
     steps = np.diff(time)
@@ -35,7 +36,7 @@ def impossible_markers(time: np.ndarray, labels: Sequence[str], positions: np.nd
 def impossible_plates(
     time: np.ndarray, names: Sequence[str], feet: Sequence[str | None], wrench: np.ndarray
 ) -> Finding | None:
-    """The same of the times (k,), the declared feet (p,) and the forces and moments (k, p, 6) of plates."""
+    """Return the finding for impossible times (k,), declared feet (p,) or wrenches (k, p, 6) of plates, or None."""
     if wrong := _not_growing(time):
         return wrong
     if len(set(names)) != len(names):
@@ -57,26 +58,26 @@ def impossible_plates(
 
 
 def impossible_position(label: str, position_m: float, time_s: float, limit_m: float | None = None) -> Finding:
-    """That a marker is somewhere where no laboratory is."""
+    """Make the finding that a marker is outside any laboratory (F171)."""
     where = Where(markers=(label,), span_s=(time_s, time_s))
     position = Quantity(position_m, "m", limit=limit_m)
     return with_evidence("F171", where, {"position_m": position, **_at(time_s)})
 
 
 def impossible_load(plate: str, what: str, time_s: float, **size: Quantity) -> Finding:
-    """That a force or moment of a plate is no number, or of a size that no plate measures."""
+    """Make the finding that a force or moment of a plate is not a number, or larger than any plate measures (F172)."""
     found = Quantity("no number" if not size else "more than any plate measures")
     where = Where(plate=plate, span_s=(time_s, time_s))
     return with_evidence("F172", where, {**size, **_at(time_s), "what": Quantity(what), "found": found})
 
 
 def _at(time_s: float) -> dict[str, Quantity]:
-    """A time as a number, and so exactly that its row is found."""
+    """Return a time as evidence: as a number, and as text precise enough to find its row."""
     return {"time_s": Quantity(time_s, "s"), "time": Quantity(f"{time_s:.6g} s")}
 
 
 def step_evidence(before: float, after: float, usual: float) -> dict[str, Quantity]:
-    """Evidence of T101: the step between two times and the usual one, s, and the times so that their rows are found."""
+    """Return evidence of T101: a step between two times and the usual one (s), and the times to find their rows by."""
     steps = {"step_s": after - before, "usual_s": usual, "time_s": before}
     known = {name: Quantity(float(value), "s") for name, value in steps.items() if np.isfinite(value)}
     times = {"before": before, "after": after, "usual": usual}
@@ -86,7 +87,7 @@ def step_evidence(before: float, after: float, usual: float) -> dict[str, Quanti
 
 
 def _not_growing(time: np.ndarray) -> Finding | None:
-    """The first time that is no number, or not later than the one before."""
+    """Return the finding for the first time that is not a number or not later than the one before, or None."""
     steps = np.diff(time)
     odd = np.flatnonzero(~(steps > 0.0))
     if odd.size:

@@ -1,4 +1,4 @@
-"""Judges markers before any model: gaps, which way is up, which way the person goes."""
+"""Checks markers before any model is used: gaps, the vertical axis, the direction of travel."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from kinertia.trial.sampled_time import runs
 STANDING_RANGE_M = 0.03
 """In a standing trial the median marker stays within this (5th to 95th percentile)."""
 _LEAST_WALK_M = 0.5
-"""Less way than this is no net travel."""
+"""Least distance that counts as net travel."""
 UPRIGHT_SHARE = 0.7
 
 
 @dataclass(frozen=True)
 class Visibility:
-    """How much of a trial one marker is seen in.
+    """Share of a trial in which one marker is seen.
 
     Attributes:
         label: the marker's name.
@@ -33,7 +33,7 @@ class Visibility:
 
 @dataclass(frozen=True)
 class Travel:
-    """Where the person goes, in ground axes.
+    """Direction and speed of travel of the person, in ground axes.
 
     Attributes:
         kind: "stands still", "no net travel" or "walks".
@@ -48,7 +48,7 @@ class Travel:
     direction_deg: float
 
     def sentence(self) -> str:
-        """In words: "walks along +X (12 degrees off), 2.1 m at 1.30 m/s"."""
+        """Return the travel in words: "walks along +X (12 degrees off), 2.1 m at 1.30 m/s"."""
         if self.kind == "no net travel":
             return "no net travel (treadmill or in place)"
         if self.kind != "walks":
@@ -61,7 +61,7 @@ class Travel:
 
 
 def visibility(markers: Markers) -> tuple[Visibility, ...]:
-    """Of every marker, in the file's order."""
+    """Return the visibility of every marker, in the order of the file."""
     seen = markers.seen
     frame_s = 0.0 if len(markers.time) < 2 else 1.0 / markers.rate_hz
     return tuple(
@@ -75,7 +75,7 @@ def _longest(missing: BoolArray) -> int:
 
 
 def travel(markers: Markers) -> Travel:
-    """What the person does: by how far the median marker comes from where it is first seen to where it is last."""
+    """Determine the person's travel from the displacement of the median marker between its first and last frames."""
     shown = markers.seen
     spans = [(k, np.flatnonzero(on)) for k, on in enumerate(shown.T) if on.any()]
     moved = [
@@ -96,7 +96,7 @@ def travel(markers: Markers) -> Travel:
 
 
 def extent_m(markers: Markers) -> FloatArray:
-    """(3,) m, median over the frames of how far the markers of one frame reach along x, y, z; NaN where unknown."""
+    """Return the extent (3,) m of the visible markers along x, y, z, median over the frames; NaN where unknown."""
     shown = markers.positions[markers.seen.sum(axis=1) >= 2]
     if not len(shown):
         return np.full(3, np.nan)

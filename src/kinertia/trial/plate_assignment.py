@@ -1,10 +1,10 @@
 """Assigns plates to feet, and finds the frames in which all ground contact is measured.
 
 Dynamics hold only where every foot on the ground stands on a plate that works. Both questions are answered from
-the data: a load belongs to the foot that is nearest to its centre of pressure, and a foot without load is on the
-ground by the heights and speeds of its markers (`kinertia.trial.ground_contact`).
+the data: a load belongs to the foot that is nearest to its centre of pressure, and whether a foot without load is on
+the ground follows from the heights and speeds of its markers (`kinertia.trial.ground_contact`).
 
-A hand on a rail, a chair or a second person is not seen here.
+A hand on a rail, a chair or a second person is not detected here.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from kinertia.trial.ground_contact import (
 from kinertia.trial.sampled_time import TIME_TOLERANCE_S, nearest_samples, runs, span_s, windows, within
 
 SHORTEST_CONTACT_S = 0.05
-"""A load that lasts less than this within the recording is noise of an empty plate."""
+"""A load within the recording that lasts less than this is noise of an unloaded plate."""
 
 FOOT_NAMES = ("right", "left")
 
@@ -37,20 +37,20 @@ SHARED_FRACTION = 0.15
 """A contact that spends at least this part of its time nearer to the other foot carries both feet in turn."""
 
 DOUBLE_SUPPORT_S = 0.2
-"""So long, in a slow walk, both feet are down when the load of one plate goes from one to the other."""
+"""Duration of double support in a slow walk, while the load of one plate passes from one foot to the other."""
 
 _MOSTLY_SHARED = 0.5
-"""Share of the frames with both feet down and one plate loaded from which on that is why nothing is measured."""
+"""Share of the frames with both feet down and one plate loaded, above which this is why nothing is measured."""
 _LISTED_SPANS = 4
 
 
 def build_trial(recording: Recording, feet: FootMarkers, window_s: tuple[float, float] | None = None) -> Trial:
-    """Sort the loads by foot and find the measured frames.
+    """Assign the loads to feet and find the frames in which all ground contact is measured.
 
     Args:
         recording: markers and force plates.
         feet: marker labels of each foot.
-        window_s: first and last time (s) that the user vouches for, in place of what the data say.
+        window_s: first and last time (s) stated by the user, in place of the detected frames.
 
     Raises:
         TrialError: T104, fewer than two frames; P271, no force plates; P278, no frame with complete contact.
@@ -85,18 +85,18 @@ def build_trial(recording: Recording, feet: FootMarkers, window_s: tuple[float, 
 
 
 def no_forces(recording: Recording) -> Finding:
-    """P271, of a recording without plates that can be used."""
+    """Make the finding P271 of a recording without usable plates."""
     left_out = Quantity("; ".join(recording.left_out) or "none")
     return finding("P271", Where(trial=recording.name), left_out=left_out)
 
 
 def assign_plates(recording: Recording, feet: FootMarkers) -> tuple[FootLoads, tuple[Finding, ...]]:
-    """Give every load to the foot it is under, whatever the files claim.
+    """Assign every load to the foot above it, whatever the files declare.
 
     A contact is a run of loaded samples on one plate, with gaps below `BRIDGED_GAP_S` bridged; contacts
-    shorter than `SHORTEST_CONTACT_S` are noise. It goes to the foot whose markers' mean is nearest to its
-    centre of pressure (horizontally, load-weighted). A contact that carries the feet in turn is divided,
-    sample by sample; while both feet stand on one plate, as in double support on a treadmill with one belt, the
+    shorter than `SHORTEST_CONTACT_S` are noise. It is assigned to the foot whose mean marker position is nearest to its
+    centre of pressure (horizontally, load-weighted). A contact that carries the feet in turn is divided sample by
+    sample; while both feet stand on one plate, as in double support on a treadmill with one belt, the
     whole load counts for the nearer one, since only the sum is known: these samples are `together`.
 
     Returns:
@@ -149,7 +149,7 @@ def assign_plates(recording: Recording, feet: FootMarkers) -> tuple[FootLoads, t
 
 
 def _changing(time: FloatArray, nearer: npt.NDArray[np.int_]) -> BoolArray:
-    """(k,) True around the samples at which the load of one contact goes from foot to foot (k,): both are down."""
+    """Return the mask (k,) of samples in double support: around those at which a contact passes to the other foot."""
     changes = (time[1:] + time[:-1])[np.diff(nearer) != 0] / 2
     if not changes.size:
         return np.zeros(len(time), dtype=bool)
@@ -160,7 +160,10 @@ def _changing(time: FloatArray, nearer: npt.NDArray[np.int_]) -> BoolArray:
 
 
 def _held(time: FloatArray, on_plate: npt.NDArray[np.int_]) -> npt.NDArray[np.int_]:
-    """Plates of the nearest loaded sample where a foot (k, 2) is on none; the first plate for a foot never loaded."""
+    """Replace -1 (a foot on no plate) in (k, 2) by the plate of the nearest loaded sample.
+
+    A foot that is never loaded gets the first plate.
+    """
     result = np.zeros_like(on_plate)
     for foot in range(2):
         loaded = np.flatnonzero(on_plate[:, foot] >= 0)
@@ -170,7 +173,7 @@ def _held(time: FloatArray, on_plate: npt.NDArray[np.int_]) -> npt.NDArray[np.in
 
 
 def _centre(markers: Markers, time: FloatArray) -> FloatArray:
-    """Horizontal middle (k, 2) m of the markers at these times, held where none is seen."""
+    """Return the horizontal mean position (k, 2) m of the markers at these times, interpolated where none is seen."""
     seen = markers.seen
     some = seen.any(axis=1)
     if not some.any():
@@ -181,7 +184,7 @@ def _centre(markers: Markers, time: FloatArray) -> FloatArray:
 
 
 def _contacts(time: FloatArray, loaded: BoolArray) -> tuple[list[tuple[int, int]], int]:
-    """First and last sample of every contact, and the number of loads that were too short to be one."""
+    """Return first and last sample of every contact, and the number of loads that were too short to be one."""
     spans = runs(bridged(time, loaded))
     real = [
         (first, last)
@@ -194,7 +197,7 @@ def _contacts(time: FloatArray, loaded: BoolArray) -> tuple[list[tuple[int, int]
 def _nearer_foot(
     force: FloatArray, moment: FloatArray, centres: Sequence[FloatArray], covered: BoolArray, height_m: float
 ) -> npt.NDArray[np.int_]:
-    """Index of the foot (k,) that each sample of one contact belongs to; -1 where no marker tells."""
+    """Return the index (k,) of the foot that each sample of one contact belongs to; -1 where no marker is visible."""
     weight = np.where(covered, force[:, 1], 0.0)
     if not weight.any():
         return np.full(len(force), -1)
@@ -216,8 +219,9 @@ def _sorted_otherwise(
     feet: Sequence[npt.NDArray[np.int_]],
     declared: str | None,
 ) -> list[Finding]:
-    """P275 of each contact (first and last sample) that goes from foot to foot, P277 of those under the other foot than
-    the file claims.
+    """Make P275 for contacts (first and last sample) that pass from foot to foot, and P277 for undeclared feet.
+
+    P277 stands for a contact under the other foot than the file declares.
     """
     findings, other = [], []
     for (first, last), foot in zip(contacts, feet, strict=True):
@@ -250,7 +254,7 @@ def _spans(time: FloatArray, mask: BoolArray) -> str:
 def _nothing_measured(
     recording: Recording, loads: FootLoads, contact: GroundContact, window_s: tuple[float, float] | None
 ) -> Finding:
-    """P278, with when forces were there, or feet on the ground and on plates, and how long both shared a plate."""
+    """Make P278, with the times of forces, of feet on the ground and on plates, and of both feet on one plate."""
     time, where = recording.markers.time, Where(trial=recording.name, span_s=window_s)
     left_out = {"left_out": Quantity("; ".join(recording.left_out))} if recording.left_out else {}
     if window_s is not None:

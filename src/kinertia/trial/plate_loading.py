@@ -1,9 +1,9 @@
-"""Separates load from idle samples of a force plate, and measures the idle noise.
+"""Separates loaded from unloaded samples of a force plate, and measures the noise of the unloaded plate.
 
-Below some 20 N the centre of pressure is a quotient of two noises, and all day long a plate reads a little of
-something. But a foot that lands or leaves passes through these small forces too: set to zero, they are missing from the
-legs' joint moments. So what joins a load without a break and stands out of the plate's noise belongs to it, and acts
-where the nearest firm sample does.
+Below some 20 N the centre of pressure is a ratio of two noise signals, and a plate always reads a small force. But a
+foot that lands or leaves passes through these small forces too: if they were set to zero, they would be missing from
+the joint moments of the legs. So samples that join a load without a break and exceed the noise of the plate belong to
+it, and act at the centre of pressure of the nearest sample with a reliable load.
 """
 
 from __future__ import annotations
@@ -20,23 +20,26 @@ from kinertia.trial.idle_reading import idle_blocks, idle_reading
 from kinertia.trial.sampled_time import TIME_TOLERANCE_S, nearest_samples, runs
 
 LONGEST_TAIL_S = 0.03
-"""A foot lands or leaves within less; what lasts longer below the threshold is an offset."""
+"""Longest low-force phase of a landing or leaving foot; what lasts longer below the threshold is an offset."""
 _ABOVE_NOISE, _LEAST_TAIL_N = 4.0, 1.0
 _FEWEST_IDLE = 20
 _IDLE_MOST_N, _STEADY_N = 3 * LOAD_THRESHOLD_N, 5.0
-"""An idle level is below the first, and varies by less than the second: a foot that lands or leaves does not."""
+"""The level of an unloaded plate is below the first and varies by less than the second; under a landing or leaving foot
+it varies more."""
 _NOISY_N, _MAINS_S = 5.0, 0.02
-"""Beyond the former, loads are looked for in the mean over the latter, a period of the mains."""
+"""With noise above the first, loads are detected in the mean over the second, one period of the mains."""
 _IDLE_PERCENT, _BEYOND_IDLE, _STEP_BEYOND, _WANDERS_N = 99.0, 1.5, 2.0, 30.0
-"""A load is beyond nearly all of what the idle plate reads by the one factor, and somewhere by the other too; a mean
-farther from the usual level is no reading of an idle plate."""
+"""A load exceeds nearly all readings of the unloaded plate by the first factor, and at some time by the second; a mean
+farther from the usual level is not a reading of an unloaded plate."""
 _GAUSSIAN = 1.4826
-"""Deviation of Gaussian noise over its median absolute deviation."""
+"""Standard deviation of Gaussian noise over its median absolute deviation."""
 
 
 class PlateLoad(NamedTuple):
-    """One plate without what it reads when unloaded: force (k, 3) N, moment (k, 3) N m, noise of the vertical force
-    N, and what it read."""
+    """Load of one plate with its unloaded reading subtracted.
+
+    Force (k, 3) N, moment (k, 3) N m, noise of the vertical force (N), and the reading itself.
+    """
 
     force: FloatArray
     moment: FloatArray
@@ -45,12 +48,12 @@ class PlateLoad(NamedTuple):
 
 
 def without_idle(time: FloatArray, force: FloatArray, moment: FloatArray) -> PlateLoad:
-    """Take off what the plate reads while nobody stands on it, and set everything to zero there.
+    """Subtract what the plate reads while nobody stands on it, and set unloaded samples to zero.
 
     Args:
         time: (k,) s.
         force, moment: (k, 3) N and N m about the ground origin, on the person; where the force is below
-            LOAD_THRESHOLD_N the moment is not looked at and may be anything.
+            LOAD_THRESHOLD_N the moment is not used and may be anything.
     """
     idle = idle_reading(time, force, moment)
     if idle.off_zero:
@@ -71,13 +74,13 @@ def without_idle(time: FloatArray, force: FloatArray, moment: FloatArray) -> Pla
 
 
 def largest_n(time: FloatArray, force: FloatArray) -> float:
-    """The vertical force that is farthest from what the idle plate reads, of forces (k, 3), without that reading."""
+    """Return the vertical force (N) farthest from the unloaded reading, of forces (k, 3), less that reading."""
     level_n = float(np.nan_to_num(idle_reading(time, force, np.zeros_like(force)).level_n[1]))
     return float(force[np.argmax(np.abs(force[:, 1] - level_n)), 1]) - level_n
 
 
 def with_idle_levels(plates: PlateLoads) -> PlateLoads:
-    """The loads as they were read, with what the idle plates read: of a laboratory that vouches for its zeros."""
+    """Return the loads as they were read, unloaded readings included, for plates that the laboratory has zeroed."""
     force, moment, readings = plates.force.copy(), plates.moment.copy(), list(plates.idle or ())
     for p, idle in enumerate(readings):
         if idle.subtracted:
@@ -88,7 +91,7 @@ def with_idle_levels(plates: PlateLoads) -> PlateLoads:
 
 
 def _loaded(time: FloatArray, vertical: FloatArray, idle: IdleReading) -> BoolArray:
-    """(k,) where a vertical force (k,) is beyond what the idle plate reads."""
+    """Return the mask (k,) of samples whose vertical force (k,) exceeds the reading of the unloaded plate."""
     if np.isnan(idle.noise_n):
         loaded: BoolArray = vertical >= load_threshold_n(vertical)
         return loaded
@@ -109,9 +112,10 @@ def _loaded(time: FloatArray, vertical: FloatArray, idle: IdleReading) -> BoolAr
 
 
 def load_threshold_n(vertical: FloatArray) -> float:
-    """From which vertical force (k,) on a plate is loaded that is idle too rarely for its level to be known.
+    """Return the vertical force (N) above which a plate is loaded, if it is unloaded too rarely to know its level.
 
-    Small forces that hardly change are what it reads while nobody stands on it.
+    It is derived from the vertical force (k,) of the recording: small forces that hardly change are its unloaded
+    reading.
     """
     offset_n, noise_n = _idle(vertical[vertical < _IDLE_MOST_N])
     if noise_n > _STEADY_N:
@@ -120,14 +124,14 @@ def load_threshold_n(vertical: FloatArray) -> float:
 
 
 def _joining(loaded: BoolArray, candidates: BoolArray) -> BoolArray:
-    """The candidates, among which are the loaded samples, that no other sample parts from a loaded one."""
+    """Return the candidates (they include the loaded samples) that are connected to a loaded sample without a break."""
     stretch = np.cumsum(np.diff(candidates, prepend=False))
     joins: BoolArray = candidates & np.isin(stretch, stretch[loaded])
     return joins
 
 
 def _idle(vertical: FloatArray) -> tuple[float, float]:
-    """Offset and deviation (N) of what an unloaded plate reads; zero where it is hardly ever unloaded."""
+    """Return offset and standard deviation (N) of an unloaded plate's reading; zero if it is hardly ever unloaded."""
     if len(vertical) < _FEWEST_IDLE:
         return 0.0, 0.0
     offset = float(np.median(vertical))

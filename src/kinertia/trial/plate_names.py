@@ -1,7 +1,8 @@
-"""Names the plates of a trial when it is one of several.
+"""Makes plate names unique to a trial when there are several trials.
 
-Plates of C3D files are the laboratory's, and have the same names in all trials. Columns of force files may be feet
-rather than plates: those of each trial are plates of their own, until somebody says that they are the same.
+Plates of C3D files are the laboratory's and have the same names in all trials. Columns of force files may stand for
+feet rather than plates: each trial's columns count as plates of their own, until the user states that they are the
+same.
 """
 
 from __future__ import annotations
@@ -13,12 +14,12 @@ from kinertia.trial.data import Recording
 
 
 def plate_of_trial(column: str, trial: str) -> str:
-    """The name of a column of the force file of this trial."""
+    """Return the name of a force file's column, made unique by the name of its trial."""
     return f"{column} ({trial})"
 
 
 def with_plates_of_trial(recording: Recording) -> Recording:
-    """The same with plates that are called as those of this trial alone, in its findings, too."""
+    """Return the recording with plate names made unique to this trial, also in its findings."""
     findings = tuple(
         replace(one, where=replace(one.where, plate=plate_of_trial(one.where.plate, recording.name)))
         if one.where.plate is not None
@@ -32,7 +33,7 @@ def with_plates_of_trial(recording: Recording) -> Recording:
 
 
 def columns_of_several_trials(plates: Sequence[str]) -> tuple[tuple[int, ...], ...]:
-    """Which of these plates are columns of the same name, of different trials.
+    """Group the plates that are columns of the same name in different trials.
 
     >>> columns_of_several_trials(["right (walk)", "left (walk)", "right (walk (2))", "plate 3"])
     ((0, 2),)
@@ -45,7 +46,10 @@ def columns_of_several_trials(plates: Sequence[str]) -> tuple[tuple[int, ...], .
 
 
 def _column(plate: str) -> str:
-    """What `plate_of_trial` was given; empty if it was not asked. Columns and trials may have brackets, too."""
+    """Return the column that `plate_of_trial` was given; empty if the name is not its output.
+
+    Columns and trials may contain brackets, too.
+    """
     unopened = 0
     for place in range(len(plate) - 1, 0, -1):
         unopened += (plate[place] == ")") - (plate[place] == "(")

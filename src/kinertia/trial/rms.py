@@ -1,4 +1,4 @@
-"""Computes root mean squares of values and of lengths of vectors; NaN does not count."""
+"""Computes root mean squares of values and of vector lengths, ignoring NaN."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ import numpy as np
 
 
 def rms(values: np.ndarray) -> float:
-    """Root mean square over everything that is not NaN."""
+    """Return the root mean square over everything that is not NaN."""
     return float(np.sqrt(np.nanmean(np.square(values))))
 
 
 def rms_length(vectors: np.ndarray) -> float:
-    """Root mean square length of vectors (..., k) over everything that is not NaN."""
+    """Return the root mean square length of vectors (..., k) over everything that is not NaN."""
     return float(np.sqrt(np.nanmean(np.square(vectors).sum(axis=-1))))

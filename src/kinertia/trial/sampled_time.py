@@ -1,6 +1,6 @@
-"""Searches sample times: nearest ones, those between two others, contiguous runs.
+"""Searches sample times for the nearest samples, samples within a span, and contiguous runs.
 
-What a clock adds to times by its rounding decides nothing here.
+Rounding errors of the times change no result.
 """
 
 from __future__ import annotations
@@ -9,28 +9,28 @@ import numpy as np
 import numpy.typing as npt
 
 TIME_TOLERANCE_S = 1e-6
-"""Times that differ by less are the same: what a clock adds by its rounding must decide nothing."""
+"""Times that differ by less are equal, so that rounding errors change no result."""
 
 
 def nearest_samples(time: npt.NDArray[np.float64], at: npt.NDArray[np.float64]) -> npt.NDArray[np.int_]:
-    """Indices into `time` (ascending) of the samples nearest to the times `at`; of two as near, the later one."""
+    """Return indices into `time` (ascending) of the samples nearest to `at`; of two equally near, the later one."""
     after = np.clip(np.searchsorted(time, at), 1, len(time) - 1)
     return after - (at - time[after - 1] < time[after] - at - TIME_TOLERANCE_S)
 
 
 def within(time: npt.NDArray[np.float64], start_s: float, end_s: float) -> npt.NDArray[np.bool_]:
-    """Which of these times are at least the one and at most the other; a clock's rounding decides nothing."""
+    """Return the mask of times from start_s to end_s, both included, whatever their rounding errors."""
     result: npt.NDArray[np.bool_] = (time >= start_s - TIME_TOLERANCE_S) & (time <= end_s + TIME_TOLERANCE_S)
     return result
 
 
 def span_s(time: npt.NDArray[np.float64], first: int = 0, last: int = -1) -> float:
-    """Seconds from one sample to another, to a microsecond: 0.04, and neither more nor less, for 10.17 to 10.21 s."""
+    """Return the seconds from one sample to another, rounded to a microsecond: exactly 0.04 for 10.17 to 10.21 s."""
     return round(float(time[last] - time[first]), 6)
 
 
 def runs(mask: npt.NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """First and last index of every contiguous run of True, in order."""
+    """Return first and last index of every contiguous run of True, in order."""
     edges = np.diff(np.concatenate(([0], mask.astype(np.int8), [0])))
     return [
         (int(start), int(end) - 1)
@@ -39,6 +39,6 @@ def runs(mask: npt.NDArray[np.bool_]) -> list[tuple[int, int]]:
 
 
 def windows(time: npt.NDArray[np.float64], mask: npt.NDArray[np.bool_]) -> list[tuple[float, float]]:
-    """First and last time (s) of every contiguous run of True in `mask` (n,), longest run first."""
+    """Return first and last time (s) of every contiguous run of True in `mask` (n,), longest run first."""
     spans = [(float(time[first]), float(time[last])) for first, last in runs(mask)]
     return sorted(spans, key=lambda span: span[0] - span[1])

@@ -1,4 +1,4 @@
-"""Decides whether anybody moves in a recording, by how fast the markers are."""
+"""Decides whether anybody moves in a recording, from the speed of the markers."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ import numpy as np
 from kinertia.trial.data import Markers
 
 STILL_M_S = 0.1
-"""Markers of people who stand move by a few cm/s, of people who walk by a metre a second."""
+"""Speed limit of standing: markers move by a few cm/s in standing, by about 1 m/s in walking."""
 _WITHIN_S = 0.1
 _SHARE = 0.9
 
 
 def speed_m_s(markers: Markers) -> float:
-    """How fast half of the markers are, over a tenth of a second, in all but the fastest tenth of the frames.
+    """Return the median marker speed (m/s) over a tenth of a second, its 90th percentile over the frames.
 
-    Zero for less than that time; infinite where no marker is seen so long.
+    It is zero for a shorter recording, and infinite if no marker is visible that long.
 
     >>> still = np.ones((50, 2, 3))
     >>> speed_m_s(Markers(np.arange(50) / 100, ("A", "B"), still))

@@ -1,16 +1,16 @@
-"""Finds out what the torque columns of a force file hold: free moments, about the vertical, or something else.
+"""Identifies what the torque columns of a force file hold: free moments about the vertical, or something else.
 
-A force file has a point of application beside each torque, and nothing but its maker sees to it that they go together.
-At the centre of pressure no torque is horizontal, by definition: in eleven sound force files the median is 0.0 mm times
-the vertical force, the 99th percentile at most 10 mm (where forces are smallest). Torques about the middle of the plate
-are horizontal, too, by some 20 mm and more. Where the point stays in its place (at the plate's middle, at the origin),
-it is no centre of pressure, and force and torque are what acts there: nothing is wrong.
+A force file has a point of application beside each torque, and nothing but the program that wrote it ensures that they
+match. At the centre of pressure, by definition, no torque is horizontal: in eleven correct force files the median is
+0.0 mm times the vertical force, the 99th percentile at most 10 mm (where forces are smallest). Torques about the middle
+of the plate do have horizontal parts, of some 20 mm and more. A point that never moves (the plate's middle, the origin)
+is not a centre of pressure: force and torque are then what acts at that point, which is no error.
 
-Free moments may also be in another plate's columns: they come and go with that plate's load. A plate that nobody stands
-on has no free moment. While the other foot alone carries the person, sound force files have at most 0.2 times the free
-moment that they have while the own one does (RMS; filters and amplifiers leave some), those with exchanged columns at
-least 5 times. What a file holds while a plate is idle may also be a quotient of two noises, but that is as large while
-nobody stands on either plate, or jumps from sample to sample. Where both always carry something nothing is told.
+Free moments may also be in another plate's columns: they follow the load of that plate. An unloaded plate has no free
+moment. While the other foot alone carries the person, correct force files have at most 0.2 times the free moment that
+they have while the plate's own foot does (RMS; filters and amplifiers leave some), files with interchanged columns at
+least 5 times. What a file holds for an unloaded plate may also be a ratio of two noise signals, but that is as large
+while neither plate is loaded, or jumps from sample to sample. Where both plates are always loaded, nothing is reported.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ from kinertia.trial.rms import rms
 
 _FEWEST = 20
 _MOVES_M = 0.02
-"""Under a foot that lands and leaves the centre of pressure moves by 0.2 m, in squats by 0.1."""
+"""Least movement of a centre of pressure: it moves by 0.2 m under a foot that lands and leaves, by 0.1 m in squats."""
 
 
 def torque_columns(force: FloatArray, point: FloatArray, torque: FloatArray) -> tuple[TorqueColumns, ...]:
-    """What the torques of p plates are as they stand in the file.
+    """Describe the torque columns of p plates as they are in the file.
 
     Args:
-        force, point, torque: (k, p, 3) N, m and N m, in ground axes; where a plate carries little the point may be
+        force, point, torque: (k, p, 3) N, m and N m, in ground axes; where a plate is hardly loaded the point may be
             anything.
     """
     loaded = force[..., 1] > FIRM_LOAD_N
@@ -52,16 +52,17 @@ def torque_columns(force: FloatArray, point: FloatArray, torque: FloatArray) -> 
 
 _FEWEST_ALONE = 10
 _SOME_NM, _LITTLE, _LONGEST_ARM_M = 0.2, 0.5, 0.034
-"""Of a free moment (RMS); of what is there meanwhile; a free moment over the vertical force (95th percentile)."""
+"""Limits: RMS of a free moment; share of it while the plate is unloaded; free moment over vertical force (95th
+percentile, m)."""
 _JUMPS = 0.7
 """RMS of the changes from sample to sample over that of the values: 1.4 of noise, 0.003 to 0.44 of free moments."""
 
 
 def exchanged_torques(vertical: FloatArray, torque: FloatArray) -> dict[int, int]:
-    """Plates with whose torques another plate's vertical force comes and goes, and the other way round: a to b, b to a.
+    """Find plates whose torques follow another plate's vertical force, and vice versa: returns {a: b, b: a}.
 
     Args:
-        vertical, torque: (k, p) N and N m about the vertical, as they stand in a file.
+        vertical, torque: (k, p) N and N m about the vertical, as they are in a file.
     """
     pairs: dict[int, int] = {}
     for a, b in combinations(range(vertical.shape[1]), 2):
@@ -80,7 +81,7 @@ def exchanged_torques(vertical: FloatArray, torque: FloatArray) -> dict[int, int
 
 
 def _goes_with(torque: FloatArray, without: BoolArray, other: BoolArray, vertical: FloatArray) -> bool:
-    """Whether a torque (k,) is next to nothing in samples `without`, and in samples `other` that load's free moment."""
+    """Decide whether a torque (k,) is near zero in samples `without` and a free moment in samples `other`."""
     torque = np.nan_to_num(torque)
     meanwhile = rms(torque[other])
     return (

@@ -1,4 +1,4 @@
-"""Holds a recording of a motion, the window that the user vouches for, and its use."""
+"""Holds a recording of a motion, the window that the user states, and its use."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ TrialUse = Literal["all", "kinematics"]
 
 @dataclass(frozen=True)
 class TrialInput:
-    """A recording and, where the user gives one, the window (s) to use instead of the detected one.
+    """A recording and, if the user gives one, the window (s) to use instead of the detected one.
 
     Attributes:
         recording: as read.
         window_s: first and last time; None: as detected.
-        read_seconds: that reading it took.
-        use: "kinematics": its markers alone, for joint centres, joint axes and the places of markers.
+        read_seconds: time that reading it took.
+        use: "all", or "kinematics" to use its markers alone, for joint centres, joint axes and marker positions.
 
     Examples:
         >>> walk = kinertia.read_recording("lab/walk.trc", "lab/walk_grf.mot")

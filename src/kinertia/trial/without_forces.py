@@ -1,4 +1,4 @@
-"""Makes a trial whose markers alone are used."""
+"""Makes a trial of which only the markers are used."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from kinertia.trial.sampled_time import within
 
 
 def trial_without_forces(recording: Recording, window_s: tuple[float, float] | None = None) -> Trial:
-    """The trial without plates; every frame counts, or those of the window (s) that the user vouches for.
+    """Return the trial without plates; every frame counts, or only frames of the window (s) that the user states.
 
     Examples:
         >>> from kinertia.trial.without_forces import trial_without_forces

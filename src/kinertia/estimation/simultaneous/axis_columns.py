@@ -1,6 +1,6 @@
-"""Computes the columns that bodies and loads give to the forces of axes, frame by frame in compiled code.
+"""Computes the contributions of bodies and loads to the forces along joint axes, frame by frame in compiled code.
 
-A load f on a segment takes S . f off the force of every axis S that moves the segment.
+A load f on a segment reduces the force of every axis S that moves the segment by S . f.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ from kinertia.model.compiled import compiled
 def add_bodies(
     axes: np.ndarray, slopes: np.ndarray, rows: np.ndarray, moved: np.ndarray, by_body: np.ndarray, out: np.ndarray
 ) -> None:
-    """Add derivatives of generalised forces by the bodies' unknowns to the first columns of `out` (n, c, s).
+    """Add the derivatives of generalised forces by the bodies' parameters to the first columns of `out` (n, c, s).
 
     Args:
-        axes: (n, a, 6) motion in ground axes at the ground origin.
-        slopes: (n, a) of every axis by its coordinate.
+        axes: (n, a, 6) motion axes, in ground axes at the ground origin.
+        slopes: (n, a) derivative of every axis value by its coordinate.
         rows: (a,) row of `out` of each axis' coordinate; -1 for none.
         moved: (b, a) whether the axis moves the body.
-        by_body: (n, 6, 10 b) derivatives of the bodies' loads at the ground origin, ten of each body.
+        by_body: (n, 6, 10 b) derivatives of the bodies' loads at the ground origin, ten per body.
         out: written.
     """
     for i in range(axes.shape[0]):
@@ -52,16 +52,16 @@ def take_load(
     by_place: np.ndarray,
     out: np.ndarray,
 ) -> None:
-    """Take a load on a segment off the axes that move it.
+    """Subtract a load on a segment from the forces of the axes that move the segment.
 
     Args:
-        axes, slopes, rows: as `add_bodies` has them.
-        moved: (k,) the axes, in order, each of which turns those after it.
+        axes, slopes, rows: as in `add_bodies`.
+        moved: (k,) the axes, in order; each rotates those after it.
         loads: (n, 6) at the ground origin.
-        by_load: (n, 6, s) its derivatives by the static unknowns, from the column `first` on; zero before.
+        by_load: (n, 6, s) derivatives of the load by the static unknowns, from the column `first` on; zero before.
         first: the column.
         tau: (n, a) forces of the axes, written.
-        by_place: (n, a, a) their derivatives by the axes' places (columns), written.
+        by_place: (n, a, a) their derivatives by the axis positions (columns), written.
         out: (n, c, s) derivatives of generalised forces by the static unknowns, written.
     """
     carried = np.empty(6)
@@ -72,7 +72,7 @@ def take_load(
             j = moved[at]
             x, y, z, u, v, w = axes[i, j, 0], axes[i, j, 1], axes[i, j, 2], axes[i, j, 3], axes[i, j, 4], axes[i, j, 5]
             tau[i, j] -= x * fx + y * fy + z * fz + u * mx + v * my + w * mz
-            # (S_j x S_l) . f = S_l . (f carried along by j)
+            # (S_j x S_l) . f = S_l . (f moved along with j)
             carried[0], carried[1], carried[2] = fy * w - fz * v, fz * u - fx * w, fx * v - fy * u
             carried[3] = my * w - mz * v + fy * z - fz * y
             carried[4] = mz * u - mx * w + fz * x - fx * z

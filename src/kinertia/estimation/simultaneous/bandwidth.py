@@ -1,12 +1,12 @@
-"""Chooses the bandwidth of a trial's motion, and that of its forces.
+"""Selects the bandwidth of a trial's motion and of its forces.
 
-The spacing of the motion's splines is a bandwidth: accelerations above it do not exist. What it must be is written in
-the ground reactions, whose sum is the body's mass times the acceleration of its centre of mass, and has none of the
-markers' noise: so wide that what it leaves of this sum is no more than rigid segments leave anyway. A slow walk takes
-10 Hz, a brisk one 12, impacts more than markers can show. Each trial of a session has its own: at the bandwidth of a
-brisk walk, the accelerations of a slow one would be noise. On trials made by OpenSim of walks at 1.3 m/s, joint moments
-at the hips err by 2.0 N m with 10 Hz, 1.7 with 12, 1.8 with 15, 2.9 with 20; body segment parameters do not depend on
-it.
+The knot spacing of the motion's splines limits the bandwidth: they have no accelerations above it. The required
+bandwidth follows from the ground reactions, whose sum is the body's mass times the acceleration of its centre of mass,
+free of marker noise: the motion must leave no larger residual of this sum than rigid segments leave anyway. A slow walk
+needs 10 Hz, a brisk one 12, impacts more than markers can resolve. Each trial of a session has its own bandwidth: at
+that of a brisk walk, the accelerations of a slow one would be noise. For trials synthesised with OpenSim from walks at
+1.3 m/s, hip moments err by 2.0 N m with 10 Hz, 1.7 with 12, 1.8 with 15, 2.9 with 20; body segment parameters do not
+depend on it.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ from kinertia.settings import ForceCutoff
 
 LADDER_HZ = (10.0, 12.0, 15.0)
 LEFT_SHARE_OF_WEIGHT = 0.005
-"""RMS force that the motion may leave of the ground reactions, share of their mean vertical force."""
+"""Largest RMS residual of the ground reactions that the motion may leave, as a share of their mean vertical force."""
 _FRAMES_PER_CYCLE = 5.0
-"""Markers show nothing faster than the frame rate over this."""
+"""Frames per cycle that markers need: they resolve nothing faster than the frame rate over this."""
 
 
 @dataclass(frozen=True)
 class Bandwidth:
-    """Of a trial.
+    """Bandwidths of a trial's motion and forces.
 
     Attributes:
-        motion_hz: half the rate of its splines, and low pass of the forces in the root equations.
-        force: of the forces in joint moments.
+        motion_hz: half the knot rate of its splines, and low-pass cutoff of the forces in the root equations.
+        force: bandwidth of the forces in joint moments.
     """
 
     motion_hz: float
@@ -41,18 +41,18 @@ class Bandwidth:
 
     @property
     def spacing_s(self) -> float:
-        """Of the splines."""
+        """Knot spacing of the splines, s."""
         return 1.0 / (2.0 * self.motion_hz)
 
     @classmethod
     def of(
         cls, trials: Sequence[Kinematics], cutoff_hz: float | Literal["gcv"] = "gcv", force: ForceCutoff = "auto"
     ) -> tuple[Bandwidth, ...]:
-        """What each of these trials needs, unless the user chose one for all.
+        """Select the bandwidth that each of these trials needs, unless the user set one for all.
 
         Args:
             trials: of one estimate.
-            cutoff_hz, force: as `Settings` has them.
+            cutoff_hz, force: as in `Settings`.
         """
         if not isinstance(cutoff_hz, str):
             return (cls(cutoff_hz, force),) * len(trials)
@@ -60,7 +60,7 @@ class Bandwidth:
 
 
 def _needed_hz(kinematics: Kinematics) -> float:
-    """The narrowest bandwidth that leaves little of the forces, and that the markers can show."""
+    """Return the narrowest bandwidth (Hz) that leaves little residual force and that the markers can resolve."""
     loads = kinematics.trial.loads
     inside = kinematics.inside(loads.time)
     force = loads.force[inside].sum(axis=1)

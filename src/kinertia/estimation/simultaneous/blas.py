@@ -1,7 +1,7 @@
-"""Factorises, solves and multiplies matrices in place, by the BLAS and LAPACK of SciPy.
+"""Factorises, solves and multiplies matrices in place, with the BLAS and LAPACK of SciPy.
 
-SciPy's own wrappers keep the interpreter to themselves while they run; these leave it to other threads. Matrices are
-row-wise (C order) and of one precision; BLAS takes them column by column, where each is its own transpose.
+SciPy's own wrappers hold the global interpreter lock while they run; these release it for other threads. Matrices are
+row-major (C order) and of one precision; BLAS reads them column-major, as their transposes.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ _Argument = np.ndarray | bytes | int | float
 
 
 def cholesky(matrix: np.ndarray) -> None:
-    """Replace a symmetric matrix (k, k) by its lower factor L.
+    """Replace a symmetric matrix (k, k) by its lower Cholesky factor L.
 
     Raises:
-        numpy.linalg.LinAlgError: it is not positive definite.
+        numpy.linalg.LinAlgError: the matrix is not positive definite.
     """
     k, failed = len(matrix), np.zeros(1, np.int32)
     _call("potrf", b"U", k, matrix, k, failed)
@@ -29,7 +29,7 @@ def cholesky(matrix: np.ndarray) -> None:
 
 
 def solve_lower(lower: np.ndarray, right: np.ndarray, transposed: bool = False) -> None:
-    """Replace a right-hand side (k, m) by L^-1 times it, or by L^-T times it."""
+    """Replace a right-hand side (k, m) by L^-1 times it, or by L^-T times it if `transposed`."""
     k, m = right.shape
     _call("trsm", b"R", b"U", b"T" if transposed else b"N", b"N", m, k, 1.0, lower, k, right, m)
 
@@ -41,13 +41,13 @@ def solve_lower_from_right(lower: np.ndarray, left: np.ndarray) -> None:
 
 
 def subtract_square(target: np.ndarray, factor: np.ndarray) -> None:
-    """Take F F^T of a factor (k, m) off the lower half of a matrix (k, k)."""
+    """Subtract F F^T of a factor (k, m) from the lower half of a matrix (k, k)."""
     k, m = factor.shape
     _call("syrk", b"U", b"T", k, m, -1.0, factor, m, 1.0, target, k)
 
 
 def subtract_product(target: np.ndarray, left: np.ndarray, right: np.ndarray, transposed: bool = False) -> None:
-    """Take A B, or A^T B where `transposed`, off a matrix (k, m); B is (n, m)."""
+    """Subtract A B, or A^T B if `transposed`, from a matrix (k, m); B is (n, m)."""
     (k, m), n = target.shape, len(right)
     _call("gemm", b"N", b"T" if transposed else b"N", m, k, n, -1.0, right, m, left, left.shape[1], 1.0, target, m)
 
@@ -66,7 +66,7 @@ def _address(argument: _Argument, letter: str) -> int:
 
 @lru_cache(maxsize=None, typed=True)
 def _kept(value: bytes | int | float, letter: str) -> ctypes.c_char | ctypes.c_int | ctypes.c_float | ctypes.c_double:
-    """A flag, a size or a factor where Fortran can read it."""
+    """Wrap a flag, a size or a factor for Fortran."""
     if isinstance(value, bytes):
         return ctypes.c_char(value)
     if isinstance(value, int):

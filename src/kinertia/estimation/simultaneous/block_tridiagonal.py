@@ -1,8 +1,8 @@
-"""Symmetric positive definite systems that are block tridiagonal with a dense border: Cholesky, solution, Schur
-complement.
+"""Factorises and solves symmetric positive definite systems that are block tridiagonal with a dense border.
 
-Ordered by time, the spline coefficients of a motion see only their neighbours, and all of them see the few unknowns
-that do not move. Work and memory grow linearly with the number of blocks.
+It provides the Cholesky factor, the solution and the Schur complement. Ordered by time, the spline coefficients of a
+motion are coupled only to their neighbours, and all of them to the few unknowns that do not move. Work and memory grow
+linearly with the number of blocks.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ class BlockBand:
 
     Attributes:
         diagonal: (b, k, k) lower triangular blocks on the diagonal.
-        below: (b - 1, k, k) blocks below it; where the matrix goes on, (b, k, k), the last being below the last of
+        below: (b - 1, k, k) blocks below it; if the matrix continues, (b, k, k), the last being below the last of
             `diagonal`.
     """
 
@@ -36,8 +36,9 @@ class BlockBand:
 
     @classmethod
     def factor(cls, diagonal: np.ndarray, below: np.ndarray, in_place: bool = False) -> BlockBand:
-        """Factor the matrix with these diagonal (b, k, k) and sub-diagonal (b - 1, k, k) blocks, or (b, k, k) where it
-        goes on; in their place, if they may be written to.
+        """Factorise the matrix with these diagonal (b, k, k) and sub-diagonal (b - 1, k, k) blocks.
+
+        There are (b, k, k) sub-diagonal blocks if the matrix continues. With `in_place` the blocks are overwritten.
 
         Raises:
             numpy.linalg.LinAlgError: it is not positive definite.
@@ -56,11 +57,11 @@ class BlockBand:
         return BlockBand(self.diagonal.astype(np.float32), self.below.astype(np.float32))
 
     def as_precise(self, precision: np.dtype[np.floating] | type[np.floating]) -> BlockBand:
-        """The same in single precision, where that is asked for."""
+        """Return the factor in this precision, converted to single precision if requested."""
         return self._single if precision == np.float32 else self
 
     def forward(self, right: np.ndarray, in_place: bool = False) -> np.ndarray:
-        """Solve L x = right; right is (b, k, m), of the factor's precision, and may be written to."""
+        """Solve L x = right; right is (b, k, m), of the factor's precision, and may be overwritten if `in_place`."""
         result = right if in_place else right.copy()
         for i in range(len(result)):
             if i:
@@ -69,7 +70,7 @@ class BlockBand:
         return result
 
     def backward(self, right: np.ndarray, after: np.ndarray | None = None, in_place: bool = False) -> np.ndarray:
-        """Solve L^T x = right; right is (b, k, m), and `after` (k, m) the solution's next block where it goes on."""
+        """Solve L^T x = right (b, k, m); `after` (k, m) is the next block of the solution if the matrix continues."""
         result, known = right if in_place else right.copy(), after
         for i in range(len(result) - 1, -1, -1):
             if known is not None:
@@ -79,8 +80,10 @@ class BlockBand:
         return result
 
     def inverse_blocks(self, after: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """Blocks of the inverse on the diagonal (b, k, k) and below it, as many as of `below`, by Takahashi's
-        recursion; `after` (k, k) is the next block on its diagonal where the matrix goes on.
+        """Compute the blocks of the inverse on the diagonal (b, k, k) and below it, by Takahashi's recursion.
+
+        There are as many as in `below`; `after` (k, k) is the next diagonal block of the inverse if the matrix
+        continues.
         """
         diagonal, below, next_one = np.empty_like(self.diagonal), np.empty_like(self.below), after
         unit = np.eye(self.diagonal.shape[1])

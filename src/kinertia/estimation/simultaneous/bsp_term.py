@@ -1,4 +1,4 @@
-"""Adds body segment parameters: their unknowns, and their cost against the literature and the scale."""
+"""Adds body segment parameters to the estimate: their unknowns, and their cost against the literature and the scale."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from kinertia.model.log_cholesky import nearest_consistent, table_jacobian, to_l
 
 
 class BodySegments(CostTerm):
-    """Ten log-Cholesky parameters of every segment: whatever they are, they are physically consistent."""
+    """Ten log-Cholesky parameters of every segment, which are physically consistent for any values."""
 
     @classmethod
     def unknowns(cls, given: Given) -> tuple[Unknowns, ...]:
-        """The parameters of all segments; the prior is of their table."""
+        """Return the parameters of all segments; the prior applies to their table."""
         start = to_log_cholesky(nearest_consistent(given.prior.mean))
         return (Unknowns(name=BSP, unit="log-Cholesky of kg, m", start=start, prior=None),)
 
@@ -29,20 +29,20 @@ class BodySegments(CostTerm):
 
     @property
     def _logs(self) -> np.ndarray:
-        """Where unknowns are logarithms: per segment of the mass, and three of square roots of second moments."""
+        """Indices of unknowns that are logarithms: per segment its mass, and three square roots of second moments."""
         every = np.arange(self._at.start, self._at.stop).reshape(-1, 10)
         result: np.ndarray = every[:, [0, 4, 5, 6]].ravel()
         return result
 
     def add_information(self, into: np.ndarray, static: np.ndarray) -> None:
-        """Of the table's prior, and of the total mass by the scale."""
+        """Add the information of the table's prior and of the total mass by the scale."""
         prior, theta = self.given.prior, self._at
         jacobian = block_diagonal(table_jacobian(static[theta]))
         mass_row = prior.on_scale @ jacobian[0::10] / prior.mass_sd_kg
         into[theta, theta] += jacobian.T @ self._information @ jacobian + np.outer(mass_row, mass_row)
 
     def add_pull(self, right: np.ndarray, static: np.ndarray) -> float:
-        """Of the same."""
+        """Add the right-hand side of the table's prior and of the scale's total mass; return their sum of squares."""
         prior, theta = self.given.prior, self._at
         bsp, by_own = self.model.bsp(static), table_jacobian(static[theta])
         gap = (bsp.table() - prior.mean.table()).ravel()
@@ -53,22 +53,22 @@ class BodySegments(CostTerm):
         return float(gap @ self._information @ gap) + mass_gap**2
 
     def shorten(self, step: np.ndarray) -> None:
-        """No logarithm changes by more than one."""
+        """Limit the change of every logarithm to one."""
         step[self._logs] = np.clip(step[self._logs], -1.0, 1.0)
 
     def add_bends(self, into: np.ndarray, right: np.ndarray) -> None:
-        """What Gauss-Newton leaves out of second derivatives by the logarithms, where the cost falls with them.
+        """Add second derivatives by logarithms that Gauss-Newton leaves out, where the cost falls with the logarithm.
 
-        The data may ask for a mass or a second moment below zero. Towards zero the first derivatives vanish, and with
-        them what holds a Gauss-Newton step back: it would promise much and keep nothing, again and again. A cost F of
-        exp(x) has the second derivative F'' exp(2 x) + F' exp(x), and the last term is the slope by x; by the logarithm
-        of a square root it is twice the slope.
+        The data may favour a mass or a second moment below zero. Towards zero the first derivatives vanish, and with
+        them the curvature that limits a Gauss-Newton step: it would again and again predict a large gain and achieve
+        none. A cost F of exp(x) has the second derivative F'' exp(2 x) + F' exp(x), and the last term is the slope by
+        x; by the logarithm of a square root it is twice the slope.
         """
         slope = -right[self._logs].reshape(-1, 4)
         into[self._logs] += (np.maximum(slope, 0.0) * [1.0, 2.0, 2.0, 2.0]).ravel()
 
     def read(self, solution: Solution) -> dict[str, Any]:
-        """Physically consistent parameters, and the covariance of their table, at most the prior's."""
+        """Return physically consistent parameters, and the covariance of their table, at most the prior's."""
         chain = block_diagonal(table_jacobian(solution.there[self._at]))
         covariance = chain @ solution.covariance[self._at, self._at] @ chain.T
         return {
@@ -78,7 +78,7 @@ class BodySegments(CostTerm):
 
 
 def _at_most(covariance: np.ndarray, prior: np.ndarray) -> np.ndarray:
-    """The same with no combination more uncertain than in the prior's covariance: nobody knows less than before."""
+    """Limit the covariance so that no combination is more uncertain than in the prior: data never add uncertainty."""
     root = np.linalg.cholesky(prior)
     left = np.linalg.solve(root, np.linalg.solve(root, covariance).T)
     shares, along = np.linalg.eigh(0.5 * (left + left.T))

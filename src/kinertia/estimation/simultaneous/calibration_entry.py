@@ -1,4 +1,4 @@
-"""Defines `CalibrationEntry`: one calibrated quantity, in the terms of the table that users read."""
+"""Defines `CalibrationEntry`: one calibrated quantity, as users read it in the table."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from kinertia.findings.display import plate_text
 POSITION, GAIN, FREE_MOMENT, ZERO, ROTATION, DELAY = (
     "position", "gain", "free moment", "zero offset", "rotation", "delay",
 )  # fmt: skip
-"""Quantities of instruments, each an error: recorded minus true; of a gain, recorded over true minus 1."""
+"""Quantities of instruments, each an error: recorded minus true; for a gain, recorded over true minus 1."""
 CENTRE, AXIS, BENDING = "centre change", "axis change", "bending"
 """Quantities of the body. A change is the estimate minus the model's value."""
 SHOWN_UNIT = {
@@ -26,29 +26,29 @@ SHOWN_UNIT = {
     "N m/N": (1e3, "N m/kN"),
     "kg m": (1.0, "kg m"),
 }
-"""Factor and unit in which people read a calibrated quantity."""
+"""Factor and unit in which a calibrated quantity is shown."""
 INTERVAL_SD = 1.96
-"""Half of a 95 % interval, in deviations."""
+"""Half of a 95 % interval, in standard deviations."""
 _NOTABLE = 2.0
 
 
 @dataclass(frozen=True, kw_only=True)
 class CalibrationEntry:
-    """What a fit found of one quantity, SI.
+    """Estimate of one calibrated quantity, in SI units.
 
     Attributes:
-        kind: what has it.
-        plate: name; None of all plates, and of what is no plate.
+        kind: kind of instrument or body part.
+        plate: name; None for all plates together, and if it is not a plate.
         joint: name.
-        trial: name; None of what all trials share.
-        quantity: what it is: the constants of this module.
+        trial: name; None if all trials share the quantity.
+        quantity: one of the constants of this module.
         axis: "x" forward, "y" up or "z" to the right; "1" or "2" of two directions across the axis of a joint.
-        value: of instruments an error, of joints a change.
+        value: an error for instruments, a change for joints.
         prior_sd, sd: standard deviations before and after.
         unit: a key of SHOWN_UNIT.
-        moved: of instruments, by how many halves of its own 95 % interval the error, put back, moves the joint moment
-            that it moves most.
-        contradicted_by: who finds another error of the instrument; None nobody.
+        moved: for instruments, the effect of the uncorrected error on the most affected joint moment, in half-widths of
+            the moment's own 95 % interval.
+        contradicted_by: other estimate that finds another error of the instrument; None if there is none.
 
     >>> gain = CalibrationEntry(
     ...     kind="plate", plate="left", quantity=GAIN, value=-0.2, prior_sd=0.01, sd=0.01, unit="1", moved=3.0
@@ -77,22 +77,22 @@ class CalibrationEntry:
 
     @property
     def key(self) -> tuple[str | None, ...]:
-        """What identifies the quantity among all of a fit."""
+        """Identifier of the quantity among all entries of a fit."""
         return self.kind, self.plate, self.joint, self.trial, self.quantity, self.axis
 
     @property
     def notable(self) -> bool:
-        """Whether it is more than an instrument is usually off."""
+        """Whether the error exceeds two prior standard deviations."""
         return abs(self.value) > _NOTABLE * self.prior_sd
 
     @property
     def found(self) -> bool:
-        """Whether it is also certain."""
+        """Whether the error also exceeds two posterior standard deviations."""
         return self.notable and abs(self.value) > _NOTABLE * self.sd
 
     @property
     def supported(self) -> bool:
-        """Whether it also matters, and is contradicted by nobody."""
+        """Whether the error also affects joint moments and is contradicted by no other estimate."""
         return self.found and self.moved is not None and self.moved > 1.0 and not self.contradicted_by
 
     def __str__(self) -> str:
@@ -101,17 +101,17 @@ class CalibrationEntry:
 
 
 def item_text(kind: str, plate: str | None, joint: str | None = None) -> str:
-    """What has a quantity: "plate left", "all plates", "hip_r", "synchronisation"."""
+    """Return the label of what has a quantity: "plate left", "all plates", "hip_r", "synchronisation"."""
     return plate_text(plate) if kind == "plate" else joint or kind
 
 
 def quantity_text(quantity: str, axis: str | None, trial: str | None = None) -> str:
-    """A quantity with its axis, and the trial that has it of its own: "position x", "gain in walk"."""
+    """Return the label of a quantity with its axis and, if specific to one, its trial: "position x", "gain in walk"."""
     along = f"{quantity} {axis}" if axis else quantity
     return f"{along} in {trial}" if trial else along
 
 
 def calibration_columns(entries: Iterable[CalibrationEntry]) -> dict[str, list[Any]]:
-    """The table of calibrated quantities, by column."""
+    """Return the table of calibrated quantities, by column."""
     entries = list(entries)
     return {field.name: [getattr(one, field.name) for one in entries] for field in fields(CalibrationEntry)}

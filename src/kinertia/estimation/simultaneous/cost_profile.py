@@ -1,9 +1,10 @@
-"""Integrates the posterior of a trial's delay over the profile of the cost: all else at its best for each delay.
+"""Integrates the posterior of a trial's delay over the profile of the cost, minimised over all else at each delay.
 
-One linearisation says too much of the delay: how forces change over milliseconds goes with motion and body, and the
-second derivatives that Gauss and Newton leave out make the profile wider than they expect, by a fifth to a quarter in
-walks. What is likelier, forces on time or off, depends on it exponentially. The profile is therefore taken at three
-delays, and its parabola joined with the priors of the clock and of the trial's own delay, each with two components.
+A single linearisation makes the delay too certain: changes of force over milliseconds are correlated with motion and
+body, and the second derivatives that Gauss-Newton leaves out make the profile a fifth to a quarter wider in walks.
+Whether delayed or synchronous forces are likelier depends on its width exponentially. The profile is therefore
+evaluated at three delays, and its parabola combined with the priors of the synchronisation delay and of the trial's own
+delay, each with two components.
 """
 
 from __future__ import annotations
@@ -19,17 +20,17 @@ from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.estimation.simultaneous.sound_or_faulty import ErrorPriors, GaussianPrior
 
 _HELD = 1e6
-"""Information that holds the delay where the profile is taken, over what is known of it."""
+"""Information that fixes the delay where the profile is evaluated, relative to what is known of it."""
 
 
 @dataclass(frozen=True, eq=False)
 class CostProfile:
-    """An estimate with the delay's posterior from its profile; of several trials as it was.
+    """An estimate with the delay's posterior from its profile; unchanged for several trials.
 
     Attributes:
-        here: the quadratic, with as much information on the delay as the profile has.
-        instruments: the Gaussian that gives clock and delay their means and deviations.
-        static: (S,) the unknowns, the others following these.
+        here: the quadratic, with the profile's information on the delay.
+        instruments: the Gaussian with the means and standard deviations of synchronisation and trial delay.
+        static: (S,) the unknowns, with the others adjusted to these.
     """
 
     here: Linearised
@@ -45,14 +46,14 @@ class CostProfile:
         point: Point,
         search: Callable[[GaussNewton, GaussianPrior], Point],
     ) -> CostProfile:
-        """From where a search has ended.
+        """Compute the profile from the point where a search has ended.
 
         Args:
             problem: of the estimate.
             here: the last quadratic.
-            instruments: the Gaussian in place of the instruments' priors.
-            point: the end.
-            search: the optimum with this quadratic and another Gaussian.
+            instruments: the Gaussian that replaces the instruments' priors.
+            point: end of the search.
+            search: finds the optimum with this quadratic and another Gaussian.
         """
         late, first = np.array(problem.profiled(), dtype=int), problem.layout.errors.start
         priors = [problem.layout.error_priors.own[k] for k in late - first]
@@ -85,7 +86,7 @@ class CostProfile:
 
 
 def _cost(problem: MapProblem, there: Point, instruments: GaussianPrior, own: np.ndarray) -> float:
-    """Of everything but what the Gaussian says of some quantities alone."""
+    """Return the cost without the Gaussian's prior of some quantities."""
     values = there.static[problem.layout.errors]
     nothing = GaussianPrior(np.zeros_like(instruments.precision), np.zeros_like(instruments.pull))
     alone = _with(nothing, own, instruments.precision[np.ix_(own, own)], instruments.pull[own])
@@ -93,12 +94,12 @@ def _cost(problem: MapProblem, there: Point, instruments: GaussianPrior, own: np
 
 
 def _held(gaussian: GaussianPrior, own: np.ndarray, values: np.ndarray, information: float) -> GaussianPrior:
-    """The same with some of the quantities held at these values by this much information on each."""
+    """Return the Gaussian with some quantities fixed at these values by this much information on each."""
     return _with(gaussian, own, information * np.eye(len(own)), information * values)
 
 
 def _with(gaussian: GaussianPrior, own: np.ndarray, precision: np.ndarray, pull: np.ndarray) -> GaussianPrior:
-    """The same with this for some of the quantities alone."""
+    """Return the Gaussian with precision and pull of some quantities replaced."""
     every, pulls = gaussian.precision.copy(), gaussian.pull.copy()
     every[np.ix_(own, own)], pulls[own] = precision, pull
     return GaussianPrior(every, pulls)

@@ -1,7 +1,7 @@
 """Defines a cost term: the unknowns that it adds, its cost, and what it reads from the solution.
 
-`terms.TERMS` lists them. The estimate knows no term by name; what terms have to do with one another goes through
-`FreedModel`, the unknowns' names in `Layout`, and the ground reactions (`GroundLoads`), which terms may change.
+`terms.TERMS` lists them. The estimate refers to no term by name; terms interact only through `FreedModel`, the
+unknowns' names in `Layout`, and the ground reactions (`GroundLoads`), which terms may change.
 """
 
 from __future__ import annotations
@@ -22,21 +22,21 @@ from kinertia.estimation.simultaneous.stretches import Stretch
 from kinertia.motion.ground_reactions import GroundReactions
 
 Derivative = tuple[np.ndarray, Callable[[np.ndarray, np.ndarray], None]]
-"""Derivatives (n, ..., 6, e) of loads by e unknowns of a term, and what adds such, (n, r, e), to those by all static
-unknowns (n, r, s)."""
+"""Derivatives (n, ..., 6, e) of loads by e unknowns of a term, and the function that adds such derivatives, (n, r, e),
+to those by all static unknowns (n, r, s)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """Where the search ended, for terms to read.
+    """Solution of the estimate, from which terms read their results.
 
     Attributes:
         static: (S,) the unknowns that do not move.
-        covariance: (S, S) of them, found at
+        covariance: (S, S) of them, evaluated at
         there: (S,).
-        displaced: per trial (k,) how far the displaced unknowns are elsewhere in it.
-        gaussian: in place of the priors of errors.
-        moved, contradicted: (k,) of errors, as `InstrumentSupport` has them.
+        displaced: per trial (k,) the trial's offsets of the displaced unknowns.
+        gaussian: replaces the priors of errors.
+        moved, contradicted: (k,) of errors, as in `InstrumentSupport`.
     """
 
     static: np.ndarray
@@ -49,86 +49,88 @@ class Solution:
 
     @cached_property
     def sd(self) -> np.ndarray:
-        """(S,) deviations."""
+        """Standard deviations (S,)."""
         result: np.ndarray = np.sqrt(np.diag(self.covariance))
         return result
 
     def pairs(self, at: slice) -> list[tuple[float, float]]:
-        """Values and deviations of the unknowns at these places."""
+        """Return values and standard deviations of the unknowns at these indices."""
         return list(zip(self.static[at].tolist(), self.sd[at].tolist(), strict=True))
 
 
 class CostTerm:
-    """A term that adds no unknowns, costs nothing and reads nothing: what each term has of these three, it overrides.
+    """A term that adds no unknowns, costs nothing and reads nothing: each term overrides what it needs of these three.
 
     Attributes:
-        given: to the estimate.
-        model: as the unknowns have it.
-        layout: where the unknowns stand.
+        given: input of the estimate.
+        model: the model as a function of the unknowns.
+        layout: positions of the unknowns in the vector.
     """
 
     @classmethod
     def unknowns(cls, given: Given) -> tuple[Unknowns, ...]:
-        """The unknowns that it adds."""
+        """Return the unknowns that the term adds."""
         return ()
 
     def __init__(self, model: FreedModel) -> None:
         self.given, self.model, self.layout = model.given, model, model.layout
 
     def add(self, into: Gradient, here: InTrial) -> None:
-        """Add its residuals in a stretch of a trial to half the sum of squares and its derivatives."""
+        """Add half the sum of squares of its residuals in a time block of a trial, and its derivatives."""
 
     def add_information(self, into: np.ndarray, static: np.ndarray) -> None:
         """Add the information (S, S) of a prior of its own."""
 
     def add_pull(self, right: np.ndarray, static: np.ndarray) -> float:
-        """Add minus the derivatives (S,) of half the sum of squares of that prior; returns the sum."""
+        """Add minus the derivatives (S,) of half the sum of squares of its own prior; return the sum."""
         return 0.0
 
     def add_bends(self, into: np.ndarray, right: np.ndarray) -> None:
-        """Add to the diagonal (S,) of the information what Gauss-Newton leaves out, from the right-hand side (S,)."""
+        """Add what Gauss-Newton leaves out to the diagonal (S,) of the information, from the right-hand side (S,)."""
 
     def shorten(self, step: np.ndarray) -> None:
-        """Shorten a step (S,) that goes farther than the quadratic holds."""
+        """Shorten a step (S,) that exceeds the range of validity of the quadratic."""
 
     def in_root(self, root: RootFrames, k: int, static: np.ndarray) -> RootFrames:
-        """The root equations of trial k with what its unknowns change of them, but by the ground reactions."""
+        """Return the root equations of trial k, changed by the term's unknowns apart from the ground reactions."""
         return root
 
     def left_out(self, static: np.ndarray) -> np.ndarray | None:
-        """(S,) by how much one more unknown of unit deviation, not in the vector, displaces the others for the data; or
-        (S, u), by how much several do.
+        """Return how an unknown of unit SD outside the vector displaces the others (S,) for the data; None without one.
+
+        Several such unknowns have (S, u).
         """
         return None
 
     def profiled(self) -> list[int]:
-        """Places of errors of which the sum has its posterior from the profile of the cost."""
+        """Return indices of errors whose sum gets its posterior from the profile of the cost."""
         return []
 
     def read(self, solution: Solution) -> dict[str, Any]:
-        """Fields of `SimultaneousResult` that are this term's; entries of several terms' "calibration" are joined."""
+        """Return this term's fields of `SimultaneousResult`; the "calibration" entries of several terms are joined."""
         return {}
 
 
 class LoadTerm(CostTerm):
-    """A term whose unknowns are errors of the ground reactions. Loads are put right by one after the other, in the
-    order of the list.
+    """A term whose unknowns are errors of the ground reactions.
+
+    Load terms correct the loads one after the other, in the order of the list.
     """
 
     def late(self, k: int) -> list[int]:
-        """Which unknowns add up to the time by which forces of trial k are late."""
+        """Return the indices of the unknowns whose sum is the delay of the forces of trial k."""
         return []
 
     def put_right(
         self, k: int, static: np.ndarray, loads: np.ndarray, loaded: np.ndarray, carrier: np.ndarray
     ) -> np.ndarray:
-        """Loads on the feet (n, 2, 6) without this term's errors: linear in the loads and in `loaded`.
+        """Correct loads on the feet (n, 2, 6) for this term's errors, linearly in the loads and in `loaded`.
 
         Args:
             k: the trial.
             static: (S,) unknowns.
             loads: (n, 2, 6) force (N) and moment about the ground origin (N m).
-            loaded: (n, 2) 1 where somebody stands; or 0, or a rate of it, with derivatives of the loads.
+            loaded: (n, 2) 1 where the foot stands, else 0; or its derivative, with derivatives of the loads.
             carrier: (n, 2) index of the plate under each foot.
         """
         return loads
@@ -136,8 +138,9 @@ class LoadTerm(CostTerm):
     def by_unknowns(
         self, k: int, static: np.ndarray, loads: np.ndarray, loaded: np.ndarray, carrier: np.ndarray
     ) -> np.ndarray:
-        """(n, 2, 6, ...) derivatives of what `put_right` gives by the unknowns. `loads` are put right by all terms: the
-        derivatives of any but the last must not depend on them.
+        """Return the derivatives (n, 2, 6, ...) of the output of `put_right` by the unknowns.
+
+        `loads` are corrected by all terms: the derivatives of any but the last must not depend on them.
         """
         raise NotImplementedError
 
@@ -147,30 +150,30 @@ class LoadTerm(CostTerm):
 
 
 class GroundLoads:
-    """Ground reactions of the trials, put right by the terms that know errors of them."""
+    """Ground reactions of the trials, corrected by the terms that model errors of them."""
 
     def __init__(self, given: Given, terms: Sequence[CostTerm]) -> None:
         self._trials, self._grounds = given.trials, given.grounds
         self._terms = [term for term in terms if isinstance(term, LoadTerm)]
 
     def late(self, k: int) -> list[int]:
-        """Which unknowns add up to the time by which forces of trial k are late."""
+        """Return the indices of the unknowns whose sum is the delay of the forces of trial k."""
         return [at for term in self._terms for at in term.late(k)]
 
     def late_s(self, k: int, static: np.ndarray) -> float:
-        """By how much they are."""
+        """Return the delay (s) of the forces of trial k."""
         return float(static[self.late(k)].sum())
 
     def on_feet(
         self, k: int, static: np.ndarray, derivative: int = 0, frames: slice | np.ndarray = slice(None)
     ) -> np.ndarray:
-        """(n, 2, 6) loads on the feet at the frames of trial k, put right; or their time derivatives."""
+        """Return corrected loads (n, 2, 6) on the feet at the frames of trial k, or their time derivatives."""
         ground, at = self._grounds[k], self._trials[k].time[frames] + self.late_s(k, static)
         loads = ground.loads(at, derivative).reshape(len(at), 2, 6)
         return self._put_right(k, static, loads, ground.loaded(at, derivative), ground.carrier[frames])
 
     def reactions(self, k: int, static: np.ndarray) -> GroundReactions:
-        """The loads for the joint moments of trial k, put right, by the clock of the markers."""
+        """Return corrected loads for the joint moments of trial k, on the time base of the markers."""
         raw = self._grounds[k].reactions
         wrench = self._put_right(k, static, raw.wrench, raw.loaded, raw.carrier)
         impact = self._put_right(k, static, raw.impact, np.zeros(raw.carrier.shape), raw.carrier)
@@ -186,8 +189,9 @@ class GroundLoads:
     def by_errors(
         self, k: int, static: np.ndarray, loads: np.ndarray, loaded: np.ndarray, frames: np.ndarray
     ) -> Iterator[Derivative]:
-        """Derivatives (n, 2, 6, ...) by each term's unknowns of loads (n, 2, 6) put right, where somebody stands
-        (n, 2).
+        """Yield the derivatives (n, 2, 6, ...) of corrected loads (n, 2, 6) by each term's unknowns.
+
+        `loaded` (n, 2) is 1 where the foot stands.
         """
         carrier, nothing = self._grounds[k].carrier[frames], np.zeros(loaded.shape)
         for place, term in enumerate(self._terms):
@@ -199,7 +203,7 @@ class GroundLoads:
             yield by, partial(term.add_by_unknowns, k)
 
     def root(self, k: int, static: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, tuple[Derivative, ...]]:
-        """(d, 6) sum of the loads on both feet, and its derivatives (d, 6, ...) by all errors but lateness."""
+        """Return the sum (d, 6) of the loads on both feet, and its derivatives (d, 6, ...) by all errors but delays."""
         loads = self.on_feet(k, static, 0, frames)
         loaded = self._grounds[k].loaded(self._trials[k].time[frames] + self.late_s(k, static))
         every = self.by_errors(k, static, loads, loaded, frames)
@@ -208,16 +212,16 @@ class GroundLoads:
 
 @dataclass(frozen=True, eq=False)
 class InTrial:
-    """A stretch of a trial at a point of the estimate.
+    """A time block of a trial at a point of the estimate.
 
     Attributes:
         model: of the person.
         loads: on the feet.
-        terms: all.
-        k: the trial.
+        terms: all terms.
+        k: index of the trial.
         coefficients: of its motion.
-        static: (S,) the other unknowns as they are in it.
-        stretch: of the trial.
+        static: (S,) the other unknowns as they are in the trial.
+        stretch: the time block.
     """
 
     model: FreedModel
@@ -230,6 +234,6 @@ class InTrial:
 
     @cached_property
     def near_q(self) -> np.ndarray:
-        """(f, c) coordinates of the freed skeleton in the stretch with its neighbours, `Stretch.with_neighbours`."""
+        """Coordinates (f, c) of the freed skeleton in the block with its neighbours, `Stretch.with_neighbours`."""
         parts = self.model.given.bases[self.k].evaluate(self.coefficients, self.stretch.with_neighbours)
         return self.model.full(parts, self.static)[0]

@@ -1,15 +1,15 @@
-"""Standard deviations of joint angles, moments, powers and ground reactions over time, from motion, body segment
-parameters and calibration together.
+"""Computes standard deviations over time of joint angles, moments, powers and ground reactions.
 
-Delta method: analytic derivatives by spline coefficients and static unknowns, times their posterior covariance. Errors
-that come back (`repetition`) make the motion no vaguer, only what many frames say of what does not move: what is left
-of the motion if that were known is that of the errors alone. Of the coefficients' covariance only the blocks near the
-diagonal are needed, since six splines are active in any frame; they come from the block-banded factor
-(`BlockBand.inverse_blocks`) and the static unknowns. They count by what is seen of the errors that they are from
-(`motion_noise`), and in moments by more where skin moves unseen (`skin_blocks`). Of the delay of the forces the whole
-distribution counts (`late_loads`): where a foot lands they change faster than it is known. Added is what of the forces
-is faster than the motion (`GroundReactions.impact`), as a moving mean square: whether it acts on the joints or is spent
-on segments that slow down is unknown.
+They combine the uncertainty of motion, body segment parameters and calibration by the delta method: analytic
+derivatives by spline coefficients and static unknowns, times their posterior covariance. Errors that recur in every
+stride (`repetition`) do not make the motion less certain, only what many frames show of unknowns that do not move: the
+residual uncertainty of the motion, given these, is due to the errors alone. Only the blocks near the diagonal of the
+coefficients' covariance are needed, since six splines are active in any frame; they come from the block-banded factor
+(`BlockBand.inverse_blocks`) and the static unknowns. They are scaled by the observed size of the underlying errors
+(`motion_noise`), in moments by more where skin motion is not observable (`skin_blocks`). The delay of the forces counts
+with its whole distribution (`late_loads`): where a foot lands they change within less than its uncertainty. The part of
+the forces that is faster than the motion (`GroundReactions.impact`) is added as a moving mean square: whether it acts
+on the joints or decelerates segments is unknown.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ from kinertia.motion.moving_windows import even_mean
 from kinertia.motion.two_threads import side_by_side
 
 _FRAMES_AT_ONCE = 100
-"""Larger arrays would leave the processor's cache."""
+"""Number of frames processed at once; larger arrays would exceed the processor's cache."""
 _LOST_KNOTS = 2.0
-"""Half of the stretch over which it is averaged, in knot intervals: one period of the cutoff."""
+"""Half of the averaging interval, in knot intervals: one period of the cutoff."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,8 +43,8 @@ class CurveDeviations:
         coordinates: (d, c) rad, m.
         moments: (d, c) of the joint moments, N m, and of the forces of translations, N.
         powers: (d, c) of joint moment times speed, W.
-        ground_forces: (d, 2, 3) of the ground reactions on right and left foot, N: of instruments put right, and of the
-            plates' own noise.
+        ground_forces: (d, 2, 3) of the ground reactions on right and left foot, N: from the instrument corrections and
+            the plates' own noise.
     """
 
     coordinates: np.ndarray
@@ -53,12 +53,12 @@ class CurveDeviations:
     ground_forces: np.ndarray
 
     def and_of(self, other: CurveDeviations) -> CurveDeviations:
-        """With what is independent of it."""
+        """Combine with other, independent standard deviations."""
         return CurveDeviations(*(np.hypot(getattr(self, f.name), getattr(other, f.name)) for f in fields(self)))
 
     @classmethod
     def filled(cls, d: int, c: int, value: float) -> CurveDeviations:
-        """Of so many frames and coordinates, with this value."""
+        """Return standard deviations of so many frames and coordinates that all have this value."""
         return cls(*(np.full(shape, value) for shape in ((d, c), (d, c), (d, c), (d, 2, 3))))
 
 
@@ -70,15 +70,16 @@ def curve_deviations(
     eliminated: Eliminated,
     root: np.ndarray,
 ) -> CurveDeviations:
-    """Posterior deviations of the curves of trial k.
+    """Compute the posterior standard deviations of the curves of trial k.
 
     Args:
         problem: of the estimate.
         k: the trial.
         coefficients, static: the estimate.
         eliminated: the trial's normal equations there, undamped.
-        root: (S, S) root of the posterior covariance of the static unknowns, as `StaticInformation` has it: rows of
-            those that root equations depend on, which come first, have as many columns that are not zero.
+        root: (S, S) root of the posterior covariance of the static unknowns, as in `StaticInformation`: the rows of
+            unknowns in the root equations, which come first, have only as many nonzero columns as there are such
+            unknowns.
     """
     basis, frames = problem.bases[k], np.flatnonzero(problem.trials[k].dynamic)
     size = (len(frames), coefficients.shape[1])
@@ -89,7 +90,7 @@ def curve_deviations(
         coefficients,
         static,
         problem.loads.reactions(k, static),
-        # errors that come back count more often only for what does not move
+        # errors that recur count more often only for what does not move
         np.sqrt(motion_noise(problem, k, coefficients, static) / problem.trials[k].repeats),
         frames,
         late_sd_s,
@@ -117,14 +118,14 @@ class _Curves:
     """The curves of a trial, whose variances are written branch by branch.
 
     Attributes:
-        problem, k, coefficients, static: as `curve_deviations` has them.
+        problem, k, coefficients, static: as in `curve_deviations`.
         reactions: loads for the joint moments.
-        shares: as `_Seen` has them.
-        frames: (d,) those that are dynamic.
-        late_sd_s: deviation of the delay of the forces.
-        grown: (d, c) times the deviations of the moments by these (`skin_blocks.block_growth`).
+        shares: as in `_Seen`.
+        frames: (d,) indices of the dynamic frames.
+        late_sd_s: standard deviation of the delay of the forces.
+        grown: (d, c) factors on the corresponding standard deviations of the moments (`skin_blocks.block_growth`).
         variance: of the curves.
-        impact: (d, c) as `MomentDerivatives` has it.
+        impact: (d, c) as in `MomentDerivatives`.
         speed: (d, c) of the coordinates.
     """
 
@@ -142,7 +143,7 @@ class _Curves:
     speed: np.ndarray
 
     def add(self, branch: Branch, root: np.ndarray, end: _EndSpread) -> None:
-        """Write what the frames of a branch have, whose splines end in a block that is this uncertain."""
+        """Write the variances in the frames of a branch, given the uncertainty of the block in which it ends."""
         for part, stretch in zip(branch.outwards(), reversed(branch.stretches), strict=True):
             spread, end = _MotionSpread.of(part, stretch, root, end)
             begin, stop = np.searchsorted(self.frames, [stretch.frames.start, stretch.frames.stop])
@@ -167,17 +168,18 @@ class _Curves:
 
 @dataclass(frozen=True)
 class _Seen:
-    """What the curves of some frames depend on.
+    """Dependence of the curves on the unknowns in some frames.
 
     Attributes:
         by: derivatives of the moments (d, c).
         speed: (d, c) of the coordinates.
         first: (d,) the first active spline.
         values: (3, d, 6) of the active splines and their first two derivatives.
-        shares: (3,) deviations of places, rates and accelerations by the markers' errors alone, over what the estimate
-            expects of them.
-        shaken: (d, c, 6 c) derivatives of the moments by the coefficients of the active splines, for what the markers'
-            errors make of the motion alone; longer where skin moves unseen (`skin_blocks.block_growth`).
+        shares: (3,) standard deviations of positions, rates and accelerations due to the markers' errors alone,
+            relative to those that the estimate expects.
+        shaken: (d, c, 6 c) derivatives of the moments by the coefficients of the active splines, for the effect of the
+            markers' errors on the motion alone; larger where skin motion is not observable
+            (`skin_blocks.block_growth`).
     """
 
     by: MomentDerivatives
@@ -205,28 +207,28 @@ class _Seen:
 
 @dataclass(frozen=True)
 class _EndSpread:
-    """How uncertain the splines of one block are: as `_MotionSpread` has it, (k, k) and (k, S)."""
+    """Uncertainty of the splines of one block, as in `_MotionSpread`: (k, k) and (k, S)."""
 
     diagonal: np.ndarray
     carried: np.ndarray
 
     @classmethod
     def of_middle(cls, middle: Factored, root: np.ndarray) -> _EndSpread:
-        """Of the block in the middle of a trial."""
+        """Compute the uncertainty of the block in the middle of a trial."""
         (diagonal,), _ = middle.band.inverse_blocks()
         return cls(diagonal, _carried(middle, root)[0])
 
 
 @dataclass(frozen=True)
 class _MotionSpread:
-    """How uncertain the coefficients of the splines that a stretch touches are, and how they go with the static
-    unknowns.
+    """Uncertainty of the spline coefficients that a time block touches, and their dependence on the static unknowns.
 
     Attributes:
         start: the first of the splines.
-        diagonal, below: blocks of SPLINES_PER_BLOCK splines (b, k, k), (b - 1, k, k) of their covariance if the static
-            unknowns were known.
-        carried: (splines, c, S) how far one deviation of each independent part of the static unknowns carries them.
+        diagonal, below: blocks of SPLINES_PER_BLOCK splines (b, k, k), (b - 1, k, k) of their covariance given the
+            static unknowns.
+        carried: (splines, c, S) their change with one standard deviation of each independent part of the static
+            unknowns.
     """
 
     start: int
@@ -238,8 +240,9 @@ class _MotionSpread:
     def of(
         cls, part: Factored, stretch: Stretch, root: np.ndarray, end: _EndSpread
     ) -> tuple[_MotionSpread, _EndSpread]:
-        """Of a stretch, with this root (S, S) of the static unknowns' covariance, and of the block with which the next
-        one ends; `end` is that of its own.
+        """Compute the uncertainty of a time block, and of the block of splines with which the next time block ends.
+
+        `root` (S, S) is the root of the static unknowns' covariance; `end` belongs to the block's own end.
         """
         carried, size = _carried(part, root, end.carried), len(root)
         diagonal, below = part.band.inverse_blocks(end.diagonal)
@@ -254,8 +257,9 @@ class _MotionSpread:
         return cls(stretch.touched.start, every, below, all_carried.reshape(-1, c, size)), other
 
     def variances(self, seen: _Seen, root: np.ndarray, into: CurveDeviations, rows: slice) -> None:
-        """Write the variances of some frames into rows of `into`; `root` (n, n) is of the static unknowns that root
-        equations depend on.
+        """Write the variances of some frames into rows of `into`.
+
+        `root` (n, n) belongs to the static unknowns that root equations depend on.
         """
         by, c, precision = seen.by, self.carried.shape[1], self.carried.dtype
         still = by.static @ root
@@ -268,14 +272,14 @@ class _MotionSpread:
             own = np.flatnonzero(seen.first == spline)
             covariance, carried = self._active(int(spline) - self.start)
             by_errors = shaken[own] @ covariance.astype(precision)
-            # how the static unknowns carry places, rates and accelerations along, and these the moments
+            # how positions, rates and accelerations change with the static unknowns, and the moments with these
             along = values[:, own].transpose(1, 0, 2).reshape(-1, 6) @ carried.reshape(6, -1)
             along = along.reshape(len(own), 3 * c, -1)
             moment = orders[own] @ along
             moment[..., : len(root)] -= still[own]
             q, qd = along[:, :c], along[:, c : 2 * c]
             each = np.arange(c)
-            blocks = covariance.reshape(6, c, 6, c)[:, each, :, each]  # (c, 6, 6) of every coordinate alone
+            blocks = covariance.reshape(6, c, 6, c)[:, each, :, each]  # (c, 6, 6) of each coordinate by itself
             place, rate = (share * value for share, value in zip(seen.shares[:2], seen.values[:2, own], strict=True))
             alone = [((one @ blocks) * one).sum(axis=-1).T for one in (place, rate)]
             together = by_errors.reshape(len(own), c, 6, c)[:, each, :, each].transpose(1, 0, 2)
@@ -288,7 +292,7 @@ class _MotionSpread:
         into.powers[rows] = speed**2 * moved[0] + value**2 * moved[1] + 2.0 * speed * value * moved[2]
 
     def _active(self, first: int) -> tuple[np.ndarray, np.ndarray]:
-        """(6 c, 6 c) covariance and (6 c, S) of the six splines from `first` on."""
+        """Return covariance (6 c, 6 c) and dependence (6 c, S) of the six splines from `first` on."""
         block, offset = divmod(first, SPLINES_PER_BLOCK)
         pair = np.block(
             [
@@ -302,8 +306,9 @@ class _MotionSpread:
 
 
 def _carried(part: Factored, root: np.ndarray, after: np.ndarray | None = None) -> np.ndarray:
-    """(b, k, S) how far one deviation of each independent part of the static unknowns carries these splines, in the
-    order of elimination; `after` (k, S) is that of the block eliminated next.
+    """Return the change (b, k, S) of these splines with one SD of each independent part of the static unknowns.
+
+    Blocks are in the order of elimination; `after` (k, S) belongs to the block eliminated next.
     """
     precision = part.border.dtype
     blocks = part.border @ root.astype(precision)

@@ -1,13 +1,13 @@
 """Eliminates the motion of a trial from its normal equations, from both ends to the middle.
 
-Stretches are assembled and eliminated in turn; each passes its contribution to the block at which it ends on. Those
-before the middle begin with the first block, those after it with the last, in a thread of their own: they meet in one
-block. Steps and the covariance of the motion need the factors again: those of the stretches beside the middle stay in
-memory, those of the others go to temporary files.
+Time blocks are assembled and eliminated in turn; each passes on its contribution to the block of splines at which it
+ends. Those before the middle start with the first block, those after it with the last, in a thread of their own: they
+meet in one block. Steps and the covariance of the motion need the factors again: those of the time blocks beside the
+middle stay in memory, the others go to temporary files.
 
-The border, which is most of the work, is in single precision. Gradients and the motion's own factor are in double, so
-that the optimum does not move; the information on what does not move loses nothing either, as long as eliminating the
-motion leaves a fair share of it: `UNSAFE`.
+The border, which is most of the work, is in single precision. Gradients and the motion's own factor are in double
+precision, so that the optimum does not change; the information on unknowns that do not move loses nothing either, as
+long as a fair share of it remains after eliminating the motion: `UNSAFE`.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ from kinertia.model.compiled import compiled
 from kinertia.motion.two_threads import side_by_side
 
 UNSAFE = 1e4
-"""Information on a static unknown with the motion known, over that with it unknown, from which on the border is in
-double precision. In measured trials it is at most 500."""
+"""Ratio of the information on a static unknown with the motion known to that with it unknown, above which the border is
+in double precision. In measured trials it is at most 500."""
 _ROWS_AT_ONCE = 2000
-"""Sums in single precision are no longer."""
+"""Longest sum in single precision."""
 
 
 @dataclass(frozen=True)
 class EndBlock:
-    """What stretches say of the block at which they end, all others eliminated.
+    """Contribution of time blocks to the block of splines at which they end, with all others eliminated.
 
     Attributes:
         diagonal: (k, k).
@@ -48,12 +48,13 @@ class EndBlock:
 
 @dataclass(frozen=True)
 class Factored:
-    """Neighbouring blocks of splines, eliminated.
+    """Eliminated neighbouring blocks of splines.
 
     Attributes:
-        splines: of the trial, in time; of fewer than the blocks have where the trial ends in one.
-        backwards: eliminated from the last to the first.
-        band: factor L of their own normal matrix, those before them eliminated; blocks in the order of elimination.
+        splines: indices in the trial, in time; fewer than the blocks hold where the trial ends in one.
+        backwards: whether they were eliminated from the last to the first.
+        band: factor L of their own normal matrix, after eliminating those before them; blocks in the order of
+            elimination.
         border: (b, k, S) L^-1 times the border, in single or double precision.
     """
 
@@ -63,7 +64,7 @@ class Factored:
     border: np.ndarray
 
     def take_off(self, information: np.ndarray) -> None:
-        """Take what eliminating these splines costs off the information (S, S) on the static unknowns."""
+        """Subtract the information (S, S) on the static unknowns that eliminating these splines costs."""
         blocks, wide, s = self.border.shape
         flat = self.border.reshape(blocks * wide, s)
         for start in range(0, len(flat), _ROWS_AT_ONCE):
@@ -71,14 +72,14 @@ class Factored:
             information -= rows.T @ rows
 
     def in_blocks(self, motion: np.ndarray) -> np.ndarray:
-        """(b, k, 1) what is given for every spline of the trial (size, c), of these."""
+        """Extract the blocks (b, k, 1) of these splines from values (size, c) of all splines of the trial."""
         blocks, wide = self.band.diagonal.shape[:2]
         flat, own = np.zeros(blocks * wide), motion[self.splines].ravel()
         flat[: len(own)] = own
         return np.ascontiguousarray(self.in_order(flat.reshape(blocks, wide, 1)))
 
     def in_order(self, blocks: np.ndarray) -> np.ndarray:
-        """Blocks (b, ...) in time, in the order of elimination; and back."""
+        """Reorder blocks (b, ...) from time to the order of elimination, or back."""
         return blocks[::-1] if self.backwards else blocks
 
 
@@ -87,13 +88,13 @@ class Branch:
     """One half of a trial, eliminated towards its middle.
 
     Attributes:
-        gradient: of its frames, before.
+        gradient: of its frames, before elimination.
         static_diagonal: (S,) diagonal of the information on the static unknowns with the motion known.
-        information: (S, S) on them with the motion unknown but for the middle.
+        information: (S, S) on them with the motion unknown except in the middle.
         stretches: in the order of elimination.
-        before: what is kept of all stretches but the last.
-        last: the one beside the middle.
-        end: what they leave to the middle.
+        before: stored factors of all time blocks but the last.
+        last: factor of the block beside the middle.
+        end: contribution to the middle.
     """
 
     gradient: Gradient
@@ -113,7 +114,7 @@ class Branch:
         precision: type[np.floating],
         stretches: Sequence[Stretch],
     ) -> Branch:
-        """Eliminate stretches in this order, backwards if the first is not the beginning of the trial."""
+        """Eliminate time blocks in this order, backwards if the first is not the beginning of the trial."""
         backwards, end, kept = stretches[0].splines.start > 0, None, KeptArrays()
         for k, stretch in enumerate(stretches):
             normal = of(stretch)
@@ -134,13 +135,13 @@ class Branch:
         return cls(whole, diagonal, information, tuple(stretches), kept, part, end)
 
     def outwards(self) -> Iterator[Factored]:
-        """What has been factored, from the middle to the end of the trial."""
+        """Yield the factors from the middle to the end of the trial."""
         yield self.last
         for k in range(len(self.stretches) - 2, -1, -1):
             yield self._kept(k)
 
     def inwards(self) -> Iterator[Factored]:
-        """The same from the end of the trial to the middle."""
+        """Yield the factors from the end of the trial to the middle."""
         for k in range(len(self.stretches) - 1):
             yield self._kept(k)
         yield self.last
@@ -151,8 +152,10 @@ class Branch:
         return Factored(_eliminated(self.stretches[k], backwards), backwards, BlockBand(diagonal, below), border)
 
     def forward(self, right: np.ndarray) -> tuple[list[np.ndarray], np.ndarray, np.ndarray]:
-        """L^-1 times a right-hand side (size, c) of the motion, per stretch (b, k, 1); what it takes of that of the
-        static unknowns (S,), and of that of the middle block (k, 1).
+        """Apply L^-1 to a right-hand side (size, c) of the motion; return it per time block (b, k, 1).
+
+        The other two results are what is to be subtracted from the right-hand sides of the static unknowns (S,) and of
+        the middle block (k, 1).
         """
         solved, lost, carried = [], np.zeros(len(self.information)), np.zeros((len(self.end.diagonal), 1))
         for part in self.inwards():
@@ -165,8 +168,9 @@ class Branch:
         return solved, lost, carried
 
     def step(self, solved: Sequence[np.ndarray], static: np.ndarray, middle: np.ndarray, into: np.ndarray) -> None:
-        """Write the step of its splines into that of the motion (size, c), for a step (S,) of the static unknowns and
-        one (k, 1) of the middle block.
+        """Write the step of the branch's splines into that of the motion (size, c).
+
+        `static` (S,) is the step of the static unknowns, `middle` (k, 1) the step of the middle block.
         """
         after = middle
         for part, motion in zip(self.outwards(), reversed(solved), strict=True):
@@ -175,13 +179,13 @@ class Branch:
 
 @dataclass(frozen=True)
 class Eliminated:
-    """A trial with its motion eliminated.
+    """A trial whose motion has been eliminated.
 
     Attributes:
-        gradient: of the whole trial, before.
+        gradient: of the whole trial, before elimination.
         static_diagonal: (S,) diagonal of the information on the static unknowns with the motion known.
         information: (S, S) on them with the motion unknown (Schur complement).
-        branches: the trial's halves; one of a very short trial.
+        branches: the trial's halves; a single one for a very short trial.
         middle: the block between them.
     """
 
@@ -199,12 +203,12 @@ class Eliminated:
         done: Callable[[NormalEquations], None],
         damping: float,
     ) -> Eliminated:
-        """Eliminate the motion.
+        """Eliminate the motion of a trial.
 
         Args:
-            stretches: of the trial.
-            of: makes the normal equations of one.
-            done: told when they are no longer needed.
+            stretches: time blocks of the trial.
+            of: makes the normal equations of one block.
+            done: called with them when they are no longer needed.
             damping: share by which the motion's diagonal is raised.
         """
         result = cls._of(stretches, partial(Branch.of, of, done, damping, np.float32))
@@ -232,8 +236,9 @@ class Eliminated:
         return cls(whole, known, information, branches, middle)
 
     def forward(self, right: np.ndarray) -> tuple[list[list[np.ndarray]], np.ndarray]:
-        """L^-1 times a right-hand side (size, c) of the motion, per branch and stretch (b, k, 1), then of the middle;
-        and what it takes of the right-hand side of the static unknowns (S,).
+        """Apply L^-1 to a right-hand side (size, c) of the motion, per branch and block (b, k, 1), then the middle.
+
+        The second result is what is to be subtracted from the right-hand side of the static unknowns (S,).
         """
         halves = side_by_side(lambda branch: branch.forward(right), self.branches)
         flat = self.middle.in_blocks(right) - sum(carried for _, _, carried in halves)
@@ -242,7 +247,7 @@ class Eliminated:
         return [*(solved for solved, _, _ in halves), [middle]], lost
 
     def motion_step(self, solved: Sequence[Sequence[np.ndarray]], static: np.ndarray) -> np.ndarray:
-        """(size, c) step of the motion for a step (S,) of the static unknowns; `solved` is what `forward` gives."""
+        """Return the motion's step (size, c) for a step (S,) of the static unknowns; `solved` is from `forward`."""
         result = np.empty_like(self.gradient.right)
         *halves, (middle,) = solved
         (block,) = write_step(self.middle, middle, static, result)
@@ -253,7 +258,7 @@ class Eliminated:
 
 
 def taken(part: Factored, motion: np.ndarray) -> np.ndarray:
-    """(S,) what L^-1 times the motion's right-hand side takes of that of the static unknowns."""
+    """Return what L^-1 times the motion's right-hand side subtracts from that of the static unknowns (S,)."""
     rows = part.border.reshape(motion.size, part.border.shape[2])
     result: np.ndarray = motion.ravel().astype(rows.dtype) @ rows
     return result
@@ -262,8 +267,9 @@ def taken(part: Factored, motion: np.ndarray) -> np.ndarray:
 def write_step(
     part: Factored, motion: np.ndarray, static: np.ndarray, into: np.ndarray, after: np.ndarray | None = None
 ) -> np.ndarray:
-    """Write the step of some splines into that of the motion (size, c), and return it as blocks (b, k, 1) in the order
-    of elimination; `after` (k, 1) is that of the block eliminated next.
+    """Write the step of some splines into that of the motion (size, c), and return it as blocks (b, k, 1).
+
+    Blocks are in the order of elimination; `after` (k, 1) is the step of the block eliminated next.
     """
     rows = part.border @ static.astype(part.border.dtype)
     step = part.band.backward(motion - rows[..., None], after, in_place=True)
@@ -280,16 +286,16 @@ def factored(
     precision: type[np.floating],
     backwards: bool = False,
 ) -> tuple[Factored, EndBlock]:
-    """Eliminate the splines that a stretch touches, all but the last block, or but the first if `backwards`.
+    """Eliminate the splines that a time block touches, all but the last block, or all but the first if `backwards`.
 
     Args:
         normal: its normal equations.
         damping: share by which their diagonal is raised.
-        carried: what the stretches before it leave to the block with which this begins.
+        carried: contribution of the time blocks before it to the block with which this one begins.
         precision: of the border.
     """
     size, c, s = normal.border.shape
-    # where the trial ends one block more than just fits, so that six active splines always lie in two
+    # at the end of the trial one block more than just fits, so that six active splines always lie in two
     count = size // SPLINES_PER_BLOCK + (1 if stretch.is_last else 0)
     diagonal, below = _blocks(normal.band, count, damping, backwards)
     border = np.zeros((count * SPLINES_PER_BLOCK, c, s), precision)
@@ -308,7 +314,7 @@ def factored(
 
 
 def _eliminated(stretch: Stretch, backwards: bool) -> slice:
-    """The splines of all blocks that a stretch touches but the last, or but the first if `backwards`."""
+    """Return the splines of all blocks that a time block touches but the last, or but the first if `backwards`."""
     start, stop = stretch.touched.start, stretch.touched.stop
     if backwards:
         return slice(start + SPLINES_PER_BLOCK, stop)
@@ -318,8 +324,9 @@ def _eliminated(stretch: Stretch, backwards: bool) -> slice:
 
 @compiled
 def _blocks(band: np.ndarray, count: int, damping: float, backwards: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Diagonal blocks (b, k, k), k = c SPLINES_PER_BLOCK, and those below (b - 1, k, k), from the first to the last or
-    backwards; ones where the band ends.
+    """Return diagonal blocks (b, k, k), k = c SPLINES_PER_BLOCK, and the blocks below them (b - 1, k, k).
+
+    They run from the first to the last or backwards; diagonal elements are one beyond the end of the band.
     """
     size, wide, c, _ = band.shape
     each = SPLINES_PER_BLOCK

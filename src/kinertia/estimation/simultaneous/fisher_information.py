@@ -1,8 +1,8 @@
-"""Predicts error bars before any estimate: what trials tell at a given motion and body.
+"""Predicts the uncertainty of an estimate before it is made, from the trials at a given motion and body.
 
-The information of the simultaneous estimate (`simultaneous`) does not depend on the data but through the point at which
-it is taken. Taken at the literature's parameters it says beforehand what a recording will show; taken at the truth it
-is the Cramér-Rao bound of the estimator's own noise model, prior included.
+The information of the simultaneous estimate (`simultaneous`) depends on the data only through the point at which it is
+evaluated. At the literature's parameters it predicts what a recording will determine; at the truth it is the Cramér-Rao
+bound of the estimator's own noise model, prior included.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ from kinertia.model.bsp import block_diagonal
 from kinertia.model.log_cholesky import table_jacobian
 
 _ROUNDS = 3
-"""Each settles the instruments' priors at what the last left of them."""
+"""Iterations, each of which sets the instruments' priors to the posterior of the one before."""
 
 
 @dataclass(frozen=True, eq=False)
 class Information:
-    """What each of several trials of a person tells of parameters and calibration, and what the prior tells.
+    """Information of several trials of a person, and of the prior, on parameters and calibration.
 
     Attributes:
-        problem: at whose start it is taken: the observations' coordinates, the prior's mean. Of observations as they
-            are alone (`observation.Observations`): repeats are counted here.
-        repeats: (t, t) how often the errors of each trial come back in each (`repetition.repeats`).
+        problem: the estimate at whose start it is evaluated: the observations' coordinates, the prior's mean. It holds
+            each trial's own observations (`observation.Observations`): repeats are counted here.
+        repeats: (t, t) how often the errors of each trial recur in each (`repetition.repeats`).
     """
 
     problem: MapProblem
@@ -40,18 +40,18 @@ class Information:
 
     @cached_property
     def of_trials(self) -> tuple[np.ndarray, ...]:
-        """Per trial (S, S) information on the static unknowns, motion eliminated."""
+        """Information (S, S) of each trial on the static unknowns, with the motion eliminated."""
         problem = self.problem
         trials = (problem.eliminated(k, start, problem.layout.start) for k, start in enumerate(problem.start))
         return tuple(trial.information for trial in trials)
 
     @cached_property
     def of_prior(self) -> np.ndarray:
-        """(S, S) information of all priors but the instruments'."""
+        """Information (S, S) of all priors but the instruments'."""
         return self.problem.prior_information(self.problem.layout.start)
 
     def root(self, trials: Iterable[int]) -> np.ndarray:
-        """R (10 s, S) with covariance R R^T of the body segment parameters that these trials together would leave."""
+        """Return R (10 s, S), where R R^T is the covariance of body segment parameters after these trials together."""
         chosen = list(trials)
         counts = self.repeats[np.ix_(chosen, chosen)].sum(axis=1)
         layout, information = self.problem.layout, self.of_prior.copy()
@@ -66,7 +66,7 @@ class Information:
         return result
 
     def _of_instruments(self, rest: np.ndarray) -> np.ndarray:
-        """(n, n) information of the instruments' priors where the data, of which the rest tells, show them sound."""
+        """Return the information (n, n) of instrument priors if data, with information `rest`, show them fault-free."""
         priors, places = self.problem.layout.error_priors, self.problem.layout.errors
         gaussian, result = GaussianPrior.of(priors), np.zeros_like(rest)
         for _ in range(_ROUNDS):
@@ -77,6 +77,6 @@ class Information:
         return result
 
     def sd(self, trials: Iterable[int]) -> np.ndarray:
-        """(s, 10) deviations of the body segment parameters that these trials together would leave."""
+        """Return standard deviations (s, 10) of the body segment parameters after these trials together."""
         result: np.ndarray = np.linalg.norm(self.root(trials), axis=1).reshape(-1, 10)
         return result

@@ -33,31 +33,31 @@ from kinertia.motion.kinematics import Kinematics
 from kinertia.motion.single_blas_thread import one_blas_thread
 
 _STAYING_SD_M = 1e-4
-"""At least, of markers that stay where a model has them."""
+"""Least standard deviation of markers that are fixed in the model."""
 TRUNK_PLACE_SD_M = 0.08
-"""Of the virtual markers of a trunk that nobody sees: it may lean by 6 degrees all the time."""
+"""Standard deviation of the virtual markers of a trunk without markers: it may lean by 6 degrees throughout."""
 _VIRTUAL_TRUNK = [marker.label for marker in VIRTUAL_TRUNK]
 
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
-    """What the simultaneous estimate says beyond the estimate itself.
+    """Uncertainty and calibration found by the simultaneous estimate, besides the estimate itself.
 
     Attributes:
-        prior_sd, sd: (s, 10) deviations of the body segment parameters before and after, in the table's order.
+        prior_sd, sd: (s, 10) standard deviations of the body segment parameters before and after, in the table's order.
         covariance: (10 s, 10 s) posterior covariance of the table rows, segment after segment.
-        calibration: joints, instruments and trunk, each quantity with its deviations.
+        calibration: quantities of joints, instruments and trunk, each with its standard deviations.
         marker_noise: per trial.
         iterations: Gauss-Newton steps.
-        base: which combinations of parameters these motions show, and which none ever shows.
-        instruments: what these trials say of plates and clock.
-        prior_mean: of the body segment parameters; None in files of before, where it was not written.
-        unlikeness: how far the estimate is from the prior; None in files of before.
-        free_moment_sign: what was found of it; None where there was nothing to ask.
-        marker_distances_m: per trial, how far each marker is from where it is in the nearest of the other trials; of
-            those that no other trial shows nothing.
-        down_weighted: per trial, the share of its measured frames that impacts leave less weight.
-        draws: of motion, parameters and calibration together; None in files of before.
+        base: combinations of parameters that these motions determine, and those that no motion determines.
+        instruments: information of these trials on plates and synchronisation.
+        prior_mean: of the body segment parameters; None in older files, which lack it.
+        unlikeness: distance of the estimate from the prior; None in older files.
+        free_moment_sign: evidence on the sign; None if it was not tested.
+        marker_distances_m: per trial, distance of each marker from its position in the nearest of the other trials, for
+            markers that other trials have.
+        down_weighted: per trial, the share of its measured frames that have less weight because of impact transients.
+        draws: of motion, parameters and calibration together; None in older files.
 
     Examples:
         >>> fit.posterior.sd.shape, bool((fit.posterior.sd <= fit.posterior.prior_sd * 1.0001).all())
@@ -81,30 +81,30 @@ class Posterior:
 
     @property
     def instrument_errors(self) -> tuple[CalibrationEntry, ...]:
-        """What `calibration` has of plates and synchronisation."""
+        """Entries of `calibration` for plates and synchronisation."""
         return tuple(one for one in self.calibration if one.of_instrument)
 
     @property
     def information(self) -> np.ndarray:
-        """(s, 10): 1 - posterior variance / prior variance; 0 nothing learnt, 1 everything; NaN for segments held."""
+        """Variance reduction (s, 10), 1 - posterior / prior variance: 0 none, 1 complete, NaN for fixed segments."""
         known = self.prior_sd > 0
         return np.where(known, 1.0 - np.square(self.sd / np.where(known, self.prior_sd, 1.0)), np.nan)
 
 
 @dataclass(frozen=True, eq=False)
 class SimultaneousFit:
-    """Outcome of `fit_simultaneous`.
+    """Result of `fit_simultaneous`.
 
     Attributes:
         result: of the estimator.
-        bsp: all segments, those that are held included.
+        bsp: all segments, including those that are not estimated.
         skeleton: with the estimated marker positions and static coordinates.
-        skeletons: the same per trial, with the markers where they are in it.
-        posterior: deviations and calibration.
-        motions: per trial, at the frames of its measured window.
-        courses: per trial, (f, c) coordinates of all frames from the first to the last of these: markers show the
-            motion between measured stretches, too.
-        foot_loads: per trial (w, 2, 6) at the corrected place and time, of the motion's bandwidth.
+        skeletons: the same per trial, with the trial's marker positions.
+        posterior: standard deviations and calibration.
+        motions: per trial, at the frames of its measured windows.
+        courses: per trial, (f, c) coordinates of all frames from the first to the last of these, since markers also
+            show the motion between measured windows.
+        foot_loads: per trial (w, 2, 6), corrected in position and time, at the motion's bandwidth.
     """
 
     result: SimultaneousResult
@@ -135,12 +135,12 @@ def fit_simultaneous(
         skeleton: calibrated.
         prior: of the body segment parameters, and the total mass of its segments by the scale.
         trials: kinematics of the trials.
-        bandwidths: per trial, of motion and forces; found from the trials if None.
-        uncertainty: what may move beside these segments.
-        progress: told the share of the estimate that is done, roughly.
-        otherwise: the same trials with other ground reactions, of which it is asked how likely they are beside
+        bandwidths: per trial, of motion and forces; derived from the trials if None.
+        uncertainty: what else may change, and which segments are fixed.
+        progress: called with the approximate share of the estimate that is done.
+        otherwise: the same trials with other ground reactions, whose evidence is computed for comparison
             (`SimultaneousResult.evidence`).
-        functional: kinematics of trials whose markers alone are used; the outcome has none of them.
+        functional: kinematics of trials whose markers alone are used; they are not in the result.
         terms: of the cost.
     """
     every = [*trials, *functional]
@@ -195,9 +195,7 @@ def fit_simultaneous(
 
 
 def held_against(fitted: SimultaneousFit, other: SimultaneousFit) -> SimultaneousFit:
-    """The same, where another reading of the same trials is as likely: errors that only one of both supports are
-    contradicted.
-    """
+    """Mark errors that only one of two equally likely interpretations of the trials supports as contradicted."""
     elsewhere = {one.key: one.supported for one in other.posterior.calibration}
     calibration = tuple(
         replace(one, contradicted_by=OTHER_SIGN) if one.supported and not elsewhere[one.key] else one
@@ -207,7 +205,7 @@ def held_against(fitted: SimultaneousFit, other: SimultaneousFit) -> Simultaneou
 
 
 def used_skeleton(skeleton: Skeleton, trials: Sequence[Kinematics], uncertainty: ModelUncertainty) -> Skeleton:
-    """The skeleton with the markers that any of the trials shows, and the segments that are held."""
+    """Return the skeleton with the markers that any of the trials has, and with the segments that are fixed."""
     shown = {label for k in trials for label in k.ik.labels}
     used = skeleton.with_markers([marker for marker in skeleton.markers if marker.label in shown])
     return used.carrying(uncertainty.held)
@@ -220,17 +218,18 @@ def observed(
     bandwidths: Sequence[Bandwidth],
     uncertainty: ModelUncertainty,
 ) -> Observations:
-    """What the estimate sees of trials of a `used_skeleton`."""
+    """Return the observations that the estimate uses, from trials of a `used_skeleton`."""
     return observe(skeleton, trials, prior.mass_kg + uncertainty.held_kg, bandwidths)
 
 
 def calibration_prior(
     skeleton: Skeleton, uncertainty: ModelUncertainty = GAIT27_UNCERTAINTY, misplaced_m: np.ndarray | float = 0.0
 ) -> CalibrationPrior:
-    """How far a calibrated skeleton with these markers, plates and clock may be off.
+    """Build the prior of the calibration of a skeleton with these markers, plates and synchronisation.
 
-    Markers that stay where a model has them are off by as much as they are found to be (`misplaced_m`): taken as exact,
-    they would hold the motion in poses that the forces contradict. A trunk that no marker shows may lean all the time.
+    Markers that are fixed in the model may be displaced by as much as they are observed to be (`misplaced_m`): taken as
+    exact, they would force the motion into poses that the forces contradict. A trunk without markers may lean
+    throughout.
     """
     known = uncertainty.marker_sd_m
     each = np.maximum(misplaced_m, _STAYING_SD_M) if known is None else known
@@ -240,7 +239,7 @@ def calibration_prior(
 
 
 def _marker_distances(result: SimultaneousResult, trials: Sequence[Kinematics]) -> tuple[dict[str, float], ...]:
-    """Per trial how far each marker is from where it is in the nearest of the other trials, m."""
+    """Return, per trial, the distance (m) of each marker from its position in the nearest of the other trials."""
     labels = result.skeleton.labels
     shown = np.array([np.isin(labels, k.ik.labels) for k in trials])
     places = np.where(shown[..., None], result.displacements_m, np.nan)

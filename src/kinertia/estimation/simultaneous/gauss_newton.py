@@ -1,4 +1,4 @@
-"""Builds the Gauss-Newton quadratic of the cost at one point: which step answers a gradient."""
+"""Builds the Gauss-Newton quadratic of the cost at one point, and solves it for steps."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ class GaussNewton:
     Attributes:
         problem: of the estimate.
         here: the point.
-        displaced: per trial what it says of the static unknowns, displacements eliminated.
+        displaced: per trial its information on the static unknowns, displacements eliminated.
         rest: (S, S) information on the static unknowns, all else eliminated, without the instruments' priors.
-        static: the same, eliminated to those that root equations depend on; with these priors.
+        static: the same, eliminated to the unknowns in the root equations; with the instruments' priors.
     """
 
     problem: MapProblem
@@ -34,7 +34,7 @@ class GaussNewton:
 
     @classmethod
     def of(cls, problem: MapProblem, here: Linearised, held: np.ndarray | float = 0.0) -> GaussNewton:
-        """At a point, with the diagonal of the information on the static unknowns raised by this much (S,)."""
+        """Build it at a point, with the diagonal of the information on the static unknowns raised by `held` (S,)."""
         places, information = problem.layout.displaced, here.information.copy()
         trials = zip(here.trials, problem.displaced_sd, strict=True)
         displaced = tuple(Displaced.of(trial.information, places, sd) for trial, sd in trials)
@@ -45,13 +45,13 @@ class GaussNewton:
         return cls(problem, here, displaced, rest, rest)
 
     def under(self, instruments: GaussianPrior) -> GaussNewton:
-        """With this Gaussian for the instruments."""
+        """Return the quadratic with this Gaussian for the instruments."""
         places, first = self.problem.layout.errors, self.rest.first.copy()
         first[places, places] += instruments.precision
         return replace(self, static=replace(self.rest, first=first))
 
     def step(self, right: np.ndarray) -> np.ndarray:
-        """The step of all unknowns for a right-hand side, both as `Point.vector` has them."""
+        """Solve for the step of all unknowns; it and the right-hand side are ordered as in `Point.vector`."""
         pull = self.here.point.like(right)
         static, solved, rests = pull.static.copy(), [], []
         places, sds = self.problem.layout.displaced, self.problem.displaced_sd
@@ -71,7 +71,7 @@ class GaussNewton:
         return np.concatenate([*(motion.ravel() for motion in motions), step, *moved])
 
     def of_instruments(self, point: Point, step: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Posterior mean (k,) and covariance (k, k) of the instruments, if a step leads from a point to the optimum."""
+        """Return posterior mean (k,) and covariance (k, k) of the instruments, given the step to the optimum."""
         places = self.problem.layout.errors
         mean = (point.static + point.like(step).static)[places]
         return mean, np.linalg.inv(self.static.first)[places, places]
@@ -79,10 +79,10 @@ class GaussNewton:
 
 @dataclass(frozen=True, eq=False)
 class MotionAlone:
-    """The same with all that does not move held.
+    """The Gauss-Newton quadratic of the motions alone, with everything that does not move fixed.
 
     Attributes:
-        point: where.
+        point: where it is built.
         trials: with their motions eliminated, without information on anything else.
     """
 
@@ -91,16 +91,16 @@ class MotionAlone:
 
     @classmethod
     def of(cls, problem: MapProblem, point: Point, damping: float) -> MotionAlone:
-        """At a point, with the diagonal of the information on the motions raised by this share."""
+        """Build it at a point, with the diagonal of the information on the motions raised by this share."""
         rows = [(k, part, problem.in_trial(k, point)) for k, part in enumerate(point.coefficients)]
         return cls(point, tuple(problem.eliminated(*row, damping, bordered=False) for row in rows))
 
     def under(self, instruments: GaussianPrior) -> MotionAlone:
-        """With this Gaussian for the instruments: the motion does not know of it."""
+        """Return it unchanged: the instruments' Gaussian does not concern the motion."""
         return self
 
     def step(self, right: np.ndarray) -> np.ndarray:
-        """The step of all unknowns for a right-hand side; of the motions alone."""
+        """Solve for the step of the motions alone; the steps of all other unknowns are zero."""
         pull = self.point.like(right)
         trials = zip(self.trials, pull.coefficients, strict=True)
         motions = [trial.motion_step(trial.forward(own)[0], np.zeros(0)).ravel() for trial, own in trials]

@@ -1,4 +1,4 @@
-"""Holds the inputs of the simultaneous estimate, and the person's model as its unknowns have it."""
+"""Holds the input of the simultaneous estimate, and the person's model as a function of its unknowns."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ BSP, STILL, PLACES, SKIN = "bsp", "static coordinates", "marker places", "skin"
 
 @dataclass(frozen=True, eq=False)
 class Given:
-    """Recordings of a person and what is known before.
+    """Recordings of a person and prior knowledge.
 
     Attributes:
         skeleton: calibrated.
         prior: of the body segment parameters.
         calibration: priors of everything else that does not move.
-        trials: as the estimate sees them.
-        phase: share of an interval by which knots of the motion's splines lie earlier.
+        trials: observations of each trial.
+        phase: share of an interval by which the knots of the motion's splines are earlier.
     """
 
     skeleton: Skeleton
@@ -42,17 +42,17 @@ class Given:
 
     @cached_property
     def free(self) -> Skeleton:
-        """The skeleton with static coordinates free."""
+        """The skeleton with its static coordinates freed."""
         return self.skeleton.free(self.calibration.coordinates)
 
     @cached_property
     def moving(self) -> np.ndarray:
-        """Indices of its coordinates that move in time."""
+        """Indices in the freed skeleton of the coordinates that change over time."""
         return self._columns(self.skeleton.coordinates)
 
     @cached_property
     def still(self) -> np.ndarray:
-        """Indices of its coordinates that do not."""
+        """Indices in the freed skeleton of the coordinates that do not change over time."""
         return self._columns(tuple(self.calibration.coordinates))
 
     def _columns(self, coordinates: Sequence[str]) -> np.ndarray:
@@ -61,17 +61,17 @@ class Given:
 
     @cached_property
     def bases(self) -> tuple[MotionBasis, ...]:
-        """Splines of every trial's motion."""
+        """Spline bases of every trial's motion."""
         return tuple(MotionBasis(trial.time, trial.spacing_s, self.phase) for trial in self.trials)
 
     @cached_property
     def start(self) -> tuple[np.ndarray, ...]:
-        """Per trial the coefficients where its motion begins."""
+        """Spline coefficients from which the search starts, per trial."""
         return tuple(basis.fit(trial.q) for basis, trial in zip(self.bases, self.trials, strict=True))
 
     @cached_property
     def skin(self) -> tuple[SkinPatterns, ...]:
-        """Per trial what the skin may follow."""
+        """Patterns that skin motion may follow, per trial."""
         count = len(self.skeleton.markers)
         return tuple(trial.skin or SkinPatterns.none(len(trial.time), count) for trial in self.trials)
 
@@ -82,17 +82,17 @@ class Given:
 
     @cached_property
     def grounds(self) -> tuple[FootPlates, ...]:
-        """Ground reactions of every trial, which count `plates`."""
+        """Ground reactions of every trial, with plates numbered as in `plates`."""
         return tuple(trial.ground.among(self.plates) for trial in self.trials)
 
 
 @dataclass(frozen=True, eq=False)
 class FreedModel:
-    """Skeleton and body segment parameters for static unknowns (S,).
+    """Skeleton and body segment parameters as a function of the static unknowns (S,).
 
     Attributes:
-        given: to the estimate.
-        layout: of the unknowns.
+        given: input of the estimate.
+        layout: order of the unknowns.
     """
 
     given: Given
@@ -100,30 +100,30 @@ class FreedModel:
 
     @property
     def segments(self) -> tuple[str, ...]:
-        """That are estimated."""
+        """Names of the estimated segments."""
         return self.given.prior.mean.segments
 
     def bsp(self, static: np.ndarray) -> BodySegmentParameters:
-        """Body segment parameters."""
+        """Return the body segment parameters."""
         return from_log_cholesky(self.segments, static[self.layout[BSP]])
 
     def placed(self, static: np.ndarray) -> Skeleton:
-        """The freed skeleton with its markers where they are."""
+        """Return the freed skeleton with its estimated marker positions."""
         return self.given.free.with_places(static[self.layout[PLACES]].reshape(-1, 3))
 
     def locked(self, static: np.ndarray) -> Skeleton:
-        """The skeleton, calibrated by the unknowns."""
+        """Return the skeleton as calibrated by the unknowns."""
         values = static[self.layout[STILL]].tolist()
         markers = self.placed(static).markers
         locked = dict(zip(self.given.calibration.coordinates, values, strict=True))
         return self.given.skeleton.with_markers(markers).lock(locked)
 
     def skin(self, k: int, static: np.ndarray, frames: slice) -> tuple[SkinPatterns, np.ndarray]:
-        """What the skin follows in these frames of trial k, and the coefficients."""
+        """Return the patterns of skin motion in these frames of trial k, and their coefficients."""
         return self.given.skin[k].cut(frames), static[self.layout[SKIN]]
 
     def full(self, parts: Sequence[np.ndarray], static: np.ndarray) -> list[np.ndarray]:
-        """Coordinates and derivatives of the freed skeleton: the static ones do not move."""
+        """Return coordinates and derivatives of the freed skeleton; static coordinates have zero derivatives."""
         result = []
         for order, part in enumerate(parts):
             every = np.zeros((len(part), len(self.given.free.coordinates)))

@@ -1,11 +1,11 @@
-"""Finds where ground reactions change faster than the motion can, and weighs them less there.
+"""Detects where ground reactions change faster than the motion can follow, and gives these frames less weight.
 
-When a foot lands, soft parts of the body swing after its bones, and the sum of the forces has a part that splines of
-the motion's bandwidth cannot make. Which of it they can make depends on where the landing lies between two knots. Taken
-as sure as in other frames, these frames would pull the motion about, and the clock to where the landing suits the
-knots: of a walk whose forces were moved in steps, the clock followed in jumps of a knot interval, tens of deviations
-wide, and with the wrong sign as often as not. With these frames counting less, three of the nine parameters that
-contradicted the literature in thirteen measured trials do so no more.
+When a foot lands, soft tissue swings after the bones, and the sum of the forces has a part that splines of the motion's
+bandwidth cannot reproduce. Which part they can reproduce depends on where the landing lies between two knots. With full
+weight, these frames would distort the motion, and shift the synchronisation delay to where the landing suits the knots:
+for a walk whose forces were shifted in steps, the delay followed in jumps of a knot interval, tens of standard
+deviations wide, and with the wrong sign as often as not. With less weight for these frames, three of the nine
+parameters that contradicted the literature in thirteen measured trials no longer do.
 """
 
 from __future__ import annotations
@@ -17,30 +17,30 @@ from kinertia.motion.moving_windows import greatest
 from kinertia.trial.sampled_time import runs
 
 _BESIDE = 2.0
-"""What a body with soft parts does otherwise than rigid segments, over what is beyond the bandwidth: it does not end
-there. Set here: with it the clock of two measured walks follows when their forces are moved, with 1 it jumps, and with
-4 a clock that is off is taken for a plate that is."""
+"""Ratio of the difference between a soft body and rigid segments to what is beyond the bandwidth, since the difference
+does not end there. Chosen here: with it the estimated delay of two measured walks follows when their forces are
+shifted, with 1 it jumps, and with 4 a delay is attributed to a plate."""
 _PHASES = 4
-"""Ways for the knots to lie, over which what the splines leave is averaged."""
+"""Number of knot positions over which the residual of the splines is averaged."""
 _FEWEST_FRAMES = 8
 _LESS_WEIGHT = 2.0
-"""Times the deviation of other frames from which on a frame counts a quarter or less."""
+"""Ratio to the standard deviation of other frames above which a frame has at most a quarter of the weight."""
 
 
 def impact_factors(
     time: np.ndarray, force: np.ndarray, dynamic: np.ndarray, spacing_s: float, force_sd: float
 ) -> np.ndarray:
-    """(n,) by how much the deviations of the root residual are larger because of what the motion cannot follow.
+    """Return the factors (n,) by which the SD of the root residual is larger because of what the motion cannot follow.
 
-    The acceleration of a quintic spline is a cubic one with the same knots: what such splines leave of the force counts
-    as an error of it, in the frames within half a knot interval.
+    The acceleration of a quintic spline is a cubic spline with the same knots: what such splines leave of the force
+    counts as its error, in the frames within half a knot interval.
 
     Args:
         time: (n,) s, of the frames.
-        force: (n, 3) N, sum of the ground reactions, of the motion's bandwidth.
+        force: (n, 3) N, sum of the ground reactions, at the motion's bandwidth.
         dynamic: (n,) frames whose root residual counts.
         spacing_s: of the motion's knots.
-        force_sd: of the root residual elsewhere, N.
+        force_sd: standard deviation of the root residual elsewhere, N.
 
     >>> time = np.arange(100) / 100
     >>> push = 700.0 + 300.0 * np.exp(-(((time - 0.5) / 0.01) ** 2))
@@ -62,17 +62,17 @@ def impact_factors(
 
 
 def down_weighted(factors: np.ndarray) -> float:
-    """Share of the frames (n,) that count a quarter or less for these factors of their deviations."""
+    """Return the share of the frames (n,) that have at most a quarter of the weight with these factors."""
     return float((factors >= _LESS_WEIGHT).mean()) if len(factors) else 0.0
 
 
 def _left(time: np.ndarray, force: np.ndarray, spacing_s: float) -> np.ndarray:
-    """(n,) N, root mean square over axes and ways for the knots to lie of what cubic splines leave of the force."""
+    """Return the RMS (n,) N, over axes and knot positions, of the residual of the force from cubic splines."""
     square = np.zeros(len(time))
     for phase in (np.arange(_PHASES) + 0.5) / _PHASES:
         inner = np.arange(time[0] + phase * spacing_s, time[-1], spacing_s)
         knots = np.concatenate([[time[0]] * 4, inner[inner < time[-1]], [time[-1]] * 4])
-        # knots this even keep normal equations well conditioned; scipy's QR takes time that grows with the square
+        # knots this even keep normal equations well conditioned; the time of scipy's QR grows with the square
         spline = make_lsq_spline(time, force, knots, k=3, method="norm-eq")
         square += np.square(force - spline(time)).mean(axis=1) / _PHASES
     return np.sqrt(square)

@@ -1,10 +1,10 @@
-"""Lists plate and synchronisation errors that were corrected, with what supports an accusation.
+"""Lists plate and synchronisation errors that were corrected, and whether the instrument is the likely cause.
 
-Of any error beyond two prior and two posterior deviations the instrument is the likely cause only where it also moves
-a joint moment beyond that moment's own error bar and is contradicted by nobody (`instrument_support`). It may as well
-be the model's else.
+For an error beyond two prior and two posterior standard deviations the instrument is the likely cause only if the error
+also changes a joint moment by more than the moment's own uncertainty and no other estimate contradicts it
+(`instrument_support`). Otherwise the model may as well be the cause.
 
-The estimate solves for what puts positions, gains and free moments right. Here all become errors, recorded minus true.
+The estimate solves for corrections of positions, gains and free moments. Here all become errors, recorded minus true.
 """
 
 from __future__ import annotations
@@ -42,23 +42,23 @@ _QUANTITIES = {
     "zero x": (ZERO, "x"),
     "zero z": (ZERO, "z"),
 }
-"""Quantity and axis by unknown of the estimate."""
+"""Quantity and axis of each unknown of the estimate."""
 _UNITS = {**PLATE_ERRORS, **ZERO_UNKNOWNS}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class FoundErrors:
-    """Values that the estimate solved for, and their posterior deviations.
+    """Values that the estimate solved for, with their posterior standard deviations.
 
     Attributes:
-        plates: per plate what is wrong with it (5,), in the order of PLATE_ERRORS, and the posterior deviations (5,).
-        clock_s: the time offset and its posterior deviation, s.
-        delays_s: per trial how much later its forces are than by the clock of all, and the posterior deviation, s; none
-            of a single trial whose clock has been checked.
-        zeros_n: per trial, per plate what it reads too much (2,), in the order of ZERO_UNKNOWNS, and the posterior
+        plates: per plate its errors (5,), in the order of PLATE_ERRORS, and their posterior standard deviations (5,).
+        clock_s: the synchronisation delay and its posterior standard deviation, s.
+        delays_s: per trial the additional delay of its forces, and its posterior standard deviation, s; none for a
+            single trial whose synchronisation has been checked.
+        zeros_n: per trial and plate the zero offsets (2,), in the order of ZERO_UNKNOWNS, and their posterior standard
             deviations (2,).
-        gains: per trial, per plate its whole gain in it, and the posterior deviation.
-        instruments: what these trials say of plates and clock.
+        gains: per trial and plate the total gain in the trial, and its posterior standard deviation.
+        instruments: information of these trials on plates and synchronisation.
     """
 
     plates: dict[str, tuple[np.ndarray, np.ndarray]]
@@ -70,7 +70,7 @@ class FoundErrors:
 
 
 class Solved(NamedTuple):
-    """An entry, with the place of its unknown among all instruments' and the value that the estimate solved for."""
+    """An entry, with the index of its unknown among all instruments' and the value that the estimate solved for."""
 
     place: int
     value: float
@@ -84,14 +84,14 @@ def instrument_errors(
     support: tuple[np.ndarray, np.ndarray],
     own_place: int,
 ) -> tuple[CalibrationEntry, ...]:
-    """All errors of instruments, found or not, each with its support.
+    """List all errors of instruments, significant or not, each with its support.
 
     Args:
-        found: by the estimator.
-        prior: what was known of the instruments before.
+        found: values from the estimator.
+        prior: of the instruments.
         trials: names.
         support: `InstrumentSupport.moved` and `contradicted`, of all errors.
-        own_place: of the first that trials have of their own among them; the laboratory's come first.
+        own_place: index of the first error that is specific to a trial; the laboratory's come first.
     """
     moved, contradicted = support
     elsewhere = _session_says_otherwise(found.instruments, prior)
@@ -110,15 +110,16 @@ def instrument_errors(
 def laboratory_errors(
     plates: Mapping[str, tuple[np.ndarray, np.ndarray]], clock_s: tuple[float, float], prior: InstrumentPrior
 ) -> Iterator[Solved]:
-    """Errors that all trials share, without support.
+    """Yield the errors that all trials share, without support.
 
-    Whoever is rotated is displaced a little, too: the cause first. A plate's position is its own and the floor's: what
-    one moves, the other does, too.
+    A rotation also displaces plates a little, so it comes first, as the cause. A plate's position is the sum of its own
+    and the common offset: a shift of one is a shift of the other.
 
     Args:
-        plates: per plate (5,) values of PLATE_ERRORS, as the estimate solves for them, and (5,) their deviations.
-        clock_s: the delay of the forces, and its deviation.
-        prior: what was known of the instruments before.
+        plates: per plate (5,) values of PLATE_ERRORS, as the estimate solves for them, and (5,) their standard
+            deviations.
+        clock_s: the delay of the forces, and its standard deviation.
+        prior: of the instruments.
     """
     floor = len(PLATE_UNKNOWNS) * len(plates)
     for values, sds in list(plates.values())[:1]:
@@ -134,7 +135,7 @@ def laboratory_errors(
 
 
 def _of_trials(found: FoundErrors, prior: InstrumentPrior, trials: Sequence[str], first: int) -> Iterator[Solved]:
-    """Errors that trials have of their own; of gains, what a plate has in the trial altogether."""
+    """Yield the errors that are specific to trials; for gains, a plate's total gain error in the trial."""
     places = count(first)
     for trial, delay_s in zip(trials, found.delays_s, strict=False):
         yield _delay(next(places), delay_s, prior.delay_s.sd, trial)
@@ -186,7 +187,7 @@ def _delay(place: int, delay_s: tuple[float, float], prior_sd: float, trial: str
 
 
 def _same_column(plate: str | None, plates: Sequence[str]) -> list[str]:
-    """Columns of the same name in the force files of other trials."""
+    """Return the columns of the same name in the force files of other trials."""
     columns = [[plates[k] for k in column] for column in columns_of_several_trials(plates)]
     return [other for column in columns if plate in column for other in column if other != plate]
 
@@ -196,7 +197,7 @@ def _apart(one: CalibrationEntry, other: CalibrationEntry) -> bool:
 
 
 def _session_says_otherwise(own: InstrumentInformation, prior: InstrumentPrior) -> set[int]:
-    """Unknowns of the laboratory's of which these trials say what the session's other people do not."""
+    """Return the laboratory's unknowns for which these trials and the session's other people disagree."""
     if not prior.session:
         return set()
     (value, sd), (others, others_sd) = (_alone(each, prior) for each in (own, prior.of_session(own.plates)))
@@ -204,7 +205,7 @@ def _session_says_otherwise(own: InstrumentInformation, prior: InstrumentPrior) 
 
 
 def _alone(shown: InstrumentInformation, prior: InstrumentPrior) -> tuple[np.ndarray, np.ndarray]:
-    """(k,), (k,) values and deviations by what some trials show, under priors of instruments that may all be faulty."""
+    """Return values (k,) and standard deviations (k,) from some trials alone, if any instrument may be faulty."""
     faulty = np.array([one.faulty_sd for one in prior.of_unknowns(shown.plates).own])
     covariance = np.linalg.inv(shown.information + np.diag(faulty**-2.0))
     return covariance @ shown.right, np.sqrt(np.diag(covariance))

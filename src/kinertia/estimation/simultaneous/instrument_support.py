@@ -1,8 +1,8 @@
-"""Tests what supports an accusation: the error moves joint moments, and no trial contradicts it.
+"""Tests whether an instrument error is credible: it affects joint moments, and no trial contradicts it.
 
-The estimate puts every instrument right by what it finds. Much of what it finds may be the model's own error: soft
-tissue that lags looks like late forces, a trunk that bends like a plate elsewhere. Whoever is told to check a plate
-should find something there. So an error must matter, by the joint moments that it moves, and hold in every trial.
+The estimate corrects every instrument error that it finds. Many of them may be errors of the model: soft tissue that
+lags looks like delayed forces, a bending trunk like a displaced plate. Users who are asked to check a plate should find
+an error there. So an error must matter, by its effect on joint moments, and be present in every trial.
 """
 
 from __future__ import annotations
@@ -22,19 +22,19 @@ from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior
 from kinertia.estimation.simultaneous.static_information import StaticInformation
 
 _MOST_FRAMES = 100
-"""Of each trial, evenly spaced, at which moments are looked at."""
+"""Number of frames of each trial, evenly spaced, at which moments are compared."""
 _ROOT = 6
-"""Coordinates of the pelvis come first: what moves them are residuals, not joint moments."""
+"""Coordinates of the pelvis come first: their generalised forces are residuals, not joint moments."""
 
 
 @dataclass(frozen=True, eq=False)
 class InstrumentSupport:
-    """Of the k instrument unknowns, in the order of `Layout.errors`.
+    """Support of the k instrument unknowns, in the order of `Layout.errors`.
 
     Attributes:
-        moved: (k,) by how many halves of its own 95 % interval a unit of the error, put back, moves the joint moment
-            that it moves most.
-        contradicted: (k,) whether a trial alone and the others do not agree; never of what is a single trial's.
+        moved: (k,) effect of a unit of the uncorrected error on the most affected joint moment, in half-widths of the
+            moment's own 95 % interval.
+        contradicted: (k,) whether a single trial and the others disagree; False for errors that belong to one trial.
     """
 
     moved: np.ndarray
@@ -44,13 +44,13 @@ class InstrumentSupport:
 def instrument_support(
     model: GaussNewton, point: Point, gaussian: GaussianPrior, curves: tuple[CurveDeviations, ...]
 ) -> InstrumentSupport:
-    """Support of all instruments' errors.
+    """Compute the support of all instruments' errors.
 
     Args:
         model: the quadratic at the end of the search, under the Gaussian.
         point: the estimate.
-        gaussian: in place of the priors of the instruments.
-        curves: deviations of the trials' curves.
+        gaussian: replaces the priors of the instruments.
+        curves: standard deviations of the trials' curves.
     """
     root, late = model.static.root_of_covariance(), model.problem.loads.late
     late_sd_s = [float(np.linalg.norm(root[late(k)].sum(axis=0))) for k in range(len(curves))]
@@ -62,8 +62,9 @@ def instrument_support(
 def moved_moments(
     problem: MapProblem, k: int, point: Point, curves: CurveDeviations, late_sd_s: float = 0.0
 ) -> np.ndarray:
-    """(k,) `InstrumentSupport.moved` in one trial, by the derivatives of its joint moments while the motion stays;
-    those by the delay are averaged over its deviation.
+    """Compute `InstrumentSupport.moved` (k,) in one trial, from derivatives of its joint moments at fixed motion.
+
+    The derivatives by the delay are averaged over its standard deviation.
     """
     dynamic, instruments = np.flatnonzero(problem.trials[k].dynamic), problem.layout.errors
     if not len(dynamic):
@@ -78,8 +79,9 @@ def moved_moments(
 
 
 def trials_apart(model: GaussNewton, gaussian: GaussianPrior) -> np.ndarray:
-    """(k,) of which of the laboratory's instruments a trial alone and all the others, each with the priors, say
-    different things: beyond 95 % for any of the trials.
+    """Return the mask (k,) of the laboratory's instruments for which one trial and all the others disagree.
+
+    Each estimate includes the priors; they disagree beyond 95 % for any of the trials.
     """
     problem, here = model.problem, model.here
     layout, count = problem.layout, len(here.trials)
@@ -93,7 +95,7 @@ def trials_apart(model: GaussNewton, gaussian: GaussianPrior) -> np.ndarray:
     prior[layout.errors, layout.errors] += gaussian.precision
     every = sum(each.information for each in model.displaced)
     shared = slice(0, layout.laboratory.stop - layout.laboratory.start)
-    # by chance one of twenty instruments, however many trials there are; of two, one contradicts the other
+    # by chance one of twenty instruments, however many trials there are; with two, each contradicts the other
     apart_sd = -ndtri(0.025 / (count if count > 2 else 1))
     for k, own in enumerate(model.displaced):
         alone = _posterior(prior + own.information, prior_right + rights[k], layout.in_root.stop, layout.errors)
@@ -105,7 +107,7 @@ def trials_apart(model: GaussNewton, gaussian: GaussianPrior) -> np.ndarray:
 
 
 def _rights(model: GaussNewton) -> list[np.ndarray]:
-    """Per trial the right-hand side (S,) on the static unknowns, motion and displacements eliminated."""
+    """Return, per trial, the right-hand side (S,) on the static unknowns, motion and displacements eliminated."""
     pull, places = model.here.point.like(model.here.slope.right), model.problem.layout.displaced
     result = []
     for k, (trial, displaced) in enumerate(zip(model.here.trials, model.displaced, strict=True)):
@@ -116,7 +118,7 @@ def _rights(model: GaussNewton) -> list[np.ndarray]:
 
 
 def _posterior(information: np.ndarray, right: np.ndarray, first: int, places: slice) -> tuple[np.ndarray, np.ndarray]:
-    """(k,), (k,) steps of the unknowns at these places, and their deviations."""
+    """Return steps (k,) of the unknowns at these indices, and their standard deviations (k,)."""
     found = StaticInformation.of(information, first)
     covariance = np.linalg.inv(found.first)
     variance = np.maximum(np.diag(covariance)[places], 0.0)

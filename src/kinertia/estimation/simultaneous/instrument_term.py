@@ -1,4 +1,4 @@
-"""Adds errors of force plates and synchronisation: the laboratory's in all trials, and each trial's."""
+"""Adds errors of force plates and synchronisation: the laboratory's in all trials, and each trial's own."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ PLATES, CLOCK, DELAYS, ZEROS, GAINS = "plates", "clock", "delays", "zeros", "gai
 
 
 class InstrumentErrors(LoadTerm):
-    """What is wrong with plates and clock.
+    """Errors of plates and synchronisation.
 
-    PLATES has PLATE_UNKNOWNS of each plate, then FLOOR_UNKNOWNS. Of several trials each has a delay of its own besides
-    the clock's, and so has one whose clock has not been checked. Zeros (ZERO_UNKNOWNS) and gains are those of each
-    trial's plates, the gains beside those of all trials.
+    PLATES has PLATE_UNKNOWNS of each plate, then FLOOR_UNKNOWNS. Each of several trials has a delay of its own besides
+    the synchronisation delay, and so has a single trial whose synchronisation was not checked. Zero offsets
+    (ZERO_UNKNOWNS) and gains belong to each trial's plates; the gains add to those of all trials.
     """
 
     @classmethod
     def unknowns(cls, given: Given) -> tuple[Unknowns, ...]:
-        """All errors, each sound or faulty."""
+        """Return all errors, each with a prior of being fault-free or faulty."""
         known, trials = given.calibration.instruments, given.trials
         shared = known.of_unknowns(given.plates)
-        # one trial of a session is one of several, and so may be one whose clock nobody has checked
+        # one trial of a session is one of several, and so may be one whose synchronisation nobody has checked
         count = sum(bool(trial.ground.plates) for trial in trials)
         late = count > 1 or known.session or known.clock_s.faulty_share > 0.0
         plates = sum(len(trial.ground.plates) for trial in trials)
@@ -58,12 +58,12 @@ class InstrumentErrors(LoadTerm):
         self._session = given.calibration.instruments.of_session(given.plates)
 
     def add_information(self, into: np.ndarray, static: np.ndarray) -> None:
-        """Of what other people of the session have shown."""
+        """Add the information from other people of the session."""
         at = self.layout.laboratory
         into[at, at] += self._session.information
 
     def add_pull(self, right: np.ndarray, static: np.ndarray) -> float:
-        """Of the same."""
+        """Add the right-hand side from other people of the session, and return the change in twice the cost."""
         own, shown = static[self.layout.laboratory], self._session
         pull = shown.information @ own
         right[self.layout.laboratory] += shown.right - pull
@@ -78,12 +78,12 @@ class InstrumentErrors(LoadTerm):
         return result
 
     def late(self, k: int) -> list[int]:
-        """The clock's delay and the trial's own."""
+        """Return the indices of the synchronisation delay and of the trial's own delay."""
         delays = self.layout[DELAYS]
         return [self.layout[CLOCK].start, *range(delays.start, delays.stop)[k : k + 1]]
 
     def profiled(self) -> list[int]:
-        """The delay of a single trial with forces of which it is open whether it is late."""
+        """Return the delays of a single trial with forces, if it is undetermined whether they are delayed."""
         places, priors = self.late(0), self.layout.error_priors.own
         own = [priors[at - self.layout.errors.start] for at in places]
         uncertain = any(0.0 < prior.faulty_share < 1.0 for prior in own)
@@ -92,17 +92,17 @@ class InstrumentErrors(LoadTerm):
     def put_right(
         self, k: int, static: np.ndarray, loads: np.ndarray, loaded: np.ndarray, carrier: np.ndarray
     ) -> np.ndarray:
-        """Loads without all errors but lateness."""
+        """Correct loads for all errors but delays."""
         return self.given.grounds[k].put_right(loads, loaded, carrier, self.plates_in(k, static))
 
     def by_unknowns(
         self, k: int, static: np.ndarray, loads: np.ndarray, loaded: np.ndarray, carrier: np.ndarray
     ) -> np.ndarray:
-        """(n, 2, 6, p, 7) derivatives by what is wrong with the plates in trial k."""
+        """Return derivatives (n, 2, 6, p, 7) by the errors of the plates in trial k."""
         return self.given.grounds[k].by_plate(loads, loaded, carrier, self.plates_in(k, static))
 
     def add_by_unknowns(self, k: int, by_static: np.ndarray, by: np.ndarray) -> None:
-        """Add derivatives (n, r, p, 7) by what is wrong with the plates in trial k."""
+        """Add derivatives (n, r, p, 7) by the errors of the plates in trial k."""
         n, rows, *_ = by.shape
         errors = len(PLATE_ERRORS)
         by_static[:, :, self.layout[PLATES]] += by[..., :errors].reshape(n, rows, -1) @ self._to_plates
@@ -110,7 +110,7 @@ class InstrumentErrors(LoadTerm):
         by_static[:, :, self.gains_of(k)] += by[:, :, self._own[k], GAIN]
 
     def plates_in(self, k: int, static: np.ndarray) -> np.ndarray:
-        """(p, 7) what is wrong with every plate in trial k: PLATE_ERRORS, ZERO_UNKNOWNS."""
+        """Return the errors (p, 7) of every plate in trial k: PLATE_ERRORS, ZERO_UNKNOWNS."""
         zeros = np.zeros((len(self.given.plates), len(ZERO_UNKNOWNS)))
         errors: np.ndarray = (self._to_plates @ static[self.layout[PLATES]]).reshape(-1, len(PLATE_ERRORS))
         errors[self._own[k], GAIN] += static[self.gains_of(k)]
@@ -118,11 +118,11 @@ class InstrumentErrors(LoadTerm):
         return np.hstack([errors, zeros])
 
     def zeros_of(self, k: int) -> np.ndarray:
-        """(q, 2) where the zeros of the q plates of trial k stand."""
+        """Return the indices (q, 2) of the zero offsets of the q plates of trial k."""
         return self._of_trial(k, ZEROS, len(ZERO_UNKNOWNS)).reshape(-1, len(ZERO_UNKNOWNS))
 
     def gains_of(self, k: int) -> np.ndarray:
-        """(q,) where their gains stand."""
+        """Return the indices (q,) of the trial-specific gains of the q plates of trial k."""
         return self._of_trial(k, GAINS, 1)
 
     def _of_trial(self, k: int, name: str, each: int) -> np.ndarray:
@@ -130,7 +130,7 @@ class InstrumentErrors(LoadTerm):
         return np.arange(first, first + each * len(self._own[k]))
 
     def read(self, solution: Solution) -> dict[str, Any]:
-        """An entry of each error with its deviation and its support, and what others of the session may use."""
+        """Return an entry of each error with standard deviation and support, and the information for the session."""
         trials, plates, values, sd = self.given.trials, self.given.plates, solution.static, solution.sd
         own = solution.covariance[self.layout[PLATES], self.layout[PLATES]]
         shape = len(plates), len(PLATE_ERRORS)
@@ -156,7 +156,7 @@ class InstrumentErrors(LoadTerm):
         return {"calibration": entries, "instruments": found.instruments}
 
     def _gains(self, k: int, solution: Solution) -> dict[str, tuple[float, float]]:
-        """The whole gains of a trial's plates in it, and their deviations."""
+        """Return the total gain errors of a trial's plates, and their standard deviations."""
         result = {}
         for plate, at in zip(self.given.trials[k].ground.plates, self.gains_of(k), strict=True):
             sums = np.zeros(self.layout.size)
@@ -166,7 +166,7 @@ class InstrumentErrors(LoadTerm):
         return result
 
     def _shown(self, solution: Solution) -> InstrumentInformation:
-        """What the trials say of the laboratory's instruments, without what was known before."""
+        """Return the information of the trials on the laboratory's instruments, without prior knowledge."""
         prior, session, every = solution.gaussian, self._session, self.layout.errors
         mean, covariance = solution.static[every], solution.covariance[every, every]
         own = slice(len(session.right), len(mean))

@@ -1,6 +1,4 @@
-"""How far force plates and clock may be off: by the literature, as the laboratory states it, and as other people of the
-same session have shown it.
-"""
+"""Defines priors of plates and synchronisation: from the literature, the laboratory, and the session's other people."""
 
 from __future__ import annotations
 
@@ -33,32 +31,33 @@ FLOOR_PRIOR: Mapping[str, SoundOrFaulty] = {
 """Names and units as in FLOOR_UNKNOWNS: plates and cameras were surveyed in different axes. Turn: corners of a plate of
 half a metre are surveyed to a millimetre, and a frame laid on the floor by eye is a few degrees askew (no source)."""
 CLOCK_PRIOR_S = SoundOrFaulty(0.0003, 0.008, 0.3)
-"""Apparent delay of the forces; soft parts may have a share. On time: half a sample of the plates. Off: published
-recordings show 7, 7, 7, 8.4, 13.5, -12 and 0.2 ms, and twelve children on one pair of plates 9 ms. It is rarer here
-than among these: where forces are on time, half and half costs ankle moments 5 %, this 1 to 2 %."""
+"""Apparent delay of the forces; soft tissue may contribute. Synchronous: half a sample of the plates. Delayed:
+published recordings show 7, 7, 7, 8.4, 13.5, -12 and 0.2 ms, and twelve children on one pair of plates 9 ms. Delays are
+assumed rarer than among these: where forces are synchronous, equal odds cost ankle moments 5 %, these 1 to 2 %."""
 DELAY_PRIOR_S = SoundOrFaulty(0.00003, 0.010, 0.03)
-"""Of one trial, besides the clock's: cameras and plates that start together do so in every trial; of two runs
-on one treadmill, forces of the first are 8.4 ms late and of the second 13.5. Who has tested the clock has not tested
-every trial."""
+"""Delay of one trial, besides the synchronisation delay: cameras and plates that start together do so in every trial;
+of two runs on one treadmill, forces of the first are delayed by 8.4 ms and of the second by 13.5. A laboratory that has
+tested the synchronisation has not tested every trial."""
 ZERO_PRIOR_N = SoundOrFaulty(1.0, 10.0, FAULTY_SHARE)
-"""Of horizontal forces. Unloaded, four plates of published trials read 0.2 to 3 N and a fifth one 12 N; under people
-who stand still, two plates together read 2 N."""
+"""Zero offset of horizontal forces. Unloaded, four plates of published trials read 0.2 to 3 N and a fifth one 12 N;
+under people who stand still, two plates together read 2 N."""
 
 TRIAL_GAIN_PRIOR = SoundOrFaulty(0.001, 0.03, 0.3)
-"""Of a plate in one trial, besides that of all. One person weighed 60 kg standing and squatting, and 63.5 to 64 walking
-on the same plates of one session: two trials of seven are 4 % off the others."""
+"""Gain error of a plate in one trial, besides that in all trials. One person weighed 60 kg standing and squatting, and
+63.5 to 64 walking on the same plates of one session: two trials of seven are 4 % off the others."""
 
 
 @dataclass(frozen=True, eq=False)
 class InstrumentInformation:
-    """What the trials of one person say of the k = 4 p + 4 unknowns of p plates, the floor and the clock.
+    """Information of one person's trials on plates and synchronisation.
 
-    They stand in this order, each plate's and the floor's as PLATE_UNKNOWNS and FLOOR_UNKNOWNS. No prior is in it.
+    There are k = 4 p + 4 unknowns for p plates, the common plate offset and the delay, in this order, each plate's as
+    in PLATE_UNKNOWNS, the common ones as in FLOOR_UNKNOWNS. No prior is included.
 
     Attributes:
         plates: names.
         information: (k, k) of normal equations in m, 1, N m/N, rad and s.
-        right: (k,) their right-hand side: information times the values that these trials show.
+        right: (k,) their right-hand side: information times the values from these trials.
 
     >>> shown = InstrumentInformation(("left",), np.eye(8), np.zeros(8))
     >>> shown.among(("right", "left"), InstrumentPrior()).information.shape
@@ -73,8 +72,9 @@ class InstrumentInformation:
     def of_posterior(
         cls, plates: Sequence[str], mean: np.ndarray, covariance: np.ndarray, before: Sequence[tuple[np.ndarray, ...]]
     ) -> InstrumentInformation:
-        """What a posterior, mean (k,) and covariance (k, k), adds to what was known before: information and right-hand
-        side of each that knew something.
+        """Return what a posterior, mean (k,) and covariance (k, k), adds to prior knowledge.
+
+        `before` holds information and right-hand side of each source of prior knowledge.
         """
         after = np.linalg.inv(covariance)
         information = after - sum(each for each, _ in before)
@@ -82,9 +82,7 @@ class InstrumentInformation:
         return cls(tuple(plates), *_never_negative(information, right, np.sqrt(np.diag(after))))
 
     def without_own(self, precision: np.ndarray, pull: np.ndarray) -> InstrumentInformation:
-        """The same without the t unknowns that trials have of their own, which stand behind everything else, where this
-        much was known of them before: (t, t), (t,).
-        """
+        """Eliminate the t unknowns that are specific to trials, which come last, given their prior: (t, t), (t,)."""
         size = len(self.right) - len(pull)
         across = self.information[:size, size:]
         own = self.information[size:, size:] + precision
@@ -96,7 +94,7 @@ class InstrumentInformation:
         )
 
     def among(self, plates: Sequence[str], prior: InstrumentPrior) -> InstrumentInformation:
-        """The same about these plates. Of one that is not among them no more is known than its prior."""
+        """Convert to these plates; a plate that is not among them contributes no more than its prior."""
         every = tuple(dict.fromkeys([*plates, *self.plates]))
         each = len(PLATE_UNKNOWNS)
         here = np.concatenate([each * every.index(name) + np.arange(each) for name in self.plates]).astype(int)
@@ -118,8 +116,9 @@ class InstrumentInformation:
 
 
 def _never_negative(information: np.ndarray, right: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The same without directions in which the information, over its scale, is below zero: rounding, and what one
-    Gaussian cannot say of two components, may leave such.
+    """Remove directions in which the information, over its scale, is negative.
+
+    They may result from rounding, and from replacing a mixture of two components by one Gaussian.
     """
     values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
     kept = vectors[:, values > 0.0]
@@ -129,16 +128,16 @@ def _never_negative(information: np.ndarray, right: np.ndarray, scale: np.ndarra
 
 @dataclass(frozen=True, eq=False)
 class InstrumentPrior:
-    """What is known of plates and clock before a person's trials are looked at.
+    """Prior knowledge of plates and synchronisation, before a person's trials.
 
     Attributes:
         plate: prior of each of PLATE_UNKNOWNS, for every plate on its own.
         floor: prior of each of FLOOR_UNKNOWNS, for all plates together.
-        clock_s: prior of the time between forces and markers.
-        delay_s: prior of how much later than by the clock of all the forces of one of several trials are.
-        zero_n: prior of the zeros of each plate's horizontal forces in each trial.
-        trial_gain: prior of what each plate's gain is besides in each trial.
-        session: what other people have shown, measured with the same instruments.
+        clock_s: prior of the delay between forces and markers.
+        delay_s: prior of the additional delay of the forces of one of several trials.
+        zero_n: prior of the zero offsets of each plate's horizontal forces in each trial.
+        trial_gain: prior of each plate's additional gain error in each trial.
+        session: information from other people measured with the same instruments.
 
     >>> stated = InstrumentPrior.stated(Instruments(plate_sd_mm=1.0))
     >>> stated.plate["x"].sd, stated.clock_s == InstrumentPrior().clock_s
@@ -155,10 +154,10 @@ class InstrumentPrior:
 
     @classmethod
     def stated(cls, instruments: Instruments, session: Sequence[InstrumentInformation] = ()) -> InstrumentPrior:
-        """As the laboratory states it: what it has checked is normal with that deviation.
+        """Build the prior from the laboratory's statements: what it has checked is normal with that standard deviation.
 
-        The rest is the literature's. A check of the centre of pressure against the cameras sees plates and floor
-        together.
+        The rest is the literature's. A check of the centre of pressure against the cameras covers plate and common
+        offset together.
         """
         result = cls(session=tuple(session))
         if instruments.plate_sd_mm is not None:
@@ -177,10 +176,10 @@ class InstrumentPrior:
         return result
 
     def of_unknowns(self, plates: Sequence[str]) -> ErrorPriors:
-        """Priors of all plates' unknowns, the floor's and the clock's.
+        """Return the priors of all plates' unknowns, the common plate offset's and the delay's.
 
-        Columns of the same name in the force files of several trials are plates of their own, but mostly the same one:
-        what a fault of theirs has in common has a prior, too.
+        Columns of the same name in the force files of several trials count as plates of their own, but are mostly the
+        same one: the common part of their faults has a prior, too.
         """
         names = list(PLATE_UNKNOWNS)
         own = [self.plate[name] for _ in plates for name in names]
@@ -194,7 +193,7 @@ class InstrumentPrior:
         return ErrorPriors((*own, *floor, self.clock_s), tuple(common))
 
     def of_session(self, plates: Sequence[str]) -> InstrumentInformation:
-        """What the others have shown of these plates, all together."""
+        """Return the information of the session's other people on these plates, combined."""
         size = len(PLATE_UNKNOWNS) * len(plates) + len(FLOOR_UNKNOWNS) + 1
         information, right = np.zeros((size, size)), np.zeros(size)
         for each in self.session:
@@ -205,7 +204,7 @@ class InstrumentPrior:
 
 
 _HARDLY = 0.1
-"""Columns of sound plates have hardly anything in common that they do not have with all plates."""
+"""Fault-free columns have hardly anything in common that they do not have with all plates."""
 _PLACE = ("x", "z")
 _NO_FLOOR_MM = 0.1
-"""Deviation of the floor's place where that of the plates has been checked against the cameras."""
+"""Standard deviation of the common plate offset if the plates' positions have been checked against the cameras."""

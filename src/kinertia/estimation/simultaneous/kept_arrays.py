@@ -1,4 +1,4 @@
-"""Keeps the arrays of a long trial, for which memory is too small, in a temporary file."""
+"""Stores the arrays of a long trial, which do not fit into memory, in a temporary file."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from kinertia.errors import KinertiaError
 
 
 class KeptArrays:
-    """Groups of arrays in a temporary file, which is made with the first group and goes with this object.
+    """Groups of arrays in a temporary file, which is created with the first group and deleted with this object.
 
     >>> kept = KeptArrays()
     >>> kept.add(np.arange(3.0), np.ones((2, 2), np.float32))
@@ -24,10 +24,10 @@ class KeptArrays:
         self._groups: list[tuple[int, list[tuple[tuple[int, ...], np.dtype[np.generic]]]]] = []
 
     def add(self, *arrays: np.ndarray) -> None:
-        """Write a group behind those before it.
+        """Append a group to the file.
 
         Raises:
-            KinertiaError: there is no room for it.
+            KinertiaError: the disk has no room for it.
         """
         try:
             if self._file is None:

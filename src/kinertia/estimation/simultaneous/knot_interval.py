@@ -1,4 +1,4 @@
-"""Weighs the terms of a knot interval's frames with its active splines, in a trial's normal equations.
+"""Weights the terms of the frames in a knot interval with its active splines, for a trial's normal equations.
 
 The same six splines are active in all frames of an interval, and seven with the two frames after it.
 """
@@ -17,7 +17,7 @@ _TOGETHER = SPLINES_PER_BLOCK + 1
 
 
 class Interval(NamedTuple):
-    """Terms of the frames of a knot interval, and of the two after them.
+    """Terms of the frames of a knot interval, and of the two frames after them.
 
     Attributes:
         squares: (5 f, c c) J^T W J of each frame with itself, f frames with the next, the latter transposed, and the
@@ -33,7 +33,7 @@ class Interval(NamedTuple):
 
 @part
 def longest_run(first: np.ndarray) -> int:
-    """The most frames of an interval."""
+    """Return the largest number of frames in an interval."""
     longest, run = 1, 1
     for k in range(1, len(first)):
         run = run + 1 if first[k] == first[k - 1] else 1
@@ -54,9 +54,10 @@ def to_splines(
     right: np.ndarray,
     bordered: bool,
 ) -> None:
-    """Weigh the terms of an interval with the splines that are active, two by two; `reach` (c, r, 2) are the runs of
-    columns of S that each coordinate meets. What is across the frames after the interval is left for the next. The
-    border is left out if not `bordered`.
+    """Weight the terms of an interval with pairs of the active splines.
+
+    `reach` (c, r, 2) are the runs of columns of S that each coordinate is coupled to. Terms across the frames after the
+    interval are left for the next one. The border is left out if not `bordered`.
     """
     n, size, c, at, most = len(first), len(band), right.shape[1], first[start], len(interval.gradient)
     own = np.zeros((1 + LATER, most, _TOGETHER))
@@ -87,7 +88,7 @@ def to_splines(
 
 @inlined
 def _weigh(weights: np.ndarray, count: int, across: np.ndarray, border: np.ndarray) -> None:
-    """Add the weighted terms (f, s) of so many frames, four at once."""
+    """Add the weighted terms (f, s) of so many frames, four at a time."""
     k = 0
     while k + 4 <= count:
         w0, w1, w2, w3 = weights[k], weights[k + 1], weights[k + 2], weights[k + 3]
@@ -102,7 +103,7 @@ def _weigh(weights: np.ndarray, count: int, across: np.ndarray, border: np.ndarr
 
 @inlined
 def _pass_on(count: int, across: np.ndarray) -> None:
-    """Leave the terms of the frames after an interval of so many frames to the next interval, zeros behind them."""
+    """Move the terms of the frames after an interval of `count` frames to the next interval, followed by zeros."""
     for row in range(min(count + LATER, len(across))):
         for s in range(across.shape[1]):
             across[row, s] = across[count + row, s] if row < LATER else 0.0
@@ -110,9 +111,9 @@ def _pass_on(count: int, across: np.ndarray) -> None:
 
 @part
 def _pair_weights(own: np.ndarray) -> np.ndarray:
-    """(28, 5 f) weights of `Interval.squares` in each pair of splines, the second not before the first.
+    """Compute weights (28, 5 f) of `Interval.squares` for each pair of splines, the second not before the first.
 
-    From the splines (3, f, 7) in each frame and in the two after it.
+    They come from the splines (3, f, 7) in each frame and in the two after it.
     """
     most, pair = own.shape[1], 0
     weights = np.empty((_TOGETHER * (_TOGETHER + 1) // 2, (1 + 2 * LATER) * most))
@@ -129,7 +130,7 @@ def _pair_weights(own: np.ndarray) -> np.ndarray:
 
 @part
 def to_border(at: int, weights: np.ndarray, across: np.ndarray, border: np.ndarray) -> None:
-    """Weigh terms (c, s) of a frame with the six splines from `at` on."""
+    """Weight terms (c, s) of a frame with the six splines from `at` on."""
     for i in range(6):
         for j in range(across.shape[0]):
             for s in range(across.shape[1]):

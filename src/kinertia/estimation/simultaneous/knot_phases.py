@@ -1,9 +1,9 @@
-"""Averages an estimate over where the knots of its splines lie, and adds the spread to its covariance.
+"""Averages an estimate over the positions of its splines' knots, and adds the spread to its covariance.
 
-Knots are a choice of ours. A trial that begins a frame later has them elsewhere, and what is barely seen (the clock,
-plates, single segments) then comes out otherwise, by up to several deviations where the motion has hardly anything
-faster than the knots. From the estimate found, others are begun whose knots lie between; they are as good. What does
-not move is averaged over all, and how far they are apart is part of its covariance.
+Knots are an arbitrary choice. A trial that begins a frame later has them elsewhere, and poorly determined unknowns
+(delay, plates, single segments) then differ, by up to several standard deviations where the motion has hardly anything
+faster than the knots. From the estimate, others are started with knots in between; they are equally good. Unknowns that
+do not move are averaged over all of them, and their spread is part of their covariance.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ from kinertia.motion.dynamics import Motion, inverse_dynamics
 from kinertia.motion.moving_windows import even_mean
 
 PHASES = (0.5,)
-"""Shares of a knot interval by which knots are moved."""
+"""Shares of a knot interval by which knots are shifted."""
 
 
 @dataclass(frozen=True, eq=False)
 class OfPhases:
-    """An estimate averaged over where knots lie.
+    """An estimate averaged over knot positions.
 
     Attributes:
-        static: (S,) what does not move, averaged.
-        covariance: (S, S) of the average, for it is of few.
-        problems, points: of each phase, the first one's first.
+        static: (S,) unknowns that do not move, averaged.
+        covariance: (S, S) of the average, since it is over few.
+        problems, points: of each phase, starting with the original.
     """
 
     static: np.ndarray
@@ -42,12 +42,12 @@ class OfPhases:
 
     @classmethod
     def of(cls, problem: MapProblem, point: Point, search: Callable[[MapProblem, Point], Point]) -> OfPhases:
-        """From where a search has ended.
+        """Average over knot positions, from the point where a search has ended.
 
         Args:
             problem: of the estimate.
-            point: the end.
-            search: from a point of another problem to its optimum.
+            point: end of the search.
+            search: leads from a point of another problem to its optimum.
         """
         problems, points = [problem], [point]
         for phase in PHASES:
@@ -61,12 +61,12 @@ class OfPhases:
         return cls(every.mean(axis=0), apart.T @ apart, tuple(problems), tuple(points))
 
     def curves_apart(self, k: int) -> CurveDeviations:
-        """Deviations between the phases of the curves of trial k."""
+        """Return the standard deviations between the phases of the curves of trial k."""
         return curves_apart(self.problems, self.points, k)
 
 
 def followed(problem: MapProblem, here: Linearised, point: Point, static: np.ndarray) -> Point:
-    """The optimum with what does not move held elsewhere, by the quadratic there."""
+    """Return the optimum with the static unknowns fixed at other values, by the quadratic at a point."""
     model, motions, displaced = GaussNewton.of(problem, here), [], []
     rows = zip(here.trials, model.displaced, problem.displaced_sd, point.coefficients, point.displaced, strict=True)
     for trial, own, sd, part, place in rows:
@@ -79,16 +79,16 @@ def followed(problem: MapProblem, here: Linearised, point: Point, static: np.nda
 
 
 def _motion(trial: Eliminated, part: np.ndarray, step: np.ndarray) -> np.ndarray:
-    """(size, c) how the motion of a trial follows a step (S,) of what does not move."""
+    """Return the change (size, c) of a trial's motion with a step (S,) of the static unknowns."""
     return trial.motion_step(trial.forward(np.zeros_like(part))[0], step)
 
 
 _KNOTS = 2.0
-"""Half of the stretch over which their squares are averaged, in knot intervals: few estimates are alike by chance."""
+"""Half of the interval over which their squares are averaged, in knot intervals: few estimates may agree by chance."""
 
 
 def curves_apart(problems: Sequence[MapProblem], points: Sequence[Point], k: int) -> CurveDeviations:
-    """Deviations between estimates of the curves of trial k."""
+    """Return the standard deviations between estimates of the curves of trial k."""
     every = [_curves(problem, k, point) for problem, point in zip(problems, points, strict=True)]
     basis = problems[0].bases[k]
     around = 1 + 2 * round(_KNOTS * len(basis.first) / (basis.size - 5))
@@ -98,7 +98,7 @@ def curves_apart(problems: Sequence[MapProblem], points: Sequence[Point], k: int
 
 
 def _curves(problem: MapProblem, k: int, point: Point) -> tuple[np.ndarray, ...]:
-    """Coordinates, moments, powers and ground reactions at the dynamic frames."""
+    """Return coordinates, moments, powers and ground reactions at the dynamic frames."""
     frames = np.flatnonzero(problem.trials[k].dynamic)
     static = problem.in_trial(k, point)
     motion = Motion(*problem.model.full(problem.bases[k].evaluate(point.coefficients[k], frames), static))

@@ -1,9 +1,9 @@
-"""Loads on the feet when the delay of the forces is known to a deviation only.
+"""Computes loads on the feet if the delay of the forces is known only to a standard deviation.
 
-Where a foot lands or leaves, forces change within less than that deviation, and a derivative by time says nothing of
-what a delay does. In its place is the regression of the loads on the delay, over all delays that are likely
-(statistical linearisation): it goes with the other unknowns as a derivative does. What it leaves is added as
-independent. Both together are the mean square change of the loads, however they change.
+Where a foot lands or leaves, forces change within less than that, and a time derivative does not describe the effect of
+a delay. It is replaced by the regression of the loads on the delay, over all likely delays (statistical linearisation),
+which enters like a derivative. Its residual is added as independent. Both together are the mean square change of the
+loads, however they change.
 """
 
 from __future__ import annotations
@@ -15,18 +15,18 @@ import numpy as np
 from kinertia.motion.ground_reactions import GroundReactions
 
 _DELAYS = np.linspace(-4.0, 4.0, 25)
-"""In deviations; of these the mean squares are."""
+"""Delays in standard deviations, over which the mean squares are taken."""
 
 
 @dataclass(frozen=True)
 class LateLoads:
-    """Loads (N, N m) at n times on right and left foot, and what a delay does.
+    """Loads (N, N m) at n times on right and left foot, and the effect of a delay.
 
     Attributes:
-        loads: (n, 2, 6) without any.
+        loads: (n, 2, 6) without delay.
         slope: (n, 2, 6) per s of delay.
-        left: (m, n, 2, 6) of m delays, what the slope does not explain, times the root of their probability: the sum of
-            squares is a mean square. None where the delay is known.
+        left: (m, n, 2, 6) residuals from the slope for m delays, times the root of their probability, so that the sum
+            of squares is a mean square; empty (m = 0) if the delay is known.
     """
 
     loads: np.ndarray
@@ -35,7 +35,7 @@ class LateLoads:
 
 
 def late_loads(reactions: GroundReactions, time: np.ndarray, sd_s: float = 0.0) -> LateLoads:
-    """At times (n,) s of reactions whose delay has this deviation; without one the slope is the derivative."""
+    """Compute the loads at times (n,) s for a delay with this SD (s); with zero SD the slope is the derivative."""
     loads, rates = reactions.with_rate(time)
     if sd_s == 0.0:
         return LateLoads(loads, rates, np.empty((0, *loads.shape)))

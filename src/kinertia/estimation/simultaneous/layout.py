@@ -1,4 +1,4 @@
-"""Places the static unknowns in the vector of the simultaneous estimate."""
+"""Arranges the static unknowns in the vector of the simultaneous estimate."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ _SEEN_BY = ("root", "both", "markers")
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Unknowns:
-    """k unknowns of one kind that a cost term adds to the estimate: what they are called, their unit and their prior.
+    """Defines k unknowns of one kind that a cost term adds to the estimate: their name, unit and prior.
 
     Attributes:
         name: by which `Layout` finds them.
         unit: of each.
         start: (k,) where the search begins, and the mean of a normal prior.
-        prior: sound or faulty, of what the ground reactions depend on and nothing else; (k,) deviations of a normal
-            prior; None: the term has a prior of its own.
+        prior: fault-free or faulty, for unknowns that only the ground reactions depend on; (k,) standard deviations of
+            a normal prior; None: the term has a prior of its own.
         seen_by: what depends on them: the root equations, the markers or both.
-        of_laboratory: other people of a session share them.
-        in_models: whether rigid segments have them, as OpenSim's next tools know them. The motion that is written
-            follows what the others do to the forces.
-        displaced_sd: per trial (k,) prior deviations of how far they are elsewhere in it; none where they are not.
+        of_laboratory: whether other people of a session share them.
+        in_models: whether a model of rigid segments, as in OpenSim's subsequent tools, can represent them. The exported
+            motion absorbs the effect of the others on the forces.
+        displaced_sd: per trial (k,) prior standard deviations of their offsets in it; empty if they have none.
     """
 
     name: str
@@ -44,7 +44,7 @@ class Unknowns:
     def errors(
         cls, name: str, unit: str, prior: ErrorPriors, *, of_laboratory: bool = False, in_models: bool = True
     ) -> Self:
-        """Errors of the ground reactions, none of them at the start."""
+        """Define errors of the ground reactions, all zero at the start."""
         start = np.zeros(len(prior.own))
         return cls(name=name, unit=unit, start=start, prior=prior, of_laboratory=of_laboratory, in_models=in_models)
 
@@ -55,12 +55,14 @@ class Unknowns:
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """The order of all unknowns: first what only root equations depend on, ending in errors of the ground reactions
-    (the laboratory's before others), then what markers depend on, too, and last what only they do.
+    """Order of all unknowns in the vector.
+
+    First come the unknowns that only root equations depend on, ending with errors of the ground reactions (the
+    laboratory's before others), then those that markers depend on, too, and last those that only markers depend on.
 
     Attributes:
-        unknowns: in this order; otherwise in that of the terms.
-        places: by name.
+        unknowns: in this order; otherwise in the order of the terms.
+        places: slices of the vector, by name.
     """
 
     unknowns: tuple[Unknowns, ...]
@@ -68,7 +70,7 @@ class Layout:
 
     @classmethod
     def of(cls, unknowns: Iterable[Unknowns]) -> Layout:
-        """The layout of the terms' unknowns."""
+        """Arrange the terms' unknowns."""
         ordered = tuple(sorted(unknowns, key=lambda one: one._order))
         ends = np.cumsum([len(one.start) for one in ordered]).tolist()
         places = {one.name: slice(end - len(one.start), end) for one, end in zip(ordered, ends, strict=True)}
@@ -78,38 +80,38 @@ class Layout:
         return self.places[name]
 
     def _span(self, chosen: Iterable[Unknowns]) -> slice:
-        """From the first to the last of these, which stand together."""
+        """Return the slice from the first to the last of these unknowns, which are contiguous."""
         places = [self[one.name] for one in chosen]
         return slice(places[0].start, places[-1].stop) if places else slice(0, 0)
 
     @cached_property
     def errors(self) -> slice:
-        """Of the ground reactions: all with a prior of being sound or faulty."""
+        """Slice of the errors of the ground reactions: all unknowns with a prior of being fault-free or faulty."""
         return self._span(one for one in self.unknowns if isinstance(one.prior, ErrorPriors))
 
     @cached_property
     def error_priors(self) -> ErrorPriors:
-        """Of these."""
+        """Priors of the unknowns in `errors`."""
         return ErrorPriors.joined([one.prior for one in self.unknowns if isinstance(one.prior, ErrorPriors)])
 
     @cached_property
     def laboratory(self) -> slice:
-        """Those errors that other people of a session share."""
+        """Slice of the errors that other people of a session share."""
         return self._span(one for one in self.unknowns if one.of_laboratory)
 
     @cached_property
     def displaced(self) -> slice:
-        """What is elsewhere in each trial."""
+        """Slice of the unknowns that have an offset in each trial."""
         return self._span(one for one in self.unknowns if one.displaced_sd)
 
     @cached_property
     def in_root(self) -> slice:
-        """What the root equations depend on."""
+        """Slice of the unknowns that the root equations depend on."""
         return slice(0, self._span(one for one in self.unknowns if one.seen_by != "markers").stop)
 
     @cached_property
     def in_markers(self) -> slice:
-        """What the markers depend on."""
+        """Slice of the unknowns that the markers depend on."""
         return self._span(one for one in self.unknowns if one.seen_by != "root")
 
     @cached_property
@@ -119,13 +121,13 @@ class Layout:
 
     @cached_property
     def start(self) -> np.ndarray:
-        """(S,) where the search begins."""
+        """Values (S,) from which the search starts."""
         result: np.ndarray = np.concatenate([one.start for one in self.unknowns])
         return result
 
     @cached_property
     def weight(self) -> np.ndarray:
-        """(S,) information of normal priors about the start; zero for unknowns that have another one."""
+        """Information (S,) of normal priors about the start; zero for unknowns that have another prior."""
         return np.concatenate(
             [
                 1.0 / np.square(one.prior) if isinstance(one.prior, np.ndarray) else np.zeros(len(one.start))
@@ -134,7 +136,7 @@ class Layout:
         )
 
     def rigid(self, static: np.ndarray) -> np.ndarray:
-        """(S,) the same without what rigid segments do not have."""
+        """Return the unknowns (S,) with those set to zero that rigid segments cannot represent."""
         result = static.copy()
         for one in self.unknowns:
             if not one.in_models:

@@ -1,4 +1,4 @@
-"""Adds the variance of unknowns that are left out of the vector, since they only displace others."""
+"""Adds the variance of unknowns that are left out of the vector, because they only displace others."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ import numpy as np
 def with_left_out(
     directions: np.ndarray, data: np.ndarray, pull: np.ndarray, covariance: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """What u more unknowns of unit deviation change, by which the data see the others displaced: (S,) how far the
-    estimate moves back to the prior, and (S, u) a root of what is added to its covariance.
+    """Compute the effect of u more unknowns of unit standard deviation that displace the others, as seen by the data.
+
+    It returns (S,) how far the estimate moves back to the prior, and (S, u) a root of what is added to its covariance.
 
     Args:
-        directions: (S, u) by which they are displaced.
+        directions: (S, u) displacements of the unknowns.
         data: (S, u) information of the data on the unknowns, times these.
         pull: (u,) of the data along them, at the estimate without these unknowns.
         covariance: (S, S) without them.

@@ -1,4 +1,4 @@
-"""Holds a point of the estimate, and the linearised cost there."""
+"""Holds a point of the estimate, and the cost linearised there."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ class Point:
     """Values of all unknowns.
 
     Attributes:
-        coefficients: per trial those of its motion.
-        static: (S,) what does not move.
-        displaced: per trial (3 m,) displacements of its markers (`displacement`), in prior deviations.
+        coefficients: per trial the spline coefficients of its motion.
+        static: (S,) unknowns that do not move.
+        displaced: per trial (3 m,) displacements of its markers (`displacement`), in prior standard deviations.
     """
 
     coefficients: tuple[np.ndarray, ...]
@@ -26,11 +26,11 @@ class Point:
 
     @property
     def vector(self) -> np.ndarray:
-        """All of them, one after the other."""
+        """All unknowns in one vector."""
         return np.concatenate([*(each.ravel() for each in self.coefficients), self.static, *self.displaced])
 
     def like(self, vector: np.ndarray) -> Point:
-        """The point of which this is the `vector`."""
+        """Return the point whose `vector` this is."""
         ends = np.cumsum([each.size for each in (*self.coefficients, self.static, *self.displaced)])
         parts = np.split(vector, ends[:-1])
         motions = zip(parts, self.coefficients, strict=False)
@@ -40,15 +40,15 @@ class Point:
 
 @dataclass(frozen=True)
 class Slope:
-    """Half the sum of squares at a point, and where it falls.
+    """Half the sum of squares at a point, and minus its gradient.
 
-    The priors of the instruments are none of a Gaussian: they count only after `under`.
+    The instruments' priors are not Gaussian: they are included only by `under`.
 
     Attributes:
         point: the point.
         cost: half the sum of squares of everything.
         right: minus its derivatives by all unknowns, as `Point.vector` has them.
-        instruments: of which unknowns of the vector.
+        instruments: slice of the instruments' unknowns in the vector.
     """
 
     point: Point
@@ -57,7 +57,7 @@ class Slope:
     instruments: slice
 
     def under(self, prior: GaussianPrior) -> tuple[float, np.ndarray]:
-        """Cost and right-hand side with this Gaussian for the instruments."""
+        """Return cost and right-hand side with this Gaussian for the instruments."""
         values, right = self.point.vector[self.instruments], self.right.copy()
         right[self.instruments] += prior.pull - prior.precision @ values
         return self.cost + prior.cost(values), right
@@ -65,12 +65,12 @@ class Slope:
 
 @dataclass(frozen=True)
 class Linearised:
-    """Normal equations at a point, motions eliminated.
+    """Normal equations at a point, with the motions eliminated.
 
     Attributes:
-        slope: there.
-        trials: of each trial, on the static unknowns as they are in it.
-        information: (S, S) of the priors but the instruments'.
+        slope: cost and gradient there.
+        trials: each trial's equations, for the static unknowns as they are in it.
+        information: (S, S) of all priors but the instruments'.
     """
 
     slope: Slope
@@ -79,5 +79,5 @@ class Linearised:
 
     @property
     def point(self) -> Point:
-        """Where it is."""
+        """The point of linearisation."""
         return self.slope.point

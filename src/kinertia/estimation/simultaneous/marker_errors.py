@@ -1,17 +1,17 @@
-"""Computes the information of marker errors that are alike from frame to frame, banded in time.
+"""Computes the information of marker errors that are correlated over time, as a matrix banded in time.
 
 The errors of a marker coordinate are a second-order autoregressive process with the poles r and s,
 
     e[t] = (r + s) e[t-1] - r s e[t-2] + white noise,
 
-with the same deviation in every frame. The inverse of its covariance, the information, is banded: a frame sees itself
-and the two on either side, so the normal matrix stays banded, too. A gap starts the process anew.
+with the same standard deviation in every frame. The inverse of its covariance, the information, is banded: a frame is
+coupled to itself and the two on either side, so the normal matrix stays banded, too. A gap starts the process anew.
 
-What skin does is slow. With s = 0, a first-order process, the spectrum falls by the square of the frequency only:
-errors of markers would shake the accelerations, and with them joint moments, by more than they do. With s = r it falls
-by the fourth power. But the cameras' noise is in every frame, and of errors that last long, in a slow movement or a
-posture, such a spectrum would soon be below it: the estimate would follow the noise. So s is as near to r as the errors
-allow that a frame shows beyond what the two before it tell.
+Skin motion is slow. With s = 0, a first-order process, the spectrum falls only with the square of the frequency: marker
+errors would affect the accelerations, and with them joint moments, more than they do. With s = r it falls with the
+fourth power. But the cameras' noise is in every frame, and for errors that last long, in a slow movement or a posture,
+such a spectrum would soon be below it: the estimate would follow the noise. So s is as near to r as the observed
+innovation of the errors allows: the part of a frame's error that the two frames before do not predict.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from typing import NamedTuple
 import numpy as np
 
 LATER = 2
-"""How many frames after it a frame meets in the information."""
+"""Number of later frames to which a frame is coupled in the information."""
 
 
 _STEPS = 32
-"""Processes that are tried between one with a double pole and white noise."""
+"""Number of processes tried between a double pole and white noise."""
 
 
 class ErrorProcess(NamedTuple):
@@ -42,8 +42,9 @@ class ErrorProcess(NamedTuple):
 
     @classmethod
     def alike_over(cls, frames: float) -> ErrorProcess:
-        """With a double pole, alike over so many neighbouring frames, the sum of its correlations over all lags:
-        (1 + r)^3 / ((1 + r^2) (1 - r)).
+        """Return the process with a double pole that is correlated over so many neighbouring frames.
+
+        The number of frames is the sum of its correlations over all lags: (1 + r)^3 / ((1 + r^2) (1 - r)).
         """
         if frames <= 1.0:
             return cls()
@@ -54,7 +55,10 @@ class ErrorProcess(NamedTuple):
 
     @classmethod
     def with_smaller(cls, smaller: float, frames: float) -> ErrorProcess:
-        """With this smaller pole s, alike over (1 - r s) (1 + r) (1 + s) / ((1 + r s) (1 - r) (1 - s)) frames."""
+        """Return the process with this smaller pole s that is correlated over so many neighbouring frames.
+
+        The number of frames is (1 - r s) (1 + r) (1 + s) / ((1 + r s) (1 - r) (1 - s)).
+        """
         more = frames * (1.0 - smaller) / (1.0 + smaller)
         half = (1.0 - smaller) * (1.0 + more)
         larger = 2.0 * (more - 1.0) / (half + np.sqrt(half**2 + 4.0 * smaller * (more - 1.0) ** 2))
@@ -62,32 +66,33 @@ class ErrorProcess(NamedTuple):
 
     @property
     def of_before(self) -> tuple[float, float]:
-        """What a frame has of the one before it, and of the second before it."""
+        """Coefficients of a frame's error on those of the frame before it and of the second before it."""
         return self.larger + self.smaller, -self.larger * self.smaller
 
     @property
     def new(self) -> float:
-        """Variance of what a frame shows beyond the two before it, of a process of unit variance."""
+        """Innovation variance of a process of unit variance: what the two frames before do not predict."""
         one, two = self.of_before
         return (1.0 + two) * ((1.0 - two) ** 2 - one**2) / (1.0 - two)
 
     @property
     def frames(self) -> float:
-        """Over how many neighbouring frames its errors are alike."""
+        """Number of neighbouring frames over which its errors are correlated."""
         one, two = self.of_before
         return self.new / (1.0 - one - two) ** 2
 
     @classmethod
     def read(cls, frames: float, together: np.ndarray) -> tuple[ErrorProcess, float]:
-        """The slowest process that has as much news in a frame as errors do, and its variance.
+        """Fit the slowest process with as much innovation per frame as the errors have; return it with its variance.
 
-        From errors of unit variance that are alike over so many frames. Where even a first-order process has less, it
-        is a shorter one, with as much more variance: as much is told about what does not vary.
+        The errors have unit variance and are correlated over so many frames. If even a first-order process has too
+        little innovation, a shorter one is used with proportionally larger variance: the information on what does not
+        vary stays equal.
 
         Args:
-            frames: of the errors.
-            together: (k, 3, 3) mean products of the errors of a frame and of the two before it, of several kinds of
-                errors: as much as in any of them.
+            frames: number of frames over which the errors are correlated.
+            together: (k, 3, 3) mean products of the errors of a frame and of the two before it, for several kinds of
+                errors; the largest innovation counts.
         """
         double = cls.alike_over(frames)
         slow = [cls.with_smaller(float(s), frames) for s in np.linspace(double.smaller, 0.0, _STEPS)[1:]]
@@ -102,7 +107,7 @@ class ErrorProcess(NamedTuple):
 
 @dataclass(frozen=True)
 class ErrorInformation:
-    """Inverse covariance of the errors of m markers over n frames; the three axes are alike and independent.
+    """Inverse covariance of the errors of m markers over n frames; the three axes are independent and alike.
 
     Attributes:
         own: (n, m) of each frame with itself, 1 / m^2; zero where the marker is not seen.
@@ -116,7 +121,7 @@ class ErrorInformation:
 
     @classmethod
     def of(cls, seen: np.ndarray, sd_m: np.ndarray, process: ErrorProcess) -> ErrorInformation:
-        """Of markers seen (n, m), with deviations sd_m (m,)."""
+        """Compute the information for markers seen (n, m), with standard deviations sd_m (m,)."""
         one, two = process.of_before
         n, m = seen.shape
         own, after, second = np.zeros((n, m)), np.zeros((max(n - 1, 0), m)), np.zeros((max(n - 2, 0), m))
@@ -130,7 +135,7 @@ class ErrorInformation:
         after[:-1] += one * two * three
         second -= two * three
         before = np.vstack([np.zeros((1, m), dtype=bool), seen[:-1]])
-        # the first two after a gap
+        # the first two frames after a gap
         pair = (seen[1:] & seen[:-1] & ~before[:-1]) / (1.0 - alike * alike)
         own[:-1] += pair
         own[1:] += pair

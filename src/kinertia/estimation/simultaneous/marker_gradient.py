@@ -1,4 +1,4 @@
-"""Computes the gradient of `marker_terms` alone, in a tenth of the time."""
+"""Computes only the gradient of `marker_terms`, in a tenth of the time."""
 
 from __future__ import annotations
 
@@ -22,7 +22,10 @@ def add_gradient(
     right: np.ndarray,
     static_right: np.ndarray,
 ) -> float:
-    """Add J^T W r (size, c) and S^T W r (s,) of frames own[0] to own[1] - 1; r^T W r. Arguments are `marker_terms`'."""
+    """Add J^T W r (size, c) and S^T W r (s,) of frames own[0] to own[1] - 1, and return r^T W r.
+
+    Arguments are as in `marker_terms`.
+    """
     n, m = markers.own.shape
     start, stop = own
     c, a = right.shape[1], len(markers.column)
@@ -57,7 +60,7 @@ def add_gradient(
 
 @part
 def _pulls(markers: SeenMarkers, k: int, placed: PlacedMarkers, pull: np.ndarray) -> float:
-    """Write W r (m, 3) of frame k; r^T W r of it."""
+    """Write W r (m, 3) of frame k, and return its r^T W r."""
     n, m = markers.own.shape
     cost, here = 0.0, placed.errors[k % 5]
     for i in range(m):

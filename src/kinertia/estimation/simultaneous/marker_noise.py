@@ -1,9 +1,10 @@
-"""Estimates marker noise: deviations, and over how many frames and markers errors are alike.
+"""Estimates marker noise: standard deviations, and over how many frames and markers errors are correlated.
 
-Skin motion lasts for many frames. Its deviation and correlation length are read from the errors that inverse kinematics
-leaves, without what of them goes with the joints (`skin`). The deviation is inflated by the square root of the number
-of markers that err alike: those of a segment ride on the same skin. Inverse kinematics absorbs part of the noise, and
-so does the regression on the joints; the deviation makes up for their degrees of freedom only on average.
+Skin motion lasts for many frames. Its standard deviation and correlation length are estimated from the residuals of
+inverse kinematics, without their part that follows the joints (`skin`). The standard deviation is inflated by the
+square root of the number of markers with common errors: those of a segment move with the same skin. Inverse kinematics
+absorbs part of the noise, and so does the regression on the joints; this is compensated by degrees of freedom, only on
+average.
 """
 
 from __future__ import annotations
@@ -21,21 +22,22 @@ from kinertia.motion.frame_chunks import pieces
 SMALLEST_MARKER_SD_M = 0.001
 _WANDERING = 3.0
 _MOST_TAKEN = 0.6
-"""Share of the variance of errors that regression on the joints is thought to take by chance, at most."""
+"""Largest share of the errors' variance that regression on the joints is assumed to remove by chance."""
 _ROUNDS = 2
-"""Of the regression: its prior is weighed with the deviation of what the last one left."""
+"""Number of regressions: each weights the prior with the standard deviation of the residuals of the one before."""
 
 
 @dataclass(frozen=True)
 class MarkerNoise:
-    """Errors of the markers of one trial.
+    """Errors of the markers in one trial.
 
     Attributes:
-        sd_m: per label, deviation of one coordinate in one frame, m, but for what goes with the joints.
-        correlation_s: time over which errors are alike.
-        wandering: labels whose deviation is more than three times the usual; they drift and are down-weighted.
-        repeats: in how many strides of all trials together they are alike (`repetition`); 1: they never come back.
-        displacement_sd_m: per label, deviation of its displacement in this trial (`displacement`), m; 0 for one trial.
+        sd_m: per label, standard deviation of one coordinate in one frame, m, without the part that follows the joints.
+        correlation_s: time over which errors are correlated.
+        wandering: labels whose standard deviation is more than three times the usual; they drift and are down-weighted.
+        repeats: number of strides in all trials together in which errors recur (`repetition`); 1: they never recur.
+        displacement_sd_m: per label, standard deviation of its displacement in this trial (`displacement`), m; 0 for
+            one trial.
     """
 
     sd_m: Mapping[str, float]
@@ -47,12 +49,12 @@ class MarkerNoise:
 
 @dataclass(frozen=True, eq=False)
 class WithoutSkin:
-    """Errors of the markers in each of several trials, without what of them goes with the joints.
+    """Errors of the markers in each of several trials, without their part that follows the joints.
 
     Attributes:
         varying: per trial (n, m, 3) m; NaN where not seen.
-        displaced: (t, m, 3) m, how far the markers are from their places in the segments, on average over a trial,
-            and not because of the postures in it.
+        displaced: (t, m, 3) m, mean offsets of the markers from their positions in the segments in each trial, without
+            the effect of its postures.
     """
 
     varying: tuple[np.ndarray, ...]
@@ -62,13 +64,13 @@ class WithoutSkin:
     def of(
         cls, varying: Sequence[np.ndarray], displaced: np.ndarray, skin: Sequence[SkinPatterns], frames: Sequence[float]
     ) -> WithoutSkin:
-        """Ridge regression on the patterns of the skin, of all trials together.
+        """Fit the skin patterns by ridge regression on all trials together, and subtract them.
 
         Args:
             varying: per trial (n, m, 3) m, errors in the axes of each marker's segment, of zero mean.
-            displaced: (t, m, 3) m, what was taken off them for that.
+            displaced: (t, m, 3) m, means that were subtracted from them.
             skin: patterns of each trial.
-            frames: per trial, over how many frames its errors are alike: so many say what one says.
+            frames: per trial, number of frames over which its errors are correlated: so many count as one.
         """
         rests, still = [each.copy() for each in varying], displaced.copy()
         for m, (first, last) in enumerate(zip(skin[0].first, skin[0].last, strict=True)):
@@ -95,12 +97,15 @@ class WithoutSkin:
 def marker_noise(
     skeleton: Skeleton, errors: np.ndarray, taken: np.ndarray, rate_hz: float
 ) -> tuple[MarkerNoise, np.ndarray, float, np.ndarray]:
-    """Noise of the markers of a trial, their effective deviations (m,), over how many neighbouring frames errors of
-    these deviations are alike, and their products (2, 3, 3) with those of the two frames before (`Observation`).
+    """Estimate the noise of the markers of a trial.
+
+    It also returns the effective standard deviations (m,), the number of neighbouring frames over which errors of these
+    standard deviations are correlated, and their products (2, 3, 3) with those of the two frames before
+    (`Observation`).
 
     Args:
         skeleton: with the trial's markers.
-        errors: (n, m, 3) m, without skin that goes with the joints.
+        errors: (n, m, 3) m, without skin motion that follows the joints.
         taken: (m,) share of each marker's variance that is missing in them by chance, since the regression fits noise.
         rate_hz: of the frames.
     """
@@ -122,15 +127,16 @@ def marker_noise(
 
 
 def taken_by_chance(frames_seen: np.ndarray, patterns: np.ndarray, frames: float) -> np.ndarray:
-    """(m,) share of the variance of errors that regression on so many patterns (m,) takes where nothing goes with the
-    joints, of so many frames (m,) with errors that are alike over `frames`.
+    """Return the share (m,) of the errors' variance that regression on so many patterns (m,) removes by chance alone.
+
+    It applies to so many frames (m,) with errors that are correlated over `frames`.
     """
     result: np.ndarray = np.minimum(patterns * frames / np.maximum(frames_seen, 1.0), _MOST_TAKEN)
     return result
 
 
 def root_mean_square(errors: np.ndarray) -> np.ndarray:
-    """(m,) of errors (n, m, 3); zero for markers that are never seen."""
+    """Return the root mean square (m,) of errors (n, m, 3); zero for markers that are never seen."""
     squares, counts = np.zeros((2, errors.shape[1]))
     for some in pieces(len(errors)):
         seen = np.isfinite(errors[some])
@@ -141,13 +147,15 @@ def root_mean_square(errors: np.ndarray) -> np.ndarray:
 
 
 def frames_alike(errors: np.ndarray, sd_m: np.ndarray | float) -> float:
-    """Over how many neighbouring frames errors (n, m, 3) of these deviations (m,) are alike."""
+    """Return over how many neighbouring frames errors (n, m, 3) of these standard deviations (m,) are correlated."""
     return Repetition.of(weighed(errors, sd_m)).frames
 
 
 def _products(skeleton: Skeleton, errors: np.ndarray, sd_m: np.ndarray) -> np.ndarray:
-    """(2, 3, 3) mean products of the errors (n, m, 3), over their deviations (m,), of a frame and of the two before it,
-    those of each marker and those that the markers of a segment have in common, as `markers_alike` counts it.
+    """Return mean products (2, 3, 3) of the errors (n, m, 3), over their SDs (m,), of a frame and of the two before it.
+
+    The first are of each marker, the second of the errors that the markers of a segment have in common, counted as in
+    `markers_alike`.
     """
     result, count = np.zeros((2, 3, 3)), 0
     of_segments = _of_segments(skeleton)
@@ -164,23 +172,22 @@ def _products(skeleton: Skeleton, errors: np.ndarray, sd_m: np.ndarray) -> np.nd
 
 
 def _of_segments(skeleton: Skeleton) -> np.ndarray:
-    """(s, m) 1 where a marker is on a segment; segments that have markers."""
+    """Return the matrix (s, m) that is 1 where a marker is on a segment, for segments that have markers."""
     result: np.ndarray = (np.unique(skeleton.marker_segments)[:, None] == skeleton.marker_segments).astype(float)
     return result
 
 
 def weighed(errors: np.ndarray, sd_m: np.ndarray | float) -> np.ndarray:
-    """(n, 3 m) errors over their deviations, as the estimate weighs them: one that wanders must not speak for all."""
+    """Return errors (n, 3 m) over their standard deviations, as in the estimate: no drifting marker may dominate."""
     each = np.broadcast_to(sd_m, errors.shape[1])
     result = errors / np.where(each > 0.0, each, 1.0)[:, None]
     return np.nan_to_num(result, copy=False).reshape(len(errors), -1)
 
 
 def markers_alike(skeleton: Skeleton, errors: np.ndarray) -> np.ndarray:
-    """(m,) how many markers of each marker's segment err as one, from errors (n, m, 3): 1 if each errs on its own.
+    """Return how many markers (m,) of each marker's segment err in common, from errors (n, m, 3); 1 if independent.
 
-    The variance of a sum of k equal errors is k times that of k independent ones. What was not seen, NaN, counts as
-    none.
+    The variance of a sum of k equal errors is k times that of k independent ones. NaN (not seen) counts as no error.
     """
     of_segments = _of_segments(skeleton)
     together, apart = np.zeros((2, len(of_segments)))

@@ -1,12 +1,12 @@
-"""Lets markers sit a little elsewhere in each trial, as the posture of a motion draws the skin.
+"""Allows small marker offsets in each trial, as the posture of a motion displaces the skin.
 
-Squats carry the thigh's markers a centimetre from where a walk has them. Every trial therefore has its own displacement
-of each marker from its place in the segment, with a prior deviation that is read from how much the trials differ
-(`observation`). What a trial says of the places in it is said of the person's places less surely; a person with one
-trial has no displacements.
+In squats the thigh markers are displaced by a centimetre from their positions in walking. Every trial therefore has its
+own displacement of each marker from its position in the segment, with a prior standard deviation derived from the
+differences between trials (`observation`). A trial's information on marker positions thus becomes weaker information on
+the person's marker positions; a person with one trial has no displacements.
 
-A trial's normal equations are those of places in the trial; its displacements are eliminated from them here. They are
-counted in their prior deviations, so that a deviation may be zero.
+A trial's normal equations are for positions in the trial; its displacements are eliminated from them here. Their unit
+is the prior standard deviation, so that it may be zero.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from scipy.linalg import cholesky, solve_triangular
 
 @dataclass(frozen=True, eq=False)
 class Displaced:
-    """What a trial says of the static unknowns of the person, its displacements eliminated.
+    """Information of a trial on the static unknowns of the person, with its displacements eliminated.
 
     Attributes:
         information: (S, S).
-        gain: (k, S) how far the displacements follow when the static unknowns step back.
+        gain: (k, S) step of the displacements per backward step of the static unknowns.
         factor: (k, k) lower Cholesky factor of the information on the displacements; None where none may be displaced.
     """
 
@@ -33,12 +33,12 @@ class Displaced:
 
     @classmethod
     def of(cls, information: np.ndarray, places: slice, sd_m: np.ndarray) -> Displaced:
-        """Eliminate displacements.
+        """Eliminate the displacements of a trial.
 
         Args:
             information: of the trial on the static unknowns as they are in the trial.
-            places: of the marker positions among them.
-            sd_m: (k,) prior deviations of the displacements.
+            places: slice of the marker positions among them.
+            sd_m: (k,) prior standard deviations of the displacements.
         """
         if not sd_m.any():
             return cls(information, np.zeros((len(sd_m), len(information))), None)
@@ -48,8 +48,9 @@ class Displaced:
         return cls(information - half.T @ half, solve_triangular(factor, half, lower=True, trans="T"), factor)
 
     def rest(self, right: np.ndarray) -> np.ndarray:
-        """(k,) step of the displacements for this right-hand side (k,), while the static unknowns stay; they get
-        `-right @ gain` of it.
+        """Return the step (k,) of the displacements for this right-hand side (k,), with the static unknowns constant.
+
+        The static unknowns receive `-right @ gain` of it.
         """
         if self.factor is None:
             return np.zeros_like(right)
@@ -59,7 +60,9 @@ class Displaced:
 
 
 def as_displaced(information: np.ndarray, places: slice, sd_m: np.ndarray) -> np.ndarray:
-    """(S, S) what information on the static unknowns says of the same with the places displaced by unknown amounts: of
-    a trial about the person, or of everything else about a trial. The arguments are those of `Displaced.of`.
+    """Return the information (S, S) after the positions have been displaced by unknown amounts.
+
+    It converts information of a trial into information on the person, or of everything else into information on a
+    trial. The arguments are those of `Displaced.of`.
     """
     return Displaced.of(information, places, sd_m).information

@@ -1,4 +1,4 @@
-"""Adds the positions of markers in their segments: one for all trials, and offsets in each."""
+"""Adds the positions of markers in their segments: common to all trials, with offsets in each."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from kinertia.estimation.simultaneous.layout import Unknowns
 
 
 class MarkerPlaces(CostTerm):
-    """Positions of the markers in their segments; of several trials each has displacements of its own besides."""
+    """Positions of the markers in their segments; with several trials each has displacements of its own."""
 
     @classmethod
     def unknowns(cls, given: Given) -> tuple[Unknowns, ...]:
-        """Three of each marker, normal about where the skeleton has it."""
+        """Return three unknowns per marker, normal about its position in the skeleton."""
         count = len(given.skeleton.markers)
         return (
             Unknowns(
@@ -32,5 +32,5 @@ class MarkerPlaces(CostTerm):
         )
 
     def read(self, solution: Solution) -> dict[str, Any]:
-        """How far the markers of each trial are from their places."""
+        """Return the displacements of the markers of each trial from their positions."""
         return {"displacements_m": tuple(own.reshape(-1, 3) for own in solution.displaced)}

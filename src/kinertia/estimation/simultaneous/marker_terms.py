@@ -1,9 +1,10 @@
-"""Adds the markers to a trial's normal equations, for errors that are alike from frame to frame.
+"""Adds the markers to a trial's normal equations, for errors that are correlated over time.
 
-With J the derivative of the markers by the coordinates that move, S that by what does not (static coordinates, marker
-positions, then coefficients of skin motion: `skin`), r = measured - model and W the information on the errors
-(`marker_errors`), the terms are J^T W J, J^T W S, J^T W r, S^T W S and S^T W r. Frames meet the two after them. They
-are summed over the frames of a knot interval, in which the same six splines are active, and seven with those after it.
+With J the derivative of the markers by the coordinates that move, S the derivative by unknowns that do not (static
+coordinates, marker positions, then coefficients of skin motion: `skin`), r = measured - model and W the information on
+the errors (`marker_errors`), the terms are J^T W J, J^T W S, J^T W r, S^T W S and S^T W r. Frames are coupled to the
+two after them. They are summed over the frames of a knot interval, in which the same six splines are active, and seven
+with those after it.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from kinertia.motion.marker_sums import add_force, add_marker, met_force, swappe
 
 
 class _Static(NamedTuple):
-    """S^T W S (s, s), S^T W r (s,) and r^T W r (1,)."""
+    """The static terms S^T W S (s, s), S^T W r (s,) and r^T W r (1,)."""
 
     square: np.ndarray
     right: np.ndarray
@@ -35,10 +36,10 @@ class _Static(NamedTuple):
 
 
 class Markers(CostTerm):
-    """Markers against the model, of all trials; it adds no unknowns, and depends on those of others."""
+    """Cost of the markers of all trials against the model; it adds no unknowns, and depends on those of other terms."""
 
     def add(self, into: Gradient, here: InTrial) -> None:
-        """Add the squares of the markers' errors, over what is expected of them."""
+        """Add the squares of the markers' errors relative to their expected size."""
         given, k, near, static = self.given, here.k, here.stretch.with_neighbours, here.static
         seen = seen_markers(
             self.model.placed(static),
@@ -55,15 +56,15 @@ class Markers(CostTerm):
 def add_markers(
     into: Gradient, columns: slice, basis: MotionBasis, stretch: Stretch, markers: SeenMarkers, still: int
 ) -> None:
-    """Add the terms of the markers in one stretch of a trial.
+    """Add the terms of the markers in one time block of a trial.
 
     Args:
         into: zero, or with other terms.
-        columns: of the static unknowns, those that markers depend on.
+        columns: slice of the static unknowns that markers depend on.
         basis: of the motion.
         stretch: of the trial.
-        markers: in the stretch with its neighbours.
-        still: how many coordinates do not move in time.
+        markers: in the block with its neighbours.
+        still: number of coordinates that do not move.
     """
     near = stretch.with_neighbours
     own = (stretch.frames.start - near.start, stretch.frames.stop - near.start)
@@ -90,8 +91,9 @@ def _add(
     static: _Static,
     bordered: bool,
 ) -> None:
-    """Frames own[0] to own[1] - 1, interval by interval, and each with the two after it; `first` and `values` are the
-    motion basis'.
+    """Add frames own[0] to own[1] - 1, interval by interval, each coupled to the two frames after it.
+
+    `first` and `values` are those of the motion basis.
     """
     n, m = markers.own.shape
     start, stop = own
@@ -117,7 +119,7 @@ def _add(
         to_splines(first, values, start, end, interval, reach, band, border, right, bordered)
         start = end
     for row in range(min(LATER, n - stop) if bordered else 0):
-        # of the frames after them, only what these have in common with the last
+        # of the frames after them, only their coupling to the last of these
         to_border(first[stop + row], values[stop + row], interval.across[row], border)
 
 
@@ -133,7 +135,10 @@ def _frame(
     static: _Static,
     bordered: bool,
 ) -> None:
-    """J^T W J of frame k with itself; if `bordered` J^T W S of places and skin; J^T W r, W r being of five frames."""
+    """Add J^T W J of frame k with itself, J^T W S of positions and skin if `bordered`, and J^T W r.
+
+    W r covers five frames.
+    """
     a, m, here = len(markers.column), len(markers.carrier), k % 5
     most = 1
     for i in range(m):
@@ -173,8 +178,9 @@ def _frame(
 def _informed(
     markers: SeenMarkers, k: int, offset: int, placed: PlacedMarkers, pull: np.ndarray, directions: np.ndarray
 ) -> None:
-    """Add what the frame at this offset from k gives of W r (m, 3), and of W times the segments' axes (m, 3, 3 g): as
-    they are, then times each pattern of the skin.
+    """Add what the frame at this offset from k gives to W r (m, 3), and to W times the segments' axes (m, 3, 3 g).
+
+    The axes come first as they are, then multiplied by each pattern of the skin.
     """
     there = k + offset
     if there < 0 or there >= len(markers.own):
@@ -208,9 +214,7 @@ def _by_place(
     interval: Interval,
     static: _Static,
 ) -> None:
-    """Terms of the markers' positions in their segments and of the skin's coefficients: across the coordinates, with
-    themselves, and of r.
-    """
+    """Add the terms of marker positions and skin coefficients: with the coordinates, with themselves, and with r."""
     c, here = interval.gradient.shape[1], k % 5
     parent, column, slopes = markers.tree.parent, markers.column, markers.slopes
     axes, at, turned, errors = placed.axes[here], placed.places[here], placed.turned[here], placed.errors[here]
@@ -219,7 +223,7 @@ def _by_place(
     own, values, velocity = np.empty((3, most)), np.empty(most), np.empty(3)
     for m in range(len(markers.carrier)):
         d, place, first = directions[m], still + 3 * m, markers.first[m]
-        # so many before the columns of the skin
+        # number of columns before those of the skin
         skin = markers.columns[m] - 3
         count = 3 + 3 * (markers.last[m] - first)
         for i in range(3):
@@ -266,7 +270,7 @@ def _pair(
     interval: Interval,
     static: _Static,
 ) -> None:
-    """J^T W J of frame k with the one so many frames later."""
+    """Add J^T W J of frame k with the frame `later` frames after it."""
     a, here, there = len(markers.column), k % 5, (k + later) % 5
     sums, met = np.zeros((a, 16)), np.empty((a, 6))
     weights = markers.next[k] if later == 1 else markers.second[k]
@@ -278,7 +282,7 @@ def _pair(
     axes, after = placed.axes[here], placed.axes[there]
     product = np.empty((a, a))
     for j in range(a):
-        # what axis j carries meets it, and all axes before it, in the other frame
+        # what axis j moves is coupled to it, and to all axes before it, in the other frame
         met_force(sums, j, after, j, met)
         i = j
         while i >= 0:
@@ -303,10 +307,10 @@ def _sort(
     across: np.ndarray,
     square: np.ndarray,
 ) -> None:
-    """Add products (a, a) of axes to where their coordinates belong: the first in a frame, the second in any.
+    """Add products (a, a) of axes to the terms of their coordinates: the first in a frame, the second in any.
 
     Args:
-        column: (a,) as `SeenMarkers` has it.
+        column: (a,) as in `SeenMarkers`.
         pairs: (p, 2) of axes that may have a product.
         product: of the first's axes (rows) with the second's.
         squares: (c c,) where both coordinates move.
@@ -327,7 +331,7 @@ def _sort(
 
 @part
 def _pairs(parent: np.ndarray) -> np.ndarray:
-    """(p, 2) axes of which one carries the other, or that are the same, both ways round."""
+    """Return pairs (p, 2) of axes that are equal or one of which moves the other, in both orders."""
     count = 0
     for j in range(len(parent)):
         i = j
@@ -349,8 +353,9 @@ def _pairs(parent: np.ndarray) -> np.ndarray:
 
 @part
 def _reach(markers: SeenMarkers, c: int, still: int) -> np.ndarray:
-    """(c, 3, 2) the columns of S that each coordinate may meet, from and to: static coordinates, and places and skin of
-    the markers that it moves.
+    """Return the runs (c, 3, 2) of columns of S that each coordinate may be coupled to, from and to.
+
+    The runs are static coordinates, and positions and skin of the markers that the coordinate moves.
     """
     reach = np.zeros((c, 3, 2), dtype=np.int64)
     reach[:, 0, 1] = still
@@ -368,7 +373,7 @@ def _reach(markers: SeenMarkers, c: int, still: int) -> np.ndarray:
 
 @inlined
 def _widen(run: np.ndarray, begin: int, end: int) -> None:
-    """Let a run of columns, empty or not, hold these, too."""
+    """Extend a run of columns, empty or not, to include these."""
     if begin < end:
         run[0] = min(run[0], begin) if run[0] < run[1] else begin
         run[1] = max(run[1], end)

@@ -1,4 +1,4 @@
-"""Decides what the simultaneous estimate may move beside the segments of its prior."""
+"""Defines what the simultaneous estimate may change besides the segments of its prior."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from kinertia.model.gait27 import AXIS_TILTS, HIP_OFFSETS, LUMBAR_OFFSETS, SHOUL
 JOINT_CENTRE_SD_M = 0.010
 JOINT_AXIS_SD_RAD = float(np.radians(5.0))
 MARKER_SD_M = 0.005
-"""The calibrated skeleton has its markers from these trials already; what is left is how well that was done."""
+"""The calibrated skeleton has its markers from these trials already; what remains is the error of that calibration."""
 
 
 @dataclass(frozen=True, eq=False)
 class ModelUncertainty:
-    """Joint centres, markers and instruments that may move, and segments that are not estimated.
+    """Joint centres, markers and instruments that may change, and segments that are not estimated.
 
     Attributes:
-        centres: static coordinate of the skeleton (locked) -> prior deviation, m.
-        marker_sd_m: prior deviation of marker positions in their segments, each axis; None: they stay where they are.
-        held: parameters of the segments that the prior does not have; None where it has all.
+        centres: static coordinate of the skeleton (locked) -> prior standard deviation, m.
+        marker_sd_m: prior standard deviation of marker positions in their segments, each axis; None: they are fixed.
+        held: parameters of the segments that are not in the prior; None if it has all.
         source: where the prior's mean comes from, for messages.
-        axes: static coordinate that tilts a joint's axis -> prior deviation, rad.
-        instruments: priors of plates and clock.
-        before: static coordinate -> its value before the trials moved it; of others the skeleton's.
+        axes: static coordinate that tilts a joint's axis -> prior standard deviation, rad.
+        instruments: priors of plates and synchronisation.
+        before: static coordinate -> its value before the trials changed it; for others the skeleton's.
     """
 
     centres: Mapping[str, float]
@@ -41,27 +41,27 @@ class ModelUncertainty:
 
     @property
     def coordinates(self) -> dict[str, float]:
-        """All static coordinates that may move -> prior deviation, m or rad."""
+        """All static coordinates that may change -> prior standard deviation, m or rad."""
         return {**self.centres, **self.axes}
 
     def with_axes(self) -> ModelUncertainty:
-        """The same with the axes of knees, ankles and elbows of the 27-DOF model free."""
+        """Return the uncertainty with the axes of knees, ankles and elbows of the 27-DOF model free."""
         return replace(self, axes=dict.fromkeys(AXIS_TILTS, JOINT_AXIS_SD_RAD))
 
     @property
     def held_kg(self) -> float:
-        """Mass of the segments that are not estimated."""
+        """Mass (kg) of the segments that are not estimated."""
         return 0.0 if self.held is None else self.held.total_mass_kg
 
     def whole(self, estimate: BodySegmentParameters) -> BodySegmentParameters:
-        """The estimate, and after it the segments that are held."""
+        """Append the segments that are not estimated to the estimate."""
         if self.held is None:
             return estimate
         table = np.concatenate([estimate.table(), self.held.table()])
         return BodySegmentParameters.from_table((*estimate.segments, *self.held.segments), table)
 
     def whole_covariance(self, covariance: np.ndarray) -> np.ndarray:
-        """(10 s, 10 s) in the order of `whole`, zero for segments that are held."""
+        """Return the covariance (10 s, 10 s) in the order of `whole`, zero for segments that are not estimated."""
         return np.pad(covariance, (0, 0 if self.held is None else 10 * len(self.held.segments)))
 
 
@@ -71,4 +71,4 @@ GAIT27_UNCERTAINTY = ModelUncertainty(
     None,
     "the literature",
 )
-"""The 27-DOF model: hip, lumbar and shoulder centres, and all markers."""
+"""Uncertainty of the 27-DOF model: hip, lumbar and shoulder centres, and all markers."""

@@ -1,4 +1,4 @@
-"""Computes joint moments, and the derivatives of these and of ground reactions by all unknowns."""
+"""Computes joint moments, and the derivatives of moments and ground reactions by all unknowns."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from kinertia.motion.rigid_body import axis_force_derivatives
 
 @dataclass(frozen=True)
 class MomentDerivatives:
-    """Generalised forces at d frames and their derivatives.
+    """Generalised forces at d frames, and their derivatives.
 
     Attributes:
         value: (d, c) the forces themselves, N m and N.
-        q, qd, qdd: (d, c, c) by the coordinates that move and their rates.
-        static: (d, c, s) by the static unknowns that root equations depend on.
-        impact: (d, c) what impacts would add.
+        q, qd, qdd: (d, c, c) derivatives by the coordinates that move and their rates.
+        static: (d, c, s) derivatives by the static unknowns that root equations depend on.
+        impact: (d, c) contribution of impact transients.
         ground: (d, 6, s) derivative of the ground reactions on the right foot, then the left (N).
         left, ground_left: (d, c), (d, 6) mean squares of what the delay of the forces does besides (`LateLoads.left`).
     """
@@ -51,16 +51,16 @@ def moment_derivatives(
     frames: np.ndarray,
     late_sd_s: float = 0.0,
 ) -> MomentDerivatives:
-    """Derivatives of `dynamics.inverse_dynamics` at d frames of trial k.
+    """Compute the derivatives of `dynamics.inverse_dynamics` at d frames of trial k.
 
     Args:
         problem: of the estimate.
         k: the trial.
-        motion: all coordinates, static ones included, and their rates (d, c), as `FreedModel.full` has them.
+        motion: all coordinates, including static ones, and their rates (d, c), as in `FreedModel.full`.
         static: the estimate.
         reactions: `GroundLoads.reactions` there.
         frames: (d,) indices.
-        late_sd_s: deviation of the delay of the forces, over which derivatives by it are averaged.
+        late_sd_s: standard deviation of the delay of the forces, over which derivatives by it are averaged.
     """
     skeleton, layout = problem.model.placed(static), problem.layout
     q, qd, qdd = motion
@@ -105,7 +105,7 @@ def moment_derivatives(
 def _loads(
     problem: MapProblem, k: int, static: np.ndarray, reactions: GroundReactions, frames: np.ndarray, late: LateLoads
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(2, d, 6) loads on the feet, and (2, d, 6, s) their derivatives by the static unknowns."""
+    """Return loads on the feet (2, d, 6), and their derivatives by the static unknowns (2, d, 6, s)."""
     time = problem.trials[k].time[frames]
     loads = late.loads
     by_load = np.zeros((loads.shape[1], len(time), 6, problem.layout.in_root.stop))

@@ -1,5 +1,4 @@
-"""Uniform quintic B-splines for the coordinates of a trial, with the normal equations of anything that depends on
-them."""
+"""Represents the coordinates of a trial by uniform quintic B-splines."""
 
 from __future__ import annotations
 
@@ -13,9 +12,9 @@ from kinertia.motion.smoothing import columns_alike
 _DEGREE = 5
 _ACTIVE = _DEGREE + 1
 _RIDGE = 1e-8
-"""Keeps splines that no frame touches at zero."""
+"""Keeps the coefficients of splines without frames at zero."""
 _ROUNDING = 1e-9
-"""Of a knot interval, and of a trial: what a clock adds by its rounding must not make one knot more."""
+"""Tolerance relative to a knot interval and to a trial: rounding of the times must not add a knot."""
 
 
 class MotionBasis:
@@ -39,7 +38,7 @@ class MotionBasis:
         knots = begin + step * np.arange(-_DEGREE, count + _ACTIVE)
         self.size = count + _DEGREE
         self.first = np.minimum(((time - begin) / step + _ROUNDING).astype(int), count - 1)
-        # on a uniform grid all splines are one, shifted
+        # on a uniform grid all splines are shifted copies of one
         shape = BSpline.basis_element(np.arange(_ACTIVE + 1.0))
         local = (time - begin) / step - self.first
         at = local[:, None] + np.arange(_DEGREE, -1, -1)
@@ -48,12 +47,12 @@ class MotionBasis:
         self.knots = knots
 
     def evaluate(self, coefficients: np.ndarray, frames: slice | np.ndarray = slice(None)) -> list[np.ndarray]:
-        """Coordinates and their first two derivatives, each (n, c), of coefficients (size, c), at these frames."""
+        """Evaluate coordinates and their first two derivatives, each (n, c), from coefficients (size, c)."""
         active = coefficients[self.active[frames]]
         return [np.einsum("na,nac->nc", values[frames], active) for values in self.values]
 
     def fit(self, q: np.ndarray) -> np.ndarray:
-        """(size, c) least-squares coefficients of q (n, c); NaN rows of a column are left out."""
+        """Fit coefficients (size, c) to q (n, c) by least squares; NaN rows of a column are left out."""
         seen = np.isfinite(q)
         filled = np.where(seen, q, 0.0)
         coefficients = np.empty((self.size, q.shape[1]))

@@ -1,10 +1,10 @@
-"""Measures how strong the markers' errors are where joint moments feel them.
+"""Measures the marker errors in the frequency band that affects joint moments.
 
-The process that stands for the errors (`marker_errors`) is true to the slowest of them, which tell most of what does
-not move, and to what is new from frame to frame. Between the two, where the body's accelerations are, it may have many
-times the power of skin: on synthetic skin ten to thirty times, on measured walks up to ten times. The estimate hardly
-depends on it, but deviations of joint moments do. So they are told by what the markers leave at the estimate, within
-the band of the motion.
+The process that represents the errors (`marker_errors`) matches their slowest part, which carries most information on
+what does not move, and their innovation from frame to frame. In between, where the body's accelerations are, it may
+have many times the power of skin motion: ten to thirty times on synthetic skin, up to ten times on measured walks. The
+estimate hardly depends on it, but standard deviations of joint moments do. So these are computed from the residuals of
+the markers at the estimate, within the band of the motion.
 """
 
 from __future__ import annotations
@@ -18,20 +18,20 @@ from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.motion.moving_windows import all_around
 
 _UNSEEN = 3.0
-"""Skin that moves as a block moves the segment and leaves nothing to see: the power of all errors over that of those
-which are seen. Set here; with it, bars hold in a laboratory whose skin moves as blocks."""
+"""Power of all errors over that of the observable ones: skin that moves as a block moves the segment, and leaves no
+residual. Chosen here; with it, intervals have their nominal coverage in a laboratory whose skin moves as blocks."""
 _LEAST_FREE = 0.1
 _ENDS = 3
-"""Knot intervals beside gaps and ends, where a fitted spline swings more than elsewhere."""
+"""Knot intervals beside gaps and ends, where a fitted spline oscillates more than elsewhere."""
 _MOST_FRAMES = 6000
-"""At once: a minute."""
+"""Number of frames at once: a minute."""
 _FREQUENCIES = 400
 
 
 def motion_noise(problem: MapProblem, k: int, coefficients: np.ndarray, static: np.ndarray) -> np.ndarray:
-    """(3,) power of the errors of trial k, of their rates and of their accelerations, over what the estimate expects.
+    """Return the power (3,) of the errors of trial k, their rates and accelerations, relative to what is expected.
 
-    At most 1: a single marker that jumps would make all bars longer.
+    It is at most 1: a single marker that jumps would widen all intervals.
 
     Args:
         problem: of the estimate.
@@ -63,7 +63,7 @@ def motion_noise(problem: MapProblem, k: int, coefficients: np.ndarray, static: 
 
 
 def _left(problem: MapProblem, k: int, coefficients: np.ndarray, static: np.ndarray, frames: slice) -> np.ndarray:
-    """(n, m, 3) m, what markers and skin leave of the measurement, in the axes of the segments; NaN where not seen."""
+    """Return the residuals (n, m, 3) m of markers and skin, in the axes of the segments; NaN where not seen."""
     q = problem.model.full(problem.bases[k].evaluate(coefficients, frames), static)[0]
     skeleton = problem.model.placed(static)
     pose = skeleton.pose(q)
@@ -75,7 +75,7 @@ def _left(problem: MapProblem, k: int, coefficients: np.ndarray, static: np.ndar
 
 
 def _expected(problem: MapProblem, k: int, band_hz: float) -> np.ndarray:
-    """(3,) mean squares of errors of unit deviation, their rates and accelerations, up to this frequency."""
+    """Return mean squares (3,) of errors of unit SD, their rates and accelerations, up to this frequency."""
     trial = problem.trials[k]
     step_s = float(np.median(np.diff(trial.time)))
     hz = np.linspace(0.0, band_hz, _FREQUENCIES)
@@ -87,7 +87,7 @@ def _expected(problem: MapProblem, k: int, band_hz: float) -> np.ndarray:
 
 
 def _free(problem: MapProblem, k: int, counts: np.ndarray) -> float:
-    """Share of the errors within the band that motion and skin have not taken up, by counting unknowns."""
+    """Return the share of the errors within the band that motion and skin have not absorbed, by counting unknowns."""
     basis = problem.bases[k]
     shown = counts.sum() * basis.size / len(basis.first)
     splines = basis.size * problem.trials[k].dynamic.mean() * len(problem.moving)

@@ -1,4 +1,4 @@
-"""Sums the normal equations of a trial's motion and of static unknowns, knot interval by knot interval."""
+"""Accumulates the normal equations of a trial's motion and of static unknowns, knot interval by knot interval."""
 
 from __future__ import annotations
 
@@ -10,19 +10,20 @@ import numpy as np
 from kinertia.model.compiled import compiled
 
 SPLINES_PER_BLOCK = 6
-"""A frame and the two after it see seven splines together: each at most the six after it, and so at most the next
-block."""
+"""A frame and the two after it involve seven splines: each is coupled at most to the six after it, and so at most to
+the next block."""
 
 
 NO_BORDER = np.zeros((2, 2, 2))[..., :1]
-"""For compiled functions, of the kind of array that they take: a part of a larger one. One without columns would be of
-another kind, for which they would be compiled once more."""
+"""Placeholder for compiled functions, of the array type that they take: a part of a larger array. An array without
+columns would be of another type, for which they would be compiled once more."""
 
 
 @dataclass
 class Gradient:
-    """Half the sum of squares of a trial or of a stretch of it, and where it falls: minus its derivatives by the motion
-    (size, c) and by the static unknowns (S,).
+    """Half the sum of squares of a trial or of a time block of it, and minus its gradient.
+
+    The derivatives are by the motion (size, c) and by the static unknowns (S,).
     """
 
     right: np.ndarray
@@ -31,11 +32,11 @@ class Gradient:
 
     @classmethod
     def zero(cls, size: int, coordinates: int, static: int) -> Self:
-        """For so many splines, coordinates and static unknowns."""
+        """Return zeros for so many splines, coordinates and static unknowns."""
         return cls(np.zeros((size, coordinates)), np.zeros(static), 0.0)
 
     def add(self, part: Gradient, splines: slice) -> None:
-        """Add the gradient of a stretch whose frames involve these splines."""
+        """Add the gradient of a time block whose frames involve these splines."""
         self.right[splines] += part.right
         self.static_right += part.static_right
         self.cost += part.cost
@@ -43,9 +44,10 @@ class Gradient:
 
 @dataclass
 class NormalEquations(Gradient):
-    """With the second derivatives of Gauss and Newton: band (size, 7, c, c), border (size, c, S), static (S, S). Row i
-    of the band has the blocks of splines i and i, i + 1, ... Of the motion alone the border has no columns, and only
-    band and `right` count.
+    """Gradient with the Gauss-Newton second derivatives: band (size, 7, c, c), border (size, c, S), static (S, S).
+
+    Row i of the band has the blocks of splines i and i, i + 1, ... For the motion alone the border has no columns, and
+    only band and `right` count.
     """
 
     band: np.ndarray
@@ -54,7 +56,7 @@ class NormalEquations(Gradient):
 
     @classmethod
     def zero(cls, size: int, coordinates: int, static: int, bordered: bool = True) -> Self:
-        """For so many splines, coordinates and static unknowns."""
+        """Return zeros for so many splines, coordinates and static unknowns."""
         return cls(
             np.zeros((size, coordinates)),
             np.zeros(static),
@@ -66,11 +68,11 @@ class NormalEquations(Gradient):
 
     @property
     def bordered(self) -> bool:
-        """Whether they have a border."""
+        """Whether the equations have a border."""
         return bool(self.border.shape[2])
 
     def cleared(self) -> Self:
-        """The same arrays, filled with zeros."""
+        """Fill the arrays with zeros, and return the same equations."""
         for array in (self.right, self.static_right, self.band, self.border, self.static):
             array.fill(0.0)
         self.cost = 0.0
@@ -78,13 +80,13 @@ class NormalEquations(Gradient):
 
     @classmethod
     def bytes_per_spline(cls, coordinates: int, static: int) -> int:
-        """How much memory a spline takes, of so many coordinates and static unknowns."""
+        """Return the memory (bytes) of one spline, with so many coordinates and static unknowns."""
         one = cls.zero(1, coordinates, static)
         return one.band.nbytes + one.border.nbytes
 
 
 class UsedAgain:
-    """Normal equations whose memory is used again: to ask the system for as much takes longer than to fill it.
+    """Pool of normal equations whose memory is reused, since allocating it takes longer than filling it.
 
     >>> room = UsedAgain()
     >>> first = room.zero(8, 2, 3)
@@ -97,7 +99,7 @@ class UsedAgain:
         self._free: dict[tuple[int, int, int, bool], list[NormalEquations]] = {}
 
     def zero(self, size: int, coordinates: int, static: int, bordered: bool = True) -> NormalEquations:
-        """Zeros for so many splines, coordinates and static unknowns."""
+        """Return zeros for so many splines, coordinates and static unknowns."""
         free = self._free.setdefault((size, coordinates, static, bordered), [])
         try:
             return free.pop().cleared()
@@ -105,14 +107,14 @@ class UsedAgain:
             return NormalEquations.zero(size, coordinates, static, bordered)
 
     def back(self, normal: NormalEquations) -> None:
-        """Take back what nobody needs any more."""
+        """Return normal equations that are no longer needed to the pool."""
         size, coordinates = normal.right.shape
         self._free[size, coordinates, len(normal.static_right), normal.bordered].append(normal)
 
 
 @compiled
 def by_splines(values: np.ndarray, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> np.ndarray:
-    """(d, r, 6, c) derivatives by the coefficients of the six active splines, from those by q, qd, qdd (d, r, c).
+    """Convert derivatives by q, qd, qdd (d, r, c) to those by the coefficients of the six active splines (d, r, 6, c).
 
     `values` (3, d, 6) are those of the splines and of their first two derivatives.
     """

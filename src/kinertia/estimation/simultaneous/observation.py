@@ -1,5 +1,6 @@
-"""What the simultaneous estimate sees of a measured trial: its frames, its smoothed loads, what its skin may follow,
-and how noisy its markers are (`marker_noise`). All deviations are inflated where errors come back (`repetition`).
+"""Extracts the observations of a measured trial: frames, smoothed loads, skin patterns and marker noise.
+
+Noise is estimated by `marker_noise`. All standard deviations are inflated where errors recur (`repetition`).
 """
 
 from __future__ import annotations
@@ -37,21 +38,21 @@ from kinertia.settings import ForceCutoff
 from kinertia.trial.sampled_time import nearest_samples, within
 
 FORCE_SD_OF_WEIGHT = 0.005
-"""Deviation of the root force from that of rigid segments, share of body weight (some 3 N)."""
+"""Standard deviation of the root force from that of rigid segments, as a share of body weight (some 3 N)."""
 MOMENT_ARM_M = 0.3
-"""Deviation of the root moment over that of the force."""
+"""Standard deviation of the root moment over that of the force."""
 
 
 @dataclass(frozen=True, eq=False)
 class Observations:
-    """Trials of one person.
+    """Observations of the trials of one person.
 
     Attributes:
-        alone: per trial, with the deviations of errors that never come back.
+        alone: per trial, with the standard deviations of errors that never recur.
         noise: per trial.
-        misplaced_m: (m,) deviation of the markers' mean places in their segments, over the trials, from those that the
-            skeleton has.
-        repeats: (t, t) how often the errors of each trial come back in each (`repetition.repeats`).
+        misplaced_m: (m,) standard deviation of the markers' mean positions in their segments, over the trials, from the
+            skeleton's.
+        repeats: (t, t) how often the errors of each trial recur in each (`repetition.repeats`).
     """
 
     alone: tuple[Observation, ...]
@@ -61,20 +62,20 @@ class Observations:
 
     @property
     def together(self) -> tuple[Observation, ...]:
-        """The trials for one estimate from all: what comes back counts once."""
+        """Observations of the trials for one estimate from all of them: errors that recur count once."""
         return tuple(o.repeated(count) for o, count in zip(self.alone, self.repeats.sum(axis=1), strict=True))
 
 
 def observe(
     skeleton: Skeleton, trials: Sequence[Kinematics], mass_kg: float, bandwidths: Sequence[Bandwidth]
 ) -> Observations:
-    """The observations of trials of one person, and the noise of their markers.
+    """Extract the observations of a person's trials, and the noise of their markers.
 
     Args:
         skeleton: with exactly the markers to use, in the order of the observations; a trial may lack some.
         trials: kinematics of each.
         mass_kg: for the size of force errors.
-        bandwidths: of each, of motion and forces.
+        bandwidths: per trial, of motion and forces.
     """
     errors = [_errors(skeleton, each) for each in trials]
     rates = [each.trial.markers.rate_hz for each in trials]
@@ -90,7 +91,7 @@ def observe(
         )
     ]
     displaced = _displacement_sd(skeleton, rest.displaced)
-    # what the estimate finds to go with the joints comes back, too: it counts as often as before it was found
+    # errors that the estimate finds to follow the joints recur, too: they count as often as before they were found
     alike = [
         repeats([weighed(e, o.marker_sd) for e, (o, _) in zip(every, pairs, strict=True)], rates)
         for every in ([each.varying for each in errors], rest.varying)
@@ -106,8 +107,9 @@ def observe(
 
 
 def _displacement_sd(skeleton: Skeleton, displaced: np.ndarray) -> np.ndarray:
-    """(m,) deviation over trials of where markers are in their segments (t, m, 3), segment by segment; NaN where a
-    trial does not show them. Zero for a single trial.
+    """Return the SD (m,) over trials of marker positions in their segments (t, m, 3), segment by segment.
+
+    Positions are NaN where a trial does not show a marker. The result is zero for a single trial.
     """
     count = np.isfinite(displaced).sum(axis=0)
     apart = np.nan_to_num(displaced - _middle(displaced))
@@ -115,20 +117,21 @@ def _displacement_sd(skeleton: Skeleton, displaced: np.ndarray) -> np.ndarray:
 
 
 def _misplaced(skeleton: Skeleton, displaced: np.ndarray) -> np.ndarray:
-    """(m,) deviation of the mean places of markers (t, m, 3) from those of the skeleton, segment by segment."""
+    """Return the SD (m,) of the mean positions of markers (t, m, 3) from the skeleton's, segment by segment."""
     shown = np.isfinite(displaced).any(axis=0)
     return _spread(skeleton, _middle(displaced)[None], shown.astype(int))
 
 
 def _middle(displaced: np.ndarray) -> np.ndarray:
-    """(m, 3) mean over trials (t, m, 3) of what is not NaN; zero where all is."""
+    """Return the mean (m, 3) over trials (t, m, 3), ignoring NaN; zero where all are NaN."""
     result: np.ndarray = np.nansum(displaced, axis=0) / np.maximum(np.isfinite(displaced).sum(axis=0), 1)
     return result
 
 
 def _spread(skeleton: Skeleton, apart: np.ndarray, freedom: np.ndarray) -> np.ndarray:
-    """(m,) root mean square of distances (t, m, 3) with these degrees of freedom (m, 3), the same for all markers of a
-    segment but for how many of them err alike.
+    """Return the RMS (m,) of distances (t, m, 3) with these degrees of freedom (m, 3), segment by segment.
+
+    It is the same for all markers of a segment but for how many of them err in common.
     """
     alike = markers_alike(skeleton, apart)
     result = np.zeros(len(alike))
@@ -141,10 +144,10 @@ def _spread(skeleton: Skeleton, apart: np.ndarray, freedom: np.ndarray) -> np.nd
 
 @dataclass(frozen=True, eq=False)
 class _Errors:
-    """What inverse kinematics leaves of one trial.
+    """Residuals of inverse kinematics in one trial.
 
     Attributes:
-        time: (n,) s, uniform: the stretches, what is between them, and their surroundings.
+        time: (n,) s, uniform: the measured windows, what is between them, and their surroundings.
         q: (n, c) coordinates; bridged where the root was not seen.
         measured: (n, m, 3) markers, m; NaN where not seen.
         displaced: (m, 3) mean of measured minus model, in the axes of each marker's segment.
@@ -166,7 +169,7 @@ def _errors(skeleton: Skeleton, kinematics: Kinematics) -> _Errors:
     near = within(time, start - AROUND_WINDOW_S, end + AROUND_WINDOW_S)
     solved = np.isfinite(kinematics.ik.q).any(axis=1)
     frames = np.flatnonzero(near & np.logical_or.accumulate(solved) & np.logical_or.accumulate(solved[::-1])[::-1])
-    # frames between must stay, or neighbours would not be neighbours; their markers show no pose
+    # frames between must stay, so that neighbouring frames remain neighbours; their markers show no pose
     solved = solved[frames]
     bridged = kinematics.spline(time[frames])
     q = np.where(solved[:, None], kinematics.ik.q[frames], bridged)
@@ -180,7 +183,7 @@ def _errors(skeleton: Skeleton, kinematics: Kinematics) -> _Errors:
         local[some] = (turned @ (measured[some] - skeleton.marker_positions(pose))[..., None])[..., 0]
         total += np.nansum(local[some], axis=0)
         count += np.isfinite(local[some]).sum(axis=0)
-    # what a marker is off its place in the segment all the time is calibration, not noise
+    # the mean offset of a marker from its position in the segment is calibration, not noise
     displaced = total / np.where(count > 0, count, np.nan)
     local -= displaced
     return _Errors(time[frames], q, measured, displaced, local, bridged)
@@ -196,14 +199,14 @@ def _observed(
     frames: float,
     mass_kg: float,
 ) -> tuple[Observation, MarkerNoise]:
-    """One trial on its own."""
+    """Extract the observation of one trial on its own, and its marker noise."""
     time = errors.time
     taken = taken_by_chance(np.isfinite(rest[..., 0]).sum(axis=0), skin.last - skin.first, frames)
     noise, effective, alike, products = marker_noise(skeleton, rest, taken, kinematics.trial.markers.rate_hz)
     shown = np.isfinite(errors.displaced).all(axis=1)
     virtual = np.array([kinematics.trial.virtual_sd_m.get(label, 0.0) for label in skeleton.labels])
     effective = np.sqrt(np.square(effective) + girdle_variance(skeleton, errors.smooth, shown) + np.square(virtual))
-    # within the band, neighbouring frames repeat one another
+    # within the band, neighbouring frames are redundant
     repeated = np.sqrt(max(1.0, kinematics.trial.markers.rate_hz / (2.0 * bandwidth.motion_hz)))
     force_sd = repeated * FORCE_SD_OF_WEIGHT * mass_kg * GRAVITY_M_S2
     ground = _ground(kinematics, time, bandwidth.motion_hz, bandwidth.force)
@@ -234,7 +237,7 @@ def _observed(
 
 
 def reading(observation: Observation, kinematics: Kinematics, bandwidth: Bandwidth) -> Observation:
-    """The same frames and markers with the ground reactions of these kinematics, which differ in nothing else."""
+    """Return the observation with the ground reactions of these kinematics, which differ in nothing else."""
     ground = _ground(kinematics, observation.time, bandwidth.motion_hz, bandwidth.force)
     return replace(observation, ground=ground)
 

@@ -1,4 +1,4 @@
-"""Holds the observations of a trial and of a laboratory: `observation` makes them."""
+"""Holds the observations of a trial, and the prior of the calibration; `observation` makes the former."""
 
 from __future__ import annotations
 
@@ -16,24 +16,25 @@ from kinertia.estimation.simultaneous.skin import SkinPatterns
 
 @dataclass(frozen=True)
 class Observation:
-    """One trial as the estimator sees it.
+    """Observations of one trial, as the estimator uses them.
 
     Attributes:
         time: (n,) s, uniform.
         markers: (n, m, 3) m in the order of the skeleton's markers; NaN where not seen.
-        marker_sd: (m,) effective deviation of each marker coordinate in one frame, m.
-        marker_frames: over how many neighbouring frames these errors are alike (`marker_errors`).
-        q: (n, c) start.
-        spacing_s: of the splines that its motion is made of (`bandwidth`).
+        marker_sd: (m,) effective standard deviation of each marker coordinate in one frame, m.
+        marker_frames: number of neighbouring frames over which these errors are correlated (`marker_errors`).
+        q: (n, c) coordinates from which the search starts.
+        spacing_s: knot spacing of the splines of its motion (`bandwidth`).
         dynamic: (n,) frames whose ground contacts are all measured.
         ground: the loads on the feet, and the plates that measured them.
-        force_sd, moment_sd: effective deviations of the root residual, N and N m, ...
-        impact: (n,) ... and by how much they are larger in each frame (`impacts`).
-        displacement_sd_m: (m,) prior deviation of each marker's displacement in this trial (`displacement`), each axis.
-        repeats: by how much errors that come back have raised all variances (`repeated`).
-        skin: what the skin may follow; None: it does not move with the joints.
-        frame_products: (k, 3, 3) of several kinds of errors, over their deviations, the mean products of a frame's and
-            of the two before it; None: of a process with a double pole.
+        force_sd, moment_sd: effective standard deviations of the root residual, N and N m.
+        impact: (n,) factor by which these are larger in each frame (`impacts`).
+        displacement_sd_m: (m,) prior standard deviation of each marker's displacement in this trial (`displacement`),
+            each axis.
+        repeats: factor by which recurring errors have raised all variances (`repeated`).
+        skin: patterns that the skin may follow; None: it does not move with the joints.
+        frame_products: (k, 3, 3) mean products of the errors of a frame and of the two before it, over their standard
+            deviations, for several kinds of errors; None: those of a process with a double pole.
         name: of the trial.
     """
 
@@ -56,22 +57,22 @@ class Observation:
 
     @cached_property
     def marker_process(self) -> tuple[np.ndarray, ErrorProcess]:
-        """(m,) deviations of the markers' errors, m, and how they go from frame to frame."""
+        """Standard deviations (m,) of the markers' errors, m, and the process that they follow from frame to frame."""
         if self.frame_products is None:
             return self.marker_sd, ErrorProcess.alike_over(self.marker_frames)
         process, variance = ErrorProcess.read(self.marker_frames, self.frame_products)
         return np.sqrt(variance) * self.marker_sd, process
 
     def root_sd(self, frames: np.ndarray) -> np.ndarray:
-        """(d, 6) deviations of the root residual in these frames: N, N m."""
+        """Return standard deviations (d, 6) of the root residual in these frames: N, N m."""
         larger = np.broadcast_to(self.impact, len(self.time))[frames]
         result: np.ndarray = np.outer(larger, np.repeat([self.force_sd, self.moment_sd], 3))
         return result
 
     def repeated(self, times: float) -> Observation:
-        """The same where its errors come back so many times in all that is estimated from.
+        """Return the observation with standard deviations for errors that recur so many times in the estimate's data.
 
-        Larger deviations leave more room for what is new in a frame, the cameras' noise: it does not come back.
+        Larger standard deviations leave more room for the innovation of a frame, the cameras' noise: it does not recur.
         """
         more = np.sqrt(times)
         return replace(
@@ -86,13 +87,13 @@ class Observation:
 
 @dataclass(frozen=True)
 class CalibrationPrior:
-    """Prior deviations of the calibration; the skeleton as it stands is the mean.
+    """Prior standard deviations of the calibration, whose mean is the skeleton as it is.
 
     Attributes:
-        coordinates: static coordinate (locked in the skeleton) -> deviation, rad or m.
+        coordinates: static coordinate (locked in the skeleton) -> standard deviation, rad or m.
         marker_sd_m: (m,) of each marker's position in its segment, each axis.
-        instruments: priors of plates and clock.
-        before: static coordinate -> its value before the trials moved it; of others the skeleton's.
+        instruments: priors of plates and synchronisation.
+        before: static coordinate -> its value before the trials changed it; for others the skeleton's.
     """
 
     coordinates: Mapping[str, float]

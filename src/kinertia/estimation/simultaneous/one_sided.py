@@ -1,11 +1,11 @@
 """Tests whether one side is heavier than the other, as with a prosthesis, an orthosis or an ankle weight.
 
-People's left and right are alike (the prior's correlation is 0.9), so that a wrong mass of one leg pulls the sound leg
-along: the moves of the two sides look alike, the difference between them does not. So differences are what is judged,
-in deviations of people's. In walks with a prosthesis, a cast or an ankle weight that nobody declared, the mass of a
-foot or a shank differs by 4 to 8 of them, and centres of mass across the limb by 1; a load that is on no plate for a
-while, a handrail or one plate that is late makes centres of mass differ by 6 and more, too; plates, clock and joints
-that are off make nothing differ by more than 2, but for a plate's vertical zero.
+People's left and right are similar (the prior's correlation is 0.9), so a wrong mass of one leg also changes the other
+leg: the changes of the two sides look alike, the difference between them does not. So differences are judged, in
+standard deviations of people's differences. In walks with an undeclared prosthesis, cast or ankle weight, the mass of a
+foot or a shank differs by 4 to 8 of them, and centres of mass across the limb by 1. A load that is on no plate for a
+while, a handrail or one delayed plate makes centres of mass differ by 6 and more, too. Errors of plates,
+synchronisation and joints make nothing differ by more than 2, except the zero offset of a plate's vertical force.
 """
 
 from __future__ import annotations
@@ -19,23 +19,24 @@ from kinertia.estimation.prior import BspPrior
 from kinertia.model.bsp import BodySegmentParameters
 
 _BEYOND_SD = 4.0
-"""Deviations from which on a difference of masses is none of a body's: one plate's vertical zero, 50 N off, makes up to
-3.5."""
+"""Standard deviations above which a difference of masses is not anatomical: a vertical zero offset of 50 N of one plate
+makes up to 3.5."""
 _ACROSS = 0.5
-"""Share of the masses' deviations that centres of mass across the limbs may have."""
+"""Largest difference of centres of mass across the limbs, relative to the difference of masses, both in standard
+deviations."""
 _WITH_IT = 0.5
-"""Share of the largest deviation from which on another pair is named, too."""
+"""Share of the largest difference above which another pair is reported, too."""
 
 
 @dataclass(frozen=True)
 class OneSided:
-    """One side's masses against the other's.
+    """Mass asymmetry between one side and the other.
 
     Attributes:
         heavier, lighter: segments, from the trunk outwards, and their other sides.
         more_kg: by how much each of them is heavier.
-        times: the largest difference, in deviations of people's.
-        added: whether the heavier side is the one that is unlike the prior; else the lighter one is.
+        times: the largest difference, in standard deviations of people's.
+        added: whether the heavier side is farther from the prior; else the lighter one is.
     """
 
     heavier: tuple[str, ...]
@@ -46,11 +47,11 @@ class OneSided:
 
 
 def one_sided(prior: BspPrior, estimate: BodySegmentParameters, covariance: np.ndarray) -> OneSided | None:
-    """The side that is heavier, where that is what departs most of all differences between the sides; else None.
+    """Return the side that is heavier, if that is the largest of all differences between the sides; else None.
 
     Args:
         prior, estimate: of the same segments.
-        covariance: posterior, of the estimate's table.
+        covariance: posterior covariance of the estimate's table.
     """
     after = {pair.segment: pair for pair in asymmetries(estimate, covariance)}
     before = {pair.segment: pair for pair in asymmetries(prior.mean, prior.covariance)}

@@ -1,4 +1,4 @@
-"""Defines the outcome of the simultaneous estimate, in units and names of measured things."""
+"""Defines the result of the simultaneous estimate, in physical units and names."""
 
 from __future__ import annotations
 
@@ -26,25 +26,25 @@ from kinertia.motion.ground_reactions import GroundReactions
 
 @dataclass(frozen=True, kw_only=True)
 class SimultaneousResult:
-    """Outcome of `estimate_simultaneous`.
+    """Result of `estimate_simultaneous`.
 
     Attributes:
         bsp: the estimate, physically consistent.
         bsp_covariance: (10 s, 10 s) posterior covariance of its table rows, segment after segment.
         skeleton: with the estimated marker positions and static coordinates.
-        coordinates: static coordinate -> (value, posterior deviation), rad or m.
-        foot_loads: per trial (n, 2, 6) loads on the feet, of instruments put right, of the motion's bandwidth.
-        reactions: per trial the loads for the joint moments, of instruments put right.
+        coordinates: static coordinate -> (value, posterior standard deviation), rad or m.
+        foot_loads: per trial (n, 2, 6) loads on the feet, corrected for instrument errors, at the motion's bandwidth.
+        reactions: per trial the loads for the joint moments, corrected for instrument errors.
         motions: per trial q, qd, qdd at its frames.
-        displacements_m: per trial (m, 3) how far its markers are from their places in the segments.
-        curve_deviations: per trial the posterior deviations of its curves at its dynamic frames.
+        displacements_m: per trial (m, 3) displacements of its markers from their positions in the segments.
+        curve_deviations: per trial the posterior standard deviations of its curves at its dynamic frames.
         calibration: entries of all quantities that terms calibrate.
-        instruments: what these trials say of plates and clock, to be added to what others say.
-        converged: the last step was short: CONVERGED_SD, CONVERGED.
+        instruments: information of these trials on plates and synchronisation, which can be added to that of others.
+        converged: whether the last step was short: CONVERGED_SD, CONVERGED.
         iterations: Gauss-Newton steps taken.
         cost: half the sum of squares, at the start and at the end.
-        support: what supports an accusation of each instrument.
-        evidence: how likely the trials are, and the same read otherwise.
+        support: whether each instrument error is credible.
+        evidence: of the trials, and of the same trials interpreted differently.
         draws: from the posterior.
     """
 
@@ -67,14 +67,16 @@ class SimultaneousResult:
     draws: PosteriorDraws
 
     def of_first(self, count: int) -> SimultaneousResult:
-        """The same with the first so many trials."""
+        """Return the result with the first `count` trials only."""
         names = ("foot_loads", "reactions", "motions", "displacements_m", "curve_deviations")
         return replace(self, **{name: getattr(self, name)[:count] for name in names})
 
 
 class Ended(NamedTuple):
-    """Where the search ended, the quadratic there and the instruments' last Gaussian; whether short of its limit, after
-    how many quadratics, from which cost and at which.
+    """State at the end of the search.
+
+    The point, the quadratic there and the instruments' last Gaussian; whether it ended before its limit; the number of
+    quadratics; the cost at the start and at the end.
     """
 
     point: Point
@@ -95,7 +97,11 @@ def result_of(
     evidence: Evidence,
     draws: PosteriorDraws,
 ) -> SimultaneousResult:
-    """In the user's terms, with these motions, covariance (S, S) of all that does not move, and curves' deviations."""
+    """Convert the end of the search to a result in physical units, from the terms' readings of the solution.
+
+    `motions` are per trial, `covariance` (S, S) is of all unknowns that do not move, `of_curves` are the curves'
+    standard deviations.
+    """
     values = ended.point.static
     solution = Solution(
         static=values,

@@ -1,8 +1,8 @@
 """Corrects plate loads for the plates' errors, with derivatives by these errors, in compiled code.
 
-A load that somebody adds to a plate is first freed of the plate's zeros, then turned about the vertical through the
-plate's middle, moved to where the plate stands, given the vertical moment that crosstalk took, and multiplied by the
-gain. What is wrong with a plate is a row of seven: PLATE_ERRORS, then ZERO_UNKNOWNS, of `plates`.
+The zero offsets are subtracted from the load on a plate first; then the load is rotated about the vertical through the
+plate's middle, moved to the plate's true position, corrected for crosstalk into the vertical moment, and multiplied by
+the gain. The errors of a plate are a row of seven: PLATE_ERRORS, then ZERO_UNKNOWNS, of `plates`.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import numpy as np
 from kinertia.model.compiled import compiled, part
 
 X, Z, GAIN, FREE_MOMENT, TURN, ZERO_X, ZERO_Z = range(7)
-"""Places of what is wrong with a plate."""
+"""Indices of a plate's errors."""
 
 
 @compiled
@@ -24,14 +24,14 @@ def put_right(
     middles: np.ndarray,
     turn: np.ndarray,
 ) -> np.ndarray:
-    """Loads on the feet (n, 2, 6), corrected for the plates' errors.
+    """Correct loads on the feet (n, 2, 6) for the plates' errors.
 
     Args:
         loads: (n, 2, 6) as the plates gave them: force (N), moment about the ground origin (N m).
-        loaded: (n, 2) where somebody stands, and zeros count.
+        loaded: (n, 2) 1 where the foot stands, so that zero offsets count.
         carrier: (n, 2) index of the plate under each foot.
-        plates: (p, 7) what is wrong with them.
-        middles: (p, 3) m, where they are turned about.
+        plates: (p, 7) their errors.
+        middles: (p, 3) m, centres of their rotation.
         turn: (3, 3) rotation from the laboratory's axes to the axes of the loads.
     """
     result, own, push = np.empty(loads.shape), np.empty(6), np.empty(6)
@@ -57,9 +57,9 @@ def by_plate(
     middles: np.ndarray,
     turn: np.ndarray,
 ) -> np.ndarray:
-    """(n, 2, 6, p, 7) derivatives of what `put_right` gives by what is wrong with the plates.
+    """Compute the derivatives (n, 2, 6, p, 7) of the output of `put_right` by the plates' errors.
 
-    The arguments are its own, but for `loads`: (n, 2, 6) put right.
+    The arguments are the same, except that `loads` (n, 2, 6) are corrected.
     """
     n, feet, _ = loads.shape
     result = np.zeros((n, feet, 6, len(plates), plates.shape[1]))
@@ -88,7 +88,7 @@ def by_plate(
 
 @part
 def _push(axis: int, middle: np.ndarray, turn: np.ndarray, out: np.ndarray) -> None:
-    """out = (6,) load of 1 N along an axis of the laboratory at the middle of a plate."""
+    """Write the load (6,) of 1 N along an axis of the laboratory at the middle of a plate into `out`."""
     x, y, z = turn[0, axis], turn[1, axis], turn[2, axis]
     out[0], out[1], out[2] = x, y, z
     out[3] = middle[1] * z - middle[2] * y
@@ -98,7 +98,7 @@ def _push(axis: int, middle: np.ndarray, turn: np.ndarray, out: np.ndarray) -> N
 
 @part
 def _put_right(load: np.ndarray, middle: np.ndarray, wrong: np.ndarray, turn: np.ndarray, out: np.ndarray) -> None:
-    """out = (6,) plate load, corrected for all errors except zero offsets."""
+    """Write the plate load (6,), corrected for all errors except zero offsets, into `out`."""
     x, y, z = middle[0], middle[1], middle[2]
     fx, fy, fz = load[0], load[1], load[2]
     # about the middle
@@ -131,7 +131,7 @@ def _by_turn(load: np.ndarray, place: np.ndarray, out: np.ndarray) -> None:
     """Write the derivative of a corrected load (6,) by its plate's rotation, at this position (3,), to out (6, 7)."""
     x, y, z = place[0], place[1], place[2]
     mx, mz = load[3] - (y * load[2] - z * load[1]), load[5] - (x * load[1] - y * load[0])
-    # the loads are turned backwards: v becomes (-v_z, 0, v_x)
+    # the loads are rotated backwards: v becomes (-v_z, 0, v_x)
     fx, fz = -load[2], load[0]
     out[0, TURN], out[2, TURN] = fx, fz
     out[3, TURN] = y * fz - mz

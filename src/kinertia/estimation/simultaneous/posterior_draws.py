@@ -1,13 +1,13 @@
 """Draws motion, body segment parameters and calibration together from the posterior.
 
-A draw of the static unknowns is their covariance's root times independent normal numbers. The motion follows it through
-the border of the normal equations, and departs from it by what markers leave open: `Eliminated.motion_step` does both
-at once. The motion's own part is then narrowed by what is seen of the markers' errors, as `curve_deviations` narrows
-its derivatives (`motion_noise`): by a filter, since places, rates and accelerations each have a share of their own and
-a draw is one motion. Where knots lie (`knot_phases`), what thighs weigh in other tasks (`task_masses`) and impacts each
-add an independent number.
+A draw of the static unknowns is a root of their covariance times independent normal numbers. The motion follows it
+through the border of the normal equations, and differs from it by what the markers leave undetermined:
+`Eliminated.motion_step` does both at once. The motion's own part is then reduced according to the observed marker
+errors, as `curve_deviations` reduces its derivatives (`motion_noise`): by a filter, since positions, rates and
+accelerations each have a share of their own and a draw is one motion. Knot positions (`knot_phases`), thigh masses in
+other tasks (`task_masses`) and impact transients each add an independent number.
 
-Draws are made once, with a fixed seed, and kept with the result: a few hundred take less room than the factors from
+Draws are made once, with a fixed seed, and stored with the result: a few hundred take less memory than the factors from
 which more could be made.
 """
 
@@ -32,32 +32,32 @@ from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.log_cholesky import dynamic_jacobian, nearest_consistent
 
 MOST_DRAWS = 200
-"""Kept of one estimate. The deviation of 200 numbers is known to 5 %."""
+"""Number of draws stored per estimate. The standard deviation of 200 numbers is known to 5 %."""
 MOST_BYTES = 8_000_000
-"""Of the kept motions of all trials together; of long trials fewer draws are kept."""
+"""Size of the stored motions of all trials together; for long trials fewer draws are stored."""
 FEWEST_DRAWS = 20
 _SEED = 20090
 _ALIKE = 1e-3
-"""Difference between shares that makes none."""
+"""Relative difference between shares that is negligible."""
 _LOOSE_ENDS = 5
-"""Splines at either end of a trial that few frames hold: they say nothing of the others."""
+"""Splines at either end of a trial that few frames determine: they are not representative of the others."""
 _LEAST_MASS = 0.05
-"""Share of a segment's estimated mass that a draw leaves at least."""
+"""Least share of a segment's estimated mass in a draw."""
 
 
 @dataclass(frozen=True, eq=False)
 class TrialDraws:
-    """What n draws have otherwise than the estimate in one trial.
+    """Differences of n draws from the estimate in one trial.
 
     Attributes:
         knots: (k + 6,) s, of quintic splines.
-        coefficients: (n, k, c) of the coordinates' departures, rad and m.
-        plates: (n, p, 7) departures of the plates' errors: PLATE_ERRORS, ZERO_UNKNOWNS.
-        plate_gain: (p,) the estimated ones.
-        middles: (p, 3) m, about which plates are turned.
+        coefficients: (n, k, c) of the coordinates' differences, rad and m.
+        plates: (n, p, 7) differences of the plates' errors: PLATE_ERRORS, ZERO_UNKNOWNS.
+        plate_gain: (p,) the estimated gains.
+        middles: (p, 3) m, about which plates are rotated.
         turn: (3, 3) from the laboratory's axes to the trial's.
-        late_s: (n,) by how much more the forces are late.
-        impact: (n,) share of the impact (`GroundReactions.impact`) that is added.
+        late_s: (n,) additional delay of the forces, s.
+        impact: (n,) share of the impact transients (`GroundReactions.impact`) that is added.
     """
 
     knots: np.ndarray
@@ -75,11 +75,11 @@ class PosteriorDraws:
     """n draws from the posterior of an estimate.
 
     Attributes:
-        segments: whose parameters are drawn.
+        segments: names of the segments whose parameters are drawn.
         bsp: (n, s, 10) tables of their body segment parameters, each physically consistent.
-        coordinates: names of the static coordinates, and ...
+        coordinates: names of the static coordinates.
         coordinate_values: (n, h) their values, rad or m.
-        places: (n, m, 3) m, departures of the markers' places in their segments.
+        places: (n, m, 3) m, differences of the markers' positions in their segments.
         trials: one per trial.
     """
 
@@ -92,24 +92,27 @@ class PosteriorDraws:
 
     @property
     def count(self) -> int:
-        """How many there are."""
+        """Number of draws."""
         return len(self.bsp)
 
     def without_places(self) -> PosteriorDraws:
-        """The same with markers that stay where they are."""
+        """Return the draws with marker positions as estimated."""
         return replace(self, places=np.zeros_like(self.places))
 
 
 @dataclass(frozen=True, eq=False)
 class Mode:
-    """One deviation of something independent: how the static unknowns (S,), and each trial's motion (k, c), go."""
+    """Effect of one SD of an independent quantity on static unknowns (S,) and each trial's motion (k, c)."""
 
     static: np.ndarray
     motions: tuple[np.ndarray, ...]
 
 
 def of_knots(phases: OfPhases) -> Mode:
-    """Where the knots lie: from the first estimate to the second, whose deviation is their distance over root two."""
+    """Return the mode of the knot positions, from the first estimate to the second.
+
+    Its standard deviation is their distance over the square root of two.
+    """
     (problem, other), (point, there) = phases.problems[:2], phases.points[:2]
     rows = zip(problem.bases, other.bases, point.coefficients, there.coefficients, strict=True)
     motions = tuple(own.fit(new.evaluate(b)[0]) - own.fit(own.evaluate(a)[0]) for own, new, a, b in rows)
@@ -118,7 +121,7 @@ def of_knots(phases: OfPhases) -> Mode:
 
 
 def of_root(model: GaussNewton, point: Point, root: np.ndarray) -> list[Mode]:
-    """Of each column of a covariance's root (S, u), with the motions that follow."""
+    """Return a mode for each column of a covariance's root (S, u), with the motions that follow."""
     result = []
     for column in root.T:
         static = column * np.sign(column[np.argmax(np.abs(column))])  # the root's sign is arbitrary
@@ -131,14 +134,14 @@ def of_root(model: GaussNewton, point: Point, root: np.ndarray) -> list[Mode]:
 def posterior_draws(
     model: GaussNewton, point: Point, roots_in_trials: Sequence[np.ndarray], modes: Sequence[Mode]
 ) -> PosteriorDraws:
-    """Draw around an estimate.
+    """Draw from the posterior around an estimate.
 
     Args:
         model: of the estimate's normal equations, with the instruments' priors.
         point: the estimate.
         roots_in_trials: per trial (S, S) root of the posterior covariance of the static unknowns as they are in it,
             block lower triangular: those that root equations depend on come first.
-        modes: what else is uncertain.
+        modes: other uncertain quantities.
     """
     problem, trials, root = model.problem, model.here.trials, model.static.root_of_covariance()
     random, count = np.random.default_rng(_SEED), _kept(sum(each.size for each in point.coefficients))
@@ -163,12 +166,12 @@ def posterior_draws(
 
 
 def _kept(size: int) -> int:
-    """How many draws of so many coefficients are kept."""
+    """Return the number of draws of so many coefficients that are stored."""
     return int(np.clip(MOST_BYTES // (4 * size), FEWEST_DRAWS, MOST_DRAWS))
 
 
 def _in_trial(drawn: np.ndarray, normal: np.ndarray, root: np.ndarray, first: int) -> np.ndarray:
-    """(n, S) draws as they are in a trial: those of the first unknowns are the same in all."""
+    """Return draws (n, S) as they are in a trial: the first unknowns are the same in all."""
     own = normal.copy()
     own[:, :first] = np.linalg.solve(root[:first, :first], drawn[:, :first].T).T
     result: np.ndarray = own @ root.T
@@ -178,7 +181,7 @@ def _in_trial(drawn: np.ndarray, normal: np.ndarray, root: np.ndarray, first: in
 def _motions(
     problem: MapProblem, k: int, point: Point, trial: Eliminated, static: np.ndarray, random: np.random.Generator
 ) -> np.ndarray:
-    """(n, k, c) departures of a motion's coefficients, with these (n, S) of the static unknowns."""
+    """Draw differences (n, k, c) of a motion's coefficients, given these (n, S) of the static unknowns."""
     size = (2 * len(static), *point.coefficients[k].shape)
     steps = _Steps(static.T, random, np.empty(size))
     after = steps.write(trial.middle)
@@ -194,12 +197,12 @@ def _motions(
 
 @dataclass(frozen=True, eq=False)
 class _Steps:
-    """Steps of a motion for n draws of the static unknowns, and n of what they leave open.
+    """Steps of a motion for n draws of the static unknowns, and n draws of what they leave undetermined.
 
     Attributes:
         static: (S, n) steps of the static unknowns.
-        random: of the latter.
-        into: (2 n, k, c) of both, one after the other.
+        random: generator for the latter.
+        into: (2 n, k, c) both, one after the other.
     """
 
     static: np.ndarray
@@ -207,8 +210,9 @@ class _Steps:
     into: np.ndarray
 
     def write(self, part: Factored, after: np.ndarray | None = None) -> np.ndarray:
-        """Write those of some splines, as `elimination.write_step`; returns the last block (k, 2 n) of them in the
-        order of elimination's beginning, which is `after` of the part eliminated before.
+        """Write the steps of some splines, as `elimination.write_step` does, and return their first block (k, 2 n).
+
+        The first in the order of elimination, it is `after` of the part eliminated before.
         """
         follow = -(part.border @ self.static.astype(part.border.dtype)).astype(float)
         right = np.concatenate([follow, self.random.standard_normal(follow.shape)], axis=2)
@@ -222,11 +226,11 @@ class _Steps:
 
 
 def _narrowed(alone: np.ndarray, shares: np.ndarray) -> np.ndarray:
-    """Series (n, k, c) of splines' coefficients narrowed, such that the power of their sums, of these sums' rates and
-    of their accelerations is that of before times these (3,).
+    """Filter series (n, k, c) of spline coefficients so that their power is multiplied by shares (3,).
 
-    The logarithm of the filter's power is a parabola in the square of the frequency, the same for all columns, so that
-    what holds between them still does.
+    The shares apply to the power of the sums of splines, of their rates and of their accelerations. The logarithm of
+    the filter's power is a parabola in the square of the frequency, the same for all columns, so that relations between
+    them are kept.
     """
     if np.ptp(shares) < _ALIKE * shares.max():
         same: np.ndarray = np.sqrt(shares.mean()) * alone
@@ -253,20 +257,20 @@ def _narrowed(alone: np.ndarray, shares: np.ndarray) -> np.ndarray:
 
 
 def _spectrum(series: np.ndarray) -> np.ndarray:
-    """(n, f, c) of series (n, k, c) and their mirror image, which makes no jump at the ends."""
+    """Return the spectrum (n, f, c) of series (n, k, c) followed by their mirror image, which avoids jumps."""
     return np.fft.rfft(np.concatenate([series, series[:, ::-1]], axis=1), axis=1)
 
 
 def _squares(count: int) -> np.ndarray:
-    """(f,) squares of frequencies, over half a cycle per knot interval."""
+    """Return the squares (f,) of frequencies, relative to half a cycle per knot interval."""
     return np.square(np.linspace(0.0, 1.0, count))
 
 
 def _bodies(problem: MapProblem, point: Point, departures: np.ndarray) -> np.ndarray:
-    """(n, s, 10) tables of drawn body segment parameters, from departures (n, 10 s) of the unknowns.
+    """Return tables (n, s, 10) of drawn body segment parameters, from differences (n, 10 s) of the unknowns.
 
-    Forces are linear in masses, first and second moments, not in logarithms: departures are taken as those of the
-    first. Where that is not physically possible it is made so.
+    Forces are linear in masses, first and second moments, not in logarithms: the differences are applied to the former
+    to first order. Impossible bodies are replaced by the nearest possible ones.
     """
     theta, estimate = point.static[problem.layout[BSP]], problem.model.bsp(point.static)
     dynamic, each = estimate.dynamic_parameters().reshape(-1, 10), departures.reshape(len(departures), -1, 10)

@@ -1,8 +1,8 @@
 """Sums the cost of all terms: normal equations and gradient at a point.
 
-The cost is the sum of its terms (`terms.TERMS`), each of which adds unknowns, what it costs and what it reads out of
-the solution. All derivatives are analytic. Frames are summed knot interval by knot interval: the normal matrix is
-banded in the motion and bordered by what does not move.
+The cost is the sum of its terms (`terms.TERMS`), each of which adds unknowns, its cost and what it reads from the
+solution. All derivatives are analytic. Frames are summed knot interval by knot interval: the normal matrix is banded in
+the motion and bordered by what does not move.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ T = TypeVar("T", bound=CostTerm)
 
 
 class MapProblem:
-    """Residuals and normal equations at a point.
+    """Cost of the maximum-a-posteriori estimate: residuals and normal equations at a point.
 
     Attributes:
-        given: what is estimated from.
+        given: input of the estimate.
         layout: of the unknowns that do not move (S of them).
-        model: of the person, as they have it.
+        model: of the person, as a function of these.
         terms: of the cost.
-        loads: on the feet, put right by them.
+        loads: on the feet, corrected by the terms.
     """
 
     def __init__(
@@ -61,49 +61,49 @@ class MapProblem:
         self._room = UsedAgain()
 
     def of(self, trials: Sequence[Observation], phase: float = 0.0) -> MapProblem:
-        """The same of other observations, and where splines have knots this share of an interval earlier."""
+        """Return the same problem with other observations, and with knots this share of an interval earlier."""
         kinds = [type(term) for term in self.terms]
         return MapProblem(self.skeleton, self.prior, self.calibration, trials, phase, kinds)
 
     def term(self, kind: type[T]) -> T:
-        """The term of this kind."""
+        """Return the term of this kind."""
         (result,) = (term for term in self.terms if isinstance(term, kind))
         return result
 
     @property
     def beginning(self) -> Point:
-        """Where the estimate starts: the observations' coordinates, the prior's mean, no displacements."""
+        """Point from which the estimate starts: the observations' coordinates, the prior's mean, no displacements."""
         return Point(self.start, self.layout.start, tuple(np.zeros_like(sd) for sd in self.displaced_sd))
 
     @property
     def displaced_sd(self) -> tuple[np.ndarray, ...]:
-        """Per trial prior deviations of what is elsewhere in each."""
+        """Prior standard deviations of the unknowns that have an offset in each trial, per trial."""
         (result,) = (one.displaced_sd for one in self.layout.unknowns if one.displaced_sd)
         return result
 
     def shortened(self, point: Point, step: np.ndarray) -> np.ndarray:
-        """A step of all unknowns from a point, no longer than the terms allow."""
+        """Shorten a step of all unknowns from a point to what the terms allow."""
         before, step = sum(part.size for part in point.coefficients), step.copy()
         for term in self.terms:
             term.shorten(step[before : before + self.layout.size])
         return step
 
     def bends(self, right: np.ndarray) -> np.ndarray:
-        """(S,) what Gauss-Newton leaves out of the diagonal of the information, from the right-hand side (S,)."""
+        """Return what Gauss-Newton leaves out of the information's diagonal (S,), from the right-hand side (S,)."""
         result = np.zeros(self.layout.size)
         for term in self.terms:
             term.add_bends(result, right)
         return result
 
     def prior_information(self, static: np.ndarray) -> np.ndarray:
-        """(S, S) of all priors but those of errors; of these, of what other people of the session have shown."""
+        """Return the information (S, S) of all priors but those of errors, including other people of the session."""
         result = np.diag(self.layout.weight)
         for term in self.terms:
             term.add_information(result, static)
         return result
 
     def prior_slope(self, static: np.ndarray) -> tuple[np.ndarray, float]:
-        """Minus the derivatives (S,) of half the sum of squares of the same priors, and that half."""
+        """Return minus the derivatives (S,) of half the sum of squares of the same priors, and that half."""
         away, weight = static - self.layout.start, self.layout.weight
         right = -weight * away
         cost = float(np.sum(weight * np.square(away)))
@@ -112,32 +112,32 @@ class MapProblem:
         return right, 0.5 * cost
 
     def left_out(self, static: np.ndarray) -> np.ndarray:
-        """(S, u) by how much unknowns of unit deviation that are left out of the vector displace the others."""
+        """Return the displacements (S, u) of the unknowns by unknowns of unit SD that are left out of the vector."""
         every = [each for term in self.terms if (each := term.left_out(static)) is not None]
         return np.column_stack(every) if every else np.zeros((self.layout.size, 0))
 
     def profiled(self) -> list[int]:
-        """Places of errors of which the sum has its posterior from the profile of the cost; none of them or some."""
+        """Return the indices of errors whose sum gets its posterior from the profile of the cost; it may be empty."""
         return [at for term in self.terms for at in term.profiled()]
 
     def read(self, solution: Solution) -> list[dict[str, Any]]:
-        """What each term reads out of the solution."""
+        """Return what each term reads from the solution."""
         return [term.read(solution) for term in self.terms]
 
     def at(self, point: Point, damping: float = 0.0) -> Linearised:
-        """Normal equations at a point, motions eliminated with their diagonal raised by this share."""
+        """Build normal equations at a point, and eliminate motions with their diagonal raised by this share."""
         rows = enumerate(point.coefficients)
         trials = tuple(self.eliminated(k, part, self.in_trial(k, point), damping) for k, part in rows)
         slope = self._slope(point, [trial.gradient for trial in trials])
         return Linearised(slope, trials, self.prior_information(point.static))
 
     def slope(self, point: Point) -> Slope:
-        """Cost and where it falls: what `at` has, in a tenth of the time."""
+        """Return cost and gradient as in `at`, in a tenth of the time."""
         rows = enumerate(point.coefficients)
         return self._slope(point, [self.gradient(k, part, self.in_trial(k, point)) for k, part in rows])
 
     def _slope(self, point: Point, gradients: Sequence[Gradient]) -> Slope:
-        """With the priors."""
+        """Add the priors to the trials' gradients."""
         right, cost = self.prior_slope(point.static)
         rows, motions, displaced = zip(gradients, self.displaced_sd, point.displaced, strict=True), [], []
         for gradient, sd, own in rows:
@@ -150,7 +150,7 @@ class MapProblem:
         return Slope(point, cost, Point(tuple(motions), right, tuple(displaced)).vector, errors)
 
     def in_trial(self, k: int, point: Point) -> np.ndarray:
-        """(S,) static unknowns as they are in trial k, displaced."""
+        """Return the static unknowns (S,) as they are in trial k, with its displacements."""
         static = point.static.copy()
         static[self.layout.displaced] += self.displaced_sd[k] * point.displaced[k]
         return static
@@ -163,7 +163,7 @@ class MapProblem:
         damping: float = 0.0,
         bordered: bool = True,
     ) -> Eliminated:
-        """Trial k with its motion eliminated; not `bordered`: of the motion alone, with all else held."""
+        """Return trial k with its motion eliminated; not `bordered`: for the motion alone, with all else fixed."""
         of = partial(self.normal, k, coefficients, static, bordered=bordered)
         return Eliminated.of(self.stretches[k], of, self._room.back, damping)
 
@@ -175,7 +175,7 @@ class MapProblem:
         stretch: Stretch | None = None,
         bordered: bool = True,
     ) -> NormalEquations:
-        """Normal equations of a stretch of trial k, or of all of it."""
+        """Build the normal equations of a time block of trial k, or of the whole trial."""
         stretch = stretch or Stretch.whole(self.bases[k])
         result = self._room.zero(stretch.size, len(self.moving), self.layout.size, bordered)
         here = self._here(k, coefficients, static, stretch)
@@ -184,7 +184,7 @@ class MapProblem:
         return result
 
     def gradient(self, k: int, coefficients: np.ndarray, static: np.ndarray) -> Gradient:
-        """Cost of trial k and where it falls."""
+        """Return the cost of trial k and minus its gradient."""
 
         def of_part(part: tuple[Sequence[Stretch], Sequence[CostTerm]]) -> Gradient:
             result = Gradient.zero(len(coefficients), len(self.moving), self.layout.size)

@@ -1,9 +1,9 @@
 """Takes quasi-Newton steps (L-BFGS) on top of a known quadratic.
 
-Gauss and Newton leave out second derivatives of the residuals. Along a few nearly flat directions these are as large as
-what is left in: there their steps are up to twice too long, or half as long as they should be, again and again. A pair
-of a step and of the change of the gradient along it corrects the quadratic in that direction (Liu and Nocedal 1989,
-Math Program 45:503), and a gradient takes a tenth of the time of a new quadratic.
+Gauss-Newton leaves out second derivatives of the residuals. Along a few nearly flat directions these are as large as
+what it retains: there its steps are repeatedly up to twice too long, or half as long as they should be. A pair of a
+step and of the change of the gradient along it corrects the quadratic in that direction (Liu and Nocedal 1989, Math
+Program 45:503), and a gradient takes a tenth of the time of a new quadratic.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _LEAST_CURVATURE = 0.02
 
 @dataclass(frozen=True, eq=False)
 class SecantPairs:
-    """Steps taken, and how much less the gradient was after each.
+    """Pairs of steps taken and of the decrease of the gradient along each.
 
     Attributes:
         steps: (k, n).
@@ -36,13 +36,11 @@ class SecantPairs:
 
     @classmethod
     def none(cls, n: int) -> SecantPairs:
-        """Before the first step, of n unknowns."""
+        """Return no pairs, for n unknowns, as before the first step."""
         return cls(np.zeros((0, n)), np.zeros((0, n)))
 
     def with_pair(self, step: np.ndarray, change: np.ndarray, expected: float) -> SecantPairs:
-        """One more, in place of the oldest of many, if along the step there is a fair share of the curvature that was
-        expected.
-        """
+        """Append a pair, in place of the oldest of many, if the step shows a fair share of the expected curvature."""
         if not step @ change > _LEAST_CURVATURE * expected:
             return self
         return SecantPairs(
@@ -50,13 +48,13 @@ class SecantPairs:
         )
 
     def stiffer(self, places: slice, more: np.ndarray) -> SecantPairs:
-        """The same where the cost has gained this information (m, m) on some of the unknowns."""
+        """Return the pairs after the cost has gained this information (m, m) on some of the unknowns."""
         changes = self.changes.copy()
         changes[:, places] += self.steps[:, places] @ more
         return SecantPairs(self.steps, changes)
 
     def step(self, right: np.ndarray, known: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-        """The step (n,) for a right-hand side, of which `known` gives the one without these pairs."""
+        """Compute the step (n,) for a right-hand side, given `known`, which computes it without these pairs."""
         left, shares = right.copy(), np.zeros(len(self.steps))
         inverse = 1.0 / np.einsum("kn,kn->k", self.steps, self.changes)
         for k in range(len(shares) - 1, -1, -1):

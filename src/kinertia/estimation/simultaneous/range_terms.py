@@ -1,13 +1,13 @@
 """Penalises coordinates beyond their ranges, in a trial's normal equations.
 
-Where markers hardly show a coordinate, the turn of a forearm above all, the estimate would send it through poses that
-no joint has, in long steps that do not end. What is paid is one-sided: the square of what is beyond, over a deviation,
-once per knot interval. The deviation is what anatomy knows of people (`range_of_motion`); where the model clamps a
-range it is so small that the coordinate stays at the end.
+Where markers hardly determine a coordinate, the rotation of a forearm above all, the estimate would take it through
+impossible poses, in long steps that do not end. The penalty is one-sided: the square of the excess, over a standard
+deviation, once per knot interval. The standard deviation comes from anatomy (`range_of_motion`); where the model clamps
+a range it is so small that the coordinate stays at the limit.
 
-Ends are rounded off over a third of a degree: what is beyond by x counts as s log(1 + exp(x / s)). Where a corner was,
-the curvature of the cost jumped, and with it the deviations of whatever is near an end of its range; a search that
-meets such corners goes to and fro between them.
+Limits are rounded off over a third of a degree: an excess x counts as s log(1 + exp(x / s)). At a sharp limit the
+curvature of the cost would jump, and with it the standard deviations of everything near a range limit; a search that
+meets such limits oscillates between them.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from kinertia.estimation.simultaneous.stretches import Stretch
 from kinertia.model.coordinate_range import Bounds
 
 _ROUNDED = 0.005
-"""Rad or m over which an end is rounded off, s above."""
+"""Angle or length (rad or m) over which a limit is rounded off, s above."""
 _NOTHING = 8.0
-"""So many of these within a range nothing is paid: it would be a millionth."""
+"""Distance within the range, in units of the rounding, beyond which the penalty is zero: it would be a millionth."""
 
 
 class RangeTerms(NamedTuple):
-    """What coordinates (n, c) pay.
+    """Penalty of coordinates (n, c) beyond their ranges.
 
     Attributes:
         curvature: (n, c) second derivatives of the cost; zero well within the range.
@@ -44,7 +44,7 @@ class RangeTerms(NamedTuple):
 
     @classmethod
     def of(cls, bounds: Bounds, q: np.ndarray, frames_per_interval: float) -> RangeTerms:
-        """Of coordinates q (n, c), rad and m.
+        """Compute the penalty of coordinates q (n, c), rad and m.
 
         >>> import numpy as np
         >>> from kinertia.model.coordinate_range import Range
@@ -67,10 +67,10 @@ class RangeTerms(NamedTuple):
 
 
 class JointRanges(CostTerm):
-    """What the coordinates of all trials pay beyond their ranges."""
+    """Penalty of the coordinates of all trials beyond their ranges."""
 
     def add(self, into: Gradient, here: InTrial) -> None:
-        """Add it."""
+        """Add the penalty in a time block."""
         frames = here.stretch.frames
         first = frames.start - here.stretch.with_neighbours.start
         q = here.near_q[first : first + frames.stop - frames.start, self.given.moving]
@@ -78,7 +78,7 @@ class JointRanges(CostTerm):
 
 
 def add_ranges(into: Gradient, basis: MotionBasis, stretch: Stretch, bounds: Bounds, q: np.ndarray) -> None:
-    """Add what the coordinates q (f, c) of the frames of a stretch pay beyond their ranges.
+    """Add the penalty of the coordinates q (f, c) in the frames of a time block.
 
     Args:
         into: zero, or with other terms.

@@ -1,12 +1,13 @@
 """Estimates how much of the marker errors repeats with every stride, and in the person's other trials.
 
-Skin motion goes with the joints: it is the same in every stride, and in the next walk. Errors that come back do not
-average out. Neither do those of a rigid model, which go with the same strides. What so many strides and trials say
-counts once: the deviations of markers and forces are raised by the root of the number of repeats.
+Skin motion follows the joints: it is the same in every stride, and in the next walk. Errors that recur do not average
+out. Neither do those of a rigid model, which recur with the same strides. The information of so many strides and trials
+counts once: the standard deviations of markers and forces are multiplied by the square root of the number of repeats.
 
-Whether errors come back is read from their correlation, summed over all marker coordinates; a repeat counts as much as
-it is alike. A gait's errors are those of another only at the same phase, so the best lag is looked for. The cameras'
-noise never comes back, but averages out in a few frames: repeats are over what one frame shares with the next.
+Whether errors recur is determined from their correlation, summed over all marker coordinates; a repeat counts in
+proportion to its correlation. The errors of two walks agree only at the same phase, so the best lag is searched for.
+The cameras' noise never recurs, but averages out in a few frames: repeats are relative to what one frame shares with
+the next.
 """
 
 from __future__ import annotations
@@ -20,28 +21,28 @@ from scipy.fft import next_fast_len, rfft
 from kinertia.motion.frame_chunks import pieces
 
 _UNLIKE, _REPEATING = 0.05, 0.3
-"""Correlations below which errors count as unlike, and above which they count as coming back."""
+"""Correlations below which errors count as uncorrelated, and above which they count as recurring."""
 _AS_ALIKE = 0.9
-"""Share of the largest correlation that marks the lags at which errors come back first."""
+"""Share of the largest correlation that marks the lags at which errors first recur."""
 _SHORTEST_OWN, _SHORTEST_OTHER = 1.0 / 3.0, 1.0 / 2.0
-"""Share of a trial that must overlap with itself, and of the shorter of two with the other: less would be alike by
-chance, or because two trials cut from one have frames in common.
+"""Share of a trial that must overlap with itself, and of the shorter of two with the other: shorter overlaps would be
+correlated by chance, or because two trials cut from one have frames in common.
 """
 _WHITE = 0.1
 """Share of the variance that one frame shares with the next below which errors are the cameras' noise."""
 
 _COLUMNS_AT_ONCE = 4
-"""Spectra are four times larger than what they are of."""
+"""Number of columns transformed at once: spectra take four times the memory of their columns."""
 
 
 @dataclass(frozen=True)
 class Repetition:
-    """Of the errors of one trial with themselves.
+    """Repetition of the errors within one trial.
 
     Attributes:
-        frames: over how many neighbouring frames they are alike; 1 for white noise.
-        period: frames from one stride to the next; None where errors do not come back.
-        strides: in how many strides they are alike; 1 where they do not come back.
+        frames: number of neighbouring frames over which they are correlated; 1 for white noise.
+        period: frames from one stride to the next; None if errors do not recur.
+        strides: number of strides in which they recur; 1 if they do not.
         slow: share of their variance that one frame shares with the next.
     """
 
@@ -52,7 +53,7 @@ class Repetition:
 
     @classmethod
     def of(cls, errors: np.ndarray) -> Repetition:
-        """Of errors (n, k), zero where a marker is not seen."""
+        """Analyse errors (n, k), zero where a marker is not seen."""
         n = len(errors)
         alike, overlap = (part[n - 1 :] for part in _correlation(errors, errors))
         if n < 2 or not alike[0] > 0:
@@ -73,11 +74,11 @@ class Repetition:
 
 
 def repeats(errors: Sequence[np.ndarray], rates_hz: Sequence[float]) -> np.ndarray:
-    """(t, t) how often the errors of each trial (rows) come back in each (columns): its strides on the diagonal, zero
-    for trials that err in other ways. Sums over trials that are used together are what their information counts for.
+    """Count how often the errors of each trial (rows) recur in each (columns): returns (t, t).
 
-    Of trials with two strides and more, the pace may differ. Few markers, or errors of few kinds, may be alike by
-    chance; they then count for less than they say.
+    The diagonal holds the trial's own strides; trials with other errors have zero. The information of trials that are
+    used together counts for its sum over them. If both trials have at least two strides, their pace may differ. Few
+    markers, or errors of few kinds, may be correlated by chance; their information is then underestimated.
 
     Args:
         errors: per trial (n, k) of the same columns, zero where a marker is not seen.
@@ -96,7 +97,7 @@ def repeats(errors: Sequence[np.ndarray], rates_hz: Sequence[float]) -> np.ndarr
 
 
 def _in_other(errors: np.ndarray, other: np.ndarray, period: float | None, slow: float) -> float:
-    """How often errors (n, k) come back in those of another trial (m, k)."""
+    """Count how often errors (n, k) recur in those of another trial (m, k)."""
     n, shortest = len(errors), min(len(errors), len(other))
     alike, overlap = _correlation(errors, other)
     per_pair = alike * n / overlap
@@ -111,12 +112,12 @@ def _in_other(errors: np.ndarray, other: np.ndarray, period: float | None, slow:
 
 
 def _counted(alike: np.ndarray, share: np.ndarray) -> float:
-    """Repeats that are alike by so much, over such shares of the errors' frames."""
+    """Return the number of repeats with these correlations, over these shares of the errors' frames."""
     return float((np.clip(alike, 0.0, 1.0) * share).sum())
 
 
 def _resampled(errors: np.ndarray, step: float) -> np.ndarray:
-    """Errors (n, k) at every so many frames."""
+    """Resample errors (n, k) at every `step` frames."""
     if step == 1.0:
         return errors
     at = np.arange(0.0, len(errors) - 1 + 1e-9, step)
@@ -128,7 +129,7 @@ def _resampled(errors: np.ndarray, step: float) -> np.ndarray:
 
 
 def _refined(alike: np.ndarray, period: int) -> float:
-    """The period by the last of its multiples that still shows a peak: a frame matters after ten strides."""
+    """Refine the period from the last of its multiples that still shows a peak: a frame matters after ten strides."""
     refined, k = float(period), 2
     while round(refined * k) + 2 < len(alike) and alike[round(refined * k)] > 0:
         near = round(refined * k) + np.arange(-2, 3)
@@ -138,7 +139,7 @@ def _refined(alike: np.ndarray, period: int) -> float:
 
 
 def _first_peak(alike: np.ndarray, wide: int) -> int | None:
-    """Index of the first of the largest peaks (what comes back after a stride does so after two); None if too low."""
+    """Return the index of the first of the largest peaks (they recur at multiples of a stride); None if too low."""
     if not alike.size or alike.max() < _REPEATING:
         return None
     high = np.flatnonzero(alike > _AS_ALIKE * alike.max())
@@ -147,8 +148,9 @@ def _first_peak(alike: np.ndarray, wide: int) -> int | None:
 
 
 def _correlation(errors: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Correlation of errors (n, k) with other (m, k) at lags -(n - 1) ... m - 1: the sum over common frames, over what
-    n frames would give if the two were alike; and how many frames are common.
+    """Correlate errors (n, k) with other errors (m, k) at lags -(n - 1) ... m - 1.
+
+    Returned are the sum over common frames, relative to n frames of equal errors, and the number of common frames.
     """
     n, m = len(errors), len(other)
     power = np.sqrt(np.square(errors).mean() * np.square(other).mean()) * n * errors.shape[1]
@@ -166,6 +168,6 @@ def _correlation(errors: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.
 
 
 def _spectra(columns: np.ndarray, padded: int) -> np.ndarray:
-    """(k, f) of columns (n, k), with zeros to this length; rows that lie together take half the time."""
+    """Return the spectra (k, f) of columns (n, k), padded with zeros; contiguous rows take half the time."""
     result: np.ndarray = rfft(np.ascontiguousarray(columns.T), padded)
     return result

@@ -1,7 +1,7 @@
-"""Computes the gradient of the root equations alone, without the derivatives of `root_columns`.
+"""Computes only the gradient of the root equations, without the derivatives of `root_columns`.
 
-With L the residual over its variance, as a motion at the ground origin, and I, B, f, S, P, Q of `rigid_body`, the pull
-on an axis' place, rate and acceleration is
+With L the residual over its variance, as a motion at the ground origin, and I, B, f, S, P, Q of `rigid_body`, the
+contribution to an axis' position, rate and acceleration is
 
     L . (S x* f) + (L B) . P + (I L) . Q        (L B) . S + 2 (I L) . P        (I L) . S
 """
@@ -42,14 +42,13 @@ def add_root_gradient(
     right: np.ndarray,
     static_right: np.ndarray,
 ) -> tuple[float, np.ndarray, np.ndarray]:
-    """Add minus the derivatives of half the sum of squares by the motion (size, c), and by the static unknowns (S,) of
-    coordinates that do not move.
+    """Add minus the gradient of half the sum of squares by the motion (size, c) and by static coordinates (S,).
 
     Args:
-        tree, gravity_m_s2, bodies, motion, bends, root, wrench, sd, columns: as `root_columns` has them.
+        tree, gravity_m_s2, bodies, motion, bends, root, wrench, sd, columns: as in `root_columns`.
         basis: (n,) the first active spline of each frame among those of `right`, and (3, n, 6) values of the active
             ones and their first two derivatives.
-        right, static_right: to which it is added.
+        right, static_right: arrays to which it is added.
 
     Returns:
         Half the sum of squares; its derivatives by the parameters of each segment's body (b, 10); and minus those by
@@ -100,7 +99,7 @@ def add_root_gradient(
 
 @part
 def _at_origin(pull: np.ndarray, about: np.ndarray) -> None:
-    """Turn the pull (6,) on a force and its moment about a point into that on the same taken at the ground origin."""
+    """Convert the gradient (6,) by a force and its moment about a point into that by the wrench at the origin."""
     x, y, z = about[0], about[1], about[2]
     pull[0] -= pull[4] * z - pull[5] * y
     pull[1] -= pull[5] * x - pull[3] * z
@@ -111,7 +110,7 @@ def _at_origin(pull: np.ndarray, about: np.ndarray) -> None:
 def _moving_centre(
     left: np.ndarray, pull: np.ndarray, slides: np.ndarray, first: int, values: np.ndarray, right: np.ndarray
 ) -> None:
-    """What the moment changes because its centre moves with the first three coordinates."""
+    """Add the change of the moment because its centre moves with the first three coordinates."""
     for c in range(3):
         x, y, z = slides[c, 0], slides[c, 1], slides[c, 2]
         by = (y * left[2] - z * left[1]) * pull[3]
@@ -122,7 +121,7 @@ def _moving_centre(
 
 @part
 def _by_axis(frame: Frame, pulls: np.ndarray, k: int, j: int, by: np.ndarray) -> None:
-    """by = (3,) the pull on place, rate and acceleration of axis j for pulls[k] on the whole load."""
+    """Write the gradient (3,) by position, rate and acceleration of axis j, for pulls[k] on the load, into `by`."""
     axes, swept, turned, borne, biased, force = (
         frame.axes,
         frame.swept,
@@ -149,7 +148,7 @@ def _by_bodies(
     segments: np.ndarray,
     by_bodies: np.ndarray,
 ) -> None:
-    """Add the pull (b, 10) on the bodies' parameters, for one (6,) on the whole load at the ground origin."""
+    """Add the gradient (b, 10) by the bodies' parameters, for the gradient (6,) by the load at the ground origin."""
     w, e, b, own, at = np.empty(3), np.empty(3), np.empty(3), np.empty((6, 10)), np.empty(6)
     for body in range(len(segments)):
         s = segments[body]

@@ -1,4 +1,4 @@
-"""Adds the root equations: what ground reactions leave unexplained of the body's motion."""
+"""Adds the root equations: the residual between ground reactions and the body's motion."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from kinertia.motion.frame_chunks import pieces
 
 
 class RootLoads(CostTerm):
-    """The root equations at the dynamic frames of all trials; it adds no unknowns, and depends on those of others."""
+    """The root equations at the dynamic frames of all trials; they add no unknowns, and depend on other terms'."""
 
     def __init__(self, model: FreedModel) -> None:
         super().__init__(model)
@@ -21,7 +21,7 @@ class RootLoads(CostTerm):
         self._columns = columns_of(given.free, model.segments, given.moving, given.still, self.layout)
 
     def add(self, into: Gradient, here: InTrial) -> None:
-        """Add the squares of the residuals, each over its deviation."""
+        """Add the squares of the residuals, each over its standard deviation."""
         basis, frames, start = self.given.bases[here.k], here.stretch.frames, here.stretch.splines.start
         dynamic = frames.start + np.flatnonzero(self.given.trials[here.k].dynamic[frames])
         for piece in pieces(len(dynamic)):
@@ -32,7 +32,7 @@ class RootLoads(CostTerm):
                 root.add_gradient(into, self._columns, basis, start)
 
     def _at(self, here: InTrial, frames: np.ndarray) -> RootFrames:
-        """The equations at some frames, with what other terms change of them."""
+        """Return the equations at some frames, with the changes by other terms."""
         k, static = here.k, here.static
         motion = self.model.full(self.given.bases[k].evaluate(here.coefficients, frames), static)
         wrench, by_errors = here.loads.root(k, static, frames)

@@ -1,4 +1,4 @@
-"""Evaluates the root equations at some frames of a trial, linearised or as a gradient, over their deviations."""
+"""Evaluates the root equations at some frames of a trial, linearised or as a gradient, in standard deviations."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ _Moving = tuple[
     np.ndarray,
     tuple[np.ndarray, np.ndarray],
 ]
-"""What both compiled functions begin with."""
+"""Common first arguments of both compiled functions."""
 
 
 @dataclass(frozen=True)
 class RootTerms:
-    """Residuals of the root equations at the dynamic frames and their derivatives, each over its deviation.
+    """Residuals of the root equations at the dynamic frames and their derivatives, each over its standard deviation.
 
     Attributes:
         frames: (d,) indices.
@@ -55,9 +55,9 @@ class OfSegment(NamedTuple):
     """An unknown that changes the dynamic parameters of a segment.
 
     Attributes:
-        place: of the unknown among the static ones.
-        row: of the segment.
-        parameters: (10,) the change by a unit.
+        place: index of the unknown among the static ones.
+        row: index of the segment.
+        parameters: (10,) the change per unit.
     """
 
     place: int
@@ -67,22 +67,22 @@ class OfSegment(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class RootFrames:
-    """The root equations at d frames of a trial, with all that they are made of.
+    """The root equations at d frames of a trial, with all that they consist of.
 
     Attributes:
         skeleton: freed, with all coordinates.
-        bsp: body segment parameters, and
-        theta: (10 b,) the unknowns that they are made from.
+        bsp: body segment parameters.
+        theta: (10 b,) the unknowns that they are computed from.
         motion: of all coordinates.
         wrench: (d, 6) sum of the ground reactions at the ground origin: N, N m.
-        by_errors: its derivatives (d, 6, ...) by errors of the ground reactions, with what adds such, (n, r, ...), to
-            those by all static unknowns (n, r, s).
-        by_single: (d, 6, e) its derivatives by time and others of e quantities, each of which is the sum of unknowns
-        at: these places.
-        sd: (d, 6) deviations of the residuals.
+        by_errors: its derivatives (d, 6, ...) by errors of the ground reactions, each with the function that adds such
+            derivatives, (n, r, ...), to those by all static unknowns (n, r, s).
+        by_single: (d, 6, e) its derivatives by e quantities such as time, each of which is a sum of unknowns.
+        at: indices of these unknowns.
+        sd: (d, 6) standard deviations of the residuals.
         frames: (d,) indices.
-        static: how many static unknowns they depend on.
-        of_segments: unknowns beside theta that change a segment; `bsp` is of their values.
+        static: number of static unknowns that they depend on.
+        of_segments: other unknowns than theta that change a segment; `bsp` includes their values.
     """
 
     skeleton: Skeleton
@@ -99,7 +99,7 @@ class RootFrames:
     of_segments: tuple[OfSegment, ...] = ()
 
     def terms(self, columns: Columns) -> RootTerms:
-        """Residuals and derivatives, each over its deviation; `columns` are `columns_of` the problem."""
+        """Return residuals and derivatives, each over its standard deviation; `columns` come from `columns_of`."""
         by_static = np.zeros((len(self.frames), 6, self.static))
         for by, add in self.by_errors:
             add(by_static, by)
@@ -109,14 +109,15 @@ class RootFrames:
         left, (q, qd, qdd) = root_columns(*self._moving, self.wrench, chain, self.sd, columns, by_static)
         for one in self.of_segments:
             own = slice(10 * one.row, 10 * one.row + 10)
-            # the step of the segment's unknowns that changes its parameters as much
+            # the step of the segment's unknowns that changes its parameters by the same amount
             step = np.linalg.solve(dynamic_jacobian(self.theta[own])[0], one.parameters)
             by_static[:, :, one.place] += by_static[:, :, own] @ step
         return RootTerms(self.frames, q, qd, qdd, by_static, left)
 
     def add_gradient(self, into: Gradient, columns: Columns, basis: MotionBasis, start: int) -> None:
-        """Add half the sum of squares and where it falls, in a fraction of the time; `start` is the spline with which
-        the gradient begins.
+        """Add half the sum of squares and minus its gradient, in a fraction of the time of `terms`.
+
+        `start` is the spline with which the gradient begins.
         """
         of_basis = basis.first[self.frames] - start, np.ascontiguousarray(basis.values[:, self.frames])
         cost, by_bodies, pulls = add_root_gradient(
@@ -135,7 +136,7 @@ class RootFrames:
 
     @property
     def _moving(self) -> _Moving:
-        """The body, its motion, and where moments are taken about."""
+        """The body, its motion, and the point about which moments are taken."""
         motion, skeleton = self.motion, self.skeleton
         return (
             skeleton.tree,
@@ -150,8 +151,9 @@ class RootFrames:
 def columns_of(
     skeleton: Skeleton, segments: Sequence[str], moving: np.ndarray, still: np.ndarray, layout: Layout
 ) -> Columns:
-    """Where the derivatives go, of these segments' parameters and of coordinates of a freed skeleton: indices of those
-    that move, and of those that do not.
+    """Return where the derivatives go: by these segments' parameters, and by the coordinates of a freed skeleton.
+
+    `moving` and `still` are indices of coordinates that move, and that do not.
     """
     to_moving, to_still = np.full((2, len(skeleton.coordinates)), -1)
     to_moving[moving] = np.arange(len(moving))
@@ -166,7 +168,7 @@ def add_root(into: NormalEquations, columns: slice, basis: MotionBasis, start: i
 
     Args:
         into: zero, or with other terms.
-        columns: of the static unknowns, those that the root equations depend on.
+        columns: slice of the static unknowns that the root equations depend on.
         basis: of the motion.
         start: the spline with which the normal equations begin.
         root: the terms.
@@ -207,8 +209,9 @@ def _add_intervals(
     border: np.ndarray,
     bordered: bool,
 ) -> None:
-    """Add squares of derivatives by the coefficients of the active splines, rows (6 d, 6 c), and across those by static
-    unknowns (6 d, s) if `bordered`; rows of an interval begin and end at `ends`, its splines begin at `first`.
+    """Add squares of derivatives by spline coefficients, rows (6 d, 6 c), and products with static ones (6 d, s).
+
+    The products are added if `bordered`. Rows of an interval begin and end at `ends`, its splines begin at `first`.
     """
     c = band.shape[2]
     for k in range(len(first)):

@@ -19,15 +19,15 @@ class SeenMarkers(NamedTuple):
 
     Attributes:
         tree: the skeleton.
-        column: (a,) place of each axis' coordinate among those that move, then those that do not.
-        at, slopes: (n, a) places of the axes, rad or m, and their derivatives by the coordinates.
-        carrier: (m,) the axis that carries each marker.
+        column: (a,) index of each axis' coordinate among those that move, then those that do not.
+        at, slopes: (n, a) values of the axes, rad or m, and their derivatives by the coordinates.
+        carrier: (m,) the last axis that moves each marker.
         local: (n, m, 3) m, the markers in the frames of these axes, displaced with the skin.
         turned: (m, 3, 3) the segments' axes in these frames.
         measured: (n, m, 3) m; NaN where not seen.
-        own, next, second: as `ErrorInformation` has them.
-        patterns, first, last: as `SkinPatterns` has them.
-        columns: (m,) where the coefficients of each marker begin among the columns of S.
+        own, next, second: as in `ErrorInformation`.
+        patterns, first, last: as in `SkinPatterns`.
+        columns: (m,) index at which the coefficients of each marker begin among the columns of S.
     """
 
     tree: KinematicTree
@@ -48,8 +48,11 @@ class SeenMarkers(NamedTuple):
 
 
 class PlacedMarkers(NamedTuple):
-    """Five neighbouring frames, in turn: axes (5, a, 6), and of the markers the places (5, m, 3) m, the errors
-    (5, m, 3) m (zero where not seen) and the axes of their segments (5, m, 3, 3)."""
+    """Axes and markers in five neighbouring frames, overwritten in turn.
+
+    Axes (5, a, 6); positions (5, m, 3) m, errors (5, m, 3) m (zero where not seen) and segment axes (5, m, 3, 3) of the
+    markers.
+    """
 
     axes: np.ndarray
     places: np.ndarray
@@ -66,13 +69,13 @@ def seen_markers(
     moving: np.ndarray,
     still: np.ndarray,
 ) -> SeenMarkers:
-    """Markers at the coordinates q, with the information on their errors.
+    """Collect the markers at the coordinates q, with the information on their errors.
 
     Args:
         skeleton: with static coordinates free.
         measured: (n, m, 3) m; NaN where not seen.
         q: (n, c) rad and m.
-        deviation: (m,) of each marker's errors, m, and how they go from frame to frame.
+        deviation: (m,) standard deviation of each marker's errors, m, and their process from frame to frame.
         skin: its patterns in the same frames, and the coefficients (k,).
         moving, still: columns of q that move in time, and that do not.
     """
@@ -104,7 +107,7 @@ def seen_markers(
 
 @part
 def place_markers(markers: SeenMarkers, k: int, placed: PlacedMarkers) -> None:
-    """Axes and markers of frame k."""
+    """Compute axes and markers of frame k."""
     a, here = len(markers.column), k % 5
     rotation, translation = np.empty((a, 3, 3)), np.empty((a, 3))
     place_axes(markers.tree, markers.at[k], rotation, translation, placed.axes[here])

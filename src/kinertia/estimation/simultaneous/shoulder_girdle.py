@@ -1,10 +1,10 @@
 """Models how far the shoulders move in the trunk: an error that all markers of an arm share.
 
-The models hold the shoulder's centre in the trunk. A person's hangs on the clavicle, which rises and goes back with the
-arm: by 6 and 16 degrees while the arm is raised by some 110 (Ludewig et al. 2009, J Bone Joint Surg Am 91:378). Elbow
-and wrist bend so that the arm's markers fit all the same, to millimetres, and seem to say that they are so good. In a
-drop jump with arms swung overhead, taken as that, they made up for four centimetres of the shoulder with a trunk
-without any inertia about its long axis, and with a force plate 36 mm off its place.
+The models fix the shoulder centre in the trunk. A person's is attached to the clavicle, which elevates and retracts
+with the arm: by 6 and 16 degrees while the arm is raised by some 110 (Ludewig et al. 2009, J Bone Joint Surg Am
+91:378). Elbow and wrist bend so that the arm's markers fit to millimetres all the same, and seem that accurate. In a
+drop jump with arms swung overhead, when they were taken to be, four centimetres of shoulder motion were compensated by
+a trunk without any inertia about its long axis, and by a force plate displaced by 36 mm.
 """
 
 from __future__ import annotations
@@ -16,13 +16,14 @@ from kinertia.model.skeleton import Joint, Skeleton
 
 CLAVICLE_M = 0.15
 CLAVICLE_PER_ARM = 0.16
-"""Angle of the clavicle over that of the arm: 17 degrees of 110."""
+"""Angle of the clavicle over that of the arm: 17 degrees over 110."""
 
 
 def girdle_variance(skeleton: Skeleton, q: np.ndarray, shown: np.ndarray) -> np.ndarray:
-    """(m,) m2, effective variance along each axis of where the girdle carries the markers; zero beside the arms.
+    """Return the effective variance (m,) m2, along each axis, of marker positions due to the shoulder girdle.
 
-    The variance of a sum of k equal errors is k times that of k independent ones: those of an arm count as one.
+    It is zero for markers that are not on the arms. The variance of a sum of k equal errors is k times that of k
+    independent ones: the errors of an arm count as one.
 
     Args:
         skeleton: with its markers.
@@ -40,7 +41,7 @@ def girdle_variance(skeleton: Skeleton, q: np.ndarray, shown: np.ndarray) -> np.
 
 
 def _on_rigid_trunk(skeleton: Skeleton, shoulder: Joint) -> bool:
-    """Whether no clavicle or scapula of the model's own moves the shoulder."""
+    """Decide whether the shoulder is fixed in the trunk, with no clavicle or scapula in the model that moves it."""
     carrier = dict(zip(skeleton.segments, skeleton.tree.carrier.tolist(), strict=True))
     above = {joint.child: joint.parent for joint in skeleton.joints}
     body = shoulder.parent
@@ -52,7 +53,7 @@ def _on_rigid_trunk(skeleton: Skeleton, shoulder: Joint) -> bool:
 
 
 def _spread_rad(skeleton: Skeleton, shoulder: Joint, q: np.ndarray) -> float:
-    """RMS of how far the arm points from its mean direction in the trunk."""
+    """Return the RMS angle (rad) between the arm's direction in the trunk and its mean."""
     elbow = next((joint for joint in skeleton.joints if joint.parent == shoulder.child), None)
     far = np.array([0.0, -1.0, 0.0]) if elbow is None else elbow.translation - shoulder.child_translation
     pose = skeleton.pose(q)
@@ -62,7 +63,7 @@ def _spread_rad(skeleton: Skeleton, shoulder: Joint, q: np.ndarray) -> float:
 
 
 def _from(skeleton: Skeleton, segment: str) -> set[str]:
-    """The segment and all that it carries."""
+    """Return the segment and all segments beyond it."""
     carried = {segment}
     for joint in skeleton.joints:
         if joint.parent in carried:

@@ -1,17 +1,17 @@
-"""Predicts skin motion from joint angles: the part of markers' errors that these explain.
+"""Predicts skin motion from joint angles: the part of the markers' errors that these explain.
 
-Skin is drawn along by the joints at both ends of its segment (Camomilla et al. 2013, J Biomech 46:2328; Bonci et al.
-2014, J Biomech 47:2354). A marker m stands at
+Skin is displaced by the joints at both ends of its segment (Camomilla et al. 2013, J Biomech 46:2328; Bonci et al.
+2014, J Biomech 47:2354). A marker m is at
 
     x_m = p(q) + R(q) [l_m + C_m phi(t)] + e,
 
 with phi the `patterns` of its segment, directions in the space of the neighbouring angles, taken from inverse
-kinematics and held fixed, and C_m (3, p) unknown: as many coefficients as the segment has patterns, on each axis. They
-are the person's, so that all trials share them. What is left, e, is `marker_errors`.
+kinematics and constant during the estimate, and C_m (3, p) unknown: as many coefficients as the segment has patterns,
+on each axis. They belong to the person, so that all trials share them. The residual e is `marker_errors`.
 
-The prior of each coefficient is a standard normal, since patterns are in metres: those of the segment together displace
-a marker by `EXPECTED_SD_M` over the trials, along each axis. Markers of a segment ride on the same skin: their
-coefficients correlate.
+The prior of each coefficient is a standard normal, since patterns are in metres: all patterns of the segment together
+displace a marker by `EXPECTED_SD_M` over the trials, along each axis. Markers of a segment move with the same skin:
+their coefficients are correlated.
 """
 
 from __future__ import annotations
@@ -27,29 +27,30 @@ from kinertia.model.skeleton import Skeleton
 from kinertia.model.skin_angles import skin_angles
 
 EXPECTED_SD_M = {"thigh": 0.004, "shank": 0.003, "foot": 0.0015}
-"""Over a stride, RMS along each axis, by segment (Peters et al. 2010, Gait Posture 31:1); others:
-`OTHER_EXPECTED_SD_M`. Foot: from 20 degrees up to 30 degrees down, its markers move by at most 1.8 mm (in front)
-to 4.3 mm (ankle, heel) over the bones (Tranberg and Karlsson 1998, Clin Biomech 13:71); to and fro by 4.3 mm is an RMS
-of 1.5 mm."""
+"""RMS displacement over a stride along each axis, by segment (Peters et al. 2010, Gait Posture 31:1); others:
+`OTHER_EXPECTED_SD_M`. Foot: from 20 degrees up to 30 degrees down, its markers move by at most 1.8 mm (in front) to 4.3
+mm (ankle, heel) over the bones (Tranberg and Karlsson 1998, Clin Biomech 13:71); a range of 4.3 mm is an RMS of 1.5 mm.
+"""
 OTHER_EXPECTED_SD_M = 0.0025
 MOST_PATTERNS = 4
-"""Per segment. The angles of a gait go together: four directions hold nearly all of what three joints do."""
+"""Largest number of patterns per segment. The angles of a gait are correlated: four directions contain nearly all
+motion of three joints."""
 ALIKE = 0.5
-"""Correlation of the same coefficient of two markers of a segment."""
+"""Correlation between two markers of a segment of the same coefficient."""
 _STILL_RAD = 1e-3
-"""An angle that varies by less draws no skin."""
+"""Angles that vary by less do not displace skin."""
 _NO_PATTERN_M = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
 class SkinPatterns:
-    """What skin may follow in one trial.
+    """Patterns that skin motion may follow in one trial.
 
-    The coefficients are those of one marker after another, pattern by pattern of its segment, three axes each.
+    Coefficients are ordered by marker, then by pattern of its segment, then by axis (three).
 
     Attributes:
-        values: (n, p) m, all segments' patterns; at `MapProblem` those of a stretch of frames.
-        first, last: (m,) those of each marker's segment: first, ..., last - 1.
+        values: (n, p) m, all segments' patterns; at `MapProblem` those of a time block.
+        first, last: (m,) range of patterns of each marker's segment: first, ..., last - 1.
     """
 
     values: np.ndarray
@@ -58,12 +59,12 @@ class SkinPatterns:
 
     @classmethod
     def none(cls, frames: int, markers: int) -> SkinPatterns:
-        """Skin that follows nothing."""
+        """Return skin that follows no pattern."""
         return cls(np.zeros((frames, 0)), *np.zeros((2, markers), dtype=int))
 
     @cached_property
     def begin(self) -> np.ndarray:
-        """(m + 1,) where the coefficients of each marker begin, and how many there are."""
+        """Index (m + 1,) at which the coefficients of each marker begin, then their total number."""
         return np.concatenate([[0], np.cumsum(3 * (self.last - self.first))])
 
     @property
@@ -72,13 +73,13 @@ class SkinPatterns:
         return int(self.begin[-1])
 
     def cut(self, frames: slice) -> SkinPatterns:
-        """At these frames."""
+        """Return the patterns at these frames."""
         result = replace(self, values=self.values[frames])
         vars(result).update(begin=self.begin, _by_segment=self._by_segment)  # worked out once
         return result
 
     def displaced(self, coefficients: np.ndarray) -> np.ndarray:
-        """(n, m, 3) m, how far skin with these coefficients carries the markers along the axes of their segments."""
+        """Return the displacement (n, m, 3) m of the markers by skin motion, along the axes of their segments."""
         result = np.zeros((len(self.values), len(self.first), 3))
         for markers, places in self._by_segment:
             patterns = self.values[:, self.first[markers[0]] : self.last[markers[0]]]
@@ -87,7 +88,7 @@ class SkinPatterns:
         return result
 
     def information(self) -> np.ndarray:
-        """(k, k) of the coefficients' prior."""
+        """Return the information (k, k) of the coefficients' prior."""
         result = np.zeros((self.size, self.size))
         for markers, places in self._by_segment:
             count = len(markers)
@@ -98,7 +99,7 @@ class SkinPatterns:
 
     @cached_property
     def _by_segment(self) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Markers (k,) of each segment that has patterns, and where their coefficients stand (k, patterns, 3)."""
+        """Markers (k,) of each segment that has patterns, and indices of their coefficients (k, patterns, 3)."""
         result = []
         for start in np.unique(self.first[self.last > self.first]):
             markers = np.flatnonzero((self.first == start) & (self.last > self.first))
@@ -110,13 +111,13 @@ class SkinPatterns:
 def skin_patterns(
     skeleton: Skeleton, trials: Sequence[np.ndarray], adapted: Sequence[bool] | None = None
 ) -> tuple[SkinPatterns, ...]:
-    """What the skin under the markers of a skeleton may follow in trials of one person.
+    """Derive the patterns of skin under a skeleton's markers from a person's trials.
 
     Args:
         skeleton: with these markers.
         trials: coordinates (n, c) of each.
-        adapted: which of the trials the skeleton's markers are adapted to: in their mean posture skin is at rest. All
-            where none is.
+        adapted: whether the skeleton's markers are adapted to each trial: skin is at rest in the mean posture of these
+            trials. None: all.
     """
     every = np.concatenate(trials)
     own = [q for q, counts in zip(trials, adapted or [True] * len(trials), strict=True) if counts]
@@ -134,13 +135,13 @@ def skin_patterns(
 
 
 def _directions(skeleton: Skeleton, segment: str, away: np.ndarray, varying: np.ndarray) -> np.ndarray:
-    """(c, p) m/rad from the coordinates to the patterns of a segment."""
+    """Return the matrix (c, p) m/rad from the coordinates to the patterns of a segment."""
     angles = [i for i in skin_angles(skeleton, segment) if varying[i] > _STILL_RAD]
     if not angles:
         return np.zeros((len(varying), 0))
     kind = (segment_of(segment) or "").rpartition("_")[0]
     expected = EXPECTED_SD_M.get(kind, OTHER_EXPECTED_SD_M)
-    # half of the expected variance goes by how far an angle moves, half to all angles alike
+    # half of the expected variance is proportional to the motion of an angle, half equal for all angles
     square = np.square(varying[angles])
     scale = expected * np.sqrt(0.5 * square / square.sum() + 0.5 / len(angles)) / varying[angles]
     _, size, directions = np.linalg.svd(away[:, angles] * scale, full_matrices=False)

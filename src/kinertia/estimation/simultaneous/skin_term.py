@@ -1,4 +1,4 @@
-"""Adds skin that moves with the joints: the coefficients of what markers follow."""
+"""Adds skin motion that follows the joints: the coefficients of its patterns."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class Skin(CostTerm):
 
     @classmethod
     def unknowns(cls, given: Given) -> tuple[Unknowns, ...]:
-        """Three of each marker and pattern; those of a segment are alike."""
+        """Return three unknowns per marker and pattern; those of a segment are correlated."""
         size = given.skin[0].size
         return (Unknowns(name=SKIN, unit="1", start=np.zeros(size), prior=None, seen_by="markers"),)
 
@@ -23,12 +23,12 @@ class Skin(CostTerm):
         self._information = self.given.skin[0].information()
 
     def add_information(self, into: np.ndarray, static: np.ndarray) -> None:
-        """Of the coefficients' prior."""
+        """Add the information of the coefficients' prior."""
         at = self.layout[SKIN]
         into[at, at] += self._information
 
     def add_pull(self, right: np.ndarray, static: np.ndarray) -> float:
-        """Of the same."""
+        """Add the right-hand side of the coefficients' prior, and return its sum of squares."""
         own = static[self.layout[SKIN]]
         pull = self._information @ own
         right[self.layout[SKIN]] -= pull

@@ -1,8 +1,8 @@
-"""Lets root errors grow while the body is accelerated: soft tissue swings after its bones.
+"""Increases root errors while the body is accelerated, since soft tissue swings after the bones.
 
-Trials of one person on the same plates contradicted one another about the clock, plates and masses, jumps most of all,
-as long as a frame of a jump counted as much as one of standing. What rigid segments leave out is in proportion to the
-force that accelerates the body.
+Trials of one person on the same plates disagreed about synchronisation, plates and masses, jumps most of all, as long
+as a frame of a jump counted as much as a frame of standing. The error of rigid segments is proportional to the force
+that accelerates the body.
 """
 
 from __future__ import annotations
@@ -12,24 +12,24 @@ import numpy as np
 from kinertia.motion.moving_windows import even_mean
 
 SWING = 0.008
-"""Root error per force that accelerates the body. Set on one person's trials: jumps, squats and walks agree about their
-instruments as well as with 0.03, which costs walks some percent of the hip's and the back's moments, and the more the
-less sure a plate is."""
+"""Root error per force that accelerates the body. Chosen on one person's trials: jumps, squats and walks agree about
+their instruments as well as with 0.03, which costs walks some percent of the hip and back moments, the more the less
+certain a plate is."""
 _SWING_S = 0.1
-"""Over which the size of that force is taken: soft parts swing on for so long."""
+"""Duration over which that force is averaged: soft tissue continues to swing for so long."""
 
 
 def swing_factors(
     time: np.ndarray, force: np.ndarray, dynamic: np.ndarray, weight_n: float, usual_n: float
 ) -> np.ndarray:
-    """(n,) by how much the deviations of the root residual are larger because the body is accelerated.
+    """Return the factors (n,) by which the SD of the root residual is larger because the body is accelerated.
 
     Args:
         time: (n,) s, of the frames.
         force: (n, 3) N, sum of the ground reactions, of the motion's bandwidth.
         dynamic: (n,) frames whose root residual counts.
         weight_n: of the body.
-        usual_n: deviation of the root residual of one frame within the band where nothing is accelerated.
+        usual_n: standard deviation of the root residual of one frame within the band, without acceleration.
 
     >>> time, standing = np.arange(100) / 100, np.full(100, 700.0)
     >>> flight = np.where(time < 0.5, standing, 0.0)

@@ -1,17 +1,17 @@
 """Finds motion, body segment parameters and calibration in one maximum-a-posteriori estimate.
 
 Unknowns are the quintic spline coefficients of every coordinate (uniform knots; their spacing follows the cutoff), and
-what the cost terms add that does not move in time (`terms`), some of it displaced in each of several trials
-(`marker_offsets`). Minimised is the sum of the terms: squares of marker errors, root residuals and departures from the
-priors, each over its deviation. Priors of errors of the ground reactions are Gaussians that change with what the data
-say of them (`sound_or_faulty`). Steps are those of Gauss and Newton (`gauss_newton`), corrected by the gradients along
-the way (`quasi_newton`), all derivatives analytic. The normal matrix is block tridiagonal in time with a border of
-static unknowns (`block_tridiagonal`); its Schur complement is the information on them, and its inverse their
-covariance. Where the knots lie is averaged over (`knot_phases`), some errors have their posterior from the profile of
-the cost (`cost_profile`), and unknowns that only displace others are added at the end (`left_out`).
+unknowns of the cost terms that do not move in time (`terms`), some of them displaced in each of several trials
+(`marker_offsets`). The sum of the terms is minimised: squares of marker errors, root residuals and distances from the
+priors, each over its standard deviation. Priors of errors of the ground reactions are Gaussians that are adapted to the
+data (`sound_or_faulty`). Steps are Gauss-Newton (`gauss_newton`), corrected by the gradients along the way
+(`quasi_newton`), with all derivatives analytic. The normal matrix is block tridiagonal in time with a border of static
+unknowns (`block_tridiagonal`); its Schur complement is the information on them, and its inverse their covariance. The
+estimate is averaged over knot positions (`knot_phases`), some errors have their posterior from the profile of the cost
+(`cost_profile`), and unknowns that only displace others are added at the end (`left_out`).
 
-Frames in which forces change faster than the motion can follow say less of all that does not move (`impacts`). When
-that is settled, the motion alone is made to follow the forces there, too.
+Frames in which forces change faster than the motion can follow have less weight for all unknowns that do not move
+(`impacts`). When these are found, the motion alone is made to follow the forces there, too.
 """
 
 from __future__ import annotations
@@ -46,44 +46,46 @@ from kinertia.model.skeleton import Skeleton
 from kinertia.motion.single_blas_thread import one_blas_thread
 
 CONVERGED = 1e-3
-"""Promised decrease of half the sum of squares below which a step is the last of the search: with the one at the end of
-it, from a quadratic of its own, no quantity is then further from the optimum than some hundredths of its deviation."""
+"""Predicted decrease of half the sum of squares below which a step is the last of the search: after one more step, from
+a new quadratic, no quantity is further from the optimum than some hundredths of its standard deviation."""
 _ENDED = 0.02
-"""What a step with that quadratic may promise where it was made; else the search goes on. A quadratic made as near as
-this that has led to the last step is the last one, too."""
+"""Predicted decrease of the step with that new quadratic below which the search ends; otherwise it continues. A
+quadratic that was made as near as this and led to the last step is the last one, too."""
 _NEAR = 8.0
-"""Promised decrease from which on gradients alone are followed: above it a new quadratic is worth its time."""
+"""Predicted decrease below which only gradients are recomputed; above it a new quadratic is worth its time."""
 _MOST_GRADIENTS = 10
-"""With one quadratic."""
+"""Largest number of gradients with one quadratic."""
 _FIRST_DAMPING = 1e-5
-"""Share of the diagonal. Directions in which motion and parameters make up for one another have hardly more
-information: 1e-3 would hold the first steps back."""
+"""Share of the diagonal. Directions in which motion and parameters compensate for one another have hardly more
+information: 1e-3 would limit the first steps."""
 _LEAST_DAMPING = 1e-9
 _STUCK = 1e6
-"""Damping at which no step lowers the cost any more."""
+"""Damping at which the search gives up: no step lowers the cost any more."""
 _MAX_ITERATIONS = 60
-"""Quadratics; most trials take 5 to 7."""
+"""Largest number of quadratics; most trials take 5 to 7."""
 _MOST_TRIES = 5
-"""Steps along one direction, each shorter."""
+"""Largest number of ever shorter steps tried along one direction."""
 _LEAST_KEPT = 1e-3
-"""Share of the promised decrease that a step must bring."""
+"""Least share of the predicted decrease that a step must achieve."""
 _ALIKE_SD = 0.02
-"""Instruments are judged again when what is said of them has moved by more, in deviations of all of them together..."""
+"""The instruments' Gaussian is updated when their mean has moved by more, in standard deviations of all of them
+together, ..."""
 _ALIKE_SHARE = 0.3
-"""... and by more than this share of how far everything is from the optimum."""
+"""... and by more than this share of the distance of all unknowns from the optimum."""
 _NO_IMPACT = 1.05
-"""Of `Observation.impact`: below it the motion follows the forces as it is."""
+"""Value of `Observation.impact` below which the motion follows the forces as it is."""
 _MOTION_CONVERGED = 3e-4
-"""As CONVERGED, of the motion alone."""
+"""As CONVERGED, for the motion alone."""
 _MOST_THROUGH_IMPACTS = 5
-"""Quadratics for the motion alone; one or two are usual."""
+"""Largest number of quadratics for the motion alone; one or two are usual."""
 _CONTINUED = 0.01
-"""As CONVERGED, of an estimate that differs in its knots only: some tenths of a deviation apart, and averaged."""
+"""As CONVERGED, for an estimate that differs only in its knots: they are some tenths of a standard deviation apart, and
+averaged."""
 _MOST_CONTINUED = 3
-"""Quadratics from an optimum to that with other knots; one is usual."""
+"""Largest number of quadratics from an optimum to that with other knots; one is usual."""
 _USUAL_ITERATIONS = 5
 _LEFT_ITERATIONS = 2
-"""What progress counts with: the usual number, and when these are done always so many more."""
+"""Numbers used for progress: usual iterations, and further ones that always follow."""
 
 
 @one_blas_thread
@@ -96,9 +98,10 @@ def estimate_simultaneous(
     otherwise: Sequence[Observation] = (),
     terms: Sequence[type[CostTerm]] = TERMS,
 ) -> SimultaneousResult:
-    """Maximum-a-posteriori motion, BSPs and calibration of one person from one or more trials; `progress` is told the
-    share done, guessed from the usual number of steps. `otherwise` are the same trials with other ground reactions, to
-    be told how likely these would be. `terms` are those of the cost.
+    """Estimate motion, BSPs and calibration of one person from one or more trials (maximum a posteriori).
+
+    `progress` is called with the share done, guessed from the usual number of steps. `otherwise` are the same trials
+    with other ground reactions, whose evidence is computed for comparison. `terms` are those of the cost.
     """
     problem = MapProblem(skeleton, prior, calibration, trials, terms=terms)
     ended = _searched(problem, progress)
@@ -123,7 +126,10 @@ def estimate_simultaneous(
 
 
 def _left_out(problem: MapProblem, model: GaussNewton, static: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """`with_left_out` at an estimate of the static unknowns (S,): its move (S,), and a root (S, u) of what is added."""
+    """Apply `with_left_out` to an estimate of the static unknowns (S,).
+
+    It returns its change (S,), and a root (S, u) of what is added to its covariance.
+    """
     directions = problem.left_out(static)
     data = sum(each.information for each in model.displaced) @ directions
     pull = -directions.T @ problem.prior_slope(static)[0]
@@ -132,7 +138,7 @@ def _left_out(problem: MapProblem, model: GaussNewton, static: np.ndarray) -> tu
 
 
 def _searched(problem: MapProblem, progress: Callable[[float], None]) -> Ended:
-    """Quasi-Newton steps with one quadratic after another until a step is short; then one with one of its own."""
+    """Take quasi-Newton steps with one quadratic after another until a step is short, then one with a new quadratic."""
     at = _Place(problem.slope(problem.beginning), _Judged.at_first(problem))
     begin, damping, scale, iterations = at.slope.cost, _FIRST_DAMPING, np.zeros(problem.layout.size), 0
     while True:
@@ -168,17 +174,19 @@ class _Judged(NamedTuple):
 
     @classmethod
     def at_first(cls, problem: MapProblem) -> _Judged:
-        """Before the data have said anything."""
+        """Return the Gaussian of the priors, before any data."""
         return cls(GaussianPrior.of(problem.layout.error_priors), np.full(len(problem.layout.error_priors.own), np.inf))
 
     @classmethod
     def known(cls, gaussian: GaussianPrior) -> _Judged:
-        """Of another estimate from the same data."""
+        """Return a Gaussian taken from another estimate with the same data."""
         return cls(gaussian, np.full(len(gaussian.pull), np.inf))
 
     def again(self, priors: ErrorPriors, mean: np.ndarray, covariance: np.ndarray, far: float) -> _Judged:
-        """From the posterior mean and covariance under this one; the same where the mean has hardly moved beside how
-        far everything is from the optimum, in half the square of deviations.
+        """Update the Gaussian from the posterior mean and covariance under the present one.
+
+        It is unchanged if the mean has hardly moved compared with the distance `far` from the optimum, in half the
+        square of standard deviations.
         """
         information, away = np.linalg.inv(covariance), mean - self.mean
         alike = max(_ALIKE_SD**2, _ALIKE_SHARE**2 * 2.0 * far)
@@ -190,7 +198,11 @@ class _Judged(NamedTuple):
 
 
 class _Place(NamedTuple):
-    """Where the search is, whether the last step was short, and what the first one with the last quadratic promised."""
+    """State of the search.
+
+    The gradient, the instruments, whether the last step was short, and the predicted decrease of the first step with
+    the last quadratic.
+    """
 
     slope: Slope
     judged: _Judged
@@ -199,7 +211,7 @@ class _Place(NamedTuple):
 
 
 def _continued(problem: MapProblem, point: Point, judged: _Judged) -> Point:
-    """The optimum, from a point near it."""
+    """Return the optimum, starting from a point near it."""
     at = _Place(problem.slope(point), judged)
     for _ in range(_MOST_CONTINUED):
         here = problem.at(at.slope.point, _LEAST_DAMPING)
@@ -211,7 +223,7 @@ def _continued(problem: MapProblem, point: Point, judged: _Judged) -> Point:
 
 
 def _held(problem: MapProblem, point: Point, model: GaussNewton, instruments: GaussianPrior) -> Point:
-    """The optimum with this Gaussian for the instruments, from that with another."""
+    """Return the optimum with this Gaussian for the instruments, starting from that with another."""
     at = _Place(problem.slope(point), _Judged.known(instruments))
     return _descended(problem, model, at, False, CONVERGED).slope.point
 
@@ -219,7 +231,7 @@ def _held(problem: MapProblem, point: Point, model: GaussNewton, instruments: Ga
 def _descended(
     problem: MapProblem, model: GaussNewton | MotionAlone, at: _Place, judging: bool, tolerance: float
 ) -> _Place:
-    """Quasi-Newton steps with one quadratic, as long as they are worth it."""
+    """Take quasi-Newton steps with one quadratic, as long as they are worthwhile."""
     slope, judged = at.slope, at.judged
     pairs, places, began = SecantPairs.none(len(slope.right)), slope.instruments, np.inf
     for count in range(_MOST_GRADIENTS):
@@ -249,7 +261,7 @@ def _descended(
 def _answer(
     slope: Slope, model: GaussNewton | MotionAlone, pairs: SecantPairs, judged: _Judged
 ) -> tuple[np.ndarray, float]:
-    """The step of all unknowns, and by how much it promises to lower the cost."""
+    """Return the step of all unknowns, and its predicted decrease of the cost."""
     right = slope.under(judged.gaussian)[1]
     step = pairs.step(right, model.under(judged.gaussian).step)
     return step, 0.5 * float(right @ step)
@@ -258,18 +270,18 @@ def _answer(
 def _judged_again(
     problem: MapProblem, model: GaussNewton, point: Point, step: np.ndarray, judged: _Judged, far: float
 ) -> _Judged:
-    """The instruments, if this step leads from a point to the optimum."""
+    """Update the instruments' Gaussian, given the step from a point to the optimum."""
     mean, covariance = model.under(judged.gaussian).of_instruments(point, step)
     return judged.again(problem.layout.error_priors, mean, covariance, far)
 
 
 def _moved(problem: MapProblem, slope: Slope, step: np.ndarray) -> Slope:
-    """After a step too short to ask for cost and gradient again."""
+    """Move the point by a step that is too short to need a new cost and gradient."""
     return replace(slope, point=slope.point.like(slope.point.vector + problem.shortened(slope.point, step)))
 
 
 def _last_step(problem: MapProblem, model: GaussNewton, at: _Place) -> _Place:
-    """After a step with the last quadratic, if the search has converged and the step is short."""
+    """Take a step with the last quadratic, if the search has converged and the step is short."""
     slope, judged, pairs = model.here.slope, at.judged, SecantPairs.none(len(model.here.slope.right))
     if not at.converged:
         return _Place(slope, judged)
@@ -282,25 +294,25 @@ def _last_step(problem: MapProblem, model: GaussNewton, at: _Place) -> _Place:
 def _lower(
     problem: MapProblem, slope: Slope, instruments: GaussianPrior, step: np.ndarray, promised: float
 ) -> Slope | None:
-    """A point along a step at which the cost is lower by a fair share of what was promised; None if there is none."""
+    """Find a point along a step where the cost is lower by a fair share of what was predicted; None without one."""
     cost, share, start = slope.under(instruments)[0], 1.0, slope.point.vector
     for _ in range(_MOST_TRIES):
         there = problem.slope(slope.point.like(start + problem.shortened(slope.point, share * step)))
         kept = (cost - there.under(instruments)[0]) / promised
         if kept > _LEAST_KEPT * share:
             return there
-        # where the parabola of cost and slope at the start, and of this cost, is lowest
+        # minimum of the parabola through cost and slope at the start, and this cost
         best = share**2 / (2.0 * share - kept) if np.isfinite(kept) else 0.0
         share = min(max(best, 0.1 * share), 0.6 * share)
     return None
 
 
 def _through_impacts(problem: MapProblem, point: Point) -> tuple[np.ndarray, ...]:
-    """Coefficients of motions that follow the forces through impacts as elsewhere, with all that does not move held.
+    """Return coefficients of motions that follow the forces even in impacts, with all static unknowns fixed.
 
-    What impacts say of body and instruments counts less (`impacts`); but a motion that did not follow the forces there
-    would leave residuals that OpenSim's next tools have to take. These know rigid segments only: the motion is to
-    follow what else changes the forces, too.
+    In the estimate, impacts have less weight for body and instruments (`impacts`); but a motion that did not follow the
+    forces there would leave residuals in OpenSim's subsequent tools. These use rigid segments only: the motion must
+    also follow other effects on the forces.
     """
     rigid = problem.layout.rigid(point.static)
     if all(np.max(trial.impact) < _NO_IMPACT for trial in problem.trials) and (rigid == point.static).all():
@@ -319,7 +331,7 @@ def _through_impacts(problem: MapProblem, point: Point) -> tuple[np.ndarray, ...
 def _deviations(
     problem: MapProblem, ended: Ended, model: GaussNewton, roots: Sequence[np.ndarray]
 ) -> tuple[np.ndarray, tuple[CurveDeviations, ...]]:
-    """Posterior covariance (S, S) of the static unknowns, and deviations of the curves of every trial."""
+    """Return the posterior covariance (S, S) of the static unknowns, and the SDs of the curves of every trial."""
     root, point, rows = model.static.root_of_covariance(), ended.point, zip(ended.here.trials, roots, strict=True)
     of_curves = [
         curve_deviations(problem, k, point.coefficients[k], problem.in_trial(k, point), trial, in_trial)
@@ -329,7 +341,7 @@ def _deviations(
 
 
 def _roots_in_trials(problem: MapProblem, ended: Ended, model: GaussNewton) -> list[np.ndarray]:
-    """(S, S) per trial a root of the posterior covariance of the static unknowns as they are in it."""
+    """Return, per trial, a root (S, S) of the posterior covariance of the static unknowns as they are in it."""
     here, layout = ended.here, problem.layout
     root, first, roots = model.static.root_of_covariance(), layout.in_root.stop, []
     for k, trial in enumerate(here.trials):

@@ -1,13 +1,14 @@
-"""Defines the prior of an instrument that is sound most of the time, and far off when it is not.
+"""Defines the prior of an instrument that is accurate most of the time, and faulty otherwise.
 
-A single Gaussian serves neither kind of laboratory. One wide enough for a plate that stands 20 mm off its recorded
-place lets a sound one wander by as much as skin motion says, and the joint moments with it; and the error of one plate
-is shared out among all. With two components sound instruments stay where they are, and the one that is off takes the
-whole of its error.
+A single Gaussian suits neither kind of laboratory. One that is wide enough for a plate displaced by 20 mm allows skin
+motion to displace an accurate one as well, and to change the joint moments with it; and the error of one plate is
+distributed over all. With two components accurate instruments stay unchanged, and the faulty one takes the whole of its
+error.
 
-Under such priors the posterior is a sum of Gaussians, one for each way to be sound or faulty. Its mean and covariance
-change smoothly with the data. The estimate takes in place of the priors the one Gaussian that gives its posterior the
-same mean and covariance (moment matching; Minka 2001, UAI 17:362, calls it assumed-density filtering).
+Under such priors the posterior is a sum of Gaussians, one for each combination of fault-free and faulty instruments.
+Its mean and covariance change smoothly with the data. In place of the priors, the estimate uses the one Gaussian that
+gives its posterior the same mean and covariance (moment matching; Minka 2001, UAI 17:362, calls it assumed-density
+filtering).
 """
 
 from __future__ import annotations
@@ -19,23 +20,23 @@ from functools import cached_property
 import numpy as np
 
 _MOST_WAYS = 1024
-"""To be sound or faulty, that are looked at with as many faults: all of twelve instruments, the likeliest of more."""
+"""Number of combinations considered with as many faults: all for twelve instruments, the likeliest for more."""
 _MOST_NUMBERS = 2**21
-"""In the covariances of these ways: of a hundred instruments and more, fewer ways are looked at."""
+"""Size of all covariances of these combinations: for a hundred instruments and more, fewer are considered."""
 _FEWEST_WAYS = 32
 _AT_ONCE = 2**15
 """Of these numbers are changed: larger arrays of them would leave the processor's cache."""
 _UNLIKELY = -15.0
-"""Logarithm of a way's chance over that of the likeliest: where none with as many faults has more, the search ends."""
+"""Log probability relative to the likeliest combination: if none with as many faults exceeds it, the search ends."""
 
 
 @dataclass(frozen=True)
 class SoundOrFaulty:
-    """Prior of one quantity whose mean is zero: a narrow Gaussian, and with some probability a wide one.
+    """Prior of a quantity with zero mean: a narrow Gaussian and, with the fault probability, a wide one.
 
     Attributes:
-        sound_sd, faulty_sd: deviations of either component.
-        faulty_share: how often an instrument is faulty, 0 to 1.
+        sound_sd, faulty_sd: standard deviations of the components.
+        faulty_share: fault probability, 0 to 1.
 
     >>> SoundOrFaulty(0.001, 0.015, 0.2).sd
     0.00676...
@@ -47,18 +48,19 @@ class SoundOrFaulty:
 
     @classmethod
     def certain(cls, sd: float) -> SoundOrFaulty:
-        """A plain Gaussian."""
+        """Return a plain Gaussian."""
         return cls(sd, sd, 0.0)
 
     @property
     def sd(self) -> float:
-        """Deviation of both components together."""
+        """Standard deviation of both components together."""
         share = self.faulty_share
         return float(np.sqrt((1.0 - share) * self.sound_sd**2 + share * self.faulty_sd**2))
 
     def least_told(self, sd: float) -> float:
-        """The smallest error that data with this deviation make likelier to be of a faulty instrument than of a sound
-        one; infinite where there is only one kind.
+        """Return the smallest error that data with this standard deviation attribute to a fault with odds above one.
+
+        It is infinite if there is only one component.
 
         >>> prior = SoundOrFaulty(0.1, 2.0, 0.05)
         >>> round(prior.least_told(0.3), 2), round(prior.least_told(1.6), 2)
@@ -71,18 +73,18 @@ class SoundOrFaulty:
         return float(np.sqrt(2.0 * odds / (sound**-2 - faulty**-2)))
 
     def draw(self, rng: np.random.Generator) -> float:
-        """One instrument's error."""
+        """Draw one instrument's error."""
         faulty = rng.random() < self.faulty_share
         return float(rng.normal(0.0, self.faulty_sd if faulty else self.sound_sd))
 
 
 @dataclass(frozen=True)
 class ErrorPriors:
-    """Priors of k errors, each the sum of one of its own and of those that it has in common with others.
+    """Priors of k errors, each the sum of a part of its own and of parts in common with others.
 
     Attributes:
-        own: of each alone.
-        common: of what several have in common, and which these are.
+        own: prior of each one's own part.
+        common: priors of common parts, each with the indices of the errors that share it.
 
     >>> plate = SoundOrFaulty(0.001, 0.015, 0.2)
     >>> ErrorPriors((plate, plate), ((plate, (0, 1)),)).covariance.round(6)
@@ -95,7 +97,7 @@ class ErrorPriors:
 
     @classmethod
     def joined(cls, every: Sequence[ErrorPriors]) -> ErrorPriors:
-        """Of all these errors, one kind after another."""
+        """Concatenate the priors of several kinds of errors."""
         common, before = [], 0
         for each in every:
             common += [(prior, tuple(before + one for one in members)) for prior, members in each.common]
@@ -109,7 +111,7 @@ class ErrorPriors:
 
     @cached_property
     def of_parts(self) -> np.ndarray:
-        """(k, k + c) from the parts to the errors."""
+        """Matrix (k, k + c) from the parts to the errors."""
         shared = np.zeros((len(self.own), len(self.common)))
         for column, (_, members) in zip(shared.T, self.common, strict=True):
             column[list(members)] = 1.0
@@ -117,7 +119,7 @@ class ErrorPriors:
 
     @cached_property
     def covariance(self) -> np.ndarray:
-        """(k, k) of the errors."""
+        """Prior covariance (k, k) of the errors."""
         scaled = self.of_parts * [part.sd for part in self.parts]
         result: np.ndarray = scaled @ scaled.T
         return result
@@ -125,11 +127,11 @@ class ErrorPriors:
 
 @dataclass(frozen=True, eq=False)
 class GaussianPrior:
-    """A joint Gaussian in place of the priors of k quantities.
+    """Joint Gaussian that replaces the priors of k quantities.
 
     Attributes:
-        precision: (k, k) inverse covariance. Where data leave both components likely it has negative directions: no
-            Gaussian prior is as wide as two apart; with what the data say it is positive again.
+        precision: (k, k) inverse covariance. Where data leave both components likely it has negative directions, since
+            no Gaussian prior is as wide as two separate ones; together with the data it is positive again.
         pull: (k,) precision times mean.
     """
 
@@ -138,23 +140,24 @@ class GaussianPrior:
 
     @classmethod
     def of(cls, priors: ErrorPriors) -> GaussianPrior:
-        """Where the data have said nothing: mean and covariance of the priors."""
+        """Return mean and covariance of the priors, without data."""
         return cls(np.linalg.inv(priors.covariance), np.zeros(len(priors.own)))
 
     def cost(self, values: np.ndarray) -> float:
-        """Half the squared departure of values (k,) from the mean over its covariance, but for a constant."""
+        """Return half the squared distance of values (k,) from the mean over its covariance, up to a constant."""
         return float(0.5 * values @ self.precision @ values - self.pull @ values)
 
     def updated(self, priors: ErrorPriors, mean: np.ndarray, covariance: np.ndarray) -> GaussianPrior:
-        """The Gaussian that gives the posterior of these priors the mean and covariance that it has, given the
-        posterior (k,), (k, k) that was found with the present one.
+        """Return the Gaussian that gives the posterior its true mean and covariance under these priors.
+
+        The arguments are the posterior mean (k,) and covariance (k, k) found with the present Gaussian.
         """
         information = np.linalg.inv(covariance)
         return GaussianPrior.given(priors, information - self.precision, information @ mean - self.pull)
 
     @classmethod
     def given(cls, priors: ErrorPriors, data: np.ndarray, right: np.ndarray) -> GaussianPrior:
-        """The same where data have this information (k, k) and right-hand side (k,)."""
+        """Return that Gaussian for data with this information (k, k) and right-hand side (k,)."""
         parts = priors.of_parts
         middle, whole = _posterior(priors.parts, parts.T @ data @ parts, parts.T @ right)
         middle, information = parts @ middle, np.linalg.inv(parts @ whole @ parts.T)
@@ -162,10 +165,11 @@ class GaussianPrior:
 
 
 def _posterior(priors: Sequence[SoundOrFaulty], data: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(k,), (k, k) mean and covariance of the sum of Gaussians, each weighed by how likely its way to be sound or
-    faulty is after data with this information (k, k) and right-hand side (k,).
+    """Return mean (k,) and covariance (k, k) of the posterior, a sum of Gaussians.
 
-    The likeliest ways with one fault more are searched among those that add one to the likeliest so far.
+    Each is weighted by the probability of its combination of faults after data with this information (k, k) and
+    right-hand side (k,). The likeliest combinations with one fault more are searched among those that add one to the
+    likeliest so far.
     """
     change, log_odds = _faults(priors)
     ways = _Ways.sound(priors, data, right)
@@ -183,8 +187,10 @@ def _posterior(priors: Sequence[SoundOrFaulty], data: np.ndarray, right: np.ndar
 
 
 def log_chance(priors: ErrorPriors, data: np.ndarray, right: np.ndarray) -> float:
-    """Logarithm of the mean, under these priors, of the chance exp(right x - x data x / 2) that data with this
-    information (k, k) and right-hand side (k,) give the errors x; but for a constant that the priors alone have.
+    """Return the log probability of data under these priors, up to a constant that depends on the priors alone.
+
+    It is the logarithm of the mean of exp(right x - x data x / 2) over errors x, for data with this information (k, k)
+    and right-hand side (k,).
     """
     parts = priors.of_parts
     data, right = parts.T @ data @ parts, parts.T @ right
@@ -198,8 +204,9 @@ def log_chance(priors: ErrorPriors, data: np.ndarray, right: np.ndarray) -> floa
 
 
 def _faults(priors: Sequence[SoundOrFaulty]) -> tuple[np.ndarray, np.ndarray]:
-    """(k,) what a fault of each quantity adds to its precision, and to the logarithm of a way's prior chance, with what
-    the components' deviations take; no chance where there is only one component.
+    """Return the change by a fault of each quantity (k,) of its precision and of a combination's log prior.
+
+    The latter includes the ratio of the components' standard deviations; it is -inf if there is only one component.
     """
     change = np.array([prior.faulty_sd**-2.0 - prior.sound_sd**-2.0 for prior in priors])
     share = np.array([prior.faulty_share for prior in priors])
@@ -210,11 +217,11 @@ def _faults(priors: Sequence[SoundOrFaulty]) -> tuple[np.ndarray, np.ndarray]:
 
 @dataclass(frozen=True, eq=False)
 class _Ways:
-    """Ways for k instruments to be sound or faulty, n with the same number of faults, and the posterior of each.
+    """Combinations of faults among k instruments, n with the same number of faults, and their posteriors.
 
     Attributes:
-        off: (n, k) what is faulty.
-        log_weight: (n,) logarithm of each way's chance, but for a constant that all have.
+        off: (n, k) which instruments are faulty.
+        log_weight: (n,) log probability of each combination, up to a common constant.
         centres, spread: (n, k), (n, k, k) mean and covariance of its Gaussian.
     """
 
@@ -225,14 +232,14 @@ class _Ways:
 
     @classmethod
     def sound(cls, priors: Sequence[SoundOrFaulty], data: np.ndarray, right: np.ndarray) -> _Ways:
-        """The one without a fault."""
+        """Return the combination without a fault."""
         spread = np.linalg.inv(data + np.diag([prior.sound_sd**-2.0 for prior in priors]))
         centre = spread @ right
         log_weight = 0.5 * (centre @ right + np.linalg.slogdet(spread)[1])
         return cls(np.zeros((1, len(right)), dtype=bool), np.array([log_weight]), centre[None], spread[None])
 
     def one_fault_more(self, change: np.ndarray, log_odds: np.ndarray) -> _Ways:
-        """The likeliest that add a fault (`_faults`) to one of these: a change of rank one (Sherman and Morrison)."""
+        """Return the likeliest that add a fault (`_faults`) to one of these, by rank-one updates (Sherman-Morrison)."""
         k = len(change)
         left = np.where(self.off, 1.0, 1.0 + change * np.diagonal(self.spread, axis1=1, axis2=2))
         log_weight = self.log_weight[:, None] + log_odds
@@ -251,8 +258,9 @@ class _Ways:
         )
 
     def _likeliest(self, log_weight: np.ndarray, most: int) -> tuple[np.ndarray, np.ndarray]:
-        """(m,), (m,) the likeliest ways after one fault more, as the way before (n) and its fault (k), each way once:
-        it is met as often as it has faults.
+        """Return the likeliest combinations with one fault more, as (m,) previous combination (n) and (m,) fault (k).
+
+        Each is returned once, although it is reached as often as it has faults.
         """
         n, k = log_weight.shape
         met = min(most * (1 + int(self.off[0].sum())), n * k)
@@ -268,7 +276,7 @@ class _Ways:
 
 
 def _in_words(off: np.ndarray) -> np.ndarray:
-    """(n, w) the same (n, k) with 64 instruments in each number."""
+    """Pack (n, k) booleans into words (n, w), with 64 instruments in each number."""
     faulty = np.packbits(off, axis=1)
     words = np.zeros((len(off), -(-off.shape[1] // 64)), np.uint64)
     words.view(np.uint8)[:, : faulty.shape[1]] = faulty

@@ -1,10 +1,9 @@
-"""Ties the motion to its start, where no marker and no force shows it.
+"""Ties the motion to its start where neither markers nor forces determine it.
 
-The outermost splines hardly touch the data, and markers may be missing for a while. A spline coefficient that nothing
-else asks about goes where its neighbours go: the move from the start may change from one coefficient to the next, by
-CHANGE_SD. The move itself is all but free, AWAY_SD. Were it not, each of the thousands of coefficients of a long trial
-would hold a joint angle's constant offset, which markers in wrong places have put into the start, and take it for
-known.
+The outermost splines hardly affect the data, and markers may be missing for a while. A spline coefficient that nothing
+else determines follows its neighbours: its change from the start may vary from one coefficient to the next by
+CHANGE_SD. The change itself is nearly free, AWAY_SD. Otherwise each of the thousands of coefficients of a long trial
+would fix a constant offset of a joint angle, which misplaced markers have put into the start, and count it as known.
 """
 
 from __future__ import annotations
@@ -16,24 +15,24 @@ from kinertia.estimation.simultaneous.normal_equations import Gradient, NormalEq
 from kinertia.estimation.simultaneous.stretches import Stretch
 
 CHANGE_SD, AWAY_SD = 1.0, 30.0
-"""Rad or m: of the change from one coefficient to the next, and of each by itself."""
+"""Standard deviations (rad or m): of the difference from one coefficient to the next, and of each by itself."""
 
 
 class Start(CostTerm):
-    """What ties the motion of every trial to its start."""
+    """Cost that ties the motion of every trial to its start."""
 
     def add(self, into: Gradient, here: InTrial) -> None:
-        """Add it."""
+        """Add the cost in a time block."""
         add_start(into, here.stretch, here.coefficients - self.given.start[here.k])
 
 
 def add_start(into: Gradient, stretch: Stretch, moved: np.ndarray) -> None:
-    """Add the terms of a stretch's own splines.
+    """Add the terms of a time block's own splines.
 
     Args:
         into: zero, or with other terms.
         stretch: of the trial.
-        moved: (splines, c) how far all coefficients of the trial are from their start.
+        moved: (splines, c) distance of all coefficients of the trial from their start.
     """
     own, following = moved[stretch.splines], moved[stretch.splines.start + 1 : stretch.splines.stop + 1]
     count, pairs = len(own), min(len(following), stretch.size - 1)

@@ -18,14 +18,14 @@ class StaticCoordinates(CostTerm):
 
     @classmethod
     def unknowns(cls, given: Given) -> tuple[Unknowns, ...]:
-        """One for each, normal about where the skeleton has it locked."""
+        """Return one unknown per coordinate, normal about the value at which the skeleton has it locked."""
         known = given.calibration.coordinates
         start = np.array([given.skeleton.locked[name] for name in known])
         sd = np.array(list(known.values()))
         return (Unknowns(name=STILL, unit="m or rad", start=start, prior=sd, seen_by="both"),)
 
     def read(self, solution: Solution) -> dict[str, Any]:
-        """Values with their deviations, and entries of how far they are from the skeleton's."""
+        """Return values with their standard deviations, and entries of their changes from the skeleton's values."""
         known = self.given.calibration.coordinates
         before = {**self.given.skeleton.locked, **self.given.calibration.before}
         turned = self.given.free.rotational[self.given.still]

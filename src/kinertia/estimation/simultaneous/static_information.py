@@ -1,8 +1,8 @@
-"""Eliminates unknowns that only markers see from the information on the static unknowns.
+"""Eliminates unknowns that only markers depend on from the information on the static unknowns.
 
-These are many, and always have a prior that holds them. What is left, body and calibration, may come near the edge of
-what is physically possible, where the logarithm of a second moment tells nothing any more and the information on it may
-round to below zero.
+They are many, and always have a prior. The remaining unknowns, body and calibration, may come near the limit of what is
+physically possible, where the logarithm of a second moment becomes undetermined and its information may round to below
+zero.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 
 _SINGULAR = 1e-13
-"""Share of the largest eigenvalue of the scaled information below which one counts as rounding."""
+"""Share of the largest eigenvalue of the scaled information below which an eigenvalue is a rounding error."""
 
 
 @dataclass(frozen=True)
 class StaticInformation:
-    """Of S unknowns, the last k eliminated.
+    """Information on S unknowns with the last k eliminated.
 
     Attributes:
         first: (n, n) on the first n (Schur complement).
@@ -42,30 +42,30 @@ class StaticInformation:
 
     @classmethod
     def of(cls, information: np.ndarray, n: int) -> StaticInformation:
-        """Information (S, S) without all but the first n.
+        """Eliminate all but the first n unknowns from the information (S, S).
 
         Raises:
-            numpy.linalg.LinAlgError: that on the others is not positive definite.
+            numpy.linalg.LinAlgError: the information on the others is not positive definite.
         """
         factor = cholesky(information[n:, n:], lower=True)
         across = solve_triangular(factor, information[n:, :n], lower=True)
         return cls(information[:n, :n] - across.T @ across, factor, across)
 
     def first_of(self, right: np.ndarray) -> np.ndarray:
-        """(n,) the right-hand side (S,) of normal equations, for the first n."""
+        """Reduce the right-hand side (S,) of normal equations to the first n unknowns (n,)."""
         n = len(self.first)
         result: np.ndarray = right[:n] - self.across.T @ solve_triangular(self.factor, right[n:], lower=True)
         return result
 
     def solution(self, right: np.ndarray) -> np.ndarray:
-        """(S,) the unknowns for a right-hand side (S,) of normal equations."""
+        """Solve the normal equations for a right-hand side (S,); returns all unknowns (S,)."""
         n = len(self.first)
         first = np.linalg.solve(self.first, self.first_of(right))
         last = solve_triangular(self.factor, right[n:], lower=True) - self.across @ first
         return np.concatenate([first, solve_triangular(self.factor, last, lower=True, trans="T")])
 
     def root_of_covariance(self) -> np.ndarray:
-        """(S, S) R with covariance R R^T of all unknowns; finite also where some information rounds to below zero."""
+        """Return R (S, S) with covariance R R^T of all unknowns; finite even if information rounds to below zero."""
         n, k = len(self.first), len(self.factor)
         scale = 1.0 / np.sqrt(np.diag(self.first))
         values, vectors = np.linalg.eigh(scale[:, None] * self.first * scale)

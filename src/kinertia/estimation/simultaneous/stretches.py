@@ -1,8 +1,8 @@
-"""Splits a trial into stretches of frames: for two threads, and to bound the memory of a long one.
+"""Splits a trial into time blocks: for two threads, and to limit the memory of a long trial.
 
-Splines see only their neighbours. Those of one stretch can be eliminated as soon as all frames that touch them are
-summed, and what follows needs of them one block only (`elimination`). The frames of a stretch touch its own splines and
-the first block of the next stretch, which gets its other terms from its own frames.
+Splines are coupled only to their neighbours. Those of one time block can be eliminated as soon as all frames that touch
+them are summed, and later blocks need only one block of splines from them (`elimination`). The frames of a time block
+touch its own splines and the first block of splines of the next, which gets its other terms from its own frames.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.normal_equations import SPLINES_PER_BLOCK, NormalEquations
 
 TOGETHER_BYTES = 2**27
-"""Trials whose normal equations are together no larger, a minute of gait, are two stretches each. Beyond it memory
-counts for more than time. What is made of them takes some four times as much in passing."""
+"""Trials whose normal equations together are no larger, a minute of gait, are two time blocks each. Beyond that, memory
+matters more than time. Their processing temporarily takes some four times as much."""
 _SHARE = 16
-"""Of it that a stretch of longer trials takes."""
+"""Inverse of the share of it that a time block of longer trials takes."""
 _FRAMES_OF_GRADIENT = 2000
-"""A stretch for gradients, which need less memory, has about so many frames: fewer would take longer."""
+"""Approximate number of frames of a time block for gradients, which need less memory: fewer would take longer."""
 
 
 _SLICES = ("splines", "touched", "frames")
@@ -30,11 +30,11 @@ _SLICES = ("splines", "touched", "frames")
 
 @dataclass(frozen=True)
 class Stretch:
-    """Neighbouring splines of a trial, and the frames whose first active spline is one of them.
+    """A time block: neighbouring splines of a trial, and the frames whose first active spline is one of them.
 
     Attributes:
         splines: its own.
-        touched: those that its frames touch: its own and, before the trial's last stretch, a block of the next.
+        touched: splines that its frames touch: its own and, except in the trial's last time block, a block of the next.
         frames: indices.
     """
 
@@ -44,32 +44,35 @@ class Stretch:
 
     @classmethod
     def whole(cls, basis: MotionBasis) -> Stretch:
-        """All of a trial."""
+        """Return the whole trial as one time block."""
         return cls(slice(0, basis.size), slice(0, basis.size), slice(0, len(basis.first)))
 
     @property
     def size(self) -> int:
-        """How many splines its frames touch."""
+        """Number of splines that its frames touch."""
         result: int = self.touched.stop - self.touched.start
         return result
 
     @property
     def is_last(self) -> bool:
-        """Nothing comes after it."""
+        """Whether it is the last of the trial."""
         return self.touched == self.splines
 
     @property
     def with_neighbours(self) -> slice:
-        """Its frames, and those before and after them that they meet, where there are such."""
+        """Its frames, and those before and after them to which they are coupled, as far as they exist."""
         return slice(max(self.frames.start - LATER, 0), self.frames.stop + LATER)
 
 
 def stretches(basis: MotionBasis, most: int) -> tuple[Stretch, ...]:
-    """The trial in whole blocks of at most so many splines, at least two stretches; one if it has hardly any blocks."""
+    """Split a trial into time blocks of at most `most` splines, in whole blocks of splines.
+
+    There are at least two, except for a very short trial.
+    """
     size, whole = basis.size, SPLINES_PER_BLOCK
     blocks = size // whole + 1
     each = max(min(most // whole, blocks // 2), 1) * whole
-    # the last has more than the block that the one before it touches
+    # the last has more splines than the block that the one before it touches
     starts = list(range(0, size - whole, each)) or [0]
     ends = [*starts[1:], size]
     frames = np.searchsorted(basis.first, [*starts, size]).tolist()
@@ -80,13 +83,13 @@ def stretches(basis: MotionBasis, most: int) -> tuple[Stretch, ...]:
 
 
 def halves(parts: Sequence[Stretch]) -> tuple[tuple[Stretch, ...], tuple[Stretch, ...]]:
-    """The stretches of a trial from its beginning to its middle, and from its end to its middle."""
+    """Return the time blocks of a trial from its beginning to its middle, and from its end to its middle."""
     middle = (len(parts) + 1) // 2
     return tuple(parts[:middle]), tuple(reversed(parts[middle:]))
 
 
 def joined(half: Sequence[Stretch]) -> list[Stretch]:
-    """Neighbouring stretches, in time or backwards, as fewer and longer ones for gradients."""
+    """Merge neighbouring time blocks, in time or backwards, into fewer and longer ones for gradients."""
     result: list[Stretch] = []
     for stretch in half:
         if result and result[-1].frames.stop - result[-1].frames.start < _FRAMES_OF_GRADIENT:
@@ -101,7 +104,7 @@ def _both(first: slice, last: slice) -> slice:
 
 
 def stretches_of_trials(bases: Sequence[MotionBasis], coordinates: int, static: int) -> list[tuple[Stretch, ...]]:
-    """Each trial's, for so many coordinates and static unknowns."""
+    """Split each trial into time blocks, for so many coordinates and static unknowns."""
     most = TOGETHER_BYTES // NormalEquations.bytes_per_spline(coordinates, static)
     if sum(basis.size for basis in bases) > most:
         most //= _SHARE

@@ -1,9 +1,9 @@
-"""Estimates how far masses depend on the task, such as what moves with the thigh in squats.
+"""Estimates how much masses depend on the task, such as the mass that moves with the thigh in squats.
 
-A thigh has mass that follows the pelvis when the hip is bent (buttock, hamstrings), and soft parts that follow neither.
-Trials of one person agreed on the mass of a thigh within a task and not between tasks: 8.8 +- 0.7 kg walking, 7.5
-jumping, 5.5 squatting, with as much more or less at the pelvis. Nothing that was tried explains it; it belongs to the
-error of what one task says, and the more the farther that task bends the hips.
+Part of a thigh's mass follows the pelvis when the hip flexes (buttock, hamstrings), and some soft tissue follows
+neither. Trials of one person agreed on the mass of a thigh within a task but not between tasks: 8.8 +- 0.7 kg walking,
+7.5 jumping, 5.5 squatting, with the difference at the pelvis. Nothing that was tried explains it; it is part of the
+uncertainty of an estimate from one task, the more the farther that task flexes the hips.
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ from kinertia.model.anatomy import segment_of
 from kinertia.model.skeleton import Skeleton
 
 LEAST_TASK_SD, TASK_SD_PER_RAD = 0.1, 0.14
-"""Of the mass that moves with a thigh, share of it: at least, and by how far hips are bent. Walks, jumps and squats of
-that person are 0.2 apart (SD). Hips are bent by 0.4 rad in its walks, 1.7 in jumps and 1.9 in squats; a task's
-deviation in proportion to that makes them agree."""
+"""Standard deviation of the mass that moves with a thigh, as a share of it: least value, and increase with hip flexion.
+Walks, jumps and squats of that person differ by 0.2 (SD). Hips are flexed by 0.4 rad in its walks, 1.7 in jumps and 1.9
+in squats; a standard deviation proportional to that makes the tasks agree."""
 _MOST_OF_TIME = 95
-"""Per cent of the frames in which hips are bent by less."""
+"""Percentage of the frames in which hips are flexed by less."""
 _MOST_FRAMES = 1000
-"""Looked at, evenly spaced."""
+"""Number of frames used, evenly spaced."""
 
 
 def task_sd(bent_rad: float) -> float:
-    """Deviation of the mass that moves with a thigh, share of it, in a task that bends the hips so far.
+    """Return the SD of the mass that moves with a thigh, as a share of it, in a task that flexes the hips this far.
 
     >>> round(task_sd(0.4), 3), round(task_sd(1.9), 3)
     (0.1, 0.266)
@@ -37,8 +37,9 @@ def task_sd(bent_rad: float) -> float:
 
 
 def hips_bent_rad(skeleton: Skeleton, q: np.ndarray) -> float:
-    """How far a thigh is turned to the pelvis in coordinates (n, c), from where it is in the model's zero pose; 0 where
-    the model has no thigh or no pelvis.
+    """Return how far a thigh is rotated to the pelvis in coordinates (n, c), from the model's zero pose, rad.
+
+    It is 0 if the model has no thigh or no pelvis.
     """
     of = [segment_of(name) or "" for name in skeleton.segments]
     thighs = [k for k, each in enumerate(of) if each.startswith("thigh")]
@@ -52,10 +53,10 @@ def hips_bent_rad(skeleton: Skeleton, q: np.ndarray) -> float:
 
 
 def task_direction(segments: Sequence[str], mass_kg: np.ndarray, sd: float) -> np.ndarray:
-    """(10 s,) one deviation of what a task shows otherwise, in the segments' unknowns, of which each first one is the
-    logarithm of a mass (s,).
+    """Return the change (10 s,) of the segments' unknowns with one SD of the task's effect on masses.
 
-    What the thighs lose, `sd` of their mass, the pelvis gains.
+    The first unknown of each segment is the logarithm of its mass (s,). The pelvis gains what the thighs lose, `sd` of
+    their mass.
     """
     of = [segment_of(name) or "" for name in segments]
     thighs, pelvis = (np.array([each.startswith(wanted) for each in of]) for wanted in ("thigh", "pelvis"))
@@ -68,18 +69,18 @@ def task_direction(segments: Sequence[str], mass_kg: np.ndarray, sd: float) -> n
 
 
 def _some(frames: int) -> np.ndarray:
-    """At most _MOST_FRAMES of so many."""
+    """Return at most _MOST_FRAMES evenly spaced frame indices."""
     return np.unique(np.linspace(0, frames - 1, min(frames, _MOST_FRAMES)).astype(int))
 
 
 class TaskMasses(CostTerm):
-    """What one task shows of the masses otherwise than another would: one more unknown, left out of the vector.
+    """Dependence of the masses on the task: one more unknown, left out of the vector.
 
-    Of several trials it is one, too: that of the trial that bends the hips least, which knows thighs best.
+    With several trials it is one, too: that of the trial that flexes the hips least, which determines thighs best.
     """
 
     def left_out(self, static: np.ndarray) -> np.ndarray:
-        """By which the data see the masses displaced."""
+        """Return the displacement of the masses as seen by the data."""
         given, result = self.given, np.zeros(len(static))
         bent = [
             hips_bent_rad(given.skeleton, basis.evaluate(start, _some(len(basis.first)))[0])

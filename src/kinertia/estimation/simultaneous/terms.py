@@ -1,4 +1,4 @@
-"""Lists the cost terms of the simultaneous estimate. A new unknown is one more of them."""
+"""Lists the cost terms of the simultaneous estimate. A new unknown is a new term."""
 
 from __future__ import annotations
 
@@ -28,5 +28,6 @@ TERMS: tuple[type[CostTerm], ...] = (
     Start,
     RootLoads,
 )
-"""In the order in which their entries are shown. The last takes about as long as all others together: of short trials,
-two threads share the work so."""
+"""In the order in which their entries are shown. The last takes about as long as all others together, so that two
+threads can share the work of short trials.
+"""

@@ -1,12 +1,12 @@
-"""Models how a bending trunk departs from a rigid one: part of it stays upright while the trunk leans.
+"""Models how a bending trunk differs from a rigid one: part of it stays upright while the trunk leans.
 
 Markers on chest and shoulders lean with the upper trunk. Head, abdomen and spine follow them only in part, so that some
-mass is nearer to the vertical through the trunk's lowest joint than a rigid trunk has it. A mass m at the height h over
+mass is nearer to the vertical through the trunk's lowest joint than in a rigid trunk. A mass m at the height h over
 that joint is displaced by s h (y - u): s is the share that stays upright, y points up, and u along the trunk. The sum
-of s m h is one unknown per trial, kappa (kg m): how much bends depends on the task.
+of s m h is one unknown per trial, kappa (kg m), since the amount of bending depends on the task.
 
-To first order in kappa the root load grows by what a first moment of -kappa along u does in a rigid trunk, with the
-inertia that belongs to it, and by the moment of a displacement that always points up: kappa y x f, where f is the
+To first order in kappa the root load changes by the effect of a first moment of -kappa along u in a rigid trunk, with
+the corresponding inertia, and by the moment of a displacement that always points up: kappa y x f, where f is the
 specific force at the trunk (acceleration less gravity). It is taken from the ground reactions: f = F / mass.
 """
 
@@ -27,23 +27,23 @@ from kinertia.model.anatomy import segment_of
 from kinertia.model.bsp import BodySegmentParameters
 
 BENDING_PRIOR_M = SoundOrFaulty(0.001, 0.02, 0.1)
-"""Of kappa over the body's mass: a trunk that is rigid, and one that bends. Under a prior of 0.015 m, a person of 63 kg
-had 0.4 to 0.8 kg m in walks, 1.0 swaying, 1.4 to 2.3 in jumps and 2.5 in squats: 0.006 to 0.04 m. Walks hardly show it,
-and where it is nothing, room for it lets the trunk's centre of mass wander: so it needs evidence."""
+"""Prior of kappa over the body's mass: a trunk that is rigid, and one that bends. Under a prior of 0.015 m, a person of
+63 kg had 0.4 to 0.8 kg m in walks, 1.0 swaying, 1.4 to 2.3 in jumps and 2.5 in squats: 0.006 to 0.04 m. Walks hardly
+determine it, and if it is zero, a wide prior makes the trunk's centre of mass less certain: so it needs evidence."""
 _MIDDLE = 1.5
-"""Mean height of what is displaced, over the trunk's centre of mass: deflections of a uniform rod that is held at its
-lower end grow with the square of the height, which puts their mean at three quarters of its length."""
+"""Mean height of the displaced mass over that of the trunk's centre of mass: deflections of a uniform rod that is
+clamped at its lower end grow with the square of the height, which puts their mean at three quarters of its length."""
 _MOST_OF_TRUNK = 0.7
-"""Share of all bodies of the trunk; a model with less in one of them has a trunk that bends."""
+"""Least share of the trunk's mass in one body; a model with less already has a trunk that bends."""
 
 
 @dataclass(frozen=True, eq=False)
 class BendingTrunk:
-    """The trunk of a model, and what one unit of kappa (kg m) changes.
+    """The trunk of a model, and the effect of one unit of kappa (kg m).
 
     Attributes:
-        row: of the trunk among the segments.
-        parameters: (10,) by how much its dynamic parameters change.
+        row: index of the trunk among the segments.
+        parameters: (10,) change of its dynamic parameters.
         mass_kg: of the whole body.
     """
 
@@ -53,7 +53,7 @@ class BendingTrunk:
 
     @classmethod
     def of(cls, bsp: BodySegmentParameters, mass_kg: float) -> BendingTrunk | None:
-        """Of these segments and a body of this mass; None if none of them is a trunk that stands on its origin."""
+        """Find the trunk of these segments, for a body of this mass; None if none extends from its origin."""
         trunk = [k for k, name in enumerate(bsp.segments) if segment_of(name) == "torso"]
         if not trunk:
             return None
@@ -68,12 +68,12 @@ class BendingTrunk:
 
     @property
     def prior(self) -> SoundOrFaulty:
-        """Of kappa, kg m."""
+        """Prior of kappa, kg m."""
         known = BENDING_PRIOR_M
         return SoundOrFaulty(self.mass_kg * known.sound_sd, self.mass_kg * known.faulty_sd, known.faulty_share)
 
     def bent(self, bsp: BodySegmentParameters, kappa: float) -> BodySegmentParameters:
-        """What moves like these segments with a trunk that bends; nothing that is physically possible."""
+        """Return parameters with the effect of a bending trunk on motion; they need not be physically possible."""
         if not kappa:
             return bsp
         parameters = bsp.dynamic_parameters().reshape(-1, 10)
@@ -82,11 +82,11 @@ class BendingTrunk:
 
 
 class TrunkBending(CostTerm):
-    """How much the trunk bends in each trial; nothing in models without one."""
+    """Bending of the trunk in each trial; without effect in models without a trunk."""
 
     @classmethod
     def unknowns(cls, given: Given) -> tuple[Unknowns, ...]:
-        """Kappa of each trial. The prior knows nothing of the person."""
+        """Return kappa of each trial. The prior does not depend on the person."""
         trunk = BendingTrunk.of(given.prior.mean, given.prior.mass_kg)
         priors = ErrorPriors((trunk.prior,) * len(given.trials) if trunk else ())
         return (Unknowns.errors(BENDING, "kg m", priors, in_models=False),)
@@ -96,7 +96,7 @@ class TrunkBending(CostTerm):
         self.trunk = BendingTrunk.of(self.given.prior.mean, self.given.prior.mass_kg)
 
     def in_root(self, root: RootFrames, k: int, static: np.ndarray) -> RootFrames:
-        """Less the moment kappa y x F / mass of the ground reactions, and of a trunk that bends."""
+        """Subtract the moment kappa y x F / mass of the ground reactions, and include a trunk that bends."""
         if self.trunk is None:
             return root
         place = self.layout[BENDING].start + k
@@ -115,7 +115,7 @@ class TrunkBending(CostTerm):
         )
 
     def read(self, solution: Solution) -> dict[str, Any]:
-        """Kappa of each trial with its deviation, kg m."""
+        """Return kappa of each trial with its standard deviation, kg m."""
         found = solution.pairs(self.layout[BENDING])
         entries = [
             CalibrationEntry(
@@ -128,13 +128,13 @@ class TrunkBending(CostTerm):
                 unit="kg m",
             )
             for trial, (kappa, sd) in zip(self.given.trials, found, strict=False)
-            if trial.ground.plates  # others show nothing of it
+            if trial.ground.plates  # other trials do not determine it
         ]
         return {"calibration": tuple(entries)}
 
 
 def _upright(loads: np.ndarray, share_m: float) -> np.ndarray:
-    """The moment -share y x F of ground reactions (d, 6), or of their derivatives (d, 6, ...)."""
+    """Return the moment -share y x F of ground reactions (d, 6), or of their derivatives (d, 6, ...)."""
     result = np.zeros_like(loads)
     result[:, 3], result[:, 5] = -share_m * loads[:, 2], share_m * loads[:, 0]
     return result

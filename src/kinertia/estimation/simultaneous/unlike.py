@@ -1,9 +1,9 @@
-"""Tests whether a person as a whole is unlike the prior, where single parameters say little.
+"""Tests whether a person as a whole is far from the prior, where single parameters are poorly determined.
 
-What the data show are combinations of parameters. Along each, the estimate's distance from the prior's mean is normal
-with the variance that the data took away from the prior's, if prior and model hold; over the combinations that the data
-know better than the prior, the squares add up to chi-square. A parameter may look ordinary while a combination is not.
-The total mass is left out as far as scale and plates may disagree, which has a warning of its own.
+The data determine combinations of parameters. Along each, the estimate's distance from the prior's mean is normal with
+the variance that the data removed from the prior's, if prior and model hold; over the combinations that the data
+determine better than the prior, the squares sum to chi-square. A parameter may look ordinary while a combination is
+not. The total mass is excluded as far as scale and plates may disagree, which has a warning of its own.
 """
 
 from __future__ import annotations
@@ -20,32 +20,32 @@ from kinertia.estimation.simultaneous.one_sided import OneSided, one_sided
 from kinertia.model.bsp import BodySegmentParameters
 
 UNLIKE_CHANCE = 1e-3
-"""People of the prior of whom more than this share are as far away are not called unlike it."""
+"""Share of the prior's people at the same or a larger distance, below which a person counts as implausible."""
 _KNOWN_SHARE = 0.5
-"""Share of a combination's prior variance that the data must have taken away for it to count."""
+"""Share of a combination's prior variance that the data must have removed for it to count."""
 
 
 _MIRRORED = (3, 8, 9)
-"""Parameters that change their sign from right to left: com_z, ixz, iyz."""
+"""Parameters whose sign differs between right and left: com_z, ixz, iyz."""
 _ALIKE = 0.5
-"""Share of a segment's move that its other side must have made, too."""
+"""Share of a segment's change that its other side must show, too."""
 _SCALE_AGAINST_PLATES = 0.03
-"""Relative deviation of the total mass here."""
+"""Relative standard deviation of the total mass in this test."""
 
 
 @dataclass(frozen=True)
 class Unlikeness:
-    """How far an estimate is from its prior.
+    """Distance of an estimate from its prior.
 
     Attributes:
-        distance2: squared distance in deviations, over the combinations that the data show.
-        combinations: how many these are.
-        chance: share of the prior's people who are as far away or further.
-        segments: those that have moved most, the furthest first.
-        both_sides: whether the first of them and its other side have moved alike: joints that are found wrongly do so,
-            a prosthesis does not.
-        one_sided: the side that is heavier, where that is what departs most; the prior pulls the other side along, so
-            that both may seem to have moved alike.
+        distance2: squared distance in standard deviations, over the combinations that the data determine.
+        combinations: number of these.
+        chance: share of the prior's people at the same or a larger distance.
+        segments: those that have changed most, the largest change first.
+        both_sides: whether the first of them and its other side have changed alike: misplaced joint centres have this
+            effect, a prosthesis does not.
+        one_sided: the heavier side, if mass asymmetry is the largest difference; through the prior the other side
+            changes too, so that both may seem to have changed alike.
     """
 
     distance2: float
@@ -57,12 +57,12 @@ class Unlikeness:
 
     @property
     def unlike(self) -> bool:
-        """Whether this is hardly a person of the prior."""
+        """Whether the person is implausible under the prior."""
         return self.chance < UNLIKE_CHANCE
 
 
 def unlikeness(prior: BspPrior, estimate: BodySegmentParameters, covariance: np.ndarray) -> Unlikeness:
-    """How far the estimate (with the posterior covariance of its table) is from the prior once the scale has spoken."""
+    """Compute the distance of the estimate (with its table's posterior covariance) from the prior given the scale."""
     mean, before = replace(prior, mass_sd_kg=_SCALE_AGAINST_PLATES * prior.mass_kg).given_scale()
     sd = np.sqrt(np.diag(before))
     left, directions = eigh(covariance / np.outer(sd, sd), before / np.outer(sd, sd))
@@ -80,7 +80,7 @@ def unlikeness(prior: BspPrior, estimate: BodySegmentParameters, covariance: np.
 
 
 def _alike(segments: Sequence[str], moved: np.ndarray, k: int) -> bool:
-    """Whether segment k and its other side have moved (s, 10) alike in what has moved most of it."""
+    """Decide whether segment k and its other side changed (s, 10) alike in the parameter that changed most."""
     name = segments[k]
     other = name[:-1] + {"r": "l", "l": "r"}.get(name[-1], "")
     if name[-2:] not in ("_r", "_l") or other not in segments:
