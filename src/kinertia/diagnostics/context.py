@@ -199,6 +199,32 @@ class RecordingContext:
         return overhangs(self.plates, self.contacts, markers.time, feet)
 
     @cached_property
+    def whole_contacts(self) -> Sequence[PlateContact]:
+        """`contacts` of feet that do not reach beyond their plate by so much that a part of the load is elsewhere."""
+        far = [one for one in self.overhangs if one.overhang_m > LITTLE_BEYOND_M]
+        return [
+            one
+            for one in self.contacts
+            if not any(
+                other.plate == one.plate and one.time[0] <= other.span_s[0] and other.span_s[1] <= one.time[-1]
+                for other in far
+            )
+        ]
+
+    @property
+    def whole_loads(self) -> PlateLoads | None:
+        """The plates without the loads that are not among `whole_contacts`."""
+        plates, partly = self.plates, set(map(id, self.contacts)) - set(map(id, self.whole_contacts))
+        if plates is None or not partly:
+            return plates
+        force, moment = plates.force.copy(), plates.moment.copy()
+        for one in self.contacts:
+            if id(one) in partly:
+                during = within(plates.time, one.time[0], one.time[-1])
+                force[during, one.plate], moment[during, one.plate] = 0.0, 0.0
+        return replace(plates, force=force, moment=moment)
+
+    @cached_property
     def loaded(self) -> Trial | KinertiaError | None:
         """The trial with its loads sorted by foot, the error where that is impossible, None without plates or feet."""
         if self.plates is None or self.feet is None:

@@ -37,10 +37,9 @@ _DELAY_SD_S, _LEAP_S = 0.010, 0.06
 
 def stance_durations(context: RecordingContext) -> Iterator[Hypothesis]:
     """T201: feet stand half or twice as long by the markers as by the plates."""
-    plates, feet = context.plates, context.foot_trajectories
-    if plates is None or feet is None:
+    plates, feet, contacts = context.whole_loads, context.foot_trajectories, context.whole_contacts
+    if plates is None or context.plates is None or feet is None:
         return
-    contacts = context.contacts
     last_row, walked = len(plates.time) - 1, [one for one in contacts if _several_steps(one, plates)]
     loaded = [
         float(plates.time[last] - plates.time[first])
@@ -65,7 +64,7 @@ def stance_durations(context: RecordingContext) -> Iterator[Hypothesis]:
         method=Quantity("duration of stance by markers and by plates"),
     )
     start = float(plates.time[0])
-    yield Hypothesis(found, replace(plates, time=start + (plates.time - start) / ratio))
+    yield Hypothesis(found, replace(context.plates, time=start + (plates.time - start) / ratio))
 
 
 def _stances(contacts: Sequence[PlateContact], feet: Feet) -> list[float]:
@@ -96,7 +95,7 @@ def contact_delays(context: RecordingContext) -> Iterator[Hypothesis]:
     plates, feet = context.plates, context.foot_trajectories
     if plates is None or feet is None:
         return
-    delays = ContactDelays.of(context.contacts, feet)
+    delays = ContactDelays.of(context.whole_contacts, feet)
     if delays is None:
         return
     if delays.grows():

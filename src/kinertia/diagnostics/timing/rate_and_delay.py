@@ -35,13 +35,14 @@ class _Best:
 
 def fitted_rate_or_delay(context: RecordingContext) -> Iterator[Hypothesis]:
     """T201 where loads fit the feet at another rate and at no delay; T211 where they are under no foot until a delay
-    is undone (a belt takes late loads along).
+    is undone (a belt takes late loads along). Loads of feet that reach beyond their plates begin late or end early.
     """
-    plates, feet, contacts = context.plates, context.foot_trajectories, context.contacts
-    if plates is None or feet is None or not contacts:
+    plates, feet, contacts = context.whole_loads, context.foot_trajectories, context.whole_contacts
+    if plates is None or context.plates is None or feet is None or not contacts:
         return
     read = ContactFit.of(contacts, feet)
-    if read.delay_rms_s <= _WRONG_S and read.far_m < FITS_M:
+    in_time = read.delay_rms_s <= _WRONG_S or len(contacts) < len(context.contacts)
+    if in_time and read.far_m < FITS_M:
         return
     start = max(float(plates.time[0]), float(feet[0].time[0]))
     if all(foot.stance_spans for foot in feet):
@@ -57,7 +58,7 @@ def fitted_rate_or_delay(context: RecordingContext) -> Iterator[Hypothesis]:
                 contacts=Quantity(len(contacts), "1"),
                 method=Quantity("rate that fits all contacts"),
             )
-            yield Hypothesis(found, replace(plates, time=start + (plates.time - start) / rate.value))
+            yield Hypothesis(found, replace(context.plates, time=start + (plates.time - start) / rate.value))
     if read.far_m < FAR_M:
         return
     delay = _best_delay(plates, feet)
@@ -70,7 +71,7 @@ def fitted_rate_or_delay(context: RecordingContext) -> Iterator[Hypothesis]:
             after_m=Quantity(delay.fit.far_m, "m"),
             contacts=Quantity(len(contacts), "1"),
         )
-        yield Hypothesis(found, replace(plates, time=plates.time - delay.value))
+        yield Hypothesis(found, replace(context.plates, time=plates.time - delay.value))
 
 
 def _best_delay(plates: PlateLoads, feet: Feet) -> _Best:
