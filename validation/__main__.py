@@ -35,7 +35,7 @@ TOOLS = ("command-speed", "truth-trials", "synthetic-walk-table", "usual-build")
 
 
 def application(only: str | None = None) -> typer.Typer:
-    """The command line with all commands, or with one: what the others need may not be installed."""
+    """Build the command line with all commands, or with one: dependencies of the others may not be installed."""
     app = typer.Typer(no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, help=__doc__)
     app.command("all", help="Make all pages again, one after the other: hours.")(_make_all)
     for names, panel in ((EVIDENCE, "Evidence: each writes the page of its name"), (TOOLS, "Tools")):
@@ -47,7 +47,7 @@ def application(only: str | None = None) -> typer.Typer:
 
 
 def _first_line(module: str) -> str:
-    """Of the module's docstring, without loading it."""
+    """Return the first line of the module's docstring, without importing it."""
     text = Path(__file__).with_name(f"{module}.py").read_text(encoding="utf-8")
     return (ast.get_docstring(ast.parse(text)) or "").partition("\n")[0]
 

@@ -24,7 +24,7 @@ from validation.walks import WALKS
 
 
 def document(sections: dict[str, str]) -> str:
-    """The text of docs/validation/accuracy.md."""
+    """Return the text of docs/validation/accuracy.md."""
     return f"""# Accuracy of the simultaneous estimate
 
 ## Joint moments
@@ -149,7 +149,7 @@ def main(
     skin: Annotated[Path | None, typer.Option(help="File of measured skin: only that laboratory and its page.")] = None,
     keep: Annotated[Path | None, typer.Option(help="Folder for its walks, which are used again.")] = None,
 ) -> None:
-    """Run everything and write the page; what needs the measured trials is left out where they are absent."""
+    """Run everything and write the page; parts that need the measured trials are left out where these are absent."""
     if skin:
         from validation.skin_laboratory import measure  # needs OpenSim
 

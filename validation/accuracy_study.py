@@ -74,29 +74,29 @@ PROOF = {
         others=("squat", "arm swing", "trunk sway"),
     ),
 }
-"""What error bars are made for."""
+"""Scenarios for which error bars are made."""
 BREAKS = {
     "axes": Scenario("axes of knees, ankles and elbows 5 degrees off", Faults("artefact", axes_rad=np.radians(5.0))),
     "hips": Scenario("hip centres 15 mm off, calibration switched off", Faults("artefact", hips_m=0.015), False),
     "wobbling": Scenario("40 % of the thighs' mass wobbles", Faults("artefact", wobbling=0.4)),
     "gain": Scenario("right plate's gain 2 % off, calibration switched off", Faults("artefact", gain=0.02), False),
 }
-"""What error bars are not made for: how far they fall."""
+"""Scenarios for which error bars are not made: how far they fail."""
 SCENARIOS = PROOF | BREAKS
 
 
 @dataclass(frozen=True, eq=False)
 class Draw:
-    """One person, measured once.
+    """Estimate of one person, measured once.
 
     Attributes:
         errors, literature_errors: (s, 10) estimate and literature minus truth, in the table's order and units.
-        prior_sd, sd: (s, 10) prior and posterior deviations.
+        prior_sd, sd: (s, 10) prior and posterior SDs.
         bound: (s, 10) the latter at the true parameters, motion and skeleton: the Cramér-Rao bound of the estimator's
             own noise model, prior included.
         attainable: per class, chance that an estimate at the bound has a smaller RMS error than the literature.
-        joints: per joint.
-        converged: of the estimate.
+        joints: errors per joint.
+        converged: whether the estimate converged.
     """
 
     errors: np.ndarray
@@ -111,12 +111,12 @@ class Draw:
 
 @dataclass(frozen=True)
 class ClassAccuracy:
-    """One class of parameters over all draws of a scenario; those by evidence are in prior deviations.
+    """Accuracy of one class of parameters over all draws of a scenario; classes by evidence are in prior SDs.
 
     Attributes:
         coverage: share of parameters within their 95 % interval.
         coverage_sd: its standard error over draws.
-        ratio: RMS of error over posterior deviation.
+        ratio: RMS of error over posterior SD.
         rms, rms_literature: RMS errors of the estimate and the literature, SI.
         bound: RMS of the Cramér-Rao bound of the estimator's own noise model at the truth, prior included, SI.
         better: share of draws in which the RMS error is below the literature's.
@@ -135,7 +135,7 @@ class ClassAccuracy:
 
 @dataclass(frozen=True)
 class ScenarioAccuracy:
-    """All classes of parameters and all joints of one scenario, and the share of draws that converged."""
+    """Accuracy of all classes of parameters and all joints of one scenario, and the share of draws that converged."""
 
     title: str
     draws: int
@@ -151,7 +151,7 @@ def run_accuracy(
     workers: int | None = None,
     progress: Callable[[float], None] = lambda share: None,
 ) -> dict[str, ScenarioAccuracy]:
-    """Accuracy in these scenarios, `draws` people each."""
+    """Compute the accuracy in these scenarios, `draws` people each."""
     drawn = run_draws(scenarios, draws, seed, workers, progress)
     return {key: summarised(scenario.title, drawn[key]) for key, scenario in scenarios.items()}
 
@@ -163,14 +163,14 @@ def run_draws(
     workers: int | None = None,
     progress: Callable[[float], None] = lambda share: None,
 ) -> dict[str, list[Draw]]:
-    """All draws of every scenario, in parallel."""
+    """Run all draws of every scenario, in parallel."""
     cases = [(scenario, number) for scenario in scenarios.values() for number in range(draws)]
     drawn = in_parallel(partial(run_draw, seed), cases, workers, progress)
     return {key: drawn[i * draws : (i + 1) * draws] for i, key in enumerate(scenarios)}
 
 
 def run_draw(seed: int, case: tuple[Scenario, int]) -> Draw:
-    """One draw; people of one number are the same in every scenario."""
+    """Run one draw; people of one number are the same in every scenario."""
     drawn = estimate_person(seed, case)
     person, prior, trials, seen, result = drawn.person, drawn.prior, drawn.trials, drawn.seen, drawn.result
     trial = trials[0]
@@ -192,12 +192,12 @@ def run_draw(seed: int, case: tuple[Scenario, int]) -> Draw:
 
 
 def at_truth(seen: Observation, trial: SyntheticTrial) -> Observation:
-    """The observation with the trial's true coordinates in place of those of inverse kinematics."""
+    """Replace the coordinates of inverse kinematics in the observation by the trial's true ones."""
     return replace(seen, q=trial.motion.q[np.searchsorted(trial.time, seen.time - 1e-9)])
 
 
 def attainable(prior: BspPrior, root: np.ndarray, rng: np.random.Generator) -> dict[str, float]:
-    """Per class, the chance that an unbiased estimate of covariance R R^T (10 s, k) errs less than the prior's mean.
+    """Return per class the chance that an unbiased estimate of covariance R R^T (10 s, k) errs less than the prior.
 
     Its errors and its distance from the prior's mean are independent; covariances of the two add up to the prior's.
     """
@@ -213,7 +213,7 @@ def attainable(prior: BspPrior, root: np.ndarray, rng: np.random.Generator) -> d
 
 
 def summarised(title: str, draws: Sequence[Draw]) -> ScenarioAccuracy:
-    """Cover, ratio and errors by class and by evidence."""
+    """Summarise coverage, ratio and errors by class and by evidence."""
     errors, before, sd, bound, prior = (
         np.array([getattr(d, name) for d in draws])
         for name in ("errors", "literature_errors", "sd", "bound", "prior_sd")
@@ -232,7 +232,7 @@ def summarised(title: str, draws: Sequence[Draw]) -> ScenarioAccuracy:
 
 
 def _class(errors: np.ndarray, before: np.ndarray, sd: np.ndarray, bound: np.ndarray) -> ClassAccuracy:
-    """Of arrays (draws, s, k); NaN is left out, and a draw of which nothing is left."""
+    """Summarise arrays (draws, s, k); NaN is left out, and so is a draw with nothing else."""
     left = np.isfinite(errors).any(axis=(1, 2))
     errors, before, sd, bound = (part[left] for part in (errors, before, sd, bound))
     away = errors / sd

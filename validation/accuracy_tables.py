@@ -18,7 +18,7 @@ _SHOWN = {
 
 
 def accuracy_rows(scenario: ScenarioAccuracy) -> list[list[str]]:
-    """One row per class of parameters, under `HEADINGS`."""
+    """Return one row per class of parameters, under `HEADINGS`."""
     rows = []
     for name, accuracy in scenario.classes.items():
         factor, unit, form = _SHOWN.get(name, (1.0, "prior sd", ".2f"))
@@ -40,11 +40,11 @@ JOINT_CAPTION = (
     "often the truth lies in the 95 % interval; W: the same of joint powers; varying: without each angle's constant "
     "error."
 )
-"""What stands under a table of `joint_rows`."""
+"""Caption of a table of `joint_rows`."""
 
 
 def joint_rows(scenario: ScenarioAccuracy) -> list[list[str]]:
-    """One row per joint, under `JOINT_HEADINGS`: RMS errors of the estimate beside the usual pipeline's."""
+    """Return one row per joint, under `JOINT_HEADINGS`: RMS errors of the estimate beside IK + ID's."""
     rows = []
     for joint, accuracy in scenario.joints.items():
         angles = (accuracy.angle_rad, accuracy.angle_ik_rad, accuracy.change_rad, accuracy.change_ik_rad)
@@ -61,7 +61,7 @@ def joint_rows(scenario: ScenarioAccuracy) -> list[list[str]]:
 
 
 def moments_markdown(accuracies: Mapping[str, ScenarioAccuracy]) -> str:
-    """One table: per laboratory and joint the RMS error of joint moments, estimate / usual pipeline."""
+    """Return one table: per laboratory and joint the RMS error of joint moments, estimate / IK + ID."""
     joints = list(next(iter(accuracies.values())).joints)
     rows = [
         [scenario.title, *(f"{one.moment_nm:.2f} / {one.usual_nm:.2f}" for one in scenario.joints.values())]
@@ -71,7 +71,7 @@ def moments_markdown(accuracies: Mapping[str, ScenarioAccuracy]) -> str:
 
 
 def accuracy_markdown(accuracies: Mapping[str, ScenarioAccuracy]) -> str:
-    """A table per scenario."""
+    """Return a table per scenario."""
     parts = []
     for scenario in accuracies.values():
         title = scenario.title[0].upper() + scenario.title[1:]

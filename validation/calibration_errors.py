@@ -24,12 +24,12 @@ from validation.synthetic_walks import FIRST_SEED, observation_of
 
 @dataclass(frozen=True)
 class Disturbance:
-    """Errors of instruments and model put into a synthetic trial.
+    """Errors of instruments and model injected into a synthetic trial.
 
     Attributes:
-        plate_m: where the right foot's plate is recorded too far along the walk.
-        clock_s: how late forces are recorded.
-        hips_m: how far forward both hips of the model are of the person's.
+        plate_m: displacement of the recorded right foot's plate along the walk.
+        clock_s: delay of the recorded forces.
+        hips_m: forward displacement of both hips of the model from the person's.
     """
 
     plate_m: float = 0.0
@@ -38,7 +38,7 @@ class Disturbance:
 
 
 LARGEST = Disturbance(0.020, 0.010, 0.010)
-"""All errors that are put in; the hips' is also their prior deviation."""
+"""All injected errors; the hips' is also their prior SD."""
 DISTURBANCES = {
     "nothing wrong": Disturbance(),
     "right plate 20 mm off": Disturbance(plate_m=0.020),
@@ -53,9 +53,9 @@ class Calibrated:
     """Outcome of one disturbed trial.
 
     Attributes:
-        deviations: per quantity put in: (error of the estimate, its posterior deviation), m and s.
+        deviations: per injected quantity: (error of the estimate, its posterior SD), m and s.
         errors: RMS of mass (kg), CoM (m) and inertia (kg m2) with calibration free.
-        errors_held: the same with calibration held at its (wrong) values.
+        errors_held: the same with calibration fixed at its (wrong) values.
         errors_literature: the same of the prior's mean.
     """
 
@@ -66,7 +66,7 @@ class Calibrated:
 
 
 def calibrated(disturbance: Disturbance, seed: int, duration_s: float = 2.5, compare: bool = True) -> Calibrated:
-    """Estimate a person unlike the literature from a disturbed trial with 1 mm of camera noise."""
+    """Estimate a person who differs from the literature from a disturbed trial with 1 mm of camera noise."""
     rng = np.random.default_rng([FIRST_SEED, seed])
     person = unlike_literature(walking_subject(), rng)
     trial = walk(person, duration_s, trapezoid=False)
@@ -101,7 +101,7 @@ def calibrated(disturbance: Disturbance, seed: int, duration_s: float = 2.5, com
 
 
 def calibration_section(runs: Mapping[str, Sequence[Calibrated]]) -> str:
-    """Per disturbance the errors of what was put in, in posterior deviations, and the BSPs."""
+    """Return per disturbance the errors of the injected quantities, in posterior SDs, and of the BSPs."""
     rows = []
     for name, outcomes in runs.items():
         cells = [name]

@@ -48,12 +48,12 @@ _LOOK_S = 0.5
 
 @dataclass(frozen=True)
 class Run:
-    """A cohort.
+    """Time and memory of a cohort run.
 
     Attributes:
-        people: how many were fitted.
-        wall_s: from the start of the command to its end.
-        most_mb: most memory of all its processes together.
+        people: number of people fitted.
+        wall_s: time from the start of the command to its end.
+        most_mb: peak memory of all its processes together.
         late_mb: the same while the second half of the people was fitted, and the tables were written.
     """
 
@@ -64,7 +64,7 @@ class Run:
 
 
 def write_people(folder: Path, count: int) -> Path:
-    """Synthetic people as files, in a folder each."""
+    """Write synthetic people as files, in a folder each."""
     subject = walking_subject()
     prior = literature_prior(subject.literature)
     for number in range(count):
@@ -76,11 +76,11 @@ def write_people(folder: Path, count: int) -> Path:
 
 @dataclass(frozen=True)
 class Singles:
-    """Seconds of single fits of the same people, results and rows of the tables included.
+    """Seconds of single fits of the same people, including results and rows of the tables.
 
     Attributes:
-        alone: one after the other.
-        at_once: in as many processes side by side as a cohort has.
+        alone: fits one after the other.
+        at_once: fits in as many parallel processes as a cohort has.
     """
 
     alone: list[float]
@@ -88,7 +88,7 @@ class Singles:
 
 
 def fit_singly(study: Path, out: Path, numbers: list[int]) -> list[float]:
-    """Seconds of these people in this process."""
+    """Return the seconds of fits of these people in this process."""
     prepare_folder(out)
     everybody = list(standings(people_of(study, out), out))
     fit_person(Job.of(everybody[numbers[0]], out))  # what is loaded and compiled once
@@ -102,7 +102,7 @@ def fit_singly(study: Path, out: Path, numbers: list[int]) -> list[float]:
 
 
 def single_fits(study: Path, numbers: list[int], workers: int) -> Singles:
-    """Of these people, each way in processes of its own."""
+    """Time fits of these people, one after the other and in parallel, in separate processes."""
     parts = [part for part in (numbers[k::workers] for k in range(workers)) if part]
     return Singles(_in_processes(study, [numbers]), _in_processes(study, parts))
 
@@ -116,7 +116,7 @@ def _in_processes(study: Path, parts: list[list[int]]) -> list[float]:
 
 
 def cohort(study: Path, out: Path, people: int) -> Run:
-    """The command."""
+    """Run and time the cohort command."""
     command = [sys.executable, "-c", "from kinertia.cli.start import main; main()", "cohort", str(study)]
     began, looks = time.perf_counter(), list[tuple[int, float]]()
     with subprocess.Popen([*command, "-o", str(out), "--quiet"]) as process:
@@ -131,7 +131,7 @@ def cohort(study: Path, out: Path, people: int) -> Run:
 
 
 def _watch(pid: int, out: Path, looks: list[tuple[int, float]]) -> None:
-    """People finished, and memory, until the process ends."""
+    """Record the number of people finished, and memory, until the process ends."""
     try:
         process = psutil.Process(pid)
         while process.is_running() and process.status() != psutil.STATUS_ZOMBIE:
@@ -150,14 +150,14 @@ def _own_mb(process: psutil.Process) -> float:
 
 
 def seconds_per_frame() -> float:
-    """Of ten minutes of gait, as that page has them: a person of the data set has a quarter of an hour."""
+    """Return seconds per frame for ten minutes of gait, from that page; a person of the data set has a quarter hour."""
     lines = (PAGES / PAGE).read_text(encoding="utf-8").splitlines()
     row = next(line for line in lines if line.startswith("| 10 min |"))
     return 1e-3 * float(row.strip("| ").split("|")[-1])
 
 
 def document(singles: Singles, runs: list[Run], workers: int) -> str:
-    """The text of the page."""
+    """Return the text of the page."""
     fewer, all_of_them = runs
     rows = [
         [

@@ -29,11 +29,11 @@ from validation.walks import WALKS, fit_arguments
 
 YARDSTICK = "import numpy, scipy.optimize, pandas"
 FITTED = ("rajagopal", "gait2354")
-"""Of WALKS."""
+"""Walks among WALKS."""
 
 
 def commands(results: Path) -> dict[str, list[str]]:
-    """Command lines by what the table calls them."""
+    """Return command lines by their title in the table."""
     kinertia = [sys.executable, "-m", "kinertia"]
     fits = {
         f"`kinertia fit`, {WALKS[walk]}, with its report": [
@@ -54,14 +54,14 @@ def commands(results: Path) -> dict[str, list[str]]:
 
 
 def spent(command: Sequence[str], before: Path | None = None) -> tuple[float, float]:
-    """Seconds on the clock and of the processor that a process takes from its start to its end.
+    """Return wall-clock and processor seconds of a process from its start to its end.
 
     Args:
         command: the command line.
-        before: checkout whose package it runs; the one that Python finds if None.
+        before: checkout whose package it runs; the installed one if None.
 
     Raises:
-        subprocess.CalledProcessError: it fails; a fit of which a check fails (status 1) is done all the same.
+        subprocess.CalledProcessError: it fails; a fit with an open ERROR (status 1) does not count as failure.
     """
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
     if before is not None:
@@ -75,8 +75,8 @@ def spent(command: Sequence[str], before: Path | None = None) -> tuple[float, fl
 
 
 def measured(runs: int, before: Path | None = None) -> tuple[dict[str, list[float]], int]:
-    """Best seconds (clock, processor) of every command after one run that fills the caches, followed by those of the
-    checkout `before`, if any; bytes of the first fit's report.
+    """Measure the best seconds (wall-clock, processor) of every command after one run that fills the caches, followed
+    by those of the checkout `before`, if any; and the bytes of the first fit's report.
     """
     with tempfile.TemporaryDirectory() as folder:
         results = Path(folder)
@@ -91,7 +91,7 @@ def measured(runs: int, before: Path | None = None) -> tuple[dict[str, list[floa
 
 
 def command_section(runs: int, before: Path | None = None) -> str:
-    """Seconds of every command on the clock and of the processor, over those of the yardstick; the report's size."""
+    """Return every command's wall-clock and processor seconds, relative to the yardstick's; and the report's size."""
     seconds, size = measured(runs, before)
     yardstick = next(iter(seconds.values()))
     heading = ["process", "clock (s)", "ratio", "processor (s)", "ratio"]
@@ -110,5 +110,5 @@ def main(
     runs: Annotated[int, typer.Option(help="The best of so many runs counts.")] = 5,
     before: Annotated[Path | None, typer.Option(metavar="FOLDER", help="Checkout to compare with.")] = None,
 ) -> None:
-    """Measure and print."""
+    """Measure and print the times."""
     print(command_section(runs, before))

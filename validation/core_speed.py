@@ -19,7 +19,7 @@ DURATION_S = 2.4
 
 
 def best(work: Callable[[], object], runs: int) -> float:
-    """Seconds of the fastest of so many runs, after one that compiles."""
+    """Return the seconds of the fastest of `runs` runs, after one that compiles."""
     work()
     times = []
     for _ in range(runs):
@@ -30,7 +30,7 @@ def best(work: Callable[[], object], runs: int) -> float:
 
 
 def core_section(runs: int) -> str:
-    """Microseconds a frame of the package's walk, both cores."""
+    """Return microseconds per frame of the package's walk, for both cores."""
     trial = walk(walking_subject(), DURATION_S, trapezoid=False)
     skeleton, state = trial.skeleton, axis_motion(trial.skeleton, trial.motion)
     core = (skeleton.tree, skeleton.gravity_m_s2, skeleton.bodies(trial.bsp), *state)

@@ -31,12 +31,12 @@ class Timing:
 
     @property
     def each_us(self) -> float:
-        """Microseconds a frame and iteration."""
+        """Microseconds per frame and iteration."""
         return 1e6 * self.seconds / (self.frames * self.iterations)
 
 
 def timed(duration_s: float) -> Timing:
-    """The estimate from a synthetic walk with skin motion, at the literature prior."""
+    """Time the estimate from a synthetic walk with skin motion, at the literature prior."""
     rng = np.random.default_rng(FIRST_SEED)
     person = unlike_literature(walking_subject(), rng)
     trial = walk(person, duration_s, trapezoid=False)
@@ -52,7 +52,7 @@ def timed(duration_s: float) -> Timing:
 
 
 def bare_calls(trial: SyntheticTrial) -> float:
-    """Seconds of Pinocchio's Jacobian, RNEA derivatives and regressor over all frames, best of three."""
+    """Return the seconds of Pinocchio's Jacobian, RNEA derivatives and regressor over all frames, best of three."""
     model = pinocchio_model(trial.skeleton, trial.bsp)
     data, best = model.createData(), np.inf
     rows = list(zip(trial.motion.q, trial.motion.qd, trial.motion.qdd, strict=True))
@@ -67,7 +67,7 @@ def bare_calls(trial: SyntheticTrial) -> float:
 
 
 def speed_section(timings: Sequence[Timing]) -> str:
-    """Seconds, and microseconds a frame and iteration beside bare Pinocchio calls."""
+    """Return seconds, and microseconds per frame and iteration beside bare Pinocchio calls."""
     rows = []
     for t in timings:
         rows.append([f"{t.duration_s:.0f} s", str(t.frames), str(t.iterations), f"{t.seconds:.2f}"])

@@ -37,17 +37,17 @@ from validation.measured_person import read_person as read_measured
 from validation.mistakes import MISTAKES, Mistake
 
 Outcome = Literal["named", "warned", "harmless", "silent", "not possible"]
-"""What became of a fault: identified; other findings are new; moments within their deviations; neither; there is
+"""Outcome of a fault: identified; other findings are new; moments within their SDs; neither; there is
 nothing to make it with."""
 _WALK_S, _PLATE_RATE_HZ, _START, _SAMPLES_PER_FRAME = 2.7, 1000.0, 0.75, 10
 _CHANGED_SD = 3.0
-"""By which the size of a finding differs from that in the fault-free files before it counts as new."""
+"""SDs by which the size of a finding must differ from the fault-free files' to count as new."""
 _LEGS = re.compile(r"(hip|knee|ankle|subtalar)_")
 
 
 @dataclass(frozen=True, eq=False)
 class JointMoments:
-    """Moments (n, c) N m of the legs' coordinates over time (n,) s, and their deviations."""
+    """Moments (n, c) N m of the legs' coordinates over time (n,) s, and their SDs."""
 
     time: np.ndarray
     coordinates: tuple[str, ...]
@@ -57,7 +57,7 @@ class JointMoments:
 
 @dataclass(frozen=True, eq=False)
 class SoundWalk:
-    """A walk as it is: what is found in it, and its joint moments; None where it cannot be fitted."""
+    """A fault-free walk: its findings, and its joint moments; None where it cannot be fitted."""
 
     name: str
     subject: SubjectFile
@@ -67,15 +67,15 @@ class SoundWalk:
 
 @dataclass(frozen=True)
 class FaultOutcome:
-    """What became of one mistake in one walk.
+    """Outcome of one fault in one walk.
 
     Attributes:
-        walk, mistake: names.
+        walk, mistake: names of the walk and the fault.
         outcome: see `Outcome`.
-        code: of the finding that identifies it, else of the worst new one; empty where there is none.
-        said: its message.
-        by: what found it: "check" or "fit".
-        change_sd, change_nm: change of the joint moments (RMS) over their deviations (RMS), and in N m, of the
+        code: code of the finding that identifies it, else of the worst new one; empty where there is none.
+        said: message of the finding.
+        by: command that found it: "check" or "fit".
+        change_sd, change_nm: change of the joint moments (RMS) over their SDs (RMS), and in N m, of the
             coordinate where the former is largest; NaN where no fit was made.
     """
 
@@ -95,13 +95,13 @@ def run_faults(
     workers: int | None = None,
     progress: Callable[[float], None] = lambda share: None,
 ) -> tuple[list[SoundWalk], list[FaultOutcome]]:
-    """What is found in the walks as they are, and in each with every fault.
+    """Return the findings in the fault-free walks, and in each walk with every fault.
 
     Args:
-        walks: subject files by name; of each the first trial is used.
-        mistakes: of `MISTAKES`.
+        walks: subject files by name; the first trial of each is used.
+        mistakes: faults among `MISTAKES`.
         workers: processes; as many as there are cores if None.
-        progress: called with the share that is done.
+        progress: called with the share done.
     """
     sound = run_sound(walks, workers, lambda share: progress(0.1 * share))
     cases = [(one, mistake.name) for one in sound for mistake in mistakes]
@@ -113,13 +113,13 @@ def run_sound(
     workers: int | None = None,
     progress: Callable[[float], None] = lambda share: None,
 ) -> list[SoundWalk]:
-    """What is found in walks as they are; arguments as of `run_faults`."""
+    """Return the findings in the fault-free walks; arguments as in `run_faults`."""
     return in_parallel(_sound, list(walks.items()), workers, progress)
 
 
 def sound_laboratories(folder: Path, count: int) -> dict[str, SubjectFile]:
-    """Files of people drawn from the literature's prior, each in a laboratory whose plates and floor are off by no more
-    than sound ones are; written into this folder.
+    """Write files of people drawn from the literature's prior into this folder, each in a laboratory whose plate errors
+    are no larger than fault-free ones.
     """
     laboratories = {}
     for number in range(1, count + 1):
@@ -147,7 +147,7 @@ def sound_laboratories(folder: Path, count: int) -> dict[str, SubjectFile]:
 
 
 def synthetic_walk(folder: Path) -> SubjectFile:
-    """Files of the package's own walk, in a careful laboratory, written into this folder."""
+    """Write files of the package's own walk, in a careful laboratory, into this folder."""
     subject = walking_subject()
     trial = walk(subject, _WALK_S, _PLATE_RATE_HZ, _START)
     recordings = record(subject, trial, LabNoise(), np.random.default_rng(1), _SAMPLES_PER_FRAME)
@@ -174,7 +174,7 @@ def _spoilt(case: tuple[SoundWalk, str]) -> FaultOutcome:
 
 
 def outcome_of(sound: SoundWalk, mistake: Mistake) -> FaultOutcome:
-    """Make the fault in the files of the walk, and see what becomes of it."""
+    """Inject the fault into the files of the walk, and return the outcome."""
     person = mistake.change(_person(sound.subject, sound.name), np.random.default_rng(_seed(mistake.name)))
     case = FaultOutcome(sound.name, mistake.name, "not possible")
     if person is None:
@@ -204,7 +204,7 @@ def _seed(name: str) -> list[int]:
 
 
 def checked(subject: Path) -> tuple[Finding, ...]:
-    """What `kinertia check` finds."""
+    """Return the findings of `kinertia check`."""
     try:
         return check_person(read_person(read_subject(subject))).findings
     except KinertiaError as error:
@@ -214,8 +214,8 @@ def checked(subject: Path) -> tuple[Finding, ...]:
 def judged(
     case: FaultOutcome, mistake: Mistake, sound: Sequence[Finding], findings: Sequence[Finding], by: str
 ) -> FaultOutcome | None:
-    """The outcome by what is new beside the fault-free files: "named" where a code of the fault is among it, "warned"
-    where others are; None where nothing is new.
+    """Return the outcome by new findings compared with the fault-free files: "named" where a code of the fault is among
+    them, "warned" where only others are; None where nothing is new.
     """
     new = [one for one in reported(findings) if _is_new(one, reported(sound))]
     naming = [one for one in new if one.code in mistake.codes]
@@ -227,7 +227,7 @@ def judged(
 
 
 def _is_new(one: Finding, before: Sequence[Finding]) -> bool:
-    """Whether it is not found there before, at least as severe and of about the same size."""
+    """Return whether no earlier finding of its kind is at least as severe and of about the same size."""
     same = [other for other in before if other.code == one.code and other.where.overlaps(one.where)]
     return not any(other.severity >= one.severity and not _differ(one.headline, other.headline) for other in same)
 
@@ -239,7 +239,7 @@ def _differ(one: Quantity | None, other: Quantity | None) -> bool:
 
 
 def moments_of(fit: Fit) -> JointMoments:
-    """Of the legs, of the first trial."""
+    """Return the joint moments of the legs in the first trial."""
     trial = fit.trials[0]
     table, deviation = trial.moments["estimate"], trial.moment_sd
     legs = [name for name in table.columns if _LEGS.match(name)]
@@ -248,7 +248,7 @@ def moments_of(fit: Fit) -> JointMoments:
 
 
 def change(sound: JointMoments | None, other: JointMoments) -> tuple[float, float]:
-    """Largest RMS change of a moment over its RMS deviation, and that change in N m, over the time that both have."""
+    """Return the largest RMS change of a moment over its RMS SD, and that change in N m, over the common time."""
     if sound is None:
         return np.nan, np.nan
     both = (other.time >= sound.time[0] - 1e-9) & (other.time <= sound.time[-1] + 1e-9)

@@ -86,14 +86,14 @@ made in the files of {walks} walks, one at a time, and given to `kinertia check`
 
 
 def counts(outcomes: Sequence[FaultOutcome]) -> dict[str, int]:
-    """How many faults came to each outcome; those that are not possible are left out."""
+    """Count faults by outcome; impossible ones are left out."""
     return {kind: sum(one.outcome == kind for one in outcomes) for kind in _OUTCOMES}
 
 
 def faults_markdown(
     sound: Sequence[SoundWalk], outcomes: Sequence[FaultOutcome], laboratories: Sequence[SoundWalk]
 ) -> str:
-    """The tables and what they come to."""
+    """Return the tables and their summary."""
     emphasised = {"silent": "**silent**", "named*": "named \\*"}
     *most, last = [[row[0], *(emphasised.get(cell, cell) for cell in row[1:])] for row in faults_rows(sound, outcomes)]
     return _PAGE.format(
@@ -111,8 +111,8 @@ def _table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def code_rows(fault_free: Sequence[SoundWalk], outcomes: Sequence[FaultOutcome]) -> list[list[str]]:
-    """A row for each code: how many faults it identifies, of how many it is the first other finding, and in how many
-    fault-free walks it is found.
+    """Return a row for each code: how many faults it identifies, for how many it is the first other finding, and in how
+    many fault-free walks it is found.
     """
     named, warned = (Counter(one.code for one in outcomes if one.outcome == kind) for kind in ("named", "warned"))
     without = Counter(code for walk in fault_free for code in {one.code for one in reported(walk.findings)})
@@ -121,8 +121,8 @@ def code_rows(fault_free: Sequence[SoundWalk], outcomes: Sequence[FaultOutcome])
 
 
 def faults_rows(sound: Sequence[SoundWalk], outcomes: Sequence[FaultOutcome]) -> list[list[str]]:
-    """One row per fault, a column per walk; the first row is of no fault, the last one counts those named among
-    those possible.
+    """Return one row per fault, a column per walk; the first row is fault-free, the last one counts those identified
+    among those possible.
     """
     by_case = {(one.walk, one.mistake): one for one in outcomes}
     mistakes = dict.fromkeys(one.mistake for one in outcomes)
@@ -134,7 +134,7 @@ def faults_rows(sound: Sequence[SoundWalk], outcomes: Sequence[FaultOutcome]) ->
 def faults_sentence(
     sound: Sequence[SoundWalk], outcomes: Sequence[FaultOutcome], laboratories: Sequence[SoundWalk]
 ) -> str:
-    """What the table comes to."""
+    """Summarise the table in a sentence."""
     sums = counts(outcomes)
     possible = sum(sums.values())
     return (
@@ -148,17 +148,17 @@ def faults_sentence(
 
 
 def _codes(walk: SoundWalk) -> str:
-    """Codes that are found in a fault-free walk, the worst first."""
+    """Return the codes found in a fault-free walk, the worst first."""
     return " ".join(dict.fromkeys(one.code for one in reported(walk.findings))) or "none"
 
 
 def _count(walks: Sequence[SoundWalk], least: Severity) -> int:
-    """In how many there is something at least as severe; a walk that cannot be fitted is blocked."""
+    """Count walks with a finding at least as severe; a walk that cannot be fitted is blocked."""
     return sum(walk.moments is None or any(one.severity >= least for one in reported(walk.findings)) for walk in walks)
 
 
 def _said_of_sound(sound: Sequence[SoundWalk]) -> list[str]:
-    """What is found in walks as they are."""
+    """List the findings in fault-free walks."""
     found = ("; ".join(f"{one.code} {one.message}" for one in reported(walk.findings)) or "nothing" for walk in sound)
     return [f"{walk.name}: {sentences}" for walk, sentences in zip(sound, found, strict=True)]
 
@@ -177,7 +177,7 @@ def _named(walk: str, outcomes: Sequence[FaultOutcome]) -> str:
 def faults_summary(
     sound: Sequence[SoundWalk], outcomes: Sequence[FaultOutcome], laboratories: Sequence[SoundWalk]
 ) -> dict[str, Any]:
-    """Every finding, and changes of the joint moments."""
+    """Return every finding, and the changes of the joint moments."""
     return {
         "kinertia": VERSION,
         "sound": {walk.name: [one.to_dict() for one in walk.findings] for walk in (*sound, *laboratories)},
@@ -198,7 +198,7 @@ def main(
     details: Annotated[Path | None, typer.Option(help="Write every finding to this JSON file.")] = None,
     workers: Annotated[int | None, typer.Option(help="Processes; one per core if left out.")] = None,
 ) -> None:
-    """Make every fault in every walk, and write the page."""
+    """Inject every fault into every walk, and write the page."""
     with TemporaryDirectory() as folder:
         given = walks or subject_files(data_folder(), Path(folder))
         sources = {"synthetic walk": synthetic_walk(Path(folder) / "lab"), **named(map(read_subject, given))}
@@ -215,7 +215,7 @@ def main(
 
 
 def named(people: Iterable[SubjectFile]) -> dict[str, SubjectFile]:
-    """By the person's name; of several people of one name the later ones are numbered."""
+    """Return people by name; several people of one name are numbered from the second on."""
     by_name: dict[str, SubjectFile] = {}
     for wanted in people:
         name = wanted.subject.name

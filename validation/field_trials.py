@@ -36,7 +36,7 @@ _ANYTHING = "*"
 
 @dataclass(frozen=True)
 class Case:
-    """A recording, the command of its user, and what is true of it (fields as in field_cases.toml)."""
+    """A recording, its user's command, and the known facts about it (fields as in field_cases.toml)."""
 
     title: str
     folder: Path
@@ -49,7 +49,7 @@ class Case:
     draft: str | None
 
     def against(self, outcome: Outcome) -> str:
-        """What is not as it should be; empty where all is."""
+        """Describe deviations from the expected outcome; empty where there are none."""
         found = {one["code"] for one in unexplained(outcome.content)}
         missing = [codes for codes in self.expected if not found & set(codes.split("|"))]
         accused = {one["code"] for one in severe(outcome.content) if one["code"][0] != _OF_RESULT} - self._true
@@ -69,13 +69,13 @@ class Case:
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a command ended.
+    """Outcome of a command.
 
     Attributes:
         status: exit status.
-        tries: commands until it ended so.
-        seconds: of the last.
-        content: what `--json` printed.
+        tries: number of commands until then.
+        seconds: time of the last command.
+        content: output of `--json`.
     """
 
     status: int
@@ -84,7 +84,7 @@ class Outcome:
     content: dict[str, Any]
 
     def residuals(self) -> str:
-        """Root residuals (N, N m) with the literature's parameters and with the estimate, where there is one."""
+        """Format root residuals (N, N m) with the literature's parameters and with the estimate, where there is one."""
         trials = self.content.get("trials") or []
         if len(trials) != 1 or "residual_force_rms_N" not in trials[0]:
             return "-"
@@ -93,7 +93,7 @@ class Outcome:
 
 
 def cases(data: Path) -> Iterator[Case]:
-    """Every recording of field_cases.toml."""
+    """Yield every recording of field_cases.toml."""
     for laboratory in tomllib.loads(CASES.read_text(encoding="utf-8"))["laboratory"]:
         folder = data / laboratory["folder"]
         for recording in laboratory["recording"]:
@@ -116,7 +116,7 @@ def cases(data: Path) -> Iterator[Case]:
 
 
 def run(case: Case, out: Path) -> Outcome:
-    """The outcome of the command, or of the second try, with a drafted marker set."""
+    """Return the outcome of the command, or of the second try, with a drafted marker set."""
     outcome = _outcome([*case.arguments, *(["-o", str(out)] if case.arguments[0] == "fit" else [])], 1)
     if case.draft is None or not {"L101", "L105"} & {one["code"] for one in unexplained(outcome.content)}:
         return outcome
@@ -137,7 +137,7 @@ def _outcome(arguments: Sequence[str], tries: int) -> Outcome:
 
 
 def document(outcomes: Sequence[tuple[Case, Outcome]]) -> str:
-    """The text of docs/validation/field-trials.md."""
+    """Return the text of docs/validation/field-trials.md."""
     rows, messages = [], []
     for case, outcome in outcomes:
         against = case.against(outcome)

@@ -24,7 +24,7 @@ loads = "{markers}_{loads}.xml"
 
 
 def subject_files(data: Path) -> dict[str, str]:
-    """Title -> text of the subject file."""
+    """Return title -> text of the subject file."""
     gait, other = data / "gait2354", data / "subject4"
     person = '[subject]\nname = "gait2354"\nsex = "male"\nmass_kg = 72.6\nheight_m = 1.803\n'
     static = f'[model]\nstatic = "{gait}/subject01_static.trc"\n'
@@ -44,7 +44,7 @@ def subject_files(data: Path) -> dict[str, str]:
 
 
 def held_out(text: str) -> list[dict[str, Any]]:
-    """What `kinertia crossval` writes for a subject file."""
+    """Return the output of `kinertia crossval` for a subject file."""
     with tempfile.TemporaryDirectory() as folder:
         subject, out = Path(folder) / "subject.toml", Path(folder) / "out"
         subject.write_text(text)
@@ -54,7 +54,7 @@ def held_out(text: str) -> list[dict[str, Any]]:
 
 
 def document(people: dict[str, list[dict[str, Any]]]) -> str:
-    """The text of docs/validation/held-out.md."""
+    """Return the text of docs/validation/held-out.md."""
     rows = []
     for title, trials in people.items():
         for trial in trials:
@@ -82,6 +82,6 @@ The BSPs from the other trials explain {better} of {len(rows)} trials better tha
 
 
 def main() -> None:
-    """Hold out and write the page."""
+    """Hold out trials and write the page."""
     people = {title: held_out(text) for title, text in subject_files(data_folder()).items()}
     write_page("held-out", document(people))

@@ -20,21 +20,21 @@ from kinertia.synthetic.walk import SyntheticTrial
 USUAL_HZ = (6.0, 10.0, 12.0)
 """Cutoffs of the coordinates in the usual pipeline: OpenSim's own and two more."""
 WITHIN = 1.959964
-"""Half width of a 95 % interval in deviations."""
+"""Half width of a 95 % interval in SDs."""
 
 
 @dataclass(frozen=True)
 class JointErrors:
-    """Mean squares over the frames of one person's walk, left and right side, for one joint.
+    """Mean squared errors over the frames of one person's walk, left and right side, for one joint.
 
     Attributes:
         moment: error of the estimate's joint moments, (N m)^2.
-        moment_variance: what the estimate says of it.
+        moment_variance: its variance according to the estimate.
         moment_coverage: share of frames within the 95 % intervals.
-        usual: error of the usual pipeline's joint moments, by USUAL_HZ.
+        usual: error of the joint moments by IK + ID, by USUAL_HZ.
         power_coverage: the same of joint powers.
         angle, angle_ik: errors of the joint angles, rad^2, by the estimate and by inverse kinematics.
-        angle_variance, angle_coverage: what the estimate says of them, and the share of frames within its intervals.
+        angle_variance, angle_coverage: their variance by the estimate, and share of frames within its intervals.
         change, change_ik: the same after taking off each angle's mean error: what varies in time.
     """
 
@@ -53,14 +53,14 @@ class JointErrors:
 
 @dataclass(frozen=True)
 class JointAccuracy:
-    """One joint over all people: RMS errors.
+    """RMS errors of one joint over all people.
 
     Attributes:
-        moment_nm, moment_sd_nm: of the joint moments, and their posterior deviation.
-        coverage, power_coverage: of the joint moments and powers by 95 % intervals.
-        usual_nm: of the usual pipeline's joint moments, at the best of USUAL_HZ.
-        angle_rad, angle_ik_rad: of joint angles by the estimate and by inverse kinematics.
-        angle_sd_rad, angle_coverage: posterior deviation of the estimate's, and coverage by 95 % intervals.
+        moment_nm, moment_sd_nm: error of the joint moments, and their posterior SD.
+        coverage, power_coverage: coverage of the joint moments and powers by 95 % intervals.
+        usual_nm: error of the joint moments by IK + ID, at the best of USUAL_HZ.
+        angle_rad, angle_ik_rad: errors of joint angles by the estimate and by inverse kinematics.
+        angle_sd_rad, angle_coverage: posterior SD of the estimate's, and coverage by 95 % intervals.
         change_rad, change_ik_rad: the same without each angle's mean error.
     """
 
@@ -79,7 +79,7 @@ class JointAccuracy:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What joint moments are computed from."""
+    """Quantities from which joint moments are computed."""
 
     skeleton: Skeleton
     bsp: BodySegmentParameters
@@ -87,15 +87,13 @@ class Outcome:
     reactions: GroundReactions
 
     def moments(self, time: np.ndarray) -> np.ndarray:
-        """(w, c) N m at these times, those of the motion."""
+        """Compute joint moments (w, c) N m at these times, which are the motion's."""
         return inverse_dynamics(self.skeleton, self.bsp, self.motion, self.reactions.at(time))
 
 
 @dataclass(frozen=True, eq=False)
 class Before:
-    """What the laboratory believes in before the estimate, and what the usual pipeline works with: inverse kinematics,
-    low-passed; literature BSPs; forces as measured.
-    """
+    """Inputs before the estimate, and of IK + ID: low-passed inverse kinematics, literature BSPs, measured forces."""
 
     skeleton: Skeleton
     literature: BodySegmentParameters
@@ -105,12 +103,12 @@ class Before:
 def joint_errors(
     truth: SyntheticTrial, before: Before, after: Outcome, deviations: CurveDeviations
 ) -> dict[str, JointErrors]:
-    """Errors of the estimate and of the usual pipeline against the truth.
+    """Compute errors of the estimate and of IK + ID against the truth.
 
     Args:
-        truth: what the person did.
-        before, after: what the estimate started from, and its outcome.
-        deviations: of its curves.
+        truth: true motion and loads of the person.
+        before, after: starting point and outcome of the estimate.
+        deviations: SDs of its curves.
     """
     kinematics, time = before.kinematics, before.kinematics.time
     at = np.searchsorted(truth.time, time - 1e-9)
@@ -154,7 +152,7 @@ def _square(values: np.ndarray) -> float:
 
 
 def joint_accuracy(people: Sequence[JointErrors]) -> JointAccuracy:
-    """One joint of all people together."""
+    """Summarise one joint over all people."""
 
     def mean(name: str) -> float:
         return float(np.mean([getattr(one, name) for one in people]))

@@ -14,12 +14,12 @@ from validation.measured_person import MeasuredPerson, acting, loads_of
 
 
 def loads(change: Callable[[PlateLoads], PlateLoads]) -> Change:
-    """Other loads of the walk."""
+    """Return a fault that changes the loads of the walk."""
     return lambda person, rng: person.with_plates(change(person.plates))
 
 
 def with_signs(x: float, y: float, z: float) -> Change:
-    """Force components times these, at the same points."""
+    """Return a fault that multiplies force components, at the same points."""
 
     def change(plates: PlateLoads) -> PlateLoads:
         force, point, torque = acting(plates)
@@ -29,7 +29,7 @@ def with_signs(x: float, y: float, z: float) -> Change:
 
 
 def turned_about_vertical(degrees: float) -> Change:
-    """Each plate turned about the vertical through its middle: the forces' directions and points."""
+    """Return a fault that rotates each plate about the vertical through its middle: force directions and points."""
     turn = Rotation.from_euler("y", degrees, degrees=True).as_matrix()
 
     def change(plates: PlateLoads) -> PlateLoads:
@@ -41,7 +41,7 @@ def turned_about_vertical(degrees: float) -> Change:
 
 
 def directions_turned(degrees: float) -> Change:
-    """Forces turned about the vertical at the same points."""
+    """Return a fault that rotates forces about the vertical at the same points."""
     turn = Rotation.from_euler("y", degrees, degrees=True).as_matrix()
 
     def change(plates: PlateLoads) -> PlateLoads:
@@ -52,7 +52,7 @@ def directions_turned(degrees: float) -> Change:
 
 
 def scaled(force: float = 1.0, point: float = 1.0, plates: slice = slice(None)) -> Change:
-    """Forces with their torques, and points times these, on all plates or on some."""
+    """Return a fault that scales forces with their torques, and points, on all plates or on some."""
 
     def change(loads: PlateLoads) -> PlateLoads:
         forces, points, torques = (part.copy() for part in acting(loads))
@@ -65,7 +65,7 @@ def scaled(force: float = 1.0, point: float = 1.0, plates: slice = slice(None)) 
 
 
 def torques_in_n_mm(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPerson | None:
-    """Torques a thousand times as large; of plates with corners, all moments about the plate's middle."""
+    """Multiply torques by a thousand; on plates with corners, all moments about the plate's middle."""
     plates = person.plates
     if plates.corners is not None:
         middle = plates.corners.mean(axis=1)
@@ -79,7 +79,7 @@ def torques_in_n_mm(person: MeasuredPerson, rng: np.random.Generator) -> Measure
 
 
 def moved(x_m: float, z_m: float) -> Change:
-    """Centres of pressure elsewhere, with the corners of the plates where the file has them."""
+    """Return a fault that displaces centres of pressure, with the corners of the plates where the file has them."""
 
     def change(plates: PlateLoads) -> PlateLoads:
         force, point, torque = acting(plates)
@@ -91,12 +91,12 @@ def moved(x_m: float, z_m: float) -> Change:
 
 
 def with_offset(x_n: float = 0.0, y_n: float = 0.0, z_n: float = 0.0) -> Change:
-    """A wrong zero of every plate, which acts in its middle."""
+    """Return a fault that adds a zero offset to every plate, acting in its middle."""
     return _with_more(lambda time: np.array([x_n, y_n, z_n]) * np.ones((len(time), 1)))
 
 
 def with_drift(last_n: float) -> Change:
-    """The zero of the vertical force of every plate drifts from 0 to this."""
+    """Return a fault that lets the zero of every plate's vertical force drift from 0 to this."""
     return _with_more(lambda time: np.outer((time - time[0]) / (time[-1] - time[0]), [0.0, last_n, 0.0]))
 
 
@@ -110,7 +110,7 @@ def _with_more(extra: Callable[[FloatArray], FloatArray]) -> Change:
 
 
 def on_one_plate(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPerson | None:
-    """The foot of the second plate lands on the first for the first 0.08 s, in front of the other foot."""
+    """Put the foot of the second plate on the first for the first 0.08 s, in front of the other foot."""
     plates = person.plates
     order = _by_time(plates)
     if len(order) < 2:
@@ -128,7 +128,7 @@ def on_one_plate(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPe
 
 
 def plates_exchanged(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPerson | None:
-    """The channels of two plates exchanged: each load lies where the other plate is. Force files have no channels."""
+    """Interchange the channels of two plates: each load lies at the other plate. Force files have no channels."""
     plates = person.plates
     order = _by_time(plates)
     if len(order) < 2 or plates.corners is None:
@@ -147,7 +147,7 @@ def plates_exchanged(person: MeasuredPerson, rng: np.random.Generator) -> Measur
 
 
 def late(delay_s: float) -> Change:
-    """Forces later than they were."""
+    """Return a fault that delays the forces."""
 
     def change(plates: PlateLoads) -> PlateLoads:
         step = float(plates.time[1] - plates.time[0])
@@ -158,19 +158,19 @@ def late(delay_s: float) -> Change:
 
 
 def of_another_trial(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPerson | None:
-    """Forces of a walk that began 0.3 s earlier, and 120 mm further on."""
+    """Replace the forces by those of a walk that began 0.3 s earlier, and 120 mm further on."""
     earlier = late(-0.3)(person, rng)
     return None if earlier is None else moved(0.12, 0.02)(earlier, rng)
 
 
 def _by_time(plates: PlateLoads) -> list[int]:
-    """Plates that are loaded, in the order of the first load."""
+    """Return loaded plates in the order of their first load."""
     firm = plates.force[..., 1] > 5 * LOAD_THRESHOLD_N
     return sorted(np.flatnonzero(firm.any(axis=0)).tolist(), key=lambda p: int(np.argmax(firm[:, p])))
 
 
 def _middles(plates: PlateLoads, point: FloatArray) -> FloatArray:
-    """(1, p, 3) m, the plates' middles: by their corners, or by where they are loaded."""
+    """Return the plates' middles (1, p, 3) m: from their corners, or from where they are loaded."""
     if plates.corners is not None:
         return np.asarray(plates.corners.mean(axis=1)[None])
     weight = np.where(plates.force[..., 1] > LOAD_THRESHOLD_N, plates.force[..., 1], 0.0)[..., None]

@@ -42,13 +42,13 @@ _CAMERA_SD_M = 0.0005
 
 @dataclass(frozen=True)
 class Long:
-    """What a walk of so many minutes took.
+    """Time and memory taken by a walk of this many minutes.
 
     Attributes:
         plates_hz: samples of the force plates per second.
         kinematics_s, estimate_s: seconds of processor time.
-        clock_s: seconds on the clock of both, in two threads where there are two cores.
-        before_mb, kinematics_mb, estimate_mb: most memory until the data are there, until inverse kinematics and
+        clock_s: wall-clock seconds of both, in two threads where there are two cores.
+        before_mb, kinematics_mb, estimate_mb: peak memory until the data are loaded, until inverse kinematics and
             smoothing are done, and until the end.
         iterations: Gauss-Newton steps.
     """
@@ -66,8 +66,8 @@ class Long:
 
 
 def stride(plates_hz: float = RATE_HZ) -> tuple[SyntheticTrial, BspPrior, Markers, np.ndarray]:
-    """A stride on a treadmill: its trial, the literature's prior, its markers with skin motion, and the loads on the
-    feet by the plates' clock, all as they come back a stride later.
+    """Return a stride on a treadmill: its trial, the literature's prior, its markers with skin motion, and the loads on
+    the feet at the plates' rate, all of which repeat a stride later.
     """
     rng = np.random.default_rng(FIRST_SEED)
     person = unlike_literature(walking_subject(), rng)
@@ -84,7 +84,7 @@ def stride(plates_hz: float = RATE_HZ) -> tuple[SyntheticTrial, BspPrior, Marker
 
 
 def _back(trial: SyntheticTrial) -> np.ndarray:
-    """(n, 1, 3) m: how far the belt has carried everything back at each frame."""
+    """Return (n, 1, 3) m, how far the belt has carried everything back at each frame."""
     x = trial.motion.q[:, 0]
     carried = np.zeros((len(x), 1, 3))
     carried[:, 0, 0] = -(x[-1] - x[0]) * np.arange(len(x)) / (len(x) - 1)
@@ -92,7 +92,7 @@ def _back(trial: SyntheticTrial) -> np.ndarray:
 
 
 def long_walk(minutes: float, plates_hz: float = RATE_HZ) -> tuple[Skeleton, BspPrior, Trial]:
-    """The stride again and again."""
+    """Repeat the stride for this many minutes."""
     trial, prior, markers, loads = stride(plates_hz)
     frames, samples = (np.arange(round(60.0 * minutes * rate)) for rate in (RATE_HZ, plates_hz))
     rng = np.random.default_rng(FIRST_SEED)
@@ -104,7 +104,7 @@ def long_walk(minutes: float, plates_hz: float = RATE_HZ) -> tuple[Skeleton, Bsp
 
 
 def measured(minutes: float, plates_hz: float) -> Long:
-    """In this process."""
+    """Measure a walk in this process."""
     skeleton, prior, trial = long_walk(minutes, plates_hz)
     started = time.perf_counter()
     marks = [(time.process_time(), _most_mb())]
@@ -119,14 +119,14 @@ def measured(minutes: float, plates_hz: float) -> Long:
 
 
 def in_own_process(minutes: float, plates_hz: float = RATE_HZ) -> Long:
-    """The same, where nothing else is in memory."""
+    """Measure a walk in a separate process, with nothing else in memory."""
     command = [sys.executable, "-m", __name__, str(minutes), str(plates_hz)]
     done = subprocess.run(command, cwd=REPOSITORY, check=True, stdout=subprocess.PIPE)
     return Long(**json.loads(done.stdout))
 
 
 def _most_mb() -> float:
-    """Most memory that this process has held."""
+    """Return the peak memory (MB) of this process."""
     if sys.platform == "linux":
         # the other figure begins with what the process held that started it
         status = Path("/proc/self/status").read_text(encoding="ascii")
@@ -137,7 +137,7 @@ def _most_mb() -> float:
 
 
 def document(walks: list[Long]) -> str:
-    """The text of docs/validation/long-trials.md."""
+    """Return the text of docs/validation/long-trials.md."""
     rows = [
         [
             f"{w.minutes:g} min",

@@ -18,13 +18,13 @@ _ACROSS = np.diag([1.0, 1.0, -1.0])
 
 
 def loaded_middle_s(person: MeasuredPerson) -> float:
-    """The middle (s) of the time in which plates are loaded: what a fit uses is around it."""
+    """Return the middle (s) of the time in which plates are loaded: a fit uses what is around it."""
     loaded = person.plates.time[(person.plates.force[..., 1] > LOAD_THRESHOLD_N).any(axis=1)]
     return float((loaded[0] + loaded[-1]) / 2)
 
 
 def exchanged(*pairs: tuple[str, str], where: str = "both") -> Change:
-    """Labels of these landmarks exchanged; `where`: "static", "walk" or "both"."""
+    """Return a fault that swaps the labels of these landmarks; `where`: "static", "walk" or "both"."""
 
     def change(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPerson | None:
         names = person.marker_set.landmarks
@@ -40,7 +40,7 @@ def exchanged(*pairs: tuple[str, str], where: str = "both") -> Change:
 
 
 def sides_exchanged(where: str = "both") -> Change:
-    """Left and right of all labels exchanged."""
+    """Return a fault that swaps left and right of all labels."""
 
     def change(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPerson | None:
         other = {
@@ -54,7 +54,7 @@ def sides_exchanged(where: str = "both") -> Change:
 
 
 def wands_exchanged(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPerson | None:
-    """A marker of the right thigh and one of the right shank that are no landmarks, exchanged in the walk."""
+    """Swap a marker of the right thigh and one of the right shank, not landmarks, in the walk."""
     joints = {label for name, labels in person.marker_set.landmarks.items() if "wand" not in name for label in labels}
     seen = set(person.walk.markers.labels)
     picked = [
@@ -68,17 +68,17 @@ def wands_exchanged(person: MeasuredPerson, rng: np.random.Generator) -> Measure
 
 
 def turned(rotation: FloatArray, where: str = "both") -> Change:
-    """Markers in other axes."""
+    """Return a fault that rotates the markers to other axes."""
     return lambda person, rng: _in(person, where, lambda markers: markers.rotated(rotation), set())
 
 
 def z_up(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPerson:
-    """Z up in the markers of the walk, Y up in the forces."""
+    """Set Z up in the markers of the walk, Y up in the forces."""
     return person.in_walk(lambda markers: markers.rotated(_TO_Z_UP))
 
 
 def mirrored(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPerson:
-    """The axis across the laboratory has the wrong sign, in markers and forces."""
+    """Reverse the sign of the axis across the laboratory, in markers and forces."""
     plates = person.plates
     corners = None if plates.corners is None else plates.corners @ _ACROSS
     # a moment is no arrow: mirrored across Z, its Z component stays and the others turn their signs
@@ -88,7 +88,7 @@ def mirrored(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPerson
 
 
 def scaled(factor: float, where: str) -> Change:
-    """Markers in another unit, or of a person of another size."""
+    """Return a fault that puts markers in another unit, or of a person of another size."""
 
     def change(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPerson | None:
         return _in(person, where, lambda markers: replace(markers, positions=factor * markers.positions), set())
@@ -97,14 +97,14 @@ def scaled(factor: float, where: str) -> Change:
 
 
 def moved(offset_m: tuple[float, float, float], where: str) -> Change:
-    """All markers elsewhere."""
+    """Return a fault that displaces all markers."""
     return lambda person, rng: _in(
         person, where, lambda markers: replace(markers, positions=markers.positions + np.array(offset_m)), set()
     )
 
 
 def placed_anew(sd_m: float) -> Change:
-    """A static trial of another session: every marker elsewhere by a deviation of `sd_m` along each axis."""
+    """Return a fault that re-applies the static trial's markers, each displaced with SD `sd_m` along each axis."""
 
     def change(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPerson:
         offsets = rng.normal(0.0, sd_m, (len(person.static.markers.labels), 3))
@@ -114,7 +114,7 @@ def placed_anew(sd_m: float) -> Change:
 
 
 def one_marker(landmark: str, change: Callable[[FloatArray, FloatArray, float], FloatArray]) -> Change:
-    """Another way (n, 3) m of one marker in the walk, by its way, the times (n,) s and the middle (s) of the loads."""
+    """Return a fault that changes a marker's trajectory (n, 3) m, given times (n,) s and middle (s) of the loads."""
 
     def spoilt(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPerson | None:
         label = person.marker_set.landmarks.get(landmark, ("",))[0]
@@ -133,7 +133,7 @@ def one_marker(landmark: str, change: Callable[[FloatArray, FloatArray, float], 
 
 
 def spikes(way: FloatArray, time: FloatArray, middle_s: float) -> FloatArray:
-    """300 mm off in every twentieth frame."""
+    """Displace the marker by 300 mm in every twentieth frame."""
     off = np.zeros_like(way)
     off[10::20, 0] = 0.3
     result: FloatArray = way + off
@@ -141,7 +141,7 @@ def spikes(way: FloatArray, time: FloatArray, middle_s: float) -> FloatArray:
 
 
 def frozen(way: FloatArray, time: FloatArray, middle_s: float) -> FloatArray:
-    """Where it was 0.25 s before the middle, until 0.25 s after it."""
+    """Freeze the marker where it was 0.25 s before the middle, until 0.25 s after it."""
     held = np.abs(time - middle_s) <= 0.25
     result = way.copy()
     result[held] = way[np.argmax(held)]
@@ -149,7 +149,7 @@ def frozen(way: FloatArray, time: FloatArray, middle_s: float) -> FloatArray:
 
 
 def bridged(way: FloatArray, time: FloatArray, middle_s: float) -> FloatArray:
-    """A gap of half a second around the middle, filled with a straight line."""
+    """Fill a gap of half a second around the middle with a straight line."""
     gap = np.abs(time - middle_s) <= 0.25
     result = way.copy()
     for axis in range(3):
@@ -158,19 +158,19 @@ def bridged(way: FloatArray, time: FloatArray, middle_s: float) -> FloatArray:
 
 
 def jumping(way: FloatArray, time: FloatArray, middle_s: float) -> FloatArray:
-    """60 mm higher from the middle on."""
+    """Raise the marker by 60 mm from the middle on."""
     result: FloatArray = way + np.outer(np.where(time > middle_s, 0.06, 0.0), [0.0, 1.0, 0.0])
     return result
 
 
 def displaced(way: FloatArray, time: FloatArray, middle_s: float) -> FloatArray:
-    """Fallen off before the walk and put back 50 mm higher."""
+    """Raise the marker by 50 mm, as if fallen off before the walk and re-applied."""
     result: FloatArray = way + np.array([0.0, 0.05, 0.0])
     return result
 
 
 def exchanged_for_a_while(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPerson | None:
-    """Labels of the two knees' outer markers exchanged for 0.4 s."""
+    """Swap the labels of the two knees' lateral markers for 0.4 s."""
     names = [person.marker_set.landmarks.get(f"knee_lateral_{side}", ("",))[0] for side in "rl"]
     if not set(names) <= set(person.walk.markers.labels):
         return None
@@ -187,7 +187,7 @@ def exchanged_for_a_while(person: MeasuredPerson, rng: np.random.Generator) -> M
 
 
 def closed_up(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPerson:
-    """80 ms of marker frames cut out in the middle, and the time after them closed up."""
+    """Cut 80 ms of marker frames in the middle, and close the gap in time."""
     middle = loaded_middle_s(person)
 
     def changed(markers: Markers) -> Markers:
@@ -198,7 +198,7 @@ def closed_up(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPerso
 
 
 def half_speed(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPerson:
-    """Markers of the walk at half their rate; in a C3D file, which has one clock, forces as well."""
+    """Give markers of the walk half their rate; in a C3D file, which has one time base, forces as well."""
 
     def slow(time: FloatArray) -> FloatArray:
         start = person.walk.markers.time[0]
@@ -211,7 +211,7 @@ def half_speed(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPers
 
 
 def virtual_markers(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPerson | None:
-    """Hip joint centres, computed from the pelvis, listed as markers of the thighs."""
+    """List hip joint centres, computed from the pelvis, as markers of the thighs."""
     marks = find_landmarks(person.static, person.marker_set)
     if not {"asis_r", "asis_l", "psis_r", "psis_l"} <= set(marks.points):
         return None
@@ -240,7 +240,7 @@ def virtual_markers(person: MeasuredPerson, rng: np.random.Generator) -> Measure
 
 
 def _forces_to_the_end(person: MeasuredPerson) -> MeasuredPerson:
-    """Without the forces after the last marker frame."""
+    """Cut the forces after the last marker frame."""
     plates, markers = person.plates, person.walk.markers
     if plates.corners is None:
         return person
@@ -254,7 +254,7 @@ def _forces_to_the_end(person: MeasuredPerson) -> MeasuredPerson:
 def _in(
     person: MeasuredPerson, where: str, change: Callable[[Markers], Markers], needed: set[str]
 ) -> MeasuredPerson | None:
-    """The person with markers changed there; None where a label that it takes is missing."""
+    """Change the markers there; None where a required label is missing."""
     files = {"static": (person.static,), "walk": (person.walk,), "both": (person.static, person.walk)}[where]
     if not all(needed <= set(file.markers.labels) for file in files):
         return None
@@ -267,7 +267,7 @@ def _renamed(markers: Markers, names: dict[str, str]) -> Markers:
 
 
 def _twin(label: str, labels: tuple[str, ...]) -> str | None:
-    """The label of the other side: R and L exchanged somewhere in it."""
+    """Return the label of the other side: R and L exchanged somewhere in it."""
     for k, letter in enumerate(label):
         if letter in "RLrl":
             twin = label[:k] + {"R": "L", "L": "R", "r": "l", "l": "r"}[letter] + label[k + 1 :]

@@ -13,28 +13,28 @@ from pathlib import Path
 from kinertia.io.samples import VARIABLE, samples_folder
 
 FOLDERS = ("gait2354", "pig_c3d", "rajagopal_walk", "subject4")
-"""Of the people that most pages need."""
+"""Folders of the people that most pages need."""
 BESIDE = Path(__file__).resolve().parents[2] / "shared" / "data"
 
 
 @cache
 def places() -> tuple[Path, ...]:
-    """The folders that exist, best first; looked for once, since tests change the environment."""
+    """Return the folders that exist, best first; cached, since tests change the environment."""
     stated = os.environ.get(VARIABLE)
     folders = [*([Path(stated)] if stated else []), BESIDE, samples_folder()]
     return tuple(folder for folder in folders if folder.is_dir())
 
 
 def find(name: str) -> Path | None:
-    """The file or folder of this name (`gait2354/subject01_walk1.trc`) in the first place that has it."""
+    """Find the file or folder of this name (`gait2354/subject01_walk1.trc`) in the first place that has it."""
     return next((folder / name for folder in places() if (folder / name).exists()), None)
 
 
 def data_folder() -> Path:
-    """The first place that holds all of FOLDERS.
+    """Return the first place that holds all of FOLDERS.
 
     Raises:
-        FileNotFoundError: there is none.
+        FileNotFoundError: there is no such place.
     """
     for folder in places():
         if all((folder / name).is_dir() for name in FOLDERS):

@@ -26,13 +26,13 @@ _IDLE_SD_N, _IDLE_SD_NM = 1.0, 0.1
 
 @dataclass(frozen=True, eq=False)
 class MeasuredPerson:
-    """What a laboratory has of one person: a static trial and a walk.
+    """Recordings of one person: a static trial and a walk.
 
     Attributes:
-        subject: as stated.
+        subject: subject data as stated.
         marker_set: which label is which landmark.
-        static, walk: as read; plates with noise where nobody stands on them.
-        window_s: what the user vouches for in the walk, if anything.
+        static, walk: recordings as read; plates with noise while unloaded.
+        window_s: window of the walk that the user vouches for, if any.
     """
 
     subject: Subject
@@ -43,30 +43,30 @@ class MeasuredPerson:
 
     @property
     def plates(self) -> PlateLoads:
-        """Those of the walk."""
+        """Plates of the walk."""
         if self.walk.plates is None:
             raise ValueError("the walk has no force plates")
         return self.walk.plates
 
     def in_static(self, change: Callable[[Markers], Markers]) -> MeasuredPerson:
-        """With other markers in the static trial."""
+        """Change the markers of the static trial."""
         return replace(self, static=replace(self.static, markers=change(self.static.markers)))
 
     def in_walk(self, change: Callable[[Markers], Markers]) -> MeasuredPerson:
-        """With other markers in the walk."""
+        """Change the markers of the walk."""
         return replace(self, walk=replace(self.walk, markers=change(self.walk.markers)))
 
     def in_both(self, change: Callable[[Markers], Markers]) -> MeasuredPerson:
-        """With other markers in both."""
+        """Change the markers of both trials."""
         return self.in_static(change).in_walk(change)
 
     def with_plates(self, plates: PlateLoads) -> MeasuredPerson:
-        """With other loads in the walk."""
+        """Replace the loads of the walk."""
         return replace(self, walk=replace(self.walk, plates=plates))
 
 
 def read_person(wanted: SubjectFile, rng: np.random.Generator) -> MeasuredPerson:
-    """The person of a subject file, with the first of the trials.
+    """Read the person of a subject file, with the first of the trials.
 
     Raises:
         KinertiaError: a file is missing or broken, or there is no static trial.
@@ -82,7 +82,7 @@ def read_person(wanted: SubjectFile, rng: np.random.Generator) -> MeasuredPerson
 
 
 def _with_idle_noise(plates: PlateLoads, rng: np.random.Generator) -> PlateLoads:
-    """The reader leaves nothing of a plate nobody stands on; a real one reads a little of something."""
+    """Add noise to unloaded plates: the reader leaves nothing there, but real plates read a little."""
     idle = (plates.force == 0).all(axis=2)[..., None]
     force = plates.force + idle * rng.normal(0.0, _IDLE_SD_N, plates.force.shape)
     moment = plates.moment + idle * rng.normal(0.0, _IDLE_SD_NM, plates.moment.shape)
@@ -90,18 +90,18 @@ def _with_idle_noise(plates: PlateLoads, rng: np.random.Generator) -> PlateLoads
 
 
 def acting(plates: PlateLoads) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Force (k, p, 3) N, its point on the ground (k, p, 3) m, and the torque (k, p, 3) N m about that."""
+    """Return force (k, p, 3) N, its point on the ground (k, p, 3) m, and the torque (k, p, 3) N m about that."""
     point = centre_of_pressure(plates.wrench)
     return plates.force, point, plates.moment - np.cross(point, plates.force)
 
 
 def loads_of(plates: PlateLoads, force: FloatArray, point: FloatArray, torque: FloatArray) -> PlateLoads:
-    """The plates with these forces, points and torques, (k, p, 3) each."""
+    """Return the plates with these forces, points and torques, (k, p, 3) each."""
     return replace(plates, force=force, moment=np.cross(point, force) + torque)
 
 
 def write_person(folder: Path, person: MeasuredPerson) -> Path:
-    """Static trial and walk as a laboratory has them, and the subject file that names them; returns its path.
+    """Write static trial and walk as a laboratory has them, and their subject file; return its path.
 
     Plates whose corners are known are written to a C3D file with the markers, others to a MOT file beside a TRC file.
     """
@@ -140,7 +140,7 @@ def _marker_set_text(marker_set: MarkerSet) -> str:
 
 
 def _toml(tables: Sequence[tuple[str, Mapping[str, object]]]) -> str:
-    """Strings, numbers and lists are written alike in JSON and TOML."""
+    """Format tables as TOML; strings, numbers and lists are written alike in JSON and TOML."""
     lines = []
     for heading, entries in tables:
         lines += [heading, *(f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in entries.items()), ""]

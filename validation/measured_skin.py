@@ -37,11 +37,11 @@ _STREAM = 77
 
 @dataclass(frozen=True, eq=False)
 class MeasuredSkin:
-    """Displacements of one donor's markers.
+    """Displacements of one donor's skin markers.
 
     Attributes:
-        moved: (n, m, 3) m.
-        places: (m, 3) over the length of the donor's femur.
+        moved: (n, m, 3) m displacements.
+        places: (m, 3) positions over the length of the donor's femur.
         segments: (m,) "thigh" or "shank".
     """
 
@@ -51,7 +51,7 @@ class MeasuredSkin:
 
     @classmethod
     def read(cls, path: Path) -> MeasuredSkin:
-        """The only donor of a file, or its first."""
+        """Read the only donor of a file, or its first."""
         with np.load(path) as file:
             name = next(key for key in file if key.endswith("_moved")).removesuffix("_moved")
             moved, places, segments, stature = (file[f"{name}_{k}"] for k in ("moved", "place", "segment", "stature"))
@@ -59,11 +59,11 @@ class MeasuredSkin:
 
     @property
     def strides(self) -> int:
-        """Whole ones."""
+        """Number of whole strides."""
         return len(self.moved) // STRIDE_FRAMES
 
     def curves(self, segment: str, places: np.ndarray) -> list[int]:
-        """The donor's marker for each of these (k, 3) places in shares of the femur; none twice if there are enough."""
+        """Choose the donor's marker for each of these (k, 3) positions in femur lengths; none twice if possible."""
         every = [int(j) for j in np.flatnonzero(self.segments == segment)]
         picked: list[int] = []
         for place in places:
@@ -72,7 +72,7 @@ class MeasuredSkin:
         return picked
 
     def at(self, strides: np.ndarray, curves: Sequence[int]) -> np.ndarray:
-        """(n, k, 3) m, displacements on these curves, so many strides (n,) after the beginning."""
+        """Return displacements (n, k, 3) m on these curves, so many strides (n,) after the beginning."""
         loop = np.concatenate([self.moved, self.moved[:1]])[:, curves].reshape(len(self.moved) + 1, -1)
         frames = strides % self.strides * STRIDE_FRAMES
         values = [np.interp(frames, np.arange(len(loop)), column) for column in loop.T]
@@ -81,18 +81,18 @@ class MeasuredSkin:
 
 
 def heel_strikes_s(forces: pd.DataFrame, side: str) -> np.ndarray:
-    """When a foot's vertical force passes LOADED_N."""
+    """Return the times at which a foot's vertical force passes LOADED_N."""
     loaded = (forces[f"ground_force_{side}_vy"] > LOADED_N).to_numpy()
     return forces.index.to_numpy()[np.flatnonzero(loaded[1:] & ~loaded[:-1]) + 1]
 
 
 def stride_s(forces: pd.DataFrame) -> float:
-    """Mean over both sides."""
+    """Return the mean stride time (s) of both sides."""
     return float(np.mean(np.concatenate([np.diff(heel_strikes_s(forces, side)) for side in SIDES])))
 
 
 def strides_since(time: np.ndarray, strikes: np.ndarray, each_s: float) -> np.ndarray:
-    """Strides from the first of these heel strikes, before and after them at the usual pace."""
+    """Return strides since the first of these heel strikes, before and after them at the usual pace."""
     before, after = each_s * np.arange(4, 0, -1), each_s * np.arange(1, 5)
     edges = np.concatenate([strikes[0] - before, strikes, strikes[-1] + after])
     return np.interp(time, edges, np.arange(len(edges)) - len(before))
@@ -101,15 +101,15 @@ def strides_since(time: np.ndarray, strikes: np.ndarray, each_s: float) -> np.nd
 def on_measured_skin(
     markers: Markers, person: Person, q: np.ndarray, forces: pd.DataFrame, skin: MeasuredSkin, seed: int
 ) -> Markers:
-    """The same, with the markers of thighs and shanks where measured skin carries them.
+    """Move the markers of thighs and shanks with measured skin motion.
 
     Args:
-        markers: at (n,) times.
-        person: whose model says where markers are.
+        markers: markers at (n,) times.
+        person: person whose model determines marker positions.
         q: (n, c) true coordinates.
-        forces: of sound instruments.
-        skin: of the donor.
-        seed: of the person.
+        forces: forces of fault-free instruments.
+        skin: displacements of the donor.
+        seed: seed of the person.
     """
     rng, positions = np.random.default_rng([seed, _STREAM]), markers.positions.copy()
     known, pace_s = person.model.getMarkerSet(), stride_s(forces)
@@ -134,14 +134,14 @@ def on_measured_skin(
 
 
 def _knee(person: Person, side: str) -> np.ndarray:
-    """Origin of the tibia in the femur."""
+    """Return the origin of the tibia in the femur."""
     bodies = person.model.getBodySet()
     femur, tibia = (bodies.get(f"{bone}_{side}") for bone in _SEGMENTS)
     return array(tibia.findStationLocationInAnotherFrame(person.state, vector([0, 0, 0]), femur))
 
 
 def _displaced(person: Person, q: np.ndarray, names: Sequence[str], moved: np.ndarray) -> np.ndarray:
-    """(n, k, 3) m, true places of markers plus displacements (n, k, 3) in the axes of their segment."""
+    """Return true marker positions plus displacements (n, k, 3) in the axes of their segment, as (n, k, 3) m."""
     result = np.empty_like(moved)
     for frame, pose in enumerate(q):
         person.pose(pose)

@@ -21,7 +21,7 @@ STAGES = ("literature", "corrected", "estimate")
 
 
 def results(name: str, folder: Path, *more: str) -> dict[str, Any]:
-    """fit.json of one walk, with the BSP table under "bsp"."""
+    """Return fit.json of one walk, with the BSP table under "bsp"."""
     # results and warnings are in fit.json: the terminal's tables would only repeat them
     with contextlib.redirect_stdout(io.StringIO()), contextlib.suppress(SystemExit):
         kinertia(["fit", *fit_arguments(data_folder(), name), *more, "-o", str(folder)])
@@ -29,36 +29,36 @@ def results(name: str, folder: Path, *more: str) -> dict[str, Any]:
 
 
 def unexplained(run: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Open findings that no other explains, from what `--json` prints or fit.json."""
+    """Return open findings that no other explains, from the output of `--json` or fit.json."""
     return [one for one in run.get("findings", []) if one["status"] == "open" and one["muted_by"] is None]
 
 
 def severe(run: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Of these, those that lower a verdict."""
+    """Return the unexplained findings that lower a verdict."""
     return [one for one in unexplained(run) if one["severity"] in ("WARNING", "ERROR")]
 
 
 def told(run: Mapping[str, Any]) -> list[str]:
-    """Code and message of what lowers a verdict."""
+    """Return code and message of findings that lower a verdict."""
     return [f"{one['code']} {one['message']}" for one in severe(run)]
 
 
 def farthest(bsp: pd.DataFrame) -> str:
-    """The parameter that is farthest from the literature's, in prior SDs."""
+    """Return the parameter farthest from the literature's, in prior SDs."""
     away = (bsp["estimate"] - bsp["literature"]) / bsp["prior_sd"]
     worst = int(away.abs().argmax())
     return f"{bsp['parameter'].iloc[worst]} of {bsp['segment'].iloc[worst]} {away.iloc[worst]:+.1f}"
 
 
 def table(headings: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
-    """A Markdown table; all columns but the first to the right."""
+    """Return a Markdown table; all columns but the first are right-aligned."""
     headings = list(headings)
     lines = [headings, ["---", *["--:"] * (len(headings) - 1)], *rows]
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
 
 def document(runs: dict[str, dict[str, Any]]) -> str:
-    """The text of docs/validation/measured-trials.md."""
+    """Return the text of docs/validation/measured-trials.md."""
     trials = {name: run["trials"][0] for name, run in runs.items()}
     used = table(
         ["walk", "frames", "used", "window (s)", "markers, IK (mm)", "markers, estimate (mm)", "converged"],

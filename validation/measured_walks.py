@@ -11,7 +11,7 @@ from validation.walks import WALKS
 
 
 def measured_walk(name: str) -> dict[str, Any]:
-    """fit.json of a measured walk, its BSP table, and its largest departure from the literature in prior SDs."""
+    """Return fit.json of a measured walk, its BSP table, and its largest departure from the literature in prior SDs."""
     with tempfile.TemporaryDirectory() as folder:
         run = results(name, Path(folder) / name)
     run["worst"] = farthest(run["bsp"])
@@ -19,7 +19,7 @@ def measured_walk(name: str) -> dict[str, Any]:
 
 
 def measured_section(runs: dict[str, dict[str, Any]]) -> str:
-    """What the estimate says of the measured walks."""
+    """Describe the estimates from the measured walks."""
     rows = []
     for name, run in runs.items():
         (trial,) = run["trials"]

@@ -16,12 +16,12 @@ KG_PER_POUND = 0.45359237
 
 @dataclass(frozen=True)
 class Mistake:
-    """One mistake.
+    """One fault that laboratories make.
 
     Attributes:
-        name: what was done.
-        change: makes it in the files of a person.
-        codes: of the findings that identify it; none of what no recording can show.
+        name: description of the fault.
+        change: injects it into the files of a person.
+        codes: codes of the findings that identify it; none if no recording can show it.
     """
 
     name: str
@@ -30,7 +30,7 @@ class Mistake:
 
 
 def _subject(**factors: float) -> Change:
-    """Mass or height times a factor, and the rest as it was."""
+    """Return a fault that multiplies mass or height by a factor."""
 
     def change(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPerson:
         stated = {key: factor * getattr(person.subject, key) for key, factor in factors.items()}
@@ -51,7 +51,7 @@ def _other_sex(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPers
 
 
 def _said(person: MeasuredPerson, stated: dict[str, object]) -> MeasuredPerson:
-    """In the subject file, and in the static trial where that says it as well."""
+    """Change stated data in the subject file, and in the static trial where they are stated as well."""
     known = {key: value for key, value in stated.items() if getattr(person.static, key, None) is not None}
     static = replace(person.static, **known)  # type: ignore[arg-type]
     walk = replace(person.walk, **{k: v for k, v in known.items() if getattr(person.walk, k) is not None})  # type: ignore[arg-type]
@@ -66,7 +66,7 @@ def _codes(*codes: str) -> frozenset[str]:
 
 
 _POSITIONS = _codes("P242", "P243", "P244", "P246")
-"""By the feet, or as a position that the estimate has corrected."""
+"""Codes of positions, by the feet, or as a position that the estimate has corrected."""
 
 MISTAKES = (
     # labels

@@ -38,7 +38,7 @@ MASS = re.compile(r"(\w+):\s*orig mass = ([-+.\deE]+), new mass = ([-+.\deE]+)")
 
 
 class RRAFailed(RuntimeError):
-    """RRA gave no result."""
+    """Error: RRA gave no result."""
 
 
 @dataclass(frozen=True)
@@ -50,14 +50,14 @@ class Reduced:
 
 
 def reduce_residuals(model: Path, motion: Path, loads: Path, span_s: tuple[float, float], folder: Path) -> Reduced:
-    """Run both passes.
+    """Run both passes of RRA.
 
     Args:
         model: a model without forces.
-        motion: inverse kinematics.
-        loads: ExternalLoads.
-        span_s: what to reduce, within the motion.
-        folder: receives all files.
+        motion: motion by inverse kinematics.
+        loads: ExternalLoads file.
+        span_s: time span to reduce, within the motion.
+        folder: folder for all files.
 
     Raises:
         RRAFailed: a pass failed, took too long or did not reach the end.
@@ -72,12 +72,12 @@ def reduce_residuals(model: Path, motion: Path, loads: Path, span_s: tuple[float
 
 
 def recommended_masses(log: str) -> dict[str, float]:
-    """Factor on the mass of each body that RRA printed."""
+    """Return the mass factor of each body that RRA printed."""
     return {body: float(new) / float(old) for body, old, new in MASS.findall(log) if float(old) > 0}
 
 
 def apply_masses(model: Path, factors: dict[str, float], out: Path) -> None:
-    """Scale masses (and inertias with them)."""
+    """Scale masses, and inertias with them."""
     if not factors:
         raise RRAFailed("no masses recommended")
     changed = opensim.Model(str(model))
@@ -91,7 +91,7 @@ def apply_masses(model: Path, factors: dict[str, float], out: Path) -> None:
 def one_pass(
     model: Path, motion: Path, loads: Path, span_s: tuple[float, float], folder: Path, adjusted: Path | None
 ) -> str:
-    """Run RRATool in a process of its own; returns what it printed. `adjusted`: where the new model shall go."""
+    """Run RRATool in a separate process; return its output. `adjusted`: where the new model shall go."""
     folder.mkdir(exist_ok=True)
     free = free_coordinates(model)
     write_actuators(model, free, folder / "actuators.xml")
@@ -118,7 +118,7 @@ def one_pass(
 
 
 def run_apart(folder: Path, until_s: float) -> str:
-    """Run the set-up of a folder in another process, its chatter in a file."""
+    """Run the set-up of a folder in a separate process, with its output in a file."""
     log = folder / "rra.log"
     with log.open("wb") as file:
         try:
@@ -135,7 +135,7 @@ def run_apart(folder: Path, until_s: float) -> str:
 
 
 def free_coordinates(model: Path) -> list[str]:
-    """Coordinates that are neither locked nor driven by others."""
+    """Return the coordinates that are neither locked nor driven by others."""
     loaded = opensim.Model(str(model))
     state = loaded.initSystem()
     coordinates = loaded.getCoordinateSet()
@@ -144,12 +144,12 @@ def free_coordinates(model: Path) -> list[str]:
 
 
 def by_prefix(name: str, values: dict[str, float], otherwise: float) -> float:
-    """The value whose key the name starts with."""
+    """Return the value whose key is a prefix of the name."""
     return next((value for key, value in values.items() if name.startswith(key)), otherwise)
 
 
 def write_actuators(model: Path, free: list[str], out: Path) -> None:
-    """Residual actuators at the pelvis's centre of mass, and a moment for every other free coordinate."""
+    """Write residual actuators at the pelvis's centre of mass, and a moment for every other free coordinate."""
     loaded = opensim.Model(str(model))
     centre = " ".join(map(str, loaded.getBodySet().get("pelvis").getMassCenter().to_numpy()))
     objects = []
@@ -175,7 +175,7 @@ def _actuator(kind: str, name: str, where: str, optimal: float, limit: float) ->
 
 
 def write_tasks(free: list[str], out: Path) -> None:
-    """Tracking tasks, critically damped."""
+    """Write tracking tasks, critically damped."""
     objects = [
         f'<CMC_Joint name="{name}"><on>true</on><weight>{by_prefix(name, WEIGHTS, 20.0)}</weight>'
         "<active>true false false</active><kp>100 1 1</kp><kv>20 1 1</kv><ka>1 1 1</ka>"
@@ -194,7 +194,7 @@ def _document(kind: str, objects: list[str]) -> str:
 
 
 def resampled(motion: Path, out: Path, span_s: tuple[float, float], rate_hz: float = 100.0) -> Path:
-    """RRA's motion has the integrator's steps; the same at an even rate."""
+    """Resample RRA's motion, which has the integrator's steps, at an even rate."""
     table = read_sto(motion)
     time = pd.Index(np.arange(span_s[0], table.index[-1], 1 / rate_hz), name="time")
     even = pd.DataFrame({column: np.interp(time, table.index, table[column]) for column in table}, time)

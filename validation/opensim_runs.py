@@ -21,7 +21,7 @@ WHOLE = (-np.inf, np.inf)
 
 @contextlib.contextmanager
 def quietly(log: Path) -> Iterator[None]:
-    """Send to a file what this process prints, also what C code prints."""
+    """Redirect to a file what this process prints, including C code."""
     opensim.Logger.removeFileSink()
     sys.stdout.flush()
     sys.stderr.flush()
@@ -40,12 +40,12 @@ def quietly(log: Path) -> Iterator[None]:
 
 
 def vector(values: Iterable[float]) -> opensim.Vec3:
-    """An array as a Vec3."""
+    """Convert an array to a Vec3."""
     return opensim.Vec3(*map(float, values))
 
 
 def radians(model: opensim.Model, motion: Path) -> pd.DataFrame:
-    """A motion file's coordinates in the model's order, in rad and m; those it lacks are left out."""
+    """Read a motion file's coordinates in the model's order, in rad and m; those it lacks are left out."""
     table = read_sto(motion)
     coordinates = model.getCoordinateSet()
     columns = {}
@@ -63,7 +63,7 @@ def inverse_kinematics(
     weights: Mapping[str, float] | None = None,
     span_s: tuple[float, float] = WHOLE,
 ) -> None:
-    """Run OpenSim's InverseKinematicsTool; every marker of the model weighs 1 unless weights are given."""
+    """Run OpenSim's InverseKinematicsTool; every marker of the model has weight 1 unless weights are given."""
     recorded = read_trc(markers)
     tool = opensim.InverseKinematicsTool()
     tool.setModel(model)
@@ -85,7 +85,7 @@ def inverse_kinematics(
 
 
 def setup_weights(setup: Path) -> dict[str, float]:
-    """Marker weights of an inverse kinematics set-up file; markers that it does not use are left out."""
+    """Read marker weights from an inverse kinematics set-up file; markers that it does not use are left out."""
     weights = {}
     for task in ET.parse(setup).iter("IKMarkerTask"):
         weight = float(task.findtext("weight", "0"))
@@ -114,7 +114,7 @@ def inverse_dynamics(model: Path, motion: Path, loads: Path, out: Path, cutoff_h
 
 
 def without_forces(model: Path, out: Path, mass_kg: float | None = None) -> None:
-    """A copy of the model without muscles and other forces, all bodies scaled to a total mass if one is given."""
+    """Copy the model without muscles and other forces, all bodies scaled to a total mass if one is given."""
     copy = opensim.Model(str(model))
     copy.updForceSet().clearAndDestroy()
     copy.updControllerSet().clearAndDestroy()
@@ -128,7 +128,7 @@ def without_forces(model: Path, out: Path, mass_kg: float | None = None) -> None
 
 
 def with_forces_file(loads: Path, forces: Path, out: Path) -> None:
-    """A copy of an ExternalLoads file that names this forces file and nothing else outside."""
+    """Copy an ExternalLoads file with this forces file as its only reference outside."""
     tree = ET.parse(loads)
     (external,) = tree.iter("ExternalLoads")
     for tag in ("external_loads_model_kinematics_file", "datafile"):
@@ -139,7 +139,7 @@ def with_forces_file(loads: Path, forces: Path, out: Path) -> None:
 
 
 def marker_rms_m(model: Path, motion: Path, markers: Path, time: np.ndarray, names: Iterable[str]) -> float:
-    """RMS distance between the model's and the measured markers at the given times."""
+    """Compute the RMS distance (m) between the model's and the measured markers at the given times."""
     posed = opensim.Model(str(model))
     state = posed.initSystem()
     coordinates = radians(posed, motion)

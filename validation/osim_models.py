@@ -20,7 +20,7 @@ from validation.page import write_page
 
 @dataclass(frozen=True)
 class Person:
-    """A person with a model of their own; files without their endings, relative to the data."""
+    """A person with their own model; files without extension, relative to the data."""
 
     title: str
     mass_kg: float
@@ -55,7 +55,7 @@ PEOPLE = {
 
 
 def subject_file(data: Path, person: Person, calibrate: bool) -> str:
-    """The subject file (TOML) of one person."""
+    """Return the subject file (TOML) of one person."""
     lines = ["[subject]", f"mass_kg = {person.mass_kg}", "[model]", f'osim = "{data / person.model}.osim"']
     lines += ["calibrate = true"] if calibrate else []
     for markers, (forces, loads) in person.trials.items():
@@ -65,7 +65,7 @@ def subject_file(data: Path, person: Person, calibrate: bool) -> str:
 
 
 def results(name: str, calibrate: bool, folder: Path) -> dict[str, Any]:
-    """fit.json of one person, with the BSP table under "bsp"."""
+    """Return fit.json of one person, with the BSP table under "bsp"."""
     folder.mkdir()
     subject = folder / f"{name}.toml"
     subject.write_text(subject_file(data_folder(), PEOPLE[name], calibrate))
@@ -76,7 +76,7 @@ def results(name: str, calibrate: bool, folder: Path) -> dict[str, Any]:
 
 
 def document(runs: dict[tuple[str, bool], dict[str, Any]]) -> str:
-    """The text of docs/validation/osim-models.md."""
+    """Return the text of docs/validation/osim-models.md."""
     rows, bodies, warnings = [], [], []
     for (name, calibrate), run in runs.items():
         title = f"{PEOPLE[name].title}, {'calibrated' if calibrate else 'as it is'}"

@@ -10,16 +10,16 @@ from pathlib import Path
 REPOSITORY = Path(__file__).resolve().parents[1]
 PAGES = REPOSITORY / "docs" / "validation"
 _CODE = ("src", "validation", "pyproject.toml")
-"""What results depend on; changed pages, for one, do not count."""
+"""Paths that results depend on; changed pages, for example, do not count."""
 
 
 def write_page(name: str, text: str, command: str | None = None) -> None:
-    """Write PAGES/NAME.md: the text with `made_by` below its title; also say where it is.
+    """Write PAGES/NAME.md: the text with `made_by` below its title; also print where it is.
 
     Args:
-        name: of the page.
-        text: of the page.
-        command: what made it; the name if left out.
+        name: name of the page.
+        text: text of the page.
+        command: command that made it; the name by default.
     """
     title, _, rest = text.partition("\n")
     path = PAGES / f"{name}.md"
@@ -28,7 +28,7 @@ def write_page(name: str, text: str, command: str | None = None) -> None:
 
 
 def write_part(name: str, text: str) -> None:
-    """Replace what PAGES/NAME.md has between `<!-- NAME -->` and `<!-- end -->`, `made_by` first; say where it is."""
+    """Replace what PAGES/NAME.md has between `<!-- NAME -->` and `<!-- end -->`, `made_by` first; print where it is."""
     path = PAGES / f"{name}.md"
     before, start, rest = path.read_text(encoding="utf-8").partition(f"<!-- {name} -->\n")
     _, end, after = rest.partition("<!-- end -->")
@@ -38,16 +38,16 @@ def write_part(name: str, text: str) -> None:
 
 
 def made_by(command: str) -> str:
-    """The line of a page: which command made it, when, and of which commit."""
+    """Return the line of a page on the command that made it, with date and commit."""
     commit, day = made_at()
     return f"*Made by `python -m validation {command}` on {day}, at commit {commit}; not edited by hand.*"
 
 
 @cache
 def made_at() -> tuple[str, str]:
-    """Commit and day (UTC, ISO) of this process, as they were when first asked for: a page takes hours to make.
+    """Return commit and day (UTC, ISO) of this process at the first call: a page takes hours to make.
 
-    Code that is not committed is said beside the commit; outside Git there is none.
+    Uncommitted code is noted beside the commit; outside Git there is none.
     """
     day = datetime.now(UTC).date().isoformat()
     try:

@@ -34,12 +34,12 @@ from validation.truth_trials import Faults, gait2354, make_trial
 CUTOFFS_HZ = (6, 10, 12)
 FAULTS = Faults(plate_m=0.020, lag_s=0.010, hip_m=0.010)
 MARGIN_S = 0.05
-"""Left out at both ends of the window that Kinertia uses: the ends of splines and filters."""
+"""Time left out at both ends of the window that Kinertia uses: the ends of splines and filters."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """One walk as everybody receives it."""
+    """One walk as every program receives it."""
 
     title: str
     folder: Path
@@ -56,7 +56,7 @@ class Case:
 
 @dataclass
 class Result:
-    """What one program made of a case."""
+    """Results of one program for a case."""
 
     seconds: float = np.nan
     moments: dict[int, pd.DataFrame] = field(default_factory=dict)
@@ -68,7 +68,7 @@ class Result:
 
 
 def truth_case(folder: Path, seed: int, faulty: bool) -> Case:
-    """A truth trial, made if it is not there yet."""
+    """Return a truth trial, which is made if it does not exist yet."""
     folder = folder / f"{'faulty' if faulty else 'sound'}{seed}"
     if not (folder / "loads.xml").exists():
         make_trial(folder, seed, FAULTS if faulty else Faults(), gait2354())
@@ -79,7 +79,7 @@ def truth_case(folder: Path, seed: int, faulty: bool) -> Case:
 
 
 def measured_cases(folder: Path) -> dict[str, Case]:
-    """The two measured walks that come with scaled OpenSim models."""
+    """Return the two measured walks that come with scaled OpenSim models."""
     data, fits = data_folder(), {"default": (), "calibrated": ("--calibrate",)}
     gait, rajagopal = data / "gait2354", data / "rajagopal_walk"
     cases = {
@@ -100,7 +100,7 @@ def measured_cases(folder: Path) -> dict[str, Case]:
 
 @contextlib.contextmanager
 def timed(result: Result) -> Iterator[None]:
-    """Add the time that the work takes."""
+    """Add the elapsed time of the block to the result."""
     started = time.perf_counter()
     yield
     spent = time.perf_counter() - started
@@ -108,7 +108,7 @@ def timed(result: Result) -> Iterator[None]:
 
 
 def fit(case: Case, name: str) -> tuple[Result, Path]:
-    """`kinertia fit --model`, and where its files are."""
+    """Run `kinertia fit --model`; return its result and folder."""
     out, result = case.folder / name, Result()
     arguments = ["fit", case.markers, "--forces", case.forces, "--loads", case.loads, "--model", case.model]
     arguments += ["--mass", case.mass_kg, *case.fits[name], "--quiet", "-o", out]
@@ -120,19 +120,19 @@ def fit(case: Case, name: str) -> tuple[Result, Path]:
 
 
 def window_s(out: Path) -> tuple[float, float]:
-    """The stretch of the walk that a fit used."""
+    """Return the window of the walk that a fit used."""
     start, end = json.loads((out / "fit.json").read_text())["trials"][0]["window_s"]
     return float(start), float(end)
 
 
 def frames(out: Path) -> np.ndarray:
-    """The frames that count: those that a fit used, without the ends."""
+    """Return the times of the frames that count: those that a fit used, without the ends."""
     time, (start, end) = read_sto(out / "inverse_dynamics.sto").index.to_numpy(), window_s(out)
     return time[(time > start + MARGIN_S) & (time < end - MARGIN_S)]
 
 
 def delivered(case: Case, result: Result, out: Path) -> None:
-    """OpenSim's inverse dynamics and marker errors of what Kinertia delivered."""
+    """Add OpenSim's inverse dynamics and marker errors of what Kinertia exported."""
     work = case.folder / f"opensim_{out.name}"
     work.mkdir(exist_ok=True)
     with quietly(work / "opensim.log"):
@@ -143,7 +143,7 @@ def delivered(case: Case, result: Result, out: Path) -> None:
 
 
 def opensim_default(case: Case, time: np.ndarray) -> Result:
-    """OpenSim's inverse kinematics and inverse dynamics, the model scaled to the person's mass."""
+    """Run OpenSim's inverse kinematics and inverse dynamics, with the model scaled to the person's mass."""
     work, result = case.folder / "opensim", Result()
     work.mkdir(exist_ok=True)
     model, motion = work / "model.osim", work / "ik.mot"
@@ -163,7 +163,7 @@ def opensim_default(case: Case, time: np.ndarray) -> Result:
 
 
 def opensim_rra(case: Case, span_s: tuple[float, float], time: np.ndarray) -> Result:
-    """OpenSim's RRA after `opensim_default`; a finished run in the case's folder is taken as it is."""
+    """Run OpenSim's RRA after `opensim_default`; a finished run in the case's folder is reused."""
     work, folder, result = case.folder / "opensim", case.folder / "rra", Result()
     done = folder / "done.json"
     try:
@@ -184,12 +184,12 @@ def opensim_rra(case: Case, span_s: tuple[float, float], time: np.ndarray) -> Re
 
 
 def marker_errors(case: Case, model: Path, motion: Path, time: np.ndarray) -> float:
-    """RMS distance of the markers that inverse kinematics uses."""
+    """Compute the RMS distance of the markers that inverse kinematics uses."""
     return marker_rms_m(model, motion, case.markers, time, used_markers(case))
 
 
 def used_markers(case: Case) -> list[str]:
-    """Markers of the model that were recorded and, where there is a set-up file, that it uses."""
+    """Return markers of the model that were recorded and, where there is a set-up file, that it uses."""
     model = opensim.Model(str(case.model))
     known = [model.getMarkerSet().get(k).getName() for k in range(model.getMarkerSet().getSize())]
     weights = setup_weights(case.ik_setup) if case.ik_setup else dict.fromkeys(known, 1.0)
@@ -198,7 +198,7 @@ def used_markers(case: Case) -> list[str]:
 
 
 def results(case: Case) -> dict[str, Any]:
-    """Everything that was made of one case: a `Result` per program, and the frames that count."""
+    """Return all results of one case: a `Result` per program, and the frames that count."""
     fits = {name: fit(case, name) for name in case.fits}
     out = next(iter(fits.values()))[1]
     time = frames(out)

@@ -47,20 +47,20 @@ PROGRAMS = {
 LOADED_N = 20.0
 FAST_HZ = 15.0
 IMPACT_S = (-0.02, 0.06)
-"""What counts as heel strike, around the moment at which the force passes LOADED_N."""
+"""Interval that counts as heel strike, around the time at which the force passes LOADED_N."""
 OURS, THEIRS, STANCE = "#D55E00", "#0072B2", "#E8E8E8"
 
 Runs = dict[str, Any]
-"""What `peer_cases.results` gives."""
+"""Result of `peer_cases.results`."""
 
 
 def at(moments: pd.DataFrame, column: str, time: np.ndarray) -> np.ndarray:
-    """One column at the given times."""
+    """Interpolate one column at the given times."""
     return np.interp(time, moments.index, moments[column])
 
 
 def joint_errors(moments: pd.DataFrame, truth: pd.DataFrame, time: np.ndarray) -> dict[str, float]:
-    """Mean square error per joint, both sides together (N² m²)."""
+    """Return the mean squared error per joint, both sides together (N² m²)."""
     squares = {
         name: (at(moments, name, time) - at(truth, name, time)) ** 2 for name in map(str, truth) if name in moments
     }
@@ -71,13 +71,13 @@ def joint_errors(moments: pd.DataFrame, truth: pd.DataFrame, time: np.ndarray) -
 
 
 def pooled(errors: Iterable[dict[str, float]]) -> dict[str, float]:
-    """RMS over people per joint."""
+    """Return the RMS over people per joint."""
     frame = pd.DataFrame(list(errors))
     return dict(np.sqrt(frame.mean())) if len(frame) else dict.fromkeys(JOINTS, np.nan)
 
 
 def moment_errors(cases: list[tuple[Case, Runs]], program: str) -> dict[str, float]:
-    """RMS error per joint (N m) of a program over all people, each joint at its best cutoff."""
+    """Return the RMS error per joint (N m) of a program over all people, each joint at its best cutoff."""
     per_cutoff: dict[int, list[dict[str, float]]] = {}
     for case, runs in cases:
         for cutoff, moments in runs[program].moments.items():
@@ -87,7 +87,7 @@ def moment_errors(cases: list[tuple[Case, Runs]], program: str) -> dict[str, flo
 
 
 def residual(result: Result, time: np.ndarray, kind: str) -> float:
-    """RMS size of the force or moment that OpenSim finds at the pelvis (NaN without a result)."""
+    """Return the RMS size of the force or moment that OpenSim finds at the pelvis (NaN without a result)."""
     if result.opensim is None:
         return np.nan
     names = [name for name in map(str, result.opensim) if name.startswith("pelvis_") and name.endswith(kind)]
@@ -95,7 +95,7 @@ def residual(result: Result, time: np.ndarray, kind: str) -> float:
 
 
 def figures_of(all_runs: list[Runs], program: str) -> list[str]:
-    """Cells: residual force and moment, marker error, seconds; RMS over people, mean of the seconds."""
+    """Return cells: residual force and moment, marker error, seconds; RMS over people, mean of the seconds."""
     done = [runs for runs in all_runs if not runs[program].failed]
     if not done:
         return ["failed", "", "", ""]
@@ -109,7 +109,7 @@ def figures_of(all_runs: list[Runs], program: str) -> list[str]:
 
 
 def moments_table(cases: list[tuple[Case, Runs]]) -> str:
-    """Joint-moment errors, a row per program, and the ratio of the last one to OpenSim's IK + ID."""
+    """Return joint-moment errors, a row per program, and the ratio of the last one to OpenSim's IK + ID."""
     rows, errors = [], {}
     for program in present(cases[0][1]):
         errors[program] = moment_errors(cases, program)
@@ -120,12 +120,12 @@ def moments_table(cases: list[tuple[Case, Runs]]) -> str:
 
 
 def present(runs: Runs) -> list[str]:
-    """The programs that a case was given to, in the order of PROGRAMS."""
+    """Return the programs that were run on a case, in the order of PROGRAMS."""
     return [program for program in PROGRAMS if program in runs]
 
 
 def figures_table(titled: dict[str, list[Runs]]) -> str:
-    """Residuals, marker errors and seconds: a row per walk and program."""
+    """Return residuals, marker errors and seconds: a row per walk and program."""
     rows = [
         [title, PROGRAMS[program], *figures_of(runs, program)]
         for title, runs in titled.items()
@@ -135,7 +135,7 @@ def figures_table(titled: dict[str, list[Runs]]) -> str:
 
 
 def contacts(loads: Path, forces: Path) -> dict[str, list[tuple[float, float]]]:
-    """Per side, when a foot was loaded: heel strike and toe-off of every stance that was measured (s)."""
+    """Return per side the times (s) of heel strike and toe-off of every stance that was measured."""
     measured, spans = read_sto(forces), {}
     for force in ET.parse(loads).iter("ExternalForce"):
         body = force.findtext("applied_to_body", "").strip()
@@ -145,7 +145,7 @@ def contacts(loads: Path, forces: Path) -> dict[str, list[tuple[float, float]]]:
 
 
 def stances(time: np.ndarray, vertical: np.ndarray, shortest_s: float = 0.1) -> list[tuple[float, float]]:
-    """Start and end of every stretch with load on the foot."""
+    """Return start and end of every interval with load on the foot."""
     loaded = np.r_[False, vertical > LOADED_N, False].astype(int)
     starts, ends = np.flatnonzero(np.diff(loaded) == 1), np.flatnonzero(np.diff(loaded) == -1) - 1
     pairs = zip(time[starts], time[ends], strict=True)
@@ -153,7 +153,7 @@ def stances(time: np.ndarray, vertical: np.ndarray, shortest_s: float = 0.1) -> 
 
 
 def fast_part(moments: pd.DataFrame, column: str) -> np.ndarray:
-    """What of a moment is above FAST_HZ."""
+    """Return the part of a moment above FAST_HZ."""
     rate = (len(moments) - 1) / (moments.index[-1] - moments.index[0])
     slow = sosfiltfilt(butter(2, FAST_HZ, fs=rate, output="sos"), moments[column])
     return moments[column].to_numpy() - slow
@@ -162,7 +162,7 @@ def fast_part(moments: pd.DataFrame, column: str) -> np.ndarray:
 def spikes(
     moments: pd.DataFrame, column: str, feet: list[tuple[float, float]], time: np.ndarray
 ) -> tuple[float, float]:
-    """Largest fast part at heel strike, and during the rest of stance (N m); only from the first to the last time."""
+    """Return the largest fast part at heel strike, and in the rest of stance (N m), from the first to the last time."""
     fast = pd.Series(np.abs(fast_part(moments, column)), moments.index)
     fast = fast[(fast.index >= time[0]) & (fast.index <= time[-1])]
     impact, rest = [0.0], [0.0]
@@ -176,7 +176,7 @@ def spikes(
 
 
 def spikes_table(cases: dict[str, tuple[Case, Runs]]) -> str:
-    """Fast part of the moments of the figures, at heel strike and later: the larger of both sides."""
+    """Return the fast part of the moments of the figures, at heel strike and later: the larger of both sides."""
     rows = []
     for case, runs in cases.values():
         feet = contacts(case.loads, case.forces)
@@ -191,7 +191,7 @@ def spikes_table(cases: dict[str, tuple[Case, Runs]]) -> str:
 
 
 def draw(case: Case, runs: Runs, path: Path) -> None:
-    """Moments over time, both programs, both sides; stance is grey from heel strike to toe-off."""
+    """Draw moments over time, both programs, both sides; stance is grey from heel strike to toe-off."""
     mpl.rcParams.update({"svg.hashsalt": "kinertia", "font.size": 9, "font.family": "sans-serif"})
     feet, time = contacts(case.loads, case.forces), runs["time"]
     figure, axes = plt.subplots(len(SHOWN), 2, figsize=(8.4, 6.4), sharex=True, sharey="row")
@@ -217,7 +217,7 @@ def draw(case: Case, runs: Runs, path: Path) -> None:
 
 
 def failures(cases: Iterable[tuple[Case, Runs]]) -> str:
-    """On which cases RRA failed, in one sentence."""
+    """State in one sentence on which cases RRA failed."""
     failed = [f"{case.title} ({runs['rra'].failed})" for case, runs in cases if runs["rra"].failed]
     return f"RRA failed on {', '.join(failed)}; these are left out of its rows." if failed else "RRA failed on none."
 
@@ -225,7 +225,7 @@ def failures(cases: Iterable[tuple[Case, Runs]]) -> str:
 def document(
     sound: list[tuple[Case, Runs]], faulty: list[tuple[Case, Runs]], measured: dict[str, tuple[Case, Runs]]
 ) -> str:
-    """The text of docs/validation/peers.md."""
+    """Return the text of docs/validation/peers.md."""
     of_truth = {
         "truth, sound instruments": [runs for _, runs in sound],
         "truth, faulty instruments": [runs for _, runs in faulty],
@@ -249,7 +249,7 @@ def document(
 
 
 def picture(name: str) -> str:
-    """Where a walk's figure is, relative to the documentation."""
+    """Return the path of a walk's figure, relative to the documentation."""
     return f"figures/moments_{name}.svg"
 
 

@@ -12,7 +12,7 @@ from kinertia.model.skeleton import Axis, Skeleton
 
 
 def pinocchio_model(skeleton: Skeleton, *parts: BodySegmentParameters | None) -> pin.Model:
-    """The model with these parameters, and those that the skeleton carries; locked axes are part of the placements."""
+    """Build the model with these parameters and those of the skeleton; locked axes are part of the placements."""
     model = pin.Model()
     model.gravity.linear = np.array([0.0, -skeleton.gravity_m_s2, 0.0])
     carrier, offset = {"ground": 0}, {"ground": pin.SE3.Identity()}
@@ -37,7 +37,7 @@ def pinocchio_model(skeleton: Skeleton, *parts: BodySegmentParameters | None) ->
 
 
 def axis_forces(model: pin.Model, motion: Sequence[np.ndarray]) -> np.ndarray:
-    """(n, a) forces of the axes for places, rates and accelerations, each (n, a)."""
+    """Compute forces (n, a) of the axes for positions, rates and accelerations, each (n, a)."""
     data = model.createData()
     return np.array([pin.rnea(model, data, *rows) for rows in zip(*motion, strict=True)])
 

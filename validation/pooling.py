@@ -15,7 +15,7 @@ from validation.measured_trials import table
 
 
 def pooled() -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-    """Estimate and deviation of every BSP of the gait2354 walk: whole, first half, second half, halves together."""
+    """Return estimate and SD of every BSP of the gait2354 walk: whole, first half, second half, halves together."""
     folder = data_folder() / "gait2354"
     walked = read_recording(
         folder / "subject01_walk1.trc", folder / "subject01_walk1_grf.mot", folder / "subject01_walk1_grf.xml"
@@ -33,7 +33,7 @@ def pooled() -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
 
 
 def pooling_section(values: dict[str, np.ndarray], sds: dict[str, np.ndarray]) -> str:
-    """How far the halves, alone and together, are from the whole, and how sure they are."""
+    """Describe how far the halves, alone and together, are from the whole, and their certainty."""
     rows = []
     for name in ("first half", "second half", "halves"):
         away = (values[name] - values["whole"]) / sds["whole"]

@@ -19,12 +19,12 @@ _TRUNK = ("pelvis", "torso")
 
 @dataclass(frozen=True)
 class Population:
-    """How the mean body of a population differs from the adults' of the same mass and lengths.
+    """Difference of a population's mean body from adults of the same mass and lengths.
 
     Attributes:
-        title: in tables.
+        title: title in tables.
         mass: factor on the mass, by segment or, for both sides, by its name without side; the trunk has the rest.
-        forward_m: the trunk's centre of mass further forward.
+        forward_m: forward displacement of the trunk's centre of mass.
         proximal: by segment, share of the way to its joint by which the centre of mass moves.
         radius: by segment, factor on the radii of gyration.
     """
@@ -36,7 +36,7 @@ class Population:
     radius: Mapping[str, float] = field(default_factory=dict)
 
     def of(self, adults: BspPrior) -> BspPrior:
-        """The distribution of this population's bodies."""
+        """Return the distribution of this population's bodies."""
         mean = adults.mean
         names = [_whole(name, self.mass) for name in mean.segments]
         trunk = np.array([name in _TRUNK for name in mean.segments])
@@ -50,7 +50,7 @@ class Population:
 
 
 def _whole(segment: str, names: Mapping[str, float]) -> str:
-    """The segment's own name where that is told apart, else the name of both sides."""
+    """Return the segment's own name where sides are distinguished, else the name of both sides."""
     return segment if segment in names else segment.removesuffix("_r").removesuffix("_l")
 
 

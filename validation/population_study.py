@@ -47,29 +47,29 @@ from validation.population_bodies import POPULATIONS
 
 LABORATORY = Faults("artefact", calibration=True)
 COLUMNS = {"mass": slice(0, 1), "CoM": slice(1, 4), "inertia": slice(4, 7)}
-"""Of `BodySegmentParameters.table`; products of inertia are in none."""
+"""Columns of `BodySegmentParameters.table`; products of inertia are in none."""
 RUCKSACK = Attached(name="rucksack", segment="torso", mass_kg=None, com_mm=(-200.0, 300.0, 0.0), on_scale=False)
 RUCKSACK_KG = 10.0
 GAIN_SD_PERCENT = 0.2
-"""What a laboratory states that has put known weights on its plates: what the literature says of sound ones."""
+"""SD stated by a laboratory that has put known weights on its plates: the literature's for fault-free ones."""
 _PARTS = 4
-"""Of a group; the prior of each part is learnt from the others."""
+"""Parts of a group; the prior of each is learnt from the others."""
 INFORMED_SD = 0.5
-"""A parameter's mean is informed by the group if its deviation is less, in the literature's deviations."""
+"""A parameter's mean is informed by the group if its SD is less, in the literature's SDs."""
 
 
 @dataclass(frozen=True, eq=False)
 class PersonOutcome:
-    """One person with one prior.
+    """Outcome of one person with one prior.
 
     Attributes:
         errors, before: (s, 10) estimate and prior mean minus truth.
-        sd: (s, 10) posterior deviations.
+        sd: (s, 10) posterior SDs.
         moments_nm, moments_before_nm: RMS error of all joint moments that the parameters make, with the true motion and
             the true forces.
-        unlike: whether the fit says that the person is unlike the prior.
-        trial: what the person did.
-        information: what the recording says; None where the estimate started elsewhere than the adults' mean.
+        unlike: whether the fit reports that the person is far from the prior.
+        trial: the synthetic trial.
+        information: information of the recording; None where the estimate did not start at the adults' mean.
     """
 
     errors: np.ndarray
@@ -84,15 +84,15 @@ class PersonOutcome:
 
 @dataclass(frozen=True)
 class PopulationAccuracy:
-    """All people of a population with one prior.
+    """Accuracy over all people of a population with one prior.
 
     Attributes:
-        title, prior: of the rows.
-        people: how many.
-        rms, rms_before: by class of `COLUMNS`, RMS errors of the estimate and of what it started from, SI.
+        title, prior: titles of the rows.
+        people: number of people.
+        rms, rms_before: by class of `COLUMNS`, RMS errors of the estimate and of its starting point, SI.
         coverage: share of all parameters within their 95 % intervals.
-        moments_nm, moments_before_nm: RMS over people.
-        unlike: share of people of whom the fit says so.
+        moments_nm, moments_before_nm: RMS over people of the moment errors.
+        unlike: share of people reported as far from the prior.
     """
 
     title: str
@@ -108,13 +108,13 @@ class PopulationAccuracy:
 
 @dataclass(frozen=True)
 class MeanAccuracy:
-    """The mean that was learnt from all people of a population.
+    """Accuracy of the mean that was learnt from all people of a population.
 
     Attributes:
-        title: of the population.
-        people: how many.
-        informed: of how many parameters the trials inform the mean (`INFORMED_SD`).
-        rms, rms_before: RMS error of these, and of the tables, in the literature's deviations.
+        title: title of the population.
+        people: number of people.
+        informed: number of parameters whose mean the trials inform (`INFORMED_SD`).
+        rms, rms_before: RMS error of these, and of the tables, in the literature's SDs.
         coverage: share of these within their 95 % intervals.
         coverage_of_all: the same of all parameters.
     """
@@ -130,7 +130,7 @@ class MeanAccuracy:
 
 @dataclass(frozen=True)
 class PopulationsStudy:
-    """All that the study finds."""
+    """All results of the population study."""
 
     accuracies: tuple[PopulationAccuracy, ...]
     means: tuple[MeanAccuracy, ...]
@@ -139,12 +139,12 @@ class PopulationsStudy:
 
 @dataclass(frozen=True)
 class RucksackAccuracy:
-    """What is found of a rucksack of unknown mass.
+    """Accuracy of the estimated mass of a rucksack of unknown mass.
 
     Attributes:
-        people: how many carried one.
-        gain_sd_percent: what the laboratory states of its plates, and is true of them; None: nothing.
-        rms_kg, sd_kg: RMS error of its mass, and RMS of what the estimate says of it.
+        people: number of people who carried one.
+        gain_sd_percent: gain SD that the laboratory states, truly, of its plates; None: nothing.
+        rms_kg, sd_kg: RMS error of its mass, and RMS of its SD by the estimate.
         coverage: share of people in which the mass is within its 95 % interval.
     """
 
@@ -158,8 +158,8 @@ class RucksackAccuracy:
 def run_populations(
     people: int = 20, seed: int = 1, workers: int | None = None, progress: Callable[[float], None] = lambda share: None
 ) -> PopulationsStudy:
-    """Every population with all priors, what is learnt of its mean, and people with a rucksack on plates of whose gain
-    the laboratory states nothing, and something.
+    """Run every population with all priors, learn its mean, and estimate people with a rucksack on plates of unknown
+    and of stated gain.
     """
     cases = [(name, number) for name in (*POPULATIONS, RUCKSACK.name) for number in range(people)]
     drawn = in_parallel(partial(run_person, seed), cases, workers, progress)
@@ -177,11 +177,11 @@ def run_populations(
 def of_population(
     name: str, drawn: Sequence[tuple[PersonOutcome, ...]]
 ) -> tuple[list[PopulationAccuracy], list[MeanAccuracy]]:
-    """A row for each prior, and what is learnt of the mean (nothing of few people).
+    """Return a row for each prior, and the accuracy of the learnt mean (none for few people).
 
     Args:
         name: a key of `POPULATIONS`.
-        drawn: of each person, what `run_person` says.
+        drawn: outcomes of `run_person` for each person.
     """
     population, adults = POPULATIONS[name], literature_prior(walking_subject().literature)
     with_adults, with_own = (list(each) for each in zip(*drawn, strict=True))
@@ -220,7 +220,7 @@ def _of_rucksack(gain_sd_percent: float | None, people: Sequence[PersonOutcome])
 
 
 def run_person(seed: int, case: tuple[str, int]) -> tuple[PersonOutcome, ...]:
-    """One person: with the adults' prior and with the own one; with a rucksack: the two laboratories."""
+    """Estimate one person with the adults' prior and with the own one; with a rucksack, in the two laboratories."""
     name, number = case
     of_person, of_noise = np.random.SeedSequence(seed, spawn_key=(number,)).spawn(2)
     subject, rng = walking_subject(), np.random.default_rng(of_person)
@@ -244,9 +244,9 @@ def run_person(seed: int, case: tuple[str, int]) -> tuple[PersonOutcome, ...]:
 
 
 def _with_learnt_prior(people: Sequence[PersonOutcome]) -> list[PersonOutcome]:
-    """Each person once more, with the prior learnt from those of the other parts of the group; none where they are few.
+    """Estimate each person once more, with the prior learnt from other parts of the group; none where they are few.
 
-    What the recording says joined with the prior, without estimating motion and calibration anew.
+    Combines the recording's information with the prior, without estimating motion and calibration again.
     """
     prior = literature_prior(walking_subject().literature)
     parts = [list(people[k::_PARTS]) for k in range(_PARTS)]
@@ -269,7 +269,7 @@ def _again(person: PersonOutcome, group: BspPrior) -> PersonOutcome:
 
 
 def own_prior(name: str, adults: BspPrior) -> BspPrior:
-    """What the subject file makes of the adults' prior for a person of this population."""
+    """Return the prior that a subject file makes of the adults' prior for a person of this population."""
     if name == "prosthesis":
         return with_prosthesis(with_prosthesis(adults, "shank_l"), "foot_l")
     content = {"name": name, "sex": SEX, "mass_kg": MASS_KG, "height_m": HEIGHT_M, "population": name}

@@ -30,7 +30,7 @@ _SHOWN = {"mass": (1.0, ".2f"), "CoM": (1e3, ".1f"), "inertia": (1.0, ".3f")}
 
 
 def population_rows(accuracies: Sequence[PopulationAccuracy]) -> list[list[str]]:
-    """One row per population and prior, under `HEADINGS`."""
+    """Return one row per population and prior, under `HEADINGS`."""
     rows = []
     for one in accuracies:
         cells = [
@@ -43,7 +43,7 @@ def population_rows(accuracies: Sequence[PopulationAccuracy]) -> list[list[str]]
 
 
 def mean_sentences(means: Sequence[MeanAccuracy]) -> list[str]:
-    """What is learnt of the mean of each population, a sentence for each."""
+    """Describe what is learnt of the mean of each population, in a sentence each."""
     return [
         f"Mean of {one.people} {one.title}: {one.informed} parameters are known to {INFORMED_SD:g} of the literature's "
         f"deviations or better; of these {100 * one.coverage:.0f} % are within their 95 % intervals (of all "
@@ -54,7 +54,7 @@ def mean_sentences(means: Sequence[MeanAccuracy]) -> list[str]:
 
 
 def rucksack_sentence(rucksacks: Sequence[RucksackAccuracy]) -> str:
-    """What is found of a rucksack that was declared with unknown mass."""
+    """Describe the estimate of a rucksack that was declared with unknown mass."""
     found = [
         f"{_gain(one)}: RMS error {one.rms_kg:.2f} kg, stated deviation {one.sd_kg:.2f} kg, within the 95 % interval "
         f"in {100 * one.coverage:.0f} %"
@@ -77,7 +77,7 @@ def _both(after: float, before: float, form: str) -> str:
 
 
 def populations_markdown(study: PopulationsStudy) -> str:
-    """The table, its caption, what is learnt of means, and the sentence of the rucksack."""
+    """Return the table, its caption, what is learnt of means, and the sentence on the rucksack."""
     lines = [HEADINGS, ("---",) * 2 + ("--:",) * (len(HEADINGS) - 2), *population_rows(study.accuracies)]
     table = "\n".join("| " + " | ".join(cells) + " |" for cells in lines)
     people = f"{study.accuracies[0].people} people each. {CAPTION}"
@@ -90,5 +90,5 @@ def main(
     seed: Annotated[int, typer.Option(help="Of people and noise.")] = 1,
     workers: Annotated[int | None, typer.Option(help="Processes; one per core if left out.")] = None,
 ) -> None:
-    """Draw and estimate everybody, and write the tables into the page."""
+    """Simulate and estimate everybody, and write the tables into the page."""
     write_part("populations", populations_markdown(run_populations(people, seed, workers)))

@@ -21,23 +21,23 @@ from scipy.stats import chi2
 from kinertia.estimation.simultaneous.calibration_entry import ZERO, CalibrationEntry
 
 APART = 1.96
-"""Deviations beyond which two values, or a value and none, differ (95 %)."""
+"""SDs beyond which two values, or a value and zero, differ (95 %)."""
 _BEYOND = 0.99
 INSTRUMENT_GROUPS = ("delay", "free moment", "position", "gain", "zero offset", "rotation")
 GROUPS = (*INSTRUMENT_GROUPS, "joint", "mass", "com", "inertia")
-"""What is compared: instruments, joint centres and axes, body segment parameters."""
+"""Groups that are compared: instruments, joint centres and axes, body segment parameters."""
 _PRODUCTS = ("ixy", "ixz", "iyz")
 """Not compared: hardly anything shows them."""
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """What one trial says of an unknown, SI.
+    """Estimate of an unknown by one trial, SI.
 
     Attributes:
-        trial: name.
-        value, sd, prior_sd: of the unknown.
-        warned: whether the fit itself says to check the instrument.
+        trial: name of the trial.
+        value, sd, prior_sd: value, SD and prior SD of the unknown.
+        warned: whether the fit itself advises to check the instrument.
     """
 
     trial: str
@@ -48,19 +48,19 @@ class Estimate:
 
     @property
     def accuses(self) -> bool:
-        """Whether it is beyond what is usual, and beyond its own deviation."""
+        """Whether the value is beyond what is usual, and beyond its own SD."""
         return abs(self.value) > APART * max(self.sd, self.prior_sd)
 
 
 @dataclass(frozen=True)
 class Shared:
-    """What several trials say of an unknown that is the same in all of them.
+    """Estimates by several trials of an unknown that is the same in all of them.
 
     Attributes:
-        name: as the fits call it.
+        name: name in the fits.
         group: one of GROUPS.
-        unit: SI.
-        estimates: of at least two trials.
+        unit: SI unit.
+        estimates: estimates of at least two trials.
     """
 
     name: str
@@ -70,7 +70,7 @@ class Shared:
 
     @property
     def chi2(self) -> float:
-        """Squares about the weighted mean, each over its variance, over the degrees of freedom."""
+        """Squared deviations from the weighted mean, each over its variance, over the degrees of freedom."""
         mean, _ = weighted_mean(self.estimates)
         squares = sum(((one.value - mean) / one.sd) ** 2 for one in self.estimates)
         return squares / (len(self.estimates) - 1)
@@ -83,13 +83,13 @@ class Shared:
 
     @property
     def apart(self) -> list[bool]:
-        """For each pair of trials, whether they differ by more than 1.96 deviations of their difference."""
+        """Whether each pair of trials differs by more than 1.96 SDs of the difference."""
         return [
             abs(a.value - b.value) > APART * float(np.hypot(a.sd, b.sd)) for a, b in combinations(self.estimates, 2)
         ]
 
     def accusations(self) -> Iterator[tuple[Estimate, bool]]:
-        """Each trial that accuses an instrument, and whether the other trials contradict it."""
+        """Yield each trial that accuses an instrument, and whether the other trials contradict it."""
         if self.group not in INSTRUMENT_GROUPS:
             return
         for one in self.estimates:
@@ -100,15 +100,15 @@ class Shared:
 
 @dataclass(frozen=True)
 class GroupSums:
-    """All unknowns of a group: chi2 over degrees of freedom, pairs and deviations.
+    """Summary of all unknowns of a group: chi2 over degrees of freedom, pairs and SDs.
 
     Attributes:
-        unknowns: how many.
-        mean, worst: of chi2 over degrees of freedom.
-        worst_name: of the unknown.
-        beyond: unknowns beyond the 99 % point.
+        unknowns: number of unknowns.
+        mean, worst: mean and worst chi2 over degrees of freedom.
+        worst_name: name of the worst unknown.
+        beyond: number of unknowns beyond the 99 % point.
         pairs_apart: share of the pairs of trials that differ.
-        median_sd: of the single estimates, SI.
+        median_sd: median SD of the single estimates, SI.
     """
 
     unknowns: int
@@ -121,18 +121,18 @@ class GroupSums:
 
 
 def weighted_mean(estimates: Sequence[Estimate]) -> tuple[float, float]:
-    """Mean, each weighted by its inverse variance, and its deviation."""
+    """Return the mean, weighted by inverse variances, and its SD."""
     weights = [one.sd**-2 for one in estimates]
     mean = sum(weight * one.value for weight, one in zip(weights, estimates, strict=True)) / sum(weights)
     return mean, sum(weights) ** -0.5
 
 
 def shared(folders: Sequence[Path], instruments_only: bool = False) -> list[Shared]:
-    """All unknowns that at least two of the fits in these folders estimate.
+    """List all unknowns that at least two of the fits in these folders estimate.
 
     Args:
         folders: results of `kinertia fit`, one trial each.
-        instruments_only: the trials are of different people.
+        instruments_only: whether the trials are of different people.
     """
     found: dict[tuple[str, str, str], list[Estimate]] = {}
     for folder in folders:
@@ -143,7 +143,7 @@ def shared(folders: Sequence[Path], instruments_only: bool = False) -> list[Shar
 
 
 def group_sums(unknowns: Iterable[Shared]) -> dict[str, GroupSums]:
-    """Sums of each group that has any unknowns."""
+    """Summarise each group that has any unknowns."""
     by_group: dict[str, list[Shared]] = {}
     for one in unknowns:
         by_group.setdefault(one.group, []).append(one)

@@ -43,13 +43,13 @@ markers = "{folder}/{trial}.c3d"
 
 @dataclass(frozen=True)
 class Session:
-    """Trials with the same plates and clock.
+    """Trials with the same plates and synchronisation.
 
     Attributes:
-        name, title: of the session.
-        folder: of the data.
-        people: of each person the trials.
-        options: of `kinertia fit` besides the trial's files; "" where a subject file says all.
+        name, title: name and title of the session.
+        folder: folder of the data.
+        people: trials of each person.
+        options: options of `kinertia fit` besides the trial's files; "" where a subject file states all.
     """
 
     name: str
@@ -85,12 +85,12 @@ SESSIONS = (
 
 @dataclass(frozen=True)
 class Outcome:
-    """One fit.
+    """Outcome of one fit.
 
     Attributes:
-        trial: name.
-        folder: of the results.
-        said: why there are none, else "".
+        trial: name of the trial.
+        folder: folder of the results.
+        said: why there are no results, else "".
     """
 
     trial: str
@@ -99,7 +99,7 @@ class Outcome:
 
 
 def arguments(session: Session, person: str, trial: str, data: Path, results: Path) -> list[str]:
-    """Of `kinertia fit`; writes the subject file where there is one."""
+    """Return the arguments of `kinertia fit`; writes the subject file where there is one."""
     lab = data / session.folder
     if session.options:
         words = session.options.format(trial=trial).split()
@@ -112,7 +112,7 @@ def arguments(session: Session, person: str, trial: str, data: Path, results: Pa
 
 
 def fitted(session: Session, person: str, trial: str, data: Path, keep: Path) -> Outcome:
-    """One trial alone by the command, in a process of its own; as it was if it is there."""
+    """Fit one trial alone by the command, in a separate process; existing results are reused."""
     name = f"{person} {trial}".strip()
     folder = keep / session.name / name.replace(" ", "-")
     ended = folder.with_suffix(".json")
@@ -130,7 +130,7 @@ def fitted(session: Session, person: str, trial: str, data: Path, keep: Path) ->
 
 
 def section(session: Session, data: Path, keep: Path) -> str:
-    """The page's part about one session."""
+    """Return the page's part about one session."""
     people = [
         [fitted(session, person, trial, data, keep) for trial in trials] for person, trials in session.people.items()
     ]
@@ -152,7 +152,7 @@ def section(session: Session, data: Path, keep: Path) -> str:
 
 
 def compared(unknowns: Sequence[Shared]) -> str:
-    """Table of the groups, and what is said against instruments."""
+    """Return the table of the groups, and the warnings about instruments."""
     units = {one.group: one.unit for one in unknowns}
     rows = []
     for group, sums in group_sums(unknowns).items():
@@ -179,7 +179,7 @@ def _deviation(value: float, unit: str) -> str:
 
 
 def document(sections: Sequence[str]) -> str:
-    """The text of docs/validation/sessions.md."""
+    """Return the text of docs/validation/sessions.md."""
     return TEXT.format(sections="\n\n".join(sections))
 
 

@@ -52,13 +52,13 @@ JOINTS = {
 
 @dataclass(frozen=True, eq=False)
 class Walk:
-    """One person, frame by frame: (n,) of each joint moment's column.
+    """Results of one person, frame by frame: (n,) of each joint moment's column.
 
     Attributes:
-        errors, sd: of the estimate, N m.
+        errors, sd: errors and SD of the estimate, N m.
         usual: errors of OpenSim's inverse kinematics and inverse dynamics, by cutoff.
-        loading: frames in which the body comes down on the leg; of the back none.
-        found: instruments' errors that the fit found, mm and ms.
+        loading: frames of loading response of the leg; none for the back.
+        found: instrument errors found by the fit, mm and ms.
     """
 
     errors: Mapping[str, np.ndarray]
@@ -69,7 +69,7 @@ class Walk:
 
 
 def made(folder: Path, skin: Path, kind: str, seed: int) -> Walk:
-    """One person's walk, made, fitted and compared, as far as it is not there yet."""
+    """Make, fit and compare one person's walk, as far as not done yet."""
     if not (folder / "loads.xml").exists():
         make_trial(folder, seed, INSTRUMENTS[kind], gait2354(), MeasuredSkin.read(skin))
     truth = json.loads((folder / "truth" / "truth.json").read_text())
@@ -83,7 +83,7 @@ def made(folder: Path, skin: Path, kind: str, seed: int) -> Walk:
 
 
 def _opensim(folder: Path, mass_kg: float) -> dict[int, pd.DataFrame]:
-    """Joint moments of the usual pipeline, the model scaled to the person's mass."""
+    """Compute joint moments by OpenSim's IK + ID, with the model scaled to the person's mass."""
     work = folder / "opensim"
     work.mkdir(exist_ok=True)
     model, motion = work / "model.osim", work / "ik.mot"
@@ -125,12 +125,12 @@ def _compared(folder: Path, usual: Mapping[int, pd.DataFrame]) -> Walk:
 
 
 def joint_of(column: str) -> str | None:
-    """One of JOINTS."""
+    """Return the joint of a column, one of JOINTS."""
     return next((joint for joint in JOINTS if column.startswith(joint)), None)
 
 
 def _instruments(calibration: Sequence[Mapping[str, object]]) -> dict[str, float]:
-    """Place of the left plate along the walk (mm), and delay of the forces (ms)."""
+    """Return the displacement of the left plate along the walk (mm), and the delay of the forces (ms)."""
     result = {}
     for one in calibration:
         value = 1e3 * float(str(one["value"]))
@@ -142,7 +142,7 @@ def _instruments(calibration: Sequence[Mapping[str, object]]) -> dict[str, float
 
 
 def _pooled(walks: Sequence[Walk], joint: str, of: str, where: str | None = None) -> np.ndarray:
-    """Values of all columns of a joint in all walks."""
+    """Return values of all columns of a joint in all walks."""
     values = []
     for walk in walks:
         each = getattr(walk, of) if of in ("errors", "sd") else walk.usual[int(of)]
@@ -157,7 +157,7 @@ def _rms(values: np.ndarray) -> float:
 
 
 def joint_row(walks: Sequence[Walk], joint: str) -> list[str]:
-    """Errors, bars and coverage of one joint."""
+    """Return errors, bars and coverage of one joint."""
     errors, sd = (_pooled(walks, joint, of) for of in ("errors", "sd"))
     best = min(_rms(_pooled(walks, joint, str(hz))) for hz in CUTOFFS_HZ)
     cells = [f"{value:.2f}" for value in (_rms(errors), best, _rms(errors) / best, _rms(sd))]
@@ -171,13 +171,13 @@ def _covered(errors: np.ndarray, sd: np.ndarray) -> str:
 
 
 def joints_table(walks: Sequence[Walk]) -> str:
-    """Errors, bars and coverage per joint."""
+    """Return errors, bars and coverage per joint."""
     heads = ["N m", "estimate", "OpenSim", "ratio", "sd", "covered", "after heel strike", "covered"]
     return table(heads, [joint_row(walks, joint) for joint in JOINTS])
 
 
 def instruments_text(walks: Sequence[Walk], faults: Faults) -> str:
-    """What was found of the plate and the delay that were put in."""
+    """Describe the estimates of the injected plate displacement and delay."""
     wrong = {"plate": 1e3 * faults.plate_m, "delay": 1e3 * faults.lag_s}
     limits = {"plate": (4.0, "mm"), "delay": (2.0, "ms")}
     said = []
@@ -191,7 +191,7 @@ def instruments_text(walks: Sequence[Walk], faults: Faults) -> str:
 
 
 def document(people: Mapping[str, Sequence[Walk]]) -> str:
-    """The text of docs/validation/measured-skin.md."""
+    """Return the text of docs/validation/measured-skin.md."""
     count = len(people["sound"])
     parts = {f"{kind}_table": joints_table(walks) for kind, walks in people.items()}
     parts |= {kind: instruments_text(walks, INSTRUMENTS[kind]) for kind, walks in people.items()}
@@ -233,13 +233,13 @@ Instruments: {calibrated}.
 
 
 def measure(skin: Path, people: int, keep: Path | None = None, workers: int = 2) -> None:
-    """Make the page.
+    """Make the page on measured skin motion.
 
     Args:
         skin: file of `measured_skin`.
-        people: with each kind of instruments.
+        people: number of people with each kind of instruments.
         keep: folder for walks and results, which are used again.
-        workers: walks at a time.
+        workers: number of walks at a time.
     """
     with tempfile.TemporaryDirectory() as temporary:
         work = keep.resolve() if keep else Path(temporary)
@@ -254,7 +254,7 @@ def measure(skin: Path, people: int, keep: Path | None = None, workers: int = 2)
 
 
 def _one(skin: Path, kind: str, folder: Path) -> None:
-    """In a process of its own: OpenSim keeps its memory."""
+    """Make one walk in a separate process: OpenSim does not free its memory."""
     seed = folder.name.removeprefix(kind)
     words = [str(folder), str(skin), kind, seed]
     subprocess.run([sys.executable, "-m", "validation.skin_laboratory", *words], check=True)

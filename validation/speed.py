@@ -61,7 +61,7 @@ STAGES = ("read", "calibration", "inverse kinematics", "smoothing", "two-level e
 
 @dataclass(frozen=True)
 class Walk:
-    """One walk as files, and what the command line would be told about the person."""
+    """One walk as files, and the person's data for the command line."""
 
     markers: Path
     forces: Path
@@ -76,7 +76,7 @@ def _model(static: Recording, marker_set: MarkerSet, subject: Subject) -> Gait27
 
 
 def walk(name: str) -> Walk:
-    """The measured walk."""
+    """Return the measured walk."""
     markers, *options = fit_arguments(data_folder(), name)
     given = dict(zip(options[::2], options[1::2], strict=True))
     subject = Subject(name=name, sex="male", mass_kg=float(given["--mass"]), height_m=float(given["--height"]))
@@ -85,13 +85,13 @@ def walk(name: str) -> Walk:
 
 
 def there_and_back(values: np.ndarray, times: int) -> np.ndarray:
-    """`times` copies along the first axis, every second one backwards, so that nothing jumps."""
+    """Repeat values `times` times along the first axis, every second copy backwards, so that nothing jumps."""
     parts = [values if k % 2 == 0 else values[::-1] for k in range(times)]
     return np.concatenate([part if k == 0 else part[1:] for k, part in enumerate(parts)])
 
 
 def lengthened(one: Walk, window_s: tuple[float, float], times: int, folder: Path) -> Walk:
-    """The walk's window repeated back and forth, as files."""
+    """Write the walk's window repeated back and forth, as files."""
     folder.mkdir(exist_ok=True)
     markers = read_trc(one.markers).cut(*window_s)
     positions = there_and_back(markers.positions, times)
@@ -107,7 +107,7 @@ def lengthened(one: Walk, window_s: tuple[float, float], times: int, folder: Pat
 
 
 def best(runs: int, work: Callable[[], Any]) -> tuple[float, Any]:
-    """Shortest time (s) of a few runs, and what the work returned."""
+    """Return the shortest time (s) of a few runs, and the result of the work."""
     times = []
     for _ in range(runs):
         started = time.perf_counter()
@@ -117,7 +117,7 @@ def best(runs: int, work: Callable[[], Any]) -> tuple[float, Any]:
 
 
 def ours(one: Walk, runs: int) -> tuple[dict[str, float], int]:
-    """Seconds per stage, and the number of frames."""
+    """Return Kinertia's seconds per stage, and the number of frames."""
     seconds = {}
     seconds["read"], recording = best(runs, lambda: read_recording(one.markers, one.forces, one.loads))
     static = read_recording(one.static)
@@ -143,7 +143,7 @@ def ours(one: Walk, runs: int) -> tuple[dict[str, float], int]:
 
 
 def opensim_ik(name: str) -> float:
-    """Seconds that OpenSim's InverseKinematicsTool takes for all frames of the walk."""
+    """Return the seconds that OpenSim's InverseKinematicsTool takes for all frames of the walk."""
     setup, model = (str(data_folder() / file) for file in SETUPS[name])
     markers = walk(name).markers
     clock = read_trc(markers).time
@@ -167,12 +167,12 @@ def opensim_ik(name: str) -> float:
 
 
 def foot_labels(marker_set: MarkerSet, markers: Markers) -> dict[str, list[str]]:
-    """Per side, the foot's markers that the trial has."""
+    """Return per side the foot's markers that the trial has."""
     return {side: [m for m in labels if m in markers.labels] for side, labels in marker_set.foot_labels().items()}
 
 
 def both_ik(name: str, runs: int) -> tuple[float, float]:
-    """Seconds per frame of `solve_ik` and of OpenSim, by turns, so that both meet the same load of the machine."""
+    """Return seconds per frame of `solve_ik` and of OpenSim, run alternately so that both meet the same load."""
     one = walk(name)
     recording, static = read_recording(one.markers, one.forces, one.loads), read_recording(one.static)
     marker_set = choose_marker_set(static.markers.labels)
@@ -187,7 +187,7 @@ def both_ik(name: str, runs: int) -> tuple[float, float]:
 
 
 def gcv_splines(frames: int, columns: int, runs: int) -> tuple[float, float]:
-    """Seconds of `smooth` and of OpenSim's GCVSplineSet to choose the smoothing of the same noisy sinusoids."""
+    """Return the seconds that `smooth` and OpenSim's GCVSplineSet take to choose the smoothing of noisy sinusoids."""
     rng = np.random.default_rng(0)
     clock = np.arange(frames) / 100
     values = np.sin(2 * np.pi * 1.5 * clock)[:, None] + 0.01 * rng.standard_normal((frames, columns))
@@ -205,7 +205,7 @@ def gcv_splines(frames: int, columns: int, runs: int) -> tuple[float, float]:
 
 
 def document(runs: int = 5, lengths: Sequence[int] = (1, 2, 4), names: Sequence[str] = tuple(SETUPS)) -> str:
-    """The text of docs/validation/speed.md, measured now."""
+    """Return the text of docs/validation/speed.md, measured now."""
     opensim.Logger.removeFileSink()
     opensim.Logger.setLevelString("error")
     peers, scaling = [], []

@@ -25,21 +25,21 @@ from validation.study_noise import drawn_start, start_prior
 from validation.synthetic_walks import observation_of, study_walk
 
 EXACT_N = 0.05
-"""Deviation of exact forces."""
+"""SD of exact forces."""
 FLOORS_M = (1e-4, 1e-5)
 """White noise of the cameras beside the study's."""
 _NOTHING_M = 1e4
-"""Deviation of markers that tell nothing."""
+"""SD of markers without information."""
 
 
 def information_on_body(trial: SyntheticTrial, seen: Observation, prior: BspPrior, floor_m: float) -> np.ndarray:
-    """(10 s, 10 s) information of the trial on the table rows of the true body, motion unknown, skeleton known.
+    """Compute the information (10 s, 10 s) of the trial on the true body's table rows, motion unknown, skeleton known.
 
     Args:
-        trial: the truth.
-        seen: the frames and loads of the trial.
-        prior: for its segments only.
-        floor_m: white noise of the markers beside the study's.
+        trial: the true trial.
+        seen: frames and loads of the trial.
+        prior: prior, used for its segments only.
+        floor_m: white noise of the markers besides the study's.
     """
     exact = replace(
         at_truth(seen, trial),
@@ -59,7 +59,7 @@ def information_on_body(trial: SyntheticTrial, seen: Observation, prior: BspPrio
 
 
 def dense_band(band: np.ndarray) -> np.ndarray:
-    """(size c, size c) the whole of a symmetric matrix from the band (size, 7, c, c) of `NormalEquations`."""
+    """Expand the band (size, 7, c, c) of `NormalEquations` to the whole symmetric matrix (size c, size c)."""
     size, reach, c, _ = band.shape
     whole = np.zeros((size, c, size, c))
     for i in range(size):
@@ -70,7 +70,7 @@ def dense_band(band: np.ndarray) -> np.ndarray:
 
 
 def _of_markers(problem: MapProblem, seen: Observation, floor_m: float) -> np.ndarray:
-    """Information of the markers on all spline coefficients."""
+    """Compute the information of the markers on all spline coefficients."""
     basis, skeleton = problem.bases[0], problem.skeleton
     q = basis.evaluate(problem.start[0])[0]
     pose = skeleton.pose(q)
@@ -91,7 +91,7 @@ def _of_markers(problem: MapProblem, seen: Observation, floor_m: float) -> np.nd
 
 
 def bound(information: np.ndarray, prior: BspPrior) -> tuple[float, float, float]:
-    """RMS over segments of the deviations of mass (kg), CoM (m) and moments of inertia (kg m2), prior included."""
+    """Return the RMS over segments of the SDs of mass (kg), CoM (m) and moments of inertia (kg m2), prior included."""
     scale = np.zeros(len(information))
     scale[::10] = 1.0 / prior.mass_sd_kg
     covariance = np.linalg.inv(information + np.linalg.inv(prior.covariance) + np.outer(scale, scale))
@@ -102,7 +102,7 @@ def bound(information: np.ndarray, prior: BspPrior) -> tuple[float, float, float
 
 
 def bound_rows(draws: int) -> list[list[str]]:
-    """Lines for the table of `study_noise.study_section`: mean bounds over the priors of its draws."""
+    """Return rows for the table of `study_noise.study_section`: mean bounds over the priors of its draws."""
     trial = study_walk()
     seen = observation_of(trial, trial.markers)
     priors = [start_prior(drawn_start(trial, number)[0], trial.bsp.total_mass_kg) for number in range(draws)]

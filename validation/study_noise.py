@@ -27,12 +27,12 @@ from validation.measured_trials import table
 from validation.synthetic_walks import FIRST_SEED, observation_of, study_walk
 
 UNIFORM_SD = 0.29
-"""Deviation of a uniform error of +/-50 %, share."""
+"""SD of a uniform error of +/-50 %, as a share."""
 CAMERA_SD_M = 0.0001
 
 
 def start_prior(start: BodySegmentParameters, mass_kg: float) -> BspPrior:
-    """All the study's estimator may know: the start, uniform +/-50 %; symmetry; principal axes along segment axes."""
+    """Return what the study's estimator may know: start, uniform +/-50 %; symmetry; principal along segment axes."""
     values = start.table()
     sd = UNIFORM_SD * np.abs(values)
     sd[:, 1:4] = np.maximum(sd[:, 1:4], 0.005)
@@ -42,9 +42,9 @@ def start_prior(start: BodySegmentParameters, mass_kg: float) -> BspPrior:
 
 
 def moved_prior(prior: BspPrior) -> BspPrior:
-    """Truth given a start = truth (1 + u), u uniform +/-50 %, if any size is as likely: start / (1 + u).
+    """Return the prior of truth given start = truth (1 + u), u uniform +/-50 %, any size as likely: start / (1 + u).
 
-    Its mean is log 3 times the start, its deviation sqrt(4 / 3 - (log 3)^2) times.
+    Its mean is log 3 times the start, its SD sqrt(4 / 3 - (log 3)^2) times.
     """
     mean, share = np.log(3.0), np.sqrt(4.0 / 3.0 - np.log(3.0) ** 2)
     start = BodySegmentParameters.from_table(prior.mean.segments, mean * prior.mean.table())
@@ -52,7 +52,7 @@ def moved_prior(prior: BspPrior) -> BspPrior:
 
 
 def drawn_start(trial: SyntheticTrial, number: int) -> tuple[BodySegmentParameters, np.random.Generator]:
-    """The start of this draw (of `kinertia study table1`, seed 1), and the generator that goes on to its noise."""
+    """Return the start of this draw (of `kinertia study table1`, seed 1), and the generator that makes its noise."""
     rng = np.random.default_rng([FIRST_SEED, number])
     vector = ParameterVector(trial.bsp, symmetric=True)
     truth = vector.values(trial.bsp)
@@ -60,7 +60,7 @@ def drawn_start(trial: SyntheticTrial, number: int) -> tuple[BodySegmentParamete
 
 
 def study_draw(number: int, two_level: bool = True) -> dict[str, tuple[float, float, float]]:
-    """Errors of every method on one draw of start and noise (the draws of `kinertia study table1`, seed 1)."""
+    """Return errors of every method on one draw of start and noise (the draws of `kinertia study table1`, seed 1)."""
     trial = study_walk()
     start, rng = drawn_start(trial, number)
     noisy = study_noise(trial.markers, rng)
@@ -97,7 +97,7 @@ def _window(trial: SyntheticTrial, noisy: Markers) -> Window:
 
 
 def study_section(draws: Sequence[dict[str, tuple[float, float, float]]], bounds: Sequence[list[str]]) -> str:
-    """Errors on the study's noise, mean over draws, and the lines of `study_bound.bound_rows`."""
+    """Return errors on the study's noise, mean over draws, and the rows of `study_bound.bound_rows`."""
     rows = []
     for name in draws[0]:
         mass, com, inertia = np.mean([draw[name] for draw in draws], axis=0)

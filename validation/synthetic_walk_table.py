@@ -38,7 +38,7 @@ DATA = Path(__file__).parents[1] / "src" / "kinertia" / "synthetic" / "data"
 
 
 def basis(time: np.ndarray, period_s: float, order: int = 0) -> np.ndarray:
-    """(n, 1 + 2 h): constant, then cosine and sine of every harmonic; or their derivatives of this order by time."""
+    """Return the Fourier basis (n, 1 + 2 h): constant, cosine and sine of every harmonic; or their time derivatives."""
     rate = 2 * np.pi / period_s * np.arange(1, HARMONICS + 1)
     angle = np.outer(time, rate) + order * np.pi / 2
     pairs = (np.stack([np.cos(angle), np.sin(angle)], axis=-1) * rate[:, None] ** order).reshape(len(time), -1)
@@ -61,7 +61,7 @@ def main() -> None:
 
 
 def write_walk(kinematics: Kinematics, trial: Trial) -> None:
-    """The Fourier series of the coordinates, with what the head of the file says."""
+    """Write the Fourier series of the coordinates, with the head of the file."""
     time, q = kinematics.time, kinematics.motion.q
 
     def misfit(period_s: float) -> float:
@@ -94,10 +94,10 @@ def write_walk(kinematics: Kinematics, trial: Trial) -> None:
 
 
 def balanced(coefficients: np.ndarray, wrench: np.ndarray, period_s: float) -> tuple[np.ndarray, np.ndarray]:
-    """Coefficients whose pelvis balances the ground reactions, and (6,) how far it moved from the first ones (RMS; m,
-    rad).
+    """Find coefficients whose pelvis balances the ground reactions, and (6,) how far it moved from the first ones (RMS;
+    m, rad).
 
-    Gauss-Newton on the root residual over one stride and on the change of the pelvis, each by its standard deviation.
+    Gauss-Newton on the root residual over one stride and on the change of the pelvis, each over its standard deviation.
     """
     subject = walking_subject()
     time = np.arange(128) * period_s / 128
@@ -125,7 +125,7 @@ def balanced(coefficients: np.ndarray, wrench: np.ndarray, period_s: float) -> t
 
 
 def write_standing(skeleton: Skeleton, static: Recording) -> None:
-    """The markers of the model in a standing pose."""
+    """Write the markers of the model in a standing pose."""
     stand = np.zeros(len(skeleton.coordinates))
     for name, value in STANDING.items():
         stand[skeleton.coordinates.index(name)] = value
@@ -142,7 +142,7 @@ def write_standing(skeleton: Skeleton, static: Recording) -> None:
 
 
 def _contacts(time: np.ndarray, vertical: np.ndarray, period_s: float) -> list[tuple[float, float]]:
-    """Start and end of contact of each foot, in shares of the stride."""
+    """Return start and end of contact of each foot, in shares of the stride."""
     spans = []
     for foot in range(2):
         whole = [(a, b) for a, b in runs(vertical[:, foot] > 20.0) if a > 0 and b < len(time) - 1]
@@ -152,7 +152,7 @@ def _contacts(time: np.ndarray, vertical: np.ndarray, period_s: float) -> list[t
 
 
 def _belt_speed(trial: Trial) -> float:
-    """The backward speed of the heel in stance: only a swinging heel moves forward."""
+    """Return the backward speed of the heel in stance: only a swinging heel moves forward."""
     heel = trial.markers.select(["R.Heel"]).positions[:, 0, 0]
     return float(-np.percentile(np.gradient(heel, trial.markers.time), 10))
 

@@ -19,17 +19,17 @@ FIRST_SEED = 1
 
 
 BANDWIDTH = Bandwidth(10.0)
-"""Of the estimates of the studies' walks."""
+"""Bandwidth of the estimates from the studies' walks."""
 
 
 def study_walk(duration_s: float = STRIDE_S + 2 * MARGIN_S) -> SyntheticTrial:
-    """The study's trial with exact derivatives: the estimator's splines hold no trapezoid sums."""
+    """Return the study's trial with exact derivatives: the estimator's splines contain no trapezoid sums."""
     subject = walking_subject()
     return walk(replace(subject, bsp=symmetric_truth(subject.bsp)), duration_s, trapezoid=False)
 
 
 def kinematics_of(trial: SyntheticTrial, markers: Markers, loads: np.ndarray | None = None) -> Kinematics:
-    """Inverse kinematics and smoothing of a synthetic trial with these markers and foot loads (n, 2, 6)."""
+    """Run inverse kinematics and smoothing of a synthetic trial with these markers and foot loads (n, 2, 6)."""
     loads = trial.foot_loads if loads is None else loads
     measured = np.ones(len(trial.time), dtype=bool)
     feet = FootLoads(trial.time, loads[..., :3], loads[..., 3:])
@@ -39,6 +39,6 @@ def kinematics_of(trial: SyntheticTrial, markers: Markers, loads: np.ndarray | N
 def observation_of(
     trial: SyntheticTrial, markers: Markers, loads: np.ndarray | None = None, bandwidth: Bandwidth = BANDWIDTH
 ) -> Observation:
-    """The observation of a synthetic trial with these markers and foot loads (n, 2, 6)."""
+    """Return the observation of a synthetic trial with these markers and foot loads (n, 2, 6)."""
     kinematics = kinematics_of(trial, markers, loads)
     return observe(trial.skeleton, [kinematics], trial.bsp.total_mass_kg, [bandwidth]).together[0]

@@ -11,7 +11,7 @@ SIDES = ("r", "l")
 
 
 class Person:
-    """An OpenSim model that can be posed and asked for forces, feet and markers."""
+    """An OpenSim model that can be posed and computes forces, feet and markers."""
 
     def __init__(self, model: opensim.Model) -> None:
         self.model, self.state = model, model.initSystem()
@@ -27,7 +27,7 @@ class Person:
         self.feet = {side: model.getBodySet().get(f"calcn_{side}") for side in SIDES}
 
     def _speed_index(self, coordinate: opensim.Coordinate) -> int:
-        """Where OpenSim's vector of generalised speeds holds that of the coordinate."""
+        """Return the index of the coordinate in OpenSim's vector of generalised speeds."""
         before, old = self.state.getU().to_numpy(), coordinate.getSpeedValue(self.state)
         coordinate.setSpeedValue(self.state, old + 1)
         change = np.abs(self.state.getU().to_numpy() - before)
@@ -46,7 +46,7 @@ class Person:
         self.model.realizeVelocity(self.state)
 
     def ground_wrench(self, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> np.ndarray:
-        """Force and moment about the ground's origin that the ground has to give for this motion."""
+        """Compute force and moment about the ground's origin that the ground has to supply for this motion."""
         self.pose(q, qd)
         accelerations = opensim.Vector(len(q), 0.0)
         for k, index in enumerate(self.speeds):
@@ -56,7 +56,9 @@ class Person:
         return np.linalg.solve(self._root_jacobian().T, root_forces)
 
     def _root_jacobian(self) -> np.ndarray:
-        """Velocity at the ground's origin and angular velocity of the pelvis per unit speed of each root coordinate."""
+        """Compute velocity at the ground's origin and angular velocity of the pelvis, per speed of each root
+        coordinate.
+        """
         jacobian = np.zeros((6, 6))
         place = array(self.pelvis.getTransformInGround(self.state).p())
         for column, k in enumerate(self.root):
@@ -67,12 +69,12 @@ class Person:
         return jacobian
 
     def foot_points(self) -> dict[str, np.ndarray]:
-        """A point of each foot, 0.1 m in front of the heel, in the ground."""
+        """Return a point of each foot, 0.1 m in front of the heel, in the ground."""
         point = vector([0.1, 0, 0])
         return {side: array(foot.findStationLocationInGround(self.state, point)) for side, foot in self.feet.items()}
 
     def marker(self, name: str) -> tuple[np.ndarray, np.ndarray]:
-        """Place of a marker, and orientation of the body that carries it."""
+        """Return the position of a marker, and the orientation of the body that carries it."""
         marker = self.model.getMarkerSet().get(name)
         turned = marker.getParentFrame().getTransformInGround(self.state).R()
         orientation = np.array([[turned.get(row, column) for column in range(3)] for row in range(3)])
@@ -80,5 +82,5 @@ class Person:
 
 
 def array(values: opensim.Vec3) -> np.ndarray:
-    """A Vec3 as an array."""
+    """Convert a Vec3 to an array."""
     return np.array([values.get(k) for k in range(3)])

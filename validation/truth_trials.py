@@ -33,7 +33,7 @@ from validation.truth_person import SIDES, Person, array
 
 KNOTS_HZ = 8.0
 EDGE_S = 0.15
-"""Left out at both ends: a spline's ends are not gait."""
+"""Time left out at both ends: a spline's ends are not gait."""
 MARKERS_HZ, FORCES_HZ = 100.0, 500.0
 SKIN_M = {"femur": 0.006, "tibia": 0.004, "torso": 0.004, "pelvis": 0.004}
 """How far markers slide (standard deviation), per body; those of other bodies by OTHER_SKIN_M."""
@@ -44,7 +44,7 @@ LIGHT_KG = 0.5
 
 @dataclass(frozen=True)
 class Faults:
-    """What is wrong in the laboratory, and with the model that is handed over."""
+    """Faults of the laboratory, and of the exported model."""
 
     plate_m: float = 0.0
     """The left plate reports the centre of pressure this far forward."""
@@ -65,7 +65,7 @@ class Source:
 
 
 def gait2354() -> Source:
-    """The walk that comes with OpenSim's gait2354."""
+    """Return the walk that comes with OpenSim's gait2354."""
     data = data_folder() / "gait2354"
     return Source(data / "subject01_scaled.osim", data / "subject01_walk1.trc", data / "subject01_walk1_grf.mot")
 
@@ -80,11 +80,11 @@ class Spline:
         self.weights = np.linalg.solve(normal, basis.T @ values)
 
     def __call__(self, time: np.ndarray) -> list[np.ndarray]:
-        """Values, first and second derivatives at the given times."""
+        """Return values, first and second derivatives at the given times."""
         return [basis @ self.weights for basis in self._basis(time)]
 
     def times(self, rate_hz: float) -> np.ndarray:
-        """Samples between the ends that are left out."""
+        """Return sample times between the ends that are left out."""
         return np.arange(self.start + EDGE_S, self.end - EDGE_S, 1 / rate_hz)
 
     def _basis(self, time: np.ndarray, degree: int = 5) -> list[np.ndarray]:
@@ -97,12 +97,12 @@ class Spline:
 
 
 def is_sided(body: str) -> bool:
-    """Whether a body is one of a pair."""
+    """Return whether a body is one of a pair."""
     return body.endswith(("_r", "_l"))
 
 
 def perturbed(model: opensim.Model, rng: np.random.Generator) -> dict[str, dict[str, Any]]:
-    """Give the model another person's body segment parameters, and say which; left about as right."""
+    """Give the model another person's body segment parameters, the left about equal to the right, and return them."""
     true, deviations = {}, {}
     for k in range(model.getBodySet().getSize()):
         body = model.getBodySet().get(k)
@@ -124,7 +124,7 @@ def perturbed(model: opensim.Model, rng: np.random.Generator) -> dict[str, dict[
 
 
 def inertia(body: opensim.Body) -> np.ndarray:
-    """Inertia tensor about the centre of mass."""
+    """Return the inertia tensor about the centre of mass."""
     (xx, yy, zz), (xy, xz, yz) = array(body.getInertia().getMoments()), array(body.getInertia().getProducts())
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
@@ -142,11 +142,11 @@ def perturb(body: opensim.Body, mass_factor: float, com: np.ndarray, inertia_fac
 
 
 def right_share(measured: pd.DataFrame, time: np.ndarray, right: np.ndarray, left: np.ndarray) -> np.ndarray:
-    """The right foot's share of the load, from the vertical forces of two measured plates.
+    """Return the right foot's share of the load, from the vertical forces of two measured plates.
 
     Args:
         measured: the forces file.
-        time: (n,) when the share is wanted.
+        time: (n,) times of the share.
         right: (n, 3) a point of the right foot.
         left: (n, 3) a point of the left foot.
     """
@@ -170,7 +170,7 @@ def _columns(measured: pd.DataFrame, ending: str) -> list[str]:
 
 
 def plate_row(wrench: np.ndarray, share: dict[str, float], points: dict[str, np.ndarray]) -> dict[str, float]:
-    """Force, centre of pressure and free moment per foot that together are the wrench at the ground's origin."""
+    """Return force, centre of pressure and free moment per foot that together give the wrench at the ground origin."""
     row = dict.fromkeys(force_columns(), 0.0)
     force, moment = wrench[:3], wrench[3:]
     below = {side: points[side] * [1, 0, 1] for side in SIDES}
@@ -188,7 +188,7 @@ def plate_row(wrench: np.ndarray, share: dict[str, float], points: dict[str, np.
 
 
 def force_columns() -> list[str]:
-    """Columns of the forces file."""
+    """Return the columns of the forces file."""
     return [
         f"ground_{kind}{axis}"
         for side in SIDES
@@ -198,7 +198,7 @@ def force_columns() -> list[str]:
 
 
 def ground_reactions(person: Person, motion: Spline, measured: pd.DataFrame) -> pd.DataFrame:
-    """The forces file of sound instruments."""
+    """Compute the forces file of fault-free instruments."""
     time = motion.times(FORCES_HZ)
     wrenches, points = [], []
     for q, qd, qdd in zip(*motion(time), strict=True):
@@ -215,7 +215,7 @@ def ground_reactions(person: Person, motion: Spline, measured: pd.DataFrame) -> 
 
 
 def disturbed(forces: pd.DataFrame, faults: Faults) -> pd.DataFrame:
-    """The forces as faulty instruments report them."""
+    """Return the forces as faulty instruments report them."""
     forces = forces.copy()
     forces["ground_force_l_px"] += faults.plate_m * (forces["ground_force_l_vy"] != 0)
     forces.index = forces.index + faults.lag_s
@@ -223,7 +223,7 @@ def disturbed(forces: pd.DataFrame, faults: Faults) -> pd.DataFrame:
 
 
 def markers_on_skin(person: Person, motion: Spline, names: Sequence[str], rng: np.random.Generator) -> Markers:
-    """Markers that slide on their bodies, linearly in two nearby joint angles, seen by noisy cameras."""
+    """Simulate markers that slide on their bodies, linearly in two nearby joint angles, seen by noisy cameras."""
     time = motion.times(MARKERS_HZ)
     q = motion(time)[0]
     seen = []
@@ -249,7 +249,7 @@ def markers_on_skin(person: Person, motion: Spline, names: Sequence[str], rng: n
 
 
 def write_loads(path: Path, forces: str) -> None:
-    """ExternalLoads for a forces file of `force_columns`."""
+    """Write the ExternalLoads file for a forces file of `force_columns`."""
     one = """<ExternalForce name="{name}"><applied_to_body>calcn_{side}</applied_to_body>
       <force_expressed_in_body>ground</force_expressed_in_body><point_expressed_in_body>ground</point_expressed_in_body>
       <force_identifier>ground_force_{side}_v</force_identifier>
@@ -272,7 +272,7 @@ def write_loads(path: Path, forces: str) -> None:
 
 
 def write_model(source: Path, path: Path, hip_m: float) -> None:
-    """The model that is handed over, its hip centres displaced."""
+    """Write the exported model, with its hip centres displaced."""
     model = opensim.Model(str(source))
     model.initSystem()
     shift = hip_m / np.sqrt(2)
@@ -284,7 +284,7 @@ def write_model(source: Path, path: Path, hip_m: float) -> None:
 
 
 def write_truth(person: Person, motion: Spline, forces: pd.DataFrame, bodies: dict[str, Any], folder: Path) -> None:
-    """What nobody could measure: the true model, motion, forces and joint moments."""
+    """Write what cannot be measured: the true model, motion, forces and joint moments."""
     time = motion.times(MARKERS_HZ)
     write_sto(folder / "motion.mot", pd.DataFrame(motion(time)[0], pd.Index(time), person.names), False, "motion")
     write_sto(folder / "forces.mot", forces, False, "forces")

@@ -25,13 +25,13 @@ HEADER = """\
 """
 PARTS_OF_STATURE = ("trunk_acromion_length", "head_crown_length", "leg_ankle_length")
 ANKLE_HEIGHT = 0.039
-"""Of stature (Drillis & Contini 1966)."""
+"""Share of stature (Drillis & Contini 1966)."""
 _ANY_CUT_M = 0.07
 """Where the trunk is cut makes no difference to the whole body's mass."""
 
 
 def read_people(folder: Path) -> tuple[FloatArray, FloatArray]:
-    """Measures (people, 58) in m, the mean of both sides, and masses (people,) in kg, NaN where nobody weighed."""
+    """Read measures (people, 58) in m, the mean of both sides, and masses (people,) in kg, NaN where not weighed."""
     people, masses = [], []
     for path in sorted(folder.glob("*.txt")):
         found = {}
@@ -47,26 +47,26 @@ def read_people(folder: Path) -> tuple[FloatArray, FloatArray]:
 
 
 def stature_m(measures_m: FloatArray) -> FloatArray:
-    """(people,) of measures (people, 58)."""
+    """Return statures (people,) from measures (people, 58)."""
     names = [one.name for one in measures()]
     total: FloatArray = measures_m[:, [names.index(name) for name in PARTS_OF_STATURE]].sum(axis=1)
     return total / (1.0 - ANKLE_HEIGHT)
 
 
 def stadium_mass_kg(measures_m: FloatArray) -> float:
-    """Of the whole body of stadiums with these measures (58,)."""
+    """Return the mass (kg) of the whole body of stadiums with these measures (58,)."""
     return float(stadium_bsp(measures_m, _ANY_CUT_M).mass_kg @ [2.0 if kind.endswith("_r") else 1.0 for kind in KINDS])
 
 
 def fitted(measures_m: FloatArray, mass_kg: FloatArray) -> UsualBuild:
-    """The usual build by people's measures (people, 58); of those whom nobody weighed, with the mass of stadiums.
+    """Fit the usual build to people's measures (people, 58); people who were not weighed have the mass of stadiums.
 
-    A few people say little of a spread: what there is counts as much as the median of its kind's, of four people more.
+    A few people show little of a spread: it is combined with the median of its kind, which counts as four people more.
     """
     values = measures_m.copy()
     mass = np.where(np.isnan(mass_kg), [stadium_mass_kg(one) for one in values], mass_kg)
     low, high = GIRTH_OVER_WIDTH
-    for girth, width in girths_with_widths():  # slips of the pen
+    for girth, width in girths_with_widths():  # errors in writing
         ratio = values[:, girth] / values[:, width]
         values[(ratio < 0.98 * low) | (ratio > 1.02 * high), width] = np.nan
     relative = np.log(values) - [log_size(m, h) for m, h in zip(mass, stature_m(measures_m), strict=True)]
@@ -87,7 +87,7 @@ def fitted(measures_m: FloatArray, mass_kg: FloatArray) -> UsualBuild:
 
 
 def written(usual: UsualBuild) -> str:
-    """The text of the file."""
+    """Return the text of the file."""
     columns = {"median_cm": 100.0 * usual.median_m, "log_shape": usual.log_shape, "log_sd": usual.log_sd}
     columns |= {f"common_{k}": values for k, values in enumerate(usual.common.T, start=1)}
     rows = [[one.name, *(f"{float(values[k]):.9g}" for values in columns.values())] for k, one in enumerate(measures())]

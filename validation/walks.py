@@ -13,7 +13,7 @@ WALKS = {
 
 
 def fit_arguments(data: Path, name: str) -> list[str]:
-    """Arguments of `kinertia fit` for one of WALKS. Mass and height of subject B come from the C3D file."""
+    """Return the arguments of `kinertia fit` for one of WALKS. Mass and height of subject B come from the C3D file."""
     if name == "gait2354":
         walk, static = data / "gait2354" / "subject01_walk1", data / "gait2354" / "subject01_static.trc"
         files = [f"{walk}.trc", "--forces", f"{walk}_grf.mot", "--loads", f"{walk}_grf.xml", "--static", str(static)]
@@ -56,7 +56,7 @@ _FAULT_FREE = (
 
 
 def subject_files(data: Path, folder: Path) -> list[Path]:
-    """Write subject files of the measured walks that faults are made in; names decide by what chance they are made.
+    """Write subject files of the measured walks that faults are injected into; names determine the random seed.
 
     Args:
         data: measured recordings.

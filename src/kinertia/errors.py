@@ -17,7 +17,7 @@ from kinertia.findings.where import Where
 
 
 def problem_of(found: Finding) -> str:
-    """Code, message and remedy of a finding, as an error says them."""
+    """Return code, message and remedy of a finding, as used in errors."""
     return f"{found.code} {found.message} {found.remedy}"
 
 
@@ -25,7 +25,7 @@ class KinertiaError(Exception):
     """Base of all errors raised on purpose; `str(error)` is one complete sentence for the user.
 
     Attributes:
-        finding: the rule of the catalogue that it is of, with its evidence; None of what has no code.
+        finding: finding of the catalogue, with its evidence; None for errors without a code.
 
     Examples:
         >>> try:
@@ -38,12 +38,12 @@ class KinertiaError(Exception):
     finding: Finding | None = None
 
     def with_finding(self, found: Finding) -> Self:
-        """The same error, of this finding."""
+        """Attach a finding to the error, and return the error."""
         self.finding = found
         return self
 
     def __reduce__(self) -> tuple[object, ...]:
-        """Back from another process as it was: errors are not made anew of their message alone."""
+        """Support pickling between processes: errors cannot be rebuilt from their message alone."""
         return _restored, (type(self), self.args, self.__dict__)
 
 
@@ -58,7 +58,7 @@ class FileError(KinertiaError):
 
     Attributes:
         path: the file.
-        line: one-based line number where the trouble was found, or None.
+        line: one-based line number of the problem, or None.
         problem: what was found, what was expected and what to do.
 
     Examples:
@@ -84,14 +84,14 @@ class FileError(KinertiaError):
         /,
         **evidence: Quantity,
     ) -> Self:
-        """The error of a rule of the catalogue, with its evidence.
+        """Create the error of a rule of the catalogue, with its evidence.
 
         Args:
             path: the file.
-            code: of the rule.
-            line: one-based.
-            at: plate, markers or time that it is about.
-            evidence: what was measured, the headline first.
+            code: code of the rule.
+            line: one-based line number.
+            at: plate, markers or time that it concerns.
+            evidence: measured quantities, the headline first.
 
         Examples:
             >>> from kinertia import FileError, Quantity
@@ -102,7 +102,7 @@ class FileError(KinertiaError):
 
     @classmethod
     def of(cls, path: str | Path, found: Finding, line: int | None = None) -> Self:
-        """The error of a finding, in this file and line."""
+        """Create the error of a finding, in this file and line."""
         where = replace(found.where, file=Path(path).name or str(path), line=line)
         placed = replace(found, where=where, severity=Severity.ERROR)
         return cls(path, problem_of(placed), line).with_finding(placed)
@@ -148,25 +148,25 @@ class TrialError(KinertiaError):
 
     @classmethod
     def found(cls, trial: str, code: str, at: Where | None = None, /, **evidence: Quantity) -> Self:
-        """The error of a rule of the catalogue, with its evidence.
+        """Create the error of a rule of the catalogue, with its evidence.
 
         Args:
             trial: the trial's name.
-            code: of the rule.
-            at: plate, markers or time that it is about.
-            evidence: what was measured, the headline first.
+            code: code of the rule.
+            at: plate, markers or time that it concerns.
+            evidence: measured quantities, the headline first.
         """
         return cls.of(trial, with_evidence(code, at or Where(), evidence))
 
     @classmethod
     def of(cls, trial: str, found: Finding) -> Self:
-        """The error of a finding, in this trial."""
+        """Create the error of a finding, in this trial."""
         placed = found.in_trial(trial).at(Severity.ERROR)
         return cls(trial, problem_of(placed)).with_finding(placed)
 
 
 class SubjectError(KinertiaError):
-    """A subject's mass, height or sex is missing or cannot be true.
+    """A subject's mass, height or sex is missing or implausible.
 
     Attributes:
         field: the field's name (`mass_kg`, `height_m`, `sex`).
@@ -184,7 +184,7 @@ class SubjectError(KinertiaError):
 
 
 class PriorError(KinertiaError):
-    """A prior of body segment parameters that cannot be: a deviation that is not positive, an impossible covariance.
+    """A prior of body segment parameters is impossible: an SD that is not positive, or an invalid covariance.
 
     Attributes:
         parameter: "segment.parameter" that is wrong, or None.
@@ -196,7 +196,7 @@ class PriorError(KinertiaError):
 
 
 class SettingsError(KinertiaError):
-    """An entry of the subject file or an option of the command line is missing or cannot be.
+    """An entry of the subject file or an option of the command line is missing or invalid.
 
     Examples:
         >>> isinstance(kinertia.SettingsError("cutoff_hz must be positive"), kinertia.KinertiaError)
@@ -205,7 +205,7 @@ class SettingsError(KinertiaError):
 
 
 class SessionError(KinertiaError):
-    """What trials say of plates and clock cannot be put together with what others say: S502.
+    """Trials of different people cannot be combined for plates and synchronisation: S502.
 
     Examples:
         >>> kinertia.SessionError("plates are told by their names").finding.code
@@ -221,7 +221,7 @@ class OsimError(FileError):
     """An OpenSim model file cannot be used: broken, of an unknown format, or a model that Kinertia cannot represent.
 
     Attributes:
-        element: name of the joint, body, marker or constraint it is about; empty where it is the file as a whole.
+        element: name of the joint, body, marker or constraint that it concerns; empty for the file as a whole.
         kind: the element's type, for example "EllipsoidJoint".
 
     Examples:
@@ -236,7 +236,7 @@ class OsimError(FileError):
 
     @classmethod
     def about(cls, path: str | Path, found: Finding, line: int | None = None) -> Self:
-        """The error of a finding about an element: of the name and kind that its evidence has."""
+        """Create the error of a finding about an element, with the name and kind in its evidence."""
         error = cls.of(path, found, line)
         texts = [found.evidence[name].value for name in ("element", "kind") if name in found.evidence]
         error.element, error.kind = (str(text) for text in (*texts, "", "")[:2])
@@ -244,10 +244,10 @@ class OsimError(FileError):
 
 
 class BlockedError(KinertiaError):
-    """Findings that stop a fit: all ERRORs of all trials at once.
+    """Findings stop a fit: all ERRORs of all trials at once.
 
     Attributes:
-        findings: all of them, what did not stop it included.
+        findings: all findings, including those that did not stop it.
 
     Examples:
         >>> issubclass(kinertia.BlockedError, kinertia.KinertiaError)
@@ -262,7 +262,7 @@ class BlockedError(KinertiaError):
 
 
 def findings_of(error: KinertiaError) -> tuple[Finding, ...]:
-    """All findings that stopped a fit, the one that an error is of, or none."""
+    """Return all findings that stopped a fit, the single finding of another error, or none."""
     if isinstance(error, BlockedError):
         return error.findings
     return () if error.finding is None else (error.finding,)

@@ -91,7 +91,7 @@ _MORE = {
 
 
 def application(only: str | None = None) -> typer.Typer:
-    """The command line with all its commands, or with one, which saves loading what the others need."""
+    """Build the command line with all its commands, or with one, which avoids loading what the others need."""
     app = typer.Typer(
         name="kinertia",
         no_args_is_help=True,
@@ -122,12 +122,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def application_for(given: Sequence[str]) -> typer.Typer:
-    """The command line with what these arguments ask for."""
+    """Build the command line for these arguments."""
     return application(given[0] if given and given[0] in _MODULES | _MORE else None)
 
 
 def run(app: typer.Typer, given: Sequence[str]) -> None:
-    """Run it; a user's error is one line and exit status 2, a failure of Kinertia one line and 70."""
+    """Run the command line; a user's error is one line and exit status 2, a failure of Kinertia one line and 70."""
     try:
         with _ended_in_order():
             app(args=as_named_now(given), prog_name="kinertia")
@@ -150,7 +150,7 @@ def run(app: typer.Typer, given: Sequence[str]) -> None:
 
 @contextmanager
 def _ended_in_order() -> Iterator[None]:
-    """Requests to end, and the end of the terminal, end the command as Ctrl-C does: nothing half-written is left."""
+    """Handle termination signals and a closed terminal like Ctrl-C: nothing half-written is left."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

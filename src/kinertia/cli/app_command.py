@@ -29,7 +29,7 @@ def app(
         bool, typer.Option("--json", help="Print address and library as JSON, for scripts, before anything is served.")
     ] = False,
 ) -> None:
-    """Drop files on a page in the browser, check them, fit, read the report.
+    """Check, fit and read reports in the browser, with files dropped on a page.
 
     The page is served on this computer to this computer only, at an address
     with a secret part; nothing is sent anywhere. What it keeps is in a folder

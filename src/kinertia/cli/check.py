@@ -47,7 +47,7 @@ from kinertia.workflow.recording import RecordingCheck
 
 @dataclass(frozen=True, eq=False)
 class _Checked:
-    """Everything that was asked for, which files each recording is from, and what a subject file lacks for a fit."""
+    """Everything that was asked for, the files of each recording, and what a subject file lacks for a fit."""
 
     person: PersonCheck | None
     models: Sequence[ModelOverview]
@@ -55,7 +55,7 @@ class _Checked:
     lacking: Sequence[str] = ()
 
     def facts(self, recording: RecordingCheck) -> list[tuple[str, str]]:
-        """Which files it is from, and what is in them."""
+        """Return the files of a recording, and its contents."""
         files = self.files.get(recording.context.name)
         return [*([] if files is None else [("files", files)]), *recording.facts()]
 
@@ -66,7 +66,7 @@ class _Checked:
 
     @property
     def status(self) -> int:
-        """1 where an ERROR is open."""
+        """Exit status: 1 where an ERROR is open."""
         return int(any(one.failed for one in self.overviews))
 
 
@@ -169,7 +169,7 @@ def _names(markers: Path, forces: Path | None) -> str:
 
 
 def _for_scripts(checked: _Checked) -> dict[str, Any]:
-    """The same for scripts."""
+    """Return the result for scripts."""
     findings = [one.to_dict() for overview in checked.overviews for one in overview.findings]
     recordings = () if checked.person is None else checked.person.recordings
     return {
@@ -183,7 +183,7 @@ def _for_scripts(checked: _Checked) -> dict[str, Any]:
 
 
 def _show(checked: _Checked, page: Path | None, verbose: bool) -> None:
-    """The verdict, at most three findings, and with `verbose` everything that is in the files."""
+    """Show the verdict, at most three findings, and with `verbose` all contents of the files."""
     if verbose and checked.person is not None:
         for recording in checked.person.recordings:
             _show_recording(recording, checked.facts(recording))

@@ -141,7 +141,7 @@ def cohort(
 
 
 def _planned(one: Standing) -> dict[str, Any]:
-    """What is to be done for a person, for scripts."""
+    """Return what is to be done for a person, for scripts."""
     state = "lacking" if one.problem else "due" if one.due else "as before"
     return {
         "person": one.person.name,
@@ -153,20 +153,20 @@ def _planned(one: Standing) -> dict[str, Any]:
 
 
 def _ended(record: Record) -> dict[str, Any]:
-    """How a person's fit ended, for scripts."""
+    """Return how a person's fit ended, for scripts."""
     return {name: getattr(record, name) for name in ("person", "status", "verdict", "sentence", "seconds")}
 
 
 @dataclass(frozen=True)
 class _Where:
-    """Where it runs: on a scheduler's workers, on SLURM's, or, with neither, on this computer."""
+    """Where fits run: on a scheduler's workers, on SLURM's, or, with neither, on this computer."""
 
     scheduler: str | None
     slurm: SlurmFile | None
 
     @contextmanager
     def client(self, people: int) -> Iterator[Any]:
-        """Of the cluster."""
+        """Yield a client of the cluster."""
         if self.scheduler:
             cluster = running_cluster(self.scheduler)
         elif self.slurm is not None:
@@ -177,7 +177,7 @@ class _Where:
             yield client
 
     def sentence(self, people: int) -> str:
-        """In words."""
+        """Describe in words where fits run."""
         if self.scheduler:
             return f"On the cluster of {self.scheduler}"
         if self.slurm is not None:
@@ -187,7 +187,7 @@ class _Where:
         return f"On this computer, in {size.workers} process{'es' if size.workers > 1 else ''}, {each}"
 
     def workers(self, people: int) -> int:
-        """How many; one where only the scheduler knows."""
+        """Return the number of workers; one where only the scheduler knows."""
         if self.scheduler:
             return 1
         return local_size(people).workers if self.slurm is None else min(self.slurm.workers, people)
@@ -202,7 +202,7 @@ class _Wanted:
 
 
 def _run(people: Sequence[Person], output: Path, where: _Where, wanted: _Wanted, lines: JsonLines) -> list[Record]:
-    """Fit who is due, and write tables and page of everybody."""
+    """Fit the people who are due, and write tables and page of everybody."""
     prepare_folder(output)
     everybody = _standing(people, output, lines)
     _say_due(everybody)
@@ -222,7 +222,7 @@ def _run(people: Sequence[Person], output: Path, where: _Where, wanted: _Wanted,
 def _run_again(
     people: Sequence[Person], outcomes: Sequence[Record], output: Path, where: _Where, wanted: _Wanted, lines: JsonLines
 ) -> list[Record]:
-    """The same with what those who were fitted teach each other."""
+    """Fit everybody again with group body data and session calibration from the first fits."""
     there = {record.person for record in outcomes if record.fitted}
     with shown_progress() as shown:
         taught = [person for person in people if person.name in there]
@@ -254,7 +254,7 @@ def _standing(people: Sequence[Person], output: Path, lines: JsonLines) -> list[
 
 
 def _fitted(everybody: Sequence[Standing], output: Path, where: _Where, lines: JsonLines) -> dict[str, Record]:
-    """Records of all that were due, by name; nothing is started where nobody is."""
+    """Fit everybody who is due and return records by name; nothing is started if nobody is due."""
     jobs = [Job.of(one, output) for one in everybody if one.due]
     records: dict[str, Record] = {}
     if not jobs:
@@ -280,7 +280,7 @@ def _say_due(everybody: Sequence[Standing]) -> None:
 
 
 def _report_plan(everybody: Sequence[Standing], where: _Where) -> None:
-    """Who, how much, what is missing, and roughly how long."""
+    """Show the people, the amount of data, what is missing, and roughly how long the fits take."""
     table = plain_table("person", "", "trials", "frames")
     for one in everybody:
         before = "as before" if one.record is None or one.record.fitted else f"as before: {one.record.sentence}"
@@ -315,18 +315,18 @@ _EVERY_S = 1.0
 
 
 class JsonLines:
-    """Events of a run; says nothing unless they are wanted."""
+    """Events of a run as JSON lines; nothing is written unless they are wanted."""
 
     def __init__(self, wanted: bool) -> None:
         self.wanted = wanted
 
     def say(self, event: str, **content: Any) -> None:
-        """One line: the name of the event, and what belongs to it; what is not a finite number is null."""
+        """Write one line: the name of the event and its content; numbers that are not finite are null."""
         if self.wanted:
             typer.echo(json.dumps({"event": event, **finite(content)}, allow_nan=False))
 
     def with_progress(self, shown: Callable[[str, float], None]) -> Callable[[str, float], None]:
-        """What shows progress, and says it here: at the start and the end of a stage, and once a second between."""
+        """Wrap a progress display to also write it here: at the start and end of a stage, and once a second between."""
         stage_now, began, said = "", 0.0, 0.0
 
         def progress(stage: str, share: float) -> None:

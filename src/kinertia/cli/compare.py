@@ -32,7 +32,7 @@ def compare(
     overwrite: Overwrite = False,
     quiet: Quiet = False,
 ) -> Outcome:
-    """What differs between fits beyond their error bars: sessions of one person, methods, models.
+    """Compare fits: differences beyond their error bars between sessions of one person, methods or models.
 
     The others are compared with the first. Writes compare.html and
     compare.csv.

@@ -12,11 +12,11 @@ from kinertia.model.compiled import is_compiled, set_compiled
 
 _STAGE = "compiling, once"
 _POSE_SHARE, _MOTION_SHARE, _KINEMATICS_SHARE, _DYNAMICS_SHARE = 0.15, 0.4, 0.5, 0.8
-"""Of the time, after which a pose, the synthetic walk, inverse kinematics and the rest before the estimate are done."""
+"""Shares of the time after which pose, synthetic walk, inverse kinematics and all before the estimate are done."""
 
 
 def compile_once(progress: Callable[[str, float], None]) -> None:
-    """Compile all that has not been compiled on this machine, by running it on a short synthetic walk."""
+    """Compile everything not yet compiled on this machine, by running it on a short synthetic walk."""
     if is_compiled():
         return
     progress(_STAGE, 0.0)
@@ -56,7 +56,7 @@ def compile_once(progress: Callable[[str, float], None]) -> None:
 
 @contextmanager
 def _without_looking_for_garbage() -> Iterator[None]:
-    """Compiling makes millions of objects that stay: looking through them, again and again, takes a tenth of it."""
+    """Disable garbage collection: compiling makes millions of lasting objects, whose scanning takes a tenth of it."""
     gc.disable()
     try:
         yield
@@ -66,8 +66,8 @@ def _without_looking_for_garbage() -> Iterator[None]:
 
 @contextmanager
 def _markers_beside() -> Iterator[None]:
-    """`compile_markers` in a process of its own, until the end of the block at the earliest; what it leaves undone, as
-    where no process can be started, the estimate compiles itself.
+    """Run `compile_markers` in a separate process, until the end of the block at the earliest; what it leaves undone,
+    as where no process can be started, the estimate compiles itself.
     """
     command = [sys.executable, "-c", f"from {__name__} import compile_markers; compile_markers()"]
     try:
@@ -84,7 +84,7 @@ def _markers_beside() -> Iterator[None]:
 
 
 def compile_markers() -> None:
-    """Compile the markers' terms, which take as long as all before the estimate: of a body at rest."""
+    """Compile the marker terms on a body at rest; they take as long as everything before the estimate."""
     import numpy as np
 
     from kinertia.estimation.simultaneous.marker_errors import ErrorProcess

@@ -68,7 +68,7 @@ def _measured_demo(folder: Path) -> Outcome:
 
 
 def _against_truth(result: Demo) -> dict[str, Any]:
-    """RMS errors of the parameters by estimate, and of the joint moments (N m) by joint."""
+    """Return RMS errors of the parameters by estimate, and of the joint moments (N m) by joint."""
     names = ("mass_kg", "com_m", "inertia_kgm2")
     bodies = {"literature": result.fit.literature, "estimate": result.fit.estimate}
     bodies["two_level"] = result.two_level.estimate
@@ -144,7 +144,7 @@ def _report_demo(result: Demo, folder: Path) -> None:
 
 
 def _verdict(before: tuple[float, float, float], after: tuple[float, float, float]) -> str:
-    """How the estimate compares with the literature, by the numbers of this run."""
+    """Compare the estimate with the literature in a sentence, by the numbers of this run."""
     shares = ", ".join(
         f"{what} {100 * (other / one - 1):+.0f} %"
         for what, one, other in zip(("mass", "centre of mass", "inertia"), before, after, strict=True)
@@ -157,7 +157,7 @@ def _verdict(before: tuple[float, float, float], after: tuple[float, float, floa
 
 
 def _two_level_verdict(before: tuple[float, float, float], after: tuple[float, float, float]) -> str:
-    """What the comparison with two-level shows, by the numbers of this run."""
+    """Compare the estimate with two-level in a sentence, by the numbers of this run."""
     worse = sum(one < other for one, other in zip(before, after, strict=True))
     if worse == len(before):
         finding = "Two-level explains the forces far better, yet every class of parameters is further from the truth"

@@ -52,7 +52,7 @@ def _unknown(code: str) -> str:
 
 
 def _show_questions(rules: Sequence[Rule]) -> None:
-    """Each question with its codes, one line each, and the message of each below it."""
+    """Show each question with its codes, one line each, and the message of each below it."""
     family = rules[0].code[0]
     out.print(f"{family}  {family_title(family)}")
     asked = None
@@ -71,7 +71,7 @@ def _show_rule(one: Rule) -> None:
 
 
 def _lines(one: Rule) -> Iterator[tuple[str, str]]:
-    """Headings and sentences about a rule."""
+    """Yield headings and sentences about a rule."""
     yield "severity", severity_text(one)
     yield "question", f"{one.question}  {one.asks}"
     yield "message", outlined(one.message)
@@ -98,12 +98,12 @@ def _show_line(heading: str, text: str) -> None:
 
 
 def severity_text(one: Rule) -> str:
-    """Severity, escalation and stage in words."""
+    """Describe severity, escalation and stage in words."""
     return one.severity + (f"; {one.escalation}" if one.escalation else "") + f" ({one.stage} stage)"
 
 
 def overruling(one: Rule) -> str:
-    """Whether and how a user may overrule it."""
+    """Describe whether and how a user may overrule a rule."""
     ignored = f'ignore = ["{one.code}"] under [diagnostics] in the subject file leaves it out of the verdict'
     if one.hard:
         waived = "cannot be waived, since nothing can be computed"

@@ -21,7 +21,7 @@ from kinertia.report.tables import write_csv, write_json, write_mat
 
 
 def _conventions(typed: str) -> list[str]:
-    """What the shell offers for --convention."""
+    """Return completions that the shell offers for --convention."""
     return [name for name in CONVENTIONS if name.startswith(typed)]
 
 

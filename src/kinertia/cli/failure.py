@@ -18,7 +18,7 @@ _PACKAGES = ("numpy", "scipy", "numba", "pandas", "ezc3d", "pydantic", "typer", 
 
 
 def show_failure(error: Exception, given: Sequence[str]) -> None:
-    """Say that this is Kinertia's fault, and where the log is that tells what happened."""
+    """Report an internal error of Kinertia, and where its log is."""
     problem = traceback.format_exception_only(error)[-1].strip() or type(error).__name__
     where = _logged(error, given)
     sent = f"please send {where} to its developers" if where else "its log file could not be written"
@@ -26,7 +26,7 @@ def show_failure(error: Exception, given: Sequence[str]) -> None:
 
 
 def _logged(error: Exception, given: Sequence[str]) -> Path | None:
-    """The log file: command, versions and traceback; None where no file can be written."""
+    """Write the log file: command, versions and traceback; None where no file can be written."""
     text = "\n".join(
         [
             command_line(["kinertia", *given]),

@@ -18,7 +18,7 @@ _STYLES = {
 
 
 def show_overview(overview: Overview, verbose: bool) -> None:
-    """The verdict in one line, then at most three findings of one line each, or everything."""
+    """Show the verdict in one line, then at most three findings of one line each, or everything."""
     out.print(overview.line, soft_wrap=True)
     if verbose:
         show_all(overview.findings)
@@ -34,7 +34,7 @@ def show_overview(overview: Overview, verbose: bool) -> None:
 
 
 def show_all(findings: Sequence[Finding]) -> None:
-    """Every finding with effect, causes and remedy, those that another explains below it."""
+    """Show every finding with effect, causes and remedy, and those that it explains below it."""
     for group in grouped(in_order(one for one in findings if one.muted_by is None)):
         _show_line(group)
         first = group.first

@@ -45,7 +45,7 @@ from kinertia.workflow.from_files import fit_subject
 
 
 def _methods(typed: str) -> list[str]:
-    """What the shell offers for --method."""
+    """Return completions that the shell offers for --method."""
     return [name for name in get_args(Settings.model_fields["method"].annotation) if name.startswith(typed)]
 
 
@@ -80,8 +80,8 @@ def fit(
 ) -> Outcome:
     """Estimate body segment parameters from gait.
 
-    Of several subject files each gets a folder of its name in the folder for
-    the results; an error in one does not keep the others from being fitted.
+    With several subject files, each gets a folder of its name in the folder for
+    the results; an error in one does not stop the others from being fitted.
 
     Exit status 1 if there is an estimate but an ERROR of it is open, or a
     trial was left out (see kinertia --help).
@@ -138,14 +138,14 @@ def fit(
 
 
 def _bsp_rows(fit: Fit) -> list[dict[str, Any]]:
-    """The rows of `bsp.csv`."""
+    """Return the rows of `bsp.csv`."""
     columns = {name: np.asarray(values).tolist() for name, values in fit.bsp_columns().items()}
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 
 @dataclass(frozen=True)
 class _Run:
-    """One person: what was given, what it asks for, where the results go, and the command that repeats it."""
+    """One person's run: what was given, the subject file, the folder for results, and the command that repeats it."""
 
     given: Path
     wanted: SubjectFile
@@ -157,7 +157,7 @@ class _Run:
 def _runs(
     trials: Sequence[Path], output: Path, options: dict[str, Any], method: str | None, overrule: Overrule
 ) -> list[_Run]:
-    """Everybody, each with a folder of their own if there are several; all subject files are read here."""
+    """Plan the runs, each with a folder of its own if there are several; all subject files are read here."""
     folders = [output]
     if len(trials) > 1:
         for path in trials:
@@ -181,12 +181,12 @@ def _runs(
 
 
 def _name(path: Path) -> str:
-    """What the results of a subject file are called: its name, or that of its folder if it is only subject.toml."""
+    """Name the results of a subject file: by its name, or by its folder if it is just subject.toml."""
     return path.resolve().name if path.is_dir() else path.resolve().parent.name if path.stem == "subject" else path.stem
 
 
 def _fitted(one: _Run) -> Fit:
-    """The fit, which is in its folder."""
+    """Fit one person and save the results in the folder."""
     with shown_progress() as progress:
         try:
             result = fit_subject(one.wanted, progress, one.overrule)
@@ -199,21 +199,21 @@ def _fitted(one: _Run) -> Fit:
 
 
 def _command(trial: Path, options: dict[str, Any], method: str | None, output: Path) -> str:
-    """The command line that repeats this run."""
+    """Return the command line that repeats this run."""
     given = {**options, "--method": method, "-o": output}
     words = [str(word) for name, value in given.items() if value is not None for word in _words(name, value)]
     return command_line(["kinertia", "fit", str(trial), *words])
 
 
 def _words(name: str, value: Any) -> list[Any]:
-    """An option as it is typed."""
+    """Return an option as it is typed."""
     if isinstance(value, tuple):
         return [word for each in value for word in (name, each)]
     return [name] if value is True else [name, value]
 
 
 def _wanted(trial: Path, options: dict[str, Any], method: str | None) -> SubjectFile:
-    """What to estimate, by the subject file or by options."""
+    """Return what to estimate, from the subject file or from options."""
     if trial.is_dir():
         trial = subject_file_in(trial)
     if trial.suffix.lower() == ".toml":
@@ -227,7 +227,7 @@ def _wanted(trial: Path, options: dict[str, Any], method: str | None) -> Subject
 
 
 def _from_options(trial: Path, options: dict[str, Any]) -> SubjectFile:
-    """The subject file that these options stand for."""
+    """Build the subject file that these options represent."""
     given = {
         key: str(value) if isinstance(value, Path) else value for key, value in options.items() if value is not None
     }

@@ -18,7 +18,7 @@ _STAGES = ("literature", "corrected", "estimate")
 
 
 def report_tables(fit: Fit) -> None:
-    """Who and how, residuals of every trial, the table of segments, and masses."""
+    """Show person and method, residuals of every trial, the table of segments, and masses."""
     fit_summary = summary(fit)
     subject, mass = fit_summary["subject"], fit_summary["total_mass_kg"]
     height = None if subject["height_m"] is None else f"{subject['height_m']:g} m"
@@ -71,7 +71,7 @@ def _report_trial(trial: dict[str, Any], before: str) -> None:
 
 
 def _bsp_table(fit: Fit) -> Table:
-    """Two rows per segment, three with error bars; where left mirrors right, the right side stands for both."""
+    """Tabulate two rows per segment, three with error bars; if left mirrors right, the right side stands for both."""
     table = plain_table("segment", "", "mass\n(kg)", "CoM x\n(mm)", "y", "z", "Ixx\n(kg m2)", "Iyy", "Izz")
     for i, segment in enumerate(fit.literature.segments):
         if fit.posterior is None and fit.settings.symmetry and segment.endswith("_l"):

@@ -33,8 +33,8 @@ def instruments(
     """Estimate plate and synchronisation errors of a session from all its trials, for use in all its fits.
 
     Writes a file for session = "..." under \\[instruments] in the subject files
-    of the session: what one person's walks leave open of a plate's position,
-    those of the others show. A fit leaves out what its own trials contributed.
+    of the session: what one person's walks cannot show of a plate's position,
+    the others' can. A fit leaves out what its own trials contributed.
 
     [bold]Example[/]
 
@@ -66,7 +66,7 @@ def instruments(
 
 
 def _wanted(path: Path) -> SubjectFile:
-    """What to estimate: without what an earlier run has found of the session."""
+    """Read a subject file, without what an earlier run found about the session."""
     if path.suffix.lower() != ".toml":
         raise FileError(path, "expected a subject file (.toml); kinertia init FOLDER drafts one of a person's files")
     wanted = read_subject(path)

@@ -67,7 +67,7 @@ def markers(
 
 
 def _draft(recording: Recording, output: Path) -> dict[str, Any]:
-    """Write a draft, and say what it lacks."""
+    """Write a draft, and report what it lacks."""
     if output.exists():
         raise FileError(output, "exists already and is left alone; remove it, or give another name")
     draft = draft_marker_set(recording, output.stem)

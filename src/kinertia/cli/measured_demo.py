@@ -33,7 +33,7 @@ loads = "subject01_walk1_grf.xml"
 
 
 def write_measured_lab(folder: Path, progress: Progress = lambda stage, share: None) -> Path:
-    """Copy the sample walk into a folder, which is made if need be, with a subject file; returns the latter.
+    """Copy the sample walk into a folder, made if necessary, with a subject file, and return that file.
 
     Raises:
         KinertiaError: it is not on this computer and cannot be downloaded.
@@ -51,8 +51,8 @@ def run_measured_demo(folder: str | Path, progress: Progress = lambda stage, sha
     """Copy the sample walk to `folder`/lab, fit it, and write the results of the fit into `folder`.
 
     Args:
-        folder: is made if need be.
-        progress: called as the work goes on.
+        folder: folder to write to, made if necessary.
+        progress: called as the work progresses.
 
     Raises:
         FileError: the folder cannot be written to.

@@ -13,13 +13,13 @@ _DRAFT = "markers.toml"
 
 
 def next_commands(error: KinertiaError, given: Path, model: Model, command: str) -> list[str]:
-    """What to do, in this order; nothing where another marker set would not help, or one was named.
+    """List the next commands in order; empty where another marker set would not help, or one was stated.
 
     Args:
-        error: why there is no fit.
+        error: the reason why there is no fit.
         given: the subject file, its folder, or the markers of a trial.
-        model: what the subject file, or options in its place, say of it.
-        command: the command that was refused.
+        model: the model as stated in the subject file, or in options.
+        command: the command that failed.
     """
     if not _NO_MARKER_SET & {one.code for one in findings_of(error)}:
         return []
@@ -35,6 +35,6 @@ def next_commands(error: KinertiaError, given: Path, model: Model, command: str)
 
 
 def _as_typed(path: Path) -> str:
-    """Relative to the folder of the shell where it is in it."""
+    """Return the path relative to the shell's folder where it is in it."""
     here = Path.cwd()
     return str(path.relative_to(here)) if path.is_relative_to(here) else str(path)

@@ -17,10 +17,10 @@ from kinertia.settings import Overrule, number_of, sex_of
 
 
 def results_folder(folder: Path, overwrite: bool, sub_folders: Collection[str] = ()) -> None:
-    """Refuse, before any work, a folder that results cannot or may not go to; `sub_folders` are names of theirs in it.
+    """Raise an error, before any work, if results cannot or may not go to a folder, or its `sub_folders`.
 
     Raises:
-        FileError: it cannot be written to, or holds somebody else's files and `overwrite` is False.
+        FileError: it cannot be written to, or holds other files and `overwrite` is False.
     """
     if not overwrite:
         expect_own_folder(folder, ", or --overwrite to write among them")
@@ -28,10 +28,10 @@ def results_folder(folder: Path, overwrite: bool, sub_folders: Collection[str] =
 
 
 def number(text: str) -> float:
-    """A number with a decimal point or a decimal comma.
+    """Parse a number with a decimal point or a decimal comma.
 
     Raises:
-        BadParameter: it is none.
+        BadParameter: the text is not a number.
     """
     try:
         return number_of(text)
@@ -40,10 +40,10 @@ def number(text: str) -> float:
 
 
 def sex(text: str) -> str:
-    """ "male" or "female"; m and f are enough.
+    """Parse "male" or "female"; m and f are enough.
 
     Raises:
-        BadParameter: it is neither.
+        BadParameter: the text is neither.
     """
     known = sex_of(text)
     if known not in ("male", "female"):
@@ -90,7 +90,7 @@ Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Show every assum
 
 
 def overrule_of(waive: Sequence[str] | None) -> Overrule:
-    """What `--waive` overrules.
+    """Parse the codes that `--waive` overrules.
 
     Raises:
         BadParameter: no such code, or one that cannot be waived.
@@ -103,10 +103,10 @@ def overrule_of(waive: Sequence[str] | None) -> Overrule:
 
 
 def own_file(output: Path, read: Callable[[Path], object], command: str) -> None:
-    """A file that a command may write: a new one, or one of its own, which `read` can read.
+    """Check that a command may write a file: a new one, or one of its own, which `read` can read.
 
     Raises:
-        FileError: a folder, in no folder, or a file of another kind.
+        FileError: it is a folder, in no folder, or a file of another kind.
     """
     if output.is_dir():
         raise FileError(output, "a folder; give the name of a file")

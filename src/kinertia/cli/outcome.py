@@ -19,10 +19,10 @@ _AS_JSON = Annotated[bool, typer.Option("--json", help="Print the results as JSO
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a command ended.
+    """Result of a command for scripts, and its exit status.
 
     Attributes:
-        content: what a script needs of it, as `--json` prints it; paths as text.
+        content: result for scripts, as `--json` prints it; paths as text.
         status: exit status.
     """
 
@@ -33,16 +33,16 @@ class Outcome:
 def add_command(
     app: typer.Typer, command: Callable[..., Any], name: str | None = None, panel: str | None = None
 ) -> None:
-    """Make it a command of `app`; one that returns an `Outcome` gets `--json`, which prints that in place of all words.
+    """Register a command of `app`; one that returns an `Outcome` gets `--json`, which prints it in place of all words.
 
-    A command that has an `as_json` of its own is told of the option, too. `panel` is its heading in `kinertia --help`.
+    A command that has an `as_json` of its own receives the option, too. `panel` is its heading in `kinertia --help`.
     """
     hints = get_type_hints(command, include_extras=True)
     app.command(name, rich_help_panel=panel)(_with_json(command, hints) if hints["return"] is Outcome else command)
 
 
 def of_error(error: KinertiaError) -> dict[str, Any]:
-    """What a script needs of an error: its text, its findings, and what to do next where that is known."""
+    """Return an error for scripts: its text, its findings, and what to do next where that is known."""
     content: dict[str, Any] = {"error": str(error), "findings": [one.to_dict() for one in findings_of(error)]}
     notes = getattr(error, "__notes__", ())
     return {**content, "next": list(notes)} if notes else content

@@ -37,9 +37,9 @@ def population(
     ] = None,
     quiet: Quiet = False,
 ) -> Outcome:
-    """Learn the mean body and the spread of a group from the fits of its people.
+    """Learn the mean body and its spread between people from the fits of a group.
 
-    Each person's trials say little about most parameters, all together say
+    Each person's trials show little about most parameters, all together show
     much about their mean. Writes a file for population = "..." under \\[prior]
     in the subject files of other people of the group.
 
@@ -60,7 +60,7 @@ def population(
 
 
 def _parameters(learnt: LearntPrior) -> list[dict[str, Any]]:
-    """What was learnt of each parameter, in the literature's deviations."""
+    """Return what was learnt of each parameter, in the literature's SDs."""
     names = [(segment, parameter) for segment in learnt.segments for parameter in PARAMETERS]
     columns = (learnt.mean, learnt.mean_sd, np.sqrt(np.diag(learnt.covariance)), learnt.learnt)
     return [
@@ -74,7 +74,7 @@ def _parameters(learnt: LearntPrior) -> list[dict[str, Any]]:
 
 
 def _read(results: list[PersonResults], without: set[str]) -> tuple[list[PersonInformation], tuple[str, ...]]:
-    """What each person's recordings say, and their SHA-256; people without error bars are left out, said."""
+    """Read each person's information and the SHA-256 of the files; reports people left out without error bars."""
     people: list[PersonInformation] = []
     files: list[str] = []
     met = set()
@@ -102,13 +102,13 @@ def _read(results: list[PersonResults], without: set[str]) -> tuple[list[PersonI
 
 
 def _recordings(saved: SavedFit) -> list[str]:
-    """SHA-256 of the files of markers that a result is from; marker sets, loads and sessions are many people's."""
+    """Return the SHA-256 of the marker files of a result; marker sets, loads and sessions are shared by many people."""
     files = {} if saved.provenance is None else saved.provenance.files
     return [content for name, content in files.items() if Path(name).suffix.lower() in MARKER_FILES]
 
 
 def _report(learnt: LearntPrior) -> None:
-    """The parameters whose mean is furthest from the tables, and how much was learnt in all."""
+    """Show the parameters whose mean is farthest from the tables, and how much was learnt in all."""
     words = [evidence(share) for share in learnt.learnt]
     table = plain_table("segment", "parameter", "mean", "known to", "spread")
     spread = np.sqrt(np.diag(learnt.covariance))

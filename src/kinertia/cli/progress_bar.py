@@ -11,7 +11,7 @@ from rich.text import Text
 
 
 class _TimeLeftColumn(TimeRemainingColumn):
-    """The time left, said to be that; nothing as long as nobody knows."""
+    """Column with the time left, labelled as such; empty as long as it is unknown."""
 
     def render(self, task: Task) -> Text:
         return super().render(task).append(" left") if task.time_remaining else Text()
@@ -19,7 +19,7 @@ class _TimeLeftColumn(TimeRemainingColumn):
 
 @contextmanager
 def shown_bar(console: Console) -> Iterator[Callable[[str, float], None]]:
-    """A bar for every stage; yields a function that takes the stage's name and its share done."""
+    """Show a bar for every stage; yields a function that takes the stage's name and its share done."""
     columns = (TextColumn("{task.description:>20}"), BarColumn(), TimeElapsedColumn(), _TimeLeftColumn())
     with Progress(*columns, console=console, transient=True) as bar:
         shown: list[str] = []

@@ -15,7 +15,7 @@ MOVED = {f"study {name}": f"python -m validation {name}" for name in ("accuracy"
 
 
 def as_named_now(given: Sequence[str]) -> list[str]:
-    """Replace old names of options among these arguments, and say so on standard error.
+    """Replace old names of options among these arguments, with a notice on standard error.
 
     Raises:
         KinertiaError: the command is no longer installed.

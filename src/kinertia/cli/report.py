@@ -65,12 +65,12 @@ def report(
 
 
 def score_text(degrees: float) -> str:
-    """The score for a terminal; without complete curves of both sides there is none."""
+    """Format the score for a terminal; without complete curves of both sides there is none."""
     return f"{degrees:.1f} degrees" if np.isfinite(degrees) else "not available: a side lacks complete curves"
 
 
 def _norms_for(fit: Fit, path: Path) -> tuple[dict[str, Norm], list[str]]:
-    """The norms in a file, and which of them this fit has no curve for."""
+    """Read the norms in a file, and list those for which this fit has no curve."""
     norms, known = read_norms(path), quantities_of(fit)
     check_convention(fit, norms)
     other = sorted(set(norms) - known)

@@ -14,14 +14,14 @@ from kinertia.report.saved_fit import FIT_FILE
 
 @dataclass(frozen=True)
 class PersonResults:
-    """Where one person's results are, and what a cohort calls the person; None in results of `kinertia fit`."""
+    """Folder of one person's results, and the person's name in a cohort; None in results of `kinertia fit`."""
 
     folder: Path
     name: str | None = None
 
 
 def results_of_people(results: list[Path]) -> list[PersonResults]:
-    """List every person's results in these folders, each once; those that a cohort lists no more are left out, said."""
+    """List every person's results in these folders, each once; reports those that a cohort no longer lists."""
     found: list[PersonResults] = []
     for path in results:
         if (path / FIT_FILE).is_file():

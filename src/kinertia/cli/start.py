@@ -19,13 +19,13 @@ _NEW_OBJECTS = 100_000
 
 def main() -> None:
     """Run the command line on the arguments of this process."""
-    if isinstance(sys.stdout, io.TextIOWrapper):  # of errors Python itself takes care
+    if isinstance(sys.stdout, io.TextIOWrapper):  # Python itself handles errors
         sys.stdout.reconfigure(errors="replace")
     given = sys.argv[1:]
     if given == ["--version"]:
         print(version("kinertia"))
         return
-    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # else every package there is, is looked through
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # otherwise every installed package is searched
     gc.disable()  # what is imported stays: looking through it for garbage, again and again, finds none
     from kinertia.cli.app import application_for, run
 
@@ -40,7 +40,7 @@ def main() -> None:
 
 
 def program() -> None:
-    """`main`, with which this process ends."""
+    """Run `main` and end this process."""
     try:
         main()
     except SystemExit as end:
@@ -49,7 +49,7 @@ def program() -> None:
 
 
 def _end(status: object) -> None:
-    """End this process without freeing everything in it one by one first, unless something else is at work in it."""
+    """End this process without freeing every object first, unless something else is at work in it."""
     from kinertia.motion.two_threads import THREAD
 
     at_work = [each for each in threading.enumerate() if not each.name.startswith(THREAD)]

@@ -42,7 +42,7 @@ def table1(
     overwrite: Overwrite = False,
     quiet: Quiet = False,
 ) -> Outcome:
-    """Repeat the study: 49 parameters from starts off by 50 %, with and without noise and pelvis correction.
+    """Repeat the study: 49 parameters from starts with 50 % error, with and without noise and pelvis correction.
 
     [bold]Examples[/]
 
@@ -109,7 +109,7 @@ def sensitivity(
     overwrite: Overwrite = False,
     quiet: Quiet = False,
 ) -> Outcome:
-    """Which BSPs are not highly sensitive to noisy kinematics? Errors against noise, strides and squats.
+    """Study which BSPs are sensitive to noisy kinematics: errors against noise, strides and squats.
 
     [bold]Example[/]
 
@@ -128,7 +128,7 @@ def sensitivity(
 
 
 def _say_where(output: Path, files: Sequence[str], picture: str) -> None:
-    """The files of the results, and how to have the picture, too, where matplotlib is missing."""
+    """List the files of the results, and how to get the picture, too, where matplotlib is missing."""
     drawn = has_matplotlib()
     out.print(f"results in {output}: {', '.join([*files, picture] if drawn else files)}", soft_wrap=True)
     if not drawn:

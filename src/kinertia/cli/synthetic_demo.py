@@ -41,8 +41,8 @@ class Demo:
     Attributes:
         fit: the simultaneous estimate.
         two_level: the two-level estimate from the same files.
-        walk: what the person did, and with which BSPs; from it the files were made.
-        subject_file: of the synthetic laboratory.
+        walk: the person's motion and BSPs, from which the files were made.
+        subject_file: subject file of the synthetic laboratory.
     """
 
     fit: Fit
@@ -52,28 +52,28 @@ class Demo:
 
     @property
     def truth(self) -> BodySegmentParameters:
-        """The person's BSPs."""
+        """True BSPs of the person."""
         return self.walk.bsp
 
     @cached_property
     def moment_errors(self) -> dict[str, tuple[float, float]]:
-        """Per joint, RMS error (N m) of joint moments by the usual way and by the simultaneous estimate."""
+        """RMS error (N m) of joint moments per joint, by IK + ID and by the simultaneous estimate."""
         return truth_of(self.walk, self.fit).moment_errors(self.fit)
 
     @cached_property
     def table(self) -> pd.DataFrame:
-        """Columns segment, parameter, unit, truth, literature, estimate, sd, two_level."""
+        """Table with columns segment, parameter, unit, truth, literature, estimate, sd, two_level."""
         table = self.fit.bsp[["segment", "parameter", "unit", "literature", "estimate", "sd"]].copy()
         table.insert(3, "truth", self.truth.to_frame()["value"])
         return table.assign(two_level=self.two_level.bsp["estimate"])
 
     def rms_errors(self, source: BodySegmentParameters) -> tuple[float, float, float]:
-        """RMS over the segments of mass (kg), CoM distance (m), moments of inertia (kg m2) against the truth."""
+        """Return the RMS errors over the segments of mass (kg), CoM distance (m), moments of inertia (kg m2)."""
         return Truth(self.walk.bsp, {}).parameter_errors(source)
 
 
 def truth_of(made: SyntheticTrial, fit: Fit) -> Truth:
-    """What is known of the walk behind a fit of one trial."""
+    """Return the truth behind a fit of one trial."""
     (trial,) = fit.trials
     at = np.searchsorted(made.time, trial.time - 1e-9)
     loads = inverse_dynamics(made.skeleton, made.bsp, made.motion.cut(at), made.foot_loads[at])
@@ -84,7 +84,7 @@ def truth_of(made: SyntheticTrial, fit: Fit) -> Truth:
 def write_synthetic_lab(
     folder: Path, seed: int = 1, noise: LabNoise | None = None
 ) -> tuple[SubjectFile, SyntheticTrial]:
-    """Write the files of a synthetic laboratory, with a subject file; what that wants, and the walk behind them."""
+    """Write the files of a synthetic laboratory, with a subject file; return the latter as read, and the walk."""
     truth_rng, noise_rng = np.random.default_rng(seed).spawn(2)
     subject = unlike_literature(walking_subject(), truth_rng)
     trial = walk(subject, DURATION_S, PLATE_RATE_HZ, START)
@@ -100,13 +100,13 @@ def run_demo(
 ) -> Demo:
     """Make the laboratory's files in `folder`/lab, estimate from them, write results and `bsp_truth.csv` into `folder`.
 
-    The results of the simultaneous estimate stand in `folder` itself, those of two-level in `folder`/two-level.
+    The results of the simultaneous estimate are in `folder` itself, those of two-level in `folder`/two-level.
 
     Args:
-        folder: is made if need be.
-        seed: of truth and noise.
+        folder: folder to write to, made if necessary.
+        seed: seed of truth and noise.
         noise: the default `LabNoise` if None.
-        progress: called as the work goes on.
+        progress: called as the work progresses.
 
     Raises:
         FileError: the folder cannot be written to.

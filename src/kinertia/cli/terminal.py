@@ -26,7 +26,7 @@ class Stream:
     """One of the two standard streams.
 
     Attributes:
-        quiet: nothing is written.
+        quiet: whether nothing is written.
     """
 
     def __init__(self, stderr: bool = False) -> None:
@@ -35,19 +35,19 @@ class Stream:
 
     @cached_property
     def console(self) -> Console:
-        """What writes to it."""
+        """Console that writes to the stream."""
         from rich.console import Console
 
         # names of files and trials may contain what rich takes for markup
         return Console(markup=False, emoji=False, highlight=False, stderr=self._stderr)
 
     def print(self, *words: Any, **form: Any) -> None:
-        """As `rich.console.Console.print` does."""
+        """Print as `rich.console.Console.print` does."""
         if not self.quiet:
             self.console.print(*words, **form)
 
     def capture(self) -> Capture:
-        """What is written within a `with` block is kept in place of being shown."""
+        """Capture what is written within a `with` block instead of showing it."""
         return self.console.capture()
 
 
@@ -55,12 +55,12 @@ out, err = Stream(), Stream(stderr=True)
 
 
 def print_json(content: Mapping[str, Any] | Sequence[Any]) -> None:
-    """Results for scripts, on standard output; what is not a finite number is null, which JSON has a word for."""
+    """Print results for scripts on standard output; numbers that are not finite are null, as JSON requires."""
     typer.echo(json.dumps(finite(content), indent=2, allow_nan=False))
 
 
 def finite(content: Any) -> Any:
-    """The same with None for what is not a finite number."""
+    """Replace numbers that are not finite by None."""
     if isinstance(content, Mapping):
         return {name: finite(value) for name, value in content.items()}
     if isinstance(content, list | tuple):
@@ -75,7 +75,7 @@ def be_quiet(quiet: bool) -> bool:
 
 
 def show_error(message: str) -> None:
-    """One line for one error."""
+    """Show one error in one line."""
     from rich.text import Text
 
     text = Text("error: ", style="bold red").append(" ".join(message.split("\n")), style="not bold default")
@@ -83,7 +83,7 @@ def show_error(message: str) -> None:
 
 
 def show_problem(error: KinertiaError, of: str = "") -> None:
-    """One line for every finding that stopped something, or for the error; `of` says whose it is, where several are."""
+    """Show one line per finding that stopped something, or for the error; `of` states whose it is among several."""
     for line in str(error).split("\n") if isinstance(error, BlockedError) else [str(error)]:
         show_error(f"{of}{line}")
     for k, line in enumerate(getattr(error, "__notes__", ())):
@@ -92,9 +92,9 @@ def show_problem(error: KinertiaError, of: str = "") -> None:
 
 @contextmanager
 def shown_progress() -> Iterator[Callable[[str, float], None]]:
-    """Progress of the stage at work: a bar with the time left on a terminal, a line per stage elsewhere.
+    """Show the progress of the current stage: a bar with the time left on a terminal, a line per stage elsewhere.
 
-    Yields a function that takes the stage's name and its share done. What has not been compiled on this machine is
+    Yields a function that takes the stage's name and its share done. Code not yet compiled on this machine is
     compiled first.
     """
     with _shown_progress() as progress:
@@ -124,7 +124,7 @@ def _shown_progress() -> Iterator[Callable[[str, float], None]]:
 
 
 def plain_table(*headings: str) -> Table:
-    """First two columns to the left if the second has no heading, the numbers to the right."""
+    """Make a table with its first two columns to the left if the second has no heading, the numbers to the right."""
     from rich import box
     from rich.table import Table
 

@@ -12,7 +12,7 @@ def warm_up(quiet: Quiet = False) -> Outcome:
     """Compile beforehand what the first fit would compile.
 
     Kinertia's calculations are compiled once on a machine, which takes about
-    half a minute; a command that computes does it when it must. The result is
+    half a minute; any command that computes does it if necessary. The result is
     kept beside the package or, where that cannot be written to, in your cache:
     run this once as the owner of an installation that others may only read,
     and on a cluster before the jobs start.

@@ -26,16 +26,16 @@ from kinertia.studies.parallel import interrupted_later
 HOW = "pip install 'kinertia[cohort]'"
 _NEEDED = ("dask", "distributed", "pyarrow")
 PERSON_MEMORY_BYTES = 2 * 1024**3
-"""What a fit is given at least: ten minutes of gait with plates at 1000 Hz need two thirds of it."""
+"""Smallest memory of a fit: ten minutes of gait with plates at 1000 Hz need two thirds of it."""
 RETRIES = 2
-"""How often a person is tried again whose process was killed."""
+"""How often the fit of a person whose process was killed is repeated."""
 KEPT_MEMORY = MappingProxyType({"MALLOC_TRIM_THRESHOLD_": 2**28, "MALLOC_MMAP_THRESHOLD_": 2**25})
 """Bytes that a worker keeps on Linux, by its environment. Dask's workers give memory back at once, and a fit asks for
 it again, page by page: it took a third longer."""
 SCHEDULING = MappingProxyType(
     {
         "distributed.scheduler.allowed-failures": RETRIES,
-        # a process that is killed takes with it what waits there, too: let it wait with the scheduler
+        # a killed process also loses the jobs that wait there: let them wait with the scheduler
         "distributed.scheduler.worker-saturation": 1.0,
         **{f"distributed.nanny.pre-spawn-environ.{name}": size for name, size in KEPT_MEMORY.items()},
         "logging": {"distributed": "critical"},
@@ -43,9 +43,9 @@ SCHEDULING = MappingProxyType(
 )
 """Settings of Dask for clusters of our own."""
 NO_DASHBOARD = MappingProxyType({"dashboard": False, "dashboard_address": "127.0.0.1:0"})
-"""Of their schedulers, which listen there all the same: at any free port, since another run may have the usual one."""
+"""Settings of their schedulers, which listen anyway: at any free port, since another run may use the usual one."""
 _SECONDS_PER_PERSON, _SECONDS_PER_FRAME = 4.0, 0.003
-"""Of one processor, for a rough guess before anything was measured: see `docs/validation/long-trials.md`."""
+"""Times of one processor, for a rough guess before any measurement: see `docs/validation/long-trials.md`."""
 _LEAST_LIMIT_S, _PATIENCE = 900.0, 50.0
 """A fit is given so long, and so many times the guess: what takes longer has no end."""
 
@@ -55,14 +55,14 @@ class Job:
     """One person to fit.
 
     Attributes:
-        person: name.
+        person: name of the person.
         subject: the subject file.
         cohort: folder of the cohort's results, as workers see it.
         inputs: SHA-256 of what goes into the fit.
-        trials: how many.
-        limit_s: after which its process is ended.
+        trials: number of trials.
+        limit_s: time after which its process is ended.
         kinertia: version of the command, which has to be the worker's.
-        run: which run of the command it is of.
+        run: identifier of the run of the command.
     """
 
     person: str
@@ -76,28 +76,28 @@ class Job:
 
     @classmethod
     def of(cls, one: Standing, cohort: Path) -> Job:
-        """To fit a person who is due, into the folder of the cohort."""
+        """Create the job of fitting a person who is due, into the folder of the cohort."""
         if one.person.subject is None:
             raise ValueError(f"{one.person.name} is not due")
         limit_s = _LEAST_LIMIT_S + _PATIENCE * guessed_seconds([one], 1)
         return cls(one.person.name, one.person.subject.resolve(), cohort, one.inputs, one.trials, limit_s)
 
     def record(self, status: int, sentence: str, settled: bool, seconds: float = 0.0) -> Record:
-        """How it ended; `settled` where the same input always ends so."""
+        """Return the record of how it ended; `settled` where the same input always ends so."""
         inputs = self.inputs if settled else ""
         return Record(self.person, status, one_line(sentence), inputs, self.kinertia, self.trials, round(seconds, 1))
 
 
 @dataclass(frozen=True)
 class ClusterSize:
-    """Processes on this computer, and the memory that each may take, bytes."""
+    """Processes on this computer, and the memory (bytes) that each may take."""
 
     workers: int
     memory_bytes: int
 
 
 def expect_extra() -> None:
-    """Raise a KinertiaError that says what to install, unless it is there."""
+    """Raise a KinertiaError that states what to install, unless the extra is installed."""
     missing = [name for name in _NEEDED if find_spec(name) is None]
     if missing:
         verb = "are" if missing[1:] else "is"
@@ -105,7 +105,7 @@ def expect_extra() -> None:
 
 
 def local_size(people: int) -> ClusterSize:
-    """One process per core, fewer where memory or people do not suffice for so many."""
+    """Return the cluster size of this computer: one process per core, fewer where memory or people do not suffice."""
     from dask.system import CPU_COUNT
     from distributed.system import MEMORY_LIMIT
 
@@ -114,14 +114,14 @@ def local_size(people: int) -> ClusterSize:
 
 
 def guessed_seconds(due: Sequence[Standing], workers: int) -> float:
-    """Roughly how long fits take; of one processor for each process."""
+    """Estimate roughly how long fits take (s), with one processor for each process."""
     each = [_SECONDS_PER_PERSON + _SECONDS_PER_FRAME * one.frames for one in due]
     return max(sum(each) / workers, max(each, default=0.0))
 
 
 @contextmanager
 def local_cluster(size: ClusterSize) -> Iterator[Any]:
-    """A client of processes on this computer, which end with the block."""
+    """Yield a client of processes on this computer, which end with the block."""
     import dask
     from distributed import Client, LocalCluster
 
@@ -144,7 +144,7 @@ def local_cluster(size: ClusterSize) -> Iterator[Any]:
 
 @contextmanager
 def running_cluster(address: str) -> Iterator[Any]:
-    """A client of a scheduler that runs already.
+    """Yield a client of a scheduler that is already running.
 
     Raises:
         SettingsError: nothing answers there.
@@ -164,7 +164,7 @@ def running_cluster(address: str) -> Iterator[Any]:
 
 
 def doubts_of_workers(client: Any, address: str) -> list[str]:
-    """What keeps the workers of a scheduler that runs already from fitting as they should, a sentence each."""
+    """Describe, a sentence each, what may keep workers of a running scheduler from fitting correctly."""
     threads = client.nthreads()
     start = f"dask worker {address} --nthreads 1"
     if not threads:
@@ -178,19 +178,19 @@ def doubts_of_workers(client: Any, address: str) -> list[str]:
 
 
 def run_jobs(client: Any, fit_person: Callable[[Job], Record], jobs: Sequence[Job]) -> Iterator[Finished]:
-    """How each job ended, as they end.
+    """Run the jobs and yield how each ended, in the order in which they end.
 
     Args:
-        client: of the cluster.
+        client: client of the cluster.
         fit_person: a function of a module, which workers import by its name; what it raises is the person's failure.
-        jobs: each a person.
+        jobs: jobs, one per person.
 
     Raises:
-        KinertiaError: the scheduler is gone.
+        KinertiaError: the scheduler has stopped.
     """
     from distributed import as_completed
 
-    run = uuid4().hex  # what two runs on one cluster submit must not be taken for the same
+    run = uuid4().hex  # jobs of two runs on one cluster must not be taken for the same
     of_key = {f"kinertia-{run}-{k}": job for k, job in enumerate(jobs)}
     futures = [
         client.submit(measured, fit_person, replace(job, run=run), key=key, pure=False) for key, job in of_key.items()
@@ -219,7 +219,7 @@ def _told(error: BaseException) -> str:
 
 
 def _undisturbed() -> Any:
-    """A plugin: Ctrl-C is for the process that waits, which ends the others in order."""
+    """Return a plugin by which Ctrl-C only reaches the waiting process, which ends the others in order."""
     from distributed import WorkerPlugin
 
     class Undisturbed(WorkerPlugin):  # type: ignore[misc]

@@ -38,10 +38,10 @@ _UNDATED = (
 
 
 def drift(rows: pd.DataFrame) -> Iterator[Part]:
-    """A panel per quantity, in it a line per instrument over the days; a day's people count by what they know.
+    """Draw a panel per quantity, with a line per instrument over the days; a day's people are weighted by information.
 
     Args:
-        rows: of the table of instruments, `COLUMNS`. Fits that knew what others of their session say are left out: days
+        rows: rows of the table of instruments, `COLUMNS`. Fits that used others of their session are left out: days
             would count people twice. So are delays and zeros, which are each trial's own.
     """
     rows = rows[~rows["with_session"] & (rows["trial"].isna() | (rows["quantity"] == GAIN))]
@@ -68,7 +68,7 @@ def drift(rows: pd.DataFrame) -> Iterator[Part]:
 
 
 def _named(rows: pd.DataFrame) -> pd.DataFrame:
-    """The rows with two columns more, as people read them: whose error it is, and of what."""
+    """Add two columns in words: the instrument and the quantity of each error."""
     known = rows.astype(object).where(rows.notna(), None)
     return rows.assign(
         instrument=list(map(item_text, known["kind"], known["plate"])),
@@ -86,7 +86,7 @@ def _panel(unknown: str, colours: Mapping[str, str], rows: pd.DataFrame) -> Pane
 
 
 def _line(instrument: str, colour: str, factor: float, rows: pd.DataFrame) -> dict[str, Any]:
-    """Value of each day and its error bar: what all its people's trials say, with one prior."""
+    """Draw the value of each day and its error bar, from all its people's trials with one prior."""
     days, means, bars, texts = [], [], [], []
     for day, of in rows.groupby("date", sort=True):
         value, sd, prior_sd = (of[name].to_numpy() for name in ("value", "sd", "prior_sd"))

@@ -41,22 +41,22 @@ from kinertia.workflow.session import person_instruments, session_instruments
 FOLDER = "learnt"
 _DONE = "learnt.json"
 PARTS = 10
-"""Of the people; each part's prior is learnt from the others."""
+"""Number of parts of the people; each part's prior is learnt from the others."""
 _FILES = ("static", "osim", "markers", "forces", "loads", "session", "bsp", "population", "measures")
 """Keys of a subject file that name files."""
 
 
 @dataclass
 class _Known:
-    """One person of the first fits.
+    """What is known of one person from the first fits.
 
     Attributes:
-        name, subject: of the cohort's list.
-        wanted: what the subject file says.
-        recordings: SHA-256 of them.
-        body: what the person's trials say of the body; None where that cannot be taken.
-        instruments: the same of plates and clock.
-        entries: for the subject file of the second fit, by table and key.
+        name, subject: name and subject file in the cohort's list.
+        wanted: content of the subject file.
+        recordings: SHA-256 of the recordings.
+        body: information from the person's trials on the body; None where unusable.
+        instruments: information on plates and synchronisation.
+        entries: entries for the subject file of the second fit, by table and key.
     """
 
     name: str
@@ -75,11 +75,11 @@ def write_second_study(
 
     Args:
         cohort: folder of the first fits; everything goes to a folder in it.
-        people: who has results there, and so a subject file.
-        progress: called as the work goes on.
+        people: people with results there, and so with a subject file.
+        progress: called as the work progresses.
 
     Returns:
-        the people of the second study, and sentences on what could not be learnt, and of whom.
+        the people of the second study, and sentences on what could not be learnt, and from whom.
 
     Raises:
         KinertiaError: nothing can be learnt at all.
@@ -111,7 +111,7 @@ def write_second_study(
 
 
 def _cause(cohort: Path, people: Sequence[Person]) -> str:
-    """SHA-256 of all that the lesson is from: first fits by their records, subject files by place and text."""
+    """Return the SHA-256 of everything that is learnt from: records of first fits, subject files by path and text."""
     parts = []
     for person in people:
         subject = known(person.subject)
@@ -121,7 +121,7 @@ def _cause(cohort: Path, people: Sequence[Person]) -> str:
 
 
 def _learnt_before(folder: Path, cause: str) -> list[str] | None:
-    """What an earlier run of this version noted of the same lesson; None where there was none."""
+    """Return the notes of an earlier run of this version on the same data; None where there was none."""
     try:
         done = json.loads((folder / _DONE).read_text(encoding="utf-8"))
         return list(done["notes"]) if (done["kinertia"], done["cause"]) == (VERSION, cause) else None
@@ -177,7 +177,7 @@ def _teach_bodies(
 
 
 def _others(part: Sequence[_Known], people: Sequence[_Known]) -> list[_Known]:
-    """Everybody who shares no recording with anybody of the part, nor with somebody before: each counts once."""
+    """Return everybody who shares no recording with this part or with someone before: each counts once."""
     met = {name for one in part for name in one.recordings}
     others = []
     for one in people:
@@ -193,7 +193,7 @@ def _population(people: Sequence[_Known], learnt: LearntPrior) -> str:
 
 
 def _teach_instruments(folder: Path, people: Sequence[_Known], notes: list[str]) -> None:
-    """Write what the people of each day say of their plates and clock together."""
+    """Write the combined information of each day's people on their plates and synchronisation."""
     days: dict[tuple[datetime.date, str], list[_Known]] = {}
     undated = 0
     for one in people:
@@ -220,17 +220,17 @@ def _teach_instruments(folder: Path, people: Sequence[_Known], notes: list[str])
 
 
 def _stated(instruments: InstrumentsFiles) -> str:
-    """What the laboratory states, which is the same for all people of a session."""
+    """Return what the laboratory states, which is the same for all people of a session."""
     return instruments.model_dump_json(exclude={"session", "date"})
 
 
 def _plates(people: Sequence[_Known]) -> set[str]:
-    """On which they stood."""
+    """Return the plates on which these people stood."""
     return {plate for one in people if one.instruments is not None for plate in one.instruments.plates}
 
 
 def _second(folder: Path, one: _Known) -> Person:
-    """The person's subject file with what was learnt, and with paths that hold from everywhere."""
+    """Write the person's subject file with what was learnt, and with absolute paths."""
     content = read_toml(one.subject, "a subject file").content
     tables = {name: _from_everywhere(value, one.subject.parent) for name, value in content.items()}
     tables["subject"] = {**tables["subject"], "name": one.wanted.subject.name}
@@ -243,7 +243,7 @@ def _second(folder: Path, one: _Known) -> Person:
 
 
 def _from_everywhere(value: Any, folder: Path) -> Any:
-    """A table of a subject file with absolute paths."""
+    """Return a table of a subject file with absolute paths."""
     if isinstance(value, list):
         return [_from_everywhere(one, folder) for one in value]
     if not isinstance(value, dict):

@@ -31,7 +31,7 @@ _HEADINGS = ("code", "severity", "finding", "people", "open", "explained by anot
 
 
 def lead(people: pd.DataFrame) -> str:
-    """The page's first sentence."""
+    """Write the page's first sentence."""
     counts = _counts(people)
     said = ", ".join(f"{count} {word}" for word, count in counts.items() if count)
     return f"{len(people)} people: {said}. Each one's report is in people/NAME/report.html."
@@ -43,7 +43,7 @@ def _counts(people: pd.DataFrame) -> dict[str, int]:
 
 
 def outcome_parts(people: pd.DataFrame, findings: pd.DataFrame) -> Iterator[Part]:
-    """Verdicts, people without results and why, findings by code, what was overruled in vain, what the codes mean."""
+    """Yield verdicts, people without results and why, findings by code, unused overrules, and the meaning of codes."""
     counts = _counts(people)
     bars = bar_figure(
         ["people"],
@@ -70,7 +70,7 @@ def outcome_parts(people: pd.DataFrame, findings: pd.DataFrame) -> Iterator[Part
 
 
 def _by_code(findings: pd.DataFrame, fitted: set[str]) -> list[tuple[str, ...]]:
-    """A row for each code, the worst and most frequent first."""
+    """Return a row for each code, the worst and most frequent first."""
     rows = []
     for code, of in findings.groupby("code", observed=True):
         severity = max(Severity[name] for name in of["severity"].unique())
@@ -90,7 +90,7 @@ def _by_code(findings: pd.DataFrame, fitted: set[str]) -> list[tuple[str, ...]]:
 
 
 def _median(of: pd.DataFrame) -> str:
-    """Median of the headline's size; empty where there is none."""
+    """Return the median size of the headlines; empty where there is none."""
     known = of.dropna(subset=["value"])
     if not len(known):
         return ""
@@ -98,7 +98,7 @@ def _median(of: pd.DataFrame) -> str:
 
 
 def overruled_in_vain(people: pd.DataFrame, findings: pd.DataFrame) -> list[str]:
-    """Codes, questions or families that people waive or ignore, and that nothing was ever found of."""
+    """List codes, questions or families that people waive or ignore, and that were never found."""
     said = Counter(code for text in people["overruled"] for code in text.split())
     found = set(findings["code"].unique())
     return [f"{code}: {count} people" for code, count in said.most_common() if not found & set(matching(code))]
@@ -111,5 +111,5 @@ def _meaning(code: str) -> Markup:
 
 
 def report_of(person: str) -> Markup:
-    """The name, which leads to the person's report."""
+    """Return the name as a link to the person's report."""
     return Markup('<a href="people/{}/report.html">{}</a>').format(quote(person), person)

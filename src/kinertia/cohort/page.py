@@ -37,7 +37,7 @@ _SHOWN = {"mass": ("mass (kg)", 1.0), "com_x": ("CoM forward (mm)", 1e3), "com_y
 _KINDS: tuple[Kind, ...] = ("angle", "moment")
 _JOINTS = ("hip_flexion", "knee_angle", "ankle_angle")
 _CURVES = {f"{name}_{kind}": UNITS[kind] for kind in _KINDS for name in _JOINTS}
-"""Which are shown, and their units."""
+"""Curves that are shown, and their units."""
 _NORMAL = 1.4826
 """Standard deviation over median distance from the median, of normal values."""
 _MOST_OUTLIERS, _FAR = 20, 6.0
@@ -56,7 +56,7 @@ def write_cohort_page(folder: Path) -> None:
 
 
 def _read(folder: Path, table: str, columns: Sequence[str]) -> pd.DataFrame:
-    """These columns; of the names, which repeat, each is in memory once."""
+    """Read these columns; repeated names are in memory only once."""
     from pyarrow import parquet
 
     repeated = [name for name in ("person", "segment", "parameter") if name in columns]
@@ -66,7 +66,7 @@ def _read(folder: Path, table: str, columns: Sequence[str]) -> pd.DataFrame:
 
 
 def _changes(bsp: pd.DataFrame) -> Iterator[Part]:
-    """Estimate minus literature, segment by segment, over people."""
+    """Draw the estimate minus literature, segment by segment, over people."""
     change = bsp["estimate"] - bsp["literature"]
     segments = list(dict.fromkeys(bsp["segment"]))
     panels: dict[str, Mapping[str, Sequence[float]]] = {}
@@ -82,7 +82,7 @@ def _changes(bsp: pd.DataFrame) -> Iterator[Part]:
 
 
 def _residuals(folder: Path) -> Part:
-    """Residuals of all trials before and after."""
+    """Draw the residuals of all trials before and after."""
     stages = {"literature": "before", "corrected": "pelvis corrected", "estimate": "estimate"}
     columns = [f"residual_{size}_{stage}" for size in _SIZES.values() for stage in stages]
     trials = _read(folder, "trials", columns)
@@ -98,7 +98,7 @@ def _residuals(folder: Path) -> Part:
 
 
 def _outliers(bsp: pd.DataFrame) -> Part:
-    """People with a parameter far from the others', in the others' spread or, where that is larger, in error bars: few
+    """List people with a parameter far from the others', in the others' spread or, where larger, in error bars: a few
     people may be close together by chance. Each is linked to the report.
     """
     parameter = [bsp["segment"], bsp["parameter"]]
@@ -120,8 +120,8 @@ def _outliers(bsp: pd.DataFrame) -> Part:
 
 
 def _mean_curves(folder: Path) -> Iterator[Part]:
-    """Mean and spread of all strides over the gait cycle, both sides, summed up piece by piece; apart where models
-    differ in the direction that is positive.
+    """Draw mean and spread of all strides over the gait cycle, both sides, summed up piece by piece; separately where
+    models differ in the positive direction.
     """
     from pyarrow import dataset
 

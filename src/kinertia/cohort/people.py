@@ -13,7 +13,7 @@ from kinertia.io.subject_draft import is_capture
 from kinertia.io.subject_file import subject_file_in
 
 _LONGEST_NAME = 200
-"""In bytes: systems end names of files at 255, and some of Kinertia's begin with a person's."""
+"""Longest name in bytes: systems limit file names to 255, and some of Kinertia's begin with a person's."""
 
 
 @dataclass(frozen=True)
@@ -21,7 +21,7 @@ class Person:
     """One person of a study.
 
     Attributes:
-        name: in tables, and of the folder of results.
+        name: name in tables, and of the folder of results.
         subject: the subject file; None where there is none.
         problem: why there is none, in one line; empty otherwise.
     """
@@ -32,12 +32,12 @@ class Person:
 
 
 def people_of(study: Path, output: Path) -> list[Person]:
-    """Everybody in a study, by name (folders) or in the order of the rows (CSV).
+    """List everybody in a study, by name (folders) or in the order of the rows (CSV).
 
     Args:
         study: a folder with one folder per person, each with a subject file; or a CSV file with the columns `subject`
             (path of a subject file, from the CSV file's folder) and, if wanted, `name`.
-        output: folder for the results, which may be inside the study and is nobody's.
+        output: folder for the results, which may be inside the study and is not a person's.
 
     Raises:
         FileError: no such study, nobody in it, columns missing, or names that cannot be folders side by side.
@@ -60,8 +60,7 @@ def people_of(study: Path, output: Path) -> list[Person]:
 
 
 def _of_folders(study: Path, output: Path) -> Iterator[Person]:
-    """Folders with a subject file, or with recordings that want one, or in whose folders there is either; others are
-    nobody's."""
+    """Yield folders with a subject file, or with recordings that need one, also in their own folders; ignore others."""
     for folder in sorted(study.iterdir()):
         if not folder.is_dir() or folder.name.startswith(".") or folder.resolve() == output:
             continue
@@ -85,7 +84,7 @@ def _with_subject_in(folder: Path, name: str) -> Person:
 
 
 def _is_session(folder: Path, output: Path) -> bool:
-    """Whether somebody's files are there, which results are not."""
+    """Return whether a folder holds a person's files, results aside."""
     results = (folder / RESULT_FILES[0]).exists() or folder.resolve() == output
     return not results and (_holds_subject(folder) or _holds_recordings(folder))
 
@@ -99,7 +98,7 @@ def _holds_recordings(folder: Path) -> bool:
 
 
 def _files(folder: Path) -> list[Path]:
-    """Links to files that are not there, too: some archives fetch files when they are asked for."""
+    """List files, including links to missing ones: some archives fetch files only when requested."""
     return [path for path in _shown(folder) if not path.is_dir()]
 
 
@@ -108,7 +107,7 @@ def _shown(folder: Path) -> list[Path]:
 
 
 def _of_rows(path: Path) -> Iterator[tuple[int, Person]]:
-    """Line number and person of every row."""
+    """Yield line number and person of every row."""
     for row in read_csv(path, ["subject"], "a row per person, with the path of the person's subject file"):
         written = row.cells["subject"]
         if not written:
@@ -121,7 +120,7 @@ def _of_rows(path: Path) -> Iterator[tuple[int, Person]]:
 
 
 def _name_of(subject: Path) -> str:
-    """What tells a subject file from others: its own name, or that of its folder."""
+    """Return what distinguishes a subject file from others: its own name, or its folder's."""
     return subject.resolve().parent.name if subject.stem.lower() == "subject" else subject.stem
 
 

@@ -23,9 +23,9 @@ from kinertia.workflow.from_files import fit_subject
 
 
 def fit_person(job: Job) -> Record:
-    """Fit one person, and put the results into their place, complete or not at all; says how it ended.
+    """Fit one person and put the results into place, complete or not at all; return how it ended.
 
-    Nothing is raised: an error in the person's files, or a failure, is what the record says.
+    Nothing is raised: an error in the person's files, or a failure, is stated in the record.
     """
     started = time.perf_counter()
     if job.kinertia != VERSION:
@@ -50,7 +50,7 @@ def fit_person(job: Job) -> Record:
 
 
 def _fitted(job: Job, started: float) -> Record:
-    """How the fit ended, its results in their place."""
+    """Fit the person, put the results into place, and return the record."""
     wanted = read_subject(job.subject)
     overruled = _overruled(wanted)
     try:
@@ -69,13 +69,13 @@ def _fitted(job: Job, started: float) -> Record:
 
 
 def _overruled(wanted: SubjectFile) -> str:
-    """Codes that the subject file waives or ignores, for all trials or single ones."""
+    """Return the codes that the subject file waives or ignores, for all trials or single ones."""
     given = [wanted.diagnostics.overrule, *(trial.diagnostics.overrule for trial in wanted.trials)]
     return " ".join(dict.fromkeys(code for each in given for code in (*each.waive, *each.ignore)))
 
 
 def _save(fit: Fit, wanted: SubjectFile, job: Job, record: Record) -> None:
-    """Results, rows of the tables and the record, in one folder that appears at once."""
+    """Save results, rows of the tables and the record, in one folder that appears at once."""
     folder = Place(job.cohort, job.person).results
     command = command_line(["kinertia", "fit", str(job.subject), "-o", str(folder)])
     with complete_folder(folder, "cohort") as work:
@@ -86,7 +86,7 @@ def _save(fit: Fit, wanted: SubjectFile, job: Job, record: Record) -> None:
 
 
 def _unchanged(job: Job) -> bool:
-    """Whether the files are still there as they were: an error of a drive that was away is none of theirs."""
+    """Return whether the files are still unchanged: an error of an unavailable drive is not the files'."""
     try:
         return inputs_of(read_subject(job.subject)) == job.inputs
     except (KinertiaError, OSError):
@@ -94,7 +94,7 @@ def _unchanged(job: Job) -> bool:
 
 
 def _failed(job: Job, error: Exception) -> Record:
-    """Kinertia's own failure, with a log beside its record."""
+    """Record an internal error of Kinertia, with a log beside its record."""
     log = Place(job.cohort, job.person).log
     last_line = traceback.format_exception_only(error)[-1].strip()
     sentence = f"Internal error ({last_line}). Please send {log} to the developers."

@@ -33,15 +33,15 @@ class Record:
     """How the fit of one person ended.
 
     Attributes:
-        person: name.
+        person: name of the person.
         status: 0 fitted, 1 fitted with an open ERROR or without a trial, 2 an error in the files, 70 Kinertia or
             its process failed.
-        sentence: what stands against it; empty where nothing does.
-        inputs: SHA-256 of all that went in; empty where the same input may end otherwise.
-        kinertia: version that did it.
-        trials: how many.
-        seconds: of computing.
-        verdict: on the result, "use", "use with care" or "do not use"; empty without one.
+        sentence: what is wrong with it; empty if nothing is.
+        inputs: SHA-256 of all inputs; empty where the same input may end differently.
+        kinertia: version of Kinertia.
+        trials: number of trials.
+        seconds: computing time.
+        verdict: verdict on the result, "use", "use with care" or "do not use"; empty without one.
         overruled: codes that the subject file waives or ignores, with spaces between them.
     """
 
@@ -61,41 +61,41 @@ class Record:
         return self.status in (PASSED, AGAINST)
 
     def text(self) -> str:
-        """As it is written."""
+        """Return the text of the record as stored."""
         return json.dumps(asdict(self), indent=1) + "\n"
 
 
 @dataclass(frozen=True)
 class Place:
-    """Where the results of one person go in the folder of a cohort."""
+    """Places of one person's results in the folder of a cohort."""
 
     cohort: Path
     person: str
 
     @property
     def results(self) -> Path:
-        """The folder of the results."""
+        """Folder of the results."""
         return self.cohort / "people" / self.person
 
     @property
     def failure(self) -> Path:
-        """The record of a person without results."""
+        """Record of a person without results."""
         return self.cohort / "failed" / f"{self.person}.json"
 
     @property
     def findings(self) -> Path:
-        """The findings of a person without results."""
+        """Findings of a person without results."""
         return self.cohort / "failed" / f"{self.person}.parquet"
 
     @property
     def log(self) -> Path:
-        """What Kinertia's developers need of a failure."""
+        """Log of a failure for Kinertia's developers."""
         return self.cohort / "failed" / f"{self.person}.log"
 
     def record(self, inputs: str) -> Record | None:
-        """What an earlier run of this version said of these inputs; None where none did.
+        """Return the record of an earlier run of this version on these inputs; None where there is none.
 
-        Results of other inputs stay until others take their place: an entry that is changed and changed back costs
+        Results of other inputs stay until they are replaced: an entry that is changed and changed back costs
         nothing.
         """
         records = (_read(self.results / RECORD), _read(self.failure))
@@ -104,15 +104,15 @@ class Place:
 
 @dataclass(frozen=True)
 class Standing:
-    """One person before a run.
+    """State of one person before a run.
 
     Attributes:
-        person: who.
-        trials: how many the subject file names.
-        frames: of all of them, by their headers.
+        person: the person.
+        trials: number of trials in the subject file.
+        frames: frames of all trials, by their headers.
         inputs: SHA-256 of all that goes into the fit.
-        record: what an earlier run said of these inputs.
-        problem: why nobody can be fitted, in one line; empty otherwise.
+        record: record of an earlier run on these inputs.
+        problem: why the person cannot be fitted, in one line; empty otherwise.
     """
 
     person: Person
@@ -123,7 +123,7 @@ class Standing:
     problem: str
 
     def outcome(self, record: Record | None, cohort: Path) -> Record:
-        """What the list of people says: the record of this run or an earlier one, or why nothing could be fitted."""
+        """Return the record for the list of people: of this run, an earlier one, or why nothing could be fitted."""
         known = (
             record or self.record or Record(self.person.name, BAD_INPUT, self.problem, "", VERSION, self.trials, 0.0)
         )
@@ -138,7 +138,7 @@ class Standing:
 
 
 def prepare_folder(cohort: Path) -> None:
-    """Make the folders that results and records go to, and sweep up what a killed run left there."""
+    """Make the folders of results and records, and remove what a killed run left there."""
     for folder in (cohort, cohort / "people", cohort / "failed"):
         folder.mkdir(parents=True, exist_ok=True)
         sweep(folder)
@@ -149,7 +149,7 @@ def prepare_folder(cohort: Path) -> None:
 
 
 def keep(cohort: Path, record: Record) -> None:
-    """Note how the fit of a person ended who has no results; results bring their own record, and end the other."""
+    """Record how a fit without results ended; results bring their own record and replace this one."""
     place = Place(cohort, record.person)
     if not record.fitted:
         write_then_rename(place.failure, record.text())
@@ -159,9 +159,9 @@ def keep(cohort: Path, record: Record) -> None:
 
 
 def standings(people: Sequence[Person], cohort: Path) -> Iterator[Standing]:
-    """Everybody, one after the other: all files are read for their hashes.
+    """Yield everybody's state, one after the other: all files are read for their hashes.
 
-    Who is there a second time, by all that goes into a fit but the name, would count twice in every table, and is not
+    A person listed a second time, by all inputs of a fit but the name, would count twice in every table, and is not
     fitted.
     """
     met: dict[str, str] = {}
@@ -183,22 +183,22 @@ def standings(people: Sequence[Person], cohort: Path) -> Iterator[Standing]:
 
 
 def inputs_of(wanted: SubjectFile) -> str:
-    """SHA-256 of every entry of a subject file, defaults included, with the content of the files that it names.
+    """Return the SHA-256 of every entry of a subject file, defaults included, with the content of its files.
 
-    Where the files are and what they are called changes nothing, nor do comments.
+    Paths and names of the files do not affect it, nor do comments.
     """
     return _hash(_contents(wanted.model_dump()))
 
 
 def _expect_new(name: str, content: Mapping[str, Any], met: dict[str, str]) -> None:
-    """Raise KinertiaError if somebody met before has the same in all but the name; of the first it is noted."""
+    """Raise a KinertiaError if an earlier person has the same inputs but for the name; else remember this one."""
     nameless = _hash({**content, "subject": {**content["subject"], "name": ""}})
     if (first := met.setdefault(nameless, name)) != name:
         raise KinertiaError(f"the same files and settings as '{first}', who would count twice; leave one of them out")
 
 
 def _expect_forces(wanted: SubjectFile) -> None:
-    """Raise KinertiaError if a trial cannot have any: files of other kinds than .trc may hold them."""
+    """Raise a KinertiaError if a trial cannot have forces: files of other kinds than .trc may hold them."""
     for trial in wanted.trials:
         if trial.markers.suffix.lower() == ".trc" and trial.forces is None and trial.loads is None:
             raise KinertiaError(f"trial '{trial.name}' has no forces; name the force file: forces = \"...\"")
@@ -210,7 +210,7 @@ def _hash(content: Mapping[str, Any]) -> str:
 
 
 def _contents(value: Any) -> Any:
-    """The same with SHA-256 in place of paths."""
+    """Replace paths by the SHA-256 of their files."""
     if isinstance(value, Path):
         return sha256(value)
     if isinstance(value, Mapping):
@@ -221,12 +221,12 @@ def _contents(value: Any) -> Any:
 
 
 def one_line(text: str) -> str:
-    """The text without line ends."""
+    """Return the text without line ends."""
     return " ".join(text.split())
 
 
 def _read(path: Path) -> Record | None:
-    """A record; None where there is none, or none of this form: that person is fitted again."""
+    """Read a record; None where there is none, or none of this form: that person is fitted again."""
     try:
         return Record(**json.loads(path.read_text(encoding="utf-8")))
     except (OSError, ValueError, TypeError):

@@ -27,9 +27,9 @@ class Finished:
     """A job that has ended.
 
     Attributes:
-        record: how.
-        worker: computer and number of the process; empty where that was lost.
-        memory_mb: most that the process has held until then; NaN where the system does not say.
+        record: how it ended.
+        worker: computer and number of the process; empty where that is unknown.
+        memory_mb: peak memory of the process until then; NaN where the system does not report it.
     """
 
     record: Record
@@ -38,7 +38,7 @@ class Finished:
 
 
 def measured(fit_person: Callable[[Work], Record], job: Work) -> Finished:
-    """Do a job, on the worker, and say what it took."""
+    """Do a job on the worker, and return its record with the resources it took."""
     record = fit_person(job)
     return Finished(record, f"{platform.node()}:{os.getpid()}", _most_memory_mb())
 

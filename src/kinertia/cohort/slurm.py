@@ -20,14 +20,14 @@ _NO_LOGS = ("--output=/dev/null", "--error=/dev/null")
 
 @contextmanager
 def slurm_cluster(wanted: SlurmFile, people: int) -> Iterator[Any]:
-    """A client of workers that SLURM starts as it has room; its jobs end with the block.
+    """Yield a client of workers that SLURM starts when it has room; its jobs end with the block.
 
     Args:
-        wanted: what to ask for.
-        people: how many are to be fitted; never more workers.
+        wanted: requested resources.
+        people: number of people to be fitted, the largest number of workers.
 
     Raises:
-        KinertiaError: dask-jobqueue or SLURM is not here, SLURM takes no job, or none of them reports.
+        KinertiaError: dask-jobqueue or SLURM is not installed, SLURM accepts no job, or none of them reports.
     """
     if find_spec("dask_jobqueue") is None:
         raise KinertiaError(f"--slurm needs dask-jobqueue, which is not installed; install: {HOW}")

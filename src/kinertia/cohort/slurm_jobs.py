@@ -19,25 +19,25 @@ from kinertia.errors import KinertiaError
 from kinertia.io.slurm_file import SlurmFile
 
 LOOK_S = 30.0
-"""Between two looks at the queue, which are made only while a worker is missing."""
+"""Interval between two looks at the queue, made only while a worker is missing."""
 IN_VAIN = 3
-"""As many times are all jobs asked for of which no one reports."""
+"""Number of times that all jobs are submitted if none of them reports."""
 _ANSWER_S = 60.0
-"""For squeue to answer in."""
+"""Time limit (s) for squeue to answer."""
 
 
 @contextmanager
 def replaced_jobs(cluster: Any, client: Any, wanted: SlurmFile, jobs: int) -> Iterator[None]:
-    """Ask for the jobs, and again for each that ends, until the block does.
+    """Submit the jobs, and resubmit each that ends, until the block does.
 
     Args:
         cluster: dask-jobqueue's, without jobs.
-        client: of the cluster; it is closed when the jobs are given up.
-        wanted: what is asked for.
-        jobs: how many.
+        client: client of the cluster; it is closed when the jobs are given up.
+        wanted: requested resources.
+        jobs: number of jobs.
 
     Raises:
-        KinertiaError: SLURM takes none, or none reports.
+        KinertiaError: SLURM accepts none, or none reports.
     """
     lookout = _Lookout(cluster, client, wanted, jobs)
     thread = Thread(target=lookout.run, daemon=True)
@@ -61,7 +61,7 @@ def replaced_jobs(cluster: Any, client: Any, wanted: SlurmFile, jobs: int) -> It
 
 
 async def _asked(cluster: Any, jobs: int) -> str:
-    """Submit them; what sbatch said to the first that it refused, or nothing."""
+    """Submit the jobs; return sbatch's message on the first that it refused, or nothing."""
     while len(cluster.worker_spec) < jobs:  # as `scale` does, which leaves what sbatch says to a log
         cluster.worker_spec.update(cluster.new_worker_spec())
     try:
@@ -72,10 +72,10 @@ async def _asked(cluster: Any, jobs: int) -> str:
 
 
 class _Lookout:
-    """Looks at the queue for jobs whose workers are missing.
+    """Watcher of the queue for jobs whose workers are missing.
 
     Attributes:
-        over: set when nobody has to look any more.
+        over: set when watching is no longer needed.
         problem: why the jobs were given up; empty unless they were.
     """
 
@@ -87,7 +87,7 @@ class _Lookout:
         self._in_vain: list[str | None] = []
 
     def run(self) -> None:
-        """Look until it is over."""
+        """Watch until it is over."""
         while not self.problem and not self.over.wait(LOOK_S):
             self._look()
 
@@ -100,7 +100,7 @@ class _Lookout:
         if queue is None:
             return
         gone = {name: job.job_id for name, job in missing.items() if job.job_id not in queue}
-        # at the second look: a worker that had reported Dask itself has replaced by then
+        # at the second look: by then Dask itself has replaced a worker that had reported
         for name in [name for name, job_id in gone.items() if self._gone.get(name, "") == job_id]:
             self._in_vain.append(gone.pop(name))
             self._cluster.sync(_forget, self._cluster, name)
@@ -126,7 +126,7 @@ class _Lookout:
 
 
 async def _forget(cluster: Any, name: str) -> None:
-    """A job that is gone; the cluster asks for another one in its place."""
+    """Drop a job that has ended, so that the cluster submits another one in its place."""
     from distributed import Status
 
     job = cluster.workers.pop(name)
@@ -135,7 +135,7 @@ async def _forget(cluster: Any, name: str) -> None:
 
 
 def _queue() -> set[str] | None:
-    """This user's jobs that wait or run; None where SLURM does not answer."""
+    """Return this user's jobs that wait or run; None where SLURM does not answer."""
     command = ["squeue", "--noheader", f"--user={getuser()}", "--format=%A"]
     try:
         answer = subprocess.run(command, capture_output=True, text=True, timeout=_ANSWER_S, check=True)
@@ -145,7 +145,7 @@ def _queue() -> set[str] | None:
 
 
 def _last_line(logs: Path, job_ids: list[str]) -> str:
-    """Of what the last of these jobs wrote as its errors."""
+    """Return the last line that the last of these jobs wrote as an error."""
     texts = [path.read_text(errors="replace") for job in job_ids[-1:] for path in logs.glob(f"*-{job}*.err")]
     lines = [line.strip() for text in texts for line in text.splitlines() if line.strip()]
     return lines[-1] if lines else f"nothing (look into {logs})"

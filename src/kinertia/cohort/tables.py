@@ -92,7 +92,7 @@ _COLUMNS: Mapping[str, Mapping[str, str]] = {
 """Columns of every table with their types, as pyarrow names them."""
 OF_A_PERSON = ("cohort", "trials", "findings", "cycles", "instruments")
 _ROWS_AT_ONCE, _PEOPLE_AT_ONCE = 50_000, 200
-"""Whichever is reached first ends a piece of a table. A file keeps a line on each column of each piece, which for ten
+"""The first to be reached ends a piece of a table. A file keeps a line on each column of each piece, which for ten
 thousand people with a piece each would be more than the numbers; and small tables that wait take more memory than
 their rows."""
 
@@ -101,11 +101,11 @@ def write_person(folder: Path, person: str, fit: Fit, day: date | None = None, w
     """Write a person's rows of the tables, into the folder of the person's results.
 
     Args:
-        folder: of the person.
-        person: name.
-        fit: its result.
-        day: of the recording, if it is known.
-        with_session: whether the fit knew what others say of plates and clock.
+        folder: folder of the person's results.
+        person: name of the person.
+        fit: the person's fit.
+        day: day of the recording, if known.
+        with_session: whether the fit used others' information on plates and synchronisation.
     """
     of_person = (_bsp(fit), _trials(fit), _findings(fit.findings), _cycles(fit), _instruments(fit, day, with_session))
     for name, columns in zip(OF_A_PERSON, of_person, strict=True):
@@ -148,10 +148,10 @@ def write_tables(
 
 
 def fitted_people(cohort: Path) -> set[str] | None:
-    """Who has results by the list of people, as names stand there; None without one, before a first run's end.
+    """Return the people with results, by name as in the list of people; None without a list, before a first run's end.
 
     Raises:
-        FileError: the list is none of ours any more.
+        FileError: the list is no longer one written by Kinertia.
     """
     path = cohort / "people.csv"
     if not path.is_file():
@@ -196,7 +196,7 @@ def read_cohort(folder: str | Path) -> dict[str, Any]:
 
 
 def _bsp(fit: Fit) -> dict[str, Any]:
-    """Body segment parameters; the trials are all that they were estimated from."""
+    """Return body segment parameters, with all trials that they were estimated from."""
     columns = fit.bsp_columns()
     rows = len(columns["segment"])
     known = {name: columns.get(name, [None] * rows) for name in _COLUMNS["cohort"] if name not in ("person", "trial")}
@@ -204,7 +204,7 @@ def _bsp(fit: Fit) -> dict[str, Any]:
 
 
 def _trials(fit: Fit) -> dict[str, Any]:
-    """What `fit.json` says of every trial, the verdict on it, and codes of its open ERRORs."""
+    """Return every trial's entries of `fit.json`, its verdict, and the codes of its open ERRORs."""
     rows = []
     for of_trial, trial in zip(summary(fit)["trials"], fit.trials, strict=True):
         row = {
@@ -223,7 +223,7 @@ def _trials(fit: Fit) -> dict[str, Any]:
 
 
 def _findings(found: Sequence[Finding]) -> dict[str, Any]:
-    """A row for each finding, muted and overruled ones included, with the headline's value."""
+    """Return a row for each finding, muted and overruled ones included, with the headline's value."""
     heads = [one.headline for one in found]
     return {
         "trial": [one.where.trial for one in found],
@@ -238,8 +238,8 @@ def _findings(found: Sequence[Finding]) -> dict[str, Any]:
 
 
 def _cycles(fit: Fit) -> dict[str, Any]:
-    """The rows of the person's `cycles.csv`, and what the person's figures call each curve: with the direction that is
-    positive, which models differ in.
+    """Return the rows of the person's `cycles.csv`, and the title of each curve in the person's figures with its
+    positive direction, in which models differ.
     """
     columns = cycle_columns(fit.trials, fit.mass_kg, "estimate", MOST_STRIDES)
     titles = {name: title for kind in UNITS for name, title in titled_quantities(fit.skeleton, kind)}
@@ -247,7 +247,7 @@ def _cycles(fit: Fit) -> dict[str, Any]:
 
 
 def _instruments(fit: Fit, day: date | None, with_session: bool) -> dict[str, Any]:
-    """What the person's trials say of plates and clock; nothing by the two-level method."""
+    """Return the person's information on plates and synchronisation; nothing by the two-level method."""
     errors = () if fit.posterior is None else fit.posterior.instrument_errors
     columns = {name: values for name, values in calibration_columns(errors).items() if name in _COLUMNS["instruments"]}
     said = {"date": None if day is None else day.isoformat(), "with_session": with_session}
@@ -267,7 +267,7 @@ def _scores(person: str, folder: Path, norms: Mapping[str, Norm]) -> dict[str, A
 
 
 def _table(name: str, columns: Mapping[str, Any]) -> pyarrow.Table:
-    """A table with its types; what is not known is null."""
+    """Build a table with its types; unknown values are null."""
     import pyarrow
 
     schema = pyarrow.schema(list(_COLUMNS[name].items()))
@@ -281,7 +281,7 @@ def _table(name: str, columns: Mapping[str, Any]) -> pyarrow.Table:
 
 
 class _GrowingTable:
-    """A table that is written in pieces."""
+    """Table that is written in pieces."""
 
     def __init__(self, path: Path, name: str, csv_path: Path | None, open_files: ExitStack) -> None:
         from pyarrow import parquet
@@ -303,7 +303,7 @@ class _GrowingTable:
             self.write()
 
     def write(self) -> None:
-        """Write what waits."""
+        """Write the rows that are waiting."""
         import pyarrow
 
         piece = pyarrow.concat_tables([self._schema.empty_table(), *self._waiting])
@@ -318,12 +318,12 @@ class _GrowingTable:
 
 @contextmanager
 def _tables_in(folder: Path, with_csv: bool) -> Iterator[dict[str, _GrowingTable]]:
-    """Tables to add to; their files take the place of older ones when the block ends without an error."""
+    """Yield tables to add to; their files replace older ones when the block ends without an error."""
     with working_folder(folder) as work:
         with ExitStack() as open_files:
             tables = {}
             for name in _COLUMNS:
-                # a CSV file of an earlier run is not left to be of other people
+                # a CSV file of an earlier run, with other people, is not left behind
                 wanted = with_csv or name == "people" or (folder / f"{name}.csv").exists()
                 csv_path = work / f"{name}.csv" if wanted else None
                 tables[name] = _GrowingTable(work / f"{name}.parquet", name, csv_path, open_files)

@@ -13,12 +13,12 @@ from contextlib import contextmanager
 from pathlib import Path
 
 _ENDED = "Timeout ("
-"""As faulthandler begins."""
+"""Beginning of faulthandler's output."""
 
 
 @contextmanager
 def time_limit(seconds: float, log: Path, run: str) -> Iterator[None]:
-    """End this process if the block takes longer; `log` then says where it was, and in which run.
+    """End this process if the block takes longer; `log` then states where it was, and in which run.
 
     One block at a time in a process.
     """
@@ -35,7 +35,7 @@ def time_limit(seconds: float, log: Path, run: str) -> Iterator[None]:
 
 
 def was_ended(log: Path, run: str) -> bool:
-    """Whether a block of this run was ended that had this log."""
+    """Return whether a block of this run with this log was ended."""
     try:
         return log.read_text(encoding="utf-8").startswith(_heading(run) + _ENDED)
     except OSError:
@@ -43,7 +43,7 @@ def was_ended(log: Path, run: str) -> bool:
 
 
 def no_end(seconds: float, log: Path) -> str:
-    """What to say of it."""
+    """Describe the time limit that was exceeded."""
     return (
         f"its fit had no end after {seconds / 60.0:.0f} min, and its process was ended; look for what is unusual in "
         f"its files, and send {log} to Kinertia's developers, which says where it was; the next run tries again"

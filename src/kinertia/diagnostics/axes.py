@@ -14,7 +14,7 @@ _FORE_AFT, _MEDIOLATERAL = "fore-aft", "mediolateral"
 
 
 class AxisNames(TypedDict):
-    """Arguments of `Where`."""
+    """Names of a ground axis, as keyword arguments of `Where`."""
 
     axis: str
     file_axis: str
@@ -37,12 +37,12 @@ class Axes:
 
     @classmethod
     def of(cls, vertical: str, moves: Travel) -> Axes:
-        """Of a recording: along X unless the person walks along Z."""
+        """Name the axes of a recording: fore-aft is X unless the person walks along Z."""
         along_z = moves.kind == "walks" and abs(np.sin(np.radians(moves.direction_deg))) > np.sqrt(0.5)
         return cls(vertical, 2 if along_z else 0)
 
     def named(self, ground_axis: int) -> AxisNames:
-        """Of ground axis 0, 1 or 2: direction of the person's walk, and signed axis of the file."""
+        """Return the anatomical direction of ground axis 0, 1 or 2, and the signed axis of the file that it is."""
         across = _FORE_AFT if ground_axis == self.fore_aft else _MEDIOLATERAL
         direction = "vertical" if ground_axis == 1 else across
         row = ground_rotation(self.vertical)[ground_axis]

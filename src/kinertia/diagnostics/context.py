@@ -86,7 +86,7 @@ class RecordingContext:
 
     @cached_property
     def markers(self) -> Markers:
-        """Those of the marker set; all where no set fits."""
+        """Markers of the marker set; all markers where no set fits."""
         if self.marker_set is None:
             return self.recording.markers
         present = set(self.recording.markers.labels)
@@ -94,13 +94,13 @@ class RecordingContext:
 
     @cached_property
     def seen_labels(self) -> frozenset[str]:
-        """Labels of all markers that a frame shows."""
+        """Labels of all markers that are visible in at least one frame."""
         markers = self.all_markers
         return frozenset(label for label, seen in zip(markers.labels, markers.seen.T, strict=True) if seen.any())
 
     @cached_property
     def contact_span_s(self) -> tuple[float, float] | None:
-        """First and last time of the part that is measured: around loads on plates; None where all of it counts."""
+        """First and last time (s) of the part used, around the loads on plates; None where all of it counts."""
         if self.is_static or self.plates is None:
             return None
         span = contact_span_s(self.plates)
@@ -110,7 +110,7 @@ class RecordingContext:
 
     @cached_property
     def measured_markers(self) -> Markers:
-        """`markers` of the part that is measured, without copies of lost frames."""
+        """`markers` within the part used, without copies of dropped frames."""
         if self.is_static:
             return self.markers
         markers = without_copied_frames(self.markers)
@@ -119,49 +119,49 @@ class RecordingContext:
 
     @cached_property
     def marker_precision(self) -> MarkerPrecision:
-        """Rounding and noise of the coordinates."""
+        """Quantisation step and noise of the marker coordinates."""
         return MarkerPrecision.of(self.measured_markers)
 
     @cached_property
     def trajectory_faults(self) -> TrajectoryFaults:
-        """Spikes, jumps and filled intervals of single markers; of who stands still, repeated spikes only."""
+        """Spikes, jumps and filled gaps of single markers; of a person who stands still, repeated spikes only."""
         segments = {} if self.marker_set is None else self.marker_set.segments
         coarse = self.is_static or self.marker_precision.rounded or self.marker_precision.noisy
         return TrajectoryFaults.of(self.measured_markers, segments, coarse)
 
     @cached_property
     def travel(self) -> Travel:
-        """What the person does: walks, stands still, or moves on the spot."""
+        """Movement of the person: walking, standing still, or moving on the spot."""
         return travel(self.markers)
 
     @cached_property
     def axes(self) -> Axes:
-        """What the ground axes are called."""
+        """Names of the ground axes of this recording."""
         return Axes.of(self.recording.vertical, self.travel)
 
     @cached_property
     def landmark_positions(self) -> Mapping[str, FloatArray]:
-        """(n, 3) m of every landmark whose labels are all there."""
+        """Positions (n, 3) m of every landmark whose labels are all present."""
         return {} if self.marker_set is None else landmark_positions(self.all_markers, self.marker_set)
 
     @cached_property
     def headings(self) -> Mapping[str, FloatArray]:
-        """(n, 3): where feet and pelvis point."""
+        """Headings of the feet and the pelvis, unit vectors (n, 3)."""
         return headings(self.landmark_positions)
 
     @cached_property
     def most_forwards(self) -> float:
-        """Largest cosine of these to the way that the person goes; 0 of who goes nowhere."""
+        """Largest cosine between these headings and the direction of travel; 0 where the person does not travel."""
         return most_forwards(self.all_markers, self.headings)
 
     @property
     def walks_backwards(self) -> bool:
-        """Whether the person goes where neither feet nor pelvis point."""
+        """Whether the person travels opposite to the headings of feet and pelvis."""
         return self.most_forwards < -CLEAR
 
     @cached_property
     def feet(self) -> FootMarkers | None:
-        """Labels on each foot, "r" and "l"; None unless both have one."""
+        """Labels of the markers on each foot, "r" and "l"; None unless both feet have one."""
         if self.marker_set is None:
             return None
         present = set(self.recording.markers.labels)
@@ -177,19 +177,19 @@ class RecordingContext:
 
     @cached_property
     def foot_trajectories(self) -> tuple[FootTrajectory, FootTrajectory] | None:
-        """Right and left foot; None where a foot is hardly seen."""
+        """Trajectories of the right and the left foot; None where a foot is hardly visible."""
         return None if self.feet is None else foot_trajectories(self.recording.markers, self.feet, self.recording.belt)
 
     @cached_property
     def contacts(self) -> Sequence[PlateContact]:
-        """Every load on a plate, with where it is on the feet; none without plates or feet."""
+        """Every load on a plate, with its position relative to the feet; none without plates or feet."""
         if self.plates is None or self.foot_trajectories is None:
             return ()
         return contacts_of(self.plates, self.foot_trajectories)
 
     @cached_property
     def overhangs(self) -> Sequence[Overhang]:
-        """Feet that reach beyond the plate that they stand on; none where its corners are not known."""
+        """Feet that extend beyond the edge of the plate that they stand on; none where its corners are unknown."""
         if self.plates is None or self.feet is None:
             return ()
         named = {} if self.marker_set is None else self.marker_set.landmarks
@@ -241,9 +241,9 @@ class RecordingContext:
 
     @cached_property
     def has_strides(self) -> bool:
-        """Whether the person walks or runs over the plates; true where feet are not known well enough to tell.
+        """Whether the person walks or runs over the plates; true where the feet are not known well enough to decide.
 
-        Landings, squats and standing have none: then the pelvis does not go with the body, and loads do not go from
+        Landings, squats and standing have none: the pelvis then does not move with the body, nor the load from
         heel to toe.
         """
         if self.trial is not None and any(periods(self.trial.loads)):
@@ -255,7 +255,7 @@ class RecordingContext:
 
     @cached_property
     def turns(self) -> bool:
-        """Whether the pelvis points elsewhere after the loads on plates than before them: who turns is turned."""
+        """Whether the person turns: the pelvis heads elsewhere after the loads on plates than before them."""
         facing, time = self.headings.get("pelvis"), self.all_markers.time
         if facing is None or self.contact_span_s is None:
             return False
@@ -300,36 +300,36 @@ class RecordingContext:
 
     @cached_property
     def adult_share(self) -> float:
-        """Body weight over an adult's, at most 1: limits in newtons, which are those of adults, are times this."""
+        """Body weight as a share of an adult's, at most 1; limits in newtons are those of adults times this share."""
         return adult_share(self.plates, self.mass_kg)
 
     @cached_property
     def velocities(self) -> Sequence[CausedVelocity]:
-        """How fast the body is by markers and by forces, one entry per measured window."""
+        """Body velocity from the markers and from the forces, one entry per measured window."""
         return () if self.trial is None else caused_velocities(self.trial, self.segment_of_label)
 
     @cached_property
     def velocity_changes(self) -> VelocityChanges | None:
-        """The same of all windows together, each without its trend; None where there are none."""
+        """Body velocities of all windows together, each without its linear trend; None where there are no windows."""
         return VelocityChanges.of(self.velocities) if self.velocities else None
 
     @cached_property
     def force_mass(self) -> ForceMass | None:
-        """Body mass by the vertical force; None where forces or markers do not show it."""
+        """Body mass from the vertical force; None where forces or markers do not show it."""
         if self.trial_on_plates is None:
             return None
         return force_mass(self.segment_of_label, self.trial_on_plates, self.travel.kind == "stands still")
 
     @cached_property
     def standing_mass(self) -> StandingMass | None:
-        """Body mass while the person stands still with both feet on plates; None where that is not so."""
+        """Body mass while the person stands still with both feet on plates; None where the person does not."""
         if self.plates is None or self.feet is None:
             return None
         return standing_mass(self.plates, self.all_markers, self.feet)
 
     @cached_property
     def plate_masses(self) -> Mapping[str, float]:
-        """kg, body mass by each plate that carries all of it for a while; empty where loads are not sorted by foot."""
+        """Body mass (kg) from each plate that supports all of it for a while; empty if loads are not sorted by foot."""
         if self.plates is None or self.trial is None:
             return {}
         return plate_masses(self.plates, self.trial, self.all_markers, self.segment_of_label)
@@ -348,11 +348,11 @@ class RecordingContext:
         return {name: kg for name, kg in self.plate_masses.items() if name not in other}
 
     def at(self, **where: Any) -> Where:
-        """A place in this recording: `at(plate="plate 1", **self.along(2))`."""
+        """Return a place in this recording: `at(plate="plate 1", **self.along(2))`."""
         return Where(trial=self.name, **where)
 
     def along(self, ground_axis: int) -> AxisNames:
-        """Names of ground axis 0, 1 or 2, as arguments of `at`."""
+        """Return the names of ground axis 0, 1 or 2, as keyword arguments of `at`."""
         return self.axes.named(ground_axis)
 
 
@@ -366,8 +366,8 @@ class PersonContext:
         static: the static trial; None with an OpenSim model, or without one.
         marker_set: which label is which landmark, or the markers of the model.
         model: the OpenSim model, where there is one.
-        calibrated: markers and joints of the model are to move.
-        total_mass: what was stated of the body and of what was worn; None where no mass is known.
+        calibrated: whether markers and joints of the model are to be calibrated.
+        total_mass: stated masses of the body and of attached items; None where no mass is known.
         found: findings of the recordings themselves, where a question depends on them.
         more_statics: recordings in which the person stands, of which none is the static trial.
     """
@@ -389,11 +389,11 @@ class PersonContext:
 
     @property
     def has_trials(self) -> bool:
-        """Whether trials were given, blocked ones included: a model is not looked at alone."""
+        """Whether trials were given, blocked ones included, so that the model is not checked on its own."""
         return bool(self.trials or self.found)
 
     def has_error(self, trial: str, *codes: str) -> bool:
-        """Whether an ERROR of one of these codes, questions or families was found in a trial."""
+        """Return whether an ERROR of one of these codes, questions or families was found in a trial."""
         return any(
             one.severity is Severity.ERROR and one.where.trial == trial and one.code.startswith(codes)
             for one in self.found

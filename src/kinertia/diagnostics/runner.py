@@ -20,11 +20,11 @@ Context = TypeVar("Context")
 
 @dataclass(frozen=True)
 class Question(Generic[Context]):
-    """One question, answered by one function.
+    """One question about a recording, person or result, answered by one function.
 
     Attributes:
-        code: its first three characters, "P21".
-        ask: what answers it.
+        code: first three characters of its codes, "P21".
+        ask: function that answers it.
         unless: codes, questions or families whose ERROR leaves it without meaning: then it is not asked.
     """
 
@@ -36,13 +36,13 @@ class Question(Generic[Context]):
 def asked(
     questions: Iterable[Question[Context]], context: Context, found: Sequence[Finding] = (), trial: str | None = None
 ) -> list[Finding]:
-    """Findings of these questions, each asked unless what was found before leaves it without meaning.
+    """Ask these questions, unless earlier findings leave one without meaning, and return the findings.
 
     Args:
         questions: in the order in which they are asked.
         context: what they are asked of.
-        found: what was found before.
-        trial: name of the trial that findings are of which name none.
+        found: earlier findings.
+        trial: name of the trial for findings that state none.
     """
     result: list[Finding] = []
     for question in questions:
@@ -55,12 +55,12 @@ def asked(
 
 
 def rules_of(*questions: Question[Any]) -> int:
-    """How many rules questions stand for."""
+    """Count the rules that these questions cover."""
     return len({code for one in questions for code in matching(one.code)})
 
 
 def explained(findings: Iterable[Finding]) -> list[Finding]:
-    """Findings with those muted that another one explains; a cause takes over the severity of its consequences.
+    """Mute findings that another one explains; a cause takes over the severity of its consequences.
 
     A correction of the estimate that resolves an earlier warning mutes it, and leaves it a correction.
     """
@@ -88,7 +88,7 @@ def explained(findings: Iterable[Finding]) -> list[Finding]:
 
 
 def _resolved(one: Finding, findings: Sequence[Finding]) -> Finding:
-    """A warning whose quantity the estimate has corrected."""
+    """Return the correction of a warning whose quantity the estimate has corrected, else the finding unchanged."""
     if one.severity is not Severity.WARNING or one.muted_by is not None:
         return one
     for correction in findings:
@@ -101,13 +101,12 @@ def _resolved(one: Finding, findings: Sequence[Finding]) -> Finding:
 def overruled(
     findings: Iterable[Finding], overrule: Overrule, of_trials: Mapping[str, Overrule] | None = None
 ) -> list[Finding]:
-    """Findings with the status that the user gives them: ERRORs are waived unless nothing can be computed, others
-    ignored.
+    """Apply the status that the user gives findings: ERRORs are waived unless nothing can be computed, others ignored.
 
     Args:
-        findings: with what explains each.
-        overrule: in all trials.
-        of_trials: in single trials, by their names.
+        findings: findings with their explanations.
+        overrule: what the user overrules in all trials.
+        of_trials: what the user overrules in single trials, by name.
     """
     result = []
     for one in findings:
@@ -121,12 +120,12 @@ def overruled(
 
 
 def blocking(findings: Iterable[Finding]) -> list[Finding]:
-    """Open ERRORs that no other finding explains: what stops the next stage."""
+    """Return open ERRORs that no other finding explains; they stop the next stage."""
     return [one for one in findings if one.severity is Severity.ERROR and one.is_open]
 
 
 def unknown_codes(overrule: Overrule) -> list[str]:
-    """What of it is no code, question or family of the catalogue, or cannot be waived."""
+    """Return entries that are no code, question or family of the catalogue, or cannot be waived."""
     unknown = [each for each in (*overrule.waive, *overrule.ignore) if not matching(each)]
     hard = [each for each in overrule.waive if len(each) == 4 and matching(each) and rule(each).hard]
     return [*unknown, *hard]

@@ -16,7 +16,7 @@ _LISTED = 4
 
 
 def _scaled(unit: str, size: float) -> tuple[float, str, int]:
-    """Factor, unit and digits after the point of a size in an SI unit."""
+    """Return factor, unit and number of decimals for a size in an SI unit."""
     match unit:
         case "m":
             return (1e3, "mm", 0 if size >= 0.01 else 1) if size < 1.0 else (1.0, "m", 2)
@@ -38,8 +38,8 @@ def _scaled(unit: str, size: float) -> tuple[float, str, int]:
 
 
 def shown(quantity: Quantity, style: str = "") -> str:
-    """A quantity with its unit: "-23 N", "4.6 mm", "0.25, 0.31 m"; `style` "+" with its sign, "%" as a percentage,
-    "#" as a count.
+    """Format a quantity with its unit: "-23 N", "4.6 mm", "0.25, 0.31 m"; `style` "+" with its sign, "%" as a
+    percentage, "#" as a count.
     """
     if isinstance(quantity.value, str):
         return quantity.value
@@ -59,13 +59,13 @@ def shown(quantity: Quantity, style: str = "") -> str:
 
 
 def first_few(names: Sequence[str], most: int = _LISTED) -> str:
-    """The first of a list, and how many more there are."""
+    """List the first names, and how many more there are."""
     more = len(names) - most
     return ", ".join(names[:most]) + (f" and {more} more" if more > 0 else "")
 
 
 def filled(template: str, where: Where, evidence: Mapping[str, Quantity]) -> str:
-    """A sentence of the catalogue with evidence and places in it: `{level_n}`, `{share:%}`, `{frames:#}`, `{plate}`."""
+    """Fill a sentence of the catalogue with evidence and places: `{level_n}`, `{share:%}`, `{frames:#}`, `{plate}`."""
     places = _places(where)
 
     def one(match: re.Match[str]) -> str:
@@ -78,11 +78,11 @@ def filled(template: str, where: Where, evidence: Mapping[str, Quantity]) -> str
 
 
 def outlined(template: str, mark: str = "<{}>") -> str:
-    """A sentence of the catalogue as it reads before anything was measured: `<level>` for `{level_n}`.
+    """Return a sentence of the catalogue as it reads before anything was measured: `<level>` for `{level_n}`.
 
     Args:
-        template: with `{names}` of evidence and places.
-        mark: how a name is shown, with its place as `{}`.
+        template: sentence with `{names}` of evidence and places.
+        mark: format of a name, with `{}` in its place.
 
     >>> outlined("Forces of {plate} lag by {delay_s:+}{condition}.")  # what joins a word is an addition
     'Forces of <plate> lag by <delay>.'
@@ -96,7 +96,7 @@ def outlined(template: str, mark: str = "<{}>") -> str:
 
 
 def names_in(template: str) -> tuple[str, ...]:
-    """Evidence and places that a sentence of the catalogue asks for, in its order."""
+    """Return the evidence and places that a sentence of the catalogue refers to, in order."""
     return tuple(field.group(1) for field in _FIELD.finditer(template))
 
 
@@ -118,14 +118,14 @@ def _places(where: Where) -> dict[str, Callable[[], str]]:
 
 
 def plate_text(name: str | None) -> str:
-    """A plate by its name, which need not say that it is one: "plate left"."""
+    """Describe a plate by its name, with "plate" added where the name lacks it: "plate left"."""
     if name is None:
         return "all plates"
     return name if re.search("plate|force|belt|platform", name, re.IGNORECASE) else f"plate {name}"
 
 
 def axis_text(where: Where) -> str:
-    """The axis as the person moves, and as the file has it: "fore-aft (X)"."""
+    """Describe the axis in the person's direction, and as in the file: "fore-aft (X)"."""
     if where.axis and where.file_axis:
         return f"{where.axis} ({where.file_axis})"
     return where.axis or where.file_axis or "an axis"

@@ -21,7 +21,7 @@ Status = Literal["open", "waived", "ignored"]
 
 
 class Severity(IntEnum):
-    """How much a finding matters: ERROR blocks, WARNING lowers a verdict, CORRECTED and INFO lower none.
+    """Importance of a finding: ERROR blocks, WARNING lowers a verdict, CORRECTED and INFO lower none.
 
     Examples:
         >>> kinertia.Severity.ERROR > kinertia.Severity.WARNING > kinertia.Severity.CORRECTED > kinertia.Severity.INFO
@@ -36,14 +36,14 @@ class Severity(IntEnum):
 
 @dataclass(frozen=True)
 class Finding:
-    """What a rule of the catalogue found.
+    """One result of a rule of the catalogue: what was found, where, and with which evidence.
 
     Attributes:
-        code: of the rule, like "P213".
-        where: what it is about.
-        evidence: what was measured by name; the first is the headline.
-        severity: the rule's, or as escalated.
-        causes: likeliest first; the rule's if empty.
+        code: code of the rule, such as "P213".
+        where: place that it concerns.
+        evidence: measured quantities by name; the first is the headline.
+        severity: severity of the rule, or as escalated.
+        causes: likely causes, likeliest first; the rule's if empty.
         muted_by: code of the finding that explains this one.
         status: "open", "waived" or "ignored".
 
@@ -70,7 +70,7 @@ class Finding:
 
     @property
     def rule(self) -> Rule:
-        """The entry of the catalogue."""
+        """Rule of the catalogue that this finding belongs to."""
         return rule(self.code)
 
     @property
@@ -85,7 +85,7 @@ class Finding:
 
     @property
     def effect(self) -> str:
-        """What goes wrong if it stays, with its typical size."""
+        """Consequence if it is not corrected, with its typical size."""
         return self._said(self.rule.effect)
 
     @property
@@ -95,38 +95,38 @@ class Finding:
 
     @property
     def likely_causes(self) -> tuple[str, ...]:
-        """Its own, or the rule's; likeliest first."""
+        """Likely causes, its own or the rule's; likeliest first."""
         return self.causes or self.rule.causes
 
     @property
     def headline(self) -> Quantity | None:
-        """The first of the evidence that is a number."""
+        """First quantity of the evidence that is a number."""
         return next((one for one in self.evidence.values() if isinstance(one.value, float | int)), None)
 
     @property
     def is_open(self) -> bool:
-        """Whether it is neither explained by another nor overruled."""
+        """Whether the finding is neither explained by another nor overruled."""
         return self.status == "open" and self.muted_by is None
 
     def muted(self, by: str) -> Finding:
-        """The same, explained by the finding of that code."""
+        """Return the finding as explained by the finding of that code."""
         return replace(self, muted_by=by)
 
     def at(self, severity: Severity) -> Finding:
-        """The same with another severity."""
+        """Return the finding with another severity."""
         return replace(self, severity=severity)
 
     def in_trial(self, trial: str | None) -> Finding:
-        """The same, found in that trial; of None, in none of them."""
+        """Return the finding as found in that trial; in no trial if None."""
         return replace(self, where=replace(self.where, trial=trial))
 
     def in_file(self, file: str) -> Finding:
-        """The same, found in that file."""
+        """Return the finding as found in that file."""
         return replace(self, where=replace(self.where, file=file))
 
     @property
     def place(self) -> str:
-        """File and line where they are known, else the trial, else the file that the message does not name."""
+        """File and line where they are known, else the trial, else the file that the message does not state."""
         where = self.where
         if where.file is not None and where.line is not None:
             return f"{where.file}, line {where.line}"
@@ -134,11 +134,11 @@ class Finding:
         return where.trial or file
 
     def line(self) -> str:
-        """Where and what on one line: `walk  P213 The zero of plate 1 is off ...`."""
+        """Return place and message on one line: `walk  P213 The zero of plate 1 is off ...`."""
         return f"{self.place}  {self.code} {self.message}" if self.place else f"{self.code} {self.message}"
 
     def to_dict(self) -> dict[str, Any]:
-        """For JSON, numbers in SI units."""
+        """Convert to JSON content, with numbers in SI units."""
         return {
             "code": self.code,
             "name": self.name,
@@ -164,14 +164,14 @@ def finding(
     causes: tuple[str, ...] = (),
     **evidence: Quantity,
 ) -> Finding:
-    """A finding of the catalogue's rule, with its severity unless another is given.
+    """Create a finding of this rule, with the rule's severity unless another is given.
 
     Args:
-        code: of the rule.
-        where: what it is about.
-        severity: where the rule's is raised or lowered.
-        causes: likeliest first, where they depend on what was measured.
-        evidence: what was measured, the headline first.
+        code: code of the rule.
+        where: place that it concerns.
+        severity: severity, where the rule's is raised or lowered.
+        causes: likely causes, likeliest first, where they depend on what was measured.
+        evidence: measured quantities, the headline first.
     """
     return with_evidence(code, where or Where(), evidence, severity, causes)
 
@@ -183,5 +183,5 @@ def with_evidence(
     severity: Severity | None = None,
     causes: tuple[str, ...] = (),
 ) -> Finding:
-    """The same of evidence that is a mapping."""
+    """Create a finding of this rule from evidence in a mapping, as `finding` does."""
     return Finding(code, where, evidence, Severity[rule(code).severity] if severity is None else severity, causes)

@@ -41,11 +41,11 @@ class Overview:
 
     @property
     def open(self) -> list[Finding]:
-        """Those that are neither explained nor overruled, the most important first."""
+        """Findings that are neither explained nor overruled, the most important first."""
         return reported(self.findings, Severity.INFO)
 
     def count(self, severity: Severity) -> int:
-        """How many open ones of this severity."""
+        """Count the open findings of this severity."""
         return sum(one.severity is severity for one in self.open)
 
     @property
@@ -55,12 +55,12 @@ class Overview:
 
     @property
     def waived(self) -> list[Finding]:
-        """ERRORs that the user overrules."""
+        """ERRORs that the user has overruled."""
         return [one for one in self.findings if one.status == "waived" and one.muted_by is None]
 
     @property
     def severity(self) -> Severity:
-        """The worst of the open ones; a waived ERROR, and one of a trial left out, count as a WARNING."""
+        """Worst severity of the open findings; a waived ERROR, and one of a trial left out, count as a WARNING."""
         used = (
             self.open if len(self.left_out) >= self.trials else [one for one in self.open if not self._is_left_out(one)]
         )
@@ -72,14 +72,14 @@ class Overview:
 
     @property
     def verdict(self) -> Use:
-        """ "use", "use with care" or "do not use"."""
+        """Verdict: "use", "use with care" or "do not use"."""
         if self.severity is Severity.ERROR:
             return DO_NOT_USE
         return WITH_CARE if self.severity is Severity.WARNING else USE
 
     @property
     def line(self) -> str:
-        """The verdict and what it rests on."""
+        """Verdict with its basis, in one line."""
         counts = [
             (self.count(Severity.ERROR), "error", "errors"),
             (self.count(Severity.WARNING), "warning", "warnings"),
@@ -99,7 +99,7 @@ class Overview:
 
 
 def in_order(findings: Iterable[Finding]) -> list[Finding]:
-    """The worst first; of equals those of all trials, then those of the earliest stage."""
+    """Sort findings, the worst first; equals by concerning all trials first, then by stage."""
 
     def importance(one: Finding) -> tuple[int, bool, int, str]:
         return -one.severity, one.where.trial is not None, STAGES.index(one.rule.stage), one.code
@@ -108,12 +108,12 @@ def in_order(findings: Iterable[Finding]) -> list[Finding]:
 
 
 def reported(findings: Iterable[Finding], least: Severity = Severity.CORRECTED) -> list[Finding]:
-    """Open findings from this severity on, in order; assumptions and advice are left out unless asked for."""
+    """Return open findings from this severity on, in order; assumptions and advice are left out by default."""
     return in_order(one for one in findings if one.is_open and one.severity >= least)
 
 
 def consequences(findings: Sequence[Finding], causes: Iterable[Finding]) -> list[Finding]:
-    """What these causes explain, and what that explains in its turn."""
+    """Return the findings that these causes explain, directly or through others."""
     found: list[Finding] = []
     waiting = list(causes)
     while waiting:
@@ -127,18 +127,18 @@ def consequences(findings: Sequence[Finding], causes: Iterable[Finding]) -> list
 
 @dataclass(frozen=True)
 class Group:
-    """Findings of one code in one trial or file, of which the first stands for all."""
+    """Findings of one code in one trial or file, represented by the first."""
 
     findings: tuple[Finding, ...]
 
     @property
     def first(self) -> Finding:
-        """The one whose message is shown."""
+        """Finding whose message is shown."""
         return self.findings[0]
 
     @property
     def message(self) -> str:
-        """Its message, and in how many places there is the same."""
+        """Message of the first finding, with the number of further places."""
         if len(self.findings) == 1:
             return self.first.message
         places = [_place(one) for one in self.findings[1:]]
@@ -154,7 +154,7 @@ class Group:
 
 
 def grouped(findings: Iterable[Finding]) -> list[Group]:
-    """Findings of the same code, file, trial and severity together, in their order."""
+    """Group findings of the same code, file, trial and severity, in order."""
     groups: dict[tuple[object, ...], list[Finding]] = {}
     for one in findings:
         alike = (one.code, one.where.file, one.where.trial, one.severity, one.status, one.muted_by)

@@ -12,8 +12,8 @@ class Quantity:
 
     Attributes:
         value: a number, several, or text.
-        unit: "m", "s", "N", "N m", "N m/N", "kg", "kg m2", "rad", "Hz" ...; "1" of shares and counts, "" of text.
-        limit: beyond which the rule fires.
+        unit: "m", "s", "N", "N m", "N m/N", "kg", "kg m2", "rad", "Hz" ...; "1" for shares and counts, "" for text.
+        limit: limit beyond which the rule fires.
         usual: range on fault-free recordings.
         sd: standard deviation.
 
@@ -29,7 +29,7 @@ class Quantity:
     sd: float | None = None
 
     def to_dict(self) -> dict[str, Any]:
-        """For JSON: value and unit, and the others where they are known."""
+        """Convert to JSON content: value and unit, and the others where known."""
         others = {"limit": self.limit, "usual": self.usual, "sd": self.sd}
         value = list(self.value) if isinstance(self.value, tuple) else self.value
         return {"value": value, "unit": self.unit} | {

@@ -15,7 +15,7 @@ class Where:
         trial: name of the trial, or of the static trial.
         plate: name of the force plate.
         axis: direction of the person's walk: "fore-aft", "vertical" or "mediolateral".
-        file_axis: the same axis as the file calls it, "X", "Y" or "Z".
+        file_axis: the same axis in the file, "X", "Y" or "Z".
         markers: labels.
         part: segment, joint, coordinate or parameter.
         span_s: start and end, s.
@@ -36,7 +36,7 @@ class Where:
     span_s: tuple[float, float] | None = None
 
     def overlaps(self, other: Where) -> bool:
-        """Whether both may be about the same: equal or unstated in each respect, with a common marker and time."""
+        """Return whether both may concern the same: equal or unstated in each respect, with common marker and time."""
         for name in ("trial", "plate", "axis", "part"):
             own, others = getattr(self, name), getattr(other, name)
             if own is not None and others is not None and own != others:
@@ -48,7 +48,7 @@ class Where:
         return self.span_s[0] <= other.span_s[1] and other.span_s[0] <= self.span_s[1]
 
     def to_dict(self) -> dict[str, Any]:
-        """For JSON: what is stated."""
+        """Convert to JSON content: what is stated."""
         stated = {name: getattr(self, name) for name in self.__dataclass_fields__}
         return {
             name: list(value) if isinstance(value, tuple) else value

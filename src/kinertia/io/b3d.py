@@ -67,12 +67,12 @@ def _recording(subject: Any, trial: int, name: str) -> Recording:
 
 
 def _stated(value: float) -> float | None:
-    """A number that the file has; AddBiomechanics writes zero or less where nobody said it."""
+    """Return a number stated in the file; None for zero or less, which AddBiomechanics writes for unknown values."""
     return float(value) if value > 0.0 else None
 
 
 def _plates(frames: Any, time: np.ndarray) -> PlateLoads | None:
-    """Loads at the frames, as the plates gave them; None without plates."""
+    """Return the loads at the frames as the plates measured them; None without plates."""
     force, torque, point = (
         np.array([[np.asarray(one) for one in getattr(frame, name)] for frame in frames], dtype=float)
         for name in ("rawForcePlateForces", "rawForcePlateTorques", "rawForcePlateCenterOfPressures")
@@ -86,9 +86,10 @@ def _plates(frames: Any, time: np.ndarray) -> PlateLoads | None:
 
 
 def about_origin(force: np.ndarray, torque: np.ndarray, point: np.ndarray) -> np.ndarray:
-    """(n, p, 3) N m, moments of loads about the ground origin, whichever of both the torques (n, p, 3) are about.
+    """Return moments (n, p, 3) N m about the ground origin, whichever of both reference points the torques (n, p, 3)
+    have.
 
-    Laboratories wrote torques about the centre of pressure or about the origin, and the file does not say which. About
+    Laboratories wrote torques about the centre of pressure or the origin, and the file does not state which. About
     the centre of pressure nothing is left of their horizontal parts.
     """
     arm = np.cross(point, force)

@@ -18,8 +18,8 @@ _FASTEST_M_S = 15.0
 
 
 def read_belt(stated: float | tuple[float, float] | Path | None) -> Belt | None:
-    """The speed of a treadmill's belt as a subject file states it: m/s, of two belts that under the right foot and that
-    under the left, or a file with it over the markers' time.
+    """Read the speed of a treadmill's belt as a subject file states it: m/s, for two belts the speeds under the right
+    and the left foot, or a file with the speed over the markers' time.
 
     CSV has the columns `time_s` and `speed_m_s`, of two belts `time_s`, `right_m_s` and `left_m_s`; MOT and STO, which
     may be the force file, a column `belt_speed`, of two belts `belt_speed_right` and `belt_speed_left`.
@@ -44,7 +44,7 @@ def read_belt(stated: float | tuple[float, float] | Path | None) -> Belt | None:
 
 
 def _from_table(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Times, and one speed or those under right and left foot."""
+    """Return times, and one speed or the speeds under right and left foot."""
     table = read_table(path)
     names = next((names for names in (_ONE, _TWO) if set(names) <= set(table.labels)), None)
     if names is None:

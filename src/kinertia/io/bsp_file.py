@@ -18,12 +18,12 @@ _COLUMNS = ("segment", "parameter", "unit", "estimate", "sd")
 
 @dataclass(frozen=True, eq=False)
 class BspTable:
-    """Estimates with their deviations.
+    """Estimates of body segment parameters with their SDs.
 
     Attributes:
-        name: of the file.
-        segments: in the file's order.
-        estimate, sd: (s, 10) in the order of `PARAMETERS`, SI; deviations of a segment that was held are all zero.
+        name: name of the file.
+        segments: segments in the file's order.
+        estimate, sd: (s, 10) in the order of `PARAMETERS`, SI; SDs of a fixed segment are all zero.
     """
 
     name: str
@@ -35,10 +35,10 @@ class BspTable:
 def read_bsp(path: Path) -> BspTable:
     """Read a file as `kinertia fit` writes it: one row per segment and parameter.
 
-    Columns segment, parameter, unit, estimate and sd are needed, others are not looked at.
+    Columns segment, parameter, unit, estimate and sd are needed, others are ignored.
 
     Raises:
-        FileError: no such file, a column or a parameter is missing, or a value is none; with the line.
+        FileError: no such file, a column or a parameter is missing, or a value is not a number; with the line.
     """
     values: dict[str, dict[str, tuple[float, float]]] = {}
     without_sd: dict[str, dict[str, int]] = {}

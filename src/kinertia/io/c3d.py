@@ -66,9 +66,9 @@ def read_c3d(path: str | Path, length_unit: str | None = None, standing: bool = 
 
     Args:
         path: the file.
-        length_unit: of its lengths, "mm", "cm" or "m", whatever the file says; by the file, or by the size of a person
+        length_unit: unit of its lengths, "mm", "cm" or "m", whatever it states; by the file, or by the size of a person
             where it says nothing, if None.
-        standing: of poses, one frame of the same person standing upright, as a static trial.
+        standing: read poses as one frame of the same person standing upright, as a static trial.
 
     Raises:
         FileError: the file is missing, empty, truncated, not a C3D file, has no markers or an unknown length unit;
@@ -117,7 +117,7 @@ def read_c3d(path: str | Path, length_unit: str | None = None, standing: bool = 
 
 
 def _open(path: Path) -> tuple[C3dContent, list[Finding]]:
-    """What is in the file, with forces where ezc3d can work them out, and plates that were left out (F151)."""
+    """Read the content of the file, with forces where ezc3d can compute them, and plates that were left out (F151)."""
     expect_file(path)
     expect_ezc3d(path)
     doubt = doubts_about(path)
@@ -141,7 +141,7 @@ def _open(path: Path) -> tuple[C3dContent, list[Finding]]:
 
 @contextlib.contextmanager
 def _plain(path: Path) -> Iterator[Path]:
-    """The file, or a copy where ezc3d would misread its analog samples."""
+    """Yield the file, or a copy where ezc3d would misread its analog samples."""
     content = with_plain_samples(path)
     if content is None:
         yield path
@@ -153,7 +153,7 @@ def _plain(path: Path) -> Iterator[Path]:
 
 
 def _poses(file: C3dContent) -> Poses | None:
-    """The poses of a file that has no points."""
+    """Return the poses of a file that has no points."""
     if file["data"]["points"].shape[1] or not np.size(file["data"]["rotations"]):
         return None
     labels = [str(label) for label in parameter_values(file["parameters"], "ROTATION", "LABELS", [])]
@@ -163,7 +163,7 @@ def _poses(file: C3dContent) -> Poses | None:
 
 
 def _length_unit(path: Path, parameters: Any, positions: FloatArray, stated: str | None) -> tuple[str, list[Finding]]:
-    """Its name; where the file has none, the one in which markers (n, m, 3) are as far apart as on a person."""
+    """Return the file's length unit; if it has none, the one that makes markers (n, m, 3) the size of a person."""
     unit = str(parameter_values(parameters, "POINT", "UNITS", [""])[0]).strip().lower()
     if stated is not None:
         differs = finding("F123", Where(path.name), stated=Quantity(stated), unit=Quantity(f"'{unit}'"))
@@ -184,7 +184,7 @@ def _length_unit(path: Path, parameters: Any, positions: FloatArray, stated: str
 
 
 def _size(positions: FloatArray) -> float:
-    """How far markers (n, m, 3) reach along an axis: the median of the frames that show most of them."""
+    """Return how far markers (n, m, 3) extend along an axis: the median of the frames that show most of them."""
     seen = np.asarray(np.isfinite(positions).all(axis=2))
     count = seen.sum(axis=1)
     fullest = np.flatnonzero(count == count.max(initial=1))
@@ -192,7 +192,7 @@ def _size(positions: FloatArray) -> float:
 
 
 def _times(file: Any, kind: str) -> FloatArray:
-    """Times (s) of the marker frames ("points"), of the poses ("rotations") or of the analog samples ("analogs")."""
+    """Return times (s) of the marker frames ("points"), the poses ("rotations") or the analog samples ("analogs")."""
     header, count = file["header"], file["data"][kind].shape[-1]
     first = "rotations" if kind == "rotations" else "points"
     start: float = header[first]["first_frame"] / header[first]["frame_rate"]
@@ -200,7 +200,7 @@ def _times(file: Any, kind: str) -> FloatArray:
 
 
 def _markers(path: Path, file: Any) -> tuple[tuple[str, ...], FloatArray, list[Finding]]:
-    """Labels and positions (n, m, 3) in lab axes and file units of the points that are places."""
+    """Read labels and positions (n, m, 3), in lab axes and file units, of the points that are positions."""
     positions = np.moveaxis(file["data"]["points"][:3], 0, 2).swapaxes(0, 1).copy()
     missing = stand_ins(positions)
     for where in missing.values():
@@ -258,17 +258,17 @@ _UNITS = {
 def file_outputs(
     parameters: Any, labels: Sequence[str], points: FloatArray, time: FloatArray, ours: Set[str]
 ) -> FileOutputs | None:
-    """Outputs of hips, knees and ankles, in SI units and degrees; None where there are none.
+    """Read outputs of hips, knees and ankles, in SI units and degrees; None where there are none.
 
     Where a file has "LViconHipAngles" beside "LHipAngles" of another model, Vicon's count. Those in unknown units are
     left out.
 
     Args:
-        parameters: of the file.
-        labels: of its points.
+        parameters: parameters of the file.
+        labels: labels of its points.
         points: (f, p, 3) in the file's units.
         time: (f,) s.
-        ours: labels of what Kinertia wrote.
+        ours: labels of points that Kinertia wrote.
     """
     found: dict[str, tuple[bool, FloatArray]] = {}
     for k, label in enumerate(labels):

@@ -20,14 +20,14 @@ _MOST = 255
 
 
 class EventToWrite(NamedTuple):
-    """An event, and what tells its time: "force plate" or "motion"."""
+    """A gait event, and the source of its time: "force plate" or "motion"."""
 
     event: GaitEvent
     method: str
 
 
 class _Row(NamedTuple):
-    """One event as the lists of the group have it."""
+    """One event as stored in the lists of the group EVENT."""
 
     context: str
     label: str
@@ -45,14 +45,14 @@ class _Row(NamedTuple):
 
 
 def add_events(section: ParameterSection, events: Sequence[EventToWrite], subject: str) -> int:
-    """Add the events that a file does not state, with their method as the description; returns how many.
+    """Add the events that a file does not state, with their method as description; return how many were added.
 
     The file's own events keep their values and order. Nothing changes where there is none to add.
 
     Args:
         section: parameters of the file.
-        events: all that are known.
-        subject: whose they are; empty where the file names nobody.
+        events: all known events.
+        subject: name of their person; empty where the file names nobody.
     """
     rows = _rows(section)
     own = [row for row in rows if not row.description.startswith(OWN_METHOD)]
@@ -78,7 +78,7 @@ def add_events(section: ParameterSection, events: Sequence[EventToWrite], subjec
 
 
 def _rows(section: ParameterSection) -> list[_Row]:
-    """Of all events of the file; lists that are too short end in what says nothing."""
+    """Read all events of the file; lists that are too short are padded with empty entries."""
     stored = section.get(_GROUP, "TIMES")
     times = np.zeros(0) if stored is None else np.asarray(stored, dtype=float)
     count = len(times) // 2

@@ -15,20 +15,20 @@ _SIDES = {"right": "r", "left": "l", "r": "r", "l": "l"}
 _SHORT = re.compile(r"([rl])[ _]?(hs|ic|fs|to|fo)")
 _STRIKE, _OFF = "foot strike|heel strike|initial contact|hs|ic|fs", "foot off|toe off|to|fo"
 OWN_METHOD = "Kinertia: "
-"""Begins the descriptions of events that Kinertia wrote: they are results, which another export replaces."""
+"""Prefix of the descriptions of events that Kinertia wrote: they are results, which another export replaces."""
 _SECONDS_PER_MINUTE = 60.0
 
 
 def file_events(parameters: Any, labels: Sequence[str] = ()) -> tuple[FileEvent, ...]:
-    """All events in order of time.
+    """Read all events in order of time.
 
     TIMES are 2 x n: minutes, which Vicon leaves zero, and seconds. Side and kind are Vicon's context ("Right", "Left",
     "General") and label ("Foot Strike", "Foot Off"), or one label such as "RHS" and "LTO". Lists go on in LABELS2,
     CONTEXTS2 and so on.
 
     Args:
-        parameters: of the file, as ezc3d has them.
-        labels: of the markers; whoever has a prefix there is not the person of the trial, and has no event here.
+        parameters: parameters of the file, as ezc3d has them.
+        labels: labels of the markers; people with a prefix there are not the trial's person, their events are left out.
     """
     times = np.asarray(parameter_values(parameters, "EVENT", "TIMES"))
     if not np.issubdtype(times.dtype, np.number) or len(times) % 2:
@@ -46,13 +46,13 @@ def file_events(parameters: Any, labels: Sequence[str] = ()) -> tuple[FileEvent,
 
 
 def _texts(parameters: Any, name: str, count: int) -> list[str]:
-    """So many strings of a list of the group EVENT; empty ones where it is shorter."""
+    """Return `count` strings of a list of the group EVENT; empty ones where it is shorter."""
     texts = text_list(parameters, "EVENT", name)
     return (texts + [""] * count)[:count]
 
 
 def side_and_kind(context: str, label: str) -> tuple[str, EventKind | None]:
-    """Side and kind by context and label, empty and None where they name none."""
+    """Identify side and kind from context and label; empty and None where neither states them."""
     side, word = _SIDES.get(context.lower(), ""), label.lower().replace("-", " ")
     short = _SHORT.fullmatch(word)
     if short and not side:

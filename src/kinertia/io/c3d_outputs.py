@@ -24,7 +24,7 @@ from kinertia.io.c3d_structure import doubts_about, with_plain_samples
 from kinertia.io.provenance import VERSION
 
 OWN_GROUP = "KINERTIA"
-"""Its LABELS are the points that Kinertia wrote."""
+"""Group whose LABELS are the points that Kinertia wrote."""
 _EDITOR = "Kinertia "
 """Begins our entry of the list of programs that changed a file (MANUFACTURER:EDITED, c3d.org)."""
 _BLOCK = 512
@@ -35,11 +35,11 @@ _TYPES = {"ANGLES": "ANGLE", "FORCES": "FORCE", "MOMENTS": "MOMENT", "POWERS": "
 
 @dataclass(frozen=True, eq=False)
 class OutputPoint:
-    """One point to write.
+    """One output point to be written into a C3D file.
 
     Attributes:
-        label: without the subject's prefix.
-        kind: "ANGLES", "FORCES", "MOMENTS", "POWERS"; "" of a place.
+        label: label without the subject's prefix.
+        kind: "ANGLES", "FORCES", "MOMENTS" or "POWERS"; "" for a position.
         values: (f, 3) at all frames of the file, in its units; NaN where it is missing.
         description: what it is.
     """
@@ -52,15 +52,15 @@ class OutputPoint:
 
 @dataclass(frozen=True, eq=False)
 class C3dFrames:
-    """What a writer of outputs needs to know of a file.
+    """Properties of a C3D file that a writer of outputs needs.
 
     Attributes:
-        content: its bytes; those of markers and analog samples are `words`.
-        labels: of its points, Kinertia's own left out.
+        content: bytes of the file; those of markers and analog samples are `words`.
+        labels: labels of its points, without Kinertia's own.
         first: number of the first frame.
-        rate_hz: of the frames.
-        points: (f, p, 3) in the file's units, NaN where missing; as `labels`.
-        units: of "ANGLES", "FORCES", "MOMENTS", "POWERS", as the file states them; only those that it states.
+        rate_hz: rate of the frames.
+        points: (f, p, 3) in the file's units, NaN where missing; ordered as `labels`.
+        units: units of "ANGLES", "FORCES", "MOMENTS", "POWERS", as the file states them; only those that it states.
     """
 
     content: bytes = field(repr=False)
@@ -73,7 +73,7 @@ class C3dFrames:
 
 @dataclass(frozen=True, eq=False)
 class _Parts:
-    """A file taken apart: first blocks, parameters, words (f, 4 p + a) as floats, and what follows them."""
+    """Parts of a C3D file: first blocks, parameters, words (f, 4 p + a) as floats, and the remainder."""
 
     before: bytes
     section: ParameterSection
@@ -84,10 +84,10 @@ class _Parts:
 
 
 def frames_of(path: Path) -> C3dFrames:
-    """Labels and places of the points of a C3D file that outputs are to be written into.
+    """Read labels and positions of the points of a C3D file that outputs are to be written into.
 
     Raises:
-        FileError: it is damaged, or stored as only another program could (DEC's numbers, poses of segments).
+        FileError: it is damaged, or stored in a form not written here (DEC numbers, poses of segments).
     """
     doubt = doubts_about(path)
     if doubt:
@@ -156,7 +156,7 @@ def with_outputs(
 
 
 def _four(values: np.ndarray) -> np.ndarray:
-    """(f, 4) words of a point: 0 0 0 -1 where it is missing."""
+    """Return the words (f, 4) of a point: 0 0 0 -1 where it is missing."""
     seen = np.isfinite(values).all(axis=1)
     return np.column_stack([np.where(seen[:, None], values, 0.0), np.where(seen, 0.0, -1.0)])
 
@@ -184,7 +184,7 @@ def _apart(content: bytes) -> _Parts:
 
 
 def _as_floats(words: np.ndarray, points: int, scale: float, order: str) -> np.ndarray:
-    """Words of a file of integers as floats: places by their scale, samples and residuals as they are."""
+    """Convert words of an integer file to floats: positions by their scale, samples and residuals unchanged."""
     result = words.astype(f"{order}f4")
     places = result[:, : 4 * points].reshape(len(words), points, 4)
     places[..., :3] *= np.float32(scale)
@@ -192,7 +192,7 @@ def _as_floats(words: np.ndarray, points: int, scale: float, order: str) -> np.n
 
 
 def _without_ours(parts: _Parts) -> _Parts:
-    """The same without what an earlier export wrote."""
+    """Remove what an earlier export wrote."""
     section = parts.section
     ours = set(_listed(section, "LABELS", OWN_GROUP))
     section.drop(OWN_GROUP)
@@ -214,7 +214,7 @@ def _without_ours(parts: _Parts) -> _Parts:
 
 
 def _together(parts: _Parts, added: np.ndarray) -> bytes:
-    """The file again, with more points (f, 4 k)."""
+    """Assemble the file, with more points (f, 4 k)."""
     order, section = parts.order, parts.section
     split, points = 4 * parts.points, parts.points + added.shape[1] // 4
     words = np.hstack([parts.words[:, :split], added.astype(f"{order}f4"), parts.words[:, split:]])
@@ -236,18 +236,18 @@ def _texts(section: ParameterSection, name: str, group: str = "POINT") -> list[s
 
 
 def _listed(section: ParameterSection, name: str, group: str = "POINT") -> list[str]:
-    """A list of texts that goes on in NAME2, NAME3."""
+    """Read a list of texts that continues in NAME2, NAME3."""
     return continued(lambda one: _texts(section, one, group), name)
 
 
 def _labels(parts: _Parts) -> list[str]:
-    """One per point."""
+    """Return one label per point."""
     labels = _listed(parts.section, "LABELS")[: parts.points]
     return labels + [""] * (parts.points - len(labels))
 
 
 def _put_list(section: ParameterSection, name: str, texts: Sequence[str], group: str = "POINT") -> None:
-    """Write a list, 255 entries in each of NAME, NAME2 ..., but leave those that stay the same."""
+    """Write a list, 255 entries in each of NAME, NAME2 ..., without touching parts that stay the same."""
     for k, start in enumerate(range(0, max(len(texts), 1), _MOST_IN_LIST)):
         some, called = list(texts[start : start + _MOST_IN_LIST]), name + ("" if k == 0 else str(k + 1))
         if section.get(group, called) != some:
@@ -255,7 +255,7 @@ def _put_list(section: ParameterSection, name: str, texts: Sequence[str], group:
 
 
 def too_many(path: Path) -> FileError:
-    """That a file has no room for more parameters."""
+    """Return the error for a file without room for more parameters."""
     return FileError.found(
         path, "F106", what=Quantity("its parameters fill all the 255 blocks that a C3D file can have")
     )

@@ -45,12 +45,12 @@ def continued(entries: Callable[[str], Sequence[str]], name: str) -> list[str]:
 
 
 class TooManyParameters(Exception):
-    """They need more blocks than one byte counts."""
+    """Parameters that need more blocks than one byte can count."""
 
 
 @dataclass(frozen=True)
 class Record:
-    """One record: its group's number, name, and the bytes before and after the distance to the next one."""
+    """One record: the number of its group, its name, and the bytes before and after the offset to the next record."""
 
     group: int
     name: str
@@ -59,10 +59,10 @@ class Record:
 
 
 class ParameterSection:
-    """All records in their order; `get`, `put` and `content` read, change and write them."""
+    """Parameter section of a C3D file, all records in order; `get`, `put` and `content` read, change and write them."""
 
     def __init__(self, section: bytes, order: str) -> None:
-        """From the bytes of a section that `c3d_structure` has nothing against, with this byte order ("<" or ">")."""
+        """Parse a section that passed the checks of `c3d_structure`, with this byte order ("<" or ">")."""
         self.order, self.start = order, section[:4]
         self.records: list[Record] = []
         at = 4
@@ -86,7 +86,7 @@ class ParameterSection:
         return at + 1 + section[at]
 
     def get(self, group: str, name: str) -> Value | None:
-        """Texts of an entry without trailing blanks, or its numbers one after the other; None where it is not there."""
+        """Return the texts of an entry without trailing blanks, or its numbers in a row; None where it is absent."""
         k = self._find(group, name)
         if k is None:
             return None
@@ -104,12 +104,12 @@ class ParameterSection:
         return [row.decode(*_TEXT).rstrip(" \0") for row in rows]
 
     def put(self, group: str, name: str, value: Value, shape: tuple[int, ...] | None = None) -> None:
-        """Give an entry this value; the entry, and its group, are made where they are not there.
+        """Set an entry to this value; the entry and its group are created if missing.
 
         Args:
-            group, name: which.
-            value: of it; a list of texts is stored as wide as the longest is, or as it was where that is more.
-            shape: as the file gives it, fastest first; one list if None.
+            group, name: which entry.
+            value: its value; texts are stored as wide as the longest, or as before where that is wider.
+            shape: shape as in the file, fastest dimension first; one list if None.
         """
         k = self._find(group, name)
         old = None if k is None else self.records[k]
@@ -124,12 +124,12 @@ class ParameterSection:
         self.records.append(Record(number, name, struct.pack("bb", len(encoded), number) + encoded, body))
 
     def drop(self, group: str) -> None:
-        """Take a group and its entries out."""
+        """Remove a group and its entries."""
         number = next((-one.group for one in self.records if one.group < 0 and one.name == group), None)
         self.records = [one for one in self.records if abs(one.group) != number]
 
     def content(self) -> bytes:
-        """The section, in whole blocks.
+        """Return the bytes of the section, in whole blocks.
 
         Raises:
             TooManyParameters: it would need more than 255.
@@ -164,7 +164,7 @@ class ParameterSection:
         return next((k for k, one in enumerate(self.records) if one.group == number and one.name == name), None)
 
     def _group(self, name: str) -> int:
-        """Number of a group, made where it is not there."""
+        """Return the number of a group, which is created if missing."""
         for one in self.records:
             if one.group < 0 and one.name == name:
                 return -one.group

@@ -32,13 +32,13 @@ _MUCH_NEARER = 0.5
 
 @dataclass(frozen=True, eq=False)
 class LabPlates:
-    """The p readable plates in lab axes, SI.
+    """Readable force plates (p) of a file in lab axes, SI.
 
     Attributes:
         names: (p) `plate 1`, ... by the file's order.
         force: (k, p, 3) N as in the file, on the person or on the plate.
         moment: (k, p, 3) N m about the lab origin.
-        corners: (p, 4, 3) m, or None where the file does not tell.
+        corners: (p, 4, 3) m, or None where the file does not state them.
     """
 
     names: tuple[str, ...]
@@ -47,7 +47,7 @@ class LabPlates:
     corners: FloatArray | None
 
     def loaded_direction(self) -> FloatArray:
-        """Mean direction (3,) of the loaded samples, each without its sign; zero when nothing is loaded."""
+        """Return the mean direction (3,) of the loaded samples, each without its sign; zero when nothing is loaded."""
         size = np.linalg.norm(self.force, axis=2)
         loaded = self.force[size > 5 * LOAD_THRESHOLD_N]
         if len(loaded) < 10:
@@ -59,9 +59,9 @@ class LabPlates:
 
 
 def lab_plates(path: Path, file: Any, length_unit: str) -> tuple[LabPlates | None, list[Finding]]:
-    """The plates that can be used, in lab axes; None where there is none. `length_unit` is the file's: mm, cm or m.
+    """Return the usable plates in lab axes (None without any) and findings; `length_unit` is the file's: mm, cm or m.
 
-    Also what was found of them: those that were left out (F151), units that were converted (F152).
+    The findings are plates that were left out (F151) and units that were converted (F152).
     """
     unit = METRES_PER_UNIT[length_unit]
     platforms = file["data"].get("platform", [])
@@ -76,7 +76,7 @@ def lab_plates(path: Path, file: Any, length_unit: str) -> tuple[LabPlates | Non
         reason, edges = _corner_trouble(places)
         if not platform["force"].size:
             reason = reason or "it has no samples"
-        if moment_unit != unit and kind == 4:  # nobody knows what its matrix makes of them
+        if moment_unit != unit and kind == 4:  # it is unknown what its matrix makes of them
             reason = reason or f"its moments are in {stated} while points are in {length_unit}"
         if reason:
             findings.append(plate_left_out(path, name, reason, **edges))
@@ -95,22 +95,22 @@ def lab_plates(path: Path, file: Any, length_unit: str) -> tuple[LabPlates | Non
 
 
 def plate_left_out(path: Path, plate: str | None, reason: str, **evidence: Quantity) -> Finding:
-    """That a plate, or all of them, cannot be used."""
+    """Return F151: a plate, or all of them, cannot be used."""
     return with_evidence("F151", Where(path.name, plate=plate), {**evidence, "reason": Quantity(reason)})
 
 
 def contradicting_moments(path: Path, plate: str, misses: float) -> Finding:
-    """That moments miss the centre of pressure by this share, which was taken without a free moment."""
+    """Return F153: moments miss the centre of pressure by this share, which was used without a free moment."""
     return finding("F153", Where(path.name, plate=plate), misses=Quantity(misses, "1", limit=MOMENTS_FIT))
 
 
 def _moment(platform: Any, kind: int, unit: float, moment_unit: float) -> FloatArray:
-    """(k, 3) N m about the lab origin, of a file whose lengths are in `unit` (m), and moments in N `moment_unit`."""
+    """Return moments (k, 3) N m about the lab origin; the file has lengths in `unit` (m), moments N `moment_unit`."""
     force, corners = platform["force"].T, platform["corners"].T
     if kind == 1:
         result: FloatArray = np.cross(unit * platform["center_of_pressure"].T, force) + unit * platform["Tz"].T
         return result
-    # to what the channels say ezc3d adds that of the way from the transducer to the surface, in the unit of lengths
+    # ezc3d adds to the channels' moments the force times the offset from transducer to surface, in the unit of lengths
     measured = platform["moment"].T - np.cross(force, _axes(corners) @ platform["origin"])
     about_middle = unit * platform["moment"].T + (moment_unit - unit) * measured
     result = about_middle + np.cross(unit * corners.mean(axis=0), force)
@@ -118,7 +118,7 @@ def _moment(platform: Any, kind: int, unit: float, moment_unit: float) -> FloatA
 
 
 def _axes(corners: FloatArray) -> FloatArray:
-    """Columns (3, 3): a plate's axes in the laboratory, by its corners (4, 3), as ezc3d has them."""
+    """Return a plate's axes in the laboratory as columns (3, 3), from its corners (4, 3), as ezc3d does."""
     x, along = corners[0] - corners[1], corners[0] - corners[3]
     z = np.cross(x, along)
     return np.column_stack([axis / np.linalg.norm(axis) for axis in (x, np.cross(z, x), z)])
@@ -127,7 +127,7 @@ def _axes(corners: FloatArray) -> FloatArray:
 def to_ground_plates(
     path: Path, plates: LabPlates | None, rotation: FloatArray, time: FloatArray
 ) -> tuple[PlateLoads | None, list[Finding]]:
-    """Loads on the person in ground axes, zero where nobody stands on a plate."""
+    """Return loads on the person in ground axes, zero where nobody stands on a plate."""
     if plates is None:
         return None, []
     force, moment = plates.force @ rotation.T, plates.moment @ rotation.T
@@ -155,12 +155,12 @@ def to_ground_plates(
 
 
 def person_on_plates(platforms: Any, people: Sequence[str], labels: Sequence[str], positions: FloatArray) -> str:
-    """Of several people the one who is much nearer to the plates while they are loaded; empty where nobody is.
+    """Return the one of several people who is much nearer to the plates while they are loaded; empty if nobody is.
 
     Args:
-        platforms: as ezc3d has them.
-        people: what their labels begin with.
-        labels: of all m markers.
+        platforms: plates as ezc3d has them.
+        people: prefixes of their labels.
+        labels: labels of all m markers.
         positions: (n, m, 3) in the axes and unit of the file.
     """
     if len(people) < 2:
@@ -179,7 +179,7 @@ def person_on_plates(platforms: Any, people: Sequence[str], labels: Sequence[str
 
 
 def _corner_trouble(corners: FloatArray) -> tuple[str, dict[str, Quantity]]:
-    """Why corners (4, 3) m are no plate's, and the lengths of its edges; nothing where they are."""
+    """Return why corners (4, 3) m cannot be a plate's, and the lengths of its edges; nothing where they can."""
     edges = np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1)
     low, high = _EDGE_LIMITS_M
     if (
@@ -196,7 +196,7 @@ def _corner_trouble(corners: FloatArray) -> tuple[str, dict[str, Quantity]]:
 
 
 def _moment_unit(parameters: Any, kind: int, plate: int, plates: int, length: str) -> tuple[str, float]:
-    """What the analog channels of a plate say its moments are in, and how many N m that is; N `length` by default."""
+    """Return the moment unit stated by a plate's analog channels, and how many N m it is; N `length` by default."""
     if kind not in (2, 4):
         return "", METRES_PER_UNIT[length]
     channels = np.reshape(parameter_values(parameters, "FORCE_PLATFORM", "CHANNEL"), (plates, -1))[plate]

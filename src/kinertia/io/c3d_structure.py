@@ -24,13 +24,13 @@ _BYTE_ORDERS = {84: ("<", 15), 85: ("<", 13), 86: (">", 12)}
 which is negative where numbers are stored as floats."""
 _KINDS = {-1: "c", 1: "b", 2: "h", 4: "f"}
 _CHANNELS = {1: (6,), 2: (6,), 3: (8,), 4: (6,)}
-"""By type of plate."""
+"""Numbers of channels by type of plate."""
 _MOST_EVENTS = 18
 
 
 @dataclass(frozen=True)
 class _Header:
-    """What the first block says."""
+    """Content of the first block of a C3D file."""
 
     points: int
     analogs: int
@@ -44,13 +44,13 @@ class _Header:
 
     @property
     def frames(self) -> int:
-        """0 where 16 bits do not hold it."""
+        """Number of frames; 0 where 16 bits cannot hold it."""
         return self.last - self.first + 1 if self.first <= self.last < 0xFFFF else 0
 
 
 @dataclass(frozen=True)
 class _Parameter:
-    """One entry of the parameter section: its shape, its bytes, and at which byte of the section they begin."""
+    """One entry of the parameter section: its shape, its bytes, and the byte of the section at which they begin."""
 
     kind: str
     shape: tuple[int, ...]
@@ -60,14 +60,14 @@ class _Parameter:
 
     @cached_property
     def numbers(self) -> tuple[float, ...]:
-        """Its values; none of text."""
+        """Values of the entry; none for text."""
         if self.kind == "c":
             return ()
         return struct.unpack(f"{self.order}{math.prod(self.shape)}{self.kind}", self.content)
 
     @property
     def size(self) -> int:
-        """How many values it has; of text how many lines."""
+        """Number of values; for text, number of lines."""
         return math.prod(self.shape[1:] if self.kind == "c" else self.shape)
 
 
@@ -75,10 +75,10 @@ _Parameters = dict[tuple[str, str], _Parameter]
 
 
 def doubts_about(path: Path) -> str:
-    """What in a C3D file contradicts itself, as ezc3d may not survive it; empty where nothing does.
+    """Describe contradictions within a C3D file that may crash ezc3d; empty where there are none.
 
     Raises:
-        FileError: it is empty, no C3D file, shorter than what it announces, or its parameters cannot be told apart.
+        FileError: it is empty, no C3D file, shorter than announced, or its parameters cannot be parsed.
     """
     block, start, section = _sections(path)
     size = path.stat().st_size
@@ -106,7 +106,7 @@ def _too_short(path: Path, size: int, needed: int) -> FileError:
 
 
 def trial_date(path: Path) -> tuple[int, ...]:
-    """TRIAL:DATE of a C3D file, which some systems write: year, month, day; empty where it does not say.
+    """Return TRIAL:DATE of a C3D file, which some systems write: year, month, day; empty where it is missing.
 
     Raises:
         FileError: as `doubts_about`.
@@ -120,9 +120,9 @@ def trial_date(path: Path) -> tuple[int, ...]:
 
 
 def with_plain_samples(path: Path) -> bytes | None:
-    """A C3D file of integers whose ANALOG:OFFSET is taken off its samples, where ezc3d would not; None of all others.
+    """Return an integer C3D file with ANALOG:OFFSET subtracted from its samples, where ezc3d would not; else None.
 
-    ezc3d takes samples to be signed, and offsets to be positive. Some files say that their samples are unsigned, and
+    ezc3d takes samples to be signed, and offsets to be positive. Some files state that their samples are unsigned, and
     they are not: in signed samples around zero those below would be the largest.
 
     Raises:
@@ -165,7 +165,7 @@ def with_plain_samples(path: Path) -> bytes | None:
 
 
 def _sections(path: Path) -> tuple[bytes, int, bytes]:
-    """The first block, where the parameters begin, and the parameters."""
+    """Return the first block, the offset of the parameters, and the parameters."""
     with path.open("rb") as stream:
         block = stream.read(_BLOCK)
         if not block:
@@ -184,7 +184,7 @@ def _sections(path: Path) -> tuple[bytes, int, bytes]:
 
 
 def header_frames(path: Path) -> int:
-    """Frames by the header of a C3D file; 0 where it does not say."""
+    """Return the number of frames in the header of a C3D file; 0 where it is not stated."""
     with path.open("rb") as stream:
         block = stream.read(_BLOCK)
         stream.seek(_BLOCK * (block[0] - 1) + 3 if block[:1] > b"\0" else 0)
@@ -205,7 +205,7 @@ def _header(block: bytes, order: str) -> _Header:
 
 
 def _parameters(path: Path, section: bytes, order: str) -> tuple[_Parameters, str]:
-    """All parameters by group and name, and what is odd about how they are stored."""
+    """Read all parameters by group and name, and describe what is irregular about their storage."""
     groups: dict[int, str] = {}
     entries: dict[tuple[int, str], _Parameter] = {}
     at, odd = 4, ""
@@ -254,7 +254,7 @@ def _parameters(path: Path, section: bytes, order: str) -> tuple[_Parameters, st
 
 
 def _header_doubt(header: _Header, end: int) -> str:
-    """What in the header cannot be."""
+    """Describe what in the header is impossible."""
     if not (math.isfinite(header.rate_hz) and 0.01 < header.rate_hz < 1e6):
         return f"its frame rate is {header.rate_hz:g} Hz"
     if not math.isfinite(header.scale) or header.scale == 0:
@@ -267,7 +267,7 @@ def _header_doubt(header: _Header, end: int) -> str:
 
 
 def _doubt(header: _Header, parameters: _Parameters) -> str:
-    """What in the parameters contradicts the header or one another."""
+    """Describe what in the parameters contradicts the header or other parameters."""
 
     def value(group: str, name: str, default: float) -> float:
         entry = parameters.get((group, name))
@@ -300,7 +300,7 @@ def _doubt(header: _Header, parameters: _Parameters) -> str:
 
 
 def _trial_doubt(header: _Header, parameters: _Parameters) -> str:
-    """TRIAL:ACTUAL_START_FIELD and ..._END_FIELD, two words of 16 bits each, against the header."""
+    """Compare TRIAL:ACTUAL_START_FIELD and ..._END_FIELD, two words of 16 bits each, with the header."""
     for name, expected in (("ACTUAL_START_FIELD", header.first), ("ACTUAL_END_FIELD", header.last)):
         entry = parameters.get(("TRIAL", name))
         if entry is not None:
@@ -311,7 +311,7 @@ def _trial_doubt(header: _Header, parameters: _Parameters) -> str:
 
 
 def _list_doubt(parameters: _Parameters, channels: int) -> str:
-    """Lists per channel that are shorter than there are channels, or not of numbers."""
+    """Find lists per channel that are shorter than the number of channels, or not numbers."""
     rotations = parameters.get(("ROTATION", "USED"))
     if rotations is not None and rotations.numbers != (0,):  # ezc3d writes that there are none
         return "it has rotations"
@@ -331,7 +331,7 @@ def _list_doubt(parameters: _Parameters, channels: int) -> str:
 
 
 def _plate_doubt(parameters: _Parameters, channels: float) -> str:
-    """Force plates whose lists do not fit their number and type."""
+    """Find force plates whose lists do not fit their number and type."""
 
     def entry(name: str) -> _Parameter:
         return parameters.get(("FORCE_PLATFORM", name)) or _Parameter("h", (0,), b"", "<")

@@ -33,7 +33,7 @@ _UNIT = re.compile(r"[\s_([]+(kg|mm|cm|m)[])]?\s*$", re.IGNORECASE)
 _NUMBER = re.compile(r"\s*(\d+(?:[.,]\d+)?)\s*(kg|mm|cm|m)?\s*", re.IGNORECASE)
 _PER_METRE = {"mm": 1000.0, "cm": 100.0, "m": 1.0}
 _MASS_KG, _HEIGHT_M, _BMI = (8.0, 300.0), (0.5, 2.5), (7.0, 90.0)
-"""Of anybody who walks, from children of one year on."""
+"""Plausible ranges for people who walk, from children of one year on."""
 _LIMITS_M = {
     "KneeWidth": (0.03, 0.2),
     "AnkleWidth": (0.02, 0.15),
@@ -45,8 +45,8 @@ _LIMITS_M = {
 
 @dataclass(frozen=True)
 class SubjectData:
-    """Mass (kg), stature (m) and further lengths (m) by their keys, those that Plug-in Gait knows by its own, too
-    (`RKneeWidth`); and what was found.
+    """Mass (kg), stature (m) and further lengths (m) by key, Plug-in Gait's under its own names too (`RKneeWidth`);
+    with findings.
     """
 
     mass_kg: float | None
@@ -56,11 +56,11 @@ class SubjectData:
 
 
 def subject_data(path: Path, parameters: Any) -> SubjectData:
-    """What the file says of its person; what cannot be true is left out (F125).
+    """Read the person's data from the file; implausible values are left out (F125).
 
     Args:
-        path: for findings.
-        parameters: of the file, as ezc3d has them.
+        path: the file, for findings.
+        parameters: parameters of the file, as ezc3d has them.
     """
     given = dict(_numbers(parameters))
     masses = {key: value for key, value in given.items() if _named(_MASS, key)}
@@ -84,7 +84,7 @@ def subject_data(path: Path, parameters: Any) -> SubjectData:
 
 
 def _numbers(parameters: Any) -> Iterator[tuple[str, tuple[float, str | None]]]:
-    """Each single positive number of the groups that describe a person, with the unit that it or its key names."""
+    """Yield each single positive number of the groups that describe a person, with the unit that it or its key has."""
     known: set[str] = set()
     for group in _GROUPS:
         for key in parameters.get(group, ()):
@@ -114,7 +114,7 @@ def _named(pattern: re.Pattern[str], key: str) -> re.Match[str] | None:
 def _lengths(
     path: Path, given: Mapping[str, tuple[float, str | None]], unit: str
 ) -> tuple[dict[str, float], list[Finding]]:
-    """Lengths in m, and F125 of those that no unit makes plausible.
+    """Return lengths in m, and F125 for lengths that no unit makes plausible.
 
     Where the unit of the stature does not fit a joint width, the only one that does is taken.
     """

@@ -87,7 +87,7 @@ def _add_plates(file: Any, plates: PlateLoads, samples_per_frame: int) -> None:
 
 
 def _ordered(corners: FloatArray) -> FloatArray:
-    """(4, 3) mm in lab axes, by the quadrants of the plate's axes: (+, +), (-, +), (-, -), (+, -)."""
+    """Order corners (4, 3), mm in lab axes, by the quadrants of the plate's axes: (+, +), (-, +), (-, -), (+, -)."""
     lab = _MM * corners @ _TO_LAB.T
     x, y, _ = _TO_PLATE @ (lab - lab.mean(axis=0)).T
     quadrant = np.select([(x > 0) & (y > 0), (x < 0) & (y > 0), (x < 0) & (y < 0)], [0, 1, 2], 3)

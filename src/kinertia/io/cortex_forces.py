@@ -27,7 +27,7 @@ _TITLE, _COLUMNS = "[Force Data]", "#Sample"
 _OF_A_PLATE = ("FX", "FY", "FZ", "X", "Y", "Z", "MZ")
 _MM = 1e-3
 _LONGEST_ARM_M = 0.1
-"""Of the free moment over the vertical force. Feet reach some millimetres: what is beyond is written in N mm."""
+"""Largest ratio of free moment to vertical force. Feet reach some millimetres: larger ones are in N mm."""
 _FASTEST_HZ = 1e6
 
 
@@ -36,7 +36,7 @@ def read_cortex_forces(path: str | Path, turn: FloatArray | None = None) -> tupl
 
     Args:
         path: the file.
-        turn: rotation (3, 3) from the laboratory's axes to ground axes, where they are others.
+        turn: rotation (3, 3) from the laboratory's axes to ground axes, where these differ.
 
     Returns:
         the plates, whose corners are unknown, and what was found.
@@ -78,7 +78,7 @@ def read_cortex_forces(path: str | Path, turn: FloatArray | None = None) -> tupl
 
 
 def _header(path: Path, lines: list[str]) -> tuple[dict[str, str], list[str], int]:
-    """Its entries, the columns, and the one-based line at which the rows begin."""
+    """Read the header entries, the columns, and the one-based line at which the rows begin."""
     if lines[0].strip() != _TITLE:
         raise mismatch(path, "a force file of Cortex", f"'{lines[0].strip()[:40]}'", f"'{_TITLE}'", 1)
     entries: dict[str, str] = {}
@@ -99,7 +99,7 @@ def _number(path: Path, header: dict[str, str], key: str) -> float:
 
 
 def _plate_numbers(path: Path, columns: list[str]) -> list[str]:
-    """What follows the names of the columns of each plate: "1", "2"."""
+    """Return the suffix of the column names of each plate: "1", "2"."""
     numbers = list(dict.fromkeys(name[2:] for name in columns if re.fullmatch(r"FX\d+", name)))
     for number in numbers or ["1"]:
         lacking = [f"{name}{number}" for name in _OF_A_PLATE if f"{name}{number}" not in columns]
@@ -110,7 +110,7 @@ def _plate_numbers(path: Path, columns: list[str]) -> list[str]:
 
 
 def _times(path: Path, samples: FloatArray, rate_hz: float, first_line: int) -> FloatArray:
-    """(k,) s of samples whose numbers count up by one."""
+    """Return times (k,) s of samples whose numbers count up by one."""
     if not len(samples):
         raise FileError.found(path, "F104", rows=Quantity(0, "1"), found=Quantity("no rows follow the column labels"))
     odd = np.flatnonzero(~(np.diff(samples) == 1.0))
@@ -122,7 +122,7 @@ def _times(path: Path, samples: FloatArray, rate_hz: float, first_line: int) -> 
 
 
 def _moment_unit(path: Path, plate: str, vertical: FloatArray, free: FloatArray) -> tuple[float, list[Finding]]:
-    """How many N m the free moment is written in, N m or N mm, which the file does not say (F152)."""
+    """Return how many N m the unit of the free moment is (N m or N mm), which the file does not state (F152)."""
     loaded = np.abs(vertical) > LOAD_THRESHOLD_N
     arm_m = float(np.median(np.abs(free[loaded] / vertical[loaded]))) if loaded.any() else 0.0
     if arm_m <= _LONGEST_ARM_M:

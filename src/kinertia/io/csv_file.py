@@ -30,9 +30,9 @@ class Row:
     """One row of a table.
 
     Attributes:
-        path, line: where it stands, the line one-based.
+        path, line: its file and its one-based line.
         cells: text by column (in lower case), without blanks around it.
-        decimal_commas: commas may stand in numbers.
+        decimal_commas: whether numbers may have decimal commas.
     """
 
     path: Path
@@ -41,10 +41,10 @@ class Row:
     decimal_commas: bool = False
 
     def number(self, column: str) -> float:
-        """The number in a column.
+        """Return the number in a column.
 
         Raises:
-            FileError: it is none, or not finite; with the line.
+            FileError: it is not a number, or not finite; with the line.
 
         Examples:
             >>> Row(Path("norms.csv"), 2, {"mean": "5,1"}, decimal_commas=True).number("mean")
@@ -67,7 +67,7 @@ class Row:
 
 
 def has_columns(path: Path, columns: Sequence[str]) -> bool:
-    """Whether a file is a table with these columns, by its name and its beginning; raises nothing for another one."""
+    """Return whether a file is a table with these columns, by its name and beginning; other files raise no error."""
     if path.suffix.lower() != ".csv" or not path.is_file():
         return False
     with path.open("rb") as file:
@@ -77,7 +77,7 @@ def has_columns(path: Path, columns: Sequence[str]) -> bool:
 
 
 class _Opened(NamedTuple):
-    """What is below the heading, row by row; what separates cells; the columns, in lower case."""
+    """An opened table: its rows below the heading, the separator of cells, and the columns in lower case."""
 
     table: Any
     separator: str
@@ -91,11 +91,11 @@ def _opened(lines: Sequence[str]) -> _Opened:
 
 
 def read_csv(path: Path, columns: Sequence[str], expected: str) -> Iterator[Row]:
-    """The rows of a table, blank ones left out; columns in any order, others are kept, missing cells at the end empty.
+    """Yield the rows of a table without blank ones; columns in any order, others kept, missing cells at the end empty.
 
     Args:
         path: the file, UTF-8.
-        columns: those that it must have.
+        columns: columns that it must have.
         expected: what the table is, for messages.
 
     Raises:
@@ -135,7 +135,7 @@ _FORMULA = ("=", "+", "-", "@", "\t", "\r")
 
 
 def inert(cell: T) -> T | str:
-    """A cell that no spreadsheet program takes for a formula: such text gets an apostrophe in front, numbers stay.
+    """Return a cell that no spreadsheet program takes for a formula: such text gets a leading apostrophe, numbers stay.
 
     Names come from files that others made: Excel would run a body called `=cmd|' /C calc'!A0`.
     """

@@ -38,16 +38,16 @@ _COPY = "copy.c3d"
 _SECONDS, _SECONDS_PER_BYTE = 6.0, 1e-5
 _WAITING = 20.0
 _BYTES, _BYTES_PER_BYTE = 800_000_000, 20
-"""How long another process may compute over a file of so many bytes, by how much longer it may take for that where the
+"""Time limit of the reading process by size of the file, by how much longer it may take for that where the
 machine has other things to do, and how much memory."""
 
 C3dContent = dict[str, Any]
-"""What is used of a file, nested as ezc3d has it: `header`, `parameters`, `data` (without analog values), and
+"""The parts of a file that are used, nested as in ezc3d: `header`, `parameters`, `data` (without analog values), and
 `trouble`: why the force plates could not be read."""
 
 
 class C3dTrouble(Exception):
-    """What ezc3d says of a file that it cannot read."""
+    """Message of ezc3d about a file that it cannot read."""
 
 
 def expect_ezc3d(path: Path) -> None:
@@ -59,7 +59,7 @@ def expect_ezc3d(path: Path) -> None:
 
 
 def read_content(path: Path) -> C3dContent:
-    """What is in a C3D file.
+    """Read the content of a C3D file.
 
     Raises:
         C3dTrouble: ezc3d cannot read it.
@@ -83,9 +83,9 @@ def read_content(path: Path) -> C3dContent:
 
 
 def _plate_shapes(parameters: Any) -> dict[str, tuple[int, ...]]:
-    """The shapes that ezc3d expects of the lists of force plates, where the file has the same numbers in others.
+    """Return the shapes that ezc3d expects of force plate lists, where the file stores the same numbers in others.
 
-    ezc3d looks beyond the dimensions of lists that have too few, and finds there what happens to be in memory.
+    ezc3d reads beyond the dimensions of lists that have too few, into arbitrary memory.
     """
     used = parameter_values(parameters, "FORCE_PLATFORM", "USED", [0])[0]
     plates = int(used) if isinstance(used, int | np.integer) else 0
@@ -107,7 +107,7 @@ def _plate_shapes(parameters: Any) -> dict[str, tuple[int, ...]]:
 
 
 def _with_plate_shapes(file: Any, shapes: dict[str, tuple[int, ...]]) -> tuple[Any, str]:
-    """`_with_plates` of a copy of a file whose lists of force plates have these shapes."""
+    """Read a copy of a file with force plate lists in these shapes, as `_with_plates` does."""
     for name, shape in shapes.items():
         entry = file["parameters"]["FORCE_PLATFORM"][name]
         entry["value"] = np.reshape(np.ravel(entry["value"], order="F"), shape, order="F")
@@ -118,7 +118,7 @@ def _with_plate_shapes(file: Any, shapes: dict[str, tuple[int, ...]]) -> tuple[A
 
 
 def _with_plates(path: Path) -> tuple[Any, str]:
-    """What is in a file as ezc3d holds it, with the loads on force plates or with why they could not be worked out.
+    """Read a file as ezc3d holds it, with the loads on force plates or the reason why they could not be computed.
 
     Raises:
         C3dTrouble: ezc3d cannot read it.
@@ -134,7 +134,7 @@ def _with_plates(path: Path) -> tuple[Any, str]:
 
 
 def parameter_values(parameters: Any, group: str, name: str, default: Sequence[Any] = ()) -> Sequence[Any]:
-    """Give the values of one parameter of a `C3dContent`, one after the other as in the file, whatever shape it gives.
+    """Return the values of one parameter of a `C3dContent` in file order, whatever its shape.
 
     USED and TYPE of p plates are p values, and CHANNEL 6 p: some writers make them p x 1, or one row.
     """
@@ -155,10 +155,10 @@ def text_list(parameters: Any, group: str, name: str) -> list[str]:
 
 
 def read_apart(path: Path) -> C3dContent:
-    """`read_content` in a process of its own, with limits of time and memory.
+    """Run `read_content` in a separate process, with limits of time and memory.
 
     Raises:
-        C3dTrouble: ezc3d cannot read it, or breaks down over it.
+        C3dTrouble: ezc3d cannot read it, or crashes.
     """
     with tempfile.TemporaryDirectory() as folder:
         result = Path(folder) / "content"
@@ -178,8 +178,8 @@ def read_apart(path: Path) -> C3dContent:
 
 
 def _read_for_another(path: str, result: str) -> None:
-    """`read_content` for the process that waits for `result`, which is written whole or not at all."""
-    if sys.platform != "win32":  # there time has to be limit enough
+    """Run `read_content` for the process that waits for `result`, which is written completely or not at all."""
+    if sys.platform != "win32":  # on Windows the time limit alone has to suffice
         import resource
 
         size = Path(path).stat().st_size
@@ -198,14 +198,14 @@ def _read_for_another(path: str, result: str) -> None:
 
 
 def _virtual_size() -> int:
-    """Bytes of address space that this process has with its libraries, on Linux; elsewhere nothing to speak of."""
+    """Return the address space (bytes) of this process with its libraries, on Linux; elsewhere a negligible number."""
     with contextlib.suppress(OSError, ValueError):
         return int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0]) * 4096
     return 0
 
 
 def _opened(path: Path, **options: Any) -> Any:
-    """What is in a C3D file, as ezc3d holds it; its own errors come through."""
+    """Open a C3D file as ezc3d holds it; ezc3d's own errors pass through."""
     if _found_by_ezc3d(path):
         return ezc3d.c3d(str(path), **options)
     with _elsewhere(path) as original:
@@ -214,7 +214,7 @@ def _opened(path: Path, **options: Any) -> Any:
 
 
 def new_c3d(path: Path) -> Any:
-    """An empty C3D file to fill, which is to be written to `path`.
+    """Create an empty C3D file to fill, which is to be written to `path`.
 
     Raises:
         FileError: ezc3d is not installed.
@@ -239,7 +239,7 @@ def _found_by_ezc3d(path: Path) -> bool:
 
 @contextlib.contextmanager
 def _elsewhere(path: Path) -> Iterator[Path]:
-    """In a temporary folder, which may have a name with umlauts itself: files in it are named from within."""
+    """Yield a path in a temporary folder, which may have umlauts in its name: files in it are addressed from within."""
     whole = path.absolute()
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
         yield whole

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def locked(path: Path) -> FileLock | None:
-    """The lock of a file, which is made if need be, held until it is released; None where another process holds it.
+    """Lock a file, created if necessary, until the lock is released; None where another process holds it.
 
     None also where no file can be made, or a network drive knows no locks.
     """
@@ -33,7 +33,7 @@ def locked(path: Path) -> FileLock | None:
 
 @contextmanager
 def sole_use(path: Path, what: str) -> Iterator[None]:
-    """Nobody else works on `what` during the block; a file beside the lock at `path` says who does.
+    """Ensure that nobody else works on `what` during the block; a file beside the lock at `path` states who does.
 
     Raises:
         FileError: another process does, on this computer or on another with the same drive.
@@ -51,7 +51,7 @@ def sole_use(path: Path, what: str) -> Iterator[None]:
 
 
 def _by(holder: Path) -> str:
-    """Who says to be at work."""
+    """Return who is stated to be at work."""
     try:
         known = json.loads(holder.read_text(encoding="utf-8"))
         return f" by process {known['pid']} on {known['host']}"

@@ -14,12 +14,12 @@ from kinertia.findings.quantity import Quantity
 _DEVICES = re.compile(r"(con|prn|aux|nul|conin\$|conout\$|(com|lpt)[0-9¹²³]) *", re.IGNORECASE)
 _FORBIDDEN = re.compile(r'[<>:"/\\|?*\x00-\x1f]|[ .]$')
 RESULT_FILES = ("fit.json", "report.html", "bsp.csv", "model.osim", "model_changes.csv")
-"""What the results of several trials have beside the folders of the trials."""
+"""Result files beside the folders of several trials."""
 _DRIVE = re.compile(r"[A-Za-z]:[\\/]")
 
 
 def fits_everywhere(name: str) -> bool:
-    """Whether a folder can have this name on Windows, macOS and Linux.
+    """Return whether a folder can have this name on Windows, macOS and Linux.
 
     Windows reserves the names of devices, with any extension (`nul.walk`), and drops dots and blanks at the end.
     """
@@ -27,17 +27,17 @@ def fits_everywhere(name: str) -> bool:
 
 
 def same_folder(one: str, other: str) -> bool:
-    """Whether two names are one folder's on some system: Windows and macOS do not tell capitals from small letters."""
+    """Return whether two names are the same folder on some system: Windows and macOS ignore case."""
     return same_name_key(one) == same_name_key(other)
 
 
 def same_name_key(name: str) -> str:
-    """What names have in common that are one folder's on some system."""
+    """Return a key that is equal for names of the same folder on some system."""
     return unicodedata.normalize("NFC", name).casefold()
 
 
 def trouble_as_folders(trials: Sequence[str]) -> tuple[int, str] | None:
-    """The first of several trials whose name cannot be that of a folder beside those before, and why."""
+    """Return the first trial whose name cannot be a folder beside the earlier ones, and why."""
     for index, name in enumerate(trials if len(trials) > 1 else ()):
         if not fits_everywhere(name):
             return index, (
@@ -54,19 +54,19 @@ def trouble_as_folders(trials: Sequence[str]) -> tuple[int, str] | None:
 
 
 def last_part(written: str) -> str:
-    """The name at the end of a path as any system writes it, without folders and drive."""
+    """Return the name at the end of a path in any system's notation, without folders and drive."""
     return re.split(r"[\\/:]", written)[-1]
 
 
 def path_from(folder: Path, written: str) -> Path:
-    """A path as it stands in a file, counted from a folder; backslashes are separators unless a file has them."""
+    """Return a path as written in a file, relative to a folder; backslashes are separators unless a file has them."""
     path = folder / _at_home(written)
     # false, and not an error, where the system allows no such name
     return path if os.path.isfile(path) else folder / _at_home(written.replace("\\", "/"))
 
 
 def _at_home(written: str) -> Path:
-    """With the user's folder in place of ~; as it is where there is no such user."""
+    """Replace ~ by the user's folder; unchanged where there is no such user."""
     try:
         return Path(written).expanduser()
     except RuntimeError:
@@ -74,11 +74,11 @@ def _at_home(written: str) -> Path:
 
 
 def missing_file(path: Path, written: str, expected: str = "") -> dict[str, Quantity]:
-    """Evidence of F101: the file, the folder in which it was looked for, and what is there in its place.
+    """Return evidence of F101: the file, the folder that was searched, and similar names in it.
 
     Args:
-        path: that leads to no file.
-        written: the same as the user wrote it.
+        path: path that leads to no file.
+        written: the path as the user wrote it.
         expected: what it should be, in words.
     """
     folder = path.parent.absolute()
@@ -101,7 +101,7 @@ def _printable(text: str) -> str:
 
 
 def _foreign_path(written: str) -> str:
-    """What is wrong with a path that leads nowhere, where it is Windows' way to write it; empty if that is not it."""
+    """Explain why a path leads nowhere, where it is written in Windows' notation; empty if that is not the reason."""
     if any(ord(letter) < 32 for letter in written):
         return "the path has a tab or line end, which TOML makes of \\t and \\n in double quotes: write / instead of \\"
     if _DRIVE.match(written) and not Path(written).is_absolute():

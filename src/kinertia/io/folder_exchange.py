@@ -14,13 +14,13 @@ _EXCHANGE = 2
 
 
 def put_in_place(new: Path, folder: Path, aside: Path) -> Path:
-    """`new` becomes `folder`; returns where that which `folder` was is now.
+    """Put `new` in the place of `folder`; return where the former `folder` is now.
 
     Linux and macOS exchange the two in one step, so that a process killed at any moment leaves one or the other.
     Windows, and file systems that cannot, take two steps: `folder` goes to `aside`, where `sweep` finds it.
 
     Raises:
-        OSError: it cannot be done; all is as it was.
+        OSError: it cannot be done; everything is unchanged.
     """
     if not folder.exists():
         os.rename(new, folder)
@@ -38,7 +38,7 @@ def put_in_place(new: Path, folder: Path, aside: Path) -> Path:
 
 
 def _exchanged(one: Path, other: Path) -> bool:
-    """Whether the system has exchanged the two."""
+    """Exchange the two folders; return whether the system could."""
     if sys.platform == "win32":
         return False
     system = ctypes.CDLL(None)

@@ -28,7 +28,7 @@ _FOOT_WORDS = {"r": "r", "right": "r", "l": "l", "left": "l"}
 
 @dataclass(frozen=True)
 class _Columns:
-    """Which columns hold one plate's load: each identifier is followed by x, y, z."""
+    """Columns of one plate's load: each identifier is followed by x, y, z."""
 
     name: str
     force: str
@@ -42,7 +42,7 @@ def read_forces(
 ) -> tuple[PlateLoads, tuple[Finding, ...]]:
     """Read force plates from a MOT or STO file: force and point of application in ground axes, N, m, N m.
 
-    With an ExternalLoads file its identifiers say which column is what and its bodies which foot it claims (a
+    With an ExternalLoads file its identifiers state the columns and its bodies the foot that each claims (a
     claim only); its own `datafile` is used only when `mot_path` is None. Without one, columns are recognised
     by name: `ground_force_vx`, `1_ground_force_vx`, `ground_force_r_vx`, `ground_force_1_vx` and the like,
     with the point `..._px` and the torque `..._mx`, `ground_torque_...x` or `ground_moment_...mx`.
@@ -95,7 +95,7 @@ def read_forces(
 
 
 def _wrench(path: Path, table: TimeTable, group: _Columns, turn: FloatArray) -> PlateLoad:
-    """Force (k, 3) and moment about the ground origin (k, 3), zero where nobody stands on the plate."""
+    """Return force (k, 3) and moment about the ground origin (k, 3), zero where nobody stands on the plate."""
     force = _triple(table, group.force) @ turn.T
     _expect_numbers(path, table, group, group.force, np.ones(len(force), dtype=bool))
     up, largest = int(np.argmax(turn[1])), int(np.argmax(np.abs(force @ turn).max(axis=0)))
@@ -121,7 +121,7 @@ def _wrench(path: Path, table: TimeTable, group: _Columns, turn: FloatArray) -> 
 
 
 def _stated(table: TimeTable, groups: Sequence[_Columns], turn: FloatArray) -> list[FloatArray]:
-    """Forces, points and torques (k, p, 3) as they stand in the file, in ground axes; torques that are not are zero."""
+    """Return forces, points and torques (k, p, 3) as stated in the file, in ground axes; missing ones are zero."""
     zero = np.zeros((len(table.time), 3))
     identifiers = ((group.force, group.point, group.torque) for group in groups)
     return [
@@ -184,9 +184,9 @@ def _external_loads(path: Path) -> ElementTree.Element:
 
 
 def _datafile(root: ElementTree.Element, loads_path: Path) -> tuple[Path, tuple[Finding, ...]]:
-    """Where the force file is that the loads name, and what was assumed.
+    """Find the force file that the loads state, with findings about assumptions.
 
-    Of a whole path on another computer, often one with Windows, the file of that name beside the loads counts.
+    For an absolute path on another computer, often Windows, the file of that name beside the loads is used.
     """
     name = (root.findtext(".//datafile") or "").strip()
     if not name or name.lower() == "unassigned":
@@ -233,12 +233,12 @@ def _groups_by_identifier(root: ElementTree.Element, path: Path) -> tuple[list[_
 
 
 def _expect_own_columns(groups: Sequence[_Columns], path: Path) -> None:
-    """Raise FileError where loads share columns, or one takes what another's name is on."""
+    """Raise FileError where loads share columns, or one uses columns with another's name."""
     forces: dict[tuple[str, ...], str] = {}
     taken: dict[str, str] = {}
     for group in groups:
         forces.setdefault(_plate_name(group.force), group.force)
-        # torques that nobody measured may be one column of zeros for all
+        # unmeasured torques may be one column of zeros for all
         for what, identifier in (("force", group.force), ("point", group.point)):
             mine = f"the {what} of {group.name}"
             if taken.setdefault(identifier, mine) != mine or identifier == group.torque:
@@ -254,7 +254,7 @@ def _expect_own_columns(groups: Sequence[_Columns], path: Path) -> None:
 
 
 def _plate_name(identifier: str) -> tuple[str, ...]:
-    """What tells the plate in the name of a column: "r", "1"."""
+    """Return the part of a column name that identifies the plate: "r", "1"."""
     words = re.sub("force|torque|moment|point|cop", "_", identifier.lower())
     return tuple(word for word in re.split(r"[_\W]+", words) if word not in ("", "v", "p", "m", "t"))
 

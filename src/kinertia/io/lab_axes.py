@@ -24,14 +24,14 @@ _AXES = {sign + "XYZ"[axis]: (axis, -1 if sign == "-" else 1) for axis in range(
 def to_ground(
     path: Path, stated: str, where: str, positions: FloatArray, plates: LabPlates | None
 ) -> tuple[FloatArray, str, list[Finding]]:
-    """From the axes of a laboratory to ground axes, by the file's word and by the data.
+    """Find the rotation from laboratory to ground axes, from the file's statement and from the data.
 
     Args:
         path: the file, for findings.
-        stated: the axis that it calls vertical, "+Z" or the like; empty where it says nothing.
-        where: it says so, or would say so.
+        stated: the axis that it states as vertical, such as "+Z"; empty where it states none.
+        where: place in the file where it states so, or would.
         positions: (n, m, 3) m, markers in the laboratory's axes; NaN where not seen.
-        plates: what stood on the floor, if anything.
+        plates: plates on the floor, if any.
 
     Returns:
         the rotation (3, 3), the axis that is up, and what was found (F131 to F133).
@@ -62,9 +62,9 @@ def to_ground(
 
 
 def upright_along_z(positions: FloatArray) -> FloatArray | None:
-    """The rotation (3, 3) to ground axes where a person stands upright on the floor z = 0; None where that is not sure.
+    """Return the rotation (3, 3) to ground axes where a person stands upright on the floor z = 0; None if uncertain.
 
-    For files that cannot say which axis is up. In half of the frames or more, markers reach from the floor to above a
+    For files that cannot state which axis is up. In half of the frames or more, markers reach from the floor to above a
     child's hip along Z, and much less far along Y.
 
     Args:
@@ -81,17 +81,17 @@ def upright_along_z(positions: FloatArray) -> FloatArray | None:
 
 
 def ground_rotation(vertical: str) -> FloatArray:
-    """The rotation (3, 3) from axes of which this one is up, "+Z" or the like, to ground axes."""
+    """Return the rotation (3, 3) to ground axes from axes with this one up, such as "+Z"."""
     return _rotation(*_AXES[vertical])
 
 
 def _seen(positions: FloatArray) -> BoolArray:
-    """(n, m) True where all three coordinates are there."""
+    """Return (n, m) True where all three coordinates are present."""
     return np.asarray(np.isfinite(positions).all(axis=2))
 
 
 def _rotation(axis: int, sign: int) -> FloatArray:
-    """Rotation (3, 3) that turns a lab axis to +Y and keeps lab X where it can; for Z up (x, y, z) -> (x, z, -y)."""
+    """Return the rotation (3, 3) of a lab axis to +Y that keeps lab X if it can; for Z up (x, y, z) -> (x, z, -y)."""
     up = np.zeros(3)
     up[axis] = sign
     forward = np.eye(3)[1 if axis == 0 else 0]

@@ -29,12 +29,12 @@ _NEEDED = tuple(name for name in LANDMARKS if not name.startswith(("thigh_wand",
 
 @dataclass(frozen=True)
 class MarkerSetDraft:
-    """A marker set for a recording.
+    """Draft of a marker set for a recording.
 
     Attributes:
-        text: TOML; what is not known, and why, is in comments.
-        needed: landmarks that were not found, and without which no leg can be made.
-        notes: what one should know before one uses it.
+        text: TOML; what is unknown, and why, is in comments.
+        needed: landmarks that were not found, and without which no leg can be modelled.
+        notes: remarks to read before using it.
     """
 
     text: str
@@ -43,7 +43,7 @@ class MarkerSetDraft:
 
 
 def preset_of(static: Recording) -> MarkerSet | None:
-    """The preset that a model can be made with of this static trial, whatever the widths of joints; None if none is."""
+    """Return the preset that can make a model of this static trial, whatever its joint widths; None if none can."""
     labels = static.markers.labels
     preset = nearest_preset(labels)
     widths = dict.fromkeys(preset.widths.values(), _ANY_WIDTH_M) | static.measurements
@@ -55,7 +55,7 @@ def preset_of(static: Recording) -> MarkerSet | None:
 
 
 def draft_marker_set(recording: Recording, name: str) -> MarkerSetDraft:
-    """A marker set for a recording, best a static trial, called by this name."""
+    """Draft a marker set with this name for a recording, ideally a static trial."""
     placed = places_of(recording)
     labels = [label for label in recording.markers.labels if label not in placed.left_out]
     landmarks, segments = placed.landmarks, placed.segments
@@ -76,7 +76,7 @@ def draft_marker_set(recording: Recording, name: str) -> MarkerSetDraft:
 
 
 def _widths(landmarks: Mapping[str, Sequence[str]], recording: Recording) -> dict[str, str]:
-    """Of joints with an outer marker only: the name of their width in the file, or one that it does not have."""
+    """Return widths of joints with only a lateral marker: their name in the file, or one that it does not have."""
     widths = {}
     for joint in WIDTHS:
         base, _, side = joint.rpartition("_")
@@ -99,7 +99,7 @@ def places_of(recording: Recording) -> Placement:
 
 
 def known_places(labels: Sequence[str]) -> tuple[dict[str, list[str]], dict[str, list[str]]]:
-    """Landmarks and segments with those of the labels that are known by their names."""
+    """Return landmarks and segments with the labels that are known by name."""
     landmarks = _placed(labels, dict(_names("landmarks", labels)), single=True)
     return landmarks, _placed(labels, dict(_names("segments", labels)), single=False)
 
@@ -113,7 +113,7 @@ def marker_set_text(
     heading: str,
     how: Mapping[str, str] | None = None,
 ) -> str:
-    """The text of a marker set (TOML); what it lacks of these labels, and of what Kinertia knows, is in comments."""
+    """Return the text of a marker set (TOML); labels and entries that it lacks are in comments."""
     lines = [heading, f"name = {quoted(name)}", "", "[landmarks]"]
     for landmark in LANDMARKS:
         own = landmarks.get(landmark)
@@ -142,19 +142,19 @@ def _listed(labels: Sequence[str]) -> str:
 
 
 def _names(table: str, labels: Sequence[str]) -> Iterator[tuple[str, str]]:
-    """What labels are called in the presets, folded, and entries of this table; the preset most like these labels has
-    the last word.
+    """Yield names of labels in the presets, folded, and entries of this table; the preset most like these labels comes
+    last and so takes precedence.
     """
     presets = map(read_marker_set, preset_names())
     for preset in sorted(presets, key=lambda preset: (share_worn(preset, labels), len(preset.labels))):
         entries = preset.landmarks if table == "landmarks" else preset.segments
         for entry, own in entries.items():
-            # a landmark of several labels is their middle: none of them is it alone
+            # a landmark of several labels is their middle, none of them alone
             yield from ((folded(label), entry) for label in own if table == "segments" or len(own) == 1)
 
 
 def _placed(labels: Sequence[str], names: Mapping[str, str], single: bool) -> dict[str, list[str]]:
-    """Entry -> labels, those of the very names first."""
+    """Return entry -> labels, exact names first."""
     placed: dict[str, list[str]] = {}
     exact = {label: names[folded(label)] for label in labels if folded(label) in names}
     near = {label: _nearest(label, names) for label in labels if label not in exact}
@@ -165,7 +165,7 @@ def _placed(labels: Sequence[str], names: Mapping[str, str], single: bool) -> di
 
 
 def _nearest(label: str, names: Mapping[str, str]) -> str | None:
-    """The entry of the name that looks most like the label, of the same side if it has one."""
+    """Return the entry of the name most similar to the label, on the same side if it has one."""
     side = folded(label)[:1]
     alike = [name for name in names if name[:1] == side]
     near = difflib.get_close_matches(folded(label), alike, n=1, cutoff=_NEAR)

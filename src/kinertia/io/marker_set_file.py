@@ -32,13 +32,13 @@ from kinertia.trial.data import Markers
 
 @cache
 def preset_names() -> tuple[str, ...]:
-    """Names of the marker sets that come with the package."""
+    """Return the names of the marker sets that come with the package."""
     folder = resources.files("kinertia.io") / "marker_sets"
     return tuple(sorted(Path(entry.name).stem for entry in folder.iterdir() if entry.name.endswith(".toml")))
 
 
 def read_marker_set(name: str | Path) -> MarkerSet:
-    """A preset by its name, or a user's own from a TOML file.
+    """Read a preset by its name, or a user's own marker set from a TOML file.
 
     Raises:
         FileError: no such preset or file, or the file is not a marker set.
@@ -53,10 +53,10 @@ def read_marker_set(name: str | Path) -> MarkerSet:
 
 
 def choose_marker_set(labels: Sequence[str]) -> MarkerSet:
-    """The preset that fits the labels of a static trial, or of one of pelvis and legs only.
+    """Choose the preset that fits the labels of a static trial, or of a trial of pelvis and legs only.
 
     Raises:
-        MarkerSetError: no preset fits (L101); with what the nearest one lacks, and the labels that look like it.
+        MarkerSetError: no preset fits (L101); with what the nearest one lacks, and similar labels.
     """
     best = nearest_preset(labels)
     if not fits_person(best, labels):
@@ -65,7 +65,7 @@ def choose_marker_set(labels: Sequence[str]) -> MarkerSet:
 
 
 def marker_set_of(markers: Markers, named: MarkerSet | None = None) -> MarkerSet:
-    """The preset that fits these markers, or the set that the user named, with the posterior pelvis that they show.
+    """Return the preset that fits these markers, or the set that the user chose, with the posterior pelvis they show.
 
     Raises:
         MarkerSetError: no preset fits (L101).
@@ -75,9 +75,9 @@ def marker_set_of(markers: Markers, named: MarkerSet | None = None) -> MarkerSet
 
 
 def nearest_preset(labels: Sequence[str]) -> MarkerSet:
-    """Of the presets that these labels hardly lack anything of, but for trunk and arms, the one that has most of them,
-    letter by letter before `spelled_as` they are; else the one that shares most of its labels, be it many or few, in
-    the same order; of such that are part of one another, the larger. It is spelled as the labels are where it fits.
+    """Return the preset nearest to the labels: of presets that the labels cover except for trunk and arms, the one with
+    most labels, letter by letter before `spelled_as` they are; else the one that shares most of its labels, be it many
+    or few, in the same order; of nested presets the larger. It is spelled as the labels are where it fits.
     """
     read = [read_marker_set(name) for name in preset_names()]
     presets = [with_posterior_pelvis(preset, labels) for preset in read]

@@ -21,11 +21,11 @@ _LONGEST_CM, _SHORTEST_CM = 250.0, 1.0
 
 @dataclass(frozen=True, eq=False)
 class BodyMeasures:
-    """What was measured of a person.
+    """Girths and lengths measured of a person.
 
     Attributes:
-        name: of the file.
-        values: value and deviation (m) by name of the measure.
+        name: name of the file.
+        values: value and SD (m) by name of the measure.
     """
 
     name: str
@@ -33,7 +33,7 @@ class BodyMeasures:
 
 
 def measures_sheet() -> str:
-    """The empty sheet: one row for each measure, those first that say most for the time that they take."""
+    """Write the empty sheet: one row per measure, the most informative for their time first."""
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
     table.writerow(COLUMNS)
@@ -43,12 +43,12 @@ def measures_sheet() -> str:
 
 
 def is_measures_sheet(path: Path) -> bool:
-    """Whether a file is such a sheet, filled in or not."""
+    """Return whether a file is such a sheet, filled in or not."""
     return has_columns(path, _NEEDED)
 
 
 def read_measures(path: Path) -> BodyMeasures:
-    """Read a sheet. Rows without a value were not measured; a deviation that was taken out is the sheet's own.
+    """Read a sheet. Rows without a value were not measured; an SD that was removed is the sheet's own.
 
     Raises:
         FileError: no such file, an unknown measure or one twice, no value at all, or one that cannot be; with the line.

@@ -30,14 +30,14 @@ _LARGEST_SHARE = 1.0
 
 @dataclass(frozen=True, eq=False)
 class Norm:
-    """One quantity of people who are taken as normal.
+    """Normative curve of one quantity.
 
     Attributes:
-        percent: (n,) of the gait cycle, ascending.
-        mean, sd: (n,) in the quantity's unit.
-        people: how many, where the file says; the fewest at any percent.
-        convention: what the quantity means, where the file says.
-        age_years, speed_m_s: spans of these people, where the file says.
+        percent: (n,) percent of the gait cycle, ascending.
+        mean, sd: (n,) mean and SD in the quantity's unit.
+        people: number of people, where the file states it; the fewest at any percent.
+        convention: definition of the quantity, where the file states it.
+        age_years, speed_m_s: ranges of these people, where the file states them.
     """
 
     percent: np.ndarray
@@ -50,7 +50,7 @@ class Norm:
 
 
 def read_norms(path: str | Path) -> dict[str, Norm]:
-    """Norms by quantity ("knee_angle_moment").
+    """Read norms by quantity ("knee_angle_moment").
 
     Raises:
         FileError: the file is missing or not text, lacks a column, or has a row that cannot be; with the line.

@@ -17,7 +17,7 @@ from kinertia.trial.data import FloatArray
 
 
 def read_lines(path: Path) -> list[str]:
-    """The lines of a text file, whatever its line ends.
+    """Read the lines of a text file, whatever its line ends.
 
     Raises:
         FileError: the file is missing, empty or not text.
@@ -34,7 +34,7 @@ def read_lines(path: Path) -> list[str]:
 
 
 def expect_file(path: Path, expected: str = "a file") -> None:
-    """Raise a FileError that names the folder and the nearest names in it, unless `path` is a file."""
+    """Raise a FileError that states the folder and the nearest names in it, unless `path` is a file."""
     if os.path.isfile(path):
         return
     if os.path.isdir(path):
@@ -43,24 +43,24 @@ def expect_file(path: Path, expected: str = "a file") -> None:
 
 
 def wrong_kind(path: Path, given: str, what: str, expected: str) -> FileError:
-    """The error that `given` "cannot {what}; expected {expected}"."""
+    """Return the error that `given` "cannot {what}; expected {expected}"."""
     return FileError.found(path, "F102", given=Quantity(given), what=Quantity(what), expected=Quantity(expected))
 
 
 def mismatch(path: Path, kind: str, found: str, expected: str, line: int | None = None) -> FileError:
-    """The error that the content "is not {kind}: found {found}, expected {expected}"."""
+    """Return the error that the content "is not {kind}: found {found}, expected {expected}"."""
     return FileError.found(path, "F103", line, found=Quantity(found), kind=Quantity(kind), expected=Quantity(expected))
 
 
 def malformed(path: Path, line: int | None, found: str, expected: str, **known: Quantity) -> FileError:
-    """The error of a cell or row: "found {found}; expected {expected}"; `cell` and `column` where it is one cell."""
+    """Return the error of a cell or row: "found {found}; expected {expected}"; `cell` and `column` for one cell."""
     return FileError.found(path, "F105", line, **known, found=Quantity(found), expected=Quantity(expected))
 
 
 def read_rows(
     path: Path, lines: Sequence[str], first_line: int, columns: int, may_be_short: bool = False
 ) -> tuple[FloatArray, list[int]]:
-    """The numbers in the lines from one-based `first_line` on, blank lines left out.
+    """Read the numbers in the lines from one-based `first_line` on, blank lines left out.
 
     Cells are separated by tabs if the line has any, else by blanks; an empty cell is NaN and trailing empty
     cells may be missing altogether.
@@ -94,7 +94,7 @@ def read_rows(
 
 
 def _complete(lines: list[str], columns: int) -> FloatArray | None:
-    """The numbers of rows that have all their cells and nothing else in them; None if there is a row that has not."""
+    """Parse rows that all have every cell and nothing else; None if a row does not."""
     if not lines:
         return None
     try:
@@ -128,6 +128,6 @@ def _cell(path: Path, line: int, column: int, cell: str) -> float:
 
 
 def wrong_cells(path: Path, line: int, cells: int, columns: int, hint: str = "") -> FileError:
-    """The error of a row that has too many or too few cells."""
+    """Return the error of a row with too many or too few cells."""
     counts = {"cells": Quantity(cells, "1"), "columns": Quantity(columns, "1")}
     return malformed(path, line, f"{cells} values in the row", f"{columns} by the header{hint}", **counts)

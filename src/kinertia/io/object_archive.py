@@ -41,9 +41,9 @@ def write_archive(path: Path, content: object, kinds: Sequence[type], remarks: M
     """Write an object made of these dataclasses, and of arrays, numbers, texts, sequences and mappings.
 
     Args:
-        path: of the file.
+        path: path of the file.
         content: the object.
-        kinds: the classes that may be in it; the file knows them by their names.
+        kinds: classes that may be in it; the file identifies them by name.
         remarks: written in clear at the beginning of `structure.json`.
 
     Raises:
@@ -56,10 +56,10 @@ def write_archive(path: Path, content: object, kinds: Sequence[type], remarks: M
 
 
 def read_archive(path: Path, kinds: Sequence[type]) -> Any:
-    """The object in a file of `write_archive`.
+    """Read the object in a file of `write_archive`.
 
     Raises:
-        FileError: there is no such file, it is damaged, or from a version that wrote other things.
+        FileError: there is no such file, it is damaged, or from a version with other content.
     """
     try:
         with zipfile.ZipFile(path) as archive:
@@ -78,7 +78,7 @@ def read_archive(path: Path, kinds: Sequence[type]) -> Any:
 
 
 def _member(name: str, content: bytes) -> tuple[zipfile.ZipInfo, bytes]:
-    """What to write: the same bytes whenever it is written."""
+    """Return an archive member that has the same bytes whenever it is written."""
     info, middle = zipfile.ZipInfo(name), len(content) // 2
     sample = content[middle : middle + _SAMPLE_BYTES]
     if len(zlib.compress(sample, _QUICK)) < _WORTH_IT * len(sample):
@@ -87,7 +87,7 @@ def _member(name: str, content: bytes) -> tuple[zipfile.ZipInfo, bytes]:
 
 
 class _Writer:
-    """Turns objects into what JSON has words for, and puts arrays into the archive."""
+    """Converter of objects to JSON, with arrays as members of the archive."""
 
     def __init__(self, archive: zipfile.ZipFile, kinds: set[type]) -> None:
         self.archive, self.kinds = archive, kinds
@@ -148,7 +148,7 @@ def _below(place: str, name: object) -> str:
 
 
 class _Reader:
-    """Turns it back."""
+    """Converter of JSON and arrays back to objects."""
 
     def __init__(self, archive: zipfile.ZipFile, kinds: Mapping[str, type]) -> None:
         self.archive, self.kinds = archive, kinds

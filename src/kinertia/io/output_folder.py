@@ -17,19 +17,19 @@ from kinertia.io.folder_exchange import put_in_place
 from kinertia.io.working_folder import BEFORE, sweep, working_folder
 
 GENERATOR = '<meta name="generator" content="kinertia'
-"""In the head of every HTML page that is a result of its own."""
+"""Tag in the head of every HTML page that is a result of its own."""
 _TELLING = (".json", ".html")
 """Types of the result files that name Kinertia as what made them."""
 _WRITTEN = ".kinertia.json"
-"""Which files are Kinertia's, in every folder that it wrote to: lists of names by what they are results of."""
+"""File that lists Kinertia's files in a folder that it wrote to, by kind of result."""
 INTERRUPTIONS = tuple(
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK") if hasattr(signal, name)
 )
 """Ctrl-C, the request to end, and the end of the terminal, as far as the system has them."""
 _OWN = ".kinertia"
-"""How the names of hidden files begin that Kinertia keeps beside results: lists, locks, what is in the making."""
+"""Prefix of hidden files that Kinertia keeps beside results: lists, locks, and unfinished results."""
 _ANYWHERE = {".DS_Store", ".localized", ".directory", ".gitkeep", ".gitignore", "desktop.ini", "Thumbs.db"}
-"""What file managers and Git leave in folders that hold nothing else."""
+"""Files that file managers and Git leave in folders that hold nothing else."""
 _RESULTS = {".html", ".json", ".csv", ".osim", ".sto", ".mot", ".trc", ".c3d", ".xml", ".toml", ".md", ".png"}
 """Types of files that results have."""
 
@@ -37,10 +37,10 @@ _RESULTS = {".html", ".json", ".csv", ".osim", ".sto", ".mot", ".trc", ".c3d", "
 def check_folder(folder: str | Path, sub_folders: Collection[str] = ()) -> None:
     """Raise FileError unless results can be written to `folder`, which need not exist yet.
 
-    Worth calling before a long computation. Also removes what runs left beside it that were killed.
+    Call it before a long computation. It also removes what killed runs left beside the folder.
 
     Args:
-        folder: is replaced as a whole when results are complete, with everything else that is in it.
+        folder: folder that is replaced as a whole when results are complete, with everything else in it.
         sub_folders: names in it that results need as folders.
     """
     folder = _real(folder)
@@ -57,7 +57,7 @@ def check_folder(folder: str | Path, sub_folders: Collection[str] = ()) -> None:
 
 
 def _expect_place(folder: Path) -> None:
-    """Raise FileError unless a folder can be made or replaced here; looks at nothing that is in it."""
+    """Raise FileError unless a folder can be made or replaced here; its content is not read."""
     parent = _existing(folder.parent)
     for place in (parent, folder):
         if place.exists() and not place.is_dir():
@@ -71,12 +71,12 @@ def _expect_place(folder: Path) -> None:
 
 
 def _real(folder: str | Path) -> Path:
-    """The folder itself where the path is a link to it."""
+    """Return the folder itself where the path is a link to it."""
     return Path(os.path.realpath(folder))
 
 
 def _irreplaceable(folder: Path) -> str:
-    """Why a folder cannot be replaced by another, if so."""
+    """Return why a folder cannot be replaced by another; empty if it can."""
     here = Path.cwd().resolve()
     if folder == here or folder in here.parents:
         return "is the current folder, or holds it"
@@ -88,7 +88,7 @@ def _irreplaceable(folder: Path) -> str:
 
 
 def _open_elsewhere(folder: Path) -> list[Path]:
-    """Files that another program has open, as Windows tells."""
+    """List files that another program has open, as Windows reports."""
     held = []
     for path in sorted(folder.rglob("*")):
         try:
@@ -100,10 +100,10 @@ def _open_elsewhere(folder: Path) -> list[Path]:
 
 
 def expect_own_folder(folder: str | Path, otherwise: str = "") -> None:
-    """Raise FileError where `folder` holds files and none of them says that Kinertia wrote the results there.
+    """Raise FileError where `folder` holds files and none of them states that Kinertia wrote the results there.
 
-    Hidden files count, but for those that systems and programs leave in any folder. Looks at no folder inside, and so
-    answers at once: worth calling before `check_folder`.
+    Hidden files count, but for those that systems and programs leave in any folder. Subfolders are not read, so that it
+    answers at once: call it before `check_folder`.
 
     Args:
         folder: need not exist yet.
@@ -122,7 +122,7 @@ def expect_own_folder(folder: str | Path, otherwise: str = "") -> None:
 
 
 def _says_kinertia(path: Path) -> bool:
-    """Whether a file is there and names Kinertia as what made it."""
+    """Return whether a file exists and states that Kinertia made it."""
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError):
@@ -137,7 +137,7 @@ def _says_kinertia(path: Path) -> bool:
 
 
 def _existing(folder: Path) -> Path:
-    """The folder itself, or the nearest one above it that exists."""
+    """Return the folder itself, or the nearest existing one above it."""
     places = (folder.absolute(), *folder.absolute().parents)
     existing = next((path for path in places if path.exists()), None)
     if existing is None:
@@ -147,15 +147,15 @@ def _existing(folder: Path) -> Path:
 
 @contextmanager
 def complete_folder(folder: str | Path, kind: str) -> Iterator[Path]:
-    """A hidden folder for new results, which take the place of those in `folder` when the block ends without an error.
+    """Yield a hidden folder for new results, which replace those in `folder` when the block ends without an error.
 
     They replace all files of the last results of this kind, not only those of the same names; what else is in `folder`
-    stays. The folder is replaced as a whole and at once: whoever looks, and whatever happens to this process, finds the
+    stays. The folder is replaced as a whole and at once: whatever happens to this process, it holds the
     old results or the new ones. After an error or an interruption everything is as it was; an interruption while
     folders are being exchanged takes effect after that.
 
     Args:
-        folder: is made if need be.
+        folder: folder of the results, made if necessary.
         kind: what they are results of, "fit" for one; results of other kinds stay.
 
     Raises:
@@ -206,7 +206,7 @@ def _replace(new: Path, folder: Path, kind: str, aside: Path) -> None:
 
 
 def _written(folder: Path) -> dict[str, list[str]]:
-    """Files that Kinertia wrote to this folder, by kind; none where it does not say."""
+    """Return files that Kinertia wrote to this folder, by kind; none where it is not stated."""
     try:
         written = json.loads((folder / _WRITTEN).read_text(encoding="utf-8"))
     except (OSError, ValueError):
@@ -217,7 +217,7 @@ def _written(folder: Path) -> dict[str, list[str]]:
 
 
 def _files(folder: Path) -> set[str]:
-    """Names of all files and links in a folder, from there."""
+    """Return names of all files and links in a folder, relative to it."""
     return {
         (Path(place) / name).relative_to(folder).as_posix()
         for place, folders, names in os.walk(folder)
@@ -226,7 +226,7 @@ def _files(folder: Path) -> set[str]:
 
 
 def _link(source: Path, target: Path) -> None:
-    """The same file in another folder, too; a copy where the file system has no links."""
+    """Link the file into another folder, or copy it where the file system has no links."""
     target.parent.mkdir(parents=True, exist_ok=True)
     try:
         os.link(source, target, follow_symlinks=False)
@@ -236,7 +236,7 @@ def _link(source: Path, target: Path) -> None:
 
 @contextmanager
 def _uninterrupted() -> Iterator[None]:
-    """Holds interruptions back until the block is done; only the main thread can, and only it is interrupted."""
+    """Delay interruptions until the block is done; only the main thread can, and only it is interrupted."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -252,7 +252,7 @@ def _uninterrupted() -> Iterator[None]:
 
 
 def write_then_rename(path: Path, text: str) -> None:
-    """Write text so that `path` appears complete or not at all; of a killed process the next one sweeps up the rest.
+    """Write text so that `path` appears complete or not at all; remains of a killed process are removed by the next.
 
     Raises:
         FileError: nothing can be written beside it.

@@ -23,7 +23,7 @@ Progress = Callable[[str, float], None]
 def read_inputs(
     wanted: SubjectFile, progress: Progress = lambda stage, share: None
 ) -> tuple[Recording, list[TrialInput], MarkerSet | None]:
-    """The static trial, the gait trials by their names in the subject file, and the marker set if it names one.
+    """Read the static trial, the gait trials by their names in the subject file, and its marker set if it states one.
 
     Raises:
         KinertiaError: a file is missing or broken.
@@ -38,7 +38,7 @@ def read_inputs(
 
 
 def read_static(wanted: SubjectFile) -> Recording:
-    """The static trial of a subject file.
+    """Read the static trial of a subject file.
 
     Raises:
         KinertiaError: there is none, or its file is missing or broken.
@@ -49,7 +49,7 @@ def read_static(wanted: SubjectFile) -> Recording:
 
 
 def read_trial(wanted: SubjectFile, files: TrialFiles) -> TrialInput:
-    """One of the trials of a subject file, by its name there.
+    """Read one of the trials of a subject file, by its name there.
 
     Columns of the same name in the force files of two trials need not come from the same plate (laboratories sort steps
     into such files), so each trial's are plates of their own, unless the subject file says that they are the same; the
@@ -67,7 +67,7 @@ def read_trial(wanted: SubjectFile, files: TrialFiles) -> TrialInput:
 
 
 def _as_zeroed(wanted: SubjectFile, recording: Recording) -> Recording:
-    """With what idle plates read in their loads, where the laboratory states that they were zeroed."""
+    """Restore what unloaded plates read in their loads, where the laboratory states that they were zeroed."""
     if not wanted.instruments.zeroed or recording.plates is None:
         return recording
     return replace(recording, plates=with_idle_levels(recording.plates))

@@ -22,11 +22,11 @@ _FEWEST = 10
 
 
 class PlateMoments(NamedTuple):
-    """Of one plate.
+    """Moments of one plate about the laboratory's origin.
 
     Attributes:
         about_origin: (k, 3) N m; without a free moment where moments and centre of pressure contradict each other.
-        misses: by which share of the horizontal moments they do; infinite where nobody stands on the plate.
+        misses: share of the horizontal moments by which they do; infinite where nobody stands on the plate.
     """
 
     about_origin: FloatArray
@@ -34,12 +34,12 @@ class PlateMoments(NamedTuple):
 
     @property
     def agree(self) -> bool:
-        """Moments and centre of pressure say the same."""
+        """Whether moments and centre of pressure agree."""
         return self.misses <= MOMENTS_FIT
 
     @classmethod
     def of(cls, force: FloatArray, moment: FloatArray, point: FloatArray) -> PlateMoments:
-        """From force (k, 3) N, moment (k, 3) N m about an unknown point, and centre of pressure (k, 3) m."""
+        """Compute from force (k, 3) N, moment (k, 3) N m about an unknown point, and centre of pressure (k, 3) m."""
         at = np.cross(np.nan_to_num(point), force)
         with np.errstate(over="ignore"):
             known = np.isfinite(np.square(np.hstack([point, force, moment, at]))).all(axis=1)

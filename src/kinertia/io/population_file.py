@@ -25,15 +25,15 @@ _DIGITS = 13
 
 
 class PopulationFile(Table):
-    """A whole file.
+    """Content of a whole population file.
 
     Attributes:
-        kinertia: version.
-        people: names.
-        files: SHA-256 of all files that it is from.
-        segments: names.
-        mean, mean_sd: (10 s,) of the group in the literature's deviations, and how well that is known.
-        covariance: (10 s, 10 s) of one more person of the group.
+        kinertia: version of Kinertia.
+        people: names of the people.
+        files: SHA-256 of all files that it was learnt from.
+        segments: names of the segments.
+        mean, mean_sd: (10 s,) mean of the group in the literature's SDs, and its own SD.
+        covariance: (10 s, 10 s) covariance of one more person of the group.
 
     Examples:
         >>> from kinertia.io.population_file import PopulationFile
@@ -62,7 +62,7 @@ class PopulationFile(Table):
 
 
 def read_population(path: Path) -> PopulationFile:
-    """What was learnt of a group.
+    """Read what was learnt from a group.
 
     Raises:
         FileError: no such file, or not one that `kinertia population` wrote; with the line.
@@ -79,7 +79,7 @@ def read_population(path: Path) -> PopulationFile:
 
 
 def population_text(population: PopulationFile) -> str:
-    """The text of the file."""
+    """Return the text of the file."""
     lines = [
         f"# {len(population.people)} people of a group, learnt by kinertia population. For the fits of others of it:",
         "#     [prior]",

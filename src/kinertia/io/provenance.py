@@ -22,12 +22,12 @@ _COMPUTES = ("kinertia", "numpy", "scipy", "numba", "ezc3d")
 
 @dataclass(frozen=True)
 class Provenance:
-    """What it takes to repeat a result.
+    """Everything needed to repeat a result.
 
     Attributes:
-        command: as typed on a command line.
+        command: command as typed on a command line.
         files: SHA-256 of every input file, by its path from the folder that holds them all.
-        trials: of each trial the path of its markers, as in `files`.
+        trials: path of each trial's markers, as in `files`.
     """
 
     command: str
@@ -36,7 +36,7 @@ class Provenance:
 
 
 def provenance_of(wanted: SubjectFile, command: str) -> Provenance:
-    """The command with the hashes of all files that the subject file names."""
+    """Collect the command and the hashes of all files in the subject file."""
     model, prior = wanted.model, wanted.prior
     others = (wanted.instruments.session, prior.bsp, prior.population, prior.measures)
     paths = [path for path in (model.static, model.osim, model.markers, *others) if isinstance(path, Path)]
@@ -50,31 +50,31 @@ def provenance_of(wanted: SubjectFile, command: str) -> Provenance:
 
 
 def recordings(wanted: SubjectFile) -> tuple[str, ...]:
-    """SHA-256 of the person's static trial or model, and of the gait trials: those of no other person."""
+    """Return the SHA-256 of the person's static trial or model and gait trials: files that no other person has."""
     paths = [wanted.model.static, wanted.model.osim, *(trial.markers for trial in wanted.trials)]
     return tuple(sha256(path) for path in paths if path is not None)
 
 
 def names_from_common_folder(paths: Sequence[PurePath]) -> list[str]:
-    """Each path from the folder that holds them all; whole paths where none does, as on two drives of Windows."""
+    """Return each path relative to their common folder; whole paths where there is none, as on two Windows drives."""
     above = next((folder for folder in paths[0].parents if all(path.is_relative_to(folder) for path in paths)), None)
     return [(path if above is None else path.relative_to(above)).as_posix() for path in paths]
 
 
 def command_line(words: Sequence[str], windows: bool = os.name == "nt") -> str:
-    """One line that a shell takes apart into these words again: cmd and PowerShell know no single quotes of POSIX."""
+    """Join words to one line that a shell splits into these again: cmd and PowerShell know no POSIX single quotes."""
     return subprocess.list2cmdline(words) if windows else shlex.join(words)
 
 
 def sha256(path: Path) -> str:
-    """Of a file's content."""
+    """Return the SHA-256 of a file's content."""
     with path.open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
 @cache
 def versions() -> dict[str, str]:
-    """Versions of everything that numbers depend on, as far as it is installed."""
+    """Return the versions of everything that numbers depend on, as far as installed."""
     installed = {"Python": platform.python_version()}
     for name in _COMPUTES:
         with contextlib.suppress(PackageNotFoundError):  # ezc3d, where it has no wheel

@@ -73,19 +73,19 @@ def read_qualisys(path: str | Path, forces: Sequence[Path] | None = None) -> Rec
 
 
 def is_plate_file(path: Path) -> bool:
-    """Whether its name is that of a plate's file."""
+    """Return whether this is the name of a plate's file."""
     return path.suffix.lower() == ".tsv" and _PLATE.search(path.stem) is not None
 
 
 def plates_beside(path: Path) -> list[Path]:
-    """The plates' files of a trial, by its markers' file or by one of them, in QTM's order."""
+    """Return the plates' files of a trial, given its markers' file or one of them, in QTM's order."""
     stem = _PLATE.sub("", path.stem)
     files = [file for file in path.parent.iterdir() if is_plate_file(file) and _PLATE.sub("", file.stem) == stem]
     return sorted(files, key=lambda file: (len(file.stem), file.stem))
 
 
 def _header(path: Path, lines: Sequence[str]) -> tuple[dict[str, list[str]], int]:
-    """Name -> values of the lines before the rows, and the one-based line at which these begin."""
+    """Return name -> values of the lines before the rows, and the one-based line at which the rows begin."""
     header: dict[str, list[str]] = {}
     for number, line in enumerate(lines, start=1):
         name, *values = line.rstrip().split("\t")
@@ -121,7 +121,7 @@ def _rate(path: Path, header: dict[str, list[str]]) -> float:
 
 
 def _markers(path: Path) -> tuple[Markers, list[Finding]]:
-    """Markers in the laboratory's axes, m, and what was found."""
+    """Read markers in the laboratory's axes, m, with findings."""
     lines = read_lines(path)
     header, first = _header(path, lines)
     labels = tuple(label for label in header.get("MARKER_NAMES", ()) if label)
@@ -181,7 +181,7 @@ def _plate(path: Path) -> _Plate:
 
 
 def _axes(corners: FloatArray) -> FloatArray:
-    """(3, 3) rows: the plate's axes in the laboratory's, from its corners in the order of _CORNERS."""
+    """Return the plate's axes in the laboratory's as rows (3, 3), from its corners in the order of _CORNERS."""
     x = corners[[0, 3]].mean(axis=0) - corners[[1, 2]].mean(axis=0)
     y = corners[[0, 1]].mean(axis=0) - corners[[2, 3]].mean(axis=0)
     x, y = x / np.linalg.norm(x), y / np.linalg.norm(y)

@@ -34,19 +34,19 @@ def read_recording(
     length_unit: str | None = None,
     standing: bool = False,
 ) -> Recording:
-    """Read one trial: markers, and forces where there are any.
+    """Read one trial: markers, and forces if any.
 
     Args:
         markers_path: a .trc or .c3d file, a .tsv file of Qualisys, or a .csv file of Vicon.
-        forces_path: a .mot or .sto file, or a .forces file of Cortex; its forces go before those of the markers' file.
+        forces_path: a .mot or .sto file, or a .forces file of Cortex; its forces precede those of the markers' file.
             Of Qualisys also the .tsv file of a plate: those of the trial's other plates beside it are read, too.
-        loads_path: an OpenSim ExternalLoads .xml file that says which force column is what. Without
+        loads_path: an OpenSim ExternalLoads .xml file that identifies the force columns. Without
             `forces_path` its own datafile is read.
-        length_unit: of a .c3d file's lengths, "mm", "cm" or "m", whatever it says itself.
+        length_unit: of a .c3d file's lengths, "mm", "cm" or "m", overriding the file.
         standing: of a .c3d file of poses (Theia), the same person standing upright, as a static trial.
 
     Returns:
-        the recording; its `plates` is None where no file holds usable force plates. Somebody who stands along Z in a
+        the recording; its `plates` is None where no file holds usable force plates. A person who stands along Z in a
         .trc file is turned to Y up, and the forces of a file with them.
 
     Raises:
@@ -81,7 +81,7 @@ def read_recording(
 def _forces(
     path: str | Path | None, loads_path: str | Path | None, turn: FloatArray | None
 ) -> tuple[PlateLoads, tuple[Finding, ...]]:
-    """Plates of a file of forces, and what was found of them."""
+    """Read the plates of a force file, with findings."""
     if path is None or Path(path).suffix.lower() != CORTEX:
         return read_forces(path, loads_path, turn)
     if loads_path is not None:
@@ -92,12 +92,12 @@ def _forces(
 
 
 def _of_markers(recording: Recording) -> list[Finding]:
-    """Without what was found of its own plates, where those of a force file take their place."""
+    """Return findings without those about the markers file's own plates, where plates of a force file replace them."""
     return [one for one in recording.findings if one.code != "F151" and one.where.plate is None]
 
 
 def _read_markers(path: Path, plate: Path | None, length_unit: str | None, standing: bool) -> Recording:
-    """What a file of markers holds; readers are loaded by those who have such files."""
+    """Read a file of markers; a format's reader is loaded only when needed."""
     kind = path.suffix.lower()
     if length_unit is not None and kind != ".c3d":
         raise wrong_kind(path, f"A '{kind}' file", "take a length_unit, since it states its own", "a .c3d file")
@@ -121,7 +121,7 @@ def _read_markers(path: Path, plate: Path | None, length_unit: str | None, stand
 
 
 def _turned(recording: Recording, path: Path, turn: FloatArray) -> Recording:
-    """Markers of a TRC file, which takes Y to be up and has not been written so."""
+    """Rotate the markers of a TRC file that was not written with Y up, as the format assumes."""
     rotated = finding("F133", Where(path.name), axis=Quantity("+Z"), source=Quantity("upright people"))
     return replace(
         recording,
@@ -139,7 +139,7 @@ def _expect_kind(path: Path, suffixes: tuple[str, ...], what: str) -> None:
 
 
 def _expect_laboratory(path: Path, recording: Recording) -> None:
-    """Raise a FileError that names a place or load that no laboratory has: a broken number spoils all that follows."""
+    """Raise a FileError for positions or loads that no laboratory has: a broken number spoils all that follows."""
     markers, plates = recording.markers, recording.plates
     far = np.argwhere(np.abs(markers.positions) > _FARTHEST_M)
     if far.size:
@@ -181,7 +181,7 @@ def _span(time: FloatArray) -> Quantity:
 
 
 def frame_count(path: Path) -> int:
-    """Frames that the header of a .c3d or .trc file announces; 0 where it does not say: reading it will tell why."""
+    """Return the number of frames in the header of a .c3d or .trc file; 0 where not stated (reading explains why)."""
     from kinertia.io import c3d_structure, trc
 
     try:

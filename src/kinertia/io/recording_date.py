@@ -19,14 +19,14 @@ _TIME_STAMP = re.compile(rb"^TIME_STAMP\t(\d{4})-(\d{2})-(\d{2})\b", re.MULTILIN
 
 
 def session_date(wanted: SubjectFile) -> date | None:
-    """As the subject file states it, or as the first gait trial that says one does; None where nobody does."""
+    """Return the date in the subject file, or of the first gait trial that states one; None where none does."""
     stated = wanted.instruments.date
     said = (recording_date(trial.markers) for trial in wanted.trials)
     return stated or next((day for day in said if day is not None), None)
 
 
 def recording_date(path: Path) -> date | None:
-    """By TRIAL:DATE of a C3D file (year, month, day: BTS), or TIME_STAMP of a Qualisys .tsv file."""
+    """Return the date from TRIAL:DATE of a C3D file (year, month, day: BTS), or TIME_STAMP of a Qualisys .tsv file."""
     try:
         if path.suffix.lower() == ".c3d":
             numbers = c3d_structure.trial_date(path)

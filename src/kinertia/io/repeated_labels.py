@@ -13,11 +13,11 @@ from kinertia.trial.data import BoolArray
 
 
 def first_with_data(path: Path, labels: Sequence[str], seen: BoolArray) -> tuple[dict[str, int], list[Finding]]:
-    """Choose one trajectory for each label: the first that has data. Says which labels are repeated (F113).
+    """Choose one trajectory for each label, the first that has data; F113 lists repeated labels.
 
     Args:
         path: the file, for findings.
-        labels: of the m trajectories.
+        labels: labels of the m trajectories.
         seen: (m) whether any frame shows them.
 
     Returns:

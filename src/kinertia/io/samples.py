@@ -34,7 +34,7 @@ SHA256: Mapping[str, str] = MappingProxyType(
 )
 """The files, and the SHA-256 of each."""
 NAME, SIZE_MB = "gait2354", 0.9
-"""Of their folder, and of all four."""
+"""Name of their folder, and size of all four."""
 VARIABLE = "KINERTIA_DATA"
 """Environment variable: a folder that holds the folder `NAME`, in place of the user's cache."""
 _TIMEOUT_S = 20
@@ -42,19 +42,19 @@ _HOW = 'pip install "kinertia[samples]"'
 
 
 def samples_folder() -> Path:
-    """Where samples are kept: what the environment variable names, or the user's cache; it need not exist."""
+    """Return the samples folder, from the environment variable or in the user's cache; it need not exist."""
     stated = os.environ.get(VARIABLE)
     return Path(stated) if stated else platformdirs.user_cache_path("kinertia", appauthor=False)
 
 
 def sample_walk(progress: Callable[[str, float], None] = lambda stage, share: None) -> Path:
-    """The folder of the sample walk; what is not in it yet is downloaded.
+    """Return the folder of the sample walk; missing files are downloaded.
 
     Args:
-        progress: takes the stage's name and its share done.
+        progress: called with the stage's name and its share done.
 
     Raises:
-        KinertiaError: a file is neither there nor to be had; it says which files to put where by hand.
+        KinertiaError: a file is missing and cannot be downloaded; states which files to put where by hand.
     """
     folder = samples_folder() / NAME
     missing = [name for name, expected in SHA256.items() if _sha256(folder / name) != expected]
@@ -76,7 +76,7 @@ def _of_all(progress: Callable[[str, float], None], k: int, count: int, share: f
 
 
 def _sha256(path: Path) -> str:
-    """Of a file; empty where there is none to read."""
+    """Return the SHA-256 of a file; empty where it cannot be read."""
     try:
         with path.open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
@@ -85,14 +85,14 @@ def _sha256(path: Path) -> str:
 
 
 class _Failure(NamedTuple):
-    """Why there is no file, and what else than downloading by hand may help."""
+    """Why a file is missing, and what may help besides downloading it by hand."""
 
     problem: str
     instead: str
 
 
 def _downloaded(name: str, folder: Path, share: _Share) -> _Failure | None:
-    """Download a file; why not, where that fails."""
+    """Download a file; return the reason where that fails."""
     import pooch
     import requests
 
@@ -117,7 +117,7 @@ def _downloaded(name: str, folder: Path, share: _Share) -> _Failure | None:
 
 
 def _no_answer(server: str, error: Exception) -> _Failure:
-    """Why nothing, or not all, came from the server."""
+    """Describe why nothing, or not everything, came from the server."""
     import requests
     from urllib3.exceptions import ReadTimeoutError
 
@@ -145,23 +145,23 @@ def _unavailable(folder: Path, names: Iterable[str], failure: _Failure) -> Kiner
 
 
 class _Share:
-    """What pooch takes for a progress bar: bytes of one file."""
+    """Progress of one file in bytes, as the progress bar that pooch expects."""
 
     def __init__(self, progress: Callable[[float], None]) -> None:
         self._progress, self._done, self.total = progress, 0, 0
 
     def tell(self, share: float) -> None:
-        """So much of the file has come, from 0 to 1."""
+        """Report the share of the file received, from 0 to 1."""
         self._progress(share)
 
     def update(self, count: int) -> None:
-        """So many more have come."""
+        """Count this many more bytes as received."""
         self._done += count
         self.tell(min(self._done / self.total, 1.0) if self.total else 0.0)
 
     def reset(self) -> None:
-        """From the beginning."""
+        """Restart from zero."""
         self._done = 0
 
     def close(self) -> None:
-        """Nothing is open."""
+        """Do nothing: nothing is open."""

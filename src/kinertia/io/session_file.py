@@ -30,14 +30,14 @@ _UNITS = {
 
 
 class PersonInstruments(Table):
-    """What the trials of one person say of plates and clock.
+    """Information from the trials of one person on plates and synchronisation.
 
     Attributes:
-        name: of the person.
-        files: SHA-256 of every file that this is from.
-        plates: names.
-        information: (k, k) on the unknowns of each plate, of the floor and of the clock, SI.
-        right: (k,) its right-hand side.
+        name: name of the person.
+        files: SHA-256 of every file that this was computed from.
+        plates: names of the plates.
+        information: (k, k) on the unknowns of each plate, of all plates together and of the synchronisation, SI.
+        right: (k,) right-hand side of the information.
 
     Examples:
         >>> from kinertia.io.session_file import PersonInstruments
@@ -61,7 +61,7 @@ class PersonInstruments(Table):
 
 
 class SessionFile(Table):
-    """A whole file. What stands in it for people is not read again."""
+    """Content of a whole session file; the part written for human readers is not read again."""
 
     kinertia: str
     found: dict[str, dict[str, float]]
@@ -69,7 +69,7 @@ class SessionFile(Table):
 
 
 def read_session(path: Path) -> tuple[PersonInstruments, ...]:
-    """What each person's trials say.
+    """Read the information from each person's trials.
 
     Raises:
         FileError: no such file, or not one that `kinertia instruments` wrote; with the line.
@@ -88,12 +88,12 @@ def read_session(path: Path) -> tuple[PersonInstruments, ...]:
 def session_text(
     version: str, values: Mapping[str, Mapping[str, tuple[float, float, str]]], people: Sequence[PersonInstruments]
 ) -> str:
-    """The text of the file.
+    """Return the text of the file.
 
     Args:
-        version: of Kinertia.
-        values: per instrument, per quantity its error, deviation and unit (m, 1, N m/N, rad or s).
-        people: what each says.
+        version: version of Kinertia.
+        values: error, SD and unit (m, 1, N m/N, rad or s) by instrument and quantity.
+        people: information from each person.
     """
     lines = [
         "# Plates and clock of a session, found by kinertia instruments. For use in its fits, in the subject files:",

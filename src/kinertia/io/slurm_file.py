@@ -15,7 +15,7 @@ Lines = Annotated[tuple[str, ...], Field(strict=False)]
 
 
 class SlurmFile(Table):
-    """A whole file; every entry may be left out.
+    """Content of a whole SLURM file; every entry may be left out.
 
     Examples:
         >>> from kinertia.io.slurm_file import SlurmFile
@@ -36,7 +36,7 @@ class SlurmFile(Table):
 
 
 def read_slurm(path: Path) -> SlurmFile:
-    """The file.
+    """Read and check the file.
 
     Raises:
         FileError: no such file, an unknown key, or a value that cannot be; with the line.

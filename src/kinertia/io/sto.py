@@ -31,9 +31,9 @@ class TimeTable:
 
     Attributes:
         time: (n,) s.
-        labels: of the k columns.
-        values: (n, k).
-        in_degrees: whether its angles are in degrees; None where the file does not say.
+        labels: labels of the k columns.
+        values: (n, k) values.
+        in_degrees: whether its angles are in degrees; None where the file does not state it.
         findings: what was assumed while reading.
     """
 
@@ -44,12 +44,12 @@ class TimeTable:
     findings: tuple[Finding, ...] = ()
 
     def columns(self, labels: Sequence[str]) -> FloatArray:
-        """(n, c) the columns of these labels."""
+        """Return the columns (n, c) of these labels."""
         return self.values[:, [self.labels.index(label) for label in labels]]
 
 
 def read_sto(path: str | Path) -> pd.DataFrame:
-    """`read_table` as pandas' table, indexed by time (s); `attrs["in_degrees"]` is its `in_degrees`."""
+    """Read a file as a pandas table indexed by time (s); `attrs["in_degrees"]` is that of `read_table`."""
     import pandas as pd
 
     time_table = read_table(path)
@@ -89,7 +89,7 @@ def read_table(path: str | Path) -> TimeTable:
 
 
 def write_sto(path: str | Path, table: pd.DataFrame, in_degrees: bool, name: str) -> None:
-    """`write_table` of pandas' table, indexed by time (s)."""
+    """Write a pandas table indexed by time (s), as `write_table` does."""
     labels = tuple(map(str, table.columns))
     write_table(path, TimeTable(table.index.to_numpy(float), labels, table.to_numpy(float), in_degrees), name)
 
@@ -99,9 +99,9 @@ def write_table(path: str | Path, table: TimeTable, name: str, remark: str = "")
 
     Args:
         path: the file, `.sto` or `.mot`; it appears complete or not at all.
-        table: in the units it shall have in the file.
+        table: table in the units of the file.
         name: first line of the file.
-        remark: one line of the header for those who read the file, if any; no equals sign, which makes it a key.
+        remark: one line of the header for human readers, if any; no equals sign, which would make it a key.
     """
     labels = ["time", *table.labels]
     values = np.column_stack((table.time, table.values)).tolist()
@@ -122,7 +122,7 @@ def write_table(path: str | Path, table: TimeTable, name: str, remark: str = "")
 
 
 def _header(lines: list[str]) -> dict[str, tuple[str, int]]:
-    """Header entries by lower-case key, each with its line; the forms are `key=value` and `key value`."""
+    """Return header entries by lower-case key, each with its line; the forms are `key=value` and `key value`."""
     entries = {}
     for number, line in enumerate(lines, start=1):
         parts = line.replace("=", " ").split()
@@ -143,12 +143,12 @@ def _labels(path: Path, line: str, number: int) -> list[str]:
 
 
 def header_entry(path: Path, line: int | None, key: str, value: str, expected: str) -> FileError:
-    """The error that in the header {key} is {value}, expected {expected}."""
+    """Return the error that {key} in the header is {value}, expected {expected}."""
     return FileError.found(path, "F114", line, key=Quantity(key), value=Quantity(value), expected=Quantity(expected))
 
 
 def expect_once(path: Path, labels: Sequence[str], line: int | None) -> None:
-    """Raise a FileError that names the labels that occur more than once."""
+    """Raise a FileError that lists the labels that occur more than once."""
     repeated = {label: count for label, count in Counter(labels).items() if count > 1}
     if repeated:
         names = Quantity(", ".join(repeated))
@@ -156,7 +156,7 @@ def expect_once(path: Path, labels: Sequence[str], line: int | None) -> None:
 
 
 def _wrong_counts(path: Path, header: dict[str, tuple[str, int]], rows: int, columns: int) -> tuple[Finding, ...]:
-    """What the header says that the file has not: no error, since rows say what is there (OpenSim reads it, too)."""
+    """Find counts in the header that the file contradicts: no error, since rows decide (OpenSim reads it, too)."""
     return tuple(
         other_count(path, line, float(stated) if stated.isdecimal() else stated, count, what)
         for keys, count, what in ((_ROW_KEYS, rows, "rows"), (_COLUMN_KEYS, columns, "columns"))
@@ -166,7 +166,7 @@ def _wrong_counts(path: Path, header: dict[str, tuple[str, int]], rows: int, col
 
 
 def other_count(path: Path, line: int | None, announced: float | str, found: int, what: str) -> Finding:
-    """What a header announces, and what the file has of it."""
+    """Return a finding on the count that a header announces and the count in the file."""
     unit = "" if isinstance(announced, str) else "1"
     counts = {"announced": Quantity(announced, unit), "found": Quantity(found, "1")}
     return with_evidence("F111", Where(path.name, line), {**counts, "what": Quantity(what)})

@@ -23,19 +23,19 @@ from kinertia.settings import Settings, Subject, Table
 from kinertia.trial.stillness import STILL_M_S, speed_m_s
 
 FILL_IN = "  # FILL IN: "
-"""What is before the words of an entry that stays unknown."""
+"""Prefix of the description of an entry that stays unknown."""
 STATIC_NAME = re.compile(r"static|(?<![a-z])cal(ib\w*)?(?![a-z])", re.IGNORECASE)
-"""What the names of static trials contain."""
+"""Pattern in the names of static trials."""
 _FORCE_NAME = re.compile("force|grf", re.IGNORECASE)
 _FORCES = re.compile(r"<force_identifier>\s*(\S+?)\s*</force_identifier>")
 _LISTED = 6
 SUBJECT, MARKER_SET = "subject.toml", "markers.toml"
 NO_FORCES = "# No forces were found for"
-"""How the line begins that says so of a trial."""
+"""Beginning of the line about a trial without forces."""
 
 
 def init_subject(folder: str | Path, nearby: bool = True) -> str:
-    """The subject file of `init_files`, with no marker set beside it."""
+    """Draft the subject file of `init_files`, without a marker set beside it."""
     return init_files(folder, nearby, marker_set=False)[SUBJECT]
 
 
@@ -43,11 +43,11 @@ def init_files(folder: str | Path, nearby: bool = True, marker_set: bool = True)
     """Draft a subject file for the recordings in a folder (not its subfolders), and a marker set where none fits the
     static trial; writes nothing.
 
-    The static trial is the one whose name says so ("static", "cal"), else the shortest in which nobody moves; forces
+    The static trial is the one with such a name ("static", "cal"), else the shortest without movement; forces
     and loads go with the trial whose name is most like theirs, and are looked for in the folders in it and beside it
     where the folder itself has none and `nearby` is True; mass and height come from a C3D file that holds them. The
-    only OpenSim model of a folder takes the place of a static trial that no name tells. A sheet of girths and lengths
-    is taken up, but not with a model, whose segments are cut elsewhere; of several, one is to be chosen. What stays
+    only OpenSim model of a folder replaces a static trial that no name identifies. A sheet of girths and lengths
+    is used, but not with a model, whose segments are cut elsewhere; of several, one is to be chosen. What stays
     unknown is a commented line marked FILL IN, and so is a trial for which no forces were found. Recordings whose names
     begin like another static trial's are left out and named in a comment.
 
@@ -107,7 +107,7 @@ def init_files(folder: str | Path, nearby: bool = True, marker_set: bool = True)
 
 
 def _drafted_set(static: Path) -> str:
-    """A marker set for a static trial that no preset makes a model of; empty where one does, or nothing can be read."""
+    """Draft a marker set for a static trial that no preset can model; empty where one can, or nothing can be read."""
     recording = _recording(static)
     if recording is None:
         return ""
@@ -116,7 +116,7 @@ def _drafted_set(static: Path) -> str:
 
 
 def _expect_files(folder: Path) -> list[Path]:
-    """What is in the folder, recordings among it.
+    """List the files in the folder, recordings among them.
 
     Raises:
         FileError: there are none, or a name that no subject file can hold.
@@ -140,7 +140,7 @@ def _expect_files(folder: Path) -> list[Path]:
 
 
 def _entry(table: type[Table], key: str, value: object, example: object = None, note: str = "") -> str:
-    """`key = value  # what it is`; without a value a commented example to fill in."""
+    """Return `key = value  # description`; without a value a commented example to fill in."""
     if value is None:
         return f"# {key} = {json.dumps(example)}{FILL_IN}{table.model_fields[key].description}{note}"
     return entry_line(table, key, value, note)
@@ -157,7 +157,7 @@ def _subject_lines(c3d: Sequence[Path]) -> list[str]:
 
 
 def _static_and_trials(captures: Sequence[Path]) -> tuple[Path | None, list[Path]]:
-    """The static trial and the dynamic trials that share most of the beginning of its name."""
+    """Separate the static trial from the dynamic trials that share most of the beginning of its name."""
     statics = [file for file in captures if STATIC_NAME.search(file.stem)]
     if not statics and len(captures) > 1:
         speeds = {file: (_speed_m_s(file), _duration_s(file)) for file in captures}
@@ -184,7 +184,7 @@ def _common_start(a: str, b: str) -> int:
 
 
 def _recording(file: Path) -> Any:
-    """What a capture holds, or None where it cannot be read: reading the trial itself will say why."""
+    """Read a capture, or return None where it cannot be read: reading the trial itself will report why."""
     try:
         return read_recording(file)
     except KinertiaError:
@@ -210,19 +210,19 @@ def _head(file: Path) -> str:
 
 
 def is_capture(file: Path) -> bool:
-    """Whether a file is a recording of markers, by its ending and, where that does not say, its head."""
+    """Return whether a file is a recording of markers, by its extension and, where that is ambiguous, its head."""
     return file.suffix.lower() == ".c3d" or _holds_markers(file)
 
 
 def _holds_markers(file: Path) -> bool:
-    """Whether a text file is a recording of markers, by its ending and its head."""
+    """Return whether a text file is a recording of markers, by its extension and its head."""
     marks = {".tsv": "MARKER_NAMES", ".csv": "Sub Frame"}
     kind = file.suffix.lower()
     return kind == ".trc" or (kind in marks and marks[kind] in _head(file))
 
 
 def _brings_forces(file: Path) -> bool:
-    """Whether force plates come with it."""
+    """Return whether force plates come with the recording."""
     kind = file.suffix.lower()
     return kind == ".c3d" or (kind == ".tsv" and bool(plates_beside(file))) or (kind == ".csv" and _has_plates(file))
 
@@ -233,9 +233,9 @@ def _has_plates(file: Path) -> bool:
 
 
 def _here_or_near(folder: Path, files: Sequence[Path], holds: Callable[[Path], bool]) -> list[Path]:
-    """The files of the folder that hold it; where there are none, those of the folders in it and beside it, else those
-    of folders of forces beside the one it is in (OpenCap's `MarkerData/Mocap` and `ForceData`). Folders with markers of
-    their own, which may be another person's, and results of Kinertia are left out.
+    """Return the files of the folder that `holds` accepts; else those of folders in it and beside it, else those of
+    folders of forces beside its parent (OpenCap's `MarkerData/Mocap` and `ForceData`). Folders with markers of their
+    own, which may be another person's, and results of Kinertia are left out.
     """
     holding = [file for file in files if holds(file)]
     of_forces = [one for one in _entries(folder.parent.parent) if _FORCE_NAME.search(one.name)]
@@ -249,7 +249,7 @@ def _here_or_near(folder: Path, files: Sequence[Path], holds: Callable[[Path], b
 
 
 def _entries(folder: Path) -> list[Path]:
-    """What is in it; nothing where it is a file or another user's."""
+    """List the folder's content; nothing where it is a file or belongs to another user."""
     try:
         return sorted(folder.iterdir())
     except OSError:
@@ -257,23 +257,23 @@ def _entries(folder: Path) -> list[Path]:
 
 
 def _relative(file: Path, folder: Path) -> str:
-    """As a subject file in the folder names it."""
+    """Return the path as a subject file in the folder states it."""
     return Path(os.path.relpath(file, folder)).as_posix()
 
 
 def holds_loads(file: Path) -> bool:
-    """Whether it is ExternalLoads."""
+    """Return whether a file is ExternalLoads."""
     return file.suffix.lower() == ".xml" and "<ExternalLoads" in _head(file)
 
 
 def holds_forces(file: Path) -> bool:
-    """Whether a motion file has force columns and is not the static trial's."""
+    """Return whether a motion file has force columns and is not the static trial's."""
     return not STATIC_NAME.search(file.stem) and has_force_columns(file)
 
 
 def has_force_columns(file: Path) -> bool:
-    """Whether it is a motion file with columns `..._vx`, `..._vy`, ..., or such as the ExternalLoads beside it call
-    forces; whichever trial's.
+    """Return whether a motion file, of any trial, has columns `..._vx`, `..._vy`, ..., or columns that the
+    ExternalLoads beside it assign to forces.
     """
     if file.suffix.lower() == CORTEX:
         return True
@@ -287,7 +287,7 @@ def has_force_columns(file: Path) -> bool:
 
 
 def _unread(files: Sequence[Path]) -> str:
-    """Of files that are called forces and have no columns that are known, what to do."""
+    """Advise on files that are called forces and have no known columns."""
     named = [file for file in files if file.suffix.lower() in (".mot", ".sto") and _FORCE_NAME.search(file.stem)]
     unread = [file.name for file in named if not has_force_columns(file)]
     if not unread:
@@ -299,7 +299,7 @@ def _unread(files: Sequence[Path]) -> str:
 
 
 def matched_by_name(wanting: Sequence[Path], offered: Sequence[Path]) -> dict[Path, Path]:
-    """Pairs of files by the longest common part of their names, the best pair first; each file once.
+    """Match files by the longest common part of their names, the best pair first; each file once.
 
     First come names that have the other as a whole word, however short: DJ1 and DJ1_forces, but not DJ12. Of others at
     least four letters must agree, unless there is one file on each side.

@@ -78,7 +78,7 @@ STUDY_FILE = "kinertia.toml"
 
 
 def subject_file_in(folder: Path) -> Path:
-    """The subject file of a folder: `subject.toml`, or the only .toml file there; hidden files are none.
+    """Find the subject file of a folder: `subject.toml`, or the only .toml file there; hidden files do not count.
 
     Raises:
         FileError: there is none, or several of which none is called subject.toml.
@@ -100,14 +100,14 @@ def subject_file_in(folder: Path) -> Path:
 
 
 def read_subject(path: str | Path, to_fit: bool = True) -> SubjectFile:
-    """Read and check a subject file; what the study file above it overrules holds, too.
+    """Read and check a subject file; what the study file above it overrules applies, too.
 
     Args:
         path: the file.
-        to_fit: what only a fit needs must be in it: the sex, of the literature's table.
+        to_fit: require what only a fit needs: the sex, for the anthropometric tables.
 
     Raises:
-        FileError: the file is missing, not TOML, or says something that cannot be (unknown key, missing or
+        FileError: the file is missing, not TOML, or states something impossible (unknown key, missing or
             wrong value, no such trial file, several trials whose names cannot be folders side by side, implausible
             mass); with the line.
     """
@@ -135,7 +135,7 @@ def read_subject(path: str | Path, to_fit: bool = True) -> SubjectFile:
 
 
 def _of_study(folder: Path) -> Diagnostics:
-    """What the nearest `kinertia.toml` overrules, in the folder or in one above it."""
+    """Return what the nearest `kinertia.toml` overrules, in the folder or in one above it."""
     path = next((one / STUDY_FILE for one in (folder, *folder.parents) if os.path.isfile(one / STUDY_FILE)), None)
     if path is None:
         return Diagnostics()
@@ -156,10 +156,10 @@ def _validated(kind: type[T], document: TomlFile, path: Path) -> T:
 
 
 def subject_from_options(content: Mapping[str, Any]) -> SubjectFile:
-    """The same from a dictionary of the subject file's form, as the command line makes it; paths from here.
+    """Build a subject file from a dictionary of its form, as the command line makes it; paths are relative to here.
 
     Raises:
-        SettingsError: something is missing, wrong or not there; the message names the entry.
+        SettingsError: something is missing, wrong or not there; the message states the entry.
     """
     try:
         result = SubjectFile.model_validate(content, context={"folder": Path.cwd()})
@@ -177,7 +177,7 @@ def _settings_error(found: Finding) -> SettingsError:
 def _incomplete(
     wanted: SubjectFile, needs_static: bool = True, needs_sex: bool = True
 ) -> tuple[Location, Finding] | None:
-    """Where and what the entries lack, or have too much of, for the kind of model.
+    """Return the place and finding of entries that are missing, or not allowed, for the kind of model.
 
     A subject file without a static trial has forgotten it; a command without one may mean it (S207).
     """
@@ -195,7 +195,7 @@ def _incomplete(
 
 
 def _no_sex(wanted: SubjectFile) -> Finding:
-    """That the sex is missing, and what else is, where no C3D file may know it."""
+    """Return the finding that the sex is missing, and what else is, where no C3D file may state it."""
     found = _finding({"loc": ("subject", "sex"), "type": "missing"})
     files = [wanted.model.static, *(one.markers for one in wanted.trials)]
     if any(one is not None and one.suffix.lower() == ".c3d" for one in files):
@@ -208,7 +208,7 @@ def _no_sex(wanted: SubjectFile) -> Finding:
 
 
 def expect_one_model(static: Path | None, markers: str | Path | None, osim: Path | None, calibrate: bool) -> None:
-    """Refuse entries of [model] that do not go together, whoever gives them.
+    """Raise an error for entries of [model] that do not go together, whatever their source.
 
     Raises:
         SettingsError: they belong to the built-in and to an OpenSim model (F193).
@@ -220,7 +220,7 @@ def expect_one_model(static: Path | None, markers: str | Path | None, osim: Path
 def _two_models(
     static: Path | None, markers: str | Path | None, osim: Path | None, calibrate: bool
 ) -> tuple[Location, Finding] | None:
-    """Where and what entries belong to the other kind of model."""
+    """Return the place and finding of entries that belong to the other kind of model."""
     if osim is not None:
         for key, given in (("static", static), ("markers", markers)):
             if given is not None:
@@ -236,10 +236,10 @@ def _conflict(one: str, other: str) -> Finding:
 
 
 def with_settings(wanted: SubjectFile, **values: Any) -> SubjectFile:
-    """The same with other settings.
+    """Return the subject file with other settings.
 
     Raises:
-        SettingsError: a value cannot be.
+        SettingsError: a value is impossible.
     """
     try:
         settings = Settings.model_validate({**wanted.settings.model_dump(), **values})
@@ -253,7 +253,7 @@ def with_settings(wanted: SubjectFile, **values: Any) -> SubjectFile:
 
 
 def _finding(detail: Any) -> Finding:
-    """What one of pydantic's errors is: F191 with entry, expectation, key and value, or what has a code of its own."""
+    """Convert one of pydantic's errors to a finding: F191 with entry, expectation, key and value, or its own code."""
     *holder, key = detail["loc"]
     error = detail.get("ctx", {}).get("error")
     if isinstance(error, CodedError):
@@ -291,7 +291,7 @@ def _entry_and_expectation(detail: Any, holder: list[str], key: str) -> tuple[st
 
 
 def _expectation(detail: Any) -> str:
-    """What a value must be."""
+    """Describe what a value must be."""
     kind = detail["type"]
     if kind == "value_error":
         return str(detail["ctx"]["error"])

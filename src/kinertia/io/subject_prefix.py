@@ -12,25 +12,25 @@ from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 
 _PERSON_SHARE = 0.5
-"""Of the labels of whoever has most; what has fewer is no second person, but a wand, or a label gone astray."""
+"""Share of the largest person's labels; a prefix with fewer is no second person, but a wand, or a stray label."""
 
 
 def people_among(labels: Sequence[str]) -> dict[str, int]:
-    """Prefixes with about as many labels as any other has, and how many these are; most first."""
+    """Return prefixes with about as many labels as any other, with their number of labels; most first."""
     prefixes = Counter(label.split(":", 1)[0] for label in labels if ":" in label).most_common()
     return {name: count for name, count in prefixes if count > _PERSON_SHARE * prefixes[0][1]}
 
 
 def without_prefixes(path: Path, labels: Sequence[str], subject: str = "") -> tuple[list[str], list[Finding]]:
-    """Labels without `subject:`, and what was found (F163); only the person of the trial loses the prefix.
+    """Remove `subject:` from labels and report it (F163); only the person of the trial loses the prefix.
 
     Args:
         path: the file.
-        labels: of all its markers.
-        subject: whose trial it is; empty where nobody knows, and whoever has most labels is taken.
+        labels: labels of all its markers.
+        subject: name of the trial's person; if empty, the person with most labels.
 
     Raises:
-        FileError: several people have about as many labels, and nobody knows whose trial it is.
+        FileError: several people have about as many labels, and the trial's person is unknown.
     """
     people = people_among(labels)
     if not people:
@@ -47,5 +47,5 @@ def without_prefixes(path: Path, labels: Sequence[str], subject: str = "") -> tu
 
 
 def left_out(path: Path, count: int, what: str) -> Finding:
-    """That so many points, or parts of labels, were left out."""
+    """Return the finding that a number of points, or parts of labels, were left out."""
     return finding("F163", Where(path.name), count=Quantity(count, "1"), what=Quantity(what))

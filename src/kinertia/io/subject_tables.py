@@ -16,7 +16,7 @@ from kinertia.trial.trial_input import TrialUse
 class Model(Table):
     """What the skeleton is built from: a static trial, or an OpenSim model.
 
-    `markers` is a preset's name, an absolute path, or None: detect it.
+    `markers` is a preset's name, an absolute path, or None for automatic detection.
     """
 
     static: File | None = Field(default=None, description="static trial, .c3d, .trc, .tsv or .csv")
@@ -63,7 +63,7 @@ class TrialFiles(Table):
 
 
 class InstrumentsFiles(Instruments):
-    """What the laboratory states of its instruments, and the file of its session."""
+    """Statements of the laboratory about its instruments, and the file of its session."""
 
     session: File | None = Field(default=None, description="what kinertia instruments wrote of the same session")
     date: datetime.date | None = Field(
@@ -72,7 +72,7 @@ class InstrumentsFiles(Instruments):
 
 
 class PriorFiles(PriorSettings):
-    """What the estimate starts from, and the file of an earlier one."""
+    """Settings of the prior, and the file of an earlier estimate."""
 
     bsp: File | None = Field(
         default=None, description="bsp.csv of an earlier fit: its estimates and sd in place of the literature's"
@@ -86,7 +86,7 @@ class PriorFiles(PriorSettings):
 
 
 class SubjectFile(Table):
-    """A validated subject file: `read_subject` makes it. Names are filled in, paths absolute, files exist.
+    """A validated subject file, made by `read_subject`: names are filled in, paths absolute, files exist.
 
     Examples:
         >>> wanted = kinertia.read_subject("lab/subject.toml")  # the files of `kinertia demo`
@@ -106,7 +106,7 @@ class SubjectFile(Table):
 
 
 class StudyFile(Table):
-    """What holds for all subject files in its folder and in those below."""
+    """Settings for all subject files in the study file's folder and in those below."""
 
     diagnostics: Diagnostics = Diagnostics()
 
@@ -122,4 +122,4 @@ TABLES: dict[str, type[Table]] = dict(
     attached=Attached,
     diagnostics=Diagnostics,
 )
-"""Of a subject file, by their names there."""
+"""Tables of a subject file, by name."""

@@ -11,7 +11,7 @@ from kinertia.settings import KnownSegment, Table
 
 
 def subject_text(content: Mapping[str, Any], heading: str) -> str:
-    """A subject file (TOML) with these entries; unknown ones are written as they are, for `read_subject` to name.
+    """Write a subject file (TOML) with these entries; unknown ones are written unchanged, for `read_subject` to report.
 
     Args:
         content: tables by their names, as `tomllib` reads them.
@@ -34,7 +34,7 @@ def subject_text(content: Mapping[str, Any], heading: str) -> str:
 
 
 def entry_line(table: type[Table] | None, key: str, value: object, note: str = "") -> str:
-    """`key = value  # what it is`."""
+    """Write the line `key = value  # description`."""
     field = None if table is None else table.model_fields.get(key)
     about = f"  # {field.description}{note}" if field is not None else ""
     return f"{_key(key)} = {_value(value)}{about}"

@@ -18,7 +18,7 @@ from kinertia.settings import folder_of
 
 
 class CodedError(ValueError):
-    """What is wrong with a value, where that has a code of its own."""
+    """Error of a value that has a code of its own."""
 
     def __init__(self, code: str, **evidence: Quantity) -> None:
         self.found = with_evidence(code, Where(), evidence, Severity.ERROR)
@@ -26,7 +26,7 @@ class CodedError(ValueError):
 
 
 def _file(value: object, info: ValidationInfo, expected: str = "a file") -> Path:
-    """An existing file, absolute; a relative one counts from the subject file's folder (the context)."""
+    """Return an existing file as an absolute path, relative to the subject file's folder (the context) if relative."""
     if not isinstance(value, str | Path):
         raise ValueError("must be a path in quotes")
     path = path_from(folder_of(info), str(value)).resolve()
@@ -45,7 +45,7 @@ def _marker_set(value: object, info: ValidationInfo) -> str | Path:
 
 
 def _trial_name(value: object) -> str:
-    """A name that can be a folder's: the results of several trials go to one folder each."""
+    """Check that a name can be a folder's: the results of several trials go to one folder each."""
     if isinstance(value, str) and value.strip(" .") and not set(value) & set("/\\\0"):
         return value
     problem = Quantity("it must be one that a folder can have: not empty, and without / and \\")
@@ -88,5 +88,5 @@ BeltSpeed = Annotated[float | tuple[float, float] | Path, BeforeValidator(_belt_
 
 
 def shown(value: object) -> str:
-    """As TOML has it, nearly."""
+    """Format a value nearly as TOML does."""
     return json.dumps(value, default=str, ensure_ascii=False)

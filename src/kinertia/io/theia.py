@@ -17,27 +17,27 @@ import numpy as np
 from kinertia.trial.data import FloatArray
 
 POSE_SD_M = 0.01
-"""Of each coordinate of a virtual marker: poses of the legs repeat within a few millimetres and degrees from trial to
+"""SD of each coordinate of a virtual marker: poses of the legs repeat within a few mm and degrees from trial to
 trial, and joint centres are 1 to 3 cm from those of markers (Kanko et al. 2021, J Biomech 127:110665)."""
 _SUFFIX = "_4X4"
 _BELL_HIP = (0.36, 0.19, 0.30)
-"""Of the width between the ASIS: the hip is to the side, behind and below (Bell et al. 1990)."""
+"""Shares of the width between the ASIS by which the hip is to the side, behind and below (Bell et al. 1990)."""
 _PELVIS_DEPTH = 0.65
 _ACROMION_OF_WIDTH = 0.17
 _HEEL_M = (0.0, -0.05, -0.05)
 _SIDE_M = {"knee": 0.05, "ankle": 0.035, "elbow": 0.04, "foot": 0.04, "wrist": 0.01}
 _STANDING_M = 1.0
-"""Height of the pelvis of a person who stands: only differences count."""
+"""Height of a standing person's pelvis: only differences matter."""
 
 
 @dataclass(frozen=True, eq=False)
 class Poses:
-    """Segments of one trial, in the laboratory's axes.
+    """Poses of the segments of one trial, in the laboratory's axes.
 
     Attributes:
-        rotation: segment -> (n, 3, 3); NaN where it is not known.
+        rotation: segment -> (n, 3, 3); NaN where unknown.
         translation: segment -> (n, 3) in the file's unit.
-        heels_m: side -> (3,) the heel in the foot's frame, where the file says it.
+        heels_m: side -> (3,) heel in the foot's frame, where the file states it.
     """
 
     rotation: Mapping[str, FloatArray]
@@ -46,7 +46,7 @@ class Poses:
 
     @classmethod
     def of(cls, labels: list[str], rotations: FloatArray, heels_m: Mapping[str, FloatArray]) -> Poses | None:
-        """From ezc3d's (4, 4, k, n) of so many labels; None where pelvis, thighs, shanks or feet are not among them."""
+        """Build poses from ezc3d's (4, 4, k, n) of k labels; None without pelvis, thighs, shanks or feet."""
         frames = np.moveaxis(rotations, (2, 3), (0, 1))
         names = [label.strip().upper().removesuffix(_SUFFIX).lower() for label in labels]
         known = {name: frame for name, frame in zip(names, frames, strict=False) if np.isfinite(frame).any()}
@@ -57,17 +57,17 @@ class Poses:
         return cls(rotation, translation, heels_m)
 
     def scaled(self, unit_m: float) -> Poses:
-        """With translations in metres."""
+        """Return the poses with translations in metres."""
         return Poses(self.rotation, {name: unit_m * each for name, each in self.translation.items()}, self.heels_m)
 
     def inside(self, segment: str, child: str) -> FloatArray:
-        """(3,) where the child's frame stands in that of the segment: median over the frames."""
+        """Return the position (3,) of the child's frame in that of the segment: median over the frames."""
         away = self.translation[child] - self.translation[segment]
         result: FloatArray = np.nanmedian(np.einsum("nji,nj->ni", self.rotation[segment], away), axis=0)
         return result
 
     def standing(self) -> Poses:
-        """One frame of the same person who stands upright, arms hanging, all segments' axes alike."""
+        """Return one frame of the same person standing upright, arms hanging, all segments' axes aligned."""
         at = {"pelvis": np.array([0.0, 0.0, _STANDING_M])}
         chains: list[tuple[str, ...]] = [("pelvis", f"{s}_thigh", f"{s}_shank", f"{s}_foot", f"{s}_toes") for s in "rl"]
         if "torso" in self.rotation:
@@ -86,7 +86,7 @@ _LEGS = {"pelvis", *(f"{side}_{name}" for side in "rl" for name in ("thigh", "sh
 
 
 def virtual_places(poses: Poses) -> dict[str, tuple[str, FloatArray]]:
-    """Label -> segment and place (3,) m in its frame, of poses in metres."""
+    """Return label -> segment and position (3,) m in its frame, for poses in metres."""
     places: dict[str, tuple[str, FloatArray]] = {}
     hips = {side: poses.inside("pelvis", f"{side}_thigh") for side in "rl"}
     aside, behind, below = _BELL_HIP
@@ -107,7 +107,7 @@ def virtual_places(poses: Poses) -> dict[str, tuple[str, FloatArray]]:
 
 
 def _upper_places(poses: Poses) -> dict[str, tuple[str, FloatArray]]:
-    """Of trunk and arms, as far as they are there."""
+    """Return the virtual markers of trunk and arms, as far as present."""
     places: dict[str, tuple[str, FloatArray]] = {}
     arms = {side: [f"{side}_{name}" for name in ("uarm", "larm", "hand")] for side in "rl"}
     if not {"torso", *(arm[0] for arm in arms.values())} <= set(poses.rotation):
@@ -137,7 +137,7 @@ def _both_sides(
 
 
 def virtual_markers(poses: Poses, places: Mapping[str, tuple[str, FloatArray]]) -> FloatArray:
-    """(n, m, 3) m, laboratory axes, of virtual markers at these places of poses in metres."""
+    """Return positions (n, m, 3) m, laboratory axes, of virtual markers at these places of poses in metres."""
     result = [
         poses.translation[segment] + poses.rotation[segment] @ place if segment in poses.rotation else None
         for segment, place in places.values()

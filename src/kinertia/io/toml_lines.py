@@ -18,28 +18,28 @@ Location = tuple[str | int, ...]
 
 @dataclass(frozen=True)
 class TomlFile:
-    """A TOML text and what it says."""
+    """A TOML text with its parsed content."""
 
     text: str
     content: dict[str, Any]
 
     @cached_property
     def lines(self) -> dict[Location, int]:
-        """Line number (from 1) of every table heading and key, by its place."""
+        """Line number (from 1) of every table heading and key, by its location."""
         return find_lines(self.text)
 
     @property
     def last_line(self) -> int:
-        """Where something that is missing would go."""
+        """Line where something that is missing would be added."""
         return self.text.count("\n") + 1
 
     def line(self, place: Location) -> int | None:
-        """Line of a place; of the nearest that holds it where the file does not have it."""
+        """Return the line of a location, or of the nearest enclosing one where the file lacks it."""
         return next((self.lines[place[:size]] for size in range(len(place), 0, -1) if place[:size] in self.lines), None)
 
 
 def read_toml(path: Path, expected: str) -> TomlFile:
-    """Read a file; `expected` says in messages what should be there ("a marker set").
+    """Read a TOML file; `expected` describes it in messages ("a marker set").
 
     Raises:
         FileError: no such file, not UTF-8, not TOML; with the line.
@@ -55,7 +55,7 @@ def read_toml(path: Path, expected: str) -> TomlFile:
 
 
 def parse_toml(text: str, path: Path) -> TomlFile:
-    """The same from the text of a file.
+    """Parse the text of a TOML file.
 
     Raises:
         FileError: not TOML; with the line.
@@ -77,14 +77,14 @@ def parse_toml(text: str, path: Path) -> TomlFile:
 
 
 def quoted(text: str) -> str:
-    """A text as TOML has it, in quotes: JSON's escapes are TOML's, which wants one more letter escaped."""
+    """Quote a text for TOML: JSON's escapes are TOML's, which requires one more character to be escaped."""
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def find_lines(text: str) -> dict[Location, int]:
-    """Line number (from 1) of every table heading and key, by its place: ("trial", 1, "markers").
+    """Return the line number (from 1) of every table heading and key, by its location: ("trial", 1, "markers").
 
-    Reads one `[table]`, `[[table]]` or `key =` per line, which is how such files are written; what stands
+    Reads one `[table]`, `[[table]]` or `key =` per line, which is how such files are written; what is
     inside an inline table is found at the key that holds it.
     """
     places: dict[Location, int] = {}
@@ -92,7 +92,7 @@ def find_lines(text: str) -> dict[Location, int]:
     counts: dict[Location, int] = {}
 
     def below(keys: Location) -> Location:
-        """In the last table of an array: `[trial.diagnostics]` below the second `[[trial]]`."""
+        """Return the location in the last table of an array: `[trial.diagnostics]` below the second `[[trial]]`."""
         return (keys[0], counts[keys[:1]], *keys[1:]) if keys[:1] in counts and len(keys) > 1 else keys
 
     for number, line in enumerate(text.split("\n"), start=1):

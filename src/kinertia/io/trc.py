@@ -36,7 +36,7 @@ def read_trc(path: str | Path) -> Markers:
     Empty cells, NaN and the triples 0 0 0 and -9999 -9999 -9999 are missing markers; `subject:` before the labels is
     taken off; of repeated labels the first one with data is kept. Frame times that were rounded when written are put
     back on the uniform grid they came from.
-    `read_trc_recording` has what was assumed.
+    `read_trc_recording` reports what was assumed.
 
     Raises:
         FileError: the file is missing or is not a complete, consistent TRC file; with the line.
@@ -45,7 +45,7 @@ def read_trc(path: str | Path) -> Markers:
 
 
 def read_trc_recording(path: str | Path) -> Recording:
-    """`read_trc` with the file's unit and the assumptions made while reading; Y is taken to point up."""
+    """Read markers as `read_trc` does, with the file's unit and findings about assumptions; Y is taken to point up."""
     path = Path(path)
     lines = read_lines(path)
     header = _header(path, lines)
@@ -78,7 +78,7 @@ def unknown_unit(
     line: int | None = None,
     known: Mapping[str, Quantity] | None = None,
 ) -> FileError:
-    """The error that the unit of {what} is {unit}, expected {expected}."""
+    """Return the error that the unit of {what} is {unit}, expected {expected}."""
     words = {"unit": Quantity(unit), "what": Quantity(what), "expected": Quantity(expected)}
     return FileError.found(path, "F121", line, **(known or {}), **words)
 
@@ -110,10 +110,10 @@ def write_trc(path: str | Path, markers: Markers) -> None:
 
 
 def header_frames(path: Path) -> int:
-    """Frames that the header of a TRC file announces.
+    """Return the number of frames in the header of a TRC file.
 
     Raises:
-        FileError: it is none.
+        FileError: it is not a TRC file.
     """
     with path.open(encoding="utf-8-sig", errors="replace") as stream:
         lines = list(islice(stream, _FIRST_ROW_LINE))
@@ -178,10 +178,10 @@ def _expect_whole(path: Path, lines: list[str], rows: int, frames: int, line: in
 
 
 def _other_markers(path: Path, lines: list[str], labels: tuple[str, ...], count: int) -> list[Finding]:
-    """That the header counts other markers than the labels and the columns of numbers, which agree.
+    """Find a header that counts other markers than the labels and the columns of numbers, which agree.
 
     Raises:
-        FileError: labels and columns do not agree either, so that nobody knows which label is whose.
+        FileError: labels and columns do not agree either, so that labels cannot be assigned.
     """
     if len(labels) == count:
         return []
@@ -194,14 +194,14 @@ def _other_markers(path: Path, lines: list[str], labels: tuple[str, ...], count:
 
 
 def _first_row(lines: list[str]) -> int:
-    """One-based line of the first row: line 5 is X1 Y1 Z1 ..., but some writers leave it out."""
+    """Return the one-based line of the first row: line 5 is X1 Y1 Z1 ..., but some writers leave it out."""
     return _FIRST_ROW_LINE if lines[4].strip()[:1].upper() in ("X", "") else _FIRST_ROW_LINE - 1
 
 
 def _uniform_time(
     path: Path, time: FloatArray, line_numbers: list[int], rate_hz: float
 ) -> tuple[FloatArray, tuple[Finding, ...]]:
-    """Times on an exactly uniform grid; DataRate gives the step, or the time column where that fits better."""
+    """Return times on an exactly uniform grid; DataRate gives the step, or the time column where that fits better."""
     _expect_even_steps(path, time, line_numbers)
     if len(time) == 1:
         return time, ()
@@ -241,7 +241,7 @@ def _expect_even_steps(path: Path, time: FloatArray, line_numbers: list[int]) ->
 def seen_positions(
     path: Path, values: FloatArray, labels: tuple[str, ...], line_numbers: list[int]
 ) -> tuple[FloatArray, list[Finding]]:
-    """Positions (n, m, 3) of rows of x, y, z of every marker, NaN where these are missing or stand for it (F115)."""
+    """Return positions (n, m, 3) from rows of x, y, z of every marker, NaN where missing or a placeholder (F115)."""
     positions = values.reshape(len(values), len(labels), 3)
     absent = np.isnan(positions)
     partly = np.argwhere(absent.any(axis=2) & ~absent.all(axis=2))
@@ -257,7 +257,7 @@ def seen_positions(
 
 
 def read_as_missing(path: Path, labels: Sequence[str], stood_in: Mapping[str, BoolArray]) -> list[Finding]:
-    """Which positions (n, m) only stood for a missing marker, by what they were."""
+    """Report positions (n, m) that were placeholders for a missing marker, by kind of placeholder."""
     return [
         finding(
             "F115",
@@ -271,7 +271,7 @@ def read_as_missing(path: Path, labels: Sequence[str], stood_in: Mapping[str, Bo
 
 
 def stand_ins(positions: FloatArray) -> dict[str, BoolArray]:
-    """Where (n, m) positions (n, m, 3) in a file's unit only stand for a missing marker, by what they are there.
+    """Find placeholders (n, m) for missing markers among positions (n, m, 3) in a file's unit, by kind.
 
     -9999 became -9.999 where millimetres were written as metres.
     """

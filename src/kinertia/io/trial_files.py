@@ -13,15 +13,15 @@ _KINDS = (".c3d", ".trc", ".tsv", ".csv")
 
 
 def trial_file(provenance: Provenance | None, name: str, results: Path, recordings: Path | None) -> Path:
-    """The file with the markers of a trial.
+    """Find the file with the markers of a trial.
 
-    Looked for in `recordings` if given, else in the folder of the results, in `lab` there (the demo's) and above it, in
-    the working folder, and where the command of the fit looked. Of the places that have a file of its name, the one
+    Searches `recordings` if given, else the folder of the results, `lab` there (the demo's) and above it,
+    the working folder, and the folders used by the fit. Of the places that have a file of its name, the one
     whose content was fitted.
 
     Args:
-        provenance: of the fit; None if it was saved from Python: then only its name is known.
-        name: of the trial.
+        provenance: provenance of the fit; None if it was saved from Python, where only its name is known.
+        name: name of the trial.
         results: folder of the fit.
         recordings: folder of the files.
 

@@ -16,19 +16,19 @@ from kinertia.trial.impossible_data import step_evidence
 
 _MOST_DECIMALS = 7
 _COARSEST_S = 0.01
-"""Times in coarser units hardly tell where samples are lost."""
+"""Times in coarser units hardly show where samples are lost."""
 _OFF = 0.75
-"""Of the unit: so far rounded times are from the even ones, half a unit and what the straight line errs by."""
+"""Largest distance of rounded times from even ones, in units: half a unit and the error of the straight line."""
 _FEWEST_ODD, _ODD_SHARE = 5, 0.02
 """Rounding makes odd steps all the time; a lost or repeated sample makes one."""
 _FEWEST_BEFORE_LAST = 10
-"""Of fewer samples nobody knows which one is off."""
+"""With fewer samples it is unknown which one is off."""
 _NOTICED = 0.05
-"""Of a step; times that are off by less stay as they are."""
+"""Share of a step; times that are off by less stay unchanged."""
 
 
 def rounding_s(time: FloatArray) -> float:
-    """The unit of the last decimal that the times are told to; 0 where there are too many."""
+    """Return the unit of the last decimal of the times; 0 where there are too many decimals."""
     for decimals in range(_MOST_DECIMALS):
         if np.abs(time - time.round(decimals)).max() < 1e-9:
             return float(10.0**-decimals)
@@ -36,9 +36,9 @@ def rounding_s(time: FloatArray) -> float:
 
 
 def uniform_times(path: Path, time: FloatArray) -> tuple[FloatArray, tuple[Finding, ...]]:
-    """Times (k,) s of forces as they are, or on the even grid that they were rounded from, with what was found.
+    """Return times (k,) s of forces unchanged, or on the even grid that they were rounded from, with findings.
 
-    Nothing tells the rate but the times: the grid is the straight line through them (T102). At 2000 Hz and in whole
+    Only the times show the rate: the grid is the straight line through them (T102). At 2000 Hz and in whole
     milliseconds every other step is zero. A last sample that alone is off is left out (T105): then the times are k - 1.
 
     Raises:
@@ -57,7 +57,7 @@ def uniform_times(path: Path, time: FloatArray) -> tuple[FloatArray, tuple[Findi
 
 
 def _even(path: Path, time: FloatArray) -> tuple[FloatArray, tuple[Finding, ...]]:
-    """The same of times whose last one counts as all others."""
+    """Return even times and findings, with the last time treated as all others."""
     steps = np.diff(time)
     if not steps.size:
         return time, ()
@@ -77,12 +77,12 @@ def _even(path: Path, time: FloatArray) -> tuple[FloatArray, tuple[Finding, ...]
 
 
 def uneven(path: Path, line: int | None, before: float, after: float, usual: float) -> FileError:
-    """The error of two times (s) whose step is not the usual one."""
+    """Return the error for two times (s) whose step is irregular."""
     return FileError.found(path, "T101", line, **step_evidence(before, after, usual))
 
 
 def times_rounded(path: Path, rounding: float, rate_hz: float) -> Finding:
-    """That times were rounded by so many seconds, and those at an even rate taken in their place."""
+    """Return T102: times were rounded by this many seconds and replaced by times at an even rate."""
     return finding(
         "T102", Where(path.name), rounding_s=Quantity(float(rounding), "s"), rate_hz=Quantity(float(rate_hz), "Hz")
     )

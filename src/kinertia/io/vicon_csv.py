@@ -40,7 +40,7 @@ _MUCH_BETTER = 0.2
 
 @dataclass(frozen=True, eq=False)
 class _Section:
-    """Attributes: rate, owner and name and unit of each column, rows (NaN where empty), and the line they begin at."""
+    """A section of the file: rate, owner, name and unit of each column, rows (NaN where empty), their first line."""
 
     rate_hz: float
     owners: tuple[str, ...]
@@ -50,7 +50,7 @@ class _Section:
     first_line: int
 
     def columns(self, owner: str, names: Sequence[str]) -> list[int]:
-        """Places of these columns of an owner."""
+        """Return the indices of these columns of an owner."""
         return [k for name in names for k in range(len(self.names)) if (self.owners[k], self.names[k]) == (owner, name)]
 
 
@@ -121,7 +121,7 @@ def _header_at(cells: Sequence[Sequence[str]], k: int) -> bool:
 
 
 def _carried(cells: Sequence[str], width: int) -> tuple[str, ...]:
-    """A name stands over the first of its columns."""
+    """Repeat each name over its columns, since it is written above the first one only."""
     result, current = [], ""
     for cell in (list(cells) + [""] * width)[:width]:
         current = cell or current
@@ -147,7 +147,7 @@ def _numbers(path: Path, line: int, row: Sequence[str], width: int) -> list[floa
 
 
 def _markers(path: Path, section: _Section) -> tuple[Markers, list[Finding]]:
-    """Markers in the laboratory's axes, m, and what was found; what is not in a unit of length is no marker."""
+    """Read markers in the laboratory's axes, m, with findings; columns not in a unit of length are no markers."""
     owners = [owner for owner in dict.fromkeys(section.owners) if len(section.columns(owner, "XYZ")) == 3]
     places = {owner: section.columns(owner, "XYZ") for owner in owners}
     places = {o: at for o, at in places.items() if section.units[at[0]] in METRES_PER_UNIT}
@@ -170,7 +170,7 @@ def _markers(path: Path, section: _Section) -> tuple[Markers, list[Finding]]:
 def _plates(
     path: Path, section: _Section | None, camera_hz: float
 ) -> tuple[LabPlates | None, FloatArray, list[Finding]]:
-    """Plates in the laboratory's axes, the times of their samples, and what was found of them."""
+    """Read plates in the laboratory's axes, the times of their samples, and findings."""
     if section is None:
         return None, np.zeros(0), []
     time = (section.rows[:, 0] - 1.0) / camera_hz + section.rows[:, 1] / section.rate_hz
@@ -205,7 +205,7 @@ def _plates(
 
 
 def _expect_every_sample(path: Path, section: _Section, time: FloatArray) -> None:
-    """Raise FileError unless frames and sub frames count up at the section's rate."""
+    """Raise FileError unless frames and sub-frames count up at the section's rate."""
     steps = section.rate_hz * np.diff(time, prepend=time[:1] - 1.0 / section.rate_hz)
     odd = np.flatnonzero(~(np.abs(steps - 1.0) < _HALF_A_SAMPLE))
     if odd.size:
@@ -223,7 +223,7 @@ _TURNS = [
 
 
 def _in_lab_axes(force: FloatArray, moment: FloatArray, point: FloatArray) -> tuple[FloatArray, PlateMoments, bool]:
-    """Force and moments in the axes of the centre of pressure, and whether they were rotated for that."""
+    """Return force and moments in the axes of the centre of pressure, and whether they were rotated to them."""
     tried = [PlateMoments.of(force @ turn.T, moment @ turn.T, point) for turn in _TURNS]
     best = int(np.argmin([one.misses for one in tried]))
     if not np.isfinite(tried[best].misses):

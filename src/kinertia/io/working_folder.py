@@ -21,12 +21,12 @@ if TYPE_CHECKING:
 
 _PREFIX, _LOCK = ".kinertia.", "lock"
 BEFORE = "before"
-"""What a folder was, under its own name, while its successor takes its place in two steps."""
+"""Name of the former folder while its successor takes its place in two steps."""
 
 
 @contextmanager
 def working_folder(within: Path) -> Iterator[Path]:
-    """A new hidden folder, removed at the end of the block.
+    """Yield a new hidden folder, removed at the end of the block.
 
     Raises:
         FileError: none can be made in `within`.
@@ -39,7 +39,7 @@ def working_folder(within: Path) -> Iterator[Path]:
 
 
 def sweep(within: Path) -> None:
-    """Remove what processes left that were killed, and put back what one of them had moved out of the way."""
+    """Remove what killed processes left, and restore what one of them had moved away."""
     for folder in within.glob(f"{_PREFIX}*"):
         lock = locked(folder / _LOCK) if folder.is_dir() else None
         if lock is None:

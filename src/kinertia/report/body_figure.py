@@ -24,11 +24,11 @@ from kinertia.report.skeleton_view import last_marker
 from kinertia.report.wording import INTERVAL_SD, fixed, start_of
 
 Shown = Literal["mass", "information"]
-"""What colours the segments."""
+"""Quantity that colours the segments."""
 
 _DENSITY_KG_M3 = 1000.0
 _CORNERS = 24
-"""Of the circles around the ends of a segment."""
+"""Corners of the circles around the ends of a segment."""
 _APART_M = 0.18
 _HEIGHT_PX, _TOP_PX, _BOTTOM_PX = 500, 56, 70
 _LEAST_PERCENT = 10.0
@@ -37,13 +37,13 @@ _LEAST_PERCENT = 10.0
 
 @dataclass(frozen=True)
 class _View:
-    """One of the drawings.
+    """One of the drawings of the body.
 
     Attributes:
-        title: above it.
+        title: heading above it.
         across: ground axis drawn from left to right.
         sign: -1 where that axis is drawn to the left.
-        near: the suffix of the limbs that are seen; "" for both sides.
+        near: suffix of the limbs that are visible; "" for both sides.
     """
 
     title: str
@@ -60,7 +60,7 @@ _VIEWS = (
 
 
 def body_figure(fit: Fit, shown: Shown = "mass") -> Figure | None:
-    """Segments coloured by change of mass, or by what the data say about it; None for the latter after two-level."""
+    """Draw segments coloured by change of mass, or by information; None for the latter after two-level."""
     if shown == "mass":
         colours = _by_mass(fit)
     elif fit.posterior is not None:
@@ -98,13 +98,13 @@ def body_figure(fit: Fit, shown: Shown = "mass") -> Figure | None:
 
 @dataclass(frozen=True)
 class _Body:
-    """Segments with mass as the model stands with all coordinates at their start, ground axes, m.
+    """Segments with mass, with all coordinates of the model at their start, ground axes, m.
 
     Attributes:
-        segments: their names.
-        points: per segment (p, 3) what it reaches: its joints, or its joint and its last marker; of something attached
+        segments: names of the segments.
+        points: per segment (p, 3) its extent: its joints, or its joint and its last marker; for an attached item
             its centre of mass.
-        radii: per segment.
+        radii: radius per segment.
         before, after: (s, 3) centres of mass.
     """
 
@@ -115,7 +115,7 @@ class _Body:
     after: np.ndarray
 
     def seen(self, view: _View) -> list[int]:
-        """Rows of the segments in a view that weigh something; from one side the limbs of the other are left out."""
+        """Return rows of the visible segments that have mass; from one side without the limbs of the other side."""
         hidden = {"_r": "_l", "_l": "_r"}.get(view.near)
         shown = [i for i, radius in enumerate(self.radii) if radius > 0.0]
         return [i for i in shown if hidden is None or not self.segments[i].endswith(hidden)]
@@ -151,23 +151,23 @@ def _standing(fit: Fit) -> _Body:
 
 
 def _length(points: np.ndarray) -> float:
-    """Between the two points farthest apart."""
+    """Return the distance between the two points farthest apart."""
     return float(np.linalg.norm(points[:, None] - points[None], axis=-1).max())
 
 
 def _radius(volume_m3: float, length_m: float) -> float:
-    """Of a capsule: a cylinder of this length with half a ball on either end."""
+    """Return the radius (m) of a capsule: a cylinder of this length with a hemisphere on either end."""
     roots = np.roots([4 / 3 * math.pi, math.pi * length_m, 0.0, -volume_m3])
     return float(max(root.real for root in roots if abs(root.imag) < 1e-9))
 
 
 def _flat(points: np.ndarray, view: _View) -> np.ndarray:
-    """(..., 2) as drawn: across and up."""
+    """Project points to (..., 2) as drawn: across and up."""
     return np.stack([view.sign * points[..., view.across], points[..., 1]], axis=-1)
 
 
 def _outline(points: np.ndarray, radius: float, view: _View) -> np.ndarray:
-    """(c, 2) the closed outline around circles at the ends."""
+    """Return the closed outline (c, 2) around circles at the ends."""
     turn = np.linspace(0, 2 * np.pi, _CORNERS, endpoint=False)
     circle = radius * np.column_stack([np.cos(turn), np.sin(turn)])
     corners = (_flat(points, view)[:, None] + circle).reshape(-1, 2)
@@ -192,7 +192,7 @@ def _segment(outline: np.ndarray, colour: str, text: str) -> dict[str, Any]:
 
 
 def _centres(fit: Fit, body: _Body, view: _View, rows: list[int], place: float) -> list[dict[str, Any]]:
-    """Centres of mass before and after."""
+    """Draw centres of mass before and after the estimate."""
     texts = [_moved(fit, i) for i in rows]
     marks = ((f"CoM, {start_of(fit).word}", body.before, "circle-open"), ("CoM, estimate", body.after, "circle"))
     return [
@@ -224,15 +224,15 @@ def _title(text: str, x: float, y: float) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class _Colours:
-    """What the colours of the segments stand for.
+    """Colours of the segments, and what they represent.
 
     Attributes:
-        values: (s,) a number per segment; NaN where it was kept.
-        limits: between which the colours run.
+        values: (s,) a number per segment; NaN where it was fixed.
+        limits: range of the colour scale.
         stops: colours at the lower limit, in the middle and at the upper one.
-        title: of the scale.
+        title: title of the scale.
         texts: (s,) a sentence on each segment.
-        alt: the figure's text for those who cannot see it.
+        alt: text alternative of the figure.
     """
 
     values: np.ndarray
@@ -243,7 +243,7 @@ class _Colours:
     alt: str
 
     def fill(self, i: int) -> str:
-        """The colour of segment i."""
+        """Return the colour of segment i."""
         if not np.isfinite(self.values[i]):
             return style.UNUSED
         low, high = self.limits
@@ -251,7 +251,7 @@ class _Colours:
         return style.between(self.stops[int(place > 1)], self.stops[1 + int(place > 1)], place - int(place > 1))
 
     def scale(self) -> dict[str, Any]:
-        """The scale below the drawings; plotly draws it for a trace, which has nothing else to show."""
+        """Draw the scale below the drawings; plotly draws it for a trace, which shows nothing else."""
         bar = {"orientation": "h", "thickness": 10, "len": 0.7, "y": 0, "yanchor": "top", "ypad": 4, "nticks": 5}
         bar |= {"title": {"text": self.title, "side": "bottom", "font": {"size": 11}}, "tickfont": {"size": 11}}
         marker = {"color": [0], "cmin": self.limits[0], "cmax": self.limits[1], "showscale": True, "colorbar": bar}

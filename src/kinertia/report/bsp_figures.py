@@ -29,20 +29,20 @@ NAMES = (
     "Ixz",
     "Iyz",
 )
-"""Of `PARAMETERS`, in words."""
+"""Names of `PARAMETERS`, in words."""
 MASS_AND_COM, MAIN, PRODUCTS = range(4), range(7), range(7, 10)
 """Columns of `PARAMETERS`; two-level leaves the products of inertia as they were."""
 
 
 def segment_name(segment: str) -> str:
-    """ "thigh_r" as "thigh, right"."""
+    """Title a segment: "thigh_r" as "thigh, right"."""
     name, _, side = segment.rpartition("_")
     words = {"r": ", right", "l": ", left"}
     return (name + words[side] if name and side in words else segment).replace("_", " ")
 
 
 def departures(fit: Fit) -> np.ndarray | None:
-    """(s, 10) estimate minus the prior's mean in prior SDs, 0 where held; None after two-level, which has none."""
+    """Return the estimate minus the prior's mean (s, 10) in prior SDs, 0 where fixed; None after two-level."""
     if fit.posterior is None:
         return None
     result: np.ndarray | None = (fit.estimate.table() - fit.expected.table()) / _scale(fit.posterior)
@@ -50,12 +50,12 @@ def departures(fit: Fit) -> np.ndarray | None:
 
 
 def _scale(posterior: Posterior) -> np.ndarray:
-    """(s, 10) prior SDs; infinite where a parameter is held."""
+    """Return prior SDs (s, 10); infinite where a parameter is fixed."""
     return np.where(posterior.prior_sd > 0, posterior.prior_sd, np.inf)
 
 
 def estimated_rows(fit: Fit) -> np.ndarray:
-    """Rows of the segments that were estimated; those with a prior SD of 0 stay as the model has them."""
+    """Return rows of the segments that were estimated; those with a prior SD of 0 stay as the model has them."""
     if fit.posterior is None:
         return np.arange(len(fit.estimate.segments))
     return np.flatnonzero((fit.posterior.prior_sd > 0).any(axis=1))
@@ -64,7 +64,7 @@ def estimated_rows(fit: Fit) -> np.ndarray:
 def change_figure(fit: Fit, columns: Sequence[int] = MAIN, truth: BodySegmentParameters | None = None) -> Figure:
     """Change of these parameters by the estimate, in kg, mm and kg m2: a panel per parameter, a row per segment.
 
-    With 95 % intervals of prior and estimate, where there are any (not after two-level). Segments that are held are
+    With 95 % intervals of prior and estimate, where there are any (not after two-level). Fixed segments are
     left out. `truth_comparison`: of a synthetic person, as diamonds.
     """
     posterior, start = fit.posterior, expected_of(fit)
@@ -86,7 +86,7 @@ def change_figure(fit: Fit, columns: Sequence[int] = MAIN, truth: BodySegmentPar
 
 
 def departure_figure(fit: Fit, columns: Sequence[int] = MAIN) -> Figure | None:
-    """The same in prior SDs, so that feet can be read beside the trunk; None after two-level, which has none."""
+    """Draw the changes in prior SDs, so that feet and trunk share a scale; None after two-level, which has none."""
     away, posterior, start = departures(fit), fit.posterior, expected_of(fit)
     if away is None or posterior is None:
         return None
@@ -107,14 +107,14 @@ def departure_figure(fit: Fit, columns: Sequence[int] = MAIN) -> Figure | None:
 
 
 def _rows(fit: Fit) -> tuple[np.ndarray, dict[str, Any]]:
-    """Rows of the segments that are shown, and the axis with their names, downwards."""
+    """Return rows of the segments shown, and the axis with their names, downwards."""
     shown = estimated_rows(fit)
     names = [segment_name(fit.estimate.segments[i]) for i in shown]
     return shown, {**_named(names), "range": [len(names) - 0.4, -0.6]}
 
 
 def _traces(fit: Fit, shown: np.ndarray, k: int, scale: np.ndarray) -> list[dict[str, Any]]:
-    """Change of parameter k in units of `scale` per segment; what was held is left out."""
+    """Draw the change of parameter k in units of `scale` per segment; fixed parameters are left out."""
     posterior, start = fit.posterior, expected_of(fit)
     before, after = fit.expected.table()[shown, k], fit.estimate.table()[shown, k]
     away, place = (after - before) / scale, np.arange(len(shown))
@@ -180,7 +180,7 @@ def _interval(k: int, value: float, sd: float) -> str:
 
 
 def information_figure(fit: Fit) -> Figure | None:
-    """Information (100 % is everything) on every parameter of the estimated segments; None after two-level.
+    """Draw the variance reduction (100 % is complete) of each parameter of estimated segments; None after two-level.
 
     The tiles of the map are bars, which plotly's basic bundle has; it has no heat maps.
     """
@@ -229,5 +229,5 @@ def information_figure(fit: Fit) -> Figure | None:
 
 
 def _named(words: Sequence[str]) -> dict[str, Any]:
-    """An axis with words at 0, 1, 2, ..."""
+    """Return an axis with words at 0, 1, 2, ..."""
     return {"tickvals": list(range(len(words))), "ticktext": [plain(word) for word in words]}

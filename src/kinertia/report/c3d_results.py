@@ -31,26 +31,26 @@ SUFFIX = "Kinertia"
 """Ends all labels where the file has outputs of the same names already."""
 SD = "SD"
 NO_DEVIATION = -1.0
-"""Where a point has deviations along other axes only: readers take a point with a NaN for missing as a whole."""
+"""Value on axes without an SD, where a point has others: readers take a point with any NaN for missing."""
 _PLUG_IN_GAIT = ({"LASI", "RASI", "LTHI", "RTHI", "LTIB", "RTIB"}, {"LASI", "RASI", "LTHI", "RTHI", "SACR"})
 _FACTORS = {"nmm": 1e-3, "n.mm": 1e-3, "nm": 1.0, "n.m": 1.0, "n": 1.0, "kn": 1e3, "w": 1.0, "mw": 1e-3, "deg": 1.0}
-"""Of units that files state for moments, forces, powers and angles, in SI and degrees; per kg or not."""
+"""Factors of the units in files for moments, forces, powers and angles, to SI and degrees; per kg or not."""
 _SAME_PLACE = 1e-3
-"""How far, as a share of their distances, markers may be from those of the fit: a file stores single precision."""
+"""Largest error of markers against the fit's, as a share of their distances: a file stores single precision."""
 _SAME_TIME_FRAMES = 0.02
 
 
 def write_c3d_results(
     saved: SavedFit, results: Path, recordings: Path | None, convention: str | None, folder: Path
 ) -> Convention:
-    """Write a C3D file with its results for each trial of a fit; returns the convention.
+    """Write a C3D file with its results for each trial of a fit; return the convention.
 
     Args:
         saved: the fit.
-        results: its folder.
-        recordings: where the trials' files are; searched for if None (`trial_file`).
-        convention: of signs, axes and units; the usual one of the marker set if None.
-        folder: to write to.
+        results: folder of the fit.
+        recordings: folder of the trials' files; searched for if None (`trial_file`).
+        convention: convention of signs, axes and units; the usual one of the marker set if None.
+        folder: folder to write to.
 
     Raises:
         FileError: a trial's file is not found, has changed, or cannot take results.
@@ -66,7 +66,7 @@ def write_c3d_results(
 
 
 def usual_convention(fit: Fit) -> Convention:
-    """Plug-in Gait's where the markers are, ISB's otherwise."""
+    """Return Plug-in Gait's convention where its markers are present, else ISB's."""
     labels = set(fit.skeleton.labels)
     return "plug-in-gait" if any(own <= labels for own in _PLUG_IN_GAIT) else "isb"
 
@@ -78,7 +78,7 @@ def outputs_of(fit: Fit, trial: TrialFit, convention: Convention) -> list[ModelO
 
 
 def new_file(recording: Recording, folder: Path) -> Path:
-    """A C3D file of a recording that came in others; plates whose corners are unknown are left out."""
+    """Write a C3D file for a recording in other formats; plates whose corners are unknown are left out."""
     plates = recording.plates if recording.plates is not None and recording.plates.corners is not None else None
     path = folder / f"{recording.name}.c3d"
     write_c3d(path, replace(recording, plates=plates))
@@ -88,12 +88,12 @@ def new_file(recording: Recording, folder: Path) -> Path:
 def c3d_with_results(
     fit: Fit, trial: TrialFit, source: Path | Recording, convention: Convention, files: Mapping[str, str]
 ) -> bytes:
-    """The content of a C3D file with a trial's results.
+    """Return the content of a C3D file with a trial's results.
 
     Args:
-        fit, trial: the result.
-        source: the trial's own C3D file, or what its files of other kinds hold.
-        convention: of signs, axes and units.
+        fit, trial: the fit and its trial.
+        source: the trial's own C3D file, or its recording read from other formats.
+        convention: convention of signs, axes and units.
         files: SHA-256 of the files of the fit, by name.
 
     Raises:
@@ -128,14 +128,14 @@ def _suffixed(label: str) -> str:
 
 
 def prefix_of(frames: C3dFrames, trial: TrialFit) -> str:
-    """The subject's, that most of the trial's markers have in the file."""
+    """Return the subject prefix that most of the trial's markers have in the file."""
     labels, own = set(frames.labels), trial.kinematics.trial.markers.labels
     prefixes = dict.fromkeys(["", *(label.split(":", 1)[0] + ":" for label in frames.labels if ":" in label)])
     return max(prefixes, key=lambda prefix: sum(prefix + label in labels for label in own))
 
 
 def _frames_at(source: Path, frames: C3dFrames, trial: TrialFit) -> np.ndarray:
-    """(w,) index in the file of the frames of the fit."""
+    """Return the indices (w,) in the file of the frames of the fit."""
     exact = trial.time * frames.rate_hz - (frames.first - 1)
     at = exact.round().astype(int)
     if np.abs(exact - at).max() > _SAME_TIME_FRAMES or at[0] < 0 or at[-1] >= len(frames.points):
@@ -150,7 +150,7 @@ def _another(source: Path, trial: TrialFit) -> FileError:
 def _points(
     outputs: list[ModelOutput], frames: C3dFrames, at: np.ndarray, units: Mapping[str, str]
 ) -> list[OutputPoint]:
-    """Outputs and their deviations at all frames of the file, in its units where it states others."""
+    """Return outputs and their SDs at all frames of the file, in the file's units where it states others."""
     points, count = [], len(frames.points)
     for one in outputs:
         stated = frames.units.get(one.kind, units[one.kind])
@@ -170,7 +170,7 @@ def _spread(values: np.ndarray, at: np.ndarray, count: int) -> np.ndarray:
 
 
 def _centres(source: Path, frames: C3dFrames, trial: TrialFit, prefix: str, at: np.ndarray) -> list[OutputPoint]:
-    """Joint centres in the axes and units of the file."""
+    """Return joint centres in the axes and units of the file."""
     lab, origin = to_file(source, frames, trial, prefix)
     pose = trial.skeleton.pose(trial.motion.q)
     return [
@@ -185,7 +185,7 @@ def _centres(source: Path, frames: C3dFrames, trial: TrialFit, prefix: str, at: 
 
 
 def to_file(source: Path, frames: C3dFrames, trial: TrialFit, prefix: str) -> tuple[np.ndarray, np.ndarray]:
-    """(3, 3) and (3,): from the axes of the fit (m, person facing +X) to those of the file, by the markers of both."""
+    """Return rotation (3, 3) and translation (3,) from the axes of the fit (m, facing +X) to the file's, by markers."""
     markers, columns = trial.kinematics.trial.markers, {label: k for k, label in enumerate(frames.labels)}
     shared = [(k, columns[prefix + label]) for k, label in enumerate(markers.labels) if prefix + label in columns]
     index = (markers.time * frames.rate_hz - (frames.first - 1)).round().astype(int)
@@ -196,7 +196,7 @@ def to_file(source: Path, frames: C3dFrames, trial: TrialFit, prefix: str) -> tu
     if known.sum() < 100:
         raise _another(source, trial)
     ours, theirs = np.column_stack([ours[known], np.ones(known.sum())]), theirs[known]
-    for _ in range(3):  # markers whose labels were put right are elsewhere in the file
+    for _ in range(3):  # markers whose labels were corrected have other labels in the file
         turn, *_ = np.linalg.lstsq(ours, theirs, rcond=None)
         apart = np.linalg.norm(ours @ turn - theirs, axis=1)
         near = apart <= max(3.0 * float(np.median(apart)), 1e-9)
@@ -209,7 +209,7 @@ def to_file(source: Path, frames: C3dFrames, trial: TrialFit, prefix: str) -> tu
 def _own(
     fit: Fit, convention: Convention, files: Mapping[str, str], units: Mapping[str, str]
 ) -> dict[str, tuple[Value, tuple[int, ...] | None]]:
-    """The group KINERTIA: what the outputs are, and segment masses (kg) and centres of mass (m, segment axes)."""
+    """Return the group KINERTIA: what the outputs are, segment masses (kg), centres of mass (m, segment axes)."""
     bsp, table = fit.estimate, fit.estimate.table()
     coms = [PARAMETERS.index(name) for name in ("com_x", "com_y", "com_z")]
     count = len(bsp.segments)

@@ -17,7 +17,7 @@ from kinertia.trial.sampled_time import nearest_samples
 from kinertia.workflow.recording import RecordingCheck
 
 MOST_SAMPLES = 1200
-"""Drawn per curve; the largest and smallest of those between are among them."""
+"""Largest number of samples drawn per curve, with the largest and smallest of those between."""
 MOST_CONTACTS = 24
 """Whose centres of pressure are drawn: more would hide each other."""
 _COMPONENTS = (
@@ -27,12 +27,12 @@ _COMPONENTS = (
 )
 _FEET = {"r": style.SIDES["r"], "l": style.SIDES["l"], None: ("unknown foot", style.GREY)}
 _WIDTHS_PX = {"1": 360, "2": 700, "3": 1000, "print": 960}
-"""Of the page, by how many columns of panels it has room for."""
+"""Widths of the page, by the number of columns of panels that fit."""
 _LEAST_PX, _MOST_PX = 150, 460
 
 
 def force_figure(check: RecordingCheck) -> Figure | None:
-    """Forces on every plate over time, with contacts by foot and the stretches that no fit can use; None without.
+    """Draw forces on every plate over time, with contacts by foot and intervals that no fit can use; None without.
 
     Plates that carry nothing are left out if others carry something.
     """
@@ -65,7 +65,7 @@ def _forces(plates: PlateLoads, p: int) -> list[dict[str, Any]]:
 
 
 def extremes_kept(values: np.ndarray, most: int) -> np.ndarray:
-    """Ascending indices of at most `most` samples, the smallest and the largest of every stretch between them."""
+    """Return ascending indices of at most `most` samples, with the smallest and largest of every interval between."""
     if len(values) <= most:
         return np.arange(len(values))
     starts = np.linspace(0, len(values), most // 2, endpoint=False).astype(int)
@@ -79,7 +79,7 @@ def extremes_kept(values: np.ndarray, most: int) -> np.ndarray:
 
 
 def _unmeasured(check: RecordingCheck, start: float, end: float) -> list[dict[str, Any]]:
-    """Grey ground where not all ground contact is measured; none where that is unknown."""
+    """Shade intervals in which not all ground contact is measured; none where that is unknown."""
     if check.used_set is None or check.travel.kind == "stands still":
         return []
     edges = [start, *(t for window in sorted(check.windows) for t in window), end]
@@ -96,7 +96,7 @@ def _ground(start: float, end: float, colour: str, opacity: float) -> dict[str, 
 
 
 def pressure_figure(check: RecordingCheck) -> Figure | None:
-    """Centres of pressure of every contact, seen from above, under the foot in the middle of the contact.
+    """Draw centres of pressure of every contact from above, under the foot in the middle of the contact.
 
     None where no plate carries anything.
     """
@@ -120,7 +120,7 @@ def pressure_figure(check: RecordingCheck) -> Figure | None:
 
 
 def _from_above(traces: Sequence[dict[str, Any]], alt: str) -> Figure:
-    """Traces with ground coordinates "X" and "Z" (m) as a figure, the longer of the two across the page."""
+    """Make a figure from traces in ground coordinates "X" and "Z" (m), with the longer one across the page."""
     spans = {}
     for axis in "XZ":
         values = np.concatenate([np.asarray(trace[axis], dtype=float) for trace in traces])
@@ -172,7 +172,7 @@ def _plate(plates: PlateLoads, p: int) -> dict[str, Any]:
 
 
 def _path(plates: PlateLoads, p: int, contact: Contact) -> dict[str, Any] | None:
-    """The centre of pressure of one contact; None where it never carries enough to tell."""
+    """Draw the centre of pressure of one contact; None where its load is always too small."""
     inside = (plates.time >= contact.start_s) & (plates.time <= contact.end_s)
     inside &= plates.force[:, p, 1] > FIRM_LOAD_N
     if not inside.any():
@@ -187,7 +187,7 @@ def _path(plates: PlateLoads, p: int, contact: Contact) -> dict[str, Any] | None
 
 
 def _foot(check: RecordingCheck, contact: Contact) -> dict[str, Any] | None:
-    """The markers of the foot in the middle of the contact; None where they are not known."""
+    """Draw the markers of the foot in the middle of the contact; None where they are unknown."""
     if check.used_set is None or contact.foot is None:
         return None
     markers: Markers = check.recording.markers

@@ -26,7 +26,7 @@ _LEFT_OUT = "left out"
 
 @dataclass(frozen=True)
 class Checked:
-    """What is said of one recording or model as a whole: verdict, and findings by code."""
+    """Verdict on one recording or model as a whole, and its findings by code."""
 
     name: str
     anchor: str
@@ -40,13 +40,13 @@ def save_check_page(
     models: Sequence[ModelOverview],
     folder: str | Path,
 ) -> Path:
-    """Write `check.html` into a folder; returns the file.
+    """Write `check.html` into a folder and return the file.
 
     Args:
-        overviews: what was found, of the person and of each model.
-        recordings: what is in each, the static trial first.
-        models: what is in each.
-        folder: is made if need be.
+        overviews: findings of the person and of each model.
+        recordings: contents of each recording, the static trial first.
+        models: contents of each model.
+        folder: folder to write to, made if necessary.
 
     Raises:
         FileError: the folder cannot be written to.
@@ -62,7 +62,7 @@ def render_check(
     recordings: Sequence[RecordingCheck],
     models: Sequence[ModelOverview] = (),
 ) -> str:
-    """The page as text; arguments as those of `save_check_page`. The first six recordings have pictures."""
+    """Render the page as text; arguments as in `save_check_page`. The first six recordings have pictures."""
     pictured = recordings[:MOST_TRIALS]
     most_frames = VIEW_FRAMES // max(len(pictured), 1)
     scenes = [(one.context.name, marker_scene(one.recording, one.used_set, most_frames)) for one in pictured]
@@ -88,7 +88,7 @@ def render_check(
 
 
 def _named(model: ModelOverview) -> Overview:
-    """Findings of a model with its file, since several may be on the page."""
+    """Add the model's file to its findings, since several may be on the page."""
     return replace(model.overview, findings=[one.in_file(model.name) for one in model.overview.findings])
 
 
@@ -103,7 +103,7 @@ def _checked(name: str, anchor: str, findings: Sequence[Finding]) -> Checked:
 
 
 def check_figures(check: RecordingCheck) -> dict[str, Any]:
-    """What the page draws of a recording: "forces", "pressure", "gaps"; None where there is nothing to draw."""
+    """Draw the pictures of a recording: "forces", "pressure", "gaps"; None where there is nothing to draw."""
     labels = [one.label for one in check.markers]
     figures: dict[str, Figure | None] = {
         "forces": force_figure(check),

@@ -30,24 +30,24 @@ from kinertia.report.wording import INTERVAL_SD, decimals, fixed, read_in
 from kinertia.trial.data import FEET
 
 CHANGED_SD = INTERVAL_SD
-"""A difference of more than this many of its own deviations is a change."""
+"""A difference of more than this many of its own SDs is a change."""
 _COLOURS = (style.BLUE, style.VERMILION, style.GREEN, style.ORANGE, style.SKY, style.BLACK)
 MOST_FITS = len(_COLOURS)
 _MOST_TRIALS = 3
-"""Of each result, whose files' own outputs are shown."""
+"""Number of trials of each result whose files' own outputs are shown."""
 _MOMENTS = ("hip_flexion", "hip_adduction", "knee_angle", "ankle_angle")
 
 
 @dataclass(frozen=True)
 class Difference:
-    """One parameter of one segment in two results.
+    """Difference of one parameter of one segment between two results.
 
     Attributes:
-        segment, parameter, unit: which; SI units.
-        first, other: their values.
-        sd: of the difference, from both error bars as if they were independent. They are not: both lean on the same
+        segment, parameter, unit: what is compared; SI units.
+        first, other: values of the two results.
+        sd: SD of the difference, from both error bars as if they were independent. They are not: both use the same
             prior, which makes the true one smaller. NaN where a result has no error bars, and where `same` is false.
-        same: whether both models mean the same by the segment (`same_segment`).
+        same: whether the segment is the same in both models (`same_segment`).
     """
 
     segment: str
@@ -60,17 +60,17 @@ class Difference:
 
     @property
     def change(self) -> float:
-        """Other minus first."""
+        """Change of the value, other minus first."""
         return self.other - self.first
 
     @property
     def changed(self) -> bool | None:
-        """Whether they differ beyond the error bars; None without them, and between different segments."""
+        """Whether the values differ beyond the error bars; None without them, and between different segments."""
         return None if np.isnan(self.sd) else bool(self.sd > 0 and abs(self.change) > CHANGED_SD * self.sd)
 
 
 def differences(first: Fit, other: Fit) -> list[Difference]:
-    """Of all parameters of the segments that both have, segment by segment."""
+    """Compare all parameters of the segments that both have, segment by segment."""
     compared = []
     for segment in first.estimate.segments:
         if segment not in other.estimate.segments:
@@ -87,12 +87,12 @@ def differences(first: Fit, other: Fit) -> list[Difference]:
 
 
 def judged(compared: Sequence[Difference]) -> list[Difference]:
-    """Those with error bars to tell a change by."""
+    """Return the differences that have error bars to test a change by."""
     return [one for one in compared if one.changed is not None]
 
 
 def outcome_of(compared: Sequence[Difference]) -> str:
-    """How many parameters changed, in words."""
+    """State in words how many parameters changed."""
     told = judged(compared)
     if not told:
         without = "no error bars" if any(one.same for one in compared) else "no segment is the same in both models"
@@ -106,7 +106,7 @@ def _sd(fit: Fit) -> np.ndarray:
 
 
 def remarks(fits: Mapping[str, Fit]) -> list[str]:
-    """What makes a comparison say less than it seems to."""
+    """List limitations of a comparison."""
     (name, first), *others = fits.items()
     said = []
     for other_name, other in others:
@@ -133,7 +133,7 @@ def remarks(fits: Mapping[str, Fit]) -> list[str]:
 
 
 def _sign_remark(joint: str, first: tuple[str, Fit], other: tuple[str, Fit]) -> str:
-    """What a moment of the other result is drawn as, where the models do not mean the same by it."""
+    """Explain how a moment of the other result is drawn, where the models define it differently."""
     (name, fit), (other_name, other_fit) = first, other
     both = [f"{joint}_{side}" for side in FEET]
     if not all(set(both) & set(one.skeleton.coordinates) for one in (fit, other_fit)):
@@ -149,7 +149,7 @@ def _sign_remark(joint: str, first: tuple[str, Fit], other: tuple[str, Fit]) -> 
 
 
 def comparison_columns(fits: Mapping[str, Fit]) -> dict[str, list[Any]]:
-    """The table of `compare.csv`: a row per other result, segment and parameter."""
+    """Return the table of `compare.csv`: a row per other result, segment and parameter."""
     (name, first), *others = fits.items()
     rows = [(name, other_name, one) for other_name, other in others for one in differences(first, other)]
     return {
@@ -163,7 +163,7 @@ def comparison_columns(fits: Mapping[str, Fit]) -> dict[str, list[Any]]:
 
 
 def comparison_summary(fits: Mapping[str, Fit]) -> dict[str, Any]:
-    """What `kinertia compare --json` prints: remarks, and every parameter against the first result; SI units."""
+    """Return what `kinertia compare --json` prints: remarks, and every parameter against the first result; SI units."""
     (first_name, first), *others = fits.items()
     return {
         "first": first_name,
@@ -177,7 +177,7 @@ def comparison_summary(fits: Mapping[str, Fit]) -> dict[str, Any]:
 
 
 def render_comparison(fits: Mapping[str, Fit]) -> str:
-    """The page of `kinertia compare`; results by the names that it calls them."""
+    """Render the page of `kinertia compare`, which titles results by these names."""
     (name, first), *others = fits.items()
     figure = moments_figure(fits)
     pairs = [(other_name, differences(first, other)) for other_name, other in others]
@@ -245,8 +245,8 @@ def _row(one: Difference) -> dict[str, Any]:
 
 
 def moments_figure(fits: Mapping[str, Fit]) -> Figure | None:
-    """Mean joint moments of the legs over the gait cycle, a colour per result, with the signs of the first; None where
-    none has strides.
+    """Draw mean joint moments of the legs over the gait cycle, a colour per result, with the signs of the first; None
+    where none has strides.
     """
     walked = {name: fit for name, fit in fits.items() if _strides(fit)}
     if not walked:

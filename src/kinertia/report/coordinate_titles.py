@@ -56,9 +56,9 @@ class Coordinate:
 
 
 def panels_of(skeleton: Skeleton) -> list[Coordinate]:
-    """The coordinates of a skeleton in their order, left and right together.
+    """List the coordinates of a skeleton in order, left and right together.
 
-    Of an OpenSim model those of the legs are called by what they do, whichever sign they have, and the others by their
+    Coordinates of an OpenSim model's legs are titled by their movement, whatever their sign, the others by their
     names.
     """
     sides = by_side(skeleton.coordinates)
@@ -90,7 +90,7 @@ def _imported_title(name: str, sides: Sequence[str], skeleton: Skeleton) -> str:
 
 
 def title_of(skeleton: Skeleton, column: int) -> str:
-    """One coordinate in a sentence: "hip flexion, right"."""
+    """Title one coordinate: "hip flexion, right"."""
     for one in panels_of(skeleton):
         for side, index in one.columns.items():
             if index == column:
@@ -100,7 +100,7 @@ def title_of(skeleton: Skeleton, column: int) -> str:
 
 
 def load_title(one: Coordinate, what: str) -> str:
-    """The moment about a coordinate, with its sign: "Hip flexion +" as "Hip moment, flexion +".
+    """Title the moment about a coordinate with its sign: "Hip flexion +" as "Hip moment, flexion +".
 
     Words that a figure of three panels beside one another has no room for are left out: "Trunk bending, to the right +"
     is "Trunk moment, bending right +".
@@ -112,9 +112,9 @@ def load_title(one: Coordinate, what: str) -> str:
 
 
 def power_title(one: Coordinate, others: Sequence[Coordinate]) -> str:
-    """The power of a coordinate, whose sign is not a direction's: "Knee power, generation +".
+    """Title the power of a coordinate, whose sign is not a direction's: "Knee power, generation +".
 
-    Of a joint that has several among `others` it says which: "Hip flexion power, generation +".
+    If the joint has several coordinates among `others`, the title includes which: "Hip flexion power, generation +".
     """
     name = one.title
     if name.endswith(" +"):

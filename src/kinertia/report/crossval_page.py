@@ -22,7 +22,7 @@ def _values(one: Explained) -> tuple[float, ...]:
 
 
 def crossval_rows(held_out: Sequence[HeldOut], before: str) -> list[list[str]]:
-    """Two rows per trial under `CROSSVAL_HEADINGS`; `before` names the parameters that others are compared with."""
+    """Return two rows per trial under `CROSSVAL_HEADINGS`; `before` is the name of the parameters for comparison."""
     rows = []
     for held in held_out:
         for source, explained in ((before, held.literature), ("others", held.estimate)):
@@ -32,18 +32,18 @@ def crossval_rows(held_out: Sequence[HeldOut], before: str) -> list[list[str]]:
 
 
 def crossval_sentence(held_out: Sequence[HeldOut]) -> str:
-    """How many trials are explained better."""
+    """State how many trials are explained better."""
     better = sum(held.estimate.objective < held.literature.objective for held in held_out)
     return f"the BSPs from the other trials explain {better} of {len(held_out)} held-out trials better"
 
 
 def crossval_summary(held_out: Sequence[HeldOut]) -> dict[str, Any]:
-    """What `crossval.json` says."""
+    """Return the content of `crossval.json`."""
     return {"kinertia": VERSION, "held_out": [asdict(held) for held in held_out]}
 
 
 def render_crossval(held_out: Sequence[HeldOut], before: str) -> str:
-    """The page."""
+    """Render the page of the cross-validation."""
     values = {
         before: [_values(held.literature) for held in held_out],
         "from the other trials": [_values(held.estimate) for held in held_out],
@@ -72,7 +72,7 @@ def render_crossval(held_out: Sequence[HeldOut], before: str) -> str:
 
 
 def save_crossval(held_out: Sequence[HeldOut], before: str, folder: str | Path) -> Path:
-    """Write `crossval.html` and `crossval.json` into a folder; returns the folder.
+    """Write `crossval.html` and `crossval.json` into a folder and return the folder.
 
     Raises:
         FileError: the folder cannot be written to.

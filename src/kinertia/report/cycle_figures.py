@@ -31,9 +31,9 @@ from kinertia.trial.data import FEET
 from kinertia.trial.sampled_time import runs
 
 MOST_STRIDES = 100
-"""Of a trial and side; of more, so many are taken, evenly spread."""
+"""Largest number of strides of a trial and side; if there are more, this many are taken, evenly spread."""
 _MOST_DRAWN = 5
-"""Of a side; mean and bands are of all."""
+"""Number of strides drawn per side; mean and bands are of all."""
 _SD_OPACITY, _BAND_OPACITY, _STRIDE_OPACITY = 0.13, 0.25, 0.45
 _CLINICAL_TITLES = dict(
     zip(
@@ -55,13 +55,13 @@ _CLINICAL_TITLES = dict(
 _FORCE_TITLES = dict(zip(FORCES, ("Forward +", "Upward +", "Towards the other foot +"), strict=True))
 
 Curves = Mapping[tuple[str, str], Sequence[CycleCurve]]
-"""By quantity and side."""
+"""Curves by quantity and side."""
 Norms = Mapping[str, Norm]
-"""By quantity, for both sides."""
+"""Norms by quantity, for both sides."""
 
 
 def cycle_figures(fit: Fit, norms: Norms = MappingProxyType({})) -> dict[Kind, Figure]:
-    """All figures over the gait cycle, by kind; none where no trial has a stride. Norms are grey bands below."""
+    """Draw all figures over the gait cycle, by kind; none where no trial has a stride. Norms are grey bands below."""
     if not any(trial.strides for trial in fit.trials):
         return {}
     drawn = _Drawn(fit, curves_of(fit, "estimate"), curves_of(fit, "literature"), norms)
@@ -69,17 +69,17 @@ def cycle_figures(fit: Fit, norms: Norms = MappingProxyType({})) -> dict[Kind, F
 
 
 def cycle_figure(fit: Fit, kind: Kind, norms: Norms = MappingProxyType({})) -> Figure | None:
-    """The one of this kind; None where no trial has a stride."""
+    """Draw the figure of this kind; None where no trial has a stride."""
     return cycle_figures(fit, norms).get(kind)
 
 
 def quantities_of(fit: Fit) -> set[str]:
-    """Names of all curves that a fit has over the gait cycle."""
+    """Return the names of all curves that a fit has over the gait cycle."""
     return {quantity for quantity, _ in curves_of(fit, "estimate")}
 
 
 def curves_of(fit: Fit, stage: Stage) -> Curves:
-    """All curves of a fit that figures are drawn from."""
+    """Return all curves of a fit from which figures are drawn."""
     curves: dict[tuple[str, str], list[CycleCurve]] = {}
     for trial in fit.trials:
         for one in cycle_curves(trial, fit.mass_kg, stage, spread_evenly(trial.strides, MOST_STRIDES)):
@@ -88,8 +88,8 @@ def curves_of(fit: Fit, stage: Stage) -> Curves:
 
 
 def titled_quantities(skeleton: Skeleton, kind: Kind) -> list[tuple[str, str]]:
-    """Names and titles of the curves of a kind, in the order of the panels; a title says which direction is positive,
-    which the name of a coordinate does not in every model.
+    """Return names and titles of the curves of a kind, in the order of the panels; a title states the positive
+    direction, which a coordinate's name does not do in every model.
     """
     if kind == "force":
         return list(_FORCE_TITLES.items())
@@ -98,7 +98,7 @@ def titled_quantities(skeleton: Skeleton, kind: Kind) -> list[tuple[str, str]]:
     coordinates = [one for one in panels_of(skeleton) if one.rotational]
     if kind == "angle":
         return [(f"{one.name}_angle", one.title) for one in coordinates]
-    if kind == "power":  # of arms and trunk next to nothing
+    if kind == "power":  # powers of arms and trunk are negligible
         legs = _leg_coordinates(skeleton)
         coordinates = [one for one in coordinates if legs & set(one.columns.values())]
         return [(f"{one.name}_power", power_title(one, coordinates)) for one in coordinates]
@@ -107,7 +107,7 @@ def titled_quantities(skeleton: Skeleton, kind: Kind) -> list[tuple[str, str]]:
 
 @dataclass(frozen=True)
 class _Drawn:
-    """What the figures are drawn from."""
+    """Data from which the figures are drawn."""
 
     fit: Fit
     estimate: Curves
@@ -125,7 +125,7 @@ class _Drawn:
         return small_multiples(panels, self._alt(kind), axis)
 
     def _usual_name(self, kind: Kind) -> str:
-        """Of the dotted curves: body segment parameters are in moments and powers alone."""
+        """Name the dotted curves: body segment parameters only affect moments and powers."""
         return USUAL if kind in ("angle", "force") else start_of(self.fit).values
 
     def _traces(self, quantity: str, usual_name: str) -> Iterator[dict[str, Any]]:
@@ -141,12 +141,12 @@ class _Drawn:
                 yield {**mean_line(usual_mean(usual, curves)), "name": f"{word}, {usual_name}", "line": line}
 
     def _opposite(self, quantity: str) -> bool:
-        """Whether the sides' curves of a quantity are opposite, though the norm is one."""
+        """Return whether the sides' curves of a quantity have opposite signs, though the norm is one."""
         base, _, kind = quantity.rpartition("_")
         return kind in ("angle", "moment") and base in opposite_on_left(self.fit.skeleton)
 
     def _toe_offs(self) -> list[dict[str, Any]]:
-        """A vertical line per side at its mean toe off."""
+        """Draw a vertical line per side at its mean toe-off."""
         shapes = []
         for side in FEET:
             strides = [stride for trial in self.fit.trials for stride in trial.strides if stride.side == side]
@@ -172,7 +172,7 @@ class _Drawn:
 
 
 def _norm(norm: Norm, opposite: bool) -> Iterator[dict[str, Any]]:
-    """A grey band; of `kinertia norms`, which mirrors what is opposite on the left, one per side in its colour."""
+    """Draw a grey band; for `kinertia norms` with opposite signs one per side in its colour, mirrored on the left."""
     low, high = norm.mean - norm.sd, norm.mean + norm.sd
     if not (opposite and norm.convention):
         yield {**_outline(norm.percent, low, high, style.faded(style.GREY, 0.3)), "name": "norm, mean ± SD"}
@@ -184,19 +184,19 @@ def _norm(norm: Norm, opposite: bool) -> Iterator[dict[str, Any]]:
 
 
 def has_spread(figure: Figure) -> bool:
-    """Whether strides overlap anywhere, so that there are means and deviations."""
+    """Return whether strides overlap anywhere, so that there are means and SDs."""
     ends = tuple(f"{style.SIDES[side][0]}, mean" for side in FEET)
     return any(trace["name"].startswith(ends) for trace in figure.data)
 
 
 def _leg_coordinates(skeleton: Skeleton) -> set[int]:
-    """Those that move a foot."""
+    """Return the coordinates that move a foot."""
     feet = [skeleton.segments.index(foot) for foot in skeleton.feet]
     return set(skeleton.map.owner[skeleton.support[feet].any(axis=0)].tolist())
 
 
 def _estimate(curves: Sequence[CycleCurve], word: str, colour: str) -> Iterator[dict[str, Any]]:
-    """Bands below, strides, and their mean on top."""
+    """Draw bands below, strides, and their mean on top."""
     values = np.array([one.value for one in curves])
     common = common_strides(values)
     mean, spread = mean_of(values[common]), _spread(values[common])
@@ -215,12 +215,12 @@ def _estimate(curves: Sequence[CycleCurve], word: str, colour: str) -> Iterator[
 
 
 def mean_curve(curves: Sequence[CycleCurve]) -> np.ndarray:
-    """(101,) of the strides that are complete, or were measured longest; NaN where one of these has a gap."""
+    """Return the mean (101,) of the strides that are complete, or were measured longest; NaN where one has a gap."""
     return mean_of_common(np.array([one.value for one in curves]))
 
 
 def usual_mean(usual: Sequence[CycleCurve], estimate: Sequence[CycleCurve]) -> np.ndarray:
-    """(101,) of the strides that the estimate's mean is of, so that they differ by the method alone."""
+    """Return the mean (101,) of the strides in the estimate's mean, so that they differ by the method alone."""
     if not estimate:
         return mean_curve(usual)
     common = common_strides(np.array([one.value for one in estimate]))
@@ -230,12 +230,12 @@ def usual_mean(usual: Sequence[CycleCurve], estimate: Sequence[CycleCurve]) -> n
 
 
 def _spread(values: np.ndarray) -> np.ndarray | None:
-    """(101,) standard deviation between the strides (n, 101) of a mean; None of one."""
+    """Return the SD (101,) between the strides (n, 101) of a mean; None for a single stride."""
     return np.std(values, axis=0, ddof=1) if len(values) > 1 else None
 
 
 def mean_line(values: np.ndarray) -> dict[str, Any]:
-    """The trace of one curve (101,)."""
+    """Draw one curve (101,)."""
     return {
         "type": "scatter",
         "mode": "lines",
@@ -247,7 +247,7 @@ def mean_line(values: np.ndarray) -> dict[str, Any]:
 
 
 def _strides(curves: Sequence[CycleCurve]) -> dict[str, Any]:
-    """All of them as one line with gaps between them."""
+    """Draw all strides as one line with gaps between them."""
     x = np.tile(np.append(PERCENT, 100), len(curves)).astype(np.uint8)
     y = np.concatenate([np.append(one.value, np.nan) for one in curves])
     said = [f"{plain(one.trial)}, {style.SIDES[one.stride.side][0]} stride {one.stride.number}" for one in curves]
@@ -256,13 +256,13 @@ def _strides(curves: Sequence[CycleCurve]) -> dict[str, Any]:
 
 
 def band(low: np.ndarray, high: np.ndarray, colour: str) -> dict[str, Any]:
-    """Around every stretch without a gap; whole percents in one byte each."""
+    """Draw a band around every interval without a gap; whole percents in one byte each."""
     outline = _outline(PERCENT, low, high, colour)
     return {**outline, "x": np.asarray(outline["x"]).astype(np.uint8)}
 
 
 def _outline(percent: np.ndarray, low: np.ndarray, high: np.ndarray, colour: str) -> dict[str, Any]:
-    """A closed outline around every stretch without a gap."""
+    """Draw a closed outline around every interval without a gap."""
     x: list[np.ndarray] = []
     y: list[np.ndarray] = []
     for first, last in runs(np.isfinite(low) & np.isfinite(high)):

@@ -24,7 +24,7 @@ _ROWS = (
 
 
 class MeasureRow(NamedTuple):
-    """One measure in words; per side, mean and standard deviation."""
+    """One measure in words, with mean and standard deviation per side."""
 
     measure: str
     right: str
@@ -32,7 +32,7 @@ class MeasureRow(NamedTuple):
 
 
 def stride_rows(fit: Fit) -> list[MeasureRow]:
-    """The table's rows; none where no trial has a stride."""
+    """Return the table's rows; none where no trial has a stride."""
     columns = spatiotemporal_columns(fit.trials)
     if not columns["side"]:
         return []
@@ -45,7 +45,7 @@ def stride_rows(fit: Fit) -> list[MeasureRow]:
 
 
 def _mean_and_sd(values: np.ndarray, digits: int) -> str:
-    """Mean, with the standard deviation of several."""
+    """Format the mean, with the standard deviation if there are several values."""
     known = values[np.isfinite(values)]
     if not len(known):
         return "–"

@@ -20,11 +20,11 @@ if TYPE_CHECKING:
 
 _OVER_TIME = {"angle": "deg", "moment": "N m"}
 _TIME_DIGITS = 6
-"""Of s: times that differ by less are the same frame of a clock."""
+"""Decimals of times (s): times that differ by less are the same frame."""
 
 
 def curve_dataset(fit: Fit, kind: str, over: str) -> Dataset:
-    """Curves as `Fit.to_xarray` has them."""
+    """Convert curves as `Fit.to_xarray` returns them."""
     units = {str(name): unit for name, unit in UNITS.items()} if over == "percent" else _OVER_TIME
     if over not in ("percent", "time") or kind not in units:
         told = "over percent there are angle, clinical, moment, power and force, over time angle and moment"
@@ -34,7 +34,7 @@ def curve_dataset(fit: Fit, kind: str, over: str) -> Dataset:
 
 
 def draw_dataset(fit: Fit, count: int, seed: int) -> Dataset:
-    """Draws as `Fit.draws_to_xarray` has them."""
+    """Convert draws as `Fit.draws_to_xarray` returns them."""
     xarray = _xarray()
     drawn = [drawn_fit(fit, number) for number in chosen_draws(fit, count, seed)]
     times, joints = _times(fit.trials), _joints(fit)
@@ -66,7 +66,7 @@ def draw_dataset(fit: Fit, count: int, seed: int) -> Dataset:
 
 
 def _over_percent(fit: Fit, kind: str) -> tuple[dict[str, Any], np.ndarray, np.ndarray]:
-    """Coordinates, values and deviations by trial, side, stride, percent and joint."""
+    """Return coordinates, values and SDs by trial, side, stride, percent and joint."""
     curves = [one for trial in fit.trials for one in cycle_curves(trial, fit.mass_kg) if one.kind == kind]
     if not curves:
         raise KinertiaError('there are no strides, and no curves over the gait cycle: ask for over="time"')
@@ -84,7 +84,7 @@ def _over_percent(fit: Fit, kind: str) -> tuple[dict[str, Any], np.ndarray, np.n
 
 
 def _over_time(fit: Fit, kind: str) -> tuple[dict[str, Any], np.ndarray, np.ndarray]:
-    """Coordinates, values and deviations by trial, time and joint."""
+    """Return coordinates, values and SDs by trial, time and joint."""
     times, joints, turns = _times(fit.trials), _joints(fit), fit.skeleton.rotational
     value, sd = np.full((2, len(fit.trials), len(times), len(joints)), np.nan)
     for k, trial in enumerate(fit.trials):
@@ -109,27 +109,27 @@ def _dataset(
 
 
 def _attributes(fit: Fit) -> dict[str, str | float]:
-    """Of the whole; numbers and texts, as netCDF has them."""
+    """Return attributes of the whole Dataset; numbers and texts, as netCDF requires."""
     return {"kinertia": VERSION, "subject": fit.subject.name, "mass_kg": fit.mass_kg, "method": fit.settings.method}
 
 
 def _joints(fit: Fit) -> list[str]:
-    """The coordinates that are angles."""
+    """Return the coordinates that are angles."""
     return [name for name, turns in zip(fit.skeleton.coordinates, fit.skeleton.rotational, strict=True) if turns]
 
 
 def _times(trials: Sequence[TrialFit]) -> np.ndarray:
-    """(t,) s, those of all trials."""
+    """Return the times (t,) s of all trials."""
     return np.unique(np.concatenate([np.round(trial.time, _TIME_DIGITS) for trial in trials]))
 
 
 def _rows(trial: TrialFit, times: np.ndarray) -> np.ndarray:
-    """(w,) where a trial's frames are among these times."""
+    """Return the rows (w,) of a trial's frames among these times."""
     return np.searchsorted(times, np.round(trial.time, _TIME_DIGITS))
 
 
 def _over_own_time(trial: TrialFit, kind: str) -> np.ndarray:
-    """(w, c) deg or N m."""
+    """Return values (w, c) in deg or N m over the trial's own time."""
     return np.degrees(trial.motion.q) if kind == "angle" else trial.joint_loads["estimate"]
 
 

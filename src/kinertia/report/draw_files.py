@@ -12,20 +12,20 @@ from kinertia.report.ground_reactions_file import write_ground_reactions
 
 
 def write_draws(fit: Fit, folder: Path, count: int, seed: int = 0) -> None:
-    """Write so many draws, each into a sub-folder: `draw_001`, `draw_002` ...
+    """Write `count` posterior draws, each into a sub-folder: `draw_001`, `draw_002` ...
 
     Each holds `model.osim`, `kinematics.mot`, `ground_reactions.mot` and `external_loads.xml`; with several trials the
-    last three are in a folder per trial, and all share the model. The spread of what another program makes of them is
+    last three are in a folder per trial, and all share the model. The spread of another program's results from them is
     the posterior deviation of its result.
 
     Args:
-        fit: of the simultaneous method.
-        folder: where to.
-        count: of draws; a result keeps 200, of long trials fewer.
-        seed: chooses which, and their order.
+        fit: a fit by the simultaneous method.
+        folder: folder to write to.
+        count: number of draws; a result keeps 200, of long trials fewer.
+        seed: selects draws and their order.
 
     Raises:
-        KinertiaError: not so many are kept.
+        KinertiaError: fewer draws are kept.
     """
     for place, number in enumerate(chosen_draws(fit, count, seed), start=1):
         drawn, into = drawn_fit(fit, number), folder / f"draw_{place:03d}"

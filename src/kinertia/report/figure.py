@@ -23,8 +23,8 @@ class Figure:
 
     Attributes:
         data: traces; numbers may be lists, or the arrays that `compact` makes.
-        layout: axes, shapes, annotations, height; `meta.alt` is the text for those who cannot see the figure.
-        frames: of an animation.
+        layout: axes, shapes, annotations, height; `meta.alt` is the text alternative.
+        frames: frames of an animation.
     """
 
     data: Sequence[Mapping[str, Any]]
@@ -33,32 +33,32 @@ class Figure:
 
     @property
     def alt(self) -> str:
-        """The figure in words."""
+        """Description of the figure in words."""
         text: str = self.layout["meta"]["alt"]
         return text
 
     def to_json(self) -> str:
-        """Traces and layout as plotly.js reads them.
+        """Return traces and layout as JSON for plotly.js.
 
         Raises:
-            ValueError: a number outside of arrays is not finite, for which JSON has no word.
+            ValueError: a number outside of arrays is not finite, which JSON cannot represent.
         """
         plain = {"data": self.data, "layout": self.layout}
         return json.dumps(plain, default=_typed_array, allow_nan=False, separators=(",", ":"))
 
 
 def written(figure: Figure) -> dict[str, Any]:
-    """A figure as the templates take it: its text for those who cannot see it, and what plotly.js reads, compressed."""
+    """Return a figure for the templates: its text alternative, and the compressed input of plotly.js."""
     return {"alt": figure.alt, "packed": packed(figure.to_json().encode()), "height": figure.layout["height"]}
 
 
 def compact(values: np.ndarray) -> np.ndarray:
-    """Single precision, in which `Figure.to_json` writes arrays: half of what doubles take, and more than eyes see."""
+    """Convert to single precision, in which `Figure.to_json` writes arrays: half the size, beyond visible accuracy."""
     return np.asarray(values, dtype=np.float32)
 
 
 def _typed_array(values: object) -> dict[str, str]:
-    """plotly.js' form of a binary array: little-endian, in base64. Here NaN, a gap in a curve, needs no word."""
+    """Return plotly.js' form of a binary array, little-endian in base64; NaN, a gap in a curve, is allowed here."""
     known = {np.dtype(np.float32): "f4", np.dtype(np.uint8): "u1"}
     if not (isinstance(values, np.ndarray) and values.dtype in known and values.ndim == 1):
         raise TypeError(f"a figure holds lists and one-dimensional arrays of float32 or uint8, not {values!r}")

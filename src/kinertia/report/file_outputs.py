@@ -20,7 +20,7 @@ from kinertia.trial.file_outputs import FileOutputs
 from kinertia.trial.sampled_time import nearest_samples
 
 _SHOWN = {"ANGLES": (0, 1.0, "deg"), "MOMENTS": (0, 1e-3, "N m/kg"), "POWERS": (2, 1.0, "W/kg")}
-"""Which of the three numbers is compared, the flexion of angle and moment; its factor and unit here."""
+"""Component that is compared (flexion, of angle and moment), with its factor and unit here."""
 _NAMES = {"ANGLES": "flexion angle", "MOMENTS": "extension moment", "POWERS": "power"}
 _ANKLE = {"ANGLES": "dorsiflexion angle", "MOMENTS": "plantarflexion moment", "POWERS": "power"}
 _PER_KG_N_M = 10.0
@@ -31,11 +31,11 @@ _FEWEST = 10
 
 @dataclass(frozen=True, eq=False)
 class Beside:
-    """One quantity of one joint of one side in both.
+    """One quantity of one joint and side, from the file and from Kinertia.
 
     Attributes:
-        trial, joint, side, kind, unit: what is compared, of Plug-in Gait's signs.
-        ours, sd, theirs: (w,) at the frames of the fit; `sd` is NaN without error bars, `theirs` where it is missing.
+        trial, joint, side, kind, unit: what is compared, with Plug-in Gait's signs.
+        ours, sd, theirs: (w,) at the frames of the fit; `sd` is NaN without error bars, `theirs` where missing.
     """
 
     trial: str
@@ -49,28 +49,28 @@ class Beside:
 
     @property
     def quantity(self) -> str:
-        """In words: "Knee extension moment"."""
+        """Name of the quantity: "Knee extension moment"."""
         return f"{self.joint} {(_ANKLE if self.joint == 'Ankle' else _NAMES)[self.kind]}"
 
     @property
     def rms(self) -> float:
-        """RMS of the file's minus ours."""
+        """RMS difference, file minus ours."""
         return float(np.sqrt(np.nanmean(np.square(self.theirs - self.ours))))
 
     @property
     def mean(self) -> float:
-        """Mean of the file's minus ours."""
+        """Mean difference, file minus ours."""
         return float(np.nanmean(self.theirs - self.ours))
 
     @property
     def correlation(self) -> float:
-        """Of both curves."""
+        """Correlation of both curves."""
         both = np.isfinite(self.theirs)
         return float(np.corrcoef(self.theirs[both], self.ours[both])[0, 1])
 
     @property
     def outside(self) -> float | None:
-        """Share of the frames in which the file's is outside our 95 % interval; None without error bars."""
+        """Share of the frames in which the file's value is outside our 95 % interval; None without error bars."""
         both = np.isfinite(self.theirs) & np.isfinite(self.sd)
         if not both.any():
             return None
@@ -78,14 +78,14 @@ class Beside:
 
     @property
     def beyond(self) -> bool | None:
-        """Whether they differ by more than our error bar: the RMS difference against 1.96 times the RMS deviation."""
+        """Whether the RMS difference exceeds our error bar, 1.96 times the RMS of our SD; None without error bars."""
         if not np.isfinite(self.sd).any():
             return None
         return self.rms > INTERVAL_SD * float(np.sqrt(np.nanmean(np.square(self.sd))))
 
 
 def beside(fit: Fit, trial: TrialFit) -> list[Beside]:
-    """What both have; nothing of a file without outputs."""
+    """Pair the quantities that both have; none for a file without outputs."""
     stated = trial.kinematics.trial.outputs
     if stated is None:
         return []
@@ -110,14 +110,14 @@ def _beside(trial: TrialFit, output: ModelOutput, stated: FileOutputs, mass_kg: 
 
 
 def _divisor(stated: FileOutputs, kind: str, mass_kg: float) -> float:
-    """Body mass where the file's moments are not per kg; powers go with them."""
+    """Return body mass where the file's moments are not per kg, else 1; powers are treated alike."""
     moments = [values for name, values in stated.values.items() if name.endswith("Moment")]
     whole = bool(moments) and max(float(np.nanmax(np.abs(values))) for values in moments) > _PER_KG_N_M
     return mass_kg if whole and kind != "ANGLES" else 1.0
 
 
 def beside_figure(trial: TrialFit, compared: list[Beside], most_frames: int = MOST_FRAMES) -> Figure:
-    """All quantities over time: ours with 95 % bands, the file's dashed."""
+    """Draw all quantities over time: ours with 95 % bands, the file's dashed."""
     panels = []
     for quantity in dict.fromkeys(one.quantity for one in compared):
         sides = [one for one in compared if one.quantity == quantity]
@@ -137,7 +137,7 @@ def beside_figure(trial: TrialFit, compared: list[Beside], most_frames: int = MO
 
 
 def beside_summary(fit: Fit) -> list[dict[str, Any]]:
-    """What `kinertia compare --json` prints of the files' own outputs, a row per trial, joint, side and quantity."""
+    """Return what `kinertia compare --json` prints of the files' own outputs, per trial, joint, side, quantity."""
     return [
         {
             "trial": one.trial,
@@ -156,7 +156,7 @@ def beside_summary(fit: Fit) -> list[dict[str, Any]]:
 
 
 def beside_sentence(fit: Fit) -> str:
-    """How far the files' own joint moments are from Kinertia's, joint by joint; empty where they hold none."""
+    """State how far the files' own joint moments are from Kinertia's, joint by joint; empty where they have none."""
     compared = [one for trial in fit.trials for one in beside(fit, trial) if one.kind == "MOMENTS"]
     parts = []
     for joint in dict.fromkeys(one.joint for one in compared):
@@ -168,7 +168,7 @@ def beside_sentence(fit: Fit) -> str:
 
 
 def beside_view(fit: Fit, trials: Sequence[TrialFit], most_frames: int = MOST_FRAMES) -> list[dict[str, Any]]:
-    """What a page shows: per trial whose file has outputs a figure and the rows of its table."""
+    """Return the content of a page: a figure and table rows for each trial whose file has outputs."""
     shown = []
     for trial in trials:
         compared = beside(fit, trial)

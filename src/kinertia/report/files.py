@@ -48,10 +48,10 @@ def save_fit(
     truth: Truth | None = None,
     force: bool = False,
 ) -> Path:
-    """Write all result files of a fit into a folder, which is made if need be; returns the folder.
+    """Write all result files of a fit into a folder, which is made if necessary, and return the folder.
 
-    With one trial its files stand in the folder itself, with several in a sub-folder per trial. The report names
-    command and files where `provenance` tells them, and shows the truth of a synthetic person. With `force` also among
+    With one trial its files are in the folder itself, with several in a sub-folder per trial. The report states
+    command and files given by `provenance`, and shows the truth of a synthetic person. With `force` also among
     files that are not results of Kinertia; those of the same names are replaced.
 
     Raises:
@@ -74,7 +74,7 @@ def save_fit(
 
 
 def _write_cycles(fit: Fit, folder: Path) -> None:
-    """The tables of `Fit.cycles` and `Fit.spatiotemporal`, where there are strides."""
+    """Write the tables of `Fit.cycles` and `Fit.spatiotemporal`, where there are strides."""
     if not any(trial.strides for trial in fit.trials):
         return
     write_columns(folder / "spatiotemporal.csv", spatiotemporal_columns(fit.trials), _SIX_DIGITS)
@@ -85,12 +85,12 @@ def _write_cycles(fit: Fit, folder: Path) -> None:
 
 
 def write_columns(path: Path, columns: Mapping[str, Sequence[Any] | np.ndarray], digits: str = _ALL_DIGITS) -> None:
-    """A table as pandas would write it: a cell without a number is empty.
+    """Write a table as pandas would: a cell without a number is empty.
 
     Args:
         path: the file.
-        columns: by name.
-        digits: how numbers that are not whole are written.
+        columns: columns by name.
+        digits: format of numbers that are not integers.
     """
     with path.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
@@ -99,7 +99,7 @@ def write_columns(path: Path, columns: Mapping[str, Sequence[Any] | np.ndarray],
 
 
 def _cells(values: Sequence[Any] | np.ndarray, digits: str) -> list[Any]:
-    """What a column has in a file."""
+    """Return the cells of a column as written to the file."""
     cells = values.tolist() if isinstance(values, np.ndarray) else list(values)
     kinds = set(map(type, cells))
     if all(issubclass(kind, float) for kind in kinds):
@@ -114,7 +114,7 @@ def _cells(values: Sequence[Any] | np.ndarray, digits: str) -> list[Any]:
 
 
 def write_model(fit: Fit, folder: Path) -> None:
-    """Write the model with the estimate; of the user's own OpenSim model a list of what changed, too."""
+    """Write the model with the estimate; for the user's own OpenSim model a list of changes, too."""
     if fit.file is None:
         export_osim(folder / "model.osim", fit.skeleton, fit.estimate)
         return
@@ -174,7 +174,7 @@ def _table(trial: TrialFit, labels: Sequence[str], values: np.ndarray) -> TimeTa
 
 
 def summary(fit: Fit) -> dict[str, Any]:
-    """What `fit.json` says."""
+    """Return the content of `fit.json`."""
     return {
         "kinertia": VERSION,
         "method": fit.settings.method,
@@ -213,7 +213,7 @@ def _posterior_summary(fit: Fit) -> dict[str, Any]:
 
 
 def _identifiability(bsp: Mapping[str, Sequence[Any]], base: BaseParameters) -> dict[str, Any]:
-    """Parameters by evidence, and the combinations that the motion shows or no motion shows."""
+    """Return parameters by evidence, and the combinations that the motion does or does not determine."""
     by_evidence: dict[str, list[str]] = {"measured": [], "informed": [], "assumed": []}
     for segment, parameter, word in zip(bsp["segment"], bsp["parameter"], bsp["evidence"], strict=True):
         if word in by_evidence:
@@ -262,7 +262,7 @@ def _trial_summary(fit: Fit, trial: TrialFit) -> dict[str, Any]:
 
 
 def _displacements(fit: Fit, trial: TrialFit) -> dict[str, list[float]]:
-    """How far markers of this trial are from where the model has them, in their segments; only those that are."""
+    """Return how far markers are displaced in this trial from their positions in the model, in their segments."""
     moved = trial.skeleton.marker_locals - fit.skeleton.marker_locals
     return {label: row.tolist() for label, row in zip(fit.skeleton.labels, moved, strict=True) if row.any()}
 

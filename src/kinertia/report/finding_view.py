@@ -39,7 +39,7 @@ _CODE = re.compile(r"\b([A-Z]\d{3})\b")
 
 @dataclass(frozen=True)
 class Measured:
-    """Evidence of one finding: where it is, and each quantity in words."""
+    """Evidence of one finding: its place, and each quantity in words."""
 
     place: str
     quantities: tuple[str, ...]
@@ -47,7 +47,7 @@ class Measured:
 
 @dataclass(frozen=True)
 class Correction:
-    """A row of the table of corrections: where, what, size with its deviation, what it does."""
+    """Row of the table of corrections: place, name, size with its SD, and effect."""
 
     finding: Finding
     where: str
@@ -65,25 +65,25 @@ class Card:
 
     @property
     def first(self) -> Finding:
-        """The one whose words are shown."""
+        """Finding whose words are shown."""
         return self.group.first
 
     @property
     def measured(self) -> list[Measured]:
-        """Evidence, an entry for each finding that has any."""
+        """Evidence, one entry for each finding that has any."""
         each = [Measured(place_text(one.where), tuple(evidence_texts(one))) for one in self.group.findings]
         return [one for one in each if one.quantities]
 
 
 @dataclass(frozen=True)
 class FindingView:
-    """What a page shows of the findings of one or several overviews."""
+    """Findings of one or several overviews, as a page shows them."""
 
     overviews: Sequence[Overview]
 
     @cached_property
     def findings(self) -> list[Finding]:
-        """All of them, the worst first."""
+        """All findings, the worst first."""
         return in_order(one for overview in self.overviews for one in overview.findings)
 
     def _cards(self, severity: Severity) -> list[Card]:
@@ -92,13 +92,13 @@ class FindingView:
         return [Card(group, self._explained(group.findings)) for group in groups]
 
     def _explained(self, causes: Sequence[Finding]) -> tuple[Group, ...]:
-        """What equal findings explain of what was found with them: each of several models explains its own."""
+        """Return the findings that equal causes explain; each of several models explains its own."""
         own = next(overview.findings for overview in self.overviews if causes[0] in overview.findings)
         return tuple(grouped(consequences(own, causes)))
 
     @cached_property
     def sections(self) -> list[tuple[str, list[Card]]]:
-        """Errors and warnings, waived ones among them, under their headings; none that is empty."""
+        """Errors and warnings, including waived ones, under their headings; without empty sections."""
         cards = [(title, self._cards(severity)) for severity, title in _TITLES.items()]
         return [(title, some) for title, some in cards if some]
 
@@ -109,7 +109,7 @@ class FindingView:
 
     @cached_property
     def notes(self) -> list[tuple[Group, str]]:
-        """Assumptions and advice, once for each code, and the trials or files that they are of."""
+        """Assumptions and advice, once for each code, with their trials or files."""
         by_code: dict[str, list[Group]] = {}
         for group in grouped(self._top(Severity.INFO)):
             by_code.setdefault(group.first.code, []).append(group)
@@ -121,19 +121,19 @@ class FindingView:
 
     @cached_property
     def ignored(self) -> str:
-        """Codes that the user does not want to see, and how often they were found; empty where there are none."""
+        """Codes that the user ignores, and how often they were found; empty without any."""
         codes = [one.code for one in self.findings if one.status == "ignored" and one.muted_by is None]
         return ", ".join(f"{code} ({codes.count(code)})" for code in dict.fromkeys(codes))
 
     @cached_property
     def steps(self) -> list[Card]:
-        """The findings whose remedies come first: at most three, each remedy once."""
+        """Findings whose remedies come first: at most three, each remedy once."""
         cards = {card.first.remedy: card for _, some in reversed(self.sections) for card in reversed(some)}
         return [card for _, some in self.sections for card in some if cards[card.first.remedy] is card][:MOST_STEPS]
 
     @cached_property
     def rules(self) -> list[Rule]:
-        """The rules of all codes that are on the page, to be explained there."""
+        """Rules of all codes on the page, to be explained there."""
         shown_ = [one for one in self.findings if one.status != "ignored"]
         return [rule(code) for code in sorted({one.code for one in shown_})]
 
@@ -145,7 +145,7 @@ def _correction(one: Finding, explained: tuple[Group, ...]) -> Correction:
 
 
 def place_text(where: Where, with_trial: bool = False) -> str:
-    """Where something is, in words: "walk: plate 1, fore-aft (X)"."""
+    """Describe a place in words: "walk: plate 1, fore-aft (X)"."""
     span = "" if where.span_s is None else f"{where.span_s[0]:.2f} to {where.span_s[1]:.2f} s"
     axis = axis_text(where) if where.axis or where.file_axis else ""
     place = ", ".join(filter(None, [where.plate, where.part, axis, first_few(where.markers), span]))
@@ -154,7 +154,7 @@ def place_text(where: Where, with_trial: bool = False) -> str:
 
 
 def evidence_texts(one: Finding) -> list[str]:
-    """Every quantity of a finding with its name, "level -23 N (limit 15 N)"; words only if the message lacks them."""
+    """List every quantity of a finding, "level -23 N (limit 15 N)"; words only if the message lacks them."""
     named = [name for name, each in one.evidence.items() if not _is_said(one, each)]
     return [f"{outlined('{' + name + '}', '{}')} {evidence_text(one, name)}" for name in named]
 
@@ -164,7 +164,7 @@ def _is_said(one: Finding, quantity: Quantity) -> bool:
 
 
 def evidence_text(one: Finding, name: str, signed: bool = False) -> str:
-    """A quantity as the message has it, with its deviation, limit and usual range."""
+    """Format a quantity as in the message, with its SD, limit and usual range."""
     quantity, style = one.evidence[name], _style(one.rule.message, name)
     plain = style.replace("+", "")
 
@@ -186,7 +186,7 @@ def _style(template: str, name: str) -> str:
 
 
 def linked(sentence: str) -> Markup:
-    """A sentence whose codes lead to their explanation on the same page."""
+    """Link the codes in a sentence to their explanation on the same page."""
     link = Markup('<a class="code" href="#explain-{0}">{0}</a>')
     parts = _CODE.split(sentence)
     return Markup("").join(
@@ -195,12 +195,12 @@ def linked(sentence: str) -> Markup:
 
 
 def lines(findings: Iterable[Finding], least: Severity = Severity.CORRECTED) -> list[str]:
-    """Open findings from this severity on, one line each, equal ones together."""
+    """List open findings from this severity on, one line each, equal ones together."""
     return [group.line for group in grouped(reported(findings, least))]
 
 
 def digest(overview: Overview) -> dict[str, Any]:
-    """Verdict and findings for the page in the browser: one entry for equal findings, assumptions left out."""
+    """Return verdict and findings for the page in the browser: one entry for equal findings, without assumptions."""
     shown_ = [one for one in overview.findings if one.severity > Severity.INFO and one.muted_by is None]
     groups = grouped(in_order(one for one in shown_ if one.status != "ignored"))
     return {

@@ -16,7 +16,7 @@ from kinertia.trial.data import FEET
 
 
 class ScoreRow(NamedTuple):
-    """One variable in words; per side, degrees."""
+    """One variable in words, with its score per side, degrees."""
 
     variable: str
     right: str
@@ -25,13 +25,13 @@ class ScoreRow(NamedTuple):
 
 @dataclass(frozen=True)
 class ProfileView:
-    """Scores in words.
+    """Gait profile scores in words.
 
     Attributes:
-        rows: of the nine variables, then of each side's score.
-        overall: of the person, degrees.
-        norm_people: how many people the norms are of, if the file says so.
-        remarks: in which way the norms are not of people like this one, in sentences.
+        rows: the nine variables, then the score of each side.
+        overall: score of the person, degrees.
+        norm_people: number of people in the norms, if the file states it.
+        remarks: sentences on differences between the norms' people and this person.
     """
 
     rows: tuple[ScoreRow, ...]
@@ -41,7 +41,7 @@ class ProfileView:
 
 
 def profile_view(fit: Fit, norms: Mapping[str, Norm]) -> ProfileView | None:
-    """Scores against these norms; None where they lack one of the nine variables."""
+    """Compute scores against these norms; None where they lack one of the nine variables."""
     if not set(CLINICAL_ANGLES) <= set(norms):
         return None
     profile = gait_profile(fit, norms)

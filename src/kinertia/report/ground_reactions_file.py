@@ -22,17 +22,17 @@ FORCES_FILE, LOADS_FILE = "ground_reactions.mot", "external_loads.xml"
 def write_ground_reactions(
     folder: Path, reactions: GroundReactions, window_s: tuple[float, float], feet: Sequence[str], remark: str = ""
 ) -> None:
-    """Write both files.
+    """Write `ground_reactions.mot` and `external_loads.xml`.
 
     Per foot: force (N), the point on the ground where it acts (m), torque there (N m), in ground axes. Where there is
     no load the point stays where it was or will be: OpenSim lays splines through the columns, which would swing at a
     jump.
 
     Args:
-        folder: where to.
-        reactions: by the motion's clock.
+        folder: folder to write to.
+        reactions: reactions on the motion's time base.
         window_s: first and last time of the motion; some samples outside are written, too: splines err at ends.
-        feet: bodies that right and left foot's forces act on.
+        feet: bodies on which the right and the left foot's forces act.
         remark: a line of the header.
     """
     first, last = np.searchsorted(reactions.time, window_s)

@@ -34,7 +34,7 @@ IMPOSSIBLE = "R202"
 
 
 class Purpose(NamedTuple):
-    """What people do with a result, whether they may with this one ("use", "use with care", "do not use"), and why."""
+    """Purpose of a result, whether this one is suitable ("use", "use with care", "do not use"), and why."""
 
     name: str
     use: str
@@ -43,13 +43,13 @@ class Purpose(NamedTuple):
 
 @dataclass(frozen=True)
 class Words:
-    """A fit in sentences.
+    """Description of a fit in sentences.
 
     Attributes:
-        purposes: what it may be used for.
-        outputs: the same by output.
+        purposes: suitability by purpose.
+        outputs: suitability by output.
         motion: how far the motion was changed.
-        knowledge: what the data could and could not tell about the body segment parameters.
+        knowledge: which body segment parameters the data determine.
         departures: estimates more than two prior SDs from the prior's mean.
     """
 
@@ -61,19 +61,19 @@ class Words:
 
 
 def words(fit: Fit) -> Words:
-    """A fit in sentences."""
+    """Describe a fit in sentences."""
     outputs = suitability(fit, fit.findings, fit.left_out)
     motion = tuple(sentence for trial in fit.trials for sentence in _motion(fit, trial))
     return Words(purposes(outputs, impossible(fit)), outputs, motion, _knowledge(fit), _departures(fit))
 
 
 def impossible(fit: Fit) -> bool:
-    """Whether a body was estimated that cannot exist, which no simulation takes."""
+    """Return whether an impossible body was estimated, which no simulation accepts."""
     return any(one.code == IMPOSSIBLE and one.severity is Severity.ERROR for one in fit.findings)
 
 
 def purposes(outputs: Sequence[Suitability], no_body: bool) -> tuple[Purpose, ...]:
-    """Three purposes from the five outputs: moments in the clinic, parameters in print, the next step in OpenSim."""
+    """Rate three purposes by the five outputs: moments in the clinic, parameters in print, next steps in OpenSim."""
     of = {one.output: one for one in outputs}
     moments, motion = of["joint moments"], of["motion"]
     segments = [of[name] for name in ("segment masses", "centres of mass", "moments of inertia")]
@@ -139,14 +139,14 @@ def _knowledge(fit: Fit) -> tuple[str, ...]:
 
 
 def held_sentence(fit: Fit) -> str:
-    """Names the segments that were not estimated; empty where all were."""
+    """List the segments that were not estimated, in a sentence; empty where all were."""
     estimated = set(estimated_rows(fit))
     names = [name for i, name in enumerate(fit.estimate.segments) if i not in estimated]
     return f"fixed at the model's values, not estimated: {_segments(names)}" if names else ""
 
 
 def hidden_combinations(fit: Fit) -> int:
-    """How many independent combinations of the estimated parameters no motion shows: parameters minus rank."""
+    """Count independent combinations of the estimated parameters that no motion shows: parameters minus rank."""
     if fit.posterior is None:
         return 0
     base = fit.posterior.base
@@ -154,7 +154,7 @@ def hidden_combinations(fit: Fit) -> int:
 
 
 def _segments(names: list[str]) -> str:
-    """ "thigh (both), foot, left"."""
+    """List segments: "thigh (both), foot, left"."""
     pairs = {name[:-2] for name in names if name.endswith("_r") and f"{name[:-2]}_l" in names}
     short = [name[:-2].replace("_", " ") if name[:-2] in pairs else segment_name(name) for name in names]
     return "; ".join(dict.fromkeys(short))

@@ -29,11 +29,11 @@ _COLUMNS = 3
 _WIDTH_MM, _ROW_MM, _LEGEND_MM = 180.0, 42.0, 12.0
 _MM_PER_INCH = 25.4
 _POINTS_PER_PX = 0.5
-"""Of lines and marks: those of the report are for screens, and a journal's panels are half as wide."""
+"""Points per pixel of lines and marks: the report's are for screens, and a journal's panels are half as wide."""
 _TITLE_LETTERS = 36
-"""In a line, beyond which it would leave the panel."""
+"""Letters of a title in a line, beyond which it would leave the panel."""
 _MOST_BESIDE, _LEGEND_LETTERS, _HANDLE_LETTERS = 4, 145, 8
-"""In a row of the legend: entries, letters, and letters that the line before each takes the room of."""
+"""Limits of a row of the legend: entries, letters, and letters that the line before each is worth."""
 _DOTS_PER_INCH = 600
 _FORMATS = (".svg", ".pdf", ".eps", ".png", ".tif", ".tiff")
 _DASHES = {"dot": ":", "dash": "--"}
@@ -56,15 +56,15 @@ _STYLE: Any = {
 OF_TRIALS = ("moments", "angles", "coordinates", "residuals")
 """Figures that can be of one trial, over time."""
 FOR_PAPERS = (*OF_TRIALS, "powers", "forces", "cycles", "bsp", "departures")
-"""Those of `fit.plot` that are small multiples; the others are to be pointed at, turned or played."""
+"""Figures of `fit.plot` that are small multiples; the others are interactive."""
 
 
 def save_figure(fit: Fit, name: str, path: str | Path, trial: str | None = None) -> Path:
-    """Draw a figure into a file, whose ending says its format; returns the file.
+    """Draw a figure into a file, whose extension determines its format, and return the file.
 
     Raises:
         KinertiaError: no such figure or trial, nothing to draw it from, or matplotlib is not installed.
-        FileError: a format that is not known, or the file cannot be written.
+        FileError: the format is unknown, or the file cannot be written.
     """
     path = Path(path)
     if name not in FOR_PAPERS:
@@ -94,7 +94,7 @@ def _no_figure(name: str) -> str:
 
 
 def drawing(figure: Figure) -> Drawing:
-    """Small multiples as matplotlib draws them: a panel per pair of axes, in rows of three."""
+    """Draw small multiples with matplotlib: a panel per pair of axes, in rows of three."""
     from matplotlib.figure import Figure as Drawing
     from matplotlib.font_manager import FontProperties
 
@@ -127,7 +127,7 @@ def drawing(figure: Figure) -> Drawing:
 
 
 def _numbers(trace: Mapping[str, Any], name: str) -> np.ndarray:
-    """Of a trace: a list, an array, or evenly spaced."""
+    """Return the numbers of a trace: a list, an array, or evenly spaced."""
     if name in trace:
         return np.asarray(trace[name], dtype=float)
     return np.asarray(trace[f"{name}0"] + trace[f"d{name}"] * np.arange(len(trace["y"])))
@@ -157,12 +157,12 @@ def _draw(panel: Axes, trace: Mapping[str, Any], x: np.ndarray, y: np.ndarray, l
 
 
 def _parts(x: np.ndarray, y: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Outlines with a gap between them, one by one."""
+    """Separate outlines that have a gap between them."""
     return [(x[first : last + 1], y[first : last + 1]) for first, last in runs(np.isfinite(y))]
 
 
 def _mark(panel: Axes, shape: Mapping[str, Any]) -> None:
-    """A vertical line, or a shaded span."""
+    """Draw a vertical line, or a shaded span."""
     if shape["type"] == "rect":
         panel.axvspan(shape["x0"], shape["x1"], color=_colour(shape["fillcolor"]), linewidth=0, zorder=0)
     else:
@@ -171,7 +171,7 @@ def _mark(panel: Axes, shape: Mapping[str, Any]) -> None:
 
 
 def _finish(panel: Axes, x: Mapping[str, Any], y: Mapping[str, Any]) -> None:
-    """Ranges, ticks and the title below."""
+    """Set ranges, ticks and the title below."""
     for axis, shown, limits in ((panel.xaxis, x, panel.set_xlim), (panel.yaxis, y, panel.set_ylim)):
         if "range" in shown:
             limits(*shown["range"])
@@ -184,7 +184,7 @@ def _finish(panel: Axes, x: Mapping[str, Any], y: Mapping[str, Any]) -> None:
 
 
 def _legend(panels: list[Axes]) -> tuple[list[Any], list[str]]:
-    """Each name once."""
+    """Return each name once."""
     by_label: dict[str, Any] = {}
     for panel in panels:
         handles, labels = panel.get_legend_handles_labels()
@@ -193,18 +193,18 @@ def _legend(panels: list[Axes]) -> tuple[list[Any], list[str]]:
 
 
 def _in_lines(title: str) -> str:
-    """A title broken where it would leave its panel, but not inside its unit."""
+    """Break a title where it would leave its panel, but not inside its unit."""
     whole = re.sub(r"\([^)]*\)", lambda unit: unit[0].replace(" ", "\N{NO-BREAK SPACE}"), title)
     return textwrap.fill(whole, _TITLE_LETTERS).replace("\N{NO-BREAK SPACE}", " ")
 
 
 def _text(marked: object) -> str:
-    """What plotly would show of a text with markup; a dollar sign is none of mathematics."""
+    """Return what plotly would show of a text with markup; a dollar sign is escaped from mathematics."""
     return html.unescape(re.sub(r"<[^>]+>", "", str(marked))).replace("$", r"\$")
 
 
 def _colour(written: str) -> Any:
-    """ "rgba(0,114,178,0.25)" as matplotlib takes it; "#0072B2" as it is."""
+    """Convert "rgba(0,114,178,0.25)" for matplotlib; "#0072B2" is unchanged."""
     if not written.startswith("rgba("):
         return written
     *rgb, opacity = (float(part) for part in written[5:-1].split(","))

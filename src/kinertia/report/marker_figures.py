@@ -18,9 +18,9 @@ _LABELS = {"automargin": True, "dtick": 1, "gridcolor": "#EFEFEF"}
 
 
 def marker_figure(trial: TrialFit, wandering: tuple[str, ...] = ()) -> Figure:
-    """RMS distance (mm) between every measured and modelled marker over the window; the farthest on top.
+    """Draw the RMS distance (mm) between every measured and modelled marker over the window; the farthest on top.
 
-    `wandering` names the markers that drift and are down-weighted.
+    `wandering` lists the markers that drift and are down-weighted.
     """
     labels = trial.kinematics.ik.labels
     distances_mm = {stage: 1e3 * rms_by_marker(errors) for stage, errors in trial.marker_errors_m.items()}
@@ -57,7 +57,7 @@ def marker_figure(trial: TrialFit, wandering: tuple[str, ...] = ()) -> Figure:
 
 
 def rms_by_marker(errors_m: np.ndarray) -> np.ndarray:
-    """(m,) root mean square of distances (w, m) over the frames that show the marker; NaN for one never seen."""
+    """Return the RMS (m,) of distances (w, m) over the frames that show the marker; NaN for one never visible."""
     seen = np.isfinite(errors_m)
     total = np.square(np.where(seen, errors_m, 0.0)).sum(axis=0)
     with np.errstate(invalid="ignore"):
@@ -66,12 +66,12 @@ def rms_by_marker(errors_m: np.ndarray) -> np.ndarray:
 
 
 def gap_figure(markers: Markers, windows_s: Sequence[tuple[float, float]], name: str) -> Figure | None:
-    """When each marker was not seen, over the whole trial; None where all always were.
+    """Draw when each marker was not visible, over the whole trial; None where all always were.
 
     Args:
-        markers: of the model or the marker set.
-        windows_s: first and last time of the stretches that a fit uses, on blue ground.
-        name: of the trial.
+        markers: markers of the model or the marker set.
+        windows_s: first and last time of the windows that a fit uses, shaded blue.
+        name: name of the trial.
     """
     time, hidden = markers.time, ~markers.seen
     gappy = [k for k in range(hidden.shape[1]) if hidden[:, k].any()]
@@ -102,6 +102,6 @@ def gap_figure(markers: Markers, windows_s: Sequence[tuple[float, float]], name:
 
 
 def fit_gap_figure(trial: TrialFit) -> Figure | None:
-    """The same of the model's markers in a trial that was fitted."""
+    """Draw the gaps of the model's markers in a trial that was fitted."""
     kinematics = trial.kinematics
     return gap_figure(kinematics.trial.markers.select(kinematics.ik.labels), kinematics.windows_s, trial.name)

@@ -28,7 +28,7 @@ _CHAIN = (
 
 
 def marker_scene(recording: Recording, marker_set: MarkerSet | None, most_frames: int) -> Scene:
-    """The markers of the set with their names, at most `most_frames` frames.
+    """Show the markers of the set with their names, in at most `most_frames` frames.
 
     Each is joined to the middle of its segment's markers, and so are neighbouring segments: a swapped or drifting label
     draws a long line. Without a marker set all markers are shown, and nothing is joined.
@@ -71,7 +71,7 @@ def _side(segment: str) -> str:
 
 
 def _middle(positions: np.ndarray) -> np.ndarray:
-    """(n, 3) mean of the markers (n, m, 3) that are seen; NaN where none is."""
+    """Return the mean (n, 3) of the visible markers (n, m, 3); NaN where none is."""
     seen = np.isfinite(positions).all(axis=2)
     total = np.where(seen[..., None], positions, 0.0).sum(axis=1)
     with np.errstate(invalid="ignore"):
@@ -80,7 +80,7 @@ def _middle(positions: np.ndarray) -> np.ndarray:
 
 
 def _bridged(path: np.ndarray) -> np.ndarray:
-    """The path (n, 3) with straight lines across what is not known; the origin where nothing is."""
+    """Return the path (n, 3) with straight lines across gaps; the origin where nothing is known."""
     known = np.flatnonzero(np.isfinite(path).all(axis=1))
     if not len(known):
         return np.zeros_like(path)

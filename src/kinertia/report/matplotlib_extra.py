@@ -10,7 +10,7 @@ HOW = "pip install 'kinertia[plots]'"
 
 
 def has_matplotlib() -> bool:
-    """Whether the studies' pictures and figures for papers can be drawn."""
+    """Return whether the studies' pictures and figures for papers can be drawn."""
     return find_spec("matplotlib") is not None
 
 

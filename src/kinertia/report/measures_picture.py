@@ -36,7 +36,7 @@ LEVELS = {
     "A6": "knuckles",
     "A7": "finger nails",
 }
-"""Each level in words, in the order of the picture's labels."""
+"""Descriptions of the levels, in the order of the picture's labels."""
 _SCALE = 5.0
 _GAP_CM, _COLUMN_CM, _WIDTH_CM = 4.2, 52.0, 250.0
 _ARM_APART_CM, _TOP_CM = 9.0, 18.0
@@ -44,7 +44,7 @@ _INK, _SKIN, _LINE = "#333", "#e8ddd0", "#8a8a8a"
 
 
 def measures_picture() -> str:
-    """An SVG file: a person of stadiums from the front, toes pointed, with every level and what it is called."""
+    """Draw an SVG file: a person of stadiums from the front, toes pointed, with every level and its name."""
     outlines, ends = _person()
     crown = ends["T8"][1] + _TOP_CM
     labels = {
@@ -85,7 +85,7 @@ def measures_picture() -> str:
 
 
 def _spread(names: list[str], ends: dict[str, tuple[float, float, float]]) -> dict[str, float]:
-    """Heights of labels from the top down, near those of their levels and not on one another."""
+    """Spread label heights from the top down, near their levels without overlap."""
     wanted = np.array([ends[name][1] for name in names])
     steps = _GAP_CM * np.arange(len(names))
     down = np.minimum.accumulate(wanted + steps) - steps
@@ -94,7 +94,7 @@ def _spread(names: list[str], ends: dict[str, tuple[float, float, float]]) -> di
 
 
 def _person() -> tuple[list[list[tuple[float, float]]], dict[str, tuple[float, float, float]]]:
-    """Outlines in cm, and by level the middle of its line (x, y) and half its length."""
+    """Return outlines in cm, and by level the middle of its line (x, y) and half its length."""
     cm = dict(zip((one.key for one in measures()), 100.0 * usual_build().median_m, strict=True))
     wide = {measures()[girth].key: measures()[width].key for girth, width in girths_with_widths()}
 

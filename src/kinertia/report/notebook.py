@@ -13,7 +13,7 @@ from kinertia.trial.rms import rms
 
 
 def fit_html(fit: Fit) -> str:
-    """Verdict, findings, residuals and body segment parameters."""
+    """Show verdict, findings, residuals and body segment parameters."""
     return rendered(
         "notebook_fit.html.j2",
         fit=fit,
@@ -26,7 +26,7 @@ def fit_html(fit: Fit) -> str:
 
 
 def trial_html(trial: Trial) -> str:
-    """Frames, markers and their gaps, measured windows, peak vertical force under each foot, findings."""
+    """Show frames, markers and their gaps, measured windows, peak vertical force under each foot, and findings."""
     peaks = trial.loads.force[:, :, 1].max(axis=0, initial=0.0)
     return rendered(
         "notebook_trial.html.j2",
@@ -38,7 +38,7 @@ def trial_html(trial: Trial) -> str:
 
 
 def trial_fit_html(trial: TrialFit) -> str:
-    """Window, distances of the markers, residuals before and after, computing time."""
+    """Show window, distances of the markers, residuals before and after, and computing time."""
     return rendered(
         "notebook_trial_fit.html.j2",
         trial=trial,
@@ -49,7 +49,7 @@ def trial_fit_html(trial: TrialFit) -> str:
 
 
 def recording_html(recording: Recording) -> str:
-    """Frames, markers and their gaps, plates and the largest force on each, what is known of the person, findings."""
+    """Show frames, markers and gaps, plates and the largest force on each, known data of the person, and findings."""
     plates = recording.plates
     peaks = [] if plates is None else plates.force[:, :, 1].max(axis=0, initial=0.0)
     return rendered(
@@ -62,7 +62,7 @@ def recording_html(recording: Recording) -> str:
 
 
 def _gappy(markers: Markers) -> list[tuple[str, float]]:
-    """Labels of markers that are not always seen, and the percentage of frames that show them; the least seen first."""
+    """Return labels of markers that are not always visible, with the percentage of frames with them, lowest first."""
     seen = markers.seen.mean(axis=0)
     shares = [(label, 100 * float(share)) for label, share in zip(markers.labels, seen, strict=True) if share < 1]
     return sorted(shares, key=lambda item: item[1])

@@ -58,7 +58,7 @@ from kinertia.trial.sampled_time import runs
 MOST_TRIALS = 6
 """Trials whose curves are shown; all are in the table of residuals and in the files."""
 VIEW_FRAMES = 300
-"""In the 3-D view; as those of the curves, shared by the trials, so that the page stays below 3.2 MB."""
+"""Frames in the 3-D view, shared by the trials like those of the curves, so that the page stays below 3.2 MB."""
 
 
 def render(
@@ -68,14 +68,14 @@ def render(
     norms: Norms = MappingProxyType({}),
     truth: Truth | None = None,
 ) -> str:
-    """The report of a fit.
+    """Render the report of a fit.
 
     Args:
-        fit: what it is about.
+        fit: the fit.
         provenance: files and command; a fit made in Python has none.
-        computed_by: the versions that the fit is from, where they are not the present ones.
-        norms: of the curves over the gait cycle, as bands behind them.
-        truth: of a synthetic person.
+        computed_by: versions that computed the fit, where they are not the present ones.
+        norms: norms of the curves over the gait cycle, drawn as bands behind them.
+        truth: truth of a synthetic person.
     """
     true_bsp = None if truth is None else truth.bsp
     shown = fit.trials[:MOST_TRIALS]
@@ -131,7 +131,7 @@ def _written(figure: Figure | None) -> dict[str, Any] | None:
 
 
 def _cycle(fit: Fit, norms: Norms) -> dict[str, Any] | None:
-    """Everything that the templates show of the gait cycle; None where there are no strides."""
+    """Collect everything that the templates show of the gait cycle; None where there are no strides."""
     figures = cycle_figures(fit, norms)
     if not figures:
         return None
@@ -151,7 +151,7 @@ def _cycle(fit: Fit, norms: Norms) -> dict[str, Any] | None:
 
 
 def _trial(fit: Fit, trial: TrialFit, k: int, count: int, truth: Truth | None) -> dict[str, Any]:
-    """Everything that the templates show of one trial."""
+    """Collect everything that the templates show of one trial."""
     frames = MOST_FRAMES // count
     noise = None if fit.posterior is None else fit.posterior.marker_noise[k]
     return {
@@ -186,7 +186,7 @@ def _trial(fit: Fit, trial: TrialFit, k: int, count: int, truth: Truth | None) -
 
 
 def residual_rows(trials: Sequence[TrialFit]) -> list[dict[str, Any]]:
-    """Per trial, bandwidth of the forces and stage: RMS and peak of force and of moment."""
+    """Return RMS and peak of force and moment, per trial, bandwidth of the forces and stage."""
     rows = []
     for trial in trials:
         narrow = f"motion's bandwidth ({bandwidths(trial)})"
@@ -201,7 +201,7 @@ def residual_rows(trials: Sequence[TrialFit]) -> list[dict[str, Any]]:
 
 
 def bsp_rows(fit: Fit) -> list[dict[str, Any]]:
-    """Table rows in the units people read: kg, mm, kg m2; each number as it is, to sort by, and as text."""
+    """Return table rows in kg, mm and kg m2; each number as it is, to sort by, and as text."""
     away, posterior = departures(fit), fit.posterior
     before, after = fit.literature.table(), fit.estimate.table()
     rows = []
@@ -228,7 +228,7 @@ def bsp_rows(fit: Fit) -> list[dict[str, Any]]:
 
 
 def _marker_rows(trial: TrialFit, sd_m: Mapping[str, float], wandering: tuple[str, ...]) -> list[dict[str, Any]]:
-    """Per marker: distances in mm, share of frames that show it (whole trial), longest gap in s."""
+    """Return per marker the distances in mm, share of frames that show it (whole trial), and longest gap in s."""
     kinematics = trial.kinematics
     markers = kinematics.trial.markers.select(kinematics.ik.labels)
     seen = markers.seen

@@ -28,7 +28,7 @@ class Panel:
     """One panel of a figure.
 
     Attributes:
-        title: with the unit.
+        title: title with the unit.
         traces: plotly traces without their axes.
         shapes: plotly shapes without their axes; `yref` "domain" spans the height of the panel, `xref` its width.
         y: further settings of the vertical axis.
@@ -41,18 +41,18 @@ class Panel:
 
 
 def plain(text: str) -> str:
-    """Text that plotly shows as it is: names of markers and trials may hold what it takes for markup."""
+    """Escape text that plotly would take for markup, as names of markers and trials may hold it."""
     return html.escape(text)
 
 
 def small_multiples(
     panels: Sequence[Panel], alt: str, x: dict[str, Any], row_px: int = 170, left_px: int = 52, linked: bool = True
 ) -> Figure:
-    """Panels of one kind as one figure.
+    """Arrange panels of one kind as one figure.
 
     Args:
-        panels: left to right, then downwards.
-        alt: the figure's text for those who cannot see it.
+        panels: panels from left to right, then downwards.
+        alt: text alternative of the figure.
         x: settings of the horizontal axes.
         row_px: height of a panel.
         left_px: room for the labels of a vertical axis.
@@ -89,7 +89,7 @@ def small_multiples(
 
 
 def _arranged(layout: dict[str, Any], flat: dict[str, Any]) -> dict[str, Any]:
-    """The layout with the settings of an arrangement, whose names are paths: "xaxis2.domain"."""
+    """Apply the settings of an arrangement, whose names are paths such as "xaxis2.domain", to the layout."""
     result = dict(layout)
     for path, value in flat.items():
         name, _, inner = path.partition(".")
@@ -111,7 +111,7 @@ _AXIS = {
 
 
 def base_layout(alt: str) -> dict[str, Any]:
-    """What all figures have: font, white ground, legend on top, the text `alt`, and no template of a notebook's."""
+    """Return the common layout of figures: font, white ground, legend on top, text `alt`, and no notebook template."""
     return {
         "template": {},
         "font": {"family": style.FONT, "size": 12, "color": "#1A1A1A"},
@@ -125,7 +125,7 @@ def base_layout(alt: str) -> dict[str, Any]:
 
 
 def sentence_figure(text: str) -> Figure:
-    """Words in the place of a figure that has nothing to show."""
+    """Show words in place of a figure that has nothing to show."""
     layout = base_layout(text)
     hidden = {"visible": False}
     place = {"xref": "paper", "yref": "paper", "x": 0, "y": 0.5, "xanchor": "left", "showarrow": False}
@@ -134,7 +134,7 @@ def sentence_figure(text: str) -> Figure:
 
 
 def _arrangement(count: int, columns: int, row_px: int, left_px: int, legend: int) -> dict[str, Any]:
-    """Domains of all axes, top margin and height of the figure, for this many columns and entries of the legend.
+    """Return domains of all axes, top margin and height of the figure, for this many columns and legend entries.
 
     Fewer panels than columns fill the width.
     """

@@ -22,13 +22,13 @@ _CLASSES = {"mass": slice(0, 1), "CoM": slice(1, 4), "Ixx Iyy Izz": slice(4, 7)}
 
 
 def _shares(planned: Plan, names: tuple[str, ...]) -> dict[str, float]:
-    """Deviation over that of the literature, mean by class."""
+    """Return SDs as a share of the literature's, mean by class."""
     ratio = planned.sd[names] / planned.prior_sd
     return {what: float(ratio[:, columns].mean()) for what, columns in _CLASSES.items()}
 
 
 def plan_rows(planned: Plan) -> list[list[str]]:
-    """One row per recording or set of recordings, under `PLAN_HEADINGS`."""
+    """Return one row per recording or set of recordings, under `PLAN_HEADINGS`."""
     return [
         [
             " + ".join(names),
@@ -40,7 +40,7 @@ def plan_rows(planned: Plan) -> list[list[str]]:
 
 
 def plan_summary(planned: Plan) -> dict[str, Any]:
-    """What `plan.json` says."""
+    """Return the content of `plan.json`."""
     return {
         "kinertia": VERSION,
         "recordings": {" + ".join(names): planned.counts(names) for names in planned.sd},
@@ -49,7 +49,7 @@ def plan_summary(planned: Plan) -> dict[str, Any]:
 
 
 def render_plan(planned: Plan) -> str:
-    """The page."""
+    """Render the page of the plan."""
     names = [" + ".join(chosen) for chosen in planned.sd]
     counts = [planned.counts(chosen) for chosen in planned.sd]
     words = {"measured": "measured", "informed": "informed", "assumed": "assumed (the literature's)"}
@@ -78,7 +78,7 @@ def render_plan(planned: Plan) -> str:
 
 
 def save_plan(planned: Plan, folder: str | Path) -> Path:
-    """Write `plan.html`, `plan.csv` and `plan.json` into a folder; returns the folder.
+    """Write `plan.html`, `plan.csv` and `plan.json` into a folder and return the folder.
 
     Raises:
         FileError: the folder cannot be written to.

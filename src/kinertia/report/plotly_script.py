@@ -21,7 +21,7 @@ _BEST = 9
 
 
 def script_path() -> Path:
-    """The script in the plotly package, which is not loaded."""
+    """Return the path of the script in the plotly package, which is not imported."""
     spec = find_spec("plotly")
     assert spec is not None, "plotly is a dependency"
     assert spec.origin is not None
@@ -29,7 +29,7 @@ def script_path() -> Path:
 
 
 def packed_script() -> str:
-    """The script, gzip in base64; compressed anew only where another plotly was installed since."""
+    """Return the script, gzip in base64; compressed again only where another plotly was installed since."""
     script = script_path()
     state = script.stat()
     kept = cache_folder() / f"plotly-{state.st_size}-{state.st_mtime_ns}.txt"
@@ -44,5 +44,5 @@ def packed_script() -> str:
 
 
 def packed(text: bytes, level: int = 6) -> str:
-    """The text in gzip and base64; the same text gives the same letters, at a level from 1 (fast) to 9 (small)."""
+    """Compress a text to gzip and base64, reproducibly, at a level from 1 (fast) to 9 (small)."""
     return base64.b64encode(gzip.compress(text, level, mtime=0)).decode("ascii")

@@ -33,7 +33,7 @@ T = TypeVar("T")
 
 
 def as_plotly(figure: Figure) -> go.Figure:
-    """The figure as plotly's object, which checks every name and value of it; plotly is loaded when it is needed."""
+    """Convert the figure to plotly's object, which checks every name and value; plotly is loaded only when needed."""
     from kinertia.report.plots import NotebookFigure
 
     return NotebookFigure(figure.data, figure.layout, figure.frames)
@@ -41,40 +41,40 @@ def as_plotly(figure: Figure) -> go.Figure:
 
 @dataclass(frozen=True, eq=False)
 class FitFigures(Generic[T]):
-    """One method for each figure of a fit.
+    """Figures of a fit, one method for each.
 
-    Those over time are of one trial; its name left out, of the first. What cannot be drawn is a KinertiaError that says
-    why, and which figure there is in its place.
+    Figures over time show one trial, by default the first. What cannot be drawn raises a KinertiaError that states
+    why, and which figure can be drawn instead.
 
     Attributes:
-        fit: what they are of.
-        drawn: what makes of a figure what the methods return: an object of plotly's or of matplotlib's.
+        fit: the fit.
+        drawn: converts a figure to what the methods return: an object of plotly's or of matplotlib's.
     """
 
     fit: Fit
     drawn: Callable[[Figure], T]
 
     def moments(self, trial: str | None = None) -> T:
-        """Joint moments over the gait cycle; of a trial that is named, or without strides, over time."""
+        """Draw joint moments over the gait cycle; over time for a given trial, or without strides."""
         if trial is None and self._walked:
             return self.cycles("moment")
         fit, one = self.fit, self._trial(trial)
         return self._of_trial(one, moment_figure(one, fit.skeleton, fit.mass_kg, start=start_of(fit)))
 
     def angles(self, trial: str | None = None) -> T:
-        """Joint angles over the gait cycle; of a trial that is named, or without strides, over time."""
+        """Draw joint angles over the gait cycle; over time for a given trial, or without strides."""
         return self.cycles("angle") if trial is None and self._walked else self.coordinates(trial)
 
     def powers(self) -> T:
-        """Joint powers over the gait cycle."""
+        """Draw joint powers over the gait cycle."""
         return self.cycles("power")
 
     def forces(self) -> T:
-        """Ground reactions over the gait cycle."""
+        """Draw ground reactions over the gait cycle."""
         return self.cycles("force")
 
     def cycles(self, kind: Kind = "moment", norms: str | Path | None = None) -> T:
-        """Angles, moments, powers or ground reactions ("force") over the gait cycle, in front of `norms`."""
+        """Draw angles, moments, powers or ground reactions ("force") over the gait cycle, in front of `norms`."""
         if kind not in UNITS:
             raise KinertiaError(f"there are no curves '{kind}' over the gait cycle; expected one of {', '.join(UNITS)}")
         figure = cycle_figure(self.fit, kind, {} if norms is None else read_norms(norms))
@@ -86,47 +86,47 @@ class FitFigures(Generic[T]):
         return self.drawn(figure)
 
     def coordinates(self, trial: str | None = None) -> T:
-        """Every coordinate over time, by inverse kinematics and as estimated."""
+        """Draw every coordinate over time, by inverse kinematics and as estimated."""
         one = self._trial(trial)
         return self._of_trial(one, coordinate_figure(one, self.fit.skeleton))
 
     def residuals(self, trial: str | None = None) -> T:
-        """Root residual force and moment over time, stage by stage."""
+        """Draw root residual force and moment over time, stage by stage."""
         one = self._trial(trial)
         return self._of_trial(one, residual_figure(one, start=start_of(self.fit)))
 
     def bsp(self) -> T:
-        """Changes of body segment parameters in kg, mm and kg m2, with intervals where there are any."""
+        """Draw changes of body segment parameters in kg, mm and kg m2, with intervals where there are any."""
         return self.drawn(change_figure(self.fit))
 
     def departures(self) -> T:
-        """The same in prior SDs."""
+        """Draw changes of body segment parameters in prior SDs."""
         return self._with_error_bars(departure_figure(self.fit), "'bsp' has the changes in kg, mm and kg m2")
 
     def information(self) -> T:
-        """What the data say about each parameter."""
+        """Draw how well the data inform each parameter."""
         return self._with_error_bars(information_figure(self.fit), "'bsp' has the changes in kg, mm and kg m2")
 
     def body(self, shown: Shown = "mass") -> T:
-        """The body, coloured by change of mass, or by what the data say of it ("information")."""
+        """Draw the body, coloured by change of mass, or by how well the data inform each segment ("information")."""
         if shown not in get_args(Shown):
             raise KinertiaError(f"a body is not coloured by '{shown}'; expected one of {', '.join(get_args(Shown))}")
         return self._with_error_bars(body_figure(self.fit, shown), "body('mass') is coloured by change of mass")
 
     def markers(self, trial: str | None = None) -> T:
-        """Distance between every measured and modelled marker."""
+        """Draw the distance between every measured and modelled marker."""
         one = self._trial(trial)
         noise = None if self.fit.posterior is None else self.fit.posterior.marker_noise[self.fit.trials.index(one)]
         return self._of_trial(one, marker_figure(one, () if noise is None else noise.wandering))
 
     def gaps(self, trial: str | None = None) -> T:
-        """When markers were not seen; a sentence where all always were."""
+        """Draw when markers were not visible; a sentence where all always were."""
         one = self._trial(trial)
         nothing = sentence_figure(f"Every marker of {one.name} was seen in every frame: there are no gaps.")
         return self._of_trial(one, fit_gap_figure(one) or nothing)
 
     def skeleton(self, trial: str | None = None) -> T:
-        """The skeleton in motion, with markers, centres of mass and ground reactions."""
+        """Draw the skeleton in motion, with markers, centres of mass and ground reactions."""
         one = self._trial(trial)
         return self._of_trial(one, skeleton_figure(self.fit, one))
 
@@ -141,7 +141,7 @@ class FitFigures(Generic[T]):
         return self.fit.trials[0] if name is None else trials[name]
 
     def _of_trial(self, trial: TrialFit, figure: Figure) -> T:
-        """The figure, whose `meta` says which trial it is of."""
+        """Return the figure with the name of its trial in `meta`."""
         meta = {**figure.layout["meta"], "trial": plain(trial.name)}
         return self.drawn(replace(figure, layout={**figure.layout, "meta": meta}))
 
@@ -158,10 +158,10 @@ name plotly's server, too, for the case that the first is not kept."""
 
 
 class NotebookFigure(go.Figure):  # type: ignore[misc]  # plotly has no types
-    """As plotly's own, but drawn in pages that `nbconvert --to html` makes of a notebook, too.
+    """Figure like plotly's own that is also drawn in pages made of a notebook by `nbconvert --to html`.
 
-    In Jupyter plotly leaves in a cell what only Jupyter's extension draws, so that cells of such a page are empty. Here
-    HTML stands beside it, unless somebody has chosen another of plotly's renderers.
+    In Jupyter plotly leaves output in a cell that only Jupyter's extension draws: cells of such a page are empty. Here
+    HTML is added to it, unless another of plotly's renderers was chosen.
     """
 
     def _ipython_display_(self) -> None:

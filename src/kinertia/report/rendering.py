@@ -21,26 +21,26 @@ from kinertia.report.wording import fixed
 
 
 def rendered(template: str, **content: Any) -> str:
-    """A page from a template; what UTF-8 cannot say, as in file names of old systems, is a question mark."""
+    """Render a page from a template; characters that UTF-8 lacks, as in old file names, become question marks."""
     page = _environment().get_template(template).render(version=VERSION, **content)
     return page.encode("utf-8", errors="replace").decode("utf-8")
 
 
 class _CompiledTemplates(jinja2.FileSystemBytecodeCache):
-    """Compiled templates, in the folder of Python's compiled modules, and only where it may write those.
+    """Cache of compiled templates in the folder of Python's compiled modules, where that is writable.
 
     Compiling takes more time than all the rest of a report.
     """
 
     def dump_bytecode(self, bucket: Bucket) -> None:
-        """Keep what was compiled, if that is possible."""
+        """Store compiled templates if possible."""
         if not sys.dont_write_bytecode:
             with suppress(OSError):
                 super().dump_bytecode(bucket)
 
 
 def templates_of(package: str) -> jinja2.Environment:
-    """The templates of a package: what they show is escaped, and a name that nobody gave is an error."""
+    """Return the templates of a package: shown content is escaped, and an undefined name is an error."""
     return jinja2.Environment(
         loader=jinja2.PackageLoader(package),
         autoescape=True,
@@ -61,7 +61,7 @@ def _environment() -> jinja2.Environment:
 
 
 def _asset(name: str) -> Markup:
-    """A style sheet or script as it is."""
+    """Return a style sheet or script unchanged."""
     loader = _environment().loader
     assert loader is not None
     return Markup(loader.get_source(_environment(), name)[0])

@@ -23,11 +23,11 @@ class Part:
     Attributes:
         title: its heading.
         text: paragraphs above everything else.
-        figure: drawn by plotly.
-        caption: under the figure or the picture.
+        figure: figure drawn by plotly.
+        caption: text under the figure or the picture.
         picture: an SVG document, where there is no figure; see `drawing`.
-        alt: the picture for those who cannot see it.
-        headings, rows: of a table; the first cell names the row.
+        alt: text alternative of the picture.
+        headings, rows: a table; the first cell is the row's name.
         listed: sentences below.
     """
 
@@ -43,7 +43,7 @@ class Part:
 
 
 def render_parts(title: str, lead: str, parts: Sequence[Part]) -> str:
-    """The page as text; `lead` is the paragraph below its title."""
+    """Render the page as text; `lead` is the paragraph below its title."""
     drawn = [
         {
             "part": part,
@@ -57,12 +57,12 @@ def render_parts(title: str, lead: str, parts: Sequence[Part]) -> str:
 
 
 def _is_number(cell: str) -> bool:
-    """Whether a cell is read as a number: those of text are to the left."""
+    """Return whether a cell is a number: text cells are aligned to the left."""
     return not cell or cell[0] in "0123456789+-−–.<±"
 
 
 def drawing(picture: Picture) -> str:
-    """A matplotlib figure as an SVG document."""
+    """Convert a matplotlib figure to an SVG document."""
     buffer = io.StringIO()
     picture.savefig(buffer, format="svg", metadata={"Date": None})
     return buffer.getvalue()

@@ -17,12 +17,12 @@ _ROW_PX, _LEFT_PX, _LETTERS = 34, 150, 22
 
 
 def dot_figure(names: Sequence[str], panels: Mapping[str, Mapping[str, Sequence[float]]], alt: str) -> Figure:
-    """A panel per quantity, in it a row per name and a dot per series.
+    """Draw a panel per quantity, with a row per name and a dot per series.
 
     Args:
-        names: of the rows, downwards.
+        names: names of the rows, downwards.
         panels: title with unit -> series -> a value per row.
-        alt: the figure's text for those who cannot see it.
+        alt: text alternative of the figure.
     """
     drawn = []
     only = all(len(series) == 1 for series in panels.values())
@@ -47,7 +47,7 @@ def dot_figure(names: Sequence[str], panels: Mapping[str, Mapping[str, Sequence[
 
 
 def bar_figure(names: Sequence[str], series: Mapping[str, Sequence[float]], alt: str, title: str) -> Figure:
-    """A row per name, in it a bar of all series one after the other; `title` says what they count."""
+    """Draw a row per name with a bar of all series, stacked; `title` states what they count."""
     traces = [
         {
             "type": "bar",
@@ -73,7 +73,7 @@ def bar_figure(names: Sequence[str], series: Mapping[str, Sequence[float]], alt:
 
 
 def _rows(names: Sequence[str]) -> dict[str, Any]:
-    """The vertical axis with a name per row, downwards."""
+    """Return the vertical axis with a name per row, downwards."""
     texts = ["<br>".join(plain(line) for line in textwrap.wrap(name, _LETTERS)) for name in names]
     ticks = {"tickmode": "array", "tickvals": list(range(len(names))), "ticktext": texts, "tickfont": {"size": 10}}
     return {**ticks, "range": [len(names) - 0.4, -0.6], "zeroline": False}

@@ -45,13 +45,13 @@ FIT_FILE = "fit.npz"
 
 @dataclass(frozen=True, eq=False)
 class SavedFit:
-    """What `fit.npz` holds.
+    """Content of `fit.npz`.
 
     Attributes:
         fit: the result.
-        provenance: command and files that it is from, if they are known.
-        versions: of what computed it.
-        truth: of a synthetic person.
+        provenance: command and files of the result, if known.
+        versions: versions of the software that computed it.
+        truth: truth of a synthetic person.
     """
 
     fit: Fit
@@ -71,16 +71,16 @@ _KINDS = (
     FileEvent,
     FileOutputs,
 )  # fmt: skip
-"""All that a result is made of. Files know the classes by these names: who renames one keeps the old name readable."""
+"""All that a result is made of. Files use these class names: after a renaming the old one must stay readable."""
 
 
 def write_fit(fit: Fit, provenance: Provenance | None, path: Path, truth: Truth | None = None) -> None:
-    """Write everything that a result is into one file."""
+    """Write a complete result into one file."""
     write_archive(path, SavedFit(fit, provenance, versions(), truth), _KINDS, {"kinertia": VERSION})
 
 
 def read_saved(folder: str | Path) -> SavedFit:
-    """The result in a folder, with what it is from.
+    """Read the result in a folder, with its provenance.
 
     Raises:
         FileError: as `load_fit`.
@@ -105,7 +105,7 @@ def read_saved(folder: str | Path) -> SavedFit:
 
 
 def load_fit(folder: str | Path) -> Fit:
-    """A result from the folder it was saved to: figures, tables, cycles and `save`, without the recordings.
+    """Load a result from the folder it was saved to: figures, tables, cycles and `save`, without the recordings.
 
     Raises:
         FileError: no result is there, or it cannot be read.

@@ -25,7 +25,7 @@ PARTS = {
     "com": "centres of mass: ○ before, ● after",
     "ellipsoids": "ellipsoids of the estimated mass and inertia",
 }
-"""What can be switched on and off in a view, in words."""
+"""Parts of a view that can be switched on and off, in words."""
 
 _HIDDEN_MM = -32768
 
@@ -36,14 +36,14 @@ def _nothing() -> np.ndarray:
 
 @dataclass(frozen=True)
 class Scene:
-    """Points in ground axes (m) over n frames; what a scene does not have is empty.
+    """Points of a 3-D view in ground axes (m) over n frames; parts that a scene lacks are empty.
 
     Attributes:
         time: (n,) s.
-        centre: (n, 3) what the camera follows.
+        centre: (n, 3) point that the camera follows.
         bones: (b, 2) indices into `points` of the ends of every line.
         sides: (b,) "r", "l" or "" for every line.
-        points: (n, p, 3) ends of the lines; NaN where not known.
+        points: (n, p, 3) ends of the lines; NaN where unknown.
         measured, modelled: (n, m, 3) markers; NaN where not seen.
         labels: names of the measured markers.
         com, com_before: (n, s, 3) centres of mass, of segments with mass, and before the estimate.
@@ -69,17 +69,17 @@ class Scene:
     plates: np.ndarray = field(default_factory=_nothing)
 
     def parts(self) -> dict[str, str]:
-        """Those of `PARTS` that this scene has."""
+        """Return the parts among `PARTS` that this scene has."""
         return {name: words for name, words in PARTS.items() if np.size(getattr(self, name))}
 
 
 def plate_corners(corners: np.ndarray | None) -> np.ndarray:
-    """`Scene.plates`; empty where the files do not tell."""
+    """Return `Scene.plates`; empty where the files do not state corners."""
     return np.empty((0, 4, 3)) if corners is None else corners
 
 
 def packed(shown: Scene) -> dict[str, Any]:
-    """The scene as the page carries it: whole millimetres from a place near the person, 16 bits each, base64."""
+    """Encode the scene for the page: whole millimetres from a point near the person, 16 bits each, base64."""
     place = np.round(shown.centre.mean(axis=0) * [1, 0, 1], 3)
     moving = {
         "centre": shown.centre[:, None],
@@ -111,7 +111,7 @@ def _millimetres(positions: np.ndarray) -> str:
 
 
 def view(scenes: Sequence[tuple[str, Scene]]) -> dict[str, Any]:
-    """Scenes with the names of their trials as the templates take them, for one view with a selector."""
+    """Arrange scenes with the names of their trials for the templates, in one view with a selector."""
     parts: dict[str, str] = {}
     for _, one in scenes:
         parts |= one.parts()

@@ -29,12 +29,12 @@ if TYPE_CHECKING:
 
 
 def sensitivity_frame(sensitivity: Sensitivity) -> pd.DataFrame:
-    """One row per parameter, one column per condition: RMS error over the literature's."""
+    """Return one row per parameter and one column per condition: RMS error over the literature's."""
     return pd.DataFrame({"parameter": sensitivity.parameters, **sensitivity.errors})
 
 
 def sensitivity_figure(sensitivity: Sensitivity) -> Figure:
-    """A map: parameters down, conditions across; dark is measured, white is no better than the literature."""
+    """Draw a map, parameters down and conditions across; dark is measured, white is no better than the literature."""
     from matplotlib.figure import Figure  # half a second, which the other studies need not wait
 
     figure = Figure(figsize=(9.0, 12.0), layout="constrained")
@@ -87,7 +87,7 @@ _PICTURE = """
 
 
 def sensitivity_markdown(sensitivity: Sensitivity) -> str:
-    """The answer on a page."""
+    """Summarise the answer on one page of Markdown."""
     heads, rows = ["parameter", *_COLUMNS], sensitivity_rows(sensitivity)
     return _PAGE.format(
         picture=_PICTURE if has_matplotlib() else "",
@@ -97,7 +97,7 @@ def sensitivity_markdown(sensitivity: Sensitivity) -> str:
 
 
 def sensitivity_rows(sensitivity: Sensitivity) -> list[list[str]]:
-    """One row per parameter: RMS error over the literature's by kind and amplitude of the noise."""
+    """Return one row per parameter: RMS error over the literature's by kind and amplitude of the noise."""
     return [
         [name, *(f"{sensitivity.errors[key][i]:.2f}" for key in _COLUMNS)]
         for i, name in enumerate(sensitivity.parameters)
@@ -105,7 +105,7 @@ def sensitivity_rows(sensitivity: Sensitivity) -> list[list[str]]:
 
 
 def render_sensitivity(sensitivity: Sensitivity) -> str:
-    """The page."""
+    """Render the page of the sensitivity study."""
     answers = _answers(sensitivity)
     answer = [
         f"Not highly sensitive (small error up to twice the noise), with the study's noise: {answers['study']}.",
@@ -132,7 +132,7 @@ def render_sensitivity(sensitivity: Sensitivity) -> str:
 
 
 def _answers(sensitivity: Sensitivity) -> dict[str, Any]:
-    """What the page says in words."""
+    """Return the sentences of the page."""
     quarter, twice = (
         np.max([sensitivity.errors[f"{kind} x {amplitude:g}"] for kind in KINDS], axis=0)
         for amplitude in (AMPLITUDES[0], AMPLITUDES[-1])
@@ -162,7 +162,7 @@ def _of_strides(count: int) -> str:
 
 
 def save_sensitivity(sensitivity: Sensitivity, folder: str | Path) -> Path:
-    """Write the files into a folder; returns the folder."""
+    """Write the files into a folder and return the folder."""
     with complete_folder(folder, "sensitivity") as work:
         text = json.dumps(sensitivity_summary(sensitivity), indent=1)
         (work / "sensitivity.json").write_text(text + "\n", encoding="utf-8")
@@ -175,7 +175,7 @@ def save_sensitivity(sensitivity: Sensitivity, folder: str | Path) -> Path:
 
 
 def sensitivity_summary(sensitivity: Sensitivity) -> dict[str, Any]:
-    """What `sensitivity.json` says."""
+    """Return the content of `sensitivity.json`."""
     return {
         "kinertia": VERSION,
         "seed": sensitivity.seed,

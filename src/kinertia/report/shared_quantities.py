@@ -19,9 +19,9 @@ _ALIKE = 0.7
 
 
 def same_segment(segment: str, one: Skeleton, other: Skeleton) -> bool:
-    """Whether a segment of both has the same joint to the same parent, and the same segments joined to it.
+    """Return whether a segment has in both the same joint to the same parent, and the same segments joined to it.
 
-    What is welded to it, such as a rucksack, does not matter.
+    Items welded to it, such as a rucksack, do not matter.
     """
     return _neighbours(segment, one) == _neighbours(segment, other)
 
@@ -34,20 +34,20 @@ def _neighbours(segment: str, skeleton: Skeleton) -> tuple[set[tuple[str, str]],
 
 
 def same_sign(name: str, side: str, one: Skeleton, other: Skeleton) -> int:
-    """1 where a leg's coordinate turns the foot in the same direction in both, -1 where in opposite ones; 0 where it
-    turns about another axis, or one has no such coordinate.
+    """Return 1 where a leg's coordinate rotates the foot in the same direction in both, -1 where in opposite ones; 0
+    where it rotates about another axis, or one has no such coordinate.
     """
     return sign_along(turning(name, side, one), turning(name, side, other))
 
 
 def sign_along(one: np.ndarray, other: np.ndarray) -> int:
-    """1 for unit vectors (3,) that point the same way, -1 for opposite ones, 0 for others."""
+    """Return 1 for unit vectors (3,) in the same direction, -1 for opposite ones, 0 for others."""
     cosine = float(one @ other)
     return int(np.sign(cosine)) if abs(cosine) > _ALIKE else 0
 
 
 def turning(name: str, side: str, skeleton: Skeleton) -> np.ndarray:
-    """(3,) unit vector about which the foot turns with the coordinate, where all are zero; zero if it does not."""
+    """Return the unit vector (3,) about which the coordinate rotates the foot, all at zero; zero if it does not."""
     column = by_side(skeleton.coordinates).get(name, {}).get(side)
     if column is None:
         return np.zeros(3)

@@ -26,7 +26,7 @@ _BALL_M_PER_KG = 0.03
 
 
 def scene(fit: Fit, trial: TrialFit, most_frames: int) -> Scene:
-    """What the view of a trial shows: the window, at most `most_frames` frames of it."""
+    """Assemble the view of a trial: the window, in at most `most_frames` frames."""
     chosen = slice(None, None, -(-len(trial.time) // most_frames))
     labels = trial.kinematics.ik.labels
     skeleton = trial.skeleton.with_markers([m for m in trial.skeleton.markers if m.label in labels])
@@ -56,7 +56,7 @@ def scene(fit: Fit, trial: TrialFit, most_frames: int) -> Scene:
 def _bones(
     skeleton: Skeleton, rotation: np.ndarray, translation: np.ndarray
 ) -> tuple[np.ndarray, tuple[str, ...], np.ndarray]:
-    """A line to every joint centre from its parent's, across hips and shoulders, and to every last marker."""
+    """Return a line to every joint centre from its parent's, across hips and shoulders, and to every last marker."""
     index = {name: i for i, name in enumerate(skeleton.segments)}
     bones = [(index[joint.parent], index[joint.child]) for joint in skeleton.joints if joint.parent in index]
     named = [joint.child for joint in skeleton.joints if joint.parent in index]
@@ -78,7 +78,7 @@ def _bones(
 
 
 def last_marker(skeleton: Skeleton, i: int) -> np.ndarray | None:
-    """(3,) m, of segment i in its frame: where it ends if nothing hangs on it, or if it is the trunk; else None."""
+    """Return the last marker (3,) m of segment i, in its frame, if it is the trunk or a segment without children."""
     segment = skeleton.segments[i]
     worn = skeleton.marker_locals[skeleton.marker_segments == i]
     if not len(worn) or (segment != "torso" and any(joint.parent == segment for joint in skeleton.joints)):
@@ -92,13 +92,13 @@ def _side(segment: str) -> str:
 
 
 def _centres(bsp: BodySegmentParameters, rotation: np.ndarray, translation: np.ndarray) -> np.ndarray:
-    """(n, s, 3) m, centres of mass of segments posed by rotation (n, s, 3, 3) and translation (n, s, 3)."""
+    """Return centres of mass (n, s, 3) m of segments posed by rotation (n, s, 3, 3) and translation (n, s, 3)."""
     result: np.ndarray = (rotation @ bsp.com_m[:, :, None])[..., 0] + translation
     return result
 
 
 def semi_axes(bsp: BodySegmentParameters) -> np.ndarray:
-    """(s, 3, 3) m, semi-axes (rows, in segment axes) of the uniform ellipsoids with each segment's mass and inertia.
+    """Return semi-axes (s, 3, 3) m (rows, segment axes) of uniform ellipsoids with each segment's mass and inertia.
 
     With principal moments I the square of a semi-axis is 5/(2 m) (I_j + I_k - I_i). NaN for a segment without mass, and
     for one whose inertia no body can have.
@@ -113,7 +113,7 @@ def semi_axes(bsp: BodySegmentParameters) -> np.ndarray:
 
 
 def _arrows(kinematics: Kinematics) -> np.ndarray:
-    """(w, f, 2, 3) m: from the centre of pressure along the force, 1 mm per newton."""
+    """Return arrows (w, f, 2, 3) m from the centre of pressure along the force, 1 mm per newton."""
     force = kinematics.foot_loads[..., :3]
     loaded = force[..., 1:2] > LOAD_THRESHOLD_N
     at = np.where(loaded, centre_of_pressure(kinematics.foot_loads), np.nan)
@@ -121,7 +121,7 @@ def _arrows(kinematics: Kinematics) -> np.ndarray:
 
 
 def skeleton_figure(fit: Fit, trial: TrialFit) -> Figure:
-    """The same as a plotly figure for notebooks, with a slider and a play button; at most 60 frames."""
+    """Draw the view as a plotly figure for notebooks, with a slider and a play button; at most 60 frames."""
     shown = scene(fit, trial, _PLOTLY_FRAMES)
     steps = [
         {"label": f"{t:.2f}", "method": "animate", "args": [[str(k)], _at_once(0)]} for k, t in enumerate(shown.time)
@@ -153,7 +153,7 @@ def _at_once(duration_ms: float) -> dict[str, Any]:
 
 
 def _traces(shown: Scene, bsp: BodySegmentParameters, k: int) -> list[dict[str, Any]]:
-    """Plotly's z is our up, its y our right."""
+    """Convert the scene to traces; plotly's z is our up, its y our right."""
     lines = np.full((len(shown.bones), 3, 3), np.nan)
     lines[:, :2] = shown.points[k][shown.bones]
     sides = np.array(shown.sides)

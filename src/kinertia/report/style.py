@@ -20,12 +20,12 @@ FONT = "system-ui, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, sans-serif"
 
 
 def faded(colour: str, opacity: float) -> str:
-    """The colour "#rrggbb" as "rgba(...)"."""
+    """Convert the colour "#rrggbb" to "rgba(...)"."""
     red, green, blue = (int(colour[k : k + 2], 16) for k in (1, 3, 5))
     return f"rgba({red},{green},{blue},{opacity:g})"
 
 
 def between(first: str, second: str, share: float) -> str:
-    """The colour that lies this share (0 to 1) of the way from one "#rrggbb" to another."""
+    """Return the colour at this share (0 to 1) of the way from one "#rrggbb" to another."""
     parts = [[int(colour[k : k + 2], 16) for k in (1, 3, 5)] for colour in (first, second)]
     return "#" + "".join(f"{round(a + share * (b - a)):02X}" for a, b in zip(*parts, strict=True))

@@ -28,7 +28,7 @@ QUANTITIES = {
     "torque": ("pelvis torque (N m)", "torque_rms_Nm", "torque_max_Nm"),
 }
 _CLASSES = {"mass (kg)": ("mass",), "CoM (m)": ("com_x", "com_y", "com_z"), "inertia (kg m2)": ("ixx", "iyy", "izz")}
-# Okabe and Ito's colours, which colour-blind people can tell apart
+# Okabe and Ito's colours, which colour-blind people can distinguish
 _COLOURS = {
     "start": "#000000",
     "no_correction_no_noise": "#56B4E9",
@@ -40,7 +40,7 @@ _MARKS = {"start": "_", **dict(zip(CONDITIONS, "svo^", strict=True))}
 
 
 def table1_frame(table: Table1) -> pd.DataFrame:
-    """One row per quantity and statistic; per condition our mean and spread over the draws, and the published value."""
+    """Return one row per quantity and statistic; per condition our mean and spread over draws, and published value."""
     rows = []
     for heading, *names in QUANTITIES.values():
         for statistic, name in zip(("RMS", "max"), names, strict=True):
@@ -54,7 +54,7 @@ def table1_frame(table: Table1) -> pd.DataFrame:
 
 
 def table1_rows(table: Table1) -> list[list[str]]:
-    """The table in the study's form: quantity, then "RMS / max" per condition: mean, spread and published value."""
+    """Return the table in the study's form: quantity, then "RMS / max" per condition: mean, spread, published value."""
     rows = []
     for heading, *names in QUANTITIES.values():
         for label, source, digits in (
@@ -68,12 +68,12 @@ def table1_rows(table: Table1) -> list[list[str]]:
 
 
 def short(value: float, digits: int) -> str:
-    """The number as the tables print it."""
+    """Format a number as the tables print it."""
     return f"{value:.{digits}g}".replace("e-0", "e-")
 
 
 def table1_figure(table: Table1) -> Figure:
-    """Error per segment and class of parameter: at the start and after estimation, RMS over draws, logarithmic."""
+    """Draw the error per segment and class of parameter, at the start and after estimation, RMS of draws, log axis."""
     from matplotlib.figure import Figure  # half a second, which the other commands need not wait
 
     figure = Figure(figsize=(11, 3.8), layout="constrained")
@@ -101,7 +101,7 @@ def table1_figure(table: Table1) -> Figure:
 
 
 def render_table1(table: Table1) -> str:
-    """The page."""
+    """Render the page of Table 1."""
     note = "RMS / max. First row: mean over the draws; then their standard deviation; then the published value."
     picture = drawing(table1_figure(table)) if has_matplotlib() else ""
     alt = (
@@ -118,12 +118,12 @@ def render_table1(table: Table1) -> str:
 
 
 def table1_summary(table: Table1) -> dict[str, Any]:
-    """What `table1.json` says."""
+    """Return the content of `table1.json`."""
     return {"kinertia": VERSION, **table1_json(table)}
 
 
 def save_table1(table: Table1, folder: str | Path) -> Path:
-    """Write `table1.json`, `table1.csv`, `report.html` and, with matplotlib, `table1.png` into a folder; returns it."""
+    """Write `table1.json`, `table1.csv`, `report.html` and, with matplotlib, `table1.png` into a folder; return it."""
     with complete_folder(folder, "table1") as work:
         (work / "table1.json").write_text(json.dumps(table1_summary(table), indent=1) + "\n", encoding="utf-8")
         table1_frame(table).to_csv(work / "table1.csv", index=False, lineterminator="\n")

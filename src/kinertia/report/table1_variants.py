@@ -36,7 +36,7 @@ _SHOWN = {LONG: ("moments about the pelvis", "#0072B2"), LONG_GROUND: ("moments 
 
 
 def variants_frame(tables: Mapping[str, Table1]) -> pd.DataFrame:
-    """One row per variant, draw and condition (without noise in the first draw only): iterations and errors."""
+    """Return one row per variant, draw and condition (without noise in the first draw only): iterations and errors."""
     return pd.DataFrame(
         {
             "variant": title,
@@ -52,7 +52,7 @@ def variants_frame(tables: Mapping[str, Table1]) -> pd.DataFrame:
 
 
 def variants_rows(tables: Mapping[str, Table1]) -> list[list[str]]:
-    """The table as text, RMS errors "without / with correction"; the published values come first."""
+    """Return the table as text, RMS errors "without / with correction"; the published values come first."""
     rows = [_row("published", 1, PUBLISHED.__getitem__, (1.0, 1.0, 1.0), 1.0)]
     for title, table in tables.items():
         rows.append(_row(title, len(table.draws), table.mean, helped(table).values(), distance(table)))
@@ -68,7 +68,7 @@ def _row(title: str, draws: int, errors: Callable[[str], Errors], shares: Iterab
 
 
 def variants_figure(tables: Mapping[str, Table1]) -> Figure:
-    """Error along the iterations, geometric mean over the draws, with moments about the pelvis and about the ground."""
+    """Draw the error along the iterations, geometric mean over draws, with moments about the pelvis and the ground."""
     from matplotlib.figure import Figure  # half a second, which the other commands need not wait
 
     figure = Figure(figsize=(11, 3.8), layout="constrained")
@@ -101,7 +101,7 @@ def variants_figure(tables: Mapping[str, Table1]) -> Figure:
 
 
 def _along(paths: Sequence[np.ndarray], columns: slice) -> np.ndarray:
-    """Geometric mean (k,) over paths of errors (k, 49) of the RMS over a class; what has stopped stays where it is."""
+    """Return the geometric mean (k,) over paths of errors (k, 49) of the RMS over a class; stopped paths stay as is."""
     errors = [[rms(wrong.reshape(-1, 7)[:, columns]) for wrong in path] for path in paths]
     longest = max(len(each) for each in errors)
     mean: np.ndarray = np.exp(np.log([np.pad(each, (0, longest - len(each)), "edge") for each in errors]).mean(axis=0))
@@ -109,7 +109,7 @@ def _along(paths: Sequence[np.ndarray], columns: slice) -> np.ndarray:
 
 
 def render_variants(tables: Mapping[str, Table1]) -> str:
-    """The page."""
+    """Render the page of the variants."""
     caption = (
         "RMS error of inertia, mass and CoM along the iterations. Dashed: without correction; solid: with. Marks: the "
         "cost changes by less than 1e-2 (triangle), 1e-4 (square), 1e-6 (circle) from one iteration to the next."

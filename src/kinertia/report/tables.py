@@ -22,7 +22,7 @@ Table = Mapping[str, Column]
 
 
 def person_tables(fit: Fit) -> dict[str, Table]:
-    """Tables of all trials together: body segment parameters, calibration, strides and curves over the cycle."""
+    """Return tables of all trials together: body segment parameters, calibration, strides and curves over the cycle."""
     tables: dict[str, Table] = {"bsp": fit.bsp_columns()}
     if fit.posterior is not None:
         tables["calibration"] = calibration_columns(fit.posterior.calibration)
@@ -34,7 +34,7 @@ def person_tables(fit: Fit) -> dict[str, Table]:
 
 
 def trial_tables(fit: Fit, trial: TrialFit) -> dict[str, Table]:
-    """Tables over the time (s) of one trial: coordinates in degrees and m, joint moments in N m (forces in N)."""
+    """Return tables over the time (s) of one trial: coordinates in degrees and m, joint moments in N m, forces in N."""
     names, turns = fit.skeleton.coordinates, fit.skeleton.rotational
 
     def over_time(values: np.ndarray) -> Table:
@@ -57,7 +57,7 @@ def trial_tables(fit: Fit, trial: TrialFit) -> dict[str, Table]:
 
 
 def write_csv(fit: Fit, folder: Path) -> None:
-    """One file per table; those of a trial in a folder of its name."""
+    """Write one CSV file per table; those of a trial into a folder with its name."""
     for name, table in person_tables(fit).items():
         write_columns(folder / f"{name}.csv", table)
     for trial in fit.trials:
@@ -67,7 +67,7 @@ def write_csv(fit: Fit, folder: Path) -> None:
 
 
 def write_json(fit: Fit, path: Path) -> None:
-    """One file: tables by name, and under "trials" those of every trial; a gap is null."""
+    """Write one JSON file: tables by name, and under "trials" those of every trial; a gap is null."""
     tables: dict[str, Any] = {name: _lists(table) for name, table in person_tables(fit).items()}
     tables["trials"] = {
         trial.name: {name: _lists(table) for name, table in trial_tables(fit, trial).items()} for trial in fit.trials
@@ -76,7 +76,7 @@ def write_json(fit: Fit, path: Path) -> None:
 
 
 def write_mat(fit: Fit, path: Path) -> None:
-    """One file for MATLAB: a struct per table with a field per column, and a struct array `trials`."""
+    """Write one MATLAB file: a struct per table with a field per column, and a struct array `trials`."""
     from scipy.io import savemat
 
     tables: dict[str, Any] = {name: _fields(table) for name, table in person_tables(fit).items()}
@@ -100,8 +100,8 @@ def _plain(value: Any) -> Any:
 
 
 def _fields(table: Table) -> dict[str, Any]:
-    """Texts as rows of characters, a hundred times faster than cells (`cellstr` makes them); names as MATLAB allows.
-    What is not there is an empty text or NaN.
+    """Return MATLAB fields: texts as rows of characters, a hundred times faster than cells (`cellstr` makes them),
+    names as MATLAB allows. Missing values are an empty text or NaN.
     """
     fields = {}
     for name, values in table.items():

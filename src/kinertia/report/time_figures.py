@@ -24,9 +24,9 @@ from kinertia.trial.gait_events import gait_events
 from kinertia.trial.rms import rms, rms_length
 
 MOST_FRAMES = 1200
-"""Drawn per curve."""
+"""Largest number of frames drawn per curve."""
 BAND_EVERY = 2
-"""Of these, one is drawn of a band's edges: they change more slowly than the curves."""
+"""Every how many of these frames a band's edges are drawn: they change more slowly than the curves."""
 MOST_EVENTS = 40
 """Gait events in the frames shown up to which they are drawn; more would hide the curves."""
 _AROUND = 0.2
@@ -35,8 +35,8 @@ _AXES = ("forward", "upward", "to the right")
 
 
 def residual_figure(trial: TrialFit, most_frames: int = MOST_FRAMES, start: Start = LITERATURE) -> Figure:
-    """Force (N) and moment (N m) at the pelvis that the model needs and the plates do not give, stage by stage, with
-    forces at the bandwidth of the motion; the estimate's at full bandwidth, too.
+    """Draw the force (N) and moment (N m) at the pelvis that the model needs and the plates do not give, stage by
+    stage, with forces at the bandwidth of the motion; the estimate's at full bandwidth, too.
     """
     thin, axis = _thin(len(trial.time), most_frames), time_axis(trial.kinematics)
     marks = [*_unused(trial.kinematics, axis), *_lines(_shown_events(trial.kinematics))]
@@ -68,13 +68,13 @@ _MOMENT_AXES = ("forward axis", "vertical", "right axis")
 
 
 def stage_name(stage: str, start: Start, hz: float | None = None) -> str:
-    """A stage of `TrialFit.residuals` or `.joint_loads` in words, with the bandwidth if it is given."""
+    """Describe a stage of `TrialFit.residuals` or `.joint_loads` in words, with the bandwidth if given."""
     name = {"literature": start.values, "corrected": f"{start.values}, pelvis corrected"}.get(stage, stage)
     return name if hz is None else f"{name} ({hz:.3g} Hz)"
 
 
 def bandwidths(trial: TrialFit) -> str:
-    """Of the motion before the estimate and after it."""
+    """Describe the bandwidths of the motion before and after the estimate."""
     before, after = (f"{_hz(trial, stage):.3g}" for stage in ("literature", "estimate"))
     return f"{after} Hz" if before == after else f"{before} Hz, estimate {after} Hz"
 
@@ -84,7 +84,7 @@ def _hz(trial: TrialFit, stage: str) -> float:
 
 
 def coordinate_figure(trial: TrialFit, skeleton: Skeleton, most_frames: int = MOST_FRAMES) -> Figure:
-    """Every coordinate (degrees, m) by inverse kinematics frame by frame, and as estimated with its 95 % band."""
+    """Draw every coordinate (degrees, m) by inverse kinematics frame by frame, and as estimated with its 95 % band."""
     ik, axis = trial.kinematics.ik, time_axis(trial.kinematics)
     unused, events = _unused(trial.kinematics, axis), _shown_events(trial.kinematics)
     shown = (ik.time >= axis["range"][0]) & (ik.time <= axis["range"][1])
@@ -112,7 +112,7 @@ def coordinate_figure(trial: TrialFit, skeleton: Skeleton, most_frames: int = MO
 
 
 def motion_change(trial: TrialFit) -> np.ndarray:
-    """(w, c) rad and m: estimated coordinates minus those of inverse kinematics; NaN where the markers told none."""
+    """Return estimated coordinates minus those of inverse kinematics (w, c), rad and m; NaN where markers show none."""
     result: np.ndarray = trial.motion.q - trial.kinematics.ik.q[trial.kinematics.frames]
     return result
 
@@ -160,14 +160,14 @@ def panel_over_time(
     band: tuple[np.ndarray, np.ndarray],
     most_frames: int = MOST_FRAMES,
 ) -> Panel:
-    """Curves of both sides over time, with a 95 % band where there are deviations.
+    """Draw curves of both sides over time, with a 95 % band where there are SDs.
 
     Args:
-        trial: whose frames they are of.
+        trial: trial of the frames.
         one: title, and the column of each side.
-        lines: values (w, c) and look of the line by name.
-        band: values and deviations (w, c).
-        most_frames: drawn per curve.
+        lines: values (w, c) and style of the line by name.
+        band: values and SDs (w, c).
+        most_frames: largest number of frames drawn per curve.
     """
     axis, thin = time_axis(trial.kinematics), _thin(len(trial.time), most_frames)
     traces = _bands(one, trial.time, *band, thin) if np.isfinite(band[1]).any() else []
@@ -178,7 +178,7 @@ def panel_over_time(
 
 
 def _bands(one: Coordinate, time: np.ndarray, values: np.ndarray, sd: np.ndarray, thin: slice) -> list[dict[str, Any]]:
-    """A 95 % band around values (w, c) for each side: an unseen lower edge, and an upper one filled down to it."""
+    """Draw a 95 % band around values (w, c) per side: an invisible lower edge, and an upper one filled down to it."""
     traces, thin = [], slice(None, None, BAND_EVERY * thin.step)
     for side, column in one.columns.items():
         word, colour = style.SIDES[side]
@@ -206,7 +206,7 @@ def _sides(
 
 
 def _curve(time: np.ndarray, values: np.ndarray, thin: slice) -> dict[str, Any]:
-    """A line over frames; the times of single ones need not be written where they are uniform. It breaks at gaps."""
+    """Draw a line over frames, which breaks at gaps; times of a single window need not be written where uniform."""
     shown, y = time[thin], values[thin]
     step = float(np.median(np.diff(shown))) if len(shown) > 1 else 1.0
     gaps = np.flatnonzero(np.diff(shown) > 1.5 * step) + 1
@@ -228,7 +228,7 @@ def _thin(frames: int, most: int) -> slice:
 
 
 def time_axis(kinematics: Kinematics) -> dict[str, Any]:
-    """Settings of the axis: all stretches with a little around them."""
+    """Return the settings of the time axis: all windows with a small margin."""
     start, end = kinematics.window_s
     around = _AROUND * (end - start)
     time = kinematics.trial.markers.time
@@ -238,7 +238,7 @@ def time_axis(kinematics: Kinematics) -> dict[str, Any]:
 
 
 def _unused(kinematics: Kinematics, axis: dict[str, Any]) -> list[dict[str, Any]]:
-    """Shades what lies outside the stretches."""
+    """Shade what lies outside the windows."""
     starts, ends = zip(*kinematics.windows_s, strict=True)
     spans = zip((axis["range"][0], *ends), (*starts, axis["range"][1]), strict=True)
     return [
@@ -259,14 +259,14 @@ def _unused(kinematics: Kinematics, axis: dict[str, Any]) -> list[dict[str, Any]
 
 
 def _shown_events(kinematics: Kinematics) -> list[GaitEvent]:
-    """In the frames shown; none where there are too many."""
+    """Return the events in the frames shown; none where there are too many."""
     first, last = time_axis(kinematics)["range"]
     shown = [event for event in gait_events(kinematics.trial) if first <= event.time_s <= last]
     return shown if len(shown) <= MOST_EVENTS else []
 
 
 def _lines(events: Sequence[GaitEvent], one: Coordinate | None = None) -> list[dict[str, Any]]:
-    """At the events of the sides that the coordinate is on; at all where it is on none."""
+    """Draw lines at the events of the sides that the coordinate is on; at all events where it is on none."""
     sides = [] if one is None else [side for side in one.columns if side]
     return [_vertical_line(event) for event in events if not sides or event.side in sides]
 

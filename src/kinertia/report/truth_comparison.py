@@ -18,10 +18,10 @@ _PARAMETERS = (("mass (kg)", 1.0, 2), ("centre of mass (mm)", 1e3, 0), ("moments
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """What is known of a synthetic person.
+    """Known truth of a synthetic person.
 
     Attributes:
-        bsp: segments in the order of the fit's.
+        bsp: parameters, segments in the order of the fit's.
         joint_loads: trial -> (w, c) N m and N in the frames and coordinates of the fit.
     """
 
@@ -29,16 +29,16 @@ class Truth:
     joint_loads: Mapping[str, np.ndarray]
 
     def parameter_errors(self, source: BodySegmentParameters) -> tuple[float, float, float]:
-        """RMS over the segments of mass (kg), CoM distance (m), moments of inertia (kg m2)."""
+        """Return the RMS over the segments of mass (kg), CoM distance (m), moments of inertia (kg m2)."""
         change = source.table() - self.bsp.table()
         distance = np.linalg.norm(change[:, 1:4], axis=1)
         mass, com, inertia = (rms(part) for part in (change[:, 0], distance, change[:, 4:7]))
         return mass, com, inertia
 
     def moment_errors(self, fit: Fit) -> dict[str, tuple[float, float]]:
-        """Per joint, RMS error (N m) over all trials of joint moments by the usual way and by the estimate.
+        """Return per joint the RMS error (N m) over all trials of joint moments by IK + ID and by the estimate.
 
-        The usual way: measured motion, literature BSPs, forces as measured.
+        IK + ID uses measured motion, literature BSPs, and forces as measured.
         """
         errors = {}
         for joint, begins in JOINTS.items():
@@ -56,7 +56,7 @@ class Truth:
 
 
 def truth_rows(fit: Fit, truth: Truth) -> dict[str, list[tuple[str, str, str]]]:
-    """RMS errors in words for the page: what, before, after; of the parameters, and of the joint moments."""
+    """Return RMS errors in words for the page: what, before, after; of the parameters, and of the joint moments."""
     pairs = zip(*(truth.parameter_errors(bsp) for bsp in (fit.literature, fit.estimate)), strict=True)
     parameters = [
         (name, f"{factor * before:.{digits}f}", f"{factor * after:.{digits}f}")

@@ -21,13 +21,13 @@ _INERTIA_DECIMALS = (4, 6)
 
 @dataclass(frozen=True)
 class Start:
-    """What the body segment parameters before the estimate are called.
+    """Names of the body segment parameters before the estimate.
 
     Attributes:
-        word: in headings and legends.
-        of: in sentences.
-        whose: "the literature's" or the model's.
-        values: of the stage of residuals and moments.
+        word: name in headings and legends.
+        of: name in sentences.
+        whose: possessive, "the literature's" or "the model's".
+        values: name of the stage of residuals and moments.
     """
 
     word: str
@@ -42,22 +42,22 @@ PRIOR = Start("prior", "the prior", "the prior's", "prior values")
 
 
 def start_of(person: Fit | Prepared) -> Start:
-    """An OpenSim model brings its own parameters, the built-in one has the literature's."""
+    """Return the names of the starting parameters: an OpenSim model's own, the literature's for the built-in one."""
     return LITERATURE if person.file is None else MODEL
 
 
 def expected_of(fit: Fit) -> Start:
-    """What the prior's mean is called: where more is known of a person than the start, the prior."""
+    """Return the names of the prior's mean: "prior" where more is known of a person than the start."""
     return PRIOR if fit.more_known else start_of(fit)
 
 
 def read_in(k: int) -> tuple[str, float]:
-    """Unit in which people read parameter k of `PARAMETERS` (kg, mm, kg m2), and the factor to it."""
+    """Return the displayed unit of parameter k of `PARAMETERS` (kg, mm, kg m2), and the factor to it."""
     return _READ_IN.get(UNITS[k], (UNITS[k], 1.0))
 
 
 def decimals(k: int, size: float) -> int:
-    """Of parameter k: 2 for kg, 1 for mm; inertias have two digits of `size`, their deviation in kg m2, at least 4."""
+    """Return decimals of parameter k: 2 for kg, 1 for mm; for kg m2 two digits of `size`, the SD, but at least 4."""
     if UNITS[k] in _DECIMALS:
         return _DECIMALS[UNITS[k]]
     least, most = _INERTIA_DECIMALS
@@ -65,13 +65,13 @@ def decimals(k: int, size: float) -> int:
 
 
 def fixed(value: float, digits: int, sign: bool = False) -> str:
-    """A number with so many decimals; what rounds to zero has no sign."""
+    """Format a number with this many decimals; a value that rounds to zero has no sign."""
     text = f"{value:+.{digits}f}" if sign else f"{value:.{digits}f}"
     return text if float(text) else text.lstrip("+-")
 
 
 def asymmetry_sentences(fit: Fit) -> list[str]:
-    """For each pair of limbs, whether left and right differ beyond their error bars; nothing after two-level."""
+    """State for each pair of limbs whether left and right differ beyond their error bars; nothing after two-level."""
     if fit.posterior is None:
         return []
     pairs = asymmetries(fit.estimate, fit.posterior.covariance)
@@ -85,7 +85,7 @@ def _said(segment: str) -> str:
 
 
 def _differences(pair: Asymmetry) -> str:
-    """The parameters that differ, right minus left."""
+    """List the parameters that differ, right minus left."""
     parts = []
     for k in pair.differing:
         unit, factor = read_in(k)

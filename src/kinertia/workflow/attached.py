@@ -27,13 +27,13 @@ from kinertia.model.skeleton import Joint, Skeleton
 from kinertia.settings import Attached
 
 _UNKNOWN_SIZE_SD = 0.5
-"""Relative deviation of the second moments of something whose size is not given."""
+"""Relative SD of the second moments of an item whose size is not stated."""
 _WATER_KG_M3 = 1000.0
 _GROUND = "ground"
 
 
 def with_attached(ready: Prepared, by_itself: Collection[str] = ()) -> Prepared:
-    """A prepared person with segments for `ready.attached`, after the body's own; one who has them stays as it is.
+    """Add segments for `ready.attached` after the body's own; a person who has them already stays unchanged.
 
     Args:
         ready: the person.
@@ -46,7 +46,7 @@ def with_attached(ready: Prepared, by_itself: Collection[str] = ()) -> Prepared:
         return ready
     scale_kg = known(ready.subject.mass_kg)
     skeleton, prior = with_attached_prior(ready.skeleton, ready.prior, ready.attached, scale_kg, by_itself)
-    # the literature's own body, which need not be the prior's mean, and segments that are held after all others
+    # the literature's own body, which need not be the prior's mean, and fixed segments after all others
     body, own = len(ready.prior.mean.segments), ready.literature
     names = (*prior.mean.segments, *own.segments[body:])
     table = np.concatenate([own.table()[:body], prior.mean.table()[body:], own.table()[body:]])
@@ -66,12 +66,12 @@ def with_attached_prior(
     scale_kg: float,
     by_itself: Collection[str] = (),
 ) -> tuple[Skeleton, BspPrior]:
-    """A skeleton with what is attached welded to it, and the prior of the whole.
+    """Weld attached items to a skeleton, and extend the prior of the body by them.
 
     Args:
-        skeleton, prior: of the body alone.
-        attached: in the order of the new segments.
-        scale_kg: what the scale said.
+        skeleton, prior: skeleton and prior of the body alone.
+        attached: items in the order of the new segments.
+        scale_kg: mass shown by the scale.
         by_itself: segments whose prior masses are no shares of the body's.
 
     Raises:
@@ -98,7 +98,7 @@ def _check(skeleton: Skeleton, attached: Sequence[Attached]) -> None:
 
 
 def _extended(prior: BspPrior, attached: Sequence[Attached], scale_kg: float, by_itself: Collection[str]) -> BspPrior:
-    """The prior with rows for what is attached: of what was weighed with the body, the body has the less the more."""
+    """Extend the prior by attached items: the heavier an item weighed with the body, the lighter the body."""
     tables, blocks = zip(*(_expected(one, *mass_of(one, scale_kg)) for one in attached), strict=True)
     names = (*prior.mean.segments, *(one.name for one in attached))
     size = len(prior.covariance)
@@ -115,13 +115,13 @@ def _extended(prior: BspPrior, attached: Sequence[Attached], scale_kg: float, by
             covariance[rows, :size] = covariance[:size, rows].T
     mean = BodySegmentParameters.from_table(names, np.concatenate([prior.mean.table(), *tables]))
     weighed = (*(True,) * len(prior.mean.segments), *(one.on_scale for one in attached))
-    # the body's own rows are those of a person who was weighed without what was on the scale with him
+    # the body's own rows are for a person weighed without the items that were on the scale
     on_scale = sum(mass_of(one, scale_kg)[0] for one in attached if one.on_scale)
     return replace(prior, mean=mean, covariance=covariance, mass_kg=prior.mass_kg + on_scale, weighed=weighed)
 
 
 def _expected(attached: Attached, mass_kg: float, sd_kg: float) -> tuple[np.ndarray, np.ndarray]:
-    """(1, 10) row of the table and (10, 10) covariance: inertia in proportion to mass, and a deviation of its own."""
+    """Return an item's row (1, 10) and covariance (10, 10): inertia in proportion to mass, and an SD of its own."""
     if attached.size_mm is None:
         radius = (3.0 * mass_kg / (4.0 * np.pi * _WATER_KG_M3)) ** (1.0 / 3.0)
         second, own_sd = np.full(3, 0.2 * mass_kg * radius**2), _UNKNOWN_SIZE_SD
@@ -140,13 +140,13 @@ def _expected(attached: Attached, mass_kg: float, sd_kg: float) -> tuple[np.ndar
 
 
 def _by_mass(table: np.ndarray, mass_kg: float) -> np.ndarray:
-    """(10,) change of a thing's row (1, 10) with its mass."""
+    """Return the change (10,) of an item's row (1, 10) per kilogram of its mass."""
     result: np.ndarray = np.r_[1.0, np.zeros(3), table[0, 4:] / mass_kg]
     return result
 
 
 def _less_body(prior: BspPrior, by_itself: Collection[str]) -> np.ndarray:
-    """(10 s,) change of the body's rows with a kilogram on the scale that is none of it."""
+    """Return the change (10 s,) of the body's rows per kilogram on the scale that is not part of the body."""
     change = -prior.mean.table() / prior.mean.total_mass_kg
     change[:, 1:4] = 0.0
     change[[name in by_itself for name in prior.mean.segments]] = 0.0

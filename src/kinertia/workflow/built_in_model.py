@@ -53,9 +53,9 @@ from kinertia.workflow.person_model import LOWER_BODY_SD_M, UPPER_BODY_SD_M, Per
 from kinertia.workflow.screening import Screened
 
 WITHOUT_STATIC = 2.0
-"""Times as uncertain are joint centres and markers of a model that is made from a walk."""
+"""Factor on the uncertainty of joint centres and markers of a model that is made from a walk."""
 _STAYS_M = 1e-4
-"""Of markers that have been adapted already."""
+"""SD (m) of markers that have been adapted already."""
 _FAR_M = 0.03
 _ARM_ROTATION_SD_RAD = 1.0
 _TURNED_RAD = 0.25
@@ -64,14 +64,14 @@ _TURNED_RAD = 0.25
 
 @dataclass(frozen=True, eq=False)
 class Calibrated:
-    """The adapted skeleton, and what adapting it showed.
+    """The adapted skeleton, and what the adaptation showed.
 
     Attributes:
-        skeleton: adapted to the trials.
+        skeleton: skeleton adapted to the trials.
         findings: labels that contradict the static trial's model.
-        moved_m: per marker label, how far it sits from its position in the static trial.
-        elbow_rotations_rad: side -> by how much an elbow axis was turned, where it was.
-        torso_rotation_rad: by how much the torso would have turned under its markers, which were kept from it.
+        moved_m: per marker label, its distance from its position in the static trial.
+        elbow_rotations_rad: side -> rotation of the elbow axis, where it was rotated.
+        torso_rotation_rad: rotation of the torso under its markers that was prevented.
         head: labels of the markers on the head, where they are left out.
     """
 
@@ -150,7 +150,7 @@ def _arms_last(
     marker_sd_m: Mapping[str, float],
     coordinate_sd: Mapping[str, float],
 ) -> Adaptation:
-    """Adapt the body without the markers of its arms, and then the arms on a body that stays as it is."""
+    """Adapt the body without the markers of its arms, then the arms on a body that stays unchanged."""
     arms = {f"{name}_{side}" for side in "rl" for name in ARM_SEGMENTS}
     worn = [marker for marker in skeleton.markers if marker.segment in arms]
     armless = skeleton.with_markers([marker for marker in skeleton.markers if marker.segment not in arms])
@@ -257,7 +257,7 @@ def _stance_of(person: Person, trials: Sequence[Turned], marker_set: MarkerSet) 
 
 
 def _uncertainty(free_axes: bool, without_static: bool) -> ModelUncertainty:
-    """How well joint centres, axes and markers of the built-in model are known."""
+    """Return the uncertainty of joint centres, axes and markers of the built-in model."""
     known_by = GAIT27_UNCERTAINTY
     if without_static:
         centres = {name: WITHOUT_STATIC * sd for name, sd in known_by.centres.items()}
@@ -266,7 +266,7 @@ def _uncertainty(free_axes: bool, without_static: bool) -> ModelUncertainty:
 
 
 def _with_trunk(model: Gait27, trials: Sequence[Turned]) -> tuple[Gait27, list[Turned]]:
-    """The model and its trials, with an upright trunk in those that show too few markers of it."""
+    """Return the model and its trials, with an upright trunk in trials that show too few trunk markers."""
     lacking = [not shows_trunk(model.skeleton, one.trial) for one in trials]
     if any(lacking) and VIRTUAL_TRUNK[0] not in model.skeleton.markers:
         model = replace(model, skeleton=model.skeleton.with_markers([*model.skeleton.markers, *VIRTUAL_TRUNK]))
@@ -277,7 +277,7 @@ def _with_trunk(model: Gait27, trials: Sequence[Turned]) -> tuple[Gait27, list[T
 
 
 def _adapted(calibrated: Calibrated) -> Iterator[Finding]:
-    """M173 of markers that sit far from their positions in the static trial, M174 of those on the head."""
+    """M173 and M174: markers far from their positions in the static trial, and markers on the head."""
     for label, distance_m in calibrated.moved_m.items():
         if distance_m > _FAR_M:
             yield finding("M173", Where(markers=(label,)), distance_m=Quantity(distance_m, "m", limit=_FAR_M))

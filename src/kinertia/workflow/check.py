@@ -22,11 +22,11 @@ from kinertia.workflow.screening import Screened, screen
 
 @dataclass(frozen=True, eq=False)
 class PersonCheck:
-    """Everything that was found of a person's recordings, and what is in them.
+    """Recordings of a person, with everything that was found in them.
 
     Attributes:
         screened: the person with all findings.
-        recordings: what is in each, the static trial first.
+        recordings: contents of each recording, the static trial first.
 
     Examples:
         >>> check = kinertia.check_person(kinertia.read_person(kinertia.read_subject("lab/subject.toml")))
@@ -39,12 +39,12 @@ class PersonCheck:
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """All of them."""
+        """All findings."""
         return self.screened.findings
 
     @property
     def overview(self) -> Overview:
-        """What they come to."""
+        """Summary of the findings."""
         trials = len(self.screened.person.trials) + len(
             {one.where.trial for one in self.screened.person.unread if one.where.trial}
         )
@@ -57,7 +57,7 @@ def check_person(person: Person) -> PersonCheck:
     """Screen a person's recordings as a fit does, up to inverse kinematics.
 
     Args:
-        person: as `read_person` or `read_files` makes it.
+        person: the person as read by `read_person` or `read_files`.
     """
     screened = screen(person)
     contexts = (*screened.context.standing, *screened.context.trials)
@@ -73,16 +73,16 @@ def check_recording(
     height_m: float | None = None,
     is_static: bool = False,
 ) -> RecordingCheck:
-    """Look at one recording as a fit would, up to inverse kinematics.
+    """Check one recording as a fit would, up to inverse kinematics.
 
     Args:
-        recording: markers, and forces where there are any.
+        recording: markers, and forces if any.
         marker_set: the laboratory's, or the markers of an OpenSim model; found among the presets if None.
-        mass_kg: as stated; the file's own if None.
+        mass_kg: stated mass; the file's own if None.
         window_s: the window that the user vouches for.
         static: the static trial that goes with it, if there is one.
         height_m: stature; the file's own if None.
-        is_static: it is the static trial.
+        is_static: whether the recording is the static trial.
 
     Examples:
         >>> walk = kinertia.read_recording("lab/walk.trc", "lab/walk_grf.mot")
@@ -100,7 +100,7 @@ def check_recording(
 
 @dataclass(frozen=True, eq=False)
 class ModelOverview:
-    """An OpenSim model by its file's name: what is in it, and what was found."""
+    """Contents and findings of an OpenSim model, with the name of its file."""
 
     name: str
     facts: ModelCheck
@@ -108,10 +108,10 @@ class ModelOverview:
 
 
 def check_osim(model: OsimModel, subject: Subject, overrule: Overrule | None = None) -> ModelOverview:
-    """What is found of an OpenSim model by itself.
+    """Check an OpenSim model by itself.
 
     Args:
-        model: as read.
+        model: the model as read.
         subject: mass, stature and sex where they are known.
         overrule: what the user overrules.
     """

@@ -13,7 +13,7 @@ from kinertia.findings.finding import Finding, Severity
 
 _DOUBTED = "S111"
 _FEWEST = 2
-"""So many occasions or plates that agree are likelier than the number that somebody wrote down."""
+"""Number of agreeing occasions or plates from which on they are likelier to be right than a written number."""
 
 
 def with_doubted_mass(prior: BspPrior, findings: Sequence[Finding]) -> BspPrior:

@@ -111,7 +111,7 @@ def estimate(ready: Prepared, progress: Progress = lambda stage, share: None) ->
 
 @dataclass(frozen=True, eq=False)
 class _Outcome:
-    """What an estimator makes of a prepared person."""
+    """Result of an estimator for a prepared person."""
 
     skeleton: Skeleton
     bsp: BodySegmentParameters
@@ -141,7 +141,7 @@ def _two_level(ready: Prepared, settings: Settings, started: float, progress: Pr
 
 
 def named_by_source(ready: Prepared) -> ModelUncertainty:
-    """The uncertainty with the source of what the estimate leans on: the prior, where more is known than the start."""
+    """Return the uncertainty with its source renamed to "the prior" where that differs from the starting values."""
     expected = ready.uncertainty.whole(ready.prior.mean).table()
     known = not np.array_equal(expected, ready.literature.table())
     return replace(ready.uncertainty, source="the prior") if known else ready.uncertainty
@@ -188,16 +188,16 @@ def _simultaneous(ready: Prepared, settings: Settings, started: float, progress:
 
 @dataclass(frozen=True, eq=False)
 class _Estimated:
-    """One trial as estimated.
+    """One trial with its estimated motion and loads.
 
     Attributes:
-        skeleton: with the markers where they are in it.
-        motion: in the measured frames.
+        skeleton: skeleton with the markers at their positions in this trial.
+        motion: motion in the measured frames.
         course: (f, c) coordinates, as in `TrialFit`.
         motion_hz: bandwidth of the motion.
-        foot_loads: (w, 2, 6) of the motion's bandwidth.
-        reactions, before: for the joint moments after and before the estimate.
-        deviations: of the curves, or None.
+        foot_loads: (w, 2, 6) at the motion's bandwidth.
+        reactions, before: ground reactions for the joint moments after and before the estimate.
+        deviations: SDs of the curves, or None.
     """
 
     skeleton: Skeleton
@@ -213,7 +213,7 @@ class _Estimated:
 def _trial_fits(
     ready: Prepared, bsp: BodySegmentParameters, estimates: Sequence[_Estimated], started: float
 ) -> tuple[TrialFit, ...]:
-    """Every trial before and after."""
+    """Return every trial before and after the estimate."""
     spent = (time.perf_counter() - started) / sum(len(k.time) for k in ready.kinematics)
     rows = zip(ready.kinematics, ready.seconds, estimates, strict=True)
     trials = []
@@ -267,7 +267,7 @@ def _trial_fit(
 
 
 def _as_opensim(k: Kinematics, estimated: _Estimated) -> Motion:
-    """The motion that OpenSim's tools read from a file of the estimated coordinates, in the measured frames."""
+    """Return the motion that OpenSim's tools read from a file of the estimated coordinates, in the measured frames."""
     if estimated.course is None:
         return joined([_interpolated(k.time[part], estimated.motion.q[part]) for part in k.stretches])
     return _interpolated(k.course_time, estimated.course).cut(k.frames - k.frames[0])
@@ -279,7 +279,7 @@ def _interpolated(time: np.ndarray, q: np.ndarray) -> Motion:
 
 
 def _stretches(k: Kinematics) -> list[Window]:
-    """The measured stretches of a trial, in parts over which the pelvis can be corrected."""
+    """Return the measured windows of a trial, in parts over which the pelvis can be corrected."""
     wrench = k.foot_loads.sum(axis=1)
     return [part for own in k.stretches for part in stretches(Window(k.time[own], k.motion.cut(own), wrench[own]))]
 
@@ -294,6 +294,6 @@ def _marker_errors(skeleton: Skeleton, kinematics: Kinematics, motion: Motion) -
 
 
 def _of_worn(k: Kinematics, errors_m: np.ndarray) -> np.ndarray:
-    """Marker errors (w, m) without those of a trunk that no marker shows."""
+    """Return marker errors (w, m) without the markers of a trunk that is not tracked."""
     virtual = np.array([label in {marker.label for marker in VIRTUAL_TRUNK} for label in k.ik.labels])
     return np.where(virtual, np.nan, errors_m)

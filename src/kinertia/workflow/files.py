@@ -21,7 +21,7 @@ from kinertia.workflow.person import Person, Unread
 
 @dataclass(frozen=True)
 class RecordingFiles:
-    """The files of one recording."""
+    """Files of one recording."""
 
     markers: Path
     forces: Path | None = None
@@ -31,13 +31,13 @@ class RecordingFiles:
 def files_by_name(
     files: Sequence[Path], loads: Path | None = None, forces: Path | None = None, static: Path | None = None
 ) -> tuple[RecordingFiles, ...]:
-    """Which files make one recording of a motion, by their names.
+    """Group files into recordings of motions, by their names.
 
     Args:
         files: markers and forces.
-        loads: explains the forces of the only one that has any.
-        forces: those of the only file of markers.
-        static: the static trial, which has no part in this; unless it is the only file, as poses may be.
+        loads: ExternalLoads file for the only recording with forces.
+        forces: forces of the only marker file.
+        static: the static trial, which is left out unless it is the only file, as poses may be.
 
     Raises:
         FileError: a file of another kind, forces without markers, or loads and forces that belong to no trial or to
@@ -76,7 +76,7 @@ def _unpaired(path: Path, problem: str, action: str) -> FileError:
 
 
 def trial_names(wanted: Sequence[RecordingFiles]) -> list[str]:
-    """What the recordings are called: as their marker files, with as much of the path as tells them apart."""
+    """Name recordings by their marker files, with as much of the path as distinguishes them."""
     paths = [one.markers for one in wanted]
     names = [[path.stem, path.name, str(path)] for path in paths]
     times = [Counter(level) for level in zip(*names, strict=True)]
@@ -84,7 +84,7 @@ def trial_names(wanted: Sequence[RecordingFiles]) -> list[str]:
 
 
 def unknown_kind(path: Path) -> FileError:
-    """The error of a file that is none of those that can be checked."""
+    """Return the error for a file of a kind that cannot be checked."""
     known = ", ".join(dict.fromkeys((*MARKER_FILES, *FORCE_FILES, ".toml", ".osim")))
     hint = "; give ExternalLoads with --loads" if path.suffix.lower() == ".xml" else ""
     return FileError(path, f"a '{path.suffix}' file cannot be checked; expected {known}{hint}")
@@ -96,13 +96,13 @@ def read_files(
     static: Path | None = None,
     progress: Callable[[float], None] = lambda share: None,
 ) -> Person:
-    """A person of whom there are files only: a recording in which the person stands still is the static trial.
+    """Read a person from files alone: a recording in which the person stands still is the static trial.
 
     Args:
         wanted: the files of each recording; the static trial may be among them.
         stated: the person without recordings.
         static: the static trial; found by the data if None, unless there is an OpenSim model in its place.
-        progress: called with the share of files that are read.
+        progress: called with the share of files read.
 
     Raises:
         KinertiaError: no recording can be read.
@@ -132,7 +132,7 @@ def read_files(
 
 
 def _matched(marked: Sequence[Path], forces: Sequence[Path]) -> dict[Path, Path]:
-    """Marker files with their forces; those of static trials among themselves, unless there are just two files."""
+    """Match marker files with their forces; static trials among themselves, unless there are just two files."""
     if len(marked) == len(forces) == 1:
         return matched_by_name(marked, forces)
     pairs: dict[Path, Path] = {}

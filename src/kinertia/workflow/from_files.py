@@ -35,11 +35,11 @@ def prepare_subject(
     progress: Progress = lambda stage, share: None,
     overrule: Overrule | None = None,
 ) -> Prepared:
-    """All that an estimator needs of the person in a subject file: everything read, calibrated, solved and smoothed.
+    """Read, calibrate, solve and smooth all that an estimator needs of the person in a subject file.
 
     Args:
-        subject: the file, or what `read_subject` made of it.
-        progress: called as the work goes on.
+        subject: the file, or the result of `read_subject`.
+        progress: called as the work progresses.
         overrule: what is overruled besides what the subject file says.
 
     Raises:
@@ -71,7 +71,7 @@ def _expect_no_mirrored_prosthesis(wanted: SubjectFile) -> None:
 
 
 def _session(wanted: SubjectFile) -> tuple[PersonInstruments, ...]:
-    """What is known of the instruments from the others of their session, whose plates this person's are."""
+    """Return the other people of the session, whose plates this person shares, with their instrument information."""
     if wanted.instruments.session is None:
         return ()
     from kinertia.io.session_file import read_session
@@ -83,7 +83,7 @@ def _session(wanted: SubjectFile) -> tuple[PersonInstruments, ...]:
 
 
 def _measures(wanted: SubjectFile) -> BodyMeasures | None:
-    """The sheet of girths and lengths, read before anything is computed."""
+    """Read the sheet of girths and lengths, before anything is computed."""
     if wanted.prior.measures is None:
         return None
     from kinertia.io.measures_file import read_measures
@@ -107,12 +107,12 @@ def _with_known_body(ready: Prepared, wanted: SubjectFile, measures: BodyMeasure
 
 
 def _with_unused(ready: Prepared, entry: str) -> Prepared:
-    """The same with what the subject file says in vain."""
+    """Add a finding for an entry of the subject file that has no effect."""
     return replace(ready, findings=(*ready.findings, finding("F194", entry=Quantity(entry))))
 
 
 def _group(wanted: SubjectFile, path: Path) -> LearntPrior:
-    """What was learnt of the person's group, unless the person was in it."""
+    """Read the prior learnt from the person's group, unless this person was part of it."""
     from kinertia.estimation.learnt_prior import LearntPrior
     from kinertia.io.population_file import read_population
 
@@ -126,10 +126,10 @@ def _group(wanted: SubjectFile, path: Path) -> LearntPrior:
 
 
 def check_plates(wanted: SubjectFile) -> None:
-    """The plates of this person are those of the session, by their names.
+    """Check that plates named alike in this person's and the session's files are the same plates.
 
     Raises:
-        SessionError: they are columns of force files, and nobody has said that those are plates.
+        SessionError: they are columns of force files, and the subject file does not state that those are plates.
     """
     files = [trial.forces for trial in wanted.trials if trial.forces is not None]
     if files and not wanted.instruments.same_plates:
@@ -145,11 +145,11 @@ def fit_subject(
     progress: Progress = lambda stage, share: None,
     overrule: Overrule | None = None,
 ) -> Fit:
-    """Body segment parameters of the person in a subject file: what `kinertia fit` does, in one call.
+    """Estimate body segment parameters of the person in a subject file: what `kinertia fit` does, in one call.
 
     Args:
-        subject: the file, or what `read_subject` made of it.
-        progress: called as the work goes on, with a stage's name and the share of it that is done.
+        subject: the file, or the result of `read_subject`.
+        progress: called as the work progresses, with a stage's name and the share of it that is done.
         overrule: what is overruled besides what the subject file says.
 
     Raises:

@@ -18,9 +18,9 @@ _SIDES = {"r": "right", "l": "left"}
 def with_widths(
     static: Recording, trials: Sequence[Recording], marker_set: MarkerSet, subject: Subject
 ) -> tuple[Recording, MarkerSet]:
-    """The static trial with all widths that are known, S105 for each from another file, and the set that names them.
+    """Return the static trial with all known widths and S105 for each from another file, and the set that names them.
 
-    What the subject file says goes before the static trial, and that before the other trials.
+    The subject file takes precedence over the static trial, and that over the other trials.
     """
     names, widths_m, borrowed = dict(marker_set.widths), dict(static.measurements), []
     for joint in WIDTHS:

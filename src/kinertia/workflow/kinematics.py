@@ -25,8 +25,8 @@ class Turned:
 
     Attributes:
         trial: facing +X with the built-in model, as recorded with an OpenSim model.
-        angle_deg: by which it was turned about the vertical.
-        read_seconds: that reading it took.
+        angle_deg: angle by which it was rotated about the vertical.
+        read_seconds: time taken to read it.
     """
 
     trial: Trial
@@ -35,8 +35,8 @@ class Turned:
 
 
 def usable_trial(context: RecordingContext) -> Trial:
-    """The trial of a recording that can be used, without markers that no frame shows, and without copied frames; of one
-    whose markers alone are used without forces.
+    """Return the usable trial of a recording: without markers that no frame shows, without copied frames, and without
+    forces where only its markers are used.
 
     Frames in which a foot bears load beyond its plate are not measured, unless the user vouches for a window, or
     hardly any others are left.
@@ -54,8 +54,8 @@ def usable_trial(context: RecordingContext) -> Trial:
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """Kinematics of the trials that could be solved, seconds by stage; what was found of them, and why the others could
-    not be solved.
+    """Kinematics of the trials that could be solved, with seconds by stage; findings about them, and why the others
+    could not be solved.
     """
 
     kinematics: tuple[Kinematics, ...]
@@ -64,12 +64,12 @@ class Solved:
 
     @property
     def without_forces(self) -> tuple[Kinematics, ...]:
-        """Of the trials whose markers alone are used."""
+        """Kinematics of the trials whose markers alone are used."""
         return tuple(one for one in self.kinematics if not one.trial.loads.plates)
 
     @property
     def with_forces(self) -> Solved:
-        """The others.
+        """The trials whose forces are used.
 
         Raises:
             SettingsError: none is left.
@@ -95,14 +95,14 @@ def solved_trials(
     calibration_s: float,
     progress: Progress,
 ) -> Solved:
-    """Smoothed coordinates of all trials.
+    """Solve and smooth the coordinates of all trials.
 
     Args:
-        skeleton: calibrated.
-        trials: in the axes in which they are solved.
+        skeleton: the calibrated skeleton.
+        trials: trials in the axes in which they are solved.
         smoothing: cutoff in Hz, or "gcv".
         calibration_s: seconds per trial that calibration took.
-        progress: called as the work goes on.
+        progress: called as the work progresses.
 
     Raises:
         TrialError: no trial can be solved.

@@ -32,11 +32,11 @@ from kinertia.settings import Attached, KnownSegment, PriorSettings
 from kinertia.workflow.attached import with_attached
 
 _UNLIKE_SD = 3.0
-"""Deviations from the tables beyond which the user is asked to look again."""
+"""Distance from the tables, in SDs, beyond which the user is asked to check the value."""
 _PROSTHESIS_MASS_SD, _PROSTHESIS_SPREAD = 0.4, 3.0
-"""Relative deviation of a prosthesis' mass, and the factor on the tables' other deviations."""
+"""Relative SD of a prosthesis' mass, and the factor on the tables' other SDs."""
 _KEPT_SHARE = 1e-3
-"""Deviation of a mass that is kept, over its prior's."""
+"""SD of a fixed mass, over its prior's."""
 
 
 def with_known_body(
@@ -47,14 +47,14 @@ def with_known_body(
     group: LearntPrior | None = None,
     measures: BodyMeasures | None = None,
 ) -> Prepared:
-    """A prepared person of whom more is known than mass, height and sex.
+    """Update the prior of a prepared person of whom more is known than mass, height and sex.
 
     Args:
-        ready: with the literature's prior.
-        settings: of the prior.
-        earlier: an estimate with deviations, in place of the literature's.
+        ready: the person with the literature's prior.
+        settings: settings of the prior.
+        earlier: an earlier estimate with SDs, in place of the literature's.
         segments: measured parameters by segment.
-        group: what was learnt of the person's group, in place of the literature's.
+        group: prior learnt from the person's group, in place of the literature's.
         measures: girths and lengths of the person.
 
     Raises:
@@ -95,7 +95,7 @@ def with_known_body(
 
 
 def _leans_on(source: str) -> Finding:
-    """What the prior is from."""
+    """Return S408, which states the source of the prior."""
     return finding("S408", source=Quantity(source))
 
 
@@ -106,7 +106,7 @@ def _leaning_on(
     segments: Mapping[str, KnownSegment],
     group: LearntPrior | None,
 ) -> tuple[Prepared, Collection[str]]:
-    """The person with the prior that measurements then move, and segments whose masses are no shares of the body's."""
+    """Return the person with the prior before measurements, and segments whose masses are not tied to body mass."""
     prior, found = ready.prior, list(ready.findings)
     if group is not None:
         if earlier is not None:
@@ -132,7 +132,7 @@ def _leaning_on(
 
 
 def _kept(prior: BspPrior, body: int, attached: Sequence[Attached]) -> dict[tuple[int, int], tuple[float, float]]:
-    """Masses of the body's segments, the first ones, and their deviations when they are kept; as `_measured`."""
+    """Return masses and SDs of the body's (first) segments for masses that are to be kept, as `_measured` does."""
     if unknown := [one.name for one in attached if one.mass_kg is None and one.on_scale]:
         raise PriorError(
             f"masses_kept = true under [prior], but {unknown[0]}, of unknown mass, was weighed with the person, so "
@@ -148,7 +148,7 @@ def _with_measures(
     segments: Mapping[str, KnownSegment],
     measures: BodyMeasures,
 ) -> tuple[BspPrior, list[Finding]]:
-    """The prior that girths and lengths have moved, and what was found of them."""
+    """Return the prior updated by girths and lengths, and the findings about them."""
     if ready.file is not None:
         raise PriorError("[prior] measures are of the built-in model's segments, which OpenSim models cut elsewhere")
     body_kg, height_m = ready.carried.body_kg, known_value(ready.subject.height_m)
@@ -166,7 +166,7 @@ def _with_measures(
 
 
 def _from_earlier(prior: BspPrior, earlier: BspTable) -> BspPrior:
-    """The prior with the mean and the deviations of an earlier estimate; of what it held, the prior's own."""
+    """Return the prior with mean and SDs of an earlier estimate; fixed parameters keep the prior's own."""
     names = prior.mean.segments
     if missing := [name for name in names if name not in earlier.segments]:
         raise PriorError(
@@ -185,7 +185,7 @@ def _from_earlier(prior: BspPrior, earlier: BspTable) -> BspPrior:
 
 
 def with_prosthesis(prior: BspPrior, segment: str) -> BspPrior:
-    """The prior of a segment that is none of the body's: wide, and independent of all others.
+    """Return the prior of a prosthetic segment: wide, and independent of all others.
 
     The side of a below-knee prosthesis is often some 2 kg lighter than the other (Smith & Martin 2011, J Prosthet
     Orthot 23:114), which is 40 % of shank and foot; its centre of mass is further up by an amount for which there are
@@ -209,7 +209,7 @@ def _row(prior: BspPrior, segment: str) -> int:
 
 
 def _measured(prior: BspPrior, segments: Mapping[str, KnownSegment]) -> dict[tuple[int, int], tuple[float, float]]:
-    """Value and deviation, SI, by row and column of the table."""
+    """Return value and SD (SI) of measured parameters, by row and column of the table."""
     result = {}
     for name, known in segments.items():
         row = _row(prior, name)
@@ -219,7 +219,7 @@ def _measured(prior: BspPrior, segments: Mapping[str, KnownSegment]) -> dict[tup
 
 
 def _given(prior: BspPrior, measured: Mapping[tuple[int, int], tuple[float, float]]) -> BspPrior:
-    """The prior once these parameters were measured."""
+    """Condition the prior on these measured parameters."""
     if not measured:
         return prior
     at = [10 * row + column for row, column in measured]

@@ -74,7 +74,7 @@ def opensim_model(screened: Screened, trials: Sequence[Turned], model: OsimModel
 
 
 def _feet(model: OsimModel) -> tuple[str, str]:
-    """The heaviest body of each foot by their names, which carries the ground reactions; there is one (O107)."""
+    """Return the heaviest body of each foot by name, which carries the ground reactions; there is one (O107)."""
     mass = dict(zip(model.bsp.segments, model.bsp.mass_kg.tolist(), strict=True))
     bodies = ([body for body in model.skeleton.segments if segment_of(body) == f"foot_{side}"] for side in "rl")
     right, left = (max(own, key=mass.__getitem__) for own in bodies)
@@ -88,7 +88,7 @@ def _assumed(
     idle: Sequence[str],
     held: BodySegmentParameters | None,
 ) -> list[Finding]:
-    """What was done to the model on the way: masses scaled, coordinates locked, bodies kept."""
+    """List assumptions made about the model: masses scaled, coordinates locked, bodies fixed."""
     file = Where(file=model.path.name)
     assumed = []
     if abs(factor - 1.0) >= _MASS_TOLERANCE:
@@ -110,10 +110,10 @@ def _assumed(
 
 
 def with_centre_offsets(model: OsimModel, skeleton: Skeleton) -> Skeleton:
-    """The skeleton with three more locked translations in front of every joint that turns about three axes.
+    """Add three locked translations in front of every joint of the skeleton that rotates about three axes.
 
-    They are `<joint>/offset_x` to `_z`, along the parent's axes. Joints that the file gives no frame of their own, or
-    one that hangs on another frame, do not get them: the file could not be changed accordingly.
+    They are `<joint>/offset_x` to `_z`, along the parent's axes. Joints without their own frame in the file, or with
+    one attached to another frame, do not get them: the file could not be changed accordingly.
     """
     joints = list(skeleton.joints)
     locked: dict[str, float] = {}
@@ -133,25 +133,25 @@ def with_centre_offsets(model: OsimModel, skeleton: Skeleton) -> Skeleton:
 
 
 def _marker_sd(skeleton: Skeleton) -> dict[str, float]:
-    """Per segment, how far its markers may be from where the model has them."""
+    """Return by segment how far (SD, m) its markers may be from their positions in the model."""
     upper = ("torso", "upper_arm", "forearm")
     return {s: UPPER_BODY_SD_M if kind_of(s) in upper else LOWER_BODY_SD_M for s in skeleton.segments}
 
 
 def kind_of(body: str) -> str:
-    """The segment of the prior's table that a body is part of by its name, without its side; else its own name."""
+    """Return the segment of the prior's table that a body belongs to by its name, without side; else its own name."""
     return (segment_of(body) or body).removesuffix("_r").removesuffix("_l")
 
 
 def at_mass(bsp: BodySegmentParameters, mass_kg: float) -> tuple[BodySegmentParameters, float]:
-    """The same parameters with masses and inertias scaled to this total, and the factor."""
+    """Scale masses and inertias to this total mass; return the parameters and the factor."""
     factor = mass_kg / bsp.total_mass_kg
     scaled = BodySegmentParameters(bsp.segments, bsp.mass_kg * factor, bsp.com_m, bsp.inertia_kgm2 * factor)
     return scaled, factor
 
 
 def parted(skeleton: Skeleton, own: BodySegmentParameters) -> tuple[BspPrior, BodySegmentParameters | None]:
-    """Prior around the model's own parameters of the bodies to be estimated, and the parameters of all others."""
+    """Return a prior around the model's own parameters of bodies to be estimated, and the parameters of all others."""
     estimated, rest = _split(skeleton, own)
     prior = literature_prior(estimated, [kind_of(name) for name in estimated.segments])
     prior = replace(prior, mass_sd_kg=SCALE_SD * own.total_mass_kg)
@@ -159,7 +159,7 @@ def parted(skeleton: Skeleton, own: BodySegmentParameters) -> tuple[BspPrior, Bo
 
 
 def _split(skeleton: Skeleton, own: BodySegmentParameters) -> tuple[BodySegmentParameters, BodySegmentParameters]:
-    """The bodies to be estimated, and all others."""
+    """Split the parameters into bodies to be estimated, and all others."""
     chosen = estimated_bodies(skeleton, own)
     estimated, rest = (_part(own, [n for n in own.segments if (n in chosen) == taken]) for taken in (True, False))
     return estimated, rest

@@ -29,16 +29,16 @@ class Person:
     """One person as given, before any question is asked.
 
     Attributes:
-        subject: what is stated.
+        subject: stated data.
         trials: recordings of motions, in the order given.
         static: the static trial.
         more_statics: further recordings in which the person stands, of which none is the static trial.
         marker_set: the laboratory's; found among the presets if None.
         model: the OpenSim model, in place of the static trial.
-        calibrate: markers and joint centres of the model are to move.
+        calibrate: whether markers and joint centres of the model may move.
         attached: what the person wore or carried.
         overrule: what the user overrules, for all trials.
-        overrule_of: the same of single trials, by their names.
+        overrule_of: what the user overrules in single trials, by name.
         unread: findings of files that could not be read.
 
     Examples:
@@ -61,16 +61,16 @@ class Person:
 
     @property
     def recordings(self) -> list[Recording]:
-        """Of the motions."""
+        """Recordings of the motions."""
         return [item.recording for item in self.trials]
 
     def with_overrule(self, overrule: Overrule) -> Person:
-        """The same where the user overrules more."""
+        """Return the person with more findings overruled by the user."""
         return replace(self, overrule=self.overrule + overrule)
 
     @cached_property
     def completed(self) -> Subject | SubjectError:
-        """What is stated, with what files add; the error where that is incomplete or cannot be true."""
+        """Stated data completed from the files; the error where they are incomplete or cannot be true."""
         try:
             return complete_subject(self.subject, self._files, mass_only=True)
         except SubjectError as error:
@@ -78,17 +78,17 @@ class Person:
 
     @property
     def lacking(self) -> list[str]:
-        """What a fit needs that neither the user nor a file states: mass, stature, sex."""
+        """Data that a fit needs and that neither the user nor a file states: mass, stature, sex."""
         return list(lacking(self.subject, self._files, mass_only=self.model is not None).values())
 
     @property
     def _files(self) -> list[Recording]:
-        """All that may state mass and stature."""
+        """All recordings that may state mass and stature."""
         return [*([] if self.static is None else [self.static]), *self.recordings]
 
     @cached_property
     def labels(self) -> MarkerSet | MarkerSetError:
-        """Which marker is on which segment, by the model or a marker set; the error where none fits."""
+        """Marker set that assigns markers to segments, from the model or a preset; the error where none fits."""
         if self.model is not None:
             return markers_of_model(self.model)
         given = [*([] if self.static is None else [self.static]), *self.recordings, *self.more_statics]
@@ -102,7 +102,7 @@ class Person:
 
 
 def read_person(wanted: SubjectFile, progress: Progress = lambda stage, share: None) -> Person:
-    """Everything that a subject file names; recordings that cannot be read become findings, the others are read.
+    """Read everything that a subject file names; recordings that cannot be read become findings.
 
     Raises:
         KinertiaError: the marker set or the model cannot be read, or no trial can.
@@ -139,16 +139,16 @@ def _read_model(path: Path) -> OsimModel:
 
 @dataclass
 class Unread:
-    """Collects the findings of files that cannot be read."""
+    """Collector of findings about files that cannot be read."""
 
     findings: list[Finding] = field(default_factory=list)
     errors: list[KinertiaError] = field(default_factory=list)
 
     def tried(self, read: Callable[[], Read], trial: str | None) -> Read | None:
-        """What could be read; None where it could not, which is then among the findings (`trial` None: of no trial).
+        """Return what was read; None if reading failed, which is then a finding (of no trial if `trial` is None).
 
         Raises:
-            KinertiaError: one that is no finding.
+            KinertiaError: an error that is not a finding.
         """
         try:
             return read()
@@ -160,6 +160,6 @@ class Unread:
             return None
 
     def expect_any(self, trials: Sequence[object]) -> None:
-        """Raise the error of a single trial that cannot be read, as it is; of several, all of them at once."""
+        """Raise the error of a single unreadable trial as it is, or of several trials all errors at once."""
         if self.errors and not trials:
             raise self.errors[0] if len(self.errors) == 1 else BlockedError(self.findings, self.findings)

@@ -51,7 +51,7 @@ class PersonModel:
 
 
 def with_stated_ranges(skeleton: Skeleton, subject: Subject) -> Skeleton:
-    """The skeleton with the ranges that the subject file states in place of its own; what was clamped stays so.
+    """Replace ranges of motion of the skeleton by those in the subject file; clamped coordinates stay clamped.
 
     Raises:
         SettingsError: the model has no such coordinate.

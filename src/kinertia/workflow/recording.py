@@ -20,13 +20,13 @@ class RecordingCheck:
     """Facts and findings of one recording; times in s on its own time base.
 
     Attributes:
-        context: what the questions were asked of.
-        marker_set: how its labels fit.
-        markers: visibility, over the whole recording, of the set's markers, or of all where no set fits.
+        context: the context in which the questions were asked.
+        marker_set: how the labels fit.
+        markers: visibility over the whole recording of the set's markers, or of all where no set fits.
         movements: how far trunk and pelvis move, or None.
         plates: one entry per plate; empty without forces.
-        windows: in which every foot on the ground stands on a plate, longest first.
-        findings: of this recording, with what explains and what overrules them.
+        windows: windows in which every foot on the ground stands on a plate, longest first.
+        findings: findings of this recording, with what explains and what overrules them.
 
     Examples:
         >>> check = kinertia.check_recording(kinertia.read_recording("lab/walk.trc", "lab/walk_grf.mot"))
@@ -44,7 +44,7 @@ class RecordingCheck:
 
     @classmethod
     def of(cls, context: RecordingContext, findings: Sequence[Finding]) -> RecordingCheck:
-        """Of a recording that was screened; `findings` are the whole person's."""
+        """Collect facts and findings of a screened recording; `findings` are the whole person's."""
         recording, used = context.recording, context.marker_set
         trial = context.trial
         movements = None
@@ -63,7 +63,7 @@ class RecordingCheck:
 
     @property
     def recording(self) -> Recording:
-        """What was read."""
+        """The recording as read."""
         return self.context.recording
 
     @property
@@ -73,11 +73,11 @@ class RecordingCheck:
 
     @property
     def travel(self) -> Travel:
-        """What the person does."""
+        """Movement of the person: walking, standing still, or moving on the spot."""
         return self.context.travel
 
     def facts(self) -> list[tuple[str, str]]:
-        """What was measured and how, as pairs of a name and a sentence."""
+        """Describe what was measured and how, as pairs of a name and a sentence."""
         markers, plates, match = self.recording.markers, self.recording.plates, self.marker_set
         rate = "" if len(markers.time) < 2 else f" at {markers.rate_hz:g} Hz, {markers.time[0]:.3f} to "
         axes = f"lengths in {self.recording.length_unit}, {self.recording.vertical} up; read as m, Y up"

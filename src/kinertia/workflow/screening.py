@@ -73,7 +73,7 @@ class Screened:
 
     @property
     def rules(self) -> int:
-        """How many rules were asked."""
+        """Number of rules that were checked."""
         of_static = STATIC_QUESTIONS if self.context.standing else ()
         return rules_of(*MOTION_QUESTIONS, *of_static, *PERSON_QUESTIONS)
 
@@ -94,7 +94,7 @@ class Screened:
         return self.left_out_by(self.findings)
 
     def left_out_by(self, findings: Sequence[Finding]) -> tuple[str, ...]:
-        """The same by these findings."""
+        """Return the names of the trials that cannot be used because of these findings."""
         names = {one.where.trial for one in blocking(findings)}
         return tuple(
             dict.fromkeys([*sorted(self._unread), *(one.name for one in self.context.trials if one.name in names)])
@@ -106,7 +106,7 @@ class Screened:
         return {one.where.trial for one in blocking(findings) if one.where.trial not in names or not _of_forces(one)}
 
     def overruled(self, findings: Sequence[Finding]) -> list[Finding]:
-        """Findings, those here or more of them, with what explains and what overrules each."""
+        """Return findings, those here or more, with what explains and what overrules each."""
         return overruled(explained(findings), self.person.overrule, self.person.overrule_of)
 
     @cached_property
@@ -123,7 +123,7 @@ class Screened:
 
 
 def screen(person: Person) -> Screened:
-    """Ask everything that can be asked before inverse kinematics."""
+    """Check everything that can be checked before inverse kinematics."""
     context = person_context(person)
     found = [*person.unread]
     if isinstance(person.completed, SubjectError) and person.completed.finding is not None:
@@ -174,12 +174,12 @@ def _of_forces(one: Finding) -> bool:
 
 
 def person_context(person: Person) -> PersonContext:
-    """What questions are asked of, before any is."""
+    """Build the context in which questions about a person are asked."""
     label_set = None if isinstance(person.labels, MarkerSetError) else person.labels
     stated = _stated(person)
 
     def standing(recording: Recording) -> RecordingContext:
-        """With the widths of joints that are known."""
+        """Return the context of a recording of standing, with the known joint widths."""
         own_set = label_set
         if own_set is not None and person.model is None:
             recording, own_set = with_widths(recording, person.recordings, own_set, person.subject)
@@ -207,7 +207,7 @@ def person_context(person: Person) -> PersonContext:
 
 
 def _stated(person: Person) -> Subject:
-    """What is stated, with what files add; as stated where it is incomplete, without what cannot be true."""
+    """Return stated data completed from the files; as stated where incomplete, without what cannot be true."""
     if isinstance(person.completed, SubjectError):
         return person.subject.model_copy(update={person.completed.field: None})
     return person.completed
@@ -226,7 +226,7 @@ def _of_recording(context: RecordingContext, questions: Sequence[Question[Record
 
 
 def _of_person(context: PersonContext, found: Sequence[Finding]) -> list[Finding]:
-    """Of the person with the trials that are not blocked themselves: another's forces would accuse the mass."""
+    """Check the person with the trials that are not blocked: another person's forces would put the mass in doubt."""
     blocked = {one.where.trial for one in blocking(explained(found))}
     sound = replace(context, trials=[one for one in context.trials if one.name not in blocked], found=tuple(found))
     of_person = [one for one in found if one.where.trial is None]
@@ -234,7 +234,7 @@ def _of_person(context: PersonContext, found: Sequence[Finding]) -> list[Finding
 
 
 def _in_model(one: Finding, context: PersonContext) -> Finding:
-    """A finding about the OpenSim model itself with the name of its file."""
+    """Add the model's file name to a finding about the OpenSim model itself."""
     if context.model is None or one.where.trial is not None or not one.code.startswith("O"):
         return one
     return one.in_file(context.model.path.name)

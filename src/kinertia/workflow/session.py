@@ -24,12 +24,12 @@ from kinertia.settings import Instruments
 
 @dataclass(frozen=True)
 class SessionInstruments:
-    """What all trials of a session together say.
+    """Instrument errors of a session, from the trials of all its people.
 
     Attributes:
-        people: what each person's trials say.
-        errors: of plates and synchronisation.
-        contradictions: errors that a person's trials find other than those of the others (S501).
+        people: information from each person's trials.
+        errors: errors of plates and synchronisation.
+        contradictions: errors in which a person's trials differ from the others' (S501).
     """
 
     people: tuple[PersonInstruments, ...]
@@ -38,7 +38,7 @@ class SessionInstruments:
 
     @property
     def found(self) -> dict[str, dict[str, tuple[float, float, str]]]:
-        """Per instrument, per quantity its error, deviation and unit, as people read them."""
+        """Error, SD and unit by instrument and quantity, in words and units for people."""
         found: dict[str, dict[str, tuple[float, float, str]]] = {}
         for one in self.errors:
             of_item = found.setdefault(item_text(one.kind, one.plate), {})
@@ -47,14 +47,14 @@ class SessionInstruments:
 
 
 def person_instruments(fit: Fit, files: Sequence[str]) -> PersonInstruments:
-    """What a fit says of plates and clock, for others of the session.
+    """Return the information of a fit on plates and synchronisation, for others of the session.
 
     Args:
-        fit: of the simultaneous estimate.
-        files: SHA-256 of every file that it is from.
+        fit: a fit by the simultaneous estimate.
+        files: SHA-256 of every file that the fit is from.
 
     Raises:
-        SessionError: it is of the two-level estimate, which takes instruments as exact.
+        SessionError: the fit is by the two-level estimate, which takes instruments as exact.
     """
     if fit.posterior is None:
         problem = 'the two-level estimate takes plates and clock as exact; use method = "simultaneous"'
@@ -70,7 +70,7 @@ def person_instruments(fit: Fit, files: Sequence[str]) -> PersonInstruments:
 
 
 def session_instruments(people: Sequence[PersonInstruments], stated: Instruments) -> SessionInstruments:
-    """All that the people of a session say together, under what the laboratory states."""
+    """Combine the information of all people of a session, under what the laboratory states."""
     apart: list[Finding] = []
     # of two, one contradicts the other
     for person in people if len(people) > 2 else people[: len(people) - 1]:
@@ -88,7 +88,7 @@ def _errors(people: Sequence[PersonInstruments], stated: Instruments) -> tuple[C
     after = before.updated(unknowns, covariance @ (shown.right + before.pull), covariance)
     covariance = np.linalg.inv(shown.information + after.precision)
     mean = covariance @ (shown.right + after.pull)
-    # plate and floor together are what a foot stands on
+    # a foot stands on the sum of plate error and common offset
     to_plates, each = plates_with_floor(len(plates)), len(PLATE_ERRORS)
     values = to_plates @ mean[:-1]
     sd = np.sqrt(np.diag(to_plates @ covariance[:-1, :-1] @ to_plates.T))
@@ -101,13 +101,13 @@ def _errors(people: Sequence[PersonInstruments], stated: Instruments) -> tuple[C
 def with_instruments(
     ready: Prepared, stated: Instruments, session: Sequence[PersonInstruments] = (), files: Sequence[str] = ()
 ) -> Prepared:
-    """A prepared person whose instruments are known as the laboratory states it, and as others have shown.
+    """Return a prepared person with instrument priors from the laboratory's statements and the session's other people.
 
     Args:
-        ready: with the literature's deviations.
-        stated: by the laboratory.
-        session: what people measured with the same instruments say.
-        files: SHA-256 of this person's files: who shares one of them is the same person, and says nothing new.
+        ready: the person with the literature's SDs.
+        stated: statements of the laboratory.
+        session: information from people measured with the same instruments.
+        files: SHA-256 of this person's files: whoever shares one is the same person and adds nothing.
 
     Raises:
         SessionError: none of the others stood on any of this person's plates.

@@ -44,16 +44,16 @@ _LABELS = {
 _MARKER_SET = "marker_set"
 _ABOUT_MARKER_SET = "left open: found from the labels where they have most of a preset's"
 USE = "use:"
-"""What the fields of the form are called that say what a file is used as; the file's name follows."""
+"""Prefix of the form's fields for the use of a file; the file's name follows."""
 
 
 def label_of(key: str) -> str:
-    """What an entry of `[subject]` is called in the form."""
+    """Return the label of an entry of `[subject]` in the form."""
     return _LABELS.get(key, key.replace("_", " "))
 
 
 def fields(content: Content, typed: Mapping[str, str] | None = None) -> list[Field]:
-    """The entries of `[subject]`, all that the subject file knows; what was typed goes before what is written."""
+    """Return all entries of `[subject]` that may be in a subject file; typed values precede written ones."""
     written = content.get("subject")
     known = written if isinstance(written, Mapping) else {}
     shown = []
@@ -69,7 +69,7 @@ def fields(content: Content, typed: Mapping[str, str] | None = None) -> list[Fie
 
 
 def marker_set_field(content: Content, typed: Mapping[str, str] | None = None) -> Field | None:
-    """Which preset; None where a file of the person's is the marker set, or a model has the markers."""
+    """Return the choice of preset; None where the marker set is a file of the person's, or a model has the markers."""
     model = _model(content)
     written = str(model.get("markers", ""))
     if "osim" in model or (written and written not in preset_names()):
@@ -84,7 +84,7 @@ def _model(content: Content) -> Mapping[str, Any]:
 
 
 def entries(person: Person) -> Content:
-    """Of the person's subject file; none where there is none.
+    """Read the entries of the person's subject file; none without a file.
 
     Raises:
         FileError: it is not TOML.
@@ -93,7 +93,7 @@ def entries(person: Person) -> Content:
 
 
 def recognise(person: Person) -> None:
-    """Make or complete the subject file after files came or went; what was corrected before stays.
+    """Make or complete the subject file after files were added or removed; earlier corrections stay.
 
     Raises:
         KinertiaError: nothing in the files can be used, or the subject file is not TOML.
@@ -107,11 +107,11 @@ def recognise(person: Person) -> None:
 
 
 def _adopt(person: Person) -> None:
-    """A subject file under another name is the person's if it is the only one."""
+    """Adopt a subject file under another name if it is the only one."""
     dropped = [path for path in person.files() if is_subject_file(path)]
     if len(dropped) == 1 and not person.subject.exists():
         dropped[0].rename(person.subject)
-        # what it names has been thought of
+        # the files that it states count as seen
         person.note(seen=[path.name for path in person.files()])
 
 
@@ -121,7 +121,7 @@ def write(person: Person, content: Content) -> None:
 
 
 def write_text(person: Person, text: str) -> None:
-    """Write the subject file as a user typed it; files are named without folders.
+    """Write the subject file as a user typed it; files are stated without folders.
 
     Raises:
         FileError: it is not TOML, and the file stays as it was.
@@ -134,10 +134,10 @@ def write_text(person: Person, text: str) -> None:
 
 
 def write_form(person: Person, form: Mapping[str, str]) -> None:
-    """Write the subject file with what the form says, everything else as it was.
+    """Write the subject file with the form's entries, everything else as it was.
 
     Raises:
-        SettingsError: a number is none.
+        SettingsError: a number cannot be read.
     """
     content = entries(person)
     subject: dict[str, Any] = dict(content.get("subject", {}))
@@ -161,7 +161,7 @@ def write_form(person: Person, form: Mapping[str, str]) -> None:
 
 
 def _write_uses(person: Person, before: Content, changed: Content, uses: Mapping[str, str]) -> None:
-    """Write the entries with these uses; a trial that is used again has the forces and the rest that it had."""
+    """Write the entries with these uses of files; a trial that is used again gets back its forces and other entries."""
     aside = person.notes().get("aside", [])
     after = with_uses(*taken_up(changed, uses, aside))
     if after != before:
@@ -181,7 +181,7 @@ def _number(key: str, text: str) -> float:
 
 
 def trouble(person: Person) -> str:
-    """What is wrong with the subject file, as the command line says it; empty if nothing is."""
+    """Return what is wrong with the subject file, as the command line reports it; empty if nothing is."""
     try:
         read_subject(person.subject)
     except KinertiaError as error:

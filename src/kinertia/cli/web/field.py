@@ -12,9 +12,9 @@ class Field:
 
     Attributes:
         key: its name in the form.
-        label, about: what it is, short and at length.
-        value: as the field shows it.
-        choices: of a field that is no number or text.
+        label, about: description, short and long.
+        value: value as the field shows it.
+        choices: choices of a field that is not a number or text.
         optional: whether most people leave it empty.
     """
 
@@ -27,7 +27,7 @@ class Field:
 
 
 def choices_of(annotation: object) -> tuple[str, ...]:
-    """What an entry can be where there is a list of it."""
+    """Return the possible values of an entry where they are a list."""
     if get_origin(annotation) is Literal:
         return get_args(annotation)
     return next((found for part in get_args(annotation) if (found := choices_of(part))), ())

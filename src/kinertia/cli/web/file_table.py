@@ -28,14 +28,14 @@ _PRIOR_FILES = ("bsp", "measures")
 
 @dataclass(frozen=True)
 class FileRow:
-    """One file.
+    """One file of a person, with its use.
 
     Attributes:
-        name: of the file.
-        kind: what is in it, in words.
-        use: which of `choices` it is used as.
-        choices: values and their words.
-        size: bytes.
+        name: name of the file.
+        kind: its content, in words.
+        use: its use, one of `choices`.
+        choices: possible uses and their words.
+        size: size in bytes.
     """
 
     name: str
@@ -46,7 +46,7 @@ class FileRow:
 
 
 def file_table(files: Sequence[Path], content: Content) -> list[FileRow]:
-    """A row per file; uses as the entries of the subject file have them."""
+    """Return a row per file; uses as the entries of the subject file have them."""
     captures = [file for file in files if is_capture(file)]
     uses = uses_of(content)
     rows = []
@@ -59,7 +59,7 @@ def file_table(files: Sequence[Path], content: Content) -> list[FileRow]:
 
 
 def _kind(file: Path, capture: bool, captures: Sequence[Path]) -> tuple[str, tuple[tuple[str, str], ...]]:
-    """What a file holds, and what it can be used as."""
+    """Return what a file holds, and its possible uses."""
     suffix = file.suffix.lower()
     unused = (NOT_USED, "not used")
     if is_plate_file(file):
@@ -88,7 +88,7 @@ def _kind(file: Path, capture: bool, captures: Sequence[Path]) -> tuple[str, tup
 
 
 def uses_of(content: Content) -> dict[str, str]:
-    """Use by file name."""
+    """Return the use by file name."""
     uses: dict[str, str] = {}
     for name, keys in (("model", _MODEL_FILES), ("prior", _PRIOR_FILES)):
         table = _table(content, name)
@@ -101,12 +101,12 @@ def uses_of(content: Content) -> dict[str, str]:
 
 
 def with_uses(content: Content, uses: Mapping[str, str]) -> Content:
-    """The entries with the files used like this; what else they say of a trial stays with it.
+    """Return the entries with these uses of files; other entries of a trial stay with it.
 
     A model takes the place of the static trial and its marker set.
 
     Raises:
-        SettingsError: two files are used as what there is one of.
+        SettingsError: two files have a use that only one can have.
     """
     by_use: dict[str, list[str]] = {}
     for name, use in uses.items():
@@ -142,14 +142,14 @@ def with_uses(content: Content, uses: Mapping[str, str]) -> Content:
 
 
 def put_aside(before: Content, after: Content, aside: Iterable[Content]) -> list[Content]:
-    """Entries of trials that are not used, to remember them: what `before` or `aside` has and `after` lacks."""
+    """Collect entries of unused trials, to remember them: those that `before` or `aside` has and `after` lacks."""
     known = {str(trial.get("markers")): dict(trial) for trial in (*aside, *_trials(before))}
     used = {str(trial.get("markers")) for trial in _trials(after)}
     return [trial for markers, trial in known.items() if markers not in used]
 
 
 def taken_up(content: Content, uses: Mapping[str, str], aside: Iterable[Content]) -> tuple[Content, dict[str, str]]:
-    """Entries and uses with what was put aside of trials that are used again; files that have another use keep it."""
+    """Restore entries and uses of trials that are used again from those put aside; files with another use keep it."""
     used = {str(trial.get("markers")) for trial in _trials(content)}
     back = [one for one in aside if uses.get(str(one.get("markers"))) == "trial" and one["markers"] not in used]
     given = set(uses.values())
@@ -159,7 +159,7 @@ def taken_up(content: Content, uses: Mapping[str, str], aside: Iterable[Content]
 
 
 def with_new_files(content: Content, draft: Content, present: Iterable[str], seen: Iterable[str]) -> Content:
-    """The entries after files were added or removed: those of files that are gone go, new files are used as drafted."""
+    """Update entries after files were added or removed: those of missing files go, new files are used as drafted."""
     here, new = set(present), set(present) - set(seen)
     drafted = uses_of(draft)
     uses = {name: use for name, use in uses_of(content).items() if name in here}
@@ -173,7 +173,7 @@ def with_new_files(content: Content, draft: Content, present: Iterable[str], see
 
 
 def within_folder(content: Content) -> Content:
-    """The entries with every file by its name only: all are in the person's folder, none is looked for elsewhere."""
+    """Reduce every file in the entries to its name: all are in the person's folder, none is looked for elsewhere."""
     changed = dict(content)
     for name, table in TABLES.items():
         keys = [key for key, field in table.model_fields.items() if _names_a_file(field.annotation)]
@@ -195,7 +195,7 @@ def _names_a_file(annotation: object) -> bool:
 
 
 def is_subject_file(file: Path) -> bool:
-    """Whether a TOML file says who walked."""
+    """Return whether a TOML file is a subject file."""
     return file.suffix.lower() == ".toml" and bool({"subject", "trial"} & set(_toml(file)))
 
 

@@ -23,7 +23,7 @@ HEADERS = {
     "cross-origin-resource-policy": "same-origin",
     "cross-origin-opener-policy": "same-origin",
 }
-"""Of every answer that does not have its own: pages load nothing from elsewhere, and no other page holds them."""
+"""Headers of every answer without its own: pages load nothing from elsewhere, and no other page may embed them."""
 RESULT_POLICY = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:; font-src data:; "
     "form-action 'none'; base-uri 'none'; frame-ancestors 'self'; sandbox allow-scripts allow-downloads allow-modals"
@@ -32,7 +32,7 @@ RESULT_POLICY = (
 
 
 class Guard:
-    """Lets requests through to the application that have the token and come from no other site.
+    """Filter that passes requests to the application only if they have the token and come from no other site.
 
     The token is the first part of the path; the application sees it as its root.
     """
@@ -43,11 +43,11 @@ class Guard:
         self._hosts = (f"127.0.0.1:{port}", f"localhost:{port}")
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """One request."""
+        """Handle one request."""
         if scope["type"] == "lifespan":
             await self._app(scope, receive, send)
             return
-        if scope["type"] != "http":  # there is nothing to talk about on a websocket
+        if scope["type"] != "http":  # websockets are not used
             await send({"type": "websocket.close", "code": 1008})
             return
         refused = self._refusal(scope)
@@ -65,7 +65,7 @@ class Guard:
         await self._app({**scope, "root_path": f"/{self._token}"}, receive, sent)
 
     def _refusal(self, scope: Scope) -> str:
-        """Why a request is refused; empty if it is not."""
+        """Return why a request is refused; empty if it is not."""
         headers = Headers(scope=scope)
         if headers.getlist("host") not in [[host] for host in self._hosts]:
             return "Kinertia answers on 127.0.0.1 only."

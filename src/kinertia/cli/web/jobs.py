@@ -14,15 +14,15 @@ from kinertia.model.compiled import is_compiled
 KINDS = ("check", "fit")
 _PATIENCE_S = 5.0
 _ENDED_FROM_OUTSIDE = (-9, -15)
-"""SIGKILL and SIGTERM, as Python tells them."""
+"""SIGKILL and SIGTERM, as Python reports them."""
 _OUTSIDE = "It was ended from outside, as the system does where memory runs out: close other programs, start it again."
 
 
 class Job(Work):
-    """A check or a fit that waits or is at work.
+    """A check or a fit that waits or is running.
 
     Attributes:
-        person: of whom.
+        person: the person.
         kind: "check" or "fit".
     """
 
@@ -32,7 +32,7 @@ class Job(Work):
         self.kind = kind
 
     def run(self) -> dict[str, Any]:
-        """Do it; how it ended, for the person's notes."""
+        """Run the job; return how it ended, for the person's notes."""
         ended = self.done(self.kind, str(self.person.folder))
         if self.cancelled:
             return {"how": "cancelled"}
@@ -51,21 +51,21 @@ class Job(Work):
 
 
 class Jobs:
-    """Two lines of people: one for checks, which take seconds, and one for fits.
+    """Two queues of people: one for checks, which take seconds, and one for fits.
 
     Attributes:
-        preparing: what is compiled once on a machine, as long as that is not done; fits wait for it.
+        preparing: one-time compilation on a machine, until it is done; fits wait for it.
     """
 
     def __init__(self, prepare: bool = False) -> None:
-        """Nobody waits yet; `prepare` for compiling beforehand, where that is not done, what the first fit needs."""
+        """Create empty queues; `prepare` compiles beforehand, where not yet done, what the first fit needs."""
         self.preparing = Work() if prepare and not is_compiled() else None
         self._lines: dict[str, list[Job]] = {kind: [] for kind in KINDS}
         self._changed = threading.Condition()
         self._closed = False
 
     def add(self, person: Person, kind: str) -> None:
-        """Let a person wait for a check or a fit, unless they do already."""
+        """Queue a check or a fit of a person, unless one is queued already."""
         with self._changed:
             if self.of(person, kind) is None:
                 person.note(**{kind: started()})
@@ -73,20 +73,20 @@ class Jobs:
                 self._changed.notify_all()
 
     def of(self, person: Person, kind: str) -> Job | None:
-        """The person's check or fit that waits or is at work."""
+        """Return the person's check or fit that waits or is running."""
         return next((job for job in self._lines[kind] if job.person == person), None)
 
     def busy(self, person: Person) -> bool:
-        """Whether anything of the person waits or is at work."""
+        """Return whether any job of the person waits or is running."""
         return any(self.of(person, kind) is not None for kind in KINDS)
 
     def place(self, job: Job) -> int:
-        """How many are before it."""
+        """Return the number of jobs before it."""
         line = self._lines[job.kind]
         return line.index(job) if job in line else 0
 
     def cancel(self, person: Person, kind: str) -> None:
-        """Give up a person's check or fit, and wait until it has ended."""
+        """Cancel a person's check or fit, and wait until it has ended."""
         job = self.of(person, kind)
         if job is None:
             return
@@ -99,7 +99,7 @@ class Jobs:
 
     @contextmanager
     def at_work(self) -> Iterator[None]:
-        """Works through the lines during the block; what is not finished at its end is given up, and noted so."""
+        """Work through the queues during the block; unfinished jobs are then cancelled and noted as interrupted."""
         threads = [threading.Thread(target=self._work, args=(kind,), daemon=True) for kind in KINDS]
         for thread in threads:
             thread.start()

@@ -33,7 +33,7 @@ from kinertia.io.working_folder import sweep
 
 SUBJECT, SUMMARY, OUTCOME = "subject.toml", "fit.json", "outcome.json"
 LOG = "failure.log"
-"""What a crash left for the developers."""
+"""Log that a crash left for the developers."""
 _RECORD, _LOCK = ".kinertia-person.json", ".kinertia-app.lock"
 _STARTED, _INTERRUPTED = "started", "interrupted"
 _LONGEST_NAME = 80
@@ -43,18 +43,18 @@ _NOTING = threading.Lock()
 
 @dataclass(frozen=True)
 class Person:
-    """One person's folder; the name of the folder is theirs."""
+    """Folder of one person, named after the person."""
 
     folder: Path
 
     @property
     def name(self) -> str:
-        """What the person is called in the library."""
+        """Name of the person in the library."""
         return self.folder.name
 
     @property
     def subject(self) -> Path:
-        """The subject file, which need not be there yet."""
+        """Path of the subject file, which need not exist yet."""
         return self.folder / SUBJECT
 
     @property
@@ -73,7 +73,7 @@ class Person:
         return (self.results / SUMMARY).is_file()
 
     def files(self) -> list[Path]:
-        """What was dropped: everything but the subject file and what a crash left."""
+        """List the dropped files: everything but the subject file and remains of a crash."""
         return sorted(
             path
             for path in self.folder.iterdir()
@@ -81,7 +81,7 @@ class Person:
         )
 
     def changed(self) -> float:
-        """When files or results changed last, seconds since 1970."""
+        """Return when files or results last changed, seconds since 1970."""
         return max((self.folder / _RECORD).stat().st_mtime, self.folder.stat().st_mtime)
 
     @cached_property
@@ -93,7 +93,7 @@ class Person:
             return ""
 
     def outcome(self, kind: str) -> dict[str, Any]:
-        """What the last check or fit left beside what it wrote; empty where there is none, or of other results."""
+        """Return the outcome that the last check or fit left beside its files; empty without, or if other results'."""
         outcome = _json(getattr(self, kind) / OUTCOME)
         summary = self.results / SUMMARY
         if kind == "results" and (not summary.is_file() or outcome.get("summary") != sha256(summary)):
@@ -101,11 +101,11 @@ class Person:
         return outcome
 
     def notes(self) -> dict[str, Any]:
-        """What else is remembered: how the last check and fit ended that left nothing, and which files were seen."""
+        """Return other notes: how a check and a fit that left no files ended, and which files were seen."""
         return _json(self.folder / _RECORD)
 
     def note(self, **values: Any) -> None:
-        """Remember this as well."""
+        """Add these values to the notes."""
         with _NOTING:
             write_then_rename(
                 self.folder / _RECORD, json.dumps({**self.notes(), **values}, indent=1, default=str) + "\n"
@@ -113,10 +113,10 @@ class Person:
 
 
 class Library:
-    """All people of a folder."""
+    """All people in a folder."""
 
     def __init__(self, folder: Path) -> None:
-        """Make the folder if need be.
+        """Open the library, making the folder if necessary.
 
         Raises:
             FileError: it cannot be written to.
@@ -127,7 +127,7 @@ class Library:
 
     @contextmanager
     def opened(self) -> Iterator[None]:
-        """Nobody else changes it during the block; what an earlier process did not finish is noted as interrupted.
+        """Lock the library during the block; jobs that an earlier process did not finish are noted as interrupted.
 
         Raises:
             FileError: another process has it open.
@@ -142,23 +142,23 @@ class Library:
             yield
 
     def people(self) -> list[Person]:
-        """Everybody, who changed last first."""
+        """List everybody, most recently changed first."""
         found = [Person(path) for path in self.folder.iterdir() if (path / _RECORD).is_file() and not path.is_symlink()]
         return sorted(found, key=Person.changed, reverse=True)
 
     def person(self, name: str) -> Person | None:
-        """Who is called that; names are compared, so that none leads out of the library."""
+        """Find the person of this name; names are compared, so that none leads out of the library."""
         return next((person for person in self.people() if person.name == name), None)
 
     def add(self, wanted: str) -> Person:
-        """A new person of this name, or of one like it that is free."""
+        """Add a new person with this name, or a similar one that is free."""
         person = Person(self.folder / self._free(_folder_name(wanted) or "Person"))
         person.folder.mkdir()
         person.note()
         return person
 
     def rename(self, person: Person, wanted: str) -> Person:
-        """The person under this name, or one like it that is free; as before if it is none.
+        """Rename a person to this name, or a similar one that is free; unchanged if nothing valid is left of it.
 
         Raises:
             FileError: a file is open in another program.
@@ -172,7 +172,7 @@ class Library:
         return Person(self.folder / name)
 
     def _free(self, base: str, but: str = "") -> str:
-        """This name, with a number where it is taken by another folder than `but`."""
+        """Return this name, with a number where it is taken by another folder than `but`."""
         taken = [path.name for path in self.folder.iterdir() if path.name != but]
         name, number = base, 1
         while any(same_folder(name, other) for other in taken):
@@ -181,7 +181,7 @@ class Library:
         return name
 
     def delete(self, person: Person) -> None:
-        """Remove a person's files and results; whoever looks finds all of it or nothing.
+        """Delete a person's files and results, all at once.
 
         Raises:
             FileError: a file is open in another program.
@@ -196,14 +196,14 @@ class Library:
 
 
 def _folder_name(wanted: str) -> str:
-    """A name that a folder can have on every system; empty if nothing is left of it."""
+    """Return a name that a folder can have on every system; empty if nothing is left of it."""
     cleaned = "".join(letter if letter.isalnum() or letter in " -_.,()" else " " for letter in wanted)
     cleaned = " ".join(cleaned.split())[:_LONGEST_NAME].strip(" .")
     return cleaned if fits_everywhere(cleaned) else ""
 
 
 def started() -> Mapping[str, str]:
-    """The note of a check or fit that has begun."""
+    """Return the note of a check or fit that has begun."""
     return {"how": _STARTED}
 
 

@@ -29,17 +29,17 @@ _HEADING = "# Written by kinertia app; name it under [model] markers or with --m
 
 @dataclass(frozen=True, eq=False)
 class MarkerPlaces:
-    """The markers of one recording and their places.
+    """Markers of one recording and their assignment to segments and landmarks.
 
     Attributes:
         file: name of the recording.
-        labels: of the recording.
-        positions: (m, 3) m, in ground axes, of the frame in which most are seen; NaN where not seen.
-        set_name: of the marker set, or of the nearest preset.
+        labels: labels of the recording.
+        positions: (m, 3) m, in ground axes, of the frame that shows most of them; NaN where not visible.
+        set_name: name of the marker set, or of the nearest preset.
         fits: whether the set is the recording's.
-        of_model: whether it is the markers of an OpenSim model, which nobody assigns.
-        segments, landmarks: of every label that has one.
-        missing: labels of the set that the recording lacks, each with those that look like it.
+        of_model: whether the set is the markers of an OpenSim model, which are not assigned by hand.
+        segments, landmarks: segment and landmark of every label that has one.
+        missing: labels of the set that the recording lacks, each with similar ones.
     """
 
     file: str
@@ -59,7 +59,7 @@ class MarkerPlaces:
 
 
 def marker_places(person: Person) -> MarkerPlaces:
-    """The markers of the static trial, or of the first other one.
+    """Read the markers of the static trial, or of the first other recording.
 
     Raises:
         KinertiaError: there is no recording, or it cannot be read.
@@ -91,14 +91,14 @@ def marker_places(person: Person) -> MarkerPlaces:
 
 
 def save_places(person: Person, segments: Mapping[str, str], landmarks: Mapping[str, str]) -> None:
-    """Write the person's own marker set, and name it in the subject file.
+    """Write the person's own marker set, and enter it in the subject file.
 
     Args:
-        person: whose.
-        segments, landmarks: of every label that has one.
+        person: the person.
+        segments, landmarks: segment and landmark of every label that has one.
 
     Raises:
-        KinertiaError: they make no marker set; then nothing is changed.
+        KinertiaError: they make no valid marker set; then nothing is changed.
     """
     places = marker_places(person)
     if places.of_model:
@@ -131,7 +131,7 @@ def save_places(person: Person, segments: Mapping[str, str], landmarks: Mapping[
 
 
 def _grouped(places: Mapping[str, str], labels: Sequence[str], known: Sequence[str]) -> dict[str, list[str]]:
-    """Labels by their place, in the order of the recording."""
+    """Group labels by their place, in the order of the recording."""
     grouped: dict[str, list[str]] = {}
     for label in labels:
         if places.get(label) in known:
@@ -144,7 +144,7 @@ def _owners(places: Mapping[str, Sequence[str]]) -> list[tuple[str, str]]:
 
 
 def _named_set(person: Person, model: Mapping[str, Any]) -> MarkerSet | None:
-    """The set that the subject file names, or that its model has."""
+    """Return the set that the subject file states, or that its model has."""
     if "osim" in model:
         return markers_of_model(read_osim(person.folder / model["osim"]))
     named = model.get("markers")

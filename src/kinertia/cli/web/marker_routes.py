@@ -24,7 +24,7 @@ _SEGMENT, _LANDMARK = "segment:", "landmark:"
 
 
 def marker_routes(library: Library, jobs: Jobs) -> list[BaseRoute]:
-    """Show and save the places of a person's markers."""
+    """Return the routes that show and save the places of a person's markers."""
 
     async def show(request: Request) -> Response:
         return await run_in_threadpool(_page, request, expect(library.person(request.path_params["name"])))
@@ -73,13 +73,13 @@ def _page(request: Request, person: Person, problem: str = "", given: Mapping[st
 
 
 def in_words(name: str) -> str:
-    """ "upper_arm_r" is the right upper arm."""
+    """Return a name in words: "upper_arm_r" is the right upper arm."""
     side = {"_r": "right ", "_l": "left "}.get(name[-2:], "")
     return side + (name[:-2] if side else name).replace("_", " ")
 
 
 def _rows(places: MarkerPlaces, given: Mapping[str, str]) -> list[dict[str, str]]:
-    """Every label with its place, those without first."""
+    """List every label with its place, those without first."""
     rows = [
         {
             "label": label,
@@ -92,7 +92,7 @@ def _rows(places: MarkerPlaces, given: Mapping[str, str]) -> list[dict[str, str]
 
 
 def _scene(places: MarkerPlaces, rows: list[dict[str, str]]) -> list[dict[str, Any]]:
-    """What the figure draws: labels with positions in mm about the middle of the body."""
+    """Return the content of the figure: labels with positions in mm about the middle of the body."""
     seen = np.isfinite(places.positions).all(axis=1)
     middle = places.positions[seen].mean(axis=0) if seen.any() else np.zeros(3)
     at = dict(zip(places.labels, (1e3 * (places.positions - middle)), strict=True))

@@ -35,10 +35,10 @@ class Standing:
     """One person in the list.
 
     Attributes:
-        name: of the person.
+        name: name of the person.
         look: "info", "warning" or "error" by the verdict on the results; empty without.
-        sentence: where they stand, in words.
-        when: of the last change.
+        sentence: state of check and fit, in words.
+        when: time of the last change.
         fitted: whether there are results.
     """
 
@@ -50,7 +50,7 @@ class Standing:
 
 
 def standing(person: Person, jobs: Jobs) -> Standing:
-    """Where a person stands."""
+    """Return the state of a person's check and fit."""
     outcome = person.outcome("results") if person.fitted else {}
     sentence, notes = outcome.get("line", ""), person.notes()
     job = jobs.of(person, "fit") or jobs.of(person, "check")
@@ -67,7 +67,7 @@ def standing(person: Person, jobs: Jobs) -> Standing:
 
 
 def progress(person: Person, jobs: Jobs) -> dict[str, Any]:
-    """How far the person's check and fit are; null for what neither waits nor is at work."""
+    """Return the progress of the person's check and fit; null for those neither waiting nor running."""
     far: dict[str, Any] = {}
     preparing = jobs.preparing
     for kind in KINDS:
@@ -96,16 +96,16 @@ def person_page(
     said: str = "",
     text_typed: str = "",
 ) -> HTMLResponse:
-    """The page.
+    """Render the page of one person.
 
     Args:
-        request: which asked for it.
-        person: whose page.
-        jobs: what waits or is at work.
-        problem: of what was just typed, which is shown again.
-        typed: the form's fields.
-        said: what was just done.
-        text_typed: of the subject file.
+        request: the request.
+        person: the person.
+        jobs: jobs waiting or running.
+        problem: error in what was just typed, which is shown again.
+        typed: fields of the form as typed.
+        said: message on what was just done.
+        text_typed: text of the subject file as typed.
     """
     content: Mapping[str, Any] = {}
     broken = ""
@@ -154,7 +154,7 @@ def person_page(
 
 
 def _how(notes: Mapping[str, Any], kind: str) -> dict[str, str]:
-    """How the last one ended that left nothing: level and sentence."""
+    """Return level and sentence on how the last check or fit ended that left no files."""
     ended = notes.get(kind, {})
     how = ended.get("how", "")
     if how == "failed":
@@ -163,7 +163,7 @@ def _how(notes: Mapping[str, Any], kind: str) -> dict[str, str]:
 
 
 def _known(outcome: Mapping[str, Any]) -> Mapping[str, Any]:
-    """An outcome of this version; none of one that had no verdict."""
+    """Return an outcome of this version; empty for one without a verdict."""
     return outcome if "verdict" in outcome else {}
 
 
@@ -186,14 +186,14 @@ _MISSING = re.compile(r"\[subject\] lacks '(\w+)'")
 
 
 class Told(NamedTuple):
-    """A trouble: in plain words, empty where it is plain as it is; and as the command line says it."""
+    """A problem in plain words (empty where the exact text is plain enough), and as the command line reports it."""
 
     plain: str
     exact: str
 
 
 def told(person: Person, trouble: str) -> Told:
-    """The trouble with a person's subject file, which is named without its folder."""
+    """Explain the problem with a person's subject file, which is stated without its folder."""
     exact = trouble.replace(f"{person.folder}{os.sep}", "")
     if missing := _MISSING.search(exact):
         return Told(f"{label_of(missing[1])} is missing: fill it in, then save and check.", exact)

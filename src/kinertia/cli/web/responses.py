@@ -36,7 +36,7 @@ def _environment() -> jinja2.Environment:
 
 
 def page(request: Request, template: str, status: int = 200, **content: Any) -> HTMLResponse:
-    """A page; `root` in it is where the application's addresses begin."""
+    """Render a page; `root` in it is where the application's addresses begin."""
     root, preparing = request.scope["root_path"], request.app.state.jobs.preparing
     told = "" if preparing is None else time_left(preparing)
     shared = {"root": root, "version": VERSION, "preparing": preparing is not None, "preparing_left": told}
@@ -45,7 +45,7 @@ def page(request: Request, template: str, status: int = 200, **content: Any) -> 
 
 
 def time_left(work: Work) -> str:
-    """The time left of the stage, in words; empty as long as nobody knows."""
+    """Return the time left of the stage, in words; empty as long as it is unknown."""
     seconds = work.seconds_left()
     if seconds is None:
         return ""
@@ -53,16 +53,16 @@ def time_left(work: Work) -> str:
 
 
 def to(request: Request, *parts: str, section: str = "") -> RedirectResponse:
-    """On to another page, or to a section of it, as after a form."""
+    """Redirect to another page, or to a section of it, as after a form."""
     address = "/".join([request.scope["root_path"], *(quote(part, safe="") for part in parts)])
     return RedirectResponse(f"{address}#{section}" if section else address, 303)
 
 
 async def form(request: Request) -> dict[str, str]:
-    """Fields of a form by their names, the last of each.
+    """Read the fields of a form by name, the last of each.
 
     Raises:
-        HTTPException: it is larger than any form of ours.
+        HTTPException: it is larger than any of our forms.
     """
     body = b""
     async for chunk in request.stream():
@@ -73,7 +73,7 @@ async def form(request: Request) -> dict[str, str]:
 
 
 def result_file(folder: Path, name: str) -> Response:
-    """A file of results: pages to look at, in a frame that reaches nothing, the rest to save.
+    """Serve a file of results: pages to be shown in an isolated frame, the rest to be saved.
 
     Raises:
         HTTPException: no such file in the folder.
@@ -91,7 +91,7 @@ def result_file(folder: Path, name: str) -> Response:
 
 
 def archive(person: Person) -> Response:
-    """Results and subject file as a zip."""
+    """Serve results and subject file as a zip archive."""
     file = cast(BinaryIO, tempfile.SpooledTemporaryFile(50_000_000))  # noqa: SIM115 - closed when it was sent
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as packed:
         for path in sorted(person.results.rglob("*")):
@@ -111,10 +111,10 @@ def archive(person: Person) -> Response:
 
 
 def expect(person: Person | None) -> Person:
-    """The person.
+    """Return the person, who must exist.
 
     Raises:
-        HTTPException: there is none of that name.
+        HTTPException: there is no person of that name.
     """
     if person is None:
         raise HTTPException(404, "nobody of this name is in the library")
@@ -122,10 +122,10 @@ def expect(person: Person | None) -> Person:
 
 
 def chosen_folder(text: str) -> Path:
-    """A folder that a user typed.
+    """Parse a folder that a user typed.
 
     Raises:
-        FileError: it is no absolute path.
+        FileError: it is not an absolute path.
     """
     path = Path(text.strip().strip('"')).expanduser()
     if not path.is_absolute():

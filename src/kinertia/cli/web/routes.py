@@ -37,11 +37,11 @@ _STATIC = Path(__file__).with_name("static")
 _FORMS = ("files", "recognise", "remove", "entries", "keep", "text", "delete", "copy", "rename", *KINDS)
 """Addresses below a person's that forms are sent to."""
 _SECTIONS = {"check": "check", "fit": "results"}
-"""Where on a person's page it is seen how far a check or a fit is."""
+"""Section of a person's page that shows the progress of a check or a fit."""
 
 
 def application(library: Library, jobs: Jobs, stop: Callable[[], None], examples: Mapping[str, Example]) -> Starlette:
-    """The pages of a library; `stop` ends the server, `examples` by their kind are people to try it with."""
+    """Build the application of a library; `stop` ends the server, `examples` by kind are people to try it with."""
     actions = _Actions(library, jobs, stop, examples)
     routes: list[BaseRoute] = [
         Route("/", actions.home),
@@ -81,7 +81,7 @@ def application(library: Library, jobs: Jobs, stop: Callable[[], None], examples
 
 
 class _Actions:
-    """What the addresses do."""
+    """Handlers of the addresses."""
 
     def __init__(self, library: Library, jobs: Jobs, stop: Callable[[], None], examples: Mapping[str, Example]) -> None:
         self._library = library
@@ -90,7 +90,7 @@ class _Actions:
         self._examples = examples
 
     async def home(self, request: Request) -> Response:
-        """Everybody in the library, and a place to drop files for somebody new."""
+        """List everybody in the library, with a place to drop files for a new person."""
         people = [standing(person, self._jobs) for person in self._library.people()]
         return page(
             request,
@@ -103,14 +103,14 @@ class _Actions:
         )
 
     async def add(self, request: Request) -> Response:
-        """Somebody new: goes to their page, or tells a script its address."""
+        """Add a new person and go to their page, or return its address to a script."""
         person = self._library.add((await form(request)).get("name", ""))
         answer = to(request, "people", person.name)
         wants_json = "application/json" in request.headers.get("accept", "")
         return JSONResponse({"address": answer.headers["location"]}) if wants_json else answer
 
     async def add_example(self, request: Request) -> Response:
-        """A person to try the page with, ready to be checked and fitted; where one cannot be had, the others."""
+        """Add an example person, ready to be checked and fitted; where one cannot be had, the others are added."""
         kind = request.path_params["kind"]
         if kind not in self._examples:
             raise HTTPException(404, "there is no such example")
@@ -129,11 +129,11 @@ class _Actions:
         return to(request, "people", person.name)
 
     async def person(self, request: Request) -> Response:
-        """One person: files, entries, check, results."""
+        """Show one person: files, entries, check, results."""
         return await run_in_threadpool(person_page, request, self._person(request), self._jobs)
 
     async def upload(self, request: Request) -> Response:
-        """One dropped file, as the body of the request; answers with what is wrong with it, if anything is."""
+        """Receive one dropped file as the body of the request; answer with what is wrong with it, if anything."""
         person = self._idle(request)
         try:
             path = await receive(person, request.query_params.get("name", ""), request.stream())
@@ -142,7 +142,7 @@ class _Actions:
         return JSONResponse({"name": path.name})
 
     async def recognised(self, request: Request) -> Response:
-        """After files were dropped: the draft of the subject file; its troubles are on the person's page."""
+        """Draft the subject file after files were dropped; its problems are shown on the person's page."""
         person = self._idle(request)
         await run_in_threadpool(_recognised, person)
         return to(request, "people", person.name)
@@ -168,7 +168,7 @@ class _Actions:
         return self._checked(request, person)
 
     async def keep(self, request: Request) -> Response:
-        """Save the form before something else takes its place, such as the page without a file that is removed."""
+        """Save the form before another page replaces it, such as the page without a removed file."""
         person = self._idle(request)
         if person.subject.is_file():
             write_form(person, await form(request))
@@ -185,7 +185,7 @@ class _Actions:
         return self._checked(request, person)
 
     async def start(self, request: Request) -> Response:
-        """Let the person wait for a check or a fit, of what is in the form if it was sent."""
+        """Queue a check or a fit, with the entries of the form if it was sent."""
         person, kind = self._person(request), self._kind(request)
         given = await form(request)
         if given and not self._jobs.busy(person):
@@ -198,23 +198,23 @@ class _Actions:
         return to(request, "people", person.name, section=_SECTIONS[kind])
 
     async def cancel(self, request: Request) -> Response:
-        """Give up a check or a fit."""
+        """Cancel a check or a fit."""
         person, kind = self._person(request), self._kind(request)
         await run_in_threadpool(self._jobs.cancel, person, kind)
         return to(request, "people", person.name, section=_SECTIONS[kind])
 
     async def back(self, request: Request) -> Response:
-        """Who opens the address of a form, from the browser's history for one, gets the person's page."""
+        """Show the person's page when the address of a form is opened, as from the browser's history."""
         if request.path_params["action"] not in _FORMS:
             raise HTTPException(404, "no such page")
         return to(request, "people", self._person(request).name)
 
     async def progress(self, request: Request) -> Response:
-        """How far the person's check and fit are."""
+        """Return the progress of the person's check and fit."""
         return JSONResponse(progress(self._person(request), self._jobs))
 
     async def preparing(self, request: Request) -> Response:
-        """The time left until the first estimate can begin, in words; null once it can."""
+        """Return the time left until the first estimate can begin, in words; null once it can."""
         work = self._jobs.preparing
         return JSONResponse({"left": None if work is None else time_left(work)})
 
@@ -225,7 +225,7 @@ class _Actions:
         return to(request, "people", renamed.name)
 
     async def delete(self, request: Request) -> Response:
-        """Remove the person with files and results; a fit at work is given up."""
+        """Delete the person with files and results; a running fit is cancelled."""
         person = self._person(request)
         for kind in KINDS:
             await run_in_threadpool(self._jobs.cancel, person, kind)
@@ -233,26 +233,26 @@ class _Actions:
         return to(request, "")
 
     async def subject_file(self, request: Request) -> Response:
-        """The subject file, to save."""
+        """Serve the subject file, to be saved."""
         return result_file(self._person(request).folder, "subject.toml")
 
     async def check_file(self, request: Request) -> Response:
-        """A file that `check` wrote."""
+        """Serve a file that `check` wrote."""
         return result_file(self._person(request).check, request.path_params["file"])
 
     async def file(self, request: Request) -> Response:
-        """A file of the results."""
+        """Serve a file of the results."""
         return result_file(self._person(request).results, request.path_params["file"])
 
     async def zipped(self, request: Request) -> Response:
-        """All results."""
+        """Serve all results as an archive."""
         person = self._person(request)
         if not person.fitted:
             raise HTTPException(404, "there are no results yet")
         return await run_in_threadpool(archive, person)
 
     async def copy(self, request: Request) -> Response:
-        """Write the results into a folder that the user names."""
+        """Write the results into a folder that the user chooses."""
         person = self._person(request)
         try:
             folder = chosen_folder((await form(request)).get("folder", ""))
@@ -262,7 +262,7 @@ class _Actions:
         return await run_in_threadpool(person_page, request, person, self._jobs, said=f"The results are in {folder}.")
 
     async def compare(self, request: Request) -> Response:
-        """The comparison of chosen results, in the page."""
+        """Show the comparison of chosen results."""
         from kinertia.report.comparison import MOST_FITS
 
         chosen = self._chosen(request)
@@ -270,7 +270,7 @@ class _Actions:
         return page(request, "compare.html.j2", people=chosen, problem=problem, query=request.url.query)
 
     async def compared(self, request: Request) -> Response:
-        """What `kinertia compare` writes of them."""
+        """Serve what `kinertia compare` writes about them."""
         from kinertia.report.comparison import MOST_FITS, render_comparison
         from kinertia.report.saved_fit import load_fit
 
@@ -284,11 +284,11 @@ class _Actions:
         return HTMLResponse(await run_in_threadpool(made), headers={"content-security-policy": RESULT_POLICY})
 
     async def measures_sheet(self, request: Request) -> Response:
-        """The empty sheet of girths and lengths that `kinertia init --measures` writes, to save."""
+        """Serve the empty sheet of girths and lengths that `kinertia init --measures` writes, to be saved."""
         return Response(measures_sheet(), media_type="text/csv")
 
     async def measures_picture(self, request: Request) -> Response:
-        """Where to measure, to save."""
+        """Serve the picture of where to measure, to be saved."""
         return Response(measures_picture(), media_type="image/svg+xml")
 
     async def end(self, request: Request) -> Response:
@@ -325,7 +325,7 @@ class _Actions:
 
 
 def _recognised(person: Person) -> None:
-    """As far as it goes; the person's page says what is wrong."""
+    """Draft the subject file as far as possible; the person's page shows what is wrong."""
     try:
         recognise(person)
         person.note(draft="")
@@ -334,14 +334,14 @@ def _recognised(person: Person) -> None:
 
 
 def _copied(person: Person, folder: Path) -> None:
-    """The results in another folder, complete or not at all."""
+    """Copy the results to another folder, complete or not at all."""
     expect_own_folder(folder)
     with complete_folder(folder, "fit") as work:
         shutil.copytree(person.results, work, ignore=shutil.ignore_patterns(".*"), dirs_exist_ok=True)
 
 
 async def _not_found(request: Request, error: Exception) -> Response:
-    """What is not there, in a page; scripts get it as JSON."""
+    """Show that something was not found, in a page; scripts get it as JSON."""
     assert isinstance(error, HTTPException)
     return _told(request, error.detail, error.status_code)
 
@@ -351,7 +351,7 @@ async def _trouble(request: Request, error: Exception) -> Response:
 
 
 async def _no_file(request: Request, error: Exception) -> Response:
-    """A full disk, a folder that may not be written to."""
+    """Report a full disk, or a folder that may not be written to."""
     assert isinstance(error, OSError)
     where = "" if error.filename is None else f"{error.filename}: "
     sentence = f"{where}{error.strerror or error}; check the path, its permissions and the space on the disk"
@@ -359,7 +359,7 @@ async def _no_file(request: Request, error: Exception) -> Response:
 
 
 async def _failed(request: Request, error: Exception) -> Response:
-    """Kinertia's own failure; the terminal has all of it."""
+    """Report an internal error of Kinertia; the terminal has all of it."""
     problem = traceback.format_exception_only(error)[-1].strip()
     sentence = (
         f"Kinertia failed, which it should not on any input ({problem}); "

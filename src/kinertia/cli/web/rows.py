@@ -48,7 +48,7 @@ class Rows:
 
     Attributes:
         kind: "segment" or "attached".
-        rows: the fields of each.
+        rows: fields of each row.
     """
 
     kind: str
@@ -56,17 +56,17 @@ class Rows:
 
     @property
     def title(self) -> str:
-        """What they are, in the form."""
+        """Heading of the rows in the form."""
         return _TITLES[self.kind]
 
     @property
     def written(self) -> int:
-        """How many there are but for the empty one."""
+        """Number of rows without the empty one."""
         return len(self.rows) - 1
 
 
 def rows(content: Content, typed: Mapping[str, str] | None = None) -> list[Rows]:
-    """Rows of every kind; what was typed goes before what is written."""
+    """Return rows of every kind; typed values take precedence over written ones."""
     return [
         Rows(kind, tuple(_fields(kind, number, row) for number, row in enumerate([*each, {}])))
         for kind in _TABLES
@@ -75,7 +75,7 @@ def rows(content: Content, typed: Mapping[str, str] | None = None) -> list[Rows]
 
 
 def with_rows(content: Content, form: Mapping[str, str]) -> Content:
-    """The entries with those of the form; a written row without its segment or name goes, kinds without a row stay.
+    """Return the entries with those of the form; emptying a row's segment or name removes it, other kinds stay.
 
     Raises:
         SettingsError: a new row lacks its segment or name, or a segment has two rows.
@@ -97,7 +97,7 @@ def with_rows(content: Content, form: Mapping[str, str]) -> Content:
 
 
 def _keys(kind: str) -> list[str]:
-    """Keys of a row, the one that it cannot be without first."""
+    """Return the keys of a row, the required one first."""
     keys = list(_TABLES[kind].model_fields)
     return [_SEGMENT, *keys] if kind == _SEGMENT else keys
 
@@ -114,7 +114,7 @@ def _fields(kind: str, number: int, row: Mapping[str, str]) -> tuple[Field, ...]
 
 
 def _written(kind: str, content: Content) -> list[dict[str, str]]:
-    """Rows of the subject file as the form shows them; none of what has another shape."""
+    """Return rows of the subject file as the form shows them, without those of another shape."""
     value = content.get(kind)
     if kind == _SEGMENT and isinstance(value, Mapping):
         value = [{_SEGMENT: name, **one} for name, one in value.items() if isinstance(one, Mapping)]
@@ -124,7 +124,7 @@ def _written(kind: str, content: Content) -> list[dict[str, str]]:
 
 
 def _typed(kind: str, form: Mapping[str, str]) -> list[dict[str, str]]:
-    """Rows of the form up to the last that is not empty."""
+    """Return rows of the form up to the last that is not empty."""
     found: dict[int, dict[str, str]] = {}
     for name, text in form.items():
         what, _, rest = name.partition(":")
@@ -141,7 +141,7 @@ def _typed(kind: str, form: Mapping[str, str]) -> list[dict[str, str]]:
 
 
 def _with_heads(kind: str, typed: Sequence[Mapping[str, str]], written: int) -> list[dict[str, str]]:
-    """Rows with their segment or name; of those that are written, whoever empties it removes the row."""
+    """Return rows with their segment or name; a written row is removed by emptying it."""
     head, title = _keys(kind)[0], _TITLES[kind]
     kept: list[dict[str, str]] = []
     for number, row in enumerate(typed):
@@ -163,7 +163,7 @@ def _shown(value: object) -> str:
 
 
 def _value(key: str, text: str) -> object:
-    """What a subject file says for what was typed."""
+    """Convert typed text to the value in a subject file."""
     if key in _TEXTS:
         return text
     if text in ("yes", "no"):
@@ -175,7 +175,7 @@ def _value(key: str, text: str) -> object:
 
 
 def _number(text: str) -> object:
-    """A number; of a value with its deviation the text, with decimal points."""
+    """Parse a number; for a value with its SD return the text, with decimal points."""
     try:
         return number_of(text)
     except ValueError:

@@ -20,14 +20,14 @@ from kinertia.cli.web.routes import Example, application
 from kinertia.errors import SettingsError
 
 _PATIENCE_S = 3
-"""What requests have to end in when the server stops."""
+"""Time limit (s) for requests to end when the server stops."""
 
 
 class Server:
-    """Serves a library of people and their results until `stop`.
+    """Server of a library of people and their results, until `stop`.
 
     Attributes:
-        address: what to open in the browser; nothing answers without its token.
+        address: address to open in the browser; nothing answers without its token.
     """
 
     def __init__(
@@ -37,16 +37,16 @@ class Server:
         examples: Mapping[str, Example] = MappingProxyType({}),
         prepare: bool = False,
     ) -> None:
-        """Take the port, but answer nothing yet.
+        """Reserve the port, but answer nothing yet.
 
         Args:
             library: people and their results.
-            port: of 127.0.0.1; 0 takes a free one.
-            examples: people to try it with: what writes their files into a folder, by their kind.
-            prepare: compile beforehand, where that is not done, what the first fit would compile.
+            port: port of 127.0.0.1; 0 takes a free one.
+            examples: people to try it with: functions that write their files into a folder, by kind.
+            prepare: whether to compile beforehand what the first fit would compile.
 
         Raises:
-            SettingsError: the port is another program's.
+            SettingsError: another program uses the port.
         """
         self._socket = _listening(port)
         port = self._socket.getsockname()[1]
@@ -68,17 +68,17 @@ class Server:
         self._server = uvicorn.Server(config)
 
     def run(self) -> None:
-        """Answer until `stop` or Ctrl-C; fits that are still at work are given up then."""
+        """Serve until `stop` or Ctrl-C; running fits are then cancelled."""
         with self._jobs.at_work():
             self._server.run(sockets=[self._socket])
 
     def stop(self) -> None:
-        """End soon; may be called from any thread."""
+        """Stop the server soon; may be called from any thread."""
         self._server.should_exit = True
 
     @contextmanager
     def in_background(self) -> Iterator[str]:
-        """Answers during the block; yields the address."""
+        """Serve during the block; yields the address."""
         thread = threading.Thread(target=self.run, daemon=True)
         thread.start()
         while not self._server.started and thread.is_alive():

@@ -13,15 +13,15 @@ from kinertia.io.file_names import fits_everywhere, last_part, same_folder
 from kinertia.io.recording import FORCE_FILES, MARKER_FILES
 
 LARGEST_FILE_MB, LARGEST_PERSON_MB, MOST_FILES = 500, 2000, 200
-"""Limits of one file, of all files of a person, and of their number; the page says them."""
+"""Limits of one file, of all files of a person, and of their number; pages state them."""
 ENDINGS = tuple(dict.fromkeys((*MARKER_FILES, *FORCE_FILES, ".xml", ".osim", ".toml")))
 LIMITS = {"file_mb": LARGEST_FILE_MB, "person_mb": LARGEST_PERSON_MB, "files": MOST_FILES, "endings": ENDINGS}
-"""As pages say them."""
+"""Limits as stated on pages."""
 _LONGEST_NAME, _LARGEST_TOML_MB = 150, 1
 
 
 def harmless_name(given: str) -> str:
-    """The name of a file without the folders before it.
+    """Return the name of a file without the folders before it.
 
     Raises:
         FileError: it cannot be a file's name on every system, or is hidden, or Kinertia does not read its kind.
@@ -48,7 +48,7 @@ async def receive(person: Person, given: str, chunks: AsyncIterator[bytes]) -> P
     """Write a dropped file to the person's folder, complete or not at all; one of the same name is replaced.
 
     Raises:
-        FileError: the name or the size is not taken.
+        FileError: the name or the size is not accepted.
     """
     name = harmless_name(given)
     files = [path for path in person.files() if not same_folder(path.name, name)]

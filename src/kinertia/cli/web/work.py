@@ -22,9 +22,9 @@ class End:
     """How a process ended.
 
     Attributes:
-        status: of its exit; 1 where it was given up before it began.
-        error: the error of a file or an entry that it named; empty if it named none.
-        log: what else it said.
+        status: exit status; 1 where it was cancelled before it began.
+        error: error of a file or an entry that it reported; empty if none.
+        log: its other output.
     """
 
     status: int
@@ -33,12 +33,12 @@ class End:
 
 
 class Work:
-    """What a worker does: it says its stage and the share of it that is done, line by line.
+    """Work of a separate process, which reports its stage and the share done line by line.
 
     Attributes:
-        stage: what it is doing; empty while it waits.
-        share: of the stage that is done, 0 to 1.
-        cancelled: whether it was given up.
+        stage: current stage; empty while it waits.
+        share: share of the stage that is done, 0 to 1.
+        cancelled: whether it was cancelled.
     """
 
     def __init__(self) -> None:
@@ -50,21 +50,21 @@ class Work:
         self._lock = threading.Lock()
 
     def seconds_left(self) -> float | None:
-        """Of this stage, by how long its share took; None as long as nobody knows."""
+        """Estimate the time left of this stage from how long its share took; None as long as it is unknown."""
         if not 0.0 < self.share < 1.0:
             return None
         left_when_told = (self._told - self._since) * (1.0 - self.share) / self.share
         return max(left_when_told - (time.monotonic() - self._told), 1.0)
 
     def cancel(self) -> None:
-        """Give it up, wherever it is; may be called from any thread."""
+        """Cancel the work, whatever its stage; may be called from any thread."""
         with self._lock:
             self.cancelled = True
             if self._process is not None:
                 self._process.terminate()
 
     def done(self, *arguments: str) -> End:
-        """Do it, with these arguments of the worker; how it ended."""
+        """Run the work with these arguments of the worker; return how it ended."""
         self._moved("starting", 0.0)
         with self._lock:
             if self.cancelled:
@@ -106,7 +106,7 @@ def _started(command: Sequence[str]) -> subprocess.Popen[str]:
 
 
 def _line(text: str) -> dict[str, Any]:
-    """What a line of a worker says; nothing where it is not one of ours."""
+    """Parse a line of a worker; empty where it is not one of ours."""
     try:
         told = json.loads(text)
     except ValueError:

@@ -26,7 +26,7 @@ Progress = Callable[[str, float], None]
 
 
 def check(person: Person, progress: Progress) -> None:
-    """What `kinertia check` does with the subject file: check.html, and its findings for the page."""
+    """Run `kinertia check` on the subject file: check.html, and its findings for the page."""
     from kinertia.report.check_page import save_check_page
     from kinertia.report.finding_view import digest
     from kinertia.workflow.check import check_person
@@ -39,7 +39,7 @@ def check(person: Person, progress: Progress) -> None:
 
 
 def fit(person: Person, progress: Progress) -> None:
-    """What `kinertia fit` does with the subject file: the results, and the subject file that they are of."""
+    """Run `kinertia fit` on the subject file: the results, and the subject file that they are of."""
     from kinertia.io.provenance import provenance_of
     from kinertia.report.files import save_fit
     from kinertia.report.finding_view import digest
@@ -76,8 +76,8 @@ def _said(stream: TextIO, **values: object) -> None:
 
 
 def main(kind: str, folder: str = "") -> int:
-    """Do it; exit status 2 for an error in the person's files or entries."""
-    page, sys.stdout = sys.stdout, sys.stderr  # for nobody else's words
+    """Run the worker; exit status 2 for an error in the person's files or entries."""
+    page, sys.stdout = sys.stdout, sys.stderr  # keeps other output off the page's stream
 
     def progress(stage: str, share: float) -> None:
         _said(page, stage=stage, share=share)

@@ -16,12 +16,13 @@ _SEEN = 0.8
 
 
 def owners_of(skeleton: Skeleton) -> dict[str, str]:
-    """Which segment of the anthropometric tables each marker of a model is on; empty where that is unknown."""
+    """Return the segment of the anthropometric tables that each marker of a model is on; empty where unknown."""
     return {marker.label: segment_of(marker.segment) or "" for marker in skeleton.markers}
 
 
 def body_centre(owners: Mapping[str, str], markers: Markers) -> FloatArray | None:
-    """(n, 3) m, the markers' centre, each segment at its share of the body's mass; None without a pelvis.
+    """Compute the marker-based centre of mass (n, 3) m, each segment weighted by its share of body mass; None without a
+    pelvis.
 
     Args:
         owners: the segment that each marker is on.
@@ -41,7 +42,7 @@ def body_centre(owners: Mapping[str, str], markers: Markers) -> FloatArray | Non
 
 
 def bridged_way(time: FloatArray, way: FloatArray) -> FloatArray:
-    """A way (n, k), bridged by lines where it is not known."""
+    """Return a trajectory (n, k) with unknown values bridged by straight lines."""
     known = np.isfinite(way).all(axis=1)
     if known.all():
         return way

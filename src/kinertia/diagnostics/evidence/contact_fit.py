@@ -27,11 +27,11 @@ Feet = tuple[FootTrajectory, FootTrajectory]
 
 @dataclass(frozen=True)
 class ContactFit:
-    """How well loads fit the feet.
+    """Agreement of the loads on plates with the feet, in time and place.
 
     Attributes:
         delay_rms_s: RMS of how far loads begin and end from foot contact and foot off; infinite where too few do.
-        far_m: of the load that is farthest from the feet.
+        far_m: distance from the feet of the load that is farthest from them.
     """
 
     delay_rms_s: float
@@ -39,7 +39,7 @@ class ContactFit:
 
     @classmethod
     def of(cls, contacts: Sequence[PlateContact], feet: Feet) -> ContactFit:
-        """Of all contacts of a trial."""
+        """Compute the agreement over all contacts of a trial."""
         delays = [delay for contact in contacts for delay in _delays(contact, feet[contact.foot])]
         enough = len(delays) >= _FEWEST_EDGES
         rms_s = float(np.sqrt(np.mean(np.square(delays)))) if enough else np.inf
@@ -47,37 +47,37 @@ class ContactFit:
 
     @property
     def fits(self) -> bool:
-        """Whether they fit as on fault-free trials."""
+        """Whether loads and feet agree as well as on fault-free trials."""
         return self.delay_rms_s < _FITS_S and self.far_m < FITS_M
 
     @property
     def misfit(self) -> float:
-        """Delay or distance over what fault-free trials show, the larger one; 1 of all that fit as these do."""
+        """Ratio of delay or distance to the limit of fault-free trials, the larger one; 1 where both are within it."""
         known_s = self.delay_rms_s if np.isfinite(self.delay_rms_s) else 0.0
         return max(1.0, known_s / _FITS_S, self.far_m / FITS_M)
 
 
 class Hypothesis(NamedTuple):
-    """One explanation of loads that do not fit the feet: what is found, and the loads once it is undone; None where
-    nothing undoes it.
+    """One explanation of loads that do not fit the feet: its finding, and the loads with the fault undone (None where
+    nothing undoes it).
     """
 
     finding: Finding
     corrected: PlateLoads | None
 
     def misfit(self, feet: Feet) -> float:
-        """See `ContactFit`."""
+        """Return the `ContactFit.misfit` of the corrected loads; infinite where there are none."""
         if self.corrected is None:
             return np.inf
         return ContactFit.of(contacts_of(self.corrected, feet), feet).misfit
 
 
 def _delays(contact: PlateContact, foot: FootTrajectory) -> list[float]:
-    """s, of the beginning and of the end of a load, where both load and stance phase show it."""
+    """Return the delays (s) of the start and the end of a load, where both the load and the stance phase show them."""
     start, end = contact.time[0], contact.time[-1]
     overlaps = [(min(end, last) - max(start, first), first, last) for first, last, _ in foot.stance_spans]
     if not overlaps or max(overlaps)[0] <= 0:
-        # a load while the foot swings is off by as much as anything
+        # a load while the foot swings has no stance phase to compare with: its whole duration is the error
         return [float(end - start)]
     _, first, last = max(overlaps)
     delays = []

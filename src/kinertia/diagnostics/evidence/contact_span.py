@@ -8,7 +8,7 @@ from kinertia.trial.foot_motion import AROUND_LOAD_S
 
 
 def contact_span_s(plates: PlateLoads) -> tuple[float, float] | None:
-    """First and last time (s) of what loads on plates are used with; None where nobody steps on them.
+    """Find the first and last time (s) of the part used with loads on plates; None where nobody steps on them.
 
     Before and after, people come and go: feet are out of the cameras' view, or markers are lost, and nothing depends on
     it.

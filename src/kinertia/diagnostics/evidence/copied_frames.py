@@ -13,11 +13,11 @@ from kinertia.trial.data import BoolArray, FloatArray, Markers
 from kinertia.trial.sampled_time import runs
 
 COPIED_SHARE = 0.25
-"""Beyond it the recording was upsampled: frames at half the rate, each repeated once, repeat in one of two."""
+"""Share of copies beyond which the recording was upsampled: at half the rate, each repeated once, half are copies."""
 FEWEST_FRAMES = 11
 LEAST_MOTION_M = 1e-3
 _LONGEST_S = 0.15
-"""Between two measured frames; who stands still, or is frozen, is so for longer."""
+"""Longest time between two measured frames; a person who stands still, or a frozen marker, does so for longer."""
 _ALIKE = 0.9
 """Share of the markers that stand still at once, while in other frames they go on."""
 
@@ -27,7 +27,7 @@ class CopiedFrames:
     """Frames that repeat the one before them.
 
     Attributes:
-        copied: (n,) of the marker frames.
+        copied: (n,) which marker frames are copies.
         amid_motion: markers stop in them and go on just before and after; those at the ends do not count.
         insertions: how many of them were put in between two consecutive frames, so that the time of everything after
             is off, where the others take the place of lost frames.
@@ -39,7 +39,7 @@ class CopiedFrames:
 
     @classmethod
     def of(cls, markers: Markers) -> CopiedFrames:
-        """Of markers of a motion."""
+        """Find the copied frames of the markers of a motion."""
         if len(markers.time) < FEWEST_FRAMES:
             return cls(np.zeros(len(markers.time), dtype=bool), False, 0)
         distance = np.linalg.norm(np.diff(markers.positions, axis=0), axis=2)
@@ -49,19 +49,19 @@ class CopiedFrames:
 
     @property
     def share(self) -> float:
-        """Of the steps from frame to frame, those that were copied."""
+        """Share of the steps from frame to frame that are copies."""
         return float(self.copied[1:].mean()) if len(self.copied) > 1 else 0.0
 
     @property
     def fill_lost_frames(self) -> bool:
-        """Whether single frames were filled, not all of the recording upsampled."""
+        """Whether the copies fill single dropped frames, rather than upsample the whole recording."""
         return 0.0 < self.share <= COPIED_SHARE and self.amid_motion
 
 
 def without_copied_frames(markers: Markers) -> Markers:
-    """The markers with copies of lost frames as gaps (NaN), which are bridged; the same markers where there are none.
+    """Return the markers with copies of dropped frames as gaps (NaN), which are bridged; unchanged without copies.
 
-    Upsampled recordings, of which more than a quarter is copied, are left as they are.
+    Upsampled recordings, more than a quarter of which is copied, are left as they are.
     """
     copies = CopiedFrames.of(markers)
     if not copies.fill_lost_frames:
@@ -70,7 +70,7 @@ def without_copied_frames(markers: Markers) -> Markers:
 
 
 def brief_runs(mask: BoolArray, rate_hz: float) -> BoolArray:
-    """The mask without runs that last longer than between two measured frames."""
+    """Return the mask without runs that last longer than the time between two measured frames."""
     kept = mask.copy()
     for first, last in runs(mask):
         if last - first + 1 > _LONGEST_S * rate_hz:
@@ -79,7 +79,7 @@ def brief_runs(mask: BoolArray, rate_hz: float) -> BoolArray:
 
 
 def _repeated(distance: FloatArray) -> BoolArray:
-    """(n - 1,) frames in which nearly all markers stay exactly where they were, of a person who moves."""
+    """Find frames (n - 1,) in which nearly all markers stay exactly where they were although the person moves."""
     seen = np.isfinite(distance)
     count = seen.sum(axis=1)
     same = (seen & (distance == 0.0)).sum(axis=1) > _ALIKE * np.maximum(count, 1)
@@ -90,7 +90,7 @@ def _repeated(distance: FloatArray) -> BoolArray:
 
 
 def _amid_motion(distance: FloatArray, repeated: BoolArray) -> bool:
-    """Whether markers stop in repeated frames (n - 1,) and go on beside them.
+    """Return whether markers stop in repeated frames (n - 1,) and move on beside them.
 
     Coordinates that are rounded repeat as well, where a person hardly moves.
     """
@@ -104,7 +104,7 @@ def _amid_motion(distance: FloatArray, repeated: BoolArray) -> bool:
 
 
 def _insertions(position: FloatArray, distance: FloatArray, repeated: BoolArray) -> int:
-    """Copies after which the motion goes on where it stopped: after lost frames it goes on farther away."""
+    """Count copies after which the motion resumes where it stopped; after dropped frames it resumes farther away."""
     inserted = 0
     for first, last in _inner(repeated):
         if first < 1 or last + 3 > len(position) - 1:

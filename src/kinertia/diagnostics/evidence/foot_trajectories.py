@@ -19,11 +19,11 @@ LEAST_BELT_M_S = 0.3
 _SLOW, _SLOW_M_S = 0.15, (0.3, 1.0)
 """A foot stands while one of its markers is slower than this share of its own fast speed, within these limits."""
 _LEAST_SWING_M_S = 1.0
-"""Who does not move the feet faster takes no steps."""
+"""A person whose feet never move faster takes no steps."""
 _NOISE_M_S, _FARTHEST_S = 0.15, 0.05
 """A speed known to the former needs no frames farther apart; frames the latter apart still show landing and leaving."""
 _THIRD_DIFFERENCE = 0.6745 * np.sqrt(20.0)
-"""Median size of third differences of white noise with a deviation of one."""
+"""Median size of third differences of white noise with an SD of one."""
 _SHORTEST_S, _MOSTLY = 0.1, 0.5
 _LOAD_BEGINS, _LOAD_GOES_ON = 0.25, 0.65
 """Shares of the line between a foot's outermost markers."""
@@ -35,13 +35,13 @@ _LANDING_S = 0.05
 
 @dataclass(frozen=True, eq=False)
 class FootTrajectory:
-    """One foot.
+    """Trajectory of one foot, with its stance phases.
 
     Attributes:
         time: (n,) s.
-        back, front: (n, 2) m, horizontal places (x, z) of the two markers that are farthest apart, interpolated where
-            they are not seen; the same for a foot with one marker. The foot swings forwards from back to front.
-        shown: (n,) whether both are seen, but for short gaps.
+        back, front: (n, 2) m, horizontal positions (x, z) of the two markers farthest apart, interpolated where
+            they are not visible; equal for a foot with one marker. The foot swings forwards from back to front.
+        shown: (n,) whether both are visible, but for short gaps.
         stands: first and last time (s) of every stance phase, and whether the trial shows both ends.
     """
 
@@ -52,11 +52,11 @@ class FootTrajectory:
     stance_spans: tuple[tuple[float, float, bool], ...]
 
     def seen(self, time: FloatArray) -> BoolArray:
-        """(k,) whether both ends are seen at these times, not interpolated."""
+        """Return (k,) whether both ends of the foot are visible, not interpolated, at these times."""
         return self.shown[nearest_samples(self.time, time)]
 
     def standing(self, time: FloatArray) -> BoolArray:
-        """(k,) whether it stands then, or a little before or after; everywhere where that cannot be told."""
+        """Return (k,) whether the foot stands at these times, or just before or after; true where that is unknown."""
         if not self.stance_spans:
             return np.ones(len(time), dtype=bool)
         slack_s = _LANDING_S + TIME_TOLERANCE_S
@@ -65,7 +65,7 @@ class FootTrajectory:
         return result
 
     def beyond(self, time: FloatArray, place: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """(k,) m, how far places (k, 2) at times (k,) are in front of the back, and in front of the front."""
+        """Return how far (k,) m positions (k, 2) at times (k,) are in front of the back, and in front of the front."""
         back, front = (self._at(end, time) for end in (self.back, self.front))
         along = front - back
         length = np.maximum(np.linalg.norm(along, axis=1), 1e-6)
@@ -73,11 +73,11 @@ class FootTrajectory:
         return ahead, ahead - length
 
     def with_toes(self) -> FootTrajectory:
-        """The same foot with toes in front of the metatarsal heads, where no marker shows them."""
+        """Return the foot extended by toes in front of the metatarsal heads, where no marker shows them."""
         return replace(self, front=self.front + _TOES * (self.front - self.back))
 
     def expected_cop(self, time: FloatArray, weight: FloatArray) -> FloatArray:
-        """(k, 2) m, where the load of a step is expected that has this vertical force (k,) N at these times (k,)."""
+        """Predict the centre of pressure (k, 2) m of a step with this vertical force (k,) N at these times (k,)."""
         back, front = (self._at(end, time) for end in (self.back, self.front))
         share = _LOAD_BEGINS + _LOAD_GOES_ON * np.cumsum(weight) / weight.sum()
         result: FloatArray = back + (front - back) * share[:, None]
@@ -87,7 +87,7 @@ class FootTrajectory:
         return np.column_stack([np.interp(time, self.time, end[:, axis]) for axis in range(2)])
 
     def offset_m(self, time: FloatArray, place: FloatArray) -> FloatArray:
-        """(k, 2) m from the nearest point between back and front to places (k, 2) on the ground at times (k,)."""
+        """Return offsets (k, 2) m to ground positions (k, 2) at times (k,) from the nearest point of the foot axis."""
         back, front = (self._at(end, time) for end in (self.back, self.front))
         along = front - back
         share = ((place - back) * along).sum(axis=1) / np.maximum((along * along).sum(axis=1), 1e-12)
@@ -98,12 +98,12 @@ class FootTrajectory:
 def foot_trajectories(
     markers: Markers, feet: Mapping[str, Sequence[str]], belt: Belt | None = None
 ) -> tuple[FootTrajectory, FootTrajectory] | None:
-    """Right and left foot; None where a foot is hardly seen.
+    """Compute the trajectories of the right and the left foot; None where a foot is hardly visible.
 
     Args:
         markers: of a motion, Y up.
         feet: labels of the markers on each foot, "r" and "l".
-        belt: of the treadmill, where its speed is stated.
+        belt: belt of the treadmill, where its speed is stated.
     """
     places = _foot_places(markers, feet)
     if places is None:
@@ -120,7 +120,7 @@ def foot_trajectories(
 
 
 def _swing(velocity: FloatArray, along: FloatArray) -> float:
-    """Positive where the foot is mostly fast (n, m, 3) along this direction (n, 2), not against it."""
+    """Return a value that is positive where the foot moves fast (n, m, 3) along, not against, this direction (n, 2)."""
     shown = _seen(velocity).any(axis=1)
     mean = np.nanmean(velocity[shown][..., [0, 2]], axis=1)
     return float(((mean * along[shown]).sum(axis=1) * np.linalg.norm(mean, axis=1)).sum())
@@ -131,7 +131,7 @@ def _seen(place: FloatArray) -> BoolArray:
 
 
 def _velocities(markers: Markers, places: Sequence[FloatArray], stated: Belt | None) -> list[FloatArray]:
-    """(n, m, 3) m/s of every marker of each foot against the ground."""
+    """Compute velocities (n, m, 3) m/s of every marker of each foot relative to the ground."""
     velocities = [_velocity(markers.time, place) for place in places]
     belts = _belts(places, velocities)
     if stated is None:
@@ -142,9 +142,10 @@ def _velocities(markers: Markers, places: Sequence[FloatArray], stated: Belt | N
 
 
 def _velocity(time: FloatArray, place: FloatArray) -> FloatArray:
-    """(n, m, 3) m/s of markers (n, m, 3), by neighbouring frames or, where they are noisy, by frames farther apart.
+    """Compute velocities (n, m, 3) m/s of markers (n, m, 3) between neighbouring frames or, where noisy, frames farther
+    apart.
 
-    The noise is that of third differences, which hardly show how feet move: poses from video jitter by some mm in every
+    Noise is taken from third differences, which hardly show how feet move: poses from video jitter by some mm in every
     frame, a speed of 0.4 m/s that no standing foot has.
     """
     step = float(np.median(np.diff(time)))
@@ -159,7 +160,7 @@ def _velocity(time: FloatArray, place: FloatArray) -> FloatArray:
 
 
 def standing_speeds(markers: Markers, feet: Mapping[str, Sequence[str]]) -> tuple[float, float] | None:
-    """m/s of what the right and the left foot stand on; None where a foot is hardly seen."""
+    """Compute velocities (m/s) of the surfaces under the right and left foot; None where a foot is hardly visible."""
     places = _foot_places(markers, feet)
     if places is None:
         return None
@@ -168,14 +169,14 @@ def standing_speeds(markers: Markers, feet: Mapping[str, Sequence[str]]) -> tupl
 
 
 def _foot_places(markers: Markers, feet: Mapping[str, Sequence[str]]) -> list[FloatArray] | None:
-    """(n, m, 3) m of the markers of each foot; None where a foot is hardly seen."""
+    """Return the positions (n, m, 3) m of the markers of each foot; None where a foot is hardly visible."""
     places = [markers.select([label for label in feet[side] if label in markers.labels]).positions for side in FEET]
     hardly = len(markers.time) < 5 or min(np.count_nonzero(_seen(place)) for place in places) == 0
     return None if hardly else places
 
 
 def _belts(places: Sequence[FloatArray], velocities: Sequence[FloatArray]) -> list[FloatArray]:
-    """(3,) m/s of what each foot stands on: of both together, unless they stand on belts of different speeds."""
+    """Compute the velocity (3,) m/s of each foot's surface: one for both feet unless their belts differ in speed."""
     own = [_belt([place], [velocity]) for place, velocity in zip(places, velocities, strict=True)]
     moving = min(float(np.linalg.norm(belt)) for belt in own) >= LEAST_BELT_M_S
     apart = float(np.linalg.norm(own[0] - own[1])) >= LEAST_BELT_M_S
@@ -183,7 +184,7 @@ def _belts(places: Sequence[FloatArray], velocities: Sequence[FloatArray]) -> li
 
 
 def _belt(places: Sequence[FloatArray], velocities: Sequence[FloatArray]) -> FloatArray:
-    """(3,) m/s, horizontal: median velocity of feet that are lowest."""
+    """Compute the horizontal belt velocity (3,) m/s: the median velocity of the feet while they are lowest."""
     low = []
     for place, velocity in zip(places, velocities, strict=True):
         shown = _seen(velocity).any(axis=1) & _seen(place).any(axis=1)
@@ -196,7 +197,7 @@ def _belt(places: Sequence[FloatArray], velocities: Sequence[FloatArray]) -> Flo
 
 
 def _short_gaps_filled(time: FloatArray, place: FloatArray) -> FloatArray:
-    """Places (n, m, 3) with gaps up to `_SHORTEST_S` bridged by a line: markers that flicker do not end a stand."""
+    """Bridge gaps up to `_SHORTEST_S` in positions (n, m, 3) linearly: flickering markers do not end a stance phase."""
     filled = place.copy()
     for marker, seen in enumerate(_seen(place).T):
         frames = np.flatnonzero(seen)
@@ -211,7 +212,7 @@ def _short_gaps_filled(time: FloatArray, place: FloatArray) -> FloatArray:
 
 
 def _stance_spans(time: FloatArray, speed: FloatArray) -> tuple[tuple[float, float, bool], ...]:
-    """Where a foot stands whose markers have these speeds (n, m); those not seen may hide where it begins or ends."""
+    """Find stance phases from the speeds (n, m) of a foot's markers; missing markers may hide a start or an end."""
     slowest = np.nan_to_num(speed, nan=np.inf).min(axis=1)
     known = slowest[np.isfinite(slowest)]
     fast = float(np.quantile(known, 0.95)) if known.size else 0.0
@@ -232,7 +233,7 @@ def _stance_spans(time: FloatArray, speed: FloatArray) -> tuple[tuple[float, flo
 
 
 def _ends(time: FloatArray, place: FloatArray) -> tuple[FloatArray, FloatArray, BoolArray]:
-    """The two markers that are farthest apart, of those that are often seen together, and where both are (n,)."""
+    """Return the two markers farthest apart, of those often visible together, and (n,) where both are visible."""
     flat, seen = place[..., [0, 2]], _seen(place)
     often = (seen[:, :, None] & seen[:, None]).sum(axis=0)
     shown = np.flatnonzero(seen.any(axis=0))

@@ -52,8 +52,8 @@ class ForeignLoad(NamedTuple):
 
 
 class UnmeasuredSupport(NamedTuple):
-    """Part of the weight that is on no plate for a while: its share, from when to when, and how much of the window has
-    all of it.
+    """Part of the weight that is on no plate for a while: its share, its start and end, and the share of the window
+    with full support.
     """
 
     missing: float
@@ -63,10 +63,10 @@ class UnmeasuredSupport(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class ForceMass:
-    """Body mass by the vertical force of one trial.
+    """Body mass from the vertical force of one trial.
 
     Attributes:
-        mass_kg, sd_kg: the mass that the forces move like the markers' centre, and its standard deviation.
+        mass_kg, sd_kg: the mass that the forces move like the marker-based centre, and its standard deviation.
         over: a key of `CHANGE_SD_M_S`.
         time: (n,) s, the frames of the longest window in which the sum of the forces is known.
         supported_kg: (n,) force over what a body of one kilogram would need for the same movement.
@@ -79,7 +79,7 @@ class ForceMass:
     supported_kg: FloatArray
 
     def unmeasured(self, total_kg: float) -> UnmeasuredSupport | None:
-        """The longest time in which a part of the weight is on no plate though at other times none is."""
+        """Find the longest interval in which part of the weight is on no plate, while at other times all is."""
         share = self.supported_kg / total_kg - 1.0
         complete = float((np.abs(share) < _COMPLETE).mean())
         spans = [(a, b) for a, b in runs(share < -MISSING) if span_s(self.time, a, b) >= UNMEASURED_S]
@@ -101,7 +101,7 @@ class ForceMass:
 
 
 def force_mass(segment_of_label: Mapping[str, str], trial: Trial, standing: bool = False) -> ForceMass | None:
-    """Body mass by the forces in the longest window in which their sum is known, or in whole strides or steps of it.
+    """Compute body mass from the forces in the longest window of known total force, or in whole strides or steps of it.
 
     Args:
         segment_of_label: which marker is on which segment.
@@ -132,7 +132,7 @@ def force_mass(segment_of_label: Mapping[str, str], trial: Trial, standing: bool
             found.append((mass_kg, mass_kg * CHANGE_SD_M_S[over] / (lasts_s * specific), over))
     if not found:
         return None
-    # a part of the weight that is on no plate at the ends of the window is in the whole of it only
+    # weight that is on no plate at the ends of the window affects only the mean over the whole window
     whole_kg, whole_sd_kg, _ = found[0]
     fitting = [one for one in found if abs(one[0] - whole_kg) <= 2.0 * float(np.hypot(one[1], whole_sd_kg))]
     slow = smooth(loads.time[inside], force[inside], _SLOW_HZ)(time)
@@ -143,7 +143,7 @@ def force_mass(segment_of_label: Mapping[str, str], trial: Trial, standing: bool
 
 
 def _spans(loads: FootLoads, start_s: float, end_s: float, standing: bool) -> list[tuple[str, float, float]]:
-    """Times over which a mean force is a mass: the whole window, and strides and steps in its middle."""
+    """List spans over which the mean force gives a mass: the whole window, and strides and steps in its middle."""
     if standing:
         return [("standing", start_s, end_s)]
     lasts_s, spans = end_s - start_s, [("the whole window", start_s, end_s)]

@@ -9,14 +9,15 @@ import numpy as np
 from kinertia.trial.data import FEET, FloatArray
 
 _AHEAD_OF_HEIGHT, _MEDIAL_OF_HEIGHT = 0.132, 0.035
-"""Of stature, from the heel marker towards the second metatarsal head and across it. Of six children of 1.23 to 1.74 m
+"""Of stature, from the heel marker towards the second metatarsal head and across it. In six children of 1.23 to 1.74 m
 the marker on the big toe is 0.126 to 0.139 ahead and 0.032 to 0.041 across."""
 _AHEAD_OF_METATARSAL, _MEDIAL_OF_METATARSAL = 1.15, 0.3
-"""The same as shares of the way to the metatarsal head, where stature is unknown."""
+"""Shares of the distance from heel to metatarsal head, used where stature is unknown."""
 
 
 def halluces(landmarks: Mapping[str, FloatArray], height_m: float | None) -> dict[str, FloatArray]:
-    """(n, 3) m by side, "r" and "l", as high as the metatarsal heads; none of feet with a toe marker or without a heel.
+    """Estimate the position (n, 3) m of each big toe ("r", "l"), as high as the metatarsal heads, for feet with a heel
+    but no toe marker.
 
     Args:
         landmarks: (n, 3) m of every landmark.

@@ -17,13 +17,13 @@ from kinertia.trial.sampled_time import span_s, within
 _PELVIS_HZ = 6.0
 _LEAST_WINDOW_S, _LEAST_SPECIFIC = 0.4, 0.2
 LEAST_CHANGE_M_S, _FOLLOWS = 0.02, 0.7
-"""Velocities that change by less (standard deviation) say nothing of forces."""
+"""Velocities whose changes have a smaller standard deviation carry no information on forces."""
 
 
 @dataclass(frozen=True, eq=False)
 class CausedVelocity:
-    """(n, 3) m/s over (n,) s: of the pelvis, of the markers' centre, and of a body of this mass as the forces cause
-    them.
+    """Velocities (n, 3) m/s over (n,) s of the pelvis, of the marker-based centre, and of a body of this mass as the
+    forces cause it.
     """
 
     time: FloatArray
@@ -33,7 +33,7 @@ class CausedVelocity:
     mass_kg: float
 
     def by(self, time: FloatArray, force: FloatArray) -> FloatArray:
-        """(n,) m/s that a force (k,) N over time (k,) s causes."""
+        """Return the velocity (n,) m/s that a force (k,) N over time (k,) s gives this mass."""
         force = np.interp(self.time, time, force)
         impulse = np.cumsum((force[1:] + force[:-1]) / 2 * np.diff(self.time))
         return np.concatenate(([0.0], impulse)) / self.mass_kg
@@ -41,7 +41,7 @@ class CausedVelocity:
 
 @dataclass(frozen=True, eq=False)
 class VelocityChanges:
-    """(n, 3) m/s: the same of all windows, one after the other, each without its trend."""
+    """Velocities (n, 3) m/s of all windows, one after the other, each without its linear trend."""
 
     pelvis: FloatArray
     centre: FloatArray
@@ -49,7 +49,7 @@ class VelocityChanges:
 
     @classmethod
     def of(cls, parts: Sequence[CausedVelocity]) -> VelocityChanges:
-        """Of these windows."""
+        """Join the velocities of these windows."""
         pelvis, centre, caused = (
             np.concatenate([without_trend(part.time, getattr(part, name)) for part in parts])
             for name in ("pelvis", "centre", "caused")
@@ -57,8 +57,8 @@ class VelocityChanges:
         return cls(pelvis, centre, caused)
 
     def vertical_ratio(self, shown: FloatArray) -> float | None:
-        """How many times as fast the forces move the body up and down as these velocities (n, 3) show; None where they
-        do not follow the forces.
+        """Return the ratio of the force-derived vertical velocity to the one shown (n, 3); None where the two do not
+        correlate.
         """
         up, caused = shown[:, 1], self.caused[:, 1]
         if min(up.std(), caused.std()) < LEAST_CHANGE_M_S or np.corrcoef(up, caused)[0, 1] < _FOLLOWS:
@@ -67,7 +67,7 @@ class VelocityChanges:
 
 
 def without_trend(time: FloatArray, values: FloatArray) -> FloatArray:
-    """Values (n,) or (n, k) over times (n,) s, less a line of each column."""
+    """Return values (n,) or (n, k) over times (n,) s, less the straight line fitted to each column."""
     after = time - time.mean()
     slope, level = np.polyfit(after, values, 1)
     result: FloatArray = values - np.multiply.outer(after, slope) - level
@@ -75,7 +75,7 @@ def without_trend(time: FloatArray, values: FloatArray) -> FloatArray:
 
 
 def caused_velocities(trial: Trial, owners: Mapping[str, str]) -> list[CausedVelocity]:
-    """Of every window in which the sum of the forces is known, if it is long enough."""
+    """Compute body velocities in every long enough window in which the total force is known."""
     windows = trial.carried_windows()
     if not windows:
         return []
@@ -102,7 +102,7 @@ def caused_velocities(trial: Trial, owners: Mapping[str, str]) -> list[CausedVel
         if len(time) < 10 or span_s(time) < _LEAST_WINDOW_S or not force[:, 1].mean() > 0:
             continue
         centre = centre_m(time, 1)
-        # who lands, or jumps off, is faster upwards at the end
+        # a person who lands, or jumps off, is faster upwards at the end
         specific = GRAVITY_M_S2 + float(centre[-1, 1] - centre[0, 1]) / span_s(time)
         if specific < _LEAST_SPECIFIC * GRAVITY_M_S2:
             continue

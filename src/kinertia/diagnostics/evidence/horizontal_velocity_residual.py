@@ -17,12 +17,12 @@ DISTINGUISHABLE = 0.5
 """Across the walk a foot pushes to one side all the time: with the wrong sign it looks like another zero. On nine
 trials what is true leaves 0.1 to 0.66 of what the other would, in one walk 0.7 to 1.7."""
 CLEARLY_BEST = 0.85
-"""A fault is told from others where undoing it leaves less than this share of what undoing any of those leaves."""
+"""A fault is identified where undoing it leaves less than this share of what undoing any other leaves."""
 
 
 @dataclass(frozen=True)
 class Scaled:
-    """One plate, or all (None), that reads `factor` times what it should; m/s that are left without that."""
+    """Gain error of one plate, or of all (None): its reading is `factor` times the truth; residual (m/s) without it."""
 
     plate: int | None
     factor: float
@@ -31,16 +31,16 @@ class Scaled:
 
 @dataclass(frozen=True, eq=False)
 class VelocityResidual:
-    """m/s, along one axis: how far the velocity that the forces cause is from that of the body (RMS), as it is and by
-    each of some faults.
+    """RMS difference (m/s) along one axis between the force-derived and the body's velocity, as recorded and with each
+    supposed fault undone.
 
     Attributes:
-        as_read: none.
-        all_reversed: all plates have the wrong sign.
-        without_trend: all plates have the same wrong zero.
-        plate_reversed, plate_zeroed: (p,) one plate has the wrong sign, or the wrong zero.
-        zero_n: (p,) N, that zero.
-        scaled: all plates have the same wrong gain, or one has it.
+        as_read: residual of the forces as recorded.
+        all_reversed: residual if all plates have the wrong sign.
+        without_trend: residual if all plates have the same zero offset.
+        plate_reversed, plate_zeroed: (p,) residuals if one plate has the wrong sign, or a zero offset.
+        zero_n: (p,) N, that zero offset.
+        scaled: residuals if all plates, or one, have a gain error.
     """
 
     as_read: float
@@ -53,7 +53,7 @@ class VelocityResidual:
 
     @classmethod
     def of(cls, time: FloatArray, force: FloatArray, parts: Sequence[CausedVelocity], axis: int) -> VelocityResidual:
-        """Along X (0) or Z (2); forces (k, p, 3) N of plates, or of feet, over (k,) s."""
+        """Compute the residuals along X (0) or Z (2), of forces (k, p, 3) N of plates or feet over (k,) s."""
         body = _centred([(part.pelvis[:, axis] + part.centre[:, axis]) / 2 for part in parts])
         caused = _centred([part.caused[:, axis] for part in parts])
         off = caused - body
@@ -81,12 +81,12 @@ class VelocityResidual:
         )
 
     def once(self, residual: float, limit: float) -> Quantity:
-        """Before and after a fault is undone, as evidence; `limit` up to which it is shown."""
+        """Return the residuals before and after a fault is undone, as evidence; `limit` up to which it is shown."""
         return Quantity((self.as_read, residual), "m/s", limit=limit)
 
 
 def rotated_residual(parts: Sequence[CausedVelocity], angle: float) -> float:
-    """m/s, of both horizontal axes together, once forces are rotated back by this angle (rad) about the vertical."""
+    """Compute the residual (m/s) of both horizontal axes, forces rotated back by `angle` (rad) about the vertical."""
     # from Z to X is a positive rotation about Y
     caused, pelvis, centre = (
         _centred([getattr(part, name)[:, 2] + 1j * getattr(part, name)[:, 0] for part in parts])
@@ -101,5 +101,5 @@ def _scaled(plate: int | None, off: FloatArray, own: FloatArray) -> Scaled:
 
 
 def _centred(windows: Sequence[np.ndarray]) -> np.ndarray:
-    """One after the other, each less its mean."""
+    """Concatenate the windows, each less its mean."""
     return np.concatenate([each - each.mean() for each in windows])

@@ -21,7 +21,7 @@ _RESOLVED_SHARE = 0.35
 
 
 class _Exchange(NamedTuple):
-    """Pairs of columns that are exchanged, by how much distances differ (m) before and after, and what that gains."""
+    """Candidate exchange of pairs of columns, with the distance errors (m) before and after, and the gain."""
 
     pairs: tuple[tuple[int, int], ...]
     before_m: float
@@ -30,11 +30,11 @@ class _Exchange(NamedTuple):
 
 
 def swapped_labels(distances: SegmentDistances, trial: str, reference: str) -> Iterator[Finding]:
-    """L212: the exchange of two labels, or else of two pairs within a segment, that fits best; none where none does.
+    """L212: the one swap of two labels, or of two pairs within a segment, that fits best; no finding where none does.
 
     Args:
         distances: between the markers of a segment, in the reference and in a trial.
-        trial: its name.
+        trial: name of the trial.
         reference: "static trial", "model", or another.
     """
     best = _best(distances, _single(distances)) or _best(distances, _double(distances))
@@ -52,7 +52,7 @@ def swapped_labels(distances: SegmentDistances, trial: str, reference: str) -> I
 
 
 def _best(distances: SegmentDistances, candidates: Iterator[tuple[tuple[int, int], ...]]) -> _Exchange | None:
-    """The exchange that resolves the differences of its markers, of several the one that gains most."""
+    """Return the exchange that resolves the differences of its markers; of several, the one that gains most."""
     off, found = np.abs(distances.differences()), []
     for pairs in candidates:
         own = np.isin(distances.pairs, pairs).any(axis=1)
@@ -73,14 +73,14 @@ def _exchanged(distances: SegmentDistances, pairs: Sequence[tuple[int, int]]) ->
 
 
 def _single(distances: SegmentDistances) -> Iterator[tuple[tuple[int, int], ...]]:
-    """Any two labels of which one has a distance that differs."""
+    """Yield every pair of labels of which one has a distance that differs."""
     off = np.abs(distances.differences())
     suspects = {int(k) for pair in distances.pairs[off > _SWAPPED_M] for k in pair}
     return (((a, b),) for a, b in combinations(range(len(distances.labels)), 2) if {a, b} & suspects)
 
 
 def _double(distances: SegmentDistances) -> Iterator[tuple[tuple[int, int], ...]]:
-    """Two pairs of labels of one segment, front and back for one, if any distance differs."""
+    """Yield two pairs of labels of one segment (such as front and back) where any distance differs."""
     if not (np.abs(distances.differences()) > _SWAPPED_M).any():
         return
     mates = {

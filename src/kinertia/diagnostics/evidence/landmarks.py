@@ -17,7 +17,7 @@ _GOES_M = 0.5
 
 
 def landmark_positions(markers: Markers, marker_set: MarkerSet) -> dict[str, FloatArray]:
-    """(n, 3) m of the landmarks whose labels are all there."""
+    """Return the positions (n, 3) m of the landmarks whose labels are all present."""
     return {
         name: markers.select(labels).positions.mean(axis=1)
         for name, labels in marker_set.landmarks.items()
@@ -26,8 +26,8 @@ def landmark_positions(markers: Markers, marker_set: MarkerSet) -> dict[str, Flo
 
 
 def headings(places: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-    """(n, 3): where "foot_r", "foot_l" and "pelvis" point, each from its own back to its front, whatever its side; NaN
-    while a foot is steep: behind a runner it points down and backwards.
+    """Compute unit headings (n, 3) of "foot_r", "foot_l" and "pelvis", each from its own back to its front, independent
+    of side; NaN while a foot is steep: behind a runner it points down and backwards.
     """
     found = {}
     for side in "rl":
@@ -43,7 +43,7 @@ def headings(places: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
 
 
 def most_forwards(markers: Markers, known: Mapping[str, FloatArray]) -> float:
-    """Of these headings the largest cosine to the way of the markers' middle; 0 where there is neither."""
+    """Return the largest cosine of these headings to the travel of the markers' middle; 0 where either is unknown."""
     shown = np.asarray(np.isfinite(markers.positions).any(axis=(1, 2)))
     middle = np.nanmedian(markers.positions[shown], axis=1)
     if not known or len(middle) < 2 or np.linalg.norm(horizontal(middle[-1] - middle[0])) < _GOES_M:
@@ -53,20 +53,20 @@ def most_forwards(markers: Markers, known: Mapping[str, FloatArray]) -> float:
 
 
 def horizontal(vectors: FloatArray) -> FloatArray:
-    """Their horizontal part."""
+    """Return the horizontal part of the vectors."""
     result: FloatArray = vectors * np.array([1.0, 0.0, 1.0])
     return result
 
 
 def unit(vectors: FloatArray) -> FloatArray:
-    """Vectors (..., 3) over their length; NaN of those that have none."""
+    """Normalise vectors (..., 3); NaN where their length is zero."""
     with np.errstate(invalid="ignore", divide="ignore"):
         result: FloatArray = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
     return result
 
 
 def cosine(vectors: FloatArray, others: FloatArray) -> float:
-    """Median over the frames of the cosine between the horizontal parts; 0 where nothing is seen."""
+    """Return the median over frames of the cosine between the horizontal parts; 0 where nothing is visible."""
     with np.errstate(invalid="ignore"):
         cosines = (unit(horizontal(vectors)) * unit(horizontal(others))).sum(axis=-1)
     seen = cosines[np.isfinite(cosines)]

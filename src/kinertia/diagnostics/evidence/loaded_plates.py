@@ -17,7 +17,7 @@ STEP_N, _FEWEST = 350.0, 10
 
 
 def adult_share(plates: PlateLoads | None, mass_kg: float | None = None) -> float:
-    """Body weight over that of an adult of 70 kg, at most 1: limits in newtons are those of adults times this.
+    """Return body weight as a share of a 70 kg adult's, at most 1: limits in newtons are an adult's times this share.
 
     Where no mass is stated, the heaviest loads on all plates stand for body weight. They are 1.1 times it in a walk and
     more in a run: too heavy rather than too light, so that a limit is never lower than the person's.
@@ -32,12 +32,12 @@ def adult_share(plates: PlateLoads | None, mass_kg: float | None = None) -> floa
 
 
 def wrenches(plates: PlateLoads) -> Iterator[tuple[str, FloatArray]]:
-    """Name and wrench (k, 6) of every plate."""
+    """Yield the name and wrench (k, 6) of every plate."""
     return zip(plates.names, np.moveaxis(plates.wrench, 1, 0), strict=True)
 
 
 def loaded_wrenches(plates: PlateLoads, fewest: int = 1) -> Iterator[tuple[str, FloatArray]]:
-    """Name and wrench (j, 6) of its samples under load, of every plate that has so many."""
+    """Yield the name and wrench (j, 6) of the loaded samples of every plate that has at least `fewest` of them."""
     for name, wrench in wrenches(plates):
         loaded = wrench[wrench[:, 1] > FIRM_LOAD_N]
         if len(loaded) >= fewest:
@@ -45,5 +45,5 @@ def loaded_wrenches(plates: PlateLoads, fewest: int = 1) -> Iterator[tuple[str, 
 
 
 def carrying(plates: PlateLoads, share: float) -> Iterator[tuple[str, FloatArray]]:
-    """The same of every plate that carries a person whose `adult_share` this is."""
+    """Yield name and wrench (j, 6) of the loaded samples of every plate that carries a person of this `adult_share`."""
     return ((name, loaded) for name, loaded in loaded_wrenches(plates, _FEWEST) if loaded[:, 1].max() >= STEP_N * share)

@@ -19,7 +19,7 @@ USUAL_HZ = 60.0
 third power."""
 _FEWEST_FRAMES = 11
 _WHOLE = 1e-3
-"""Of a quantisation step, by which multiples of it may be off."""
+"""Share of a quantisation step by which its multiples may be off."""
 _THIRD_DIFFERENCE = float(np.sqrt(20.0))
 """SD of the third differences of noise over its own; motions have hardly any at 60 Hz and more."""
 _GAUSSIAN = 1.4826
@@ -27,12 +27,12 @@ _GAUSSIAN = 1.4826
 
 @dataclass(frozen=True)
 class MarkerPrecision:
-    """Quantisation step and noise of single coordinates, m.
+    """Quantisation step and noise (m) of single marker coordinates.
 
     Attributes:
-        step_m: what all coordinates are multiples of, if that is coarse; 0 where they are not.
+        step_m: quantisation step of all coordinates, if it is coarse; else 0.
         noise_m: SD from frame to frame, median over the markers; NaN where too few frames show them.
-        noise_limit_m: beyond which it is no camera's, at the recording's frame rate.
+        noise_limit_m: largest noise that cameras cause at the recording's frame rate.
     """
 
     step_m: float
@@ -41,18 +41,18 @@ class MarkerPrecision:
 
     @classmethod
     def of(cls, markers: Markers) -> MarkerPrecision:
-        """Of all markers together."""
+        """Estimate the precision of all markers together."""
         limit = NOISY_M * max(1.0, USUAL_HZ / markers.rate_hz) ** 3 if len(markers.time) > 1 else np.inf
         return cls(_step_m(markers.positions), _noise_m(markers.positions), limit)
 
     @property
     def rounded(self) -> bool:
-        """Whether markers seem to stand still and to jump since their coordinates are rounded."""
+        """Whether the coordinates are rounded so coarsely that markers seem to stand still and to jump."""
         return self.step_m > COARSE_M
 
     @property
     def noisy(self) -> bool:
-        """Whether markers jitter by more than cameras that are calibrated make them."""
+        """Whether markers jitter more than calibrated cameras make them."""
         return self.noise_m > self.noise_limit_m
 
 

@@ -15,11 +15,11 @@ from kinertia.trial.sampled_time import TIME_TOLERANCE_S, runs, span_s
 COP_MIN_FORCE_N = 5 * LOAD_THRESHOLD_N
 CONTACT_FORCE_N, SHORTEST_S = 50.0, 0.15
 FAR_M = 0.15
-"""Half of a load farther than this from both feet is under neither."""
+"""A load that is farther from both feet than this, for half of it, is under neither."""
 ONE_STEP_S = 1.5
-"""Longer loads are of both feet, in turn (walking on one belt) or at once (squats)."""
+"""Longest load of a single step; longer ones are of both feet, in turn (walking on one belt) or at once (squats)."""
 BETWEEN_M = 0.08
-"""Of a load of both feet at once (squats) most is between them, farther than this from both."""
+"""Distance from both feet beyond which most of a load of both at once (squats) lies, between them."""
 _MOSTLY_NEAR, _LEAST_SHARE = 0.7, 0.2
 """While one foot takes over from the other, the load is under neither."""
 _END = 0.05
@@ -30,10 +30,10 @@ class PlateContact:
     """One load on one plate.
 
     Attributes:
-        plate: its index.
-        start_s, end_s: when it is above `CONTACT_FORCE_N`; NaN for an end that the trial does not show.
-        foot: 0 right, 1 left, under which it mostly is.
-        weight: (k,) N, its vertical force where that is reliable and the foot is seen.
+        plate: index of the plate.
+        start_s, end_s: when the load is above `CONTACT_FORCE_N`; NaN for an end that the trial does not show.
+        foot: the foot under which the load mostly is, 0 right, 1 left.
+        weight: (k,) N, vertical force where it is reliable and the foot is visible.
         time: (k,) s.
         place: (k, 2) m, centre of pressure.
         offset_m: (2, k, 2) m, horizontally from each foot to the centre of pressure.
@@ -52,12 +52,12 @@ class PlateContact:
 
     @property
     def is_step(self) -> bool:
-        """Whether the trial shows all of it, and it is no longer than a step."""
+        """Whether the trial shows the whole load and it lasts no longer than a step."""
         return 0.0 < round(self.end_s - self.start_s, 6) < ONE_STEP_S
 
     @property
     def in_turn(self) -> bool:
-        """Whether it goes from under one foot to under the other: steps on one long plate, or on a treadmill's belt."""
+        """Whether the load passes from one foot to the other: steps on one long plate, or on a treadmill's belt."""
         distance = np.linalg.norm(self.offset_m, axis=2)
         of_right = float(self.weight[distance[0] < distance[1]].sum() / self.weight.sum())
         near = _quantile(distance.min(axis=0), self.weight, _MOSTLY_NEAR) < FAR_M / 2
@@ -65,25 +65,25 @@ class PlateContact:
 
     @property
     def between(self) -> bool:
-        """Whether most of it is between the feet, under neither: both stand on the plate."""
+        """Whether most of the load is between the feet, under neither: both stand on the plate."""
         opposite = np.prod(self.offset_m, axis=0).sum(axis=1) < 0
         apart = (np.linalg.norm(self.offset_m, axis=2) > BETWEEN_M).all(axis=0) & opposite
         return bool(self.weight[apart].sum() > self.weight.sum() / 2)
 
     @property
     def distance_m(self) -> float:
-        """From the nearer foot, within which half of the load is."""
+        """Median distance (m) of the load from the nearer foot."""
         return _quantile(np.linalg.norm(self.offset_m, axis=2).min(axis=0), self.weight, 0.5)
 
     @property
     def own_offset_m(self) -> FloatArray:
-        """(2,) m, mean distance of the load from its foot along X and Z."""
+        """Mean offset (2,) m of the load from its foot along X and Z."""
         result: FloatArray = self.weight @ self.offset_m[self.foot] / self.weight.sum()
         return result
 
 
 def contacts_of(plates: PlateLoads, feet: tuple[FootTrajectory, FootTrajectory]) -> list[PlateContact]:
-    """Loads of at least `SHORTEST_S` while markers are there; none whose foot is mostly hidden."""
+    """Find loads of at least `SHORTEST_S` while markers are visible, except those whose foot is mostly hidden."""
     first_s, last_s = feet[0].time[0] - TIME_TOLERANCE_S, feet[0].time[-1] + TIME_TOLERANCE_S
     point = cop_horizontal(plates)
     contacts = []
@@ -113,13 +113,13 @@ def contacts_of(plates: PlateLoads, feet: tuple[FootTrajectory, FootTrajectory])
 
 
 def loads_on(plates: PlateLoads, p: int) -> list[tuple[int, int]]:
-    """First and last sample of every load of at least `SHORTEST_S` on plate `p`."""
+    """Return the first and last sample of every load of at least `SHORTEST_S` on plate `p`."""
     loaded = runs(bridged(plates.time, plates.force[:, p, 1] > CONTACT_FORCE_N))
     return [(first, last) for first, last in loaded if span_s(plates.time, first, last) >= SHORTEST_S]
 
 
 def cop_horizontal(plates: PlateLoads) -> FloatArray:
-    """(k, p, 2) m, centres of pressure (x, z), at the plates' height where that is known."""
+    """Return centres of pressure (k, p, 2) m (x, z), at the plates' height where it is known."""
     height = 0.0 if plates.corners is None else plates.corners[:, :, 1].mean(axis=1)[None, :, None]
     force, moment = plates.force, plates.moment
     lifted = moment - np.cross(np.array([0.0, 1.0, 0.0]) * height, force)
@@ -127,14 +127,14 @@ def cop_horizontal(plates: PlateLoads) -> FloatArray:
 
 
 def displaced(plates: PlateLoads, by_m: FloatArray) -> PlateLoads:
-    """The same with centres of pressure displaced by `by_m` (x, z), in any shape that fits (k, p, 2)."""
+    """Return the plates with centres of pressure displaced by `by_m` (x, z), which broadcasts to (k, p, 2)."""
     by = np.broadcast_to(by_m, (*plates.force.shape[:2], 2))
     lever = np.stack([by[..., 0], np.zeros(by.shape[:2]), by[..., 1]], axis=-1)
     return replace(plates, moment=plates.moment + np.cross(lever, plates.force))
 
 
 def _quantile(values: FloatArray, weight: FloatArray, share: float) -> float:
-    """The value below which this share of the weight is."""
+    """Return the weighted quantile: the value below which this share of the weight lies."""
     order = np.argsort(values)
     passed = np.cumsum(weight[order]) / weight.sum()
     return float(values[order][min(int(np.searchsorted(passed, share)), len(order) - 1)])

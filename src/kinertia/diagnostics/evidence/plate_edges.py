@@ -14,9 +14,9 @@ from kinertia.trial.sampled_time import within
 OVERHANG_M, HALLUX_M = 0.01, 0.02
 """Markers stand off the skin by as much; so well is the place of the big toe known that has none."""
 LITTLE_BEYOND_M = 0.03
-"""So little of a heel bears no load to speak of."""
+"""Overhang of a heel that bears no notable load."""
 _TOE_M = 0.05
-"""Nothing but toes is so short."""
+"""Length that only toes do not exceed."""
 _LIFTED_M = 0.01
 """A heel that is higher than where it is lowest by more is lifted. Under a big toe 36 mm beyond a plate a tenth of the
 weight is missing 0.1 s later."""
@@ -25,13 +25,13 @@ _LOW_M = 0.03
 
 
 class Overhang(NamedTuple):
-    """A foot that stands on a plate and reaches beyond it.
+    """A foot that stands on a plate and extends beyond its edge.
 
     Attributes:
         plate, foot: index of the plate; 0 right, 1 left.
-        overhang_m: of the marker that is farthest out.
+        overhang_m: distance beyond the edge of the marker that is farthest out.
         span_s: first and last time at which a marker is out while it is on the ground.
-        unmeasured_s: first and last time at which what is out bears load; None where it does not. Toes do once the heel
+        unmeasured_s: first and last time at which the part outside bears load; None if never. Toes do once the heel
             is lifted.
     """
 
@@ -43,7 +43,7 @@ class Overhang(NamedTuple):
 
 
 def beyond_edges(corners: FloatArray, place: FloatArray) -> FloatArray:
-    """(...) m, how far horizontal places (..., 2) are beyond the edges of a plate (4, 3); negative on the plate."""
+    """Return how far (m) horizontal positions (..., 2) are beyond a plate's edges (4, 3); negative on the plate."""
     flat = corners[:, [0, 2]]
     edges = np.roll(flat, -1, axis=0) - flat
     normals = np.column_stack([edges[:, 1], -edges[:, 0]]) / np.linalg.norm(edges, axis=1)[:, None]
@@ -53,12 +53,12 @@ def beyond_edges(corners: FloatArray, place: FloatArray) -> FloatArray:
 
 
 class FootPoints(NamedTuple):
-    """Points of one foot.
+    """Points of one foot that may be beyond a plate's edge.
 
     Attributes:
-        place: (n, m, 3) m.
-        toe: (m,) which of them are on toes.
-        limit_m: (m,) m, beyond the edge by which they are out.
+        place: positions (n, m, 3) m.
+        toe: (m,) which of the points are on toes.
+        limit_m: (m,) m, distance beyond the edge from which a point counts as outside.
     """
 
     place: FloatArray
@@ -69,7 +69,7 @@ class FootPoints(NamedTuple):
     def of(
         cls, markers: Markers, labels: Sequence[str], toes: Collection[str], hallux: FloatArray | None
     ) -> FootPoints:
-        """Those of its markers, and of the big toe where that has none."""
+        """Collect the points of a foot: its markers, and the big toe where it has no marker."""
         known = [label for label in labels if label in markers.labels]
         place = markers.select(known).positions
         toe = [label in toes for label in known]
@@ -80,24 +80,24 @@ class FootPoints(NamedTuple):
         return cls(place, np.array(toe), np.array(limit_m))
 
     def at(self, rows: BoolArray) -> FootPoints:
-        """The same in some frames."""
+        """Return the points in some of the frames."""
         return self._replace(place=self.place[rows])
 
 
 def overhangs(
     plates: PlateLoads, contacts: Sequence[PlateContact], time: FloatArray, feet: Sequence[FootPoints]
 ) -> list[Overhang]:
-    """Feet that stand on a plate, under its load, and reach beyond its edge onto no other plate.
+    """Find feet that stand on a plate, under its load, and extend beyond its edge onto no other plate.
 
     Args:
-        plates: with corners; nothing is known without.
-        contacts: loads on them.
-        time: (n,) s, of the feet.
+        plates: plates with corners; without corners nothing is found.
+        contacts: loads on the plates.
+        time: (n,) s, time of the feet.
         feet: the right and the left one.
     """
     found = []
     for contact in contacts:
-        # where the load is not under the foot, the plate is not where its corners are
+        # where the load is not under the foot, the corners are not at the plate's true position
         if plates.corners is None or contact.distance_m > FAR_M / 2 or contact.in_turn or contact.between:
             continue
         inside = within(time, contact.time[0], contact.time[-1])
@@ -108,7 +108,7 @@ def overhangs(
 
 
 def _overhang(contact: PlateContact, corners: FloatArray, time: FloatArray, foot: FootPoints) -> list[Overhang]:
-    """One foot (n frames) during one load on one of the plates (p, 4, 3)."""
+    """Find the overhang of one foot (n frames) during one load on one of the plates (p, 4, 3)."""
     seen = np.isfinite(foot.place).all(axis=2)
     height = np.where(seen, foot.place[..., 1], np.inf)
     low = height < height.min(axis=0) + _LOW_M
@@ -130,8 +130,8 @@ def _overhang(contact: PlateContact, corners: FloatArray, time: FloatArray, foot
 
 
 def _heel_lifted(foot: FootPoints, height: FloatArray, toes: BoolArray) -> BoolArray:
-    """(n,) whether of points so high (n, m) the one that is farthest from these toes (m,) is lifted: from then on they
-    bear load.
+    """Return (n,) whether, of points of these heights (n, m), the one farthest from these toes (m,) is lifted: from
+    then on the toes bear load.
     """
     away = np.linalg.norm(foot.place - foot.place[:, toes].mean(axis=1, keepdims=True), axis=2)
     usual = np.where(np.isfinite(away).any(axis=0), np.nan_to_num(away).max(axis=0), -np.inf)
@@ -141,5 +141,5 @@ def _heel_lifted(foot: FootPoints, height: FloatArray, toes: BoolArray) -> BoolA
 
 
 def _span(time: FloatArray, rows: BoolArray) -> tuple[float, float] | None:
-    """First and last of these times; None of none."""
+    """Return the first and last of the selected times; None where none is selected."""
     return (float(time[rows][0]), float(time[rows][-1])) if rows.any() else None

@@ -20,12 +20,13 @@ _ALONE_N, _UNLOADED_N, _SHORTEST_S = 50.0, 10.0, 0.2
 def plate_masses(
     plates: PlateLoads, trial: Trial, markers: Markers, segment_of_label: Mapping[str, str]
 ) -> dict[str, float]:
-    """kg, by plate, of a body that moves like the markers' centre; plates that never carry it alone are left out.
+    """Compute body mass (kg) by plate, of a body that moves like the marker-based centre; only plates that for a while
+    support it alone.
 
     Args:
-        plates: of the recording.
-        trial: the same with loads sorted by foot; it knows in which frames ground contact is measured.
-        markers: all of the recording.
+        plates: plates of the recording.
+        trial: the recording with loads sorted by foot; it knows in which frames ground contact is measured.
+        markers: all markers of the recording.
         segment_of_label: which marker is on which segment.
     """
     windows = trial.windows()

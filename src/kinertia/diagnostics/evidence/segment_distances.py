@@ -16,7 +16,7 @@ from kinertia.trial.data import FloatArray, Markers
 
 LOWER_BODY = ("pelvis", *(f"{name}_{side}" for name in ("thigh", "shank", "foot") for side in "rl"))
 FEWEST_PAIRS = 6
-"""Fewer say nothing of a whole body."""
+"""Fewer pairs say nothing about a whole body."""
 SAME_SESSION_M = 0.009
 """RMS difference of the distances: re-applied markers are 5 to 10 mm off along each axis, which makes 7 to 14."""
 _FRAMES = 60
@@ -27,8 +27,8 @@ class SegmentDistances:
     """Distances (m, m) m between the markers of the lower body that both trials have, and which of them count.
 
     Attributes:
-        labels: of the m markers.
-        static, trial: medians over the frames, of the static trial or of a model; NaN for those that are never seen
+        labels: labels of the m markers.
+        static, trial: medians over the frames, of the static trial or of a model; NaN for markers that are never seen
             together.
         pairs: (p, 2) indices of two markers of one segment, both known.
         segments: (p,) index of the pair's segment in `LOWER_BODY`.
@@ -42,7 +42,7 @@ class SegmentDistances:
 
     @classmethod
     def of(cls, static: Markers, trial: Markers, marker_set: MarkerSet) -> SegmentDistances:
-        """Of the markers that the set has on pelvis, legs and feet."""
+        """Compute the distances between the markers that the set has on pelvis, legs and feet."""
         both = set(static.labels) & set(trial.labels)
         segments = [[label for label in marker_set.segments.get(name, ()) if label in both] for name in LOWER_BODY]
         labels = tuple(dict.fromkeys(label for own in segments for label in own))
@@ -53,29 +53,29 @@ class SegmentDistances:
         return cls(labels, before, after, known[:, :2], known[:, 2])
 
     def ratio(self) -> float:
-        """How many times as far apart the pairs are in the trial: the median."""
+        """Return the median ratio of the pairs' distances, trial over static trial."""
         before, after = self.lengths()
         return float(np.median(after / before))
 
     def lengths(self) -> tuple[FloatArray, FloatArray]:
-        """(p,) m, of the pairs before, and in the trial."""
+        """Return the distances (p,) m of the pairs in the static trial, and in the trial."""
         at = tuple(self.pairs.T)
         return self.static[at], self.trial[at]
 
     def worst_pair(self) -> str:
-        """The two labels whose distances differ most: "RASI to LASI"."""
+        """Return the two labels whose distances differ most: "RASI to LASI"."""
         worst = int(np.argmax(np.abs(self.differences())))
         return " to ".join(self.labels[k] for k in self.pairs[worst])
 
     def differences(self, order: NDArray[np.int_] | None = None) -> FloatArray:
-        """(p,) m, by how much the pairs are farther apart in the trial, with its markers in another order."""
+        """Return by how much (p,) m the pairs are farther apart in the trial, with its markers in another order."""
         trial = self.trial if order is None else self.trial[np.ix_(order, order)]
         result: FloatArray = trial[tuple(self.pairs.T)] - self.static[tuple(self.pairs.T)]
         return result
 
 
 def _medians(markers: Markers, labels: tuple[str, ...]) -> FloatArray:
-    """(m, m) m, median distances over a few frames."""
+    """Compute median distances (m, m) m between markers over a few frames."""
     places = markers.select(labels).positions[:: -(-len(markers.time) // _FRAMES)]
     distances = np.linalg.norm(places[:, :, None] - places[:, None], axis=-1)
     seen = np.isfinite(distances).any(axis=0)

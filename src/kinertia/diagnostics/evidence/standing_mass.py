@@ -15,21 +15,21 @@ from kinertia.trial.ground_contact import FootMarkers
 from kinertia.trial.sampled_time import TIME_TOLERANCE_S, within
 
 _WINDOW_S, _STILL_M = 0.2, 0.005
-"""Who stands moves by less within this time: in quiet standing it is 1 to 3 mm."""
+"""A standing person moves by less within this time: in quiet standing 1 to 3 mm."""
 _CHANGE_SD_M_S = 0.01
-"""Of the vertical velocity between both ends (`force_mass.CHANGE_SD_M_S`)."""
+"""SD of the change of vertical velocity between both ends (`force_mass.CHANGE_SD_M_S`)."""
 _BETWEEN, _ASIDE_M = (0.15, 0.85), 0.15
-"""Where between the feet the load of both is: beyond, one of them stands on something else too."""
+"""Range between the feet of the load of both: beyond it, one of them also stands on something else."""
 
 
 @dataclass(frozen=True)
 class StandingMass:
-    """What the plates carry of a person who stands still.
+    """Mass that the plates support while a person stands still.
 
     Attributes:
-        mass_kg, sd_kg: the mass, and its deviation by how the person sways.
-        span_s: first and last time.
-        plates: names of the plates that carry it.
+        mass_kg, sd_kg: the mass, and its SD from the person's sway.
+        span_s: first and last time of standing still.
+        plates: names of the plates that support the mass.
     """
 
     mass_kg: float
@@ -39,7 +39,7 @@ class StandingMass:
 
 
 def standing_mass(plates: PlateLoads, markers: Markers, feet: FootMarkers) -> StandingMass | None:
-    """Weigh the person in the longest time of standing still with both feet on plates; None without one."""
+    """Weigh the person in the longest interval of standing still with both feet on plates; None without one."""
     total = plates.wrench.sum(axis=1)
     best: StandingMass | None = None
     for start_s, end_s in _still_spans(markers):
@@ -60,7 +60,7 @@ def standing_mass(plates: PlateLoads, markers: Markers, feet: FootMarkers) -> St
 
 
 def _still_spans(markers: Markers) -> list[tuple[float, float]]:
-    """Times (s) in which the median marker stays where it is, joined where they follow each other."""
+    """Find intervals (s) in which the median marker stays in place, joined where they follow each other."""
     if len(markers.time) < 2:
         return []
     every = max(2, round(_WINDOW_S * markers.rate_hz))
@@ -77,7 +77,7 @@ def _still_spans(markers: Markers) -> list[tuple[float, float]]:
 
 
 def _places(markers: Markers, labels: Sequence[str], at_s: float) -> FloatArray:
-    """(m, 2) m, horizontal places of the markers of one foot that are seen at this time."""
+    """Return horizontal positions (m, 2) m of the markers of one foot that are visible at this time."""
     first = int(np.searchsorted(markers.time, at_s - TIME_TOLERANCE_S))
     place = markers.select(labels).positions[first][:, [0, 2]]
     result: FloatArray = place[np.isfinite(place).all(axis=1)]
@@ -85,7 +85,7 @@ def _places(markers: Markers, labels: Sequence[str], at_s: float) -> FloatArray:
 
 
 def _under_both(total: FloatArray, right: FloatArray, left: FloatArray) -> bool:
-    """Whether the whole load (k, 6) is between both feet (m, 2)."""
+    """Return whether the whole load (k, 6) is between both feet (m, 2)."""
     if not len(right) or not len(left):
         return False
     mean, start, along = total.mean(axis=0), right.mean(axis=0), left.mean(axis=0) - right.mean(axis=0)
@@ -96,7 +96,7 @@ def _under_both(total: FloatArray, right: FloatArray, left: FloatArray) -> bool:
 
 
 def _beyond_plates(plates: PlateLoads, feet: FloatArray) -> bool:
-    """Whether a marker on the feet (m, 2) is beyond the edges of all plates, whose corners are known."""
+    """Return whether a marker on the feet (m, 2) is beyond the edges of all plates, whose corners are known."""
     if plates.corners is None:
         return False
     each = np.stack([beyond_edges(corners, feet) for corners in plates.corners])

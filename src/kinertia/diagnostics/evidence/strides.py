@@ -17,17 +17,17 @@ _TOGETHER = 0.2
 _SHORTEST_STEP_S = 0.2
 """Feet that land or leave within less do so together: a sprinter's steps last longer."""
 _LONGEST_SWING_S = 1.0
-"""A foot that is in the air for longer is lifted: who lands on the other one."""
+"""A foot that is in the air for longer is held up while the person lands on the other one."""
 
 
 def periods(loads: FootLoads) -> tuple[list[float], list[float]]:
-    """Times (s) between landings, and between leavings, of one foot; and from each to the other foot's next.
+    """Return times (s) between foot contacts, and foot-offs, of one foot; and from each to the other foot's next.
 
     Both are empty where the feet do not alternate, as in jumps, squats and when sitting down: there are no strides.
     """
     strides, steps = [], []
     contacts = [runs(bridged(loads.time, loads.force[:, foot, 1] > 0)) for foot in range(len(FEET))]
-    for edge, unseen in ((0, 0), (1, len(loads.time) - 1)):  # what lasts to the end of the recording has no event there
+    for edge, unseen in ((0, 0), (1, len(loads.time) - 1)):  # no event where a contact lasts to the end
         events = [[float(loads.time[run[edge]]) for run in spans if run[edge] != unseen] for spans in contacts]
         if not _alternating(*events):
             continue
@@ -41,7 +41,7 @@ def periods(loads: FootLoads) -> tuple[list[float], list[float]]:
 
 
 def swing_in_turn(feet: tuple[FootTrajectory, FootTrajectory], part_s: tuple[float, float]) -> bool:
-    """Whether one foot swings, and then the other, by their markers: one step on a plate shows no stride by its load.
+    """Return whether one foot swings and then the other, by their markers: one step on a plate shows no stride.
 
     Feet that leave and land together jump. A foot that lands while the other stays lifted is a landing.
 
@@ -65,7 +65,7 @@ def swing_in_turn(feet: tuple[FootTrajectory, FootTrajectory], part_s: tuple[flo
 
 
 def _swings(foot: FootTrajectory) -> list[tuple[float, float]]:
-    """When a foot leaves the ground and when it lands; NaN where the trial does not show it. None that is too long."""
+    """Find when a foot leaves the ground and lands (NaN where not shown), except swings that are too long."""
     spans, time = foot.stance_spans, foot.time
     if not spans:
         return []
@@ -84,12 +84,12 @@ def _swings(foot: FootTrajectory) -> list[tuple[float, float]]:
 
 
 def _later_s(swing: tuple[float, float], other: tuple[float, float]) -> list[float]:
-    """s, by how much another swing leaves and lands later, as far as both are known."""
+    """Return the delays (s) of another swing's foot-off and foot contact, as far as both are known."""
     return [second - first for first, second in zip(swing, other, strict=True) if np.isfinite(second - first)]
 
 
 def _alternating(right: Sequence[float], left: Sequence[float]) -> bool:
-    """Whether events of one foot lie well between those of the other, as far as there are any."""
+    """Return whether the known events of one foot lie well between those of the other."""
     phases = [
         (between - start) / (end - start)
         for own, other in ((right, left), (left, right))

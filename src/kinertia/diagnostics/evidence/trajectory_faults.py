@@ -24,7 +24,7 @@ STRAIGHT_M = 1.5e-4
 """Nothing alive moves so straight, at a constant speed, for `STRAIGHT_S`; cameras err by more."""
 STRAIGHT_S = 0.15
 OFF_M = 0.015
-"""By which a marker's distances in its segment change while it is frozen or goes straight, and the segment does not."""
+"""Change of a marker's distances in its segment while it is frozen or moves straight, and the segment does not."""
 _SINGLE = 1.5
 """A single frame is off by twice as much as it makes those beside it look; one before or after a jump, by as much."""
 _BRIEF_S = 0.06
@@ -34,7 +34,7 @@ _FROZEN_M = 1e-3
 
 @dataclass(frozen=True)
 class Fault:
-    """What is wrong with one marker for a while."""
+    """Fault of one marker for a while."""
 
     label: str
     span_s: tuple[float, float]
@@ -42,11 +42,11 @@ class Fault:
 
 @dataclass(frozen=True)
 class Spikes(Fault):
-    """Single frames, or a few, in which one marker is off.
+    """Single frames, or a few, in which one marker is displaced.
 
     Attributes:
-        distance_m: from the middle of its neighbours, or from the line across a few frames, the largest.
-        frames: how many.
+        distance_m: largest distance from the middle of its neighbours, or from the line across a few frames.
+        frames: number of displaced frames.
         far_frames: how many of them are beyond `spike_limit_m`.
     """
 
@@ -57,14 +57,14 @@ class Spikes(Fault):
 
 @dataclass(frozen=True)
 class Jump(Fault):
-    """A step (m) of one marker that stays."""
+    """Lasting step (m) of one marker."""
 
     step_m: float
 
 
 @dataclass(frozen=True)
 class Filled(Fault):
-    """An interval in which one marker is frozen, or goes along a straight line, while its segment (m) does not."""
+    """Interval in which one marker is frozen, or moves along a straight line, while its segment (m) does not."""
 
     frozen: bool
     relative_motion_m: float
@@ -72,7 +72,7 @@ class Filled(Fault):
 
 @dataclass(frozen=True)
 class TrajectoryFaults:
-    """What is wrong with single trajectories."""
+    """Faults of single marker trajectories."""
 
     spikes: tuple[Spikes, ...] = ()
     jumps: tuple[Jump, ...] = ()
@@ -80,7 +80,7 @@ class TrajectoryFaults:
 
     @classmethod
     def of(cls, markers: Markers, segments: Mapping[str, Sequence[str]], coarse: bool = False) -> TrajectoryFaults:
-        """Of all markers.
+        """Find the faults of all markers.
 
         Args:
             markers: of a motion, or of a person who stands.
@@ -107,39 +107,39 @@ class TrajectoryFaults:
 
     @property
     def labels(self) -> frozenset[str]:
-        """Of all markers with faults."""
+        """Labels of all markers with faults."""
         found: tuple[Fault, ...] = (*self.spikes, *self.jumps, *self.filled)
         return frozenset(one.label for one in found)
 
 
 MOST_SPIKES = 2
-"""More frames of one marker that are far off are no accident of labelling."""
+"""Number of far frames of one marker up to which they may be an accident of labelling."""
 
 
 def spike_limit_m(rate_hz: float) -> float:
-    """Distance from the middle of the neighbours beyond which a frame is far off; 80 mm at 60 Hz and more."""
+    """Return the distance (m) from the neighbours' middle beyond which a frame is a spike; 80 mm from 60 Hz up."""
     return SPIKE_M + BODY_M * slowness(rate_hz)
 
 
 def step_limit_m(rate_hz: float) -> float:
-    """Step beyond which a marker jumps."""
+    """Return the step (m) beyond which a marker jumps."""
     return STEP_M * slowness(rate_hz)
 
 
 def slowness(rate_hz: float) -> float:
-    """By how much farther accelerations take a marker from frame to frame than at 60 Hz."""
+    """Return how much farther accelerations move a marker from frame to frame than at 60 Hz."""
     return max(1.0, USUAL_HZ / rate_hz) ** 2
 
 
 def steps(position: FloatArray) -> FloatArray:
-    """(n - 3, m, 3) m, by how much the way from frame i + 1 to i + 2 differs from those before and after it."""
+    """Compute (n - 3, m, 3) m, how much each displacement i + 1 to i + 2 differs from those before and after."""
     way = np.diff(position, axis=0)
     result: FloatArray = way[1:-1] - (way[:-2] + way[2:]) / 2
     return result
 
 
 def _spikes(markers: Markers, off: FloatArray, far: BoolArray, single: BoolArray) -> tuple[Spikes, ...]:
-    """Of frames (n - 2, m) that are far off, and of those that are off alone."""
+    """Collect spikes from frames (n - 2, m) that are far off, and from those that are off alone."""
     found = []
     for k in range(len(markers.labels)):
         often = np.count_nonzero(far[:, k]) > MOST_SPIKES
@@ -153,7 +153,7 @@ def _spikes(markers: Markers, off: FloatArray, far: BoolArray, single: BoolArray
 
 
 def _jumps(markers: Markers, size: FloatArray) -> tuple[Jump, ...]:
-    """Of steps (n - 3, m) m; 0 where there are none. Of adjacent ones the largest is the jump."""
+    """Collect jumps from steps (n - 3, m) m, 0 where there are none; of adjacent steps the largest is the jump."""
     return tuple(
         Jump(markers.labels[k], (float(markers.time[frame + 1]), float(markers.time[frame + 2])), float(size[frame, k]))
         for k in np.flatnonzero(size.any(axis=0))
@@ -162,7 +162,7 @@ def _jumps(markers: Markers, size: FloatArray) -> tuple[Jump, ...]:
 
 
 def _brief_or_lasting(markers: Markers, jumps: Sequence[Jump]) -> tuple[list[Spikes], list[Jump]]:
-    """Spikes of a few frames, which begin or end with a step; and the steps that stay."""
+    """Separate spikes of a few frames, which begin or end with a step, from the steps that stay."""
     spikes, lasting = [], []
     for jump in jumps:
         place = markers.positions[:, markers.labels.index(jump.label)]
@@ -182,8 +182,8 @@ def _brief_or_lasting(markers: Markers, jumps: Sequence[Jump]) -> tuple[list[Spi
 
 
 def _frames_off(place: FloatArray, frame: int, rate_hz: float) -> tuple[int, int] | None:
-    """The fewest frames around a step from `frame` to the next without which a marker (n, 3) goes on as before; None
-    where the step stays.
+    """Find the fewest frames around a step from `frame` to the next without which a marker (n, 3) continues as before;
+    None where the step stays.
     """
     limit_m = step_limit_m(rate_hz) / 2
     for count in range(1, max(2, round(_BRIEF_S * rate_hz)) + 1):
@@ -198,7 +198,7 @@ def _frames_off(place: FloatArray, frame: int, rate_hz: float) -> tuple[int, int
 
 
 def _by_marker(spikes: Sequence[Spikes]) -> tuple[Spikes, ...]:
-    """One entry per marker."""
+    """Merge spikes into one entry per marker."""
     found: dict[str, Spikes] = {}
     for one in spikes:
         own = found.get(one.label, one)
@@ -222,7 +222,7 @@ def _filled(markers: Markers, segments: Mapping[str, Sequence[str]]) -> tuple[Fi
             inside = slice(first, last + count)
             way = markers.positions[inside, k]
             moved = float(np.linalg.norm(way[-1] - way[0]))
-            # against all of a body nothing can be said of a foot on the ground
+            # comparing with the whole body would tell nothing about a foot on the ground
             relative = _relative_motion_m(way, markers.positions[inside][:, mates]) if mates else moved / 2
             if relative > OFF_M:
                 span = (float(markers.time[first]), float(markers.time[last + count - 1]))
@@ -231,7 +231,7 @@ def _filled(markers: Markers, segments: Mapping[str, Sequence[str]]) -> tuple[Fi
 
 
 def _relative_motion_m(way: FloatArray, others: FloatArray) -> float:
-    """By how much the distance of a way (f, 3) from one of other markers (f, m, 3) changes; 0 where it is unknown."""
+    """Return by how much (m) the distance of a trajectory (f, 3) from markers (f, m, 3) changes; 0 where unknown."""
     distance = np.linalg.norm(others - way[:, None], axis=-1)
     if not np.isfinite(distance).all(axis=0).any():
         return 0.0
@@ -240,7 +240,7 @@ def _relative_motion_m(way: FloatArray, others: FloatArray) -> float:
 
 
 def _straight(position: FloatArray, count: int) -> BoolArray:
-    """(n - count + 1, m) where the next `count` frames of a marker are on a line, at a constant speed."""
+    """Find (n - count + 1, m) where the next `count` frames of a marker lie on a line, at a constant speed."""
     first, last = position[: len(position) - count + 1], position[count - 1 :]
     result = np.isfinite(first).all(axis=-1) & np.isfinite(last).all(axis=-1)
     for k in range(1, count - 1):
@@ -252,19 +252,19 @@ def _straight(position: FloatArray, count: int) -> BoolArray:
 
 
 def _off_neighbours(position: FloatArray) -> FloatArray:
-    """(n - 2, m) m, from the middle between the frames before and after; 0 where one of them is not seen."""
+    """Return the distance (n - 2, m) m from the middle between the frames before and after; 0 where one is missing."""
     off = np.linalg.norm(position[1:-1] - (position[2:] + position[:-2]) / 2, axis=-1)
     result: FloatArray = np.nan_to_num(off)
     return result
 
 
 def _local_peaks(off: FloatArray) -> BoolArray:
-    """Of three frames around a spike the middle one is farthest off."""
+    """Find local peaks: of three frames around a spike the middle one is farthest off."""
     beside = np.pad(off, ((1, 1), (0, 0)))
     return np.asarray((off >= beside[2:]) & (off >= beside[:-2]))
 
 
 def _is_single(off: FloatArray) -> BoolArray:
-    """Where single frames are off: those beside them are half as far off then, and as far where a marker jumps."""
+    """Find single frames that are off: their neighbours are then half as far off, but as far where a marker jumps."""
     beside = np.pad(off, ((1, 1), (0, 0)))
     return np.asarray(off > _SINGLE * np.maximum(beside[2:], beside[:-2]))

@@ -15,18 +15,18 @@ from kinertia.diagnostics.evidence.horizontal_velocity import CausedVelocity
 from kinertia.trial.data import FloatArray
 
 MOST_LEFT = 0.22
-"""What a delay may leave unexplained; where it is more, another fault is the reason."""
+"""Largest residual of a delay; a larger one has another fault as its reason."""
 _STEPS = 5
 
 
 @dataclass(frozen=True)
 class UpsAndDowns:
-    """Of shown(t) = factor * (caused(t + delay + growth * t) + gain * own(t)), up to a wrong zero and a level.
+    """Fit of shown(t) = factor * (caused(t + delay + growth * t) + gain * own(t)), up to a zero offset and a level.
 
     Attributes:
-        delay_s, growth: of the forces, in the middle, and in seconds per second.
-        gain: by which one plate reads more than the others.
-        left: what is not explained, over what there is (standard deviations).
+        delay_s, growth: delay of the forces in the middle, and its growth in seconds per second.
+        gain: gain by which one plate reads more than the others.
+        left: unexplained share (residual SD over the SD of what is shown).
     """
 
     delay_s: float
@@ -38,7 +38,7 @@ class UpsAndDowns:
 def vertical_match(
     part: CausedVelocity, shown: FloatArray, own: FloatArray | None = None, growing: bool = False
 ) -> UpsAndDowns | None:
-    """By Gauss-Newton; None where the velocities do not follow the forces.
+    """Fit the vertical velocity by Gauss-Newton; None where the velocities do not follow the forces.
 
     Args:
         part: what the forces cause, over (n,) s.
@@ -73,6 +73,6 @@ def vertical_match(
 def vertical_match_of(
     part: CausedVelocity, own: FloatArray | None = None, growing: bool = False
 ) -> Sequence[UpsAndDowns]:
-    """By the pelvis and by the markers' centre; empty where either does not follow the forces."""
+    """Fit pelvis and marker-based centre of mass; empty where either does not follow the forces."""
     found = [vertical_match(part, shown, own, growing) for shown in (part.pelvis, part.centre)]
     return [one for one in found if one is not None] if all(found) else []

@@ -29,7 +29,7 @@ _OPPOSED = 0.2
 """Cosine; the sides of a pelvis are up to 70 degrees apart, those of one with a side reversed 110 or more."""
 _BELOW_M = 0.05
 _BEHIND, _BEYOND, _USUAL_SHARE = -0.1, 1.1, (0.22, 0.48)
-"""Share of the way from the heel to the toes at which an ankle is; of 12 people."""
+"""Position of an ankle as a share of the distance from heel to toes; from 12 people."""
 _BENT = 0.35
 """Sine of 20 degrees: beyond it, an elbow's bend is clear."""
 _PAIRS = ("asis", "psis", "knee_lateral", "ankle_lateral", "heel", "metatarsal", "acromion")
@@ -37,10 +37,10 @@ _PAIRS = ("asis", "psis", "knee_lateral", "ankle_lateral", "heel", "metatarsal",
 
 @dataclass(frozen=True, eq=False)
 class _Body:
-    """Landmarks (n, 3) m of a recording.
+    """Landmarks (n, 3) m of a recording, and which of them findings already explain.
 
     Attributes:
-        places: by their names.
+        places: positions by landmark name.
         blamed: landmarks that a finding explains.
     """
 
@@ -50,18 +50,18 @@ class _Body:
     blamed: set[str] = field(default_factory=set)
 
     def shows(self, *landmarks: str) -> bool:
-        """Whether these are known, and not explained yet."""
+        """Return whether these landmarks are known and not explained yet."""
         return set(landmarks) <= set(self.places) and not self.blamed & set(landmarks)
 
     def found(self, code: str, *landmarks: str, **evidence: Quantity) -> Finding:
-        """The finding that the labels of these landmarks are swapped."""
+        """Return the finding that the labels of these landmarks are swapped."""
         self.blamed.update(landmarks)
         labels = [label for name in landmarks for label in self.marker_set.landmarks.get(name, ())]
         return with_evidence(code, self.context.at(markers=tuple(dict.fromkeys(labels))), evidence)
 
 
 def anatomy(context: RecordingContext) -> Iterator[Finding]:
-    """L201 to L208; of a person upright, standing or moving, with Y up."""
+    """L201 to L208: labels that contradict a person's anatomy, of a person upright, standing or moving, with Y up."""
     if context.marker_set is None or not context.marker_set.landmarks:
         return
     body = _Body(context, context.marker_set, context.landmark_positions)
@@ -84,7 +84,7 @@ def anatomy(context: RecordingContext) -> Iterator[Finding]:
 
 
 def _mean_heading(known: Mapping[str, FloatArray]) -> FloatArray:
-    """(n, 3), of what is known in each frame; NaN where nothing is."""
+    """Return the mean of the known headings (n, 3) in each frame; NaN where none is known."""
     units = np.array([unit(heading) for heading in known.values()])
     seen = np.isfinite(units)
     count = seen.sum(axis=0)
@@ -92,7 +92,7 @@ def _mean_heading(known: Mapping[str, FloatArray]) -> FloatArray:
 
 
 def _travel(context: RecordingContext, known: Mapping[str, FloatArray]) -> FloatArray | None:
-    """(n, 3) where the person walks, if the only heading is the same: it confirms that one."""
+    """Return the direction of travel (n, 3) where the only known heading agrees with it, and so is confirmed."""
     if context.travel.kind != "walks" or not known:
         return None
     angle = np.radians(context.travel.direction_deg)
@@ -101,7 +101,7 @@ def _travel(context: RecordingContext, known: Mapping[str, FloatArray]) -> Float
 
 
 def _reversed_parts(body: _Body, known: Mapping[str, FloatArray]) -> Iterator[Finding]:
-    """L203 and L205: a side of the pelvis, the pelvis, or a foot that points backwards by the others."""
+    """L203 and L205: a side of the pelvis, the pelvis, or a foot that points backwards compared with the others."""
     places, feet = body.places, [heading for name, heading in known.items() if name.startswith("foot")]
     if {"asis_r", "asis_l", "psis_r", "psis_l"} <= set(places):
         sides = {side: horizontal(places[f"asis_{side}"] - places[f"psis_{side}"]) for side in "rl"}
@@ -128,7 +128,7 @@ def _blamed_part(body: _Body, part: str) -> bool:
 
 
 def _odd_one_out(known: Mapping[str, FloatArray]) -> tuple[str, float]:
-    """The part that points backwards by the other two, and the cosine; of two parts nobody knows which is wrong."""
+    """Return the part that points backwards by the other two, and the cosine; of two parts either may be wrong."""
     if len(known) < 3:
         return "", 1.0
     agreed = {(foot, "pelvis"): cosine(known[foot], known["pelvis"]) for foot in ("foot_l", "foot_r")}
@@ -144,7 +144,7 @@ def _odd_one_out(known: Mapping[str, FloatArray]) -> tuple[str, float]:
 
 
 def _rotation_from(vectors: FloatArray, others: FloatArray) -> complex:
-    """Mean rotation about the vertical from one direction to another, over the frames that show both: a unit number."""
+    """Return the mean rotation about the vertical from one direction to another, over frames with both, unit number."""
     one, other = (each[:, 0] + 1j * each[:, 2] for each in (vectors, others))
     rotation = other * one.conjugate()
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -154,7 +154,7 @@ def _rotation_from(vectors: FloatArray, others: FloatArray) -> complex:
 
 
 def _swapped_sides(body: _Body, right: FloatArray) -> Iterator[Finding]:
-    """L201, or L202 of each pair that is the wrong way round."""
+    """L201, or L202 of each pair whose sides are swapped."""
     pairs = [pair for pair in _PAIRS if body.shows(f"{pair}_r", f"{pair}_l")]
     across = {pair: cosine(body.places[f"{pair}_r"] - body.places[f"{pair}_l"], right) for pair in pairs}
     wrong = {pair: each for pair, each in across.items() if each < -CLEAR}
@@ -170,7 +170,7 @@ def _swapped_sides(body: _Body, right: FloatArray) -> Iterator[Finding]:
 
 
 def _swapped_labels(body: _Body, right: FloatArray) -> Iterator[Finding]:
-    """L202, as a WARNING, of pairs on head, trunk and pelvis that are no landmarks: others show the segment, too.
+    """L202, as a WARNING, of pairs on head, trunk and pelvis that are no landmarks, in segments that others show, too.
 
     Nobody turns the head so far that its right side is on the left of the body.
     """
@@ -190,7 +190,7 @@ def _swapped_labels(body: _Body, right: FloatArray) -> Iterator[Finding]:
 
 
 def _order(body: _Body) -> Iterator[Finding]:
-    """L206: knees that are below ankles, the pelvis below knees."""
+    """L206: knees that are below the ankles, or a pelvis below the knees."""
     for side in "rl":
         for upper, lower in (("knee_lateral", "ankle_lateral"), ("asis", "knee_lateral")):
             names = (f"{upper}_{side}", f"{lower}_{side}")
@@ -225,7 +225,7 @@ def _ankles(body: _Body) -> Iterator[Finding]:
 
 
 def _thighs(body: _Body) -> Iterator[Finding]:
-    """L206: a marker of the thigh that is below the knee, beside one of the shank that is above it."""
+    """L206: a thigh marker that is below the knee, beside a shank marker that is above it."""
     marker_set, markers = body.marker_set, body.context.all_markers
     joints = {label for name, labels in marker_set.landmarks.items() if "wand" not in name for label in labels}
     for side in "rl":
@@ -247,7 +247,7 @@ def _thighs(body: _Body) -> Iterator[Finding]:
 
 
 def _lateral(body: _Body, right: FloatArray) -> Iterator[Finding]:
-    """L208 of knees and ankles."""
+    """L208 of knees and ankles: lateral and medial labels are swapped."""
     for joint in ("knee", "ankle"):
         for side, sign in (("r", 1.0), ("l", -1.0)):
             names = (f"{joint}_lateral_{side}", f"{joint}_medial_{side}")
@@ -259,8 +259,8 @@ def _lateral(body: _Body, right: FloatArray) -> Iterator[Finding]:
 
 
 def _elbows(body: _Body, right: FloatArray) -> Iterator[Finding]:
-    """L208 of elbows: an arm may turn its outer side anywhere, but elbows bend forwards only; and the outer side of a
-    straight arm is never inside where it hangs, nor below where it is raised.
+    """L208 of elbows: the lateral side of an arm may point anywhere, but elbows bend forwards only; and the lateral
+    side of a straight arm is never medial where it hangs, nor below where it is raised.
     """
     for side, sign in (("r", 1.0), ("l", -1.0)):
         names = [f"{name}_{side}" for name in ("elbow_lateral", "elbow_medial", "acromion", "wrist")]

@@ -19,10 +19,10 @@ _USUAL_HEIGHT_M, _ANY_SEX = 1.7, "male"
 
 
 def landmarks(context: RecordingContext) -> Iterator[Finding]:
-    """Why no model can be built from a static trial: the finding of the error (L105, S206); L107 of each part that one
-    can do without.
+    """L105, S206 or L107: why no model can be built from a static trial (L105, S206), and each missing part that a
+    model can do without (L107).
 
-    Errors that are not about markers are those of stature, which other questions are about.
+    Errors that are not about markers concern stature, which other questions cover.
     """
     if context.marker_set is None or not context.marker_set.landmarks:
         return

@@ -17,10 +17,10 @@ class MarkerSetMatch:
     """Which labels of a marker set a recording has.
 
     Attributes:
-        name: of the set.
+        name: name of the set.
         fits: whether it is the recording's set; if not, it is the nearest preset.
-        missing: labels of the set that the recording lacks, each with those of `others` that look most alike.
-        n_labels: of the set.
+        missing: labels of the set that the recording lacks, each with the most similar labels of `others`.
+        n_labels: number of labels of the set.
         others: labels of the recording that are not in the set and stay unused.
         of_model: whether the set is the markers of an OpenSim model.
     """
@@ -34,7 +34,7 @@ class MarkerSetMatch:
 
 
 def match_labels(labels: Sequence[str], marker_set: MarkerSet | None) -> tuple[MarkerSetMatch, MarkerSet | None]:
-    """How the labels fit the set, or the nearest preset; and the set if it is theirs."""
+    """Match the labels to the set, or to the nearest preset; return the match, and the set if it is the recording's."""
     wanted = nearest_preset(labels) if marker_set is None else marker_set
     if not wanted.landmarks:
         fits = bool(set(wanted.labels) & set(labels))
@@ -49,7 +49,7 @@ def match_labels(labels: Sequence[str], marker_set: MarkerSet | None) -> tuple[M
 
 
 def labels_match(context: RecordingContext) -> Iterator[Finding]:
-    """L101; L102; L103, one per label."""
+    """L101 to L103: no marker set fits, labels are missing, or labels are spelled differently (one finding each)."""
     match, used = match_labels(context.all_markers.labels, context.marker_set)
     if used is None:
         yield replace(no_marker_set(match.name, match.n_labels, match.missing), where=context.at())

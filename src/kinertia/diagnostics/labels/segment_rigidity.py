@@ -24,7 +24,7 @@ from kinertia.model.marker_set import MarkerSet, in_words
 from kinertia.trial.data import FloatArray, Markers
 
 _SEGMENT_M, _JOINT_M, _USUAL_M = 0.06, 0.10, (0.0, 0.04)
-"""Of one segment, if one of the markers goes with another; of landmarks on both sides of a joint, and in any case."""
+"""Limits within a segment, if a marker moves with another; of landmarks on both sides of a joint; usual range."""
 _ELSEWHERE = 0.35
 """Change of the distances to the markers of the segment with which a marker goes, over that to those of its own."""
 _OWN_WAY = ("torso", "head", "upper_arm", "forearm", "hand")
@@ -32,7 +32,7 @@ _OWN_WAY = ("torso", "head", "upper_arm", "forearm", "hand")
 _TOGETHER_M, _MUCH_BETTER = 0.04, 0.4
 _PERCENTILES = (0.1, 0.9)
 _SPREAD = 2.563 * np.sqrt(2.0)
-"""Between these percentiles, of the distance of two markers with noise of SD 1."""
+"""Spread between these percentiles of the distance of two markers with noise of SD 1."""
 _FEWEST_FRAMES = 11
 _SOFT = ("torso", "head")
 """Shoulders and head move against the trunk."""
@@ -45,7 +45,7 @@ _JOINED = (("ankle_lateral", "heel"), ("ankle_lateral", "metatarsal"), ("elbow_l
 
 
 class _Pair(NamedTuple):
-    """By how much (m) the distance of two markers changes, that may change by `limit_m`, and what joins them."""
+    """Change (m) of the distance of two markers, its limit `limit_m`, and the part that joins them."""
 
     change_m: float
     one: str
@@ -57,7 +57,7 @@ class _Pair(NamedTuple):
 def rigidity(context: RecordingContext) -> Iterator[Finding]:
     """L213, one per marker that does not move with its segment; L214, one per segment on the wrong leg.
 
-    Markers whose trajectories have faults of their own are left out. Noise that is no camera's widens the limits.
+    Markers whose trajectories have faults of their own are left out. Noise beyond that of cameras widens the limits.
     """
     if context.marker_set is None:
         return
@@ -77,7 +77,7 @@ def _not_rigid(context: RecordingContext, markers: Markers, marker_set: MarkerSe
     while far:
         count = Counter(label for pair in far for label in (pair.one, pair.other))
         worst = max(far)
-        # what is no landmark is rather wrong, and what is far from several
+        # a marker that is no landmark is more likely wrong, and one far from several others
         odd = max((worst.one, worst.other), key=lambda label: (label not in marks, count[label]))
         own = [pair for pair in far if odd in (pair.one, pair.other)]
         far = [pair for pair in far if pair not in own]
@@ -94,7 +94,7 @@ def _not_rigid(context: RecordingContext, markers: Markers, marker_set: MarkerSe
 
 
 def _elsewhere(markers: Markers, marker_set: MarkerSet, odd: str) -> bool:
-    """Does this marker go with another segment of the legs or the pelvis?"""
+    """Return whether this marker moves with another segment of the legs or the pelvis."""
     segments = {name: [one for one in own if one in markers.labels] for name, own in marker_set.segments.items()}
     changes = {
         name: np.median(_changes_m(markers, [(odd, mate) for mate in own if mate != odd]))
@@ -106,7 +106,7 @@ def _elsewhere(markers: Markers, marker_set: MarkerSet, odd: str) -> bool:
 
 
 def _better(markers: Markers, marker_set: MarkerSet, odd: str, change_m: float) -> dict[str, Quantity]:
-    """With which marker of another segment a marker goes, as evidence; empty where with none."""
+    """Return, as evidence, the marker of another segment that this marker moves with; empty where there is none."""
     owners = {label: name for name, labels in marker_set.segments.items() for label in labels}
     mates = [mate for mate in markers.labels if mate in owners and owners[mate] != owners.get(odd)]
     changes = _changes_m(markers, [(odd, mate) for mate in mates], np.inf)
@@ -121,7 +121,7 @@ def _better(markers: Markers, marker_set: MarkerSet, odd: str, change_m: float) 
 
 
 def _crossed(context: RecordingContext, markers: Markers, marker_set: MarkerSet, least_m: float) -> Iterator[Finding]:
-    """Whole segments that go with those of the other leg: a set without markers at the joints has no other sign."""
+    """Find whole segments that move with the other leg: a set without markers at the joints has no other sign."""
     crossed: dict[tuple[str, str], tuple[float, float]] = {}
     measured = 0
     for upper, lower in _NEIGHBOURS:
@@ -153,7 +153,7 @@ def _crossed(context: RecordingContext, markers: Markers, marker_set: MarkerSet,
 
 
 def _neighbours_change_m(markers: Markers, marker_set: MarkerSet, upper: str, lower: str) -> float:
-    """Median over the pairs of a marker of each; NaN where one has none."""
+    """Return the median change (m) of the distances between markers of two segments; NaN where one has none."""
     here = set(markers.labels)
     above, below = ([label for label in marker_set.segments.get(name, ()) if label in here] for name in (upper, lower))
     changes = _changes_m(markers, [(one, other) for one in above for other in below], np.nan)
@@ -178,7 +178,7 @@ def _pairs(markers: Markers, marker_set: MarkerSet, noise_m: float) -> list[_Pai
 
 
 def _changes_m(markers: Markers, pairs: Sequence[tuple[str, str]], unknown: float = 0.0) -> FloatArray:
-    """(p,) m, by how much the distance of each two markers changes; `unknown` where few frames show both."""
+    """Return by how much (p,) m the distance of each pair of markers changes; `unknown` where few frames show both."""
     place = {label: column for column, label in enumerate(markers.labels)}
     one, other = ([place[pair[end]] for pair in pairs] for end in (0, 1))
     apart: FloatArray = np.linalg.norm(markers.positions[:, one] - markers.positions[:, other], axis=2)

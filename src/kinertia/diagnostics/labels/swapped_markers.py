@@ -84,9 +84,9 @@ def labels_by_model(skeleton: Skeleton, trial: Trial | Recording) -> Iterator[Fi
 
 
 def _complete_frames(skeleton: Skeleton, name: str, markers: Markers) -> tuple[Skeleton, Markers, np.ndarray] | Finding:
-    """The skeleton with arms that turn about their own axes, without coordinates that the trial never shows, a few
-    frames of its markers, and their errors (f, m) from the model that fits best; R103 where no frame shows all
-    coordinates, of the rarest one.
+    """Return a skeleton whose arms turn about their own axes, without coordinates that the trial never shows, with a
+    few frames of its markers and their errors (f, m) from the best fit; R103 of the rarest coordinate where no frame
+    shows all.
 
     No frame with a straight elbow shows how the arm has turned about itself, and none needs to; which way an elbow
     bends does not matter here. A single marker shows where an arm points, as long as it does not turn.
@@ -111,13 +111,13 @@ def _complete_frames(skeleton: Skeleton, name: str, markers: Markers) -> tuple[S
 
 
 def _arm_markers(skeleton: Skeleton, markers: Markers, side: str) -> int:
-    """How many of an arm's markers the trial has."""
+    """Count the markers of an arm that the trial has."""
     segments = (f"upper_arm_{side}", f"forearm_{side}")
     return sum(marker.segment in segments and marker.label in markers.labels for marker in skeleton.markers)
 
 
 def _swapped_errors(skeleton: Skeleton, labels: tuple[str, ...], measured: np.ndarray) -> np.ndarray:
-    """(h, m) m, `_typical` distance of each marker from the model that fits best, for h versions (h, f, m, 3)."""
+    """Return the `_typical` distance (h, m) m of each marker from the best fit, for h versions (h, f, m, 3)."""
     if not len(measured):
         return np.zeros((0, len(labels)))
     frames = measured.reshape(-1, *measured.shape[2:])
@@ -127,7 +127,7 @@ def _swapped_errors(skeleton: Skeleton, labels: tuple[str, ...], measured: np.nd
 
 
 def _typical(errors: np.ndarray) -> np.ndarray:
-    """(..., m) of errors (..., f, m): the median over the frames, 0 for a marker that is not seen.
+    """Return the typical error (..., m) of errors (..., f, m): the median over frames, 0 for a marker that is not seen.
 
     The fit starts from the upright pose and may be lost in one of them.
     """
@@ -136,11 +136,11 @@ def _typical(errors: np.ndarray) -> np.ndarray:
 
 
 _NEAR_M = 0.04
-"""Each is this near to where the other was a frame before."""
+"""Largest distance of each marker from the other's position one frame before."""
 
 
 def label_swaps(context: RecordingContext) -> Iterator[Finding]:
-    """L211, one per swap: where labels go back to their own markers there is another."""
+    """L211: one finding per swap; where labels return to their own markers there is another."""
     markers = context.measured_markers
     if len(markers.time) < 5:
         return

@@ -19,7 +19,7 @@ from kinertia.trial.sampled_time import runs, span_s
 
 _SMALLEST_M, _LARGEST_M = 0.3, 2.8
 _UPRIGHT = 0.5
-"""Cosine of 60 degrees: who sits has the pelvis half beside the feet."""
+"""Cosine of 60 degrees: a sitting person has the pelvis partly beside the feet."""
 _STILL_M_S, _SHORTEST_S = 0.15, 0.08
 _LONGEST_M, _FEWEST_PLACES = 1.0, 3
 _TILTED_RAD, _STEEP_RAD, _OFF_LINE_M = np.radians(0.8), np.radians(10.0), 0.006
@@ -28,7 +28,7 @@ _USUAL_RAD = (-np.radians(0.1), np.radians(0.1))
 
 
 def unit_and_vertical(context: RecordingContext) -> Iterator[Finding]:
-    """M141, or M142 by the extent of the markers or by the line from the feet to the pelvis."""
+    """M141 and M142: wrong unit of length, or vertical axis by the markers' extent or the line from feet to pelvis."""
     extent = extent_m(context.markers)
     if np.isnan(extent).any():
         return
@@ -55,7 +55,7 @@ def unit_and_vertical(context: RecordingContext) -> Iterator[Finding]:
 
 
 def _feet_to_pelvis_m(context: RecordingContext) -> FloatArray | None:
-    """(3,) m, median over the frames; None where it is not seen."""
+    """Return the vector (3,) m from the feet to the pelvis, median over the frames; None where it is not visible."""
     places = context.landmark_positions
     feet = [place for name, place in places.items() if name.startswith(("heel", "ankle_lateral", "metatarsal"))]
     if not feet or not {"asis_r", "asis_l"} <= set(places):
@@ -66,7 +66,7 @@ def _feet_to_pelvis_m(context: RecordingContext) -> FloatArray | None:
 
 
 def floor_slope(context: RecordingContext) -> Iterator[Finding]:
-    """M144: a floor that rises (positive) or falls along the walk; not asked of a treadmill."""
+    """M144: a floor that rises (positive) or falls along the walk; not tested on a treadmill."""
     if context.feet is None or context.recording.belt is not None:
         return
     markers = context.all_markers
@@ -103,7 +103,7 @@ def floor_slope(context: RecordingContext) -> Iterator[Finding]:
 
 
 def _stances(time: FloatArray, position: FloatArray) -> FloatArray:
-    """(s, 3) m, where one marker stood."""
+    """Return the positions (s, 3) m of one marker while its foot stands."""
     speed = np.linalg.norm(np.gradient(position, time, axis=0), axis=1)
     still = [
         position[first : last + 1].mean(axis=0)

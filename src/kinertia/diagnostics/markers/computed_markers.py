@@ -22,7 +22,7 @@ from kinertia.trial.data import FloatArray
 _EXACT_M, _SKIN_M = 1e-4, 3e-4
 """Skin moves by more than the latter; where pelvis markers do not, they are computed themselves, or on one plate."""
 _NEAR_M = 0.02
-"""What is fixed in the pelvis is as far from its middle all the time; thighs swing by more."""
+"""Change of distance from the pelvis' middle below which a point is fixed in it; thighs swing by more."""
 _MOST_CORNERS = 5
 _FRAMES, _FEWEST = 25, 10
 _FLAT = 0.1
@@ -31,7 +31,7 @@ _JOINTS = ("knee", "ankle", "elbow")
 
 
 class _Computed(NamedTuple):
-    """Labels that a point was computed from, and by how much (m) it moves among them."""
+    """Labels from which a point was computed, and by how much (m) it moves relative to them."""
 
     sources: tuple[str, ...]
     sd_m: float
@@ -54,7 +54,7 @@ def computed_markers(context: RecordingContext) -> Iterator[Finding]:
 
 
 def _in_pelvis(place: Mapping[str, FloatArray], marker_set: MarkerSet) -> dict[str, _Computed]:
-    """Markers of other segments that are fixed in the pelvis: in axes through three of its places (markers, or the
+    """Find markers of other segments that are fixed in the pelvis: in axes through three of its points (markers, or the
     middle of two), or in the rigid body that fits all its markers best.
     """
     corners = [label for label in marker_set.segments.get("pelvis", ()) if label in place][:_MOST_CORNERS]
@@ -86,7 +86,7 @@ def _in_pelvis(place: Mapping[str, FloatArray], marker_set: MarkerSet) -> dict[s
 
 
 def _frames(points: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Origins (n, t, 3) and axes (n, t, 3, 3) through all threes of points (n, p, 3) that are not in line."""
+    """Return origins (n, t, 3) and axes (n, t, 3, 3) through all triples of points (n, p, 3) that are not in line."""
     one, two, three = np.array(list(permutations(range(points.shape[1]), 3))).T
     origin = points[:, one]
     x, across = points[:, two] - origin, points[:, three] - origin
@@ -100,8 +100,8 @@ def _frames(points: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _best_fit(points: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Origin (n, 1, 3) and axes (n, 1, 3, 3) of the rigid body that fits points (n, p, 3) best (Kabsch), whose shape is
-    that of the first frame.
+    """Return origin (n, 1, 3) and axes (n, 1, 3, 3) of the rigid body that fits points (n, p, 3) best (Kabsch), with
+    the shape of the first frame.
     """
     middle = points.mean(axis=1, keepdims=True)
     u, _, vt = np.linalg.svd(np.einsum("npi,pj->nij", points - middle, (points - middle)[0]))
@@ -110,7 +110,7 @@ def _best_fit(points: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _between(place: Mapping[str, FloatArray], marker_set: MarkerSet) -> dict[str, _Computed]:
-    """Markers that are always at the same share of the way from the lateral to the medial marker of a joint."""
+    """Find markers that are always at the same share of the line from the lateral to the medial marker of a joint."""
     found = {}
     for joint in (f"{name}_{side}" for name in _JOINTS for side in "rl"):
         head, _, side = joint.partition("_")

@@ -36,7 +36,7 @@ than this share of how much the quick frames bend."""
 
 
 def frames(context: RecordingContext) -> Iterator[Finding]:
-    """M121, one per cut; M122; M123."""
+    """M121 to M123: missing frames (one finding per cut), copied frames, and interpolated frames."""
     markers = context.markers
     if len(markers.time) < FEWEST_FRAMES:
         return
@@ -83,7 +83,7 @@ def _copied(context: RecordingContext, copies: CopiedFrames) -> Finding:
 
 
 def _missing(context: RecordingContext) -> Iterator[Finding]:
-    """Where most markers step at once, up to the last load: frames that are missing before make forces late."""
+    """Find cuts where most markers step at once, up to the last load: frames missing before it delay the forces."""
     markers = without_copied_frames(context.markers)
     if context.contact_span_s is not None:
         markers = markers.cut(markers.time[0], context.contact_span_s[1])
@@ -109,7 +109,7 @@ def _missing(context: RecordingContext) -> Iterator[Finding]:
 
 
 def _median_step_m(markers: Markers) -> FloatArray:
-    """(n - 3,) m, of the median marker; NaN where half of the markers are not seen."""
+    """Return the step (n - 3,) m of the median marker; NaN where half of the markers are not visible."""
     size = np.linalg.norm(steps(markers.positions), axis=-1)
     shown = np.isfinite(size).sum(axis=1) > 0.5 * len(markers.labels)
     median = np.full(len(size), np.nan)
@@ -118,14 +118,14 @@ def _median_step_m(markers: Markers) -> FloatArray:
 
 
 def _frames_lost(markers: Markers, cut: int) -> int:
-    """By how far markers go across a cut, and beside it."""
+    """Return the number of missing frames, from how far markers move across a cut and beside it."""
     went = np.linalg.norm(np.diff(markers.positions, axis=0), axis=-1)
     usual = float(np.nanmedian(np.concatenate([went[cut : cut + 1], went[cut + 2 : cut + 3]])))
     return max(1, round(float(np.nanmedian(went[cut + 1])) / max(usual, 1e-4)) - 1)
 
 
 def _between(position: FloatArray) -> BoolArray:
-    """(n - 2,) frames in which most markers are in the middle between their neighbours, if in others they are not."""
+    """Find frames (n - 2,) in which most markers are midway between their neighbours, if in others they are not."""
     bend = np.linalg.norm(np.diff(position, n=2, axis=0), axis=2)
     shown = np.isfinite(bend).any(axis=1)
     went = np.linalg.norm(np.diff(position, axis=0), axis=2)

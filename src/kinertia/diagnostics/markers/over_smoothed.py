@@ -28,7 +28,7 @@ _MOSTLY_SEEN = 0.9
 
 
 def over_smoothed(context: RecordingContext) -> Iterator[Finding]:
-    """M133: markers without the quick part of the motion that the forces show; nothing where nobody steps."""
+    """M133: markers without the fast part of the motion that the forces show; no finding where nobody steps."""
     trial, owners, changes = context.trial, context.segment_of_label, context.velocity_changes
     if trial is None or changes is None or not context.has_strides:
         return
@@ -47,7 +47,7 @@ def over_smoothed(context: RecordingContext) -> Iterator[Finding]:
 
 
 def _quick_share(markers: Markers, owners: Mapping[str, str]) -> float | None:
-    """Of the energy of motion, median over markers of swinging feet; None where no foot swings."""
+    """Return the fast share of the energy of motion, median over swinging feet's markers; None where no foot swings."""
     shares = []
     for k, label in enumerate(markers.labels):
         seen = np.asarray(np.isfinite(markers.positions[:, k]).all(axis=1))
@@ -64,7 +64,7 @@ def _quick_share(markers: Markers, owners: Mapping[str, str]) -> float | None:
 
 
 def _distances_change_m(markers: Markers, owners: Mapping[str, str]) -> float:
-    """Between two markers of a shank, median over pairs; infinite where no shank has two."""
+    """Return how much (m) the distance of two markers of a shank changes, median of pairs; infinite without a pair."""
     ranges = []
     for side in "rl":
         own = [k for k, label in enumerate(markers.labels) if owners.get(label) == f"shank_{side}"]

@@ -14,7 +14,7 @@ from kinertia.diagnostics.runner import Question
 _SIZE = "M141"
 """In another unit of length no limit in metres means anything."""
 _MADE_UP = "M123"
-"""Nor do steps from frame to frame where frames were made up."""
+"""Where frames were interpolated, steps from frame to frame mean nothing."""
 
 STATIC_QUESTIONS: tuple[Question[RecordingContext], ...] = (
     Question("M10", visible),

@@ -18,7 +18,7 @@ from kinertia.findings.quantity import Quantity
 
 
 def trajectories(context: RecordingContext) -> Iterator[Finding]:
-    """M111 to M114, one per marker with spikes, and one per jump and filled interval."""
+    """M111 to M114: faults of single trajectories, one finding per marker with spikes, per jump and per filled gap."""
     faults, rate_hz = context.trajectory_faults, context.markers.rate_hz
     for spikes in faults.spikes:
         yield finding(

@@ -18,7 +18,7 @@ _DISPENSABLE = ("upper_arm", "forearm")
 
 
 def visible(context: RecordingContext) -> Iterator[Finding]:
-    """M101, one per marker; M102 and M103, one per marker, over the measured window; M104, one per segment."""
+    """M101 to M104: one finding per marker (M102 and M103 over the measured window), M104 one per bare segment."""
     for one in visibility(context.markers):
         if one.share == 0.0:
             yield finding("M101", context.at(markers=(one.label,)), share=Quantity(0.0, "1"))
@@ -32,13 +32,13 @@ def visible(context: RecordingContext) -> Iterator[Finding]:
 
 
 def _in_window(context: RecordingContext) -> Markers:
-    """The frames that a fit would use; those around loads on plates where they are not known."""
+    """Return the frames that a fit would use; those around loads on plates where they are unknown."""
     windows = () if context.trial is None else context.trial.windows()
     return context.markers.cut(*windows[0]) if windows else context.measured_markers
 
 
 def _bare_segments(context: RecordingContext) -> Iterator[Finding]:
-    """M104: pelvis, legs and feet, and the trunk if the static trial shows it; of an OpenSim model's markers, feet."""
+    """M104: pelvis, legs, feet without markers, the trunk if the static trial shows it; of an OpenSim model, feet."""
     marker_set = context.marker_set
     if marker_set is None:
         return

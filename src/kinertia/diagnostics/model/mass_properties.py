@@ -29,7 +29,7 @@ _NO_EXTENT_M = 1e-4
 
 
 def impossible_inertia(context: PersonContext) -> Iterator[Finding]:
-    """O201: bodies that no distribution of mass can have."""
+    """O201: bodies whose inertia no distribution of mass can have."""
     if context.model is None:
         return
     bsp = context.model.bsp
@@ -45,7 +45,7 @@ def impossible_inertia(context: PersonContext) -> Iterator[Finding]:
 
 
 def missing_inertia(context: PersonContext) -> Iterator[Finding]:
-    """O202: mass without inertia, or with a negative one: all of it would be in a point."""
+    """O202: mass without inertia, or with a negative one, as if all of it were in a point."""
     if context.model is None:
         return
     bsp, estimated = context.model.bsp, _estimated(context)
@@ -90,24 +90,24 @@ def degenerate_inertia(context: PersonContext) -> Iterator[Finding]:
 
 
 def of_body(context: PersonContext, name: str, severity: Severity) -> Severity:
-    """INFO of a body that a fit does not estimate, else as it is."""
+    """Return INFO for a body that a fit does not estimate, else the severity as it is."""
     return severity if name in _estimated(context) else Severity.INFO
 
 
 def advice(context: PersonContext) -> Severity:
-    """A fit takes the model's parameters as a prior only, a simulation takes them as they are."""
+    """Return the severity of advice: a fit takes the model's parameters as a prior only, a simulation as they are."""
     return Severity.INFO if context.has_trials else Severity.WARNING
 
 
 def _estimated(context: PersonContext) -> set[str]:
-    """Bodies whose parameters a fit would estimate; all of a model that is looked at alone."""
+    """Return the bodies whose parameters a fit would estimate; all of a model that is checked on its own."""
     assert context.model is not None
     model = context.model
     return estimated_bodies(model.skeleton, model.bsp) if context.has_trials else set(model.bsp.segments)
 
 
 def _radii(bsp: BodySegmentParameters) -> list[tuple[str, float, float]]:
-    """Name, mass (kg) and root mean square distance (m) of the mass from its centre; negative where the inertia is."""
+    """List name, mass (kg) and RMS distance (m) of the mass from its centre; negative where the inertia is."""
     second: FloatArray = np.trace(second_moments(bsp.inertia_kgm2), axis1=1, axis2=2)
     square = second / np.where(bsp.mass_kg > 0, bsp.mass_kg, np.inf)
     radii = np.sign(square) * np.sqrt(np.abs(square))

@@ -27,7 +27,7 @@ sign: 18 mm."""
 
 
 def mirrored_joints(context: PersonContext) -> Iterator[Finding]:
-    """Axes (O302) and positions (O303) of joints of which left and right do not mirror each other.
+    """O302 and O303: axes (O302) and positions (O303) of joints of which left and right do not mirror each other.
 
     A position changes the sign of z in its mirror image, a direction or orientation those of x and y.
     """
@@ -52,7 +52,7 @@ def _finding(code: str, right: str, left: str, **measured: Quantity) -> Finding:
 
 
 def _axis_angles(neutral: NeutralJoints, pair: tuple[str, str], sideways: int) -> Iterator[tuple[str, str, float]]:
-    """Coordinates of the right and left joint, and the angle (rad) of one's axis from the other's mirror image."""
+    """Yield coordinates of the right and left joint, and the angle (rad) of one axis from the other's mirror image."""
     right, left = pair
     others = {without_side(name): name for name in neutral.turns[left]}
     for name, axis in neutral.turns[right].items():
@@ -66,7 +66,7 @@ def _axis_angles(neutral: NeutralJoints, pair: tuple[str, str], sideways: int) -
 
 
 def _mismatch_m(neutral: NeutralJoints, right: str, left: str, sideways: int) -> float:
-    """How far (m) the right joint is from the left one's mirror image, each in its own parent.
+    """Return how far (m) the right joint is from the left one's mirror image, each in its own parent.
 
     Zero where the parents are not each other's: one knee of a model may have more bodies than the other.
     """
@@ -91,7 +91,7 @@ def _mismatch_m(neutral: NeutralJoints, right: str, left: str, sideways: int) ->
 
 
 def _in_one_parent(neutral: NeutralJoints, right: str, left: str, view: tuple[FloatArray, FloatArray]) -> float:
-    """The same of two joints of one body; its middle is where it carries joints of no side, else between the two."""
+    """Return the asymmetry (m) of two joints of one body about its unpaired joints, else about their own middle."""
     turn, reflection = view
     parent = neutral.joints[right].parent
     first, second = (turn.T @ (neutral.centres[name] - neutral.origins[parent]) for name in (right, left))
@@ -109,7 +109,7 @@ def _in_one_parent(neutral: NeutralJoints, right: str, left: str, view: tuple[Fl
 def _views(
     neutral: NeutralJoints, right: str, left: str, sideways: int
 ) -> Iterator[tuple[FloatArray, FloatArray, FloatArray]]:
-    """Axes to look along at the right and the left joint, and the reflection between them: ground's, the parents'."""
+    """Yield viewing axes at the right and left joint and the reflection between them: ground's, then the parents'."""
     yield np.eye(3), np.eye(3), mirrored(sideways)
     first, second = (neutral.joints[name].parent for name in (right, left))
     if "ground" not in (first, second):
@@ -118,5 +118,5 @@ def _views(
 
 
 def without_side(coordinate: str) -> str:
-    """The name that both sides have in common."""
+    """Return the name that both sides have in common."""
     return re.sub(r"_[rl](?=_|$)", "", coordinate)

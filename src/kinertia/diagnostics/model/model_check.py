@@ -15,21 +15,21 @@ from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
 
 SIDE_MASS, SIDE_COM_M, SIDE_MOMENT = 0.01, 0.005, 0.05
-"""Left and right differ worth a look: share of the mass, distance of the CoM, share of a moment."""
+"""Notable differences of left and right: share of the mass, distance of the CoM, share of a moment."""
 _COLUMNS = ("mass\n(kg)", "CoM x\n(mm)", "y", "z", "Ixx\n(kg m2)", "Iyy", "Izz")
 
 
 @dataclass(frozen=True, eq=False)
 class ModelCheck:
-    """What is in one model.
+    """Mass properties of one model, next to the anthropometric tables.
 
     Attributes:
-        name: the model's.
-        bsp: of its bodies, as the file has them.
+        name: name of the model.
+        bsp: body segment parameters as in the file.
         segments: the bodies combined by segment, in ISB axes.
         literature: "de Leva" and "Dumas" for the same segments; empty where the person is not known. Values that the
             tables cannot give for this model are NaN.
-        spread: (10,) SD of people from the tables, by segment; empty likewise.
+        spread: (10,) SD of people from the tables, by segment; empty where `literature` is.
         symmetric: whether left mirrors right.
 
     Examples:
@@ -52,7 +52,7 @@ class ModelCheck:
         return _has_arms(self.segments)
 
     def facts(self) -> list[tuple[str, str]]:
-        """What the model is, as pairs of a name and a sentence."""
+        """Return descriptions of the model as pairs of a name and a sentence."""
         massless = [name for name, mass in zip(self.bsp.segments, self.bsp.mass_kg, strict=True) if mass == 0]
         facts = [
             ("model", self.name),
@@ -65,11 +65,11 @@ class ModelCheck:
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Headings of `rows`."""
+        """Column headings of `rows`."""
         return ("segment" if self.literature else "body", "", *_COLUMNS)
 
     def rows(self) -> list[tuple[str, ...]]:
-        """Every segment next to the literature in ISB axes, or every body as in the file; a "-" is unknown.
+        """Tabulate every segment next to the literature in ISB axes, or every body as in the file; "-" is unknown.
 
         Where left mirrors right, the right segments stand for both.
         """
@@ -91,12 +91,12 @@ def check_model(
     height_m: float | None = None,
     sex: str | None = None,
 ) -> ModelCheck:
-    """Look at the mass properties of a model.
+    """Compare the mass properties of a model with the anthropometric tables.
 
     Args:
-        skeleton, bsp: of the model; all bodies.
+        skeleton, bsp: all bodies of the model.
         mass_kg: as stated; the model's own total is taken for the literature if None.
-        height_m, sex: of the person; without both there is no comparison with the literature.
+        height_m, sex: stature and sex of the person; without both there is no comparison with the literature.
 
     Raises:
         SubjectError: mass, height or sex cannot be true.
@@ -112,8 +112,8 @@ def check_model(
 
 
 class SideDifference(NamedTuple):
-    """How far a right body is from the left one's mirror image: share of the mass, distance of the CoM, and the largest
-    share of a moment of inertia.
+    """Deviation of a right body from the left one's mirror image: share of the mass, distance of the CoM, and the
+    largest share of a moment of inertia.
     """
 
     body: str
@@ -123,7 +123,7 @@ class SideDifference(NamedTuple):
 
 
 def side_differences(bsp: BodySegmentParameters) -> list[SideDifference]:
-    """Pairs of bodies that do not mirror each other."""
+    """List pairs of bodies that do not mirror each other."""
     table, other = bsp.table(), bsp.mirrored().table()
     found = []
     for i, name in enumerate(bsp.segments):
@@ -143,21 +143,21 @@ def _has_arms(segments: ModelSegments) -> bool:
 
 
 def _cells(row: np.ndarray) -> tuple[str, ...]:
-    """Mass, CoM (mm) and moments of a row of the table of body segment parameters."""
+    """Format mass, CoM (mm) and moments of one row of the table of body segment parameters."""
     com = (f"{round(value * 1e3)}" if np.isfinite(value) else "-" for value in row[1:4])
     texts = [f"{row[0]:.2f}", *com, *map(_moment, row[4:7])]
     return tuple("-" if np.isnan(value) else text for text, value in zip(texts, row, strict=False))
 
 
 def _moment(value: float) -> str:
-    """A moment of inertia (kg m2), those of small bodies to two digits."""
+    """Format a moment of inertia (kg m2), small bodies' with two digits."""
     return f"{value:.4f}" if abs(value) >= 1e-3 else f"{value:.2g}"
 
 
 def _literature(
     segments: ModelSegments, geometry: BodyGeometry, mass_kg: float, height_m: float, sex: str
 ) -> tuple[dict[str, dict[str, np.ndarray]], dict[str, np.ndarray]]:
-    """Rows of the tables by source and segment, and the deviation of people from them by segment."""
+    """Return rows of the tables by source and segment, and the SD of people from them by segment."""
     by_source = {}
     for source, name in (("deleva", "de Leva"), ("dumas", "Dumas")):
         bsp = literature_bsp(mass_kg, height_m, sex, geometry, source)

@@ -12,7 +12,7 @@ from kinertia.model.anatomy import segment_of
 
 
 def markers_and_feet(context: PersonContext) -> Iterator[Finding]:
-    """O106 without markers, which only a fit needs; O107 without a body of a foot."""
+    """O106 and O107: a model without markers, which only a fit needs (O106), or without a body of a foot (O107)."""
     model = context.model
     if model is None:
         return

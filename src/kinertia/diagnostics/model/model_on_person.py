@@ -31,7 +31,7 @@ from kinertia.trial.rms import rms
 _OTHER_SCALE, _OTHER_BODY = 0.025, 0.05
 """Median share by which distances may differ: beyond the one a fit warns, beyond the other it refuses."""
 _NOBODY = 5.0
-"""Nobody is this many times as large as another."""
+"""Ratio of sizes that no two people have."""
 _ELSEWHERE_M = 0.014
 _ARRANGED = {("pelvis", "torso"): (5, 1.6), ("pelvis", "thigh_r", "thigh_l"): (8, 1.15)}
 """Segments whose markers tell left from right, which pose hardly changes; how many it takes, and how many times as bad
@@ -42,8 +42,8 @@ _FRAMES = 60
 
 
 def model_and_trials(context: PersonContext) -> Iterator[Finding]:
-    """What each trial's markers speak against in the model: another unit (O401), left and right exchanged (O402),
-    labels that are swapped (L212), another scale (O404), markers that were not placed (O405).
+    """O401, O402, L212, O404 and O405: each trial's markers indicate another unit (O401), left and right interchanged
+    (O402), swapped labels (L212), another scale (O404), or markers that were not placed (O405).
     """
     marker_set = context.marker_set
     if context.model is None or marker_set is None or marker_set.in_model is None:
@@ -73,7 +73,7 @@ def model_and_trials(context: PersonContext) -> Iterator[Finding]:
 
 
 def moved_markers(before: Skeleton, after: Skeleton, trials: Sequence[Markers]) -> Iterator[Finding]:
-    """O407: markers of the lower body that calibration moved farther than a marker is ever put elsewhere.
+    """O407: markers of the lower body that calibration moved farther than a marker is ever misplaced.
 
     Args:
         before, after: the model's skeleton and the calibrated one.
@@ -89,7 +89,7 @@ def moved_markers(before: Skeleton, after: Skeleton, trials: Sequence[Markers]) 
 
 
 def _mirrored(places: Markers, trial: Markers, marker_set: MarkerSet) -> Quantity | None:
-    """How many times as badly the model fits the person's markers as its mirror image does, where that decides."""
+    """Return how many times worse the model fits the markers than its mirror image does, where that is decisive."""
     for names, (fewest, limit) in _ARRANGED.items():
         own = [marker_set.segments.get(name, ()) for name in names]
         parts = [[label for label in labels if label in trial.labels] for labels in own]
@@ -108,7 +108,7 @@ def _mirrored(places: Markers, trial: Markers, marker_set: MarkerSet) -> Quantit
 
 
 def _mirror_ratio(model: FloatArray, person: FloatArray) -> float:
-    """How badly points (m, 3) fit frames (n, m, 3) when turned, over how badly their mirror image does: the median.
+    """Return the misfit of rotated points (m, 3) to frames (n, m, 3) over that of their mirror image: the median.
 
     The singular values of both points' product give the least squares (Kabsch 1976, Acta Cryst A 32:922).
     """

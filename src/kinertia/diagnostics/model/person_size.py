@@ -13,7 +13,7 @@ from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
 
 _FARTHEST_M = 1.5
-"""From a joint to what its body carries: a thigh has half a metre, the end of a barbell is 1.1 m from its middle."""
+"""Longest body from its joint: a thigh has half a metre, the end of a barbell is 1.1 m from its middle."""
 _SMALLEST_M, _LARGEST_M = 0.2, 3.0
 """Largest distance of two joints of a whole body: a newborn's legs, and a giant's stretched arms."""
 _WHOLE = 6
@@ -21,7 +21,7 @@ _WHOLE = 6
 
 
 def length_unit(context: PersonContext) -> Iterator[Finding]:
-    """O301: joints, centres of mass or markers that are not in metres; it names the farthest."""
+    """O301: joints, centres of mass or markers that are not in metres; the finding identifies the farthest."""
     if context.model is None:
         return
     skeleton = context.model.skeleton
@@ -39,7 +39,7 @@ def length_unit(context: PersonContext) -> Iterator[Finding]:
 
 
 def _lengths(skeleton: Skeleton, bsp: BodySegmentParameters) -> list[tuple[float, str]]:
-    """Lengths (m) within bodies, and what each is of."""
+    """List lengths (m) within bodies, and what each belongs to."""
     joints = _joints(skeleton)
     lengths = []
     for body, places in joints.items():
@@ -55,7 +55,7 @@ def _lengths(skeleton: Skeleton, bsp: BodySegmentParameters) -> list[tuple[float
 
 
 def _joints(skeleton: Skeleton) -> dict[str, list[np.ndarray]]:
-    """(3,) m by body, the joints that it carries and its own, in its frame; the root's own may be anywhere."""
+    """Return by body the joints (3,) m that it carries and its own, in its frame; the root's own may be anywhere."""
     joints: dict[str, list[np.ndarray]] = {}
     for joint in skeleton.joints:
         if joint.parent != "ground":
@@ -69,6 +69,6 @@ def _nearest_m(place: np.ndarray, joints: Sequence[np.ndarray]) -> float:
 
 
 def _extent_m(skeleton: Skeleton) -> float:
-    """Largest distance of two bodies' origins with all coordinates at zero."""
+    """Return the largest distance (m) between two bodies' origins with all coordinates at zero."""
     places = skeleton.pose(np.zeros((1, len(skeleton.coordinates)))).translation[0]
     return float(np.linalg.norm(places[:, None] - places[None], axis=-1).max())

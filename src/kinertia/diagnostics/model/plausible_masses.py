@@ -30,7 +30,7 @@ _OUTLYING_SD = 2.0
 
 
 def placeholders(context: PersonContext) -> Iterator[Finding]:
-    """O211: inertias that nobody measured, with three equal moments, or moments of at most two digits."""
+    """O211: placeholder inertias that nobody measured: three equal moments, or moments of at most two digits."""
     if context.model is None:
         return
     bsp = context.model.bsp
@@ -49,8 +49,8 @@ def placeholders(context: PersonContext) -> Iterator[Finding]:
 
 
 def unlike_tables(context: PersonContext) -> Iterator[Finding]:
-    """O212: of each segment the parameter that is farthest from both tables, if it is farther than people are; of a
-    model that is fitted at the mass to which the fit scales it.
+    """O212: the parameter of each segment farthest from both tables, if farther than people are; a model that is fitted
+    is compared at the mass to which the fit scales it.
     """
     check = _checked(context)
     if check is None or not check.literature:
@@ -77,8 +77,8 @@ def unlike_tables(context: PersonContext) -> Iterator[Finding]:
 
 
 def model_mass(context: PersonContext) -> Iterator[Finding]:
-    """O213: the model's mass is another than the person's. A fit scales the masses, so that there it takes a difference
-    as between people to be worth a word.
+    """O213: a model mass that differs from the person's. A fit scales the masses, so that only a difference larger than
+    between people is reported there.
     """
     stated_kg = None if context.total_mass is None else context.total_mass.body_kg
     stated_kg = context.subject.mass_kg if stated_kg is None else stated_kg
@@ -132,7 +132,7 @@ def arms_in_torso(context: PersonContext) -> Iterator[Finding]:
 
 
 def compared_with_tables(context: PersonContext) -> Iterator[Finding]:
-    """O415: what of a model that is looked at alone was not compared, and why."""
+    """O415: what was not compared of a model that is checked on its own, and why."""
     if context.model is None or context.has_trials:
         return
     subject = context.subject
@@ -151,7 +151,7 @@ def compared_with_tables(context: PersonContext) -> Iterator[Finding]:
 
 
 def _checked(context: PersonContext) -> ModelCheck | None:
-    """The model beside the tables; None where the person is not known well enough."""
+    """Return the model next to the tables; None where the person is not known well enough."""
     subject, model = context.subject, context.model
     if model is None or subject.height_m is None or subject.sex is None:
         return None

@@ -14,7 +14,7 @@ from kinertia.model.skeleton import Skeleton
 from kinertia.motion.inverse_kinematics import InverseKinematics
 
 _AT_LIMIT, _BEYOND_RAD = 0.05, float(np.radians(10.0))
-"""Share of the frames, and angle, from which on a limit of a coordinate's range is worth a word."""
+"""Share of the frames, and angle, from which on a limit of a coordinate's range is reported."""
 _CLAMPED = 0.2
 """Share of the frames from which on a clamped coordinate of legs or trunk is a fault of the model: on 30 fault-free
 trials with models of six makers it is 0.08 at most (knees that end straight), in one that clamps knees at 10 degrees
@@ -22,12 +22,12 @@ trials with models of six makers it is 0.08 at most (knees that end straight), i
 
 
 def range_findings(skeleton: Skeleton, ik: InverseKinematics) -> Iterator[Finding]:
-    """O311: legs and trunk that stay at a clamped limit, so that other joints make up for it; O312: whatever else stays
-    at one, or goes beyond the usual range of a joint.
+    """O311 and O312: legs and trunk that stay at a clamped limit, so that other joints compensate (O311); other
+    coordinates that stay at one, or exceed the usual range of a joint (O312).
 
     Args:
-        skeleton: with its ranges.
-        ik: of one trial.
+        skeleton: skeleton with its ranges of motion.
+        ik: inverse kinematics of one trial.
     """
     bounds, known = skeleton.bounds, np.isfinite(ik.q)
     at_limit = ((ik.q <= bounds.least) | (ik.q >= bounds.most)).sum(axis=0) / np.maximum(known.sum(axis=0), 1)

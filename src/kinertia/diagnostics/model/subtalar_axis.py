@@ -46,7 +46,7 @@ def subtalar_axis(context: PersonContext) -> Iterator[Finding]:
 
 
 def _usual(neutral: NeutralJoints, body: str) -> np.ndarray:
-    """(3,) the usual axis of this foot, in ground: forward is where up and right say."""
+    """Return the usual axis (3,) of this foot, in ground, where forward follows from up and right."""
     forward, up, right = _USUAL
     to_right = np.zeros(3)
     across = sum((neutral.centres[one] - neutral.centres[other] for one, other in neutral.pairs), np.zeros(3))

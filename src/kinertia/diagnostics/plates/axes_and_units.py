@@ -14,15 +14,15 @@ from kinertia.trial.centre_of_pressure import free_moment
 from kinertia.trial.data import LOAD_THRESHOLD_N, PlateLoads
 
 _VERTICAL_SHARE = 0.7
-"""Of the largest force; a foot pushes sideways and backwards by less."""
+"""Share of the largest force; a foot pushes sideways and backwards by less."""
 _WEAKEST_N = 0.3
-"""Less is no load in kN, nor in multiples of body weight."""
+"""Smallest peak of a load in kN, or in multiples of body weight."""
 _LONGEST_ARM_M, _USUAL_ARM_M, _FEWEST = 0.15, 0.04, 10
 """Free moment over vertical force; so many samples under load, at least."""
 
 
 def axes_and_units(context: RecordingContext) -> Iterator[Finding]:
-    """P201 to P203."""
+    """P201 to P203: forces in other axes or other units, by the plates themselves."""
     plates = context.plates
     if plates is None:
         return
@@ -50,7 +50,7 @@ def axes_and_units(context: RecordingContext) -> Iterator[Finding]:
 
 
 def _peak_of_weak_loads(plates: PlateLoads) -> float | None:
-    """N, where all that plates show is too little for a person, and yet comes and goes as loads do; else None.
+    """Return the peak (N) where all loads are too small for a person and yet come and go as loads do; else None.
 
     A plate that nobody steps on has noise, at times of some newtons, a zero or a drift, too.
     """

@@ -14,7 +14,7 @@ from kinertia.findings.quantity import Quantity
 from kinertia.trial.data import PlateLoads
 
 OFF_PLATE_SHARE = 0.05
-"""More of the load than this with its centre of pressure off the plate is worth a look; half of it is wrong."""
+"""Share of the load with its centre of pressure off the plate that is reported; half of it is wrong."""
 _MOST_SHARE = 0.5
 
 
@@ -31,8 +31,8 @@ def cop_on_plate(context: RecordingContext) -> Iterator[Finding]:
 
 
 def off_plate(plates: PlateLoads, p: int) -> tuple[float, float] | None:
-    """Share of the reliably loaded samples of plate `p` with a centre of pressure off it, and their distance (m, 95th
-    percentile; 0 where none is); None where the file has no corners or nothing is loaded.
+    """Return the share of the reliably loaded samples of plate `p` with a centre of pressure off it, and their distance
+    (m, 95th percentile; 0 where none is); None where the file has no corners or nothing is loaded.
     """
     loaded = plates.force[:, p, 1] > COP_MIN_FORCE_N
     if plates.corners is None or not loaded.any():

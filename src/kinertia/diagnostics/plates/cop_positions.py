@@ -42,8 +42,8 @@ _USUAL_BEGIN_M, _USUAL_END_M = (0.035, 0.1), (-0.06, 0.025)
 
 
 def loads_and_feet(context: RecordingContext) -> Iterator[Finding]:
-    """P204, or the explanation (P24, T20, T21) that leaves loads nearest to the feet and to their times, with the
-    others among its causes; of equally good ones that which is asked first. Where loads fit: P243 of small offsets.
+    """P204, P24, T20, T21 and P243: the explanation that leaves loads nearest to the feet and to their times, with the
+    others among its causes; of equally good ones the first tested. Where loads fit: P243 of small offsets.
     """
     if context.is_static or context.foot_trajectories is None or not context.contacts:
         return
@@ -80,7 +80,7 @@ def _with_runners_up(ranked: Sequence[Finding]) -> Finding:
 
 
 def _other_unit(context: RecordingContext) -> Iterator[Finding]:
-    """P204: plates whose loads are all out of the laboratory: one alone, where each has columns of its own."""
+    """P204: plates whose loads are all outside the laboratory: one plate, where each has columns of its own."""
     plates = context.plates
     assert plates is not None
     nearest: dict[int, float] = {}
@@ -97,7 +97,7 @@ def _other_unit(context: RecordingContext) -> Iterator[Finding]:
 
 
 def _displaced(context: RecordingContext) -> Iterator[Hypothesis]:
-    """Loads that are under no foot: all displaced alike (P243), or not (P244)."""
+    """Yield hypotheses for loads that are under no foot: all displaced equally (P243), or not (P244)."""
     plates = context.plates
     assert plates is not None
     # a load of both feet is under neither (P276)
@@ -122,7 +122,7 @@ def _displaced(context: RecordingContext) -> Iterator[Hypothesis]:
 
 
 def _stray(context: RecordingContext) -> Iterator[Finding]:
-    """P244 as a WARNING: a single load far from both feet, which is another person's or a thing's."""
+    """P244 as a WARNING: a single load far from both feet, caused by another person or an object."""
     plates = context.plates
     assert plates is not None
     for one in context.contacts:
@@ -133,7 +133,7 @@ def _stray(context: RecordingContext) -> Iterator[Finding]:
 
 
 def _offset(context: RecordingContext) -> Iterator[Finding]:
-    """P243: right and left are off in the same direction of the laboratory."""
+    """P243: the loads of right and left are displaced in the same direction of the laboratory."""
     contacts = context.contacts
     means = [[one.own_offset_m for one in contacts if one.foot == foot] for foot in range(2)]
     if not all(means):
@@ -148,8 +148,8 @@ def _offset(context: RecordingContext) -> Iterator[Finding]:
 
 
 def _ends(context: RecordingContext, contacts: Sequence[PlateContact]) -> Iterator[Finding]:
-    """P243: loads that begin behind the heel or end in front of the toes: what an offset along the foot does first."""
-    # of two contacts both, lest a second foot on one plate counts
+    """P243: loads that begin behind the heel or end in front of the toes, as an offset along the foot first does."""
+    # both of two contacts, so that a second foot on one plate does not count
     ends = np.sort([one.ends_m for one in contacts], axis=0)
     begin, end = float(ends[len(ends) // 2, 0]), float(ends[(len(ends) - 1) // 2, 1])
     steps = [one.ends_m for one in contacts if np.isfinite(one.end_s - one.start_s)]
@@ -173,7 +173,7 @@ def _ends(context: RecordingContext, contacts: Sequence[PlateContact]) -> Iterat
 
 
 def _excess_of_both(begin_m: float, end_m: float) -> float:
-    """m by which steps both begin and end too far back (negative), or too far forward; 0 where they do not."""
+    """Return by how much (m) steps both begin and end too far back (negative), or forward; 0 where they do not."""
     if begin_m < _BOTH_BACK_M[0] and end_m < _BOTH_BACK_M[1]:
         return max(begin_m - _USUAL_BEGIN_M[0], end_m - _USUAL_END_M[0])
     if begin_m > _BOTH_FORWARD_M[0] and end_m > _BOTH_FORWARD_M[1]:
@@ -191,7 +191,7 @@ _DELAY_S = 0.03
 
 
 def forces_keep_time(context: RecordingContext) -> bool:
-    """Whether a recording without strides shows, by vertical velocities, that its forces are neither late nor early."""
+    """Return whether vertical velocities show, without strides, that the forces are neither late nor early."""
     if context.has_strides:
         return False
     found = [one for part in context.velocities for one in vertical_match_of(part) if one.left <= MOST_LEFT]

@@ -22,8 +22,8 @@ _USUAL_M = (0.043, 0.148)
 
 
 def cop_progression(context: RecordingContext) -> Iterator[Finding]:
-    """P251: plates whose centre of pressure never moves during a step; P252: those on which it goes from toe to heel,
-    while on another it goes from heel to toe.
+    """P251 and P252: plates whose centre of pressure never moves during a step (P251), or moves from toe to heel while
+    on another plate it moves from heel to toe (P252).
     """
     plates, feet = context.plates, context.foot_trajectories
     if plates is None or feet is None or context.is_static or not lands_on_heels(context):
@@ -45,7 +45,7 @@ def cop_progression(context: RecordingContext) -> Iterator[Finding]:
 
 
 def _progression_m(contact: PlateContact, foot: FootTrajectory) -> float:
-    """How much farther forwards on its foot a load is in its last third than in its first."""
+    """Return how much farther forwards (m) on its foot a load is in its last third than in its first."""
     ahead = foot.beyond(contact.time, contact.place)[0]
     third = max(len(ahead) // 3, 1)
     return float(np.median(ahead[-third:]) - np.median(ahead[:third]))

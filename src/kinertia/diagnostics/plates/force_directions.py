@@ -37,14 +37,14 @@ ones 0.9 (squats), 1.4 (runs) and more."""
 
 @dataclass(frozen=True)
 class _Hypothesis:
-    """What would be wrong, and the residual (m/s) of the velocities once it is undone."""
+    """A supposed fault, and the residual (m/s) of the velocities once it is undone."""
 
     found: Finding
     residual_m_s: float
 
 
 def force_directions(context: RecordingContext) -> Iterator[Finding]:
-    """P231 to P233: the hypothesis that leaves least; the others that would do are among its causes.
+    """P231 to P233: the hypothesis with the smallest residual; other sufficient ones are among its causes.
 
     One about both axes is weighed against the best of each axis. Without strides the trunk bends, so that pelvis and
     markers' centre must both oppose the forces, and only a wrong sign of all of them is looked for.
@@ -82,9 +82,9 @@ def _rotated(
     correlations: dict[int, float],
     against: Sequence[int],
 ) -> _Hypothesis | None:
-    """P231: by 180 degrees where both axes oppose the motion, else by the angle at which the forces go with it."""
+    """P231: rotated by 180 degrees where both axes oppose the motion, else by the angle at which forces follow it."""
     angle_deg, strength = _angle(changes)
-    # beside an axis that is opposed, one that goes with the markers says that they are not rotated
+    # beside an opposed axis, one that agrees with the markers shows that the forces are not rotated
     enough = -_OPPOSED if against else _CLEAR
     fitting = any(one > enough for one in correlations.values())
     if len(against) == len(HORIZONTAL):
@@ -150,8 +150,8 @@ def _reversed_plate(
 
 
 def _best_explained(plates: PlateLoads, parts: Sequence[CausedVelocity], axis: int) -> VelocityResidual:
-    """By pelvis and markers' centre, or, where that leaves less of long windows, by the centre alone: the pelvis of
-    runners sways along the way.
+    """Return the residual by pelvis and marker-based centre, or by the centre alone where that leaves less of long
+    windows: the pelvis of runners sways along the direction of travel.
     """
     shown = [parts]
     if max(span_s(part.time) for part in parts) >= _LONG_WINDOW_S:
@@ -161,14 +161,14 @@ def _best_explained(plates: PlateLoads, parts: Sequence[CausedVelocity], axis: i
 
 
 def _one_zero_off(trial: Trial, parts: Sequence[CausedVelocity], axis: int) -> bool:
-    """Whether a wrong zero under one foot accounts for more than reversing the sign of all."""
+    """Return whether a zero offset under one foot explains more than reversing the sign of all plates."""
     residual = VelocityResidual.of(trial.loads.time, trial.loads.force, parts, axis)
     return bool(residual.plate_zeroed.min() < DISTINGUISHABLE * residual.all_reversed)
 
 
 def _correlations(changes: VelocityChanges, strides: bool) -> dict[int, float]:
-    """Along each axis, of what the forces cause with pelvis and markers' centre: in strides the mean of both, else the
-    larger one; NaN where hardly anything moves.
+    """Return along each axis the correlation of force-derived velocities with pelvis and marker-based centre: in
+    strides the mean of both, else the larger one; NaN where hardly anything moves.
     """
     result = {}
     for axis in HORIZONTAL:
@@ -180,8 +180,8 @@ def _correlations(changes: VelocityChanges, strides: bool) -> dict[int, float]:
 
 
 def _angle(changes: VelocityChanges) -> tuple[float, float]:
-    """The angle (deg) about the vertical by which the forces' velocities are rotated from the markers', and how well
-    both correlate once it is taken back: of the mean over pelvis and markers' centre.
+    """Return the angle (deg) about the vertical from the markers' to the force-derived velocities, and their
+    correlation once it is undone: of the mean over pelvis and marker-based centre.
     """
     # from Z to X is a positive rotation about Y
     caused, *shown = (part[:, 2] + 1j * part[:, 0] for part in (changes.caused, changes.pelvis, changes.centre))

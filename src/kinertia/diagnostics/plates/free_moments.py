@@ -34,7 +34,7 @@ _LONG_ARM_M, _USUAL_PERCENT, _ACCOUNTED, _FEWEST = 0.034, 95.0, 1.8, 20
 
 
 def free_moments(context: RecordingContext) -> Iterator[Finding]:
-    """P261 to P264."""
+    """P261 to P264: free moments that contradict the plates' own forces."""
     plates = context.plates
     if plates is None:
         return
@@ -50,7 +50,7 @@ def free_moments(context: RecordingContext) -> Iterator[Finding]:
 
 
 def _columns(context: RecordingContext, plates: PlateLoads) -> Iterator[Finding]:
-    """P261 and P262: torque columns that are not the free moments at their centres of pressure."""
+    """P261 and P262: moment columns that are not the free moments at their centres of pressure."""
     for name, one in zip(plates.names, plates.torques or (), strict=plates.torques is not None):
         x, _, z = one.rms_nm
         across = float(np.hypot(x, z))
@@ -70,7 +70,7 @@ def _columns(context: RecordingContext, plates: PlateLoads) -> Iterator[Finding]
 
 
 def _is_rotated(columns: TorqueColumns, across_nm: float) -> bool:
-    """Whether a free moment stands in the column of a horizontal axis: they are of this size."""
+    """Return whether a free moment is in the column of a horizontal axis: the columns are of its size."""
     some = columns.arm_m > 0.0 and _SOME_NM < across_nm < _LARGEST_NM
     return bool(some and columns.rms_nm[1] < _LITTLE * across_nm)
 
@@ -78,7 +78,7 @@ def _is_rotated(columns: TorqueColumns, across_nm: float) -> bool:
 def _about_fixed_point(
     context: RecordingContext, plates: PlateLoads, explained: Container[str | None]
 ) -> Iterator[Finding]:
-    """P261: vertical torques that are those about a fixed point, the plate's middle or the origin (Mz for Tz)."""
+    """P261: vertical moments about a fixed point, the plate's middle or the origin (Mz for Tz), not free moments."""
     for name, wrench in loaded_wrenches(plates, _FEWEST):
         if name in explained:
             continue
@@ -98,7 +98,7 @@ def _about_fixed_point(
 
 
 def _fixed_point(wrench: FloatArray, torque: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The point (x, z) m about which torques (k,) N m would be moments of wrenches (k, 6), and what is left."""
+    """Find the point (x, z) m about which torques (k,) N m would be moments of wrenches (k, 6), and the residual."""
     acts = centre_of_pressure(wrench)
     forces = wrench[:, [0, 2]]
     about_origin = acts[:, 2] * forces[:, 0] - acts[:, 0] * forces[:, 1]
@@ -109,7 +109,7 @@ def _fixed_point(wrench: FloatArray, torque: FloatArray) -> tuple[FloatArray, Fl
 
 
 def _exchanged(context: RecordingContext, plates: PlateLoads) -> Iterator[Finding]:
-    """P263, of each pair of plates: what is left in the columns of each while it is loaded."""
+    """P263: moment columns of two plates interchanged, by the residuals of each plate while it is loaded."""
     torques = plates.torques or ()
     for a, one in enumerate(torques):
         b = one.belongs_to

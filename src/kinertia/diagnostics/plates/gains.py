@@ -35,12 +35,12 @@ are as large another gain leaves 0.72 and more, or another zero explains more. B
 
 
 def gains(context: RecordingContext) -> Iterator[Finding]:
-    """P221, of the plates in single support or else by the vertical velocity; P222, of each horizontal axis."""
+    """P221 and P222: P221 by single support on each plate, else by vertical velocity; P222 of each horizontal axis."""
     plates = context.plates
     if plates is None or context.trial is None:
         return
     weights = _by_single_support(context) or _by_vertical_velocity(context, plates)
-    # a light plate lacks what a foot has beyond its edge
+    # a plate reads too little while a foot extends beyond its edge
     if weights is not None and weights.evidence["other"].value not in context.plates_reached_beyond:
         yield weights
     long = [part for part in context.velocities if span_s(part.time) >= _LEAST_WINDOW_S]
@@ -68,7 +68,7 @@ def _by_single_support(context: RecordingContext) -> Finding | None:
 
 
 def _by_vertical_velocity(context: RecordingContext, plates: PlateLoads) -> Finding | None:
-    """The plate whose other gain explains how the body goes up and down, better than another rate would."""
+    """Find the plate whose gain error explains the body's vertical motion better than a rate error would."""
     for part in context.velocities if len(plates.names) > 1 else ():
         if span_s(part.time) < _LEAST_WINDOW_S:
             continue
@@ -83,7 +83,7 @@ def _by_vertical_velocity(context: RecordingContext, plates: PlateLoads) -> Find
         rivals = np.array([_RESIDUAL_SHARE * each.left for each in read]), np.array([e.left for e in rate or read])
         if abs(np.sign(gain).sum()) < len(gain) or np.abs(gain).min() < _LEAST_GAIN or (residual > rivals).any():
             continue
-        # this plate should read so much more beside the others: by it alone the body weighs as much less
+        # this plate should read more by this factor: by it alone the body weighs less by the same
         share = float(own[best][-1] / sum(each[-1] for each in own))
         own_kg = part.mass_kg / (share + (1.0 - share) * (1.0 + float(gain.mean())))
         others = " and ".join(plates.names[p] for p in used if p != best)
@@ -103,7 +103,7 @@ def _by_vertical_velocity(context: RecordingContext, plates: PlateLoads) -> Find
 def _disagreeing(
     context: RecordingContext, names: tuple[str, str], mass_kg: tuple[float, float], **evidence: Quantity
 ) -> Finding:
-    """P221 of the plate that reads more and of the one that reads less; which of them is wrong nobody knows."""
+    """P221 of the plate that reads more and the one that reads less; which of them is wrong remains unknown."""
     plates = {"plate": Quantity(names[0]), "other": Quantity(names[1])}
     masses = {"mass_kg": Quantity(mass_kg[0], "kg"), "other_kg": Quantity(mass_kg[1], "kg")}
     return with_evidence("P221", context.at(**context.along(1)), {**masses, **plates, **evidence})
@@ -112,7 +112,7 @@ def _disagreeing(
 def _scaled_axis(
     context: RecordingContext, plates: PlateLoads, long: Sequence[CausedVelocity], axis: int
 ) -> Finding | None:
-    """P222: the axis of one plate, or of all, that reads so many times as much as it should."""
+    """P222: the axis of one plate, or of all, that reads a multiple of the true force."""
     residual = VelocityResidual.of(plates.time, plates.force, long, axis)
     best = min(residual.scaled, key=lambda one: one.residual)
     limit = min(_SCALED * residual.as_read, CLEARLY_BEST * float(residual.plate_zeroed.min()))

@@ -55,8 +55,8 @@ def complete_contact(context: RecordingContext) -> Iterator[Finding]:
 
 
 def both_feet(context: RecordingContext) -> Iterator[Finding]:
-    """P276: a load between the feet; both are on the plate, but only the sum of what they do is known. A foot that
-    swings by its markers is on none.
+    """P276: a load between the feet; both are on the plate, and only their total load is known. A foot that swings by
+    its markers is on none.
     """
     plates, feet = context.plates, context.foot_trajectories
     if plates is None or feet is None or context.is_static or not goes_forwards(context):
@@ -75,14 +75,14 @@ def both_feet(context: RecordingContext) -> Iterator[Finding]:
 def _to_toes(
     context: RecordingContext, contact: PlateContact, feet: tuple[FootTrajectory, FootTrajectory]
 ) -> PlateContact:
-    """The load, with its distance to the end of the toes of feet that have no marker there."""
+    """Return the load with its distance to the end of the toes, for feet that have no marker there."""
     named = {} if context.marker_set is None else context.marker_set.landmarks
     whole = [foot if f"toe_{side}" in named else foot.with_toes() for side, foot in zip(FEET, feet, strict=True)]
     return replace(contact, offset_m=np.stack([foot.offset_m(contact.time, contact.place) for foot in whole]))
 
 
 def _under_both(contact: PlateContact) -> BoolArray:
-    """(k,) where the load is between the feet, or away from its own, and the other one bears a good part of it."""
+    """Return (k,) where the load is between the feet, or off its own foot while the other bears a good part of it."""
     own, other = np.linalg.norm(contact.offset_m, axis=2)[[contact.foot, 1 - contact.foot]]
     opposite = np.prod(contact.offset_m, axis=0).sum(axis=1) < 0
     away: BoolArray = np.minimum(own, other) > BETWEEN_M
@@ -95,7 +95,7 @@ def _under_both(contact: PlateContact) -> BoolArray:
 
 
 def plate_edges(context: RecordingContext) -> Iterator[Finding]:
-    """P282: feet that reach beyond the plate that they stand on, onto the floor."""
+    """P282: feet that extend beyond the plate that they stand on, onto the floor."""
     plates = context.plates
     if plates is None or context.is_static:
         return

@@ -12,17 +12,17 @@ _LEAST_LENGTH_M = 0.08
 
 
 def lands_on_heels(context: RecordingContext) -> bool:
-    """Whether loads can be expected to go from heel to toe: strides, and nobody walks backwards."""
+    """Return whether loads can be expected to progress from heel to toe: in strides that do not go backwards."""
     return context.has_strides and goes_forwards(context)
 
 
 def goes_forwards(context: RecordingContext) -> bool:
-    """Whether loads can be expected between heel and toe: whole feet, and nobody walks backwards."""
+    """Return whether loads can be expected between heel and toe: whole feet are visible and nobody walks backwards."""
     return shows_whole_feet(context) and not context.walks_backwards
 
 
 def shows_whole_feet(context: RecordingContext) -> bool:
-    """Whether heel and forefoot of both feet are seen: loads are between them, and foot off is not heel off."""
+    """Return whether heel and forefoot of both feet are visible: loads are between them, foot-off is not heel-off."""
     feet, marker_set = context.foot_trajectories, context.marker_set
     if feet is None or marker_set is None:
         return False

@@ -25,7 +25,7 @@ _DIFFERENCE = 0.25
 
 
 def interchanged_plates(context: RecordingContext) -> Iterator[Hypothesis]:
-    """P241: loads that are under no foot where they are, but under one where another plate is."""
+    """P241: loads that are under no foot at their own position, but under one at another plate's."""
     plates, feet, contacts = context.plates, context.foot_trajectories, context.contacts
     if plates is None or feet is None or len({one.plate for one in contacts}) < 2:
         return
@@ -63,7 +63,7 @@ def _interchanged(
 
 
 def _middles(plates: PlateLoads, used: Sequence[int]) -> dict[int, FloatArray]:
-    """(2,) m of each plate: by its corners, or by where it is loaded."""
+    """Return the middle (2,) m of each plate: from its corners, or from where it is loaded."""
     if plates.corners is not None:
         return {p: plates.corners[p].mean(axis=0)[[0, 2]] for p in used}
     point = cop_horizontal(plates)
@@ -72,7 +72,7 @@ def _middles(plates: PlateLoads, used: Sequence[int]) -> dict[int, FloatArray]:
 
 
 def _opposite(context: RecordingContext, plates: PlateLoads, feet: Feet) -> Iterator[Hypothesis]:
-    """Loads of two plates, or belts, that are off by as much in opposite directions, each by the same all the time."""
+    """Yield loads of two plates, or belts, displaced equally in opposite directions, each by a constant amount."""
     steps = [one for one in context.contacts if one.is_step]
     used = sorted({one.plate for one in steps})
     if len(used) != 2:
@@ -81,7 +81,7 @@ def _opposite(context: RecordingContext, plates: PlateLoads, feet: Feet) -> Iter
     for one in steps:
         from_feet = [one.place - foot.expected_cop(one.time, one.weight) for foot in feet]
         mean = [np.average(each, axis=0, weights=one.weight) for each in from_feet]
-        # the foot that swings goes away
+        # the swinging foot moves away
         foot = int(np.argmin([np.square(each - m).sum(axis=1).mean() for each, m in zip(from_feet, mean, strict=True)]))
         offsets[one.plate].append(mean[foot])
     first, second = (np.mean(offsets[p], axis=0) for p in used)

@@ -21,14 +21,14 @@ _MAINS_HZ = (50.0, 60.0)
 _BESIDE_HZ = (-16.0, -13.0, -10.0, 10.0, 13.0, 16.0)
 _HUM_N, _BESIDE_N, _STANDS_OUT = 4.0, 0.2, 6.0
 _LOUD_N, _FILTERED = 15.0, 2.0
-"""So much crosses the threshold of a load, where it begins and ends, several times; unless the unloaded plate shows it:
+"""This amplitude crosses the load threshold several times at contact and off, unless the unloaded plate shows it:
 then its noise sets the threshold, and forces are low-passed. In a measured walk, 20 and 71 N at 50 Hz then change leg
 moments by 1 to 1.4 SD (RMS), and by up to 29 N m at foot contact."""
 _SHORTEST_S, _SAMPLES_PER_PERIOD, _SLOW_ORDER = 0.2, 3.0, 6
 
 
 def mains_interference(context: RecordingContext) -> Iterator[Finding]:
-    """P107, of every plate and axis, at the frequency that is louder."""
+    """P107: mains interference of every plate and axis, at the stronger of the two mains frequencies."""
     plates = context.plates
     if plates is None:
         return
@@ -50,7 +50,7 @@ def mains_interference(context: RecordingContext) -> Iterator[Finding]:
 
 
 def _longest_load(plates: PlateLoads, p: int) -> slice | None:
-    """The rows of the longest load of a plate; None where it is short or slowly sampled."""
+    """Return the rows of the longest load of a plate; None where it is short or slowly sampled."""
     if len(plates.time) < 2:
         return None
     rate_hz = 1.0 / float(np.median(np.diff(plates.time)))
@@ -62,14 +62,14 @@ def _longest_load(plates: PlateLoads, p: int) -> slice | None:
 
 
 def _hum_n(time: FloatArray, force: FloatArray, mains_hz: float) -> FloatArray:
-    """(3,) N at this frequency in a force (k, 3), 0 along axes on which it does not stand out of those beside it."""
+    """Return the amplitude (3,) N at this frequency in a force (k, 3); 0 along axes where neighbours are as strong."""
     hum, *beside = _amplitudes(time, force, mains_hz + np.array([0.0, *_BESIDE_HZ]))
     stands_out = hum > _STANDS_OUT * np.max([*beside, np.full(3, _BESIDE_N)], axis=0)
     return np.where(stands_out, hum, 0.0)
 
 
 def _amplitudes(time: FloatArray, forces: FloatArray, frequencies_hz: FloatArray) -> FloatArray:
-    """(f, 3) N, of these frequencies in forces (k, 3), less what changes slowly."""
+    """Return amplitudes (f, 3) N at these frequencies in forces (k, 3), less slow changes."""
     after = 2.0 * (time - time.mean()) / float(np.ptp(time))
     slow = np.polynomial.chebyshev.chebvander(after, _SLOW_ORDER)
     rest = forces - slow @ np.linalg.lstsq(slow, forces, rcond=None)[0]

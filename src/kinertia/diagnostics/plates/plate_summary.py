@@ -16,7 +16,7 @@ _LISTED = 4
 
 @dataclass(frozen=True)
 class Contact:
-    """One foot (None where the markers do not tell which) on one plate."""
+    """Contact of one foot (None where the markers do not show which) with one plate."""
 
     foot: str | None
     start_s: float
@@ -25,14 +25,14 @@ class Contact:
 
 @dataclass(frozen=True)
 class PlateCheck:
-    """One plate.
+    """Summary of one force plate: its peak and who stands on it when.
 
     Attributes:
         name: as the recording has it.
-        declared: the foot that the file claims, or None.
+        declared: foot stated in the file, or None.
         peak_n: largest vertical force.
         contacts: in the order of time.
-        outside_share: share of the firmly loaded samples whose centre of pressure is off the plate; None where the file
+        outside_share: share of reliably loaded samples whose centre of pressure is off the plate; None where the file
             has no corners or nothing is loaded.
         outside_m: how far off, 95th percentile of those samples; 0 where none is.
     """
@@ -45,7 +45,7 @@ class PlateCheck:
     outside_m: float
 
     def stood_on(self) -> str:
-        """Which foot when, in words; of many contacts their number."""
+        """Describe which foot was on the plate when; of many contacts, their number."""
         if not self.contacts:
             return "none"
         phrases = []
@@ -59,7 +59,7 @@ class PlateCheck:
 
 
 def check_plates(recording: Recording, feet: FootMarkers | None) -> tuple[PlateCheck, ...]:
-    """Every plate of a recording; without foot markers the contacts are nobody's."""
+    """Summarise every plate of a recording; without foot markers the contacts have no foot."""
     if recording.plates is None:
         return ()
     return tuple(_check_plate(recording, p, feet) for p in range(len(recording.plates.names)))

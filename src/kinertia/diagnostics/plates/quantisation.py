@@ -18,7 +18,7 @@ from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.data import FloatArray
 
 _COARSE_N, _COARSE_M = 7.5, 0.0075
-"""Steps of 5 N, or of 5 mm, change joint moments by less than their deviations; of 10 N, or 10 mm, by up to twice
+"""Steps of 5 N, or of 5 mm, change joint moments by less than their SDs; of 10 N, or 10 mm, by up to twice
 those."""
 _FEWEST_SAMPLES, _FEWEST_VALUES, _OFF_STEP, _DECIMALS_N, _DECIMALS_M = 20, 3, 0.01, 3, 5
 _OVERSHOOT_S, _OVERSHOOT_HZ_S = 0.06, 0.45
@@ -26,7 +26,7 @@ _OVERSHOOT_S, _OVERSHOOT_HZ_S = 0.06, 0.45
 
 
 def quantisation(context: RecordingContext) -> Iterator[Finding]:
-    """P105 and P106: forces, or centres of pressure, in coarse steps. P108: forces spread in time by a filter."""
+    """P105, P106 and P108: forces, or centres of pressure, in coarse steps; forces spread in time by a filter."""
     plates = context.plates
     if plates is None:
         return
@@ -51,7 +51,7 @@ def quantisation(context: RecordingContext) -> Iterator[Finding]:
 
 
 def quantisation_n(values: FloatArray) -> float:
-    """What forces (k,) along one axis are multiples of, but for their zero; 0 where they take any value."""
+    """Return the quantisation step of forces (k,) along one axis, less their zero; 0 where they are continuous."""
     return _step(values, _DECIMALS_N)
 
 

@@ -38,9 +38,9 @@ PLACE_QUESTIONS: tuple[Question[RecordingContext], ...] = (
     Question("P27", complete_contact),
 )
 _OTHER_AXES = ("P201",)
-"""Then there is no vertical force to judge by."""
+"""ERROR after which there is no vertical force to judge by."""
 _NO_VELOCITY = ("L20", "M12", "M14", "P10", "P20", "P24", "T201", "T211", "T212")
-"""Then markers, forces or their times are not those of one moving body."""
+"""ERRORs after which markers, forces or their times do not belong to one moving body."""
 
 SIGNAL_QUESTIONS: tuple[Question[RecordingContext], ...] = (
     Question("P20", axes_and_units),

@@ -31,8 +31,8 @@ _OPERATIONS = (
 
 
 def rotated_plates(context: RecordingContext) -> Iterator[Hypothesis]:
-    """P242: the one correction of one plate, or of all alike, that puts all loads under the feet; nothing where none
-    does, or several do.
+    """P242: the one correction of one plate, or of all equally, that puts all loads under the feet; nothing where none
+    or several do.
     """
     plates, feet = context.plates, context.foot_trajectories
     steps = [one for one in context.contacts if one.is_step]
@@ -72,13 +72,13 @@ def rotated_plates(context: RecordingContext) -> Iterator[Hypothesis]:
 
 
 def _turned(place: FloatArray, middle: FloatArray, matrix: Sequence[Sequence[int]]) -> FloatArray:
-    """Places (..., 2) m turned about the middle of their plate."""
+    """Rotate positions (..., 2) m about the middle of their plate."""
     result: FloatArray = middle + (place - middle) @ np.array(matrix).T
     return result
 
 
 def _distances(steps: Sequence[PlateContact], place: Sequence[FloatArray], feet: Feet) -> FloatArray:
-    """m (RMS), of each step, from where the load of the nearer foot is expected."""
+    """Return the distance (m, RMS) of each step from where the load of the nearer foot is expected."""
     errors = []
     for one, each in zip(steps, place, strict=True):
         off = [np.square(each - foot.expected_cop(one.time, one.weight)).sum(axis=1) for foot in feet]

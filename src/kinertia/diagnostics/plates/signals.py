@@ -18,11 +18,11 @@ from kinertia.trial.sampled_time import runs, span_s
 _DEAD_N = 0.5
 """Amplifiers have more noise than this."""
 _CARRIED_SHARE = 0.4
-"""Of what plates carry in the middle: a foot that leaves or lands takes some samples to lose or gain so much."""
+"""Share of the median load that a foot at contact or off takes several samples to gain or lose."""
 _SAME, _SATURATED_S, _FEWEST_SATURATED, _STEEP = 1e-6, 0.02, 4, 0.02
 """At the end of a range a force stays exactly the same, and comes and goes steeply."""
 _FULL_RANGE_N, _FULL_RANGE_ACROSS_N = 200.0, 30.0
-"""Of an adult; no amplifier's range ends below that."""
+"""Smallest ranges of amplifiers, as forces of an adult."""
 _REPEATED_S, _LONG_REPEATED_S, _FEWEST_REPEATED, _LEAP_STEPS = 0.025, 0.1, 3, 3.0
 """Loads of 25 fault-free trials never stay the same in all channels for more than 2 ms. Long repetitions shift where
 contacts begin and end."""
@@ -31,7 +31,7 @@ _QUANTISED, _STEPS = 4.0, 3.2
 
 
 def signals(context: RecordingContext) -> Iterator[Finding]:
-    """P101 to P104, of every plate and axis."""
+    """P101 to P104: faulty signals of every plate and axis."""
     if context.plates is None:
         return
     for detect in (_dead_channels, _dropped_samples, _repeated_samples, _saturated):
@@ -39,7 +39,7 @@ def signals(context: RecordingContext) -> Iterator[Finding]:
 
 
 def _dead_channels(context: RecordingContext, plates: PlateLoads) -> Iterator[Finding]:
-    """Horizontal axes along which a plate that carries a person shows nothing at all."""
+    """Find horizontal axes along which a plate that supports a person reads nothing at all."""
     for name, wrench in carrying(plates, context.adult_share):
         for axis in (0, 2):
             largest = float(np.abs(wrench[:, axis]).max())
@@ -53,7 +53,7 @@ def _dead_channels(context: RecordingContext, plates: PlateLoads) -> Iterator[Fi
 
 
 def _dropped_samples(context: RecordingContext, plates: PlateLoads) -> Iterator[Finding]:
-    """Spans in which all plates read nothing, between samples that carry a person."""
+    """Find intervals in which all plates read nothing, between samples that support a person."""
     total = plates.force[..., 1].sum(axis=1)
     carried = total[total > FIRM_LOAD_N]
     much = _CARRIED_SHARE * float(np.median(carried)) if carried.size else np.inf
@@ -69,7 +69,7 @@ def _dropped_samples(context: RecordingContext, plates: PlateLoads) -> Iterator[
 
 
 def _repeated_samples(context: RecordingContext, plates: PlateLoads) -> Iterator[Finding]:
-    """The longest span in which a plate that carries somebody reads exactly the same in all its channels."""
+    """Find the longest interval in which a plate that supports a person repeats its reading exactly in all channels."""
     for name, wrench in wrenches(plates):
         same = np.equal(np.diff(wrench, axis=0), 0.0).all(axis=1) & (wrench[1:, 1] > FIRM_LOAD_N)
         # forces that are rounded stay, and go on by one step; before late ones a file may be filled up with the first
@@ -93,10 +93,10 @@ def _repeated_samples(context: RecordingContext, plates: PlateLoads) -> Iterator
 
 
 def _saturated(context: RecordingContext, plates: PlateLoads) -> Iterator[Finding]:
-    """Forces that reach their largest value along an axis and stay there, where a foot's would have gone on."""
+    """Find forces that reach their largest value along an axis and stay there, where a foot's would rise further."""
     for name, wrench in wrenches(plates):
         for axis, least in enumerate((_FULL_RANGE_ACROSS_N, _FULL_RANGE_N, _FULL_RANGE_ACROSS_N)):
-            # upwards a person weighs; sideways a foot pushes as hard one way as the other
+            # vertical forces have one sign; sideways a foot pushes equally hard both ways
             for sign in (1.0,) if axis == 1 else (1.0, -1.0):
                 signed = sign * wrench[:, axis]
                 top = float(signed.max(initial=0.0))
@@ -111,7 +111,7 @@ def _saturated(context: RecordingContext, plates: PlateLoads) -> Iterator[Findin
 
 
 def _at_top(time: FloatArray, values: FloatArray, top: float) -> tuple[float, float] | None:
-    """The longest span (s) in which values (k,) stay exactly at their largest, having come there steeply."""
+    """Find the longest interval (s) in which values (k,) stay exactly at their largest after a steep rise."""
     flat = [
         (first, last)
         for first, last in runs(values >= top * (1.0 - _SAME))
@@ -127,5 +127,5 @@ def _at_top(time: FloatArray, values: FloatArray, top: float) -> tuple[float, fl
 
 
 def _as_long(mask: BoolArray) -> int:
-    """With how many True a mask (k,) begins."""
+    """Count the True values at the beginning of a mask (k,)."""
     return len(mask) if mask.all() else int(np.argmin(mask))

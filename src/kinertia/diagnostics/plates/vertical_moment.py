@@ -29,16 +29,16 @@ two hold a whole stride: Rajagopal's has 0.5 mm (1.6 at most, were the stride ta
 is wrong, 5 mm.
 """
 _FREE_SHARE = 0.5
-"""Of the mean vertical moment, from which on the free moments under the feet are its likeliest cause."""
+"""Share of the mean vertical moment from which on the free moments under the feet are its likeliest cause."""
 
 
 @dataclass(frozen=True)
 class MeanVerticalMoment:
-    """Mean vertical moments (N m, positive turns to the left) over whole strides.
+    """Mean vertical moments (N m, positive rotates the body to the left) over whole strides.
 
     Attributes:
-        moment_nm: of all ground reactions about the body.
-        free_nm: of the right and the left foot about its own centre of pressure: the free moments.
+        moment_nm: moment of all ground reactions about the body.
+        free_nm: free moments of the right and the left foot, each about its own centre of pressure.
         allowed_nm: largest moment that does not contradict gait.
         span_s: start and end of the strides, s.
     """
@@ -50,17 +50,17 @@ class MeanVerticalMoment:
 
     @property
     def contradicts(self) -> bool:
-        """Whether nobody can walk like that."""
+        """Whether nobody can walk with this moment."""
         return abs(self.moment_nm) > self.allowed_nm
 
     @property
     def by_free_moments(self) -> bool:
-        """Whether free moments that have the same sign, or do not cancel, are most of it."""
+        """Whether most of the moment is from free moments that have the same sign, or do not cancel."""
         return sum(self.free_nm) / self.moment_nm >= _FREE_SHARE
 
 
 def vertical_moment(context: RecordingContext) -> Iterator[Finding]:
-    """P266: about the middle of the pelvis markers, in the longest measured window; not of who turns."""
+    """P266: mean vertical moment about the pelvis markers' middle, in the longest measured window; not in turns."""
     trial = context.trial
     if trial is None or not trial.windows() or not context.has_strides or context.turns:
         return
@@ -87,12 +87,12 @@ def vertical_moment(context: RecordingContext) -> Iterator[Finding]:
 
 
 def mean_vertical_moment(loads: FootLoads, time: FloatArray, centre: FloatArray) -> MeanVerticalMoment | None:
-    """The mean vertical moments over as many whole strides as the middle of a measured window holds.
+    """Compute mean vertical moments over as many whole strides as the middle of a measured window holds.
 
-    Where the body is need not be known well: the horizontal forces of whole strides cancel, too.
+    The position of the body need not be accurate: the horizontal forces of whole strides cancel, too.
 
     Args:
-        loads: with foot contacts or feet off that are whole strides apart.
+        loads: loads with foot contacts or foot-offs that are whole strides apart.
         time: (n,) s, a window in which all ground contact is measured.
         centre: (n, 3) m, a point that moves with the trunk, such as the middle of the pelvis.
 
@@ -120,5 +120,5 @@ def mean_vertical_moment(loads: FootLoads, time: FloatArray, centre: FloatArray)
 
 
 def _vertical_moment(force: FloatArray, moment: FloatArray, point: FloatArray) -> FloatArray:
-    """(k, 2) N m about these points, of forces and their moments about the ground origin (k, 2, 3)."""
+    """Compute moments (k, 2) N m about these points from forces and moments about the ground origin (k, 2, 3)."""
     return moment[..., 1] - (point[..., 2] * force[..., 0] - point[..., 0] * force[..., 2])

@@ -16,17 +16,17 @@ from kinertia.trial.idle_level import ZEROED_N, ZEROED_NM, IdleReading
 _ZERO_N, _FAR_FROM_ZERO_N, _DRIFT_N = 15.0, 40.0, 15.0
 """Zeroed plates read a few newtons; 40 N are 5 % of an adult's weight on every plate."""
 _LEAST_N = 6.0
-"""Twice what zeroed plates read: no limit is lower, however light the person."""
+"""Lowest limit, twice what zeroed plates read, however light the person."""
 _MOST_UNLOADED_N, _STEADY_N = 150.0, 15.0
 _UNLOADED_PERCENT = (2.0, 15.0)
-"""A plate that somebody walks over is unloaded for at least so many percent of the record."""
+"""Percentage of the record for which a plate that is walked over is at least unloaded."""
 _UNKNOWN = IdleReading((np.nan, np.nan, np.nan), np.nan, 0.0, 0.0)
 
 
 def zeros(context: RecordingContext) -> Iterator[Finding]:
-    """P211, P213 and P216, of every plate and axis; limits in newtons are those of adults.
+    """P211, P213 and P216: zero offsets of every plate and axis; limits in newtons are those of adults.
 
-    Readers take a constant level off the loads (P216). One that is not constant, and one of plates that are stated to
+    Readers subtract a constant level from the loads (P216). One that is not constant, and one of plates stated to
     be zeroed, is still in them (P213).
     """
     plates, share = context.plates, context.adult_share
@@ -50,7 +50,7 @@ def zeros(context: RecordingContext) -> Iterator[Finding]:
 
 
 def idle_levels(context: RecordingContext) -> Iterator[Finding]:
-    """P216: what a plate that is stood on reads while it is not, taken off its loads."""
+    """P216: what a plate that is stood on reads while unloaded, which has been subtracted from its loads."""
     plates = context.plates
     for p, idle in enumerate(() if plates is None else plates.idle or ()):
         assert plates is not None
@@ -83,7 +83,7 @@ def _zero(
 
 
 def _steady_minimum(vertical: FloatArray, share: float) -> float | None:
-    """A small steady force (N) of a plate that somebody walked over, where others show none; None without one.
+    """Return the small steady force (N) of a plate that was walked over, where others show none; None without one.
 
     It counts as a load, so that no contact on that plate begins or ends.
     """

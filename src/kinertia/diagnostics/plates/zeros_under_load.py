@@ -33,7 +33,7 @@ _AGREES = 0.5
 
 
 def zeros_under_load(context: RecordingContext) -> Iterator[Finding]:
-    """P212 and P214, along each horizontal axis.
+    """P212 and P214: zero offsets under load along each horizontal axis.
 
     Their limits are the same for children: of six of 25 to 60 kg who walk straight and turn, forces of up to 27 N
     accelerate nothing by the pelvis' markers, in windows below 1 s, and zeros of one plate seem to be up to 11 N.
@@ -50,9 +50,9 @@ def zeros_under_load(context: RecordingContext) -> Iterator[Finding]:
 def _unexplained(
     context: RecordingContext, plates: PlateLoads, parts: Sequence[CausedVelocity], axis: int
 ) -> Finding | None:
-    """P214: the trend of what the forces cause beyond the pelvis, as a force; the longer windows count more.
+    """P214: the trend of the force-derived velocity beyond the pelvis', as a force; longer windows count more.
 
-    Without strides the trunk bends, so that the pelvis goes its own way: the markers' centre must say the same.
+    Without strides the trunk bends, so that the pelvis moves differently: the marker-based centre must agree.
     """
     spans = np.array([np.ptp(part.time) for part in parts])
     force_n = _trend_n([part.pelvis for part in parts], parts, axis)
@@ -79,7 +79,7 @@ def _unexplained(
 
 
 def _trend_n(shown: Sequence[FloatArray], parts: Sequence[CausedVelocity], axis: int) -> float:
-    """N, by which the forces change the body's velocity more than these velocities (n, 3) m/s of each window show."""
+    """Return the force (N) by which the forces change the body's velocity more than shown (n, 3) m/s in each window."""
     trends = [
         part.mass_kg * np.polyfit(part.time - part.time.mean(), part.caused[:, axis] - velocity[:, axis], 1)[0]
         for velocity, part in zip(shown, parts, strict=True)
@@ -88,8 +88,8 @@ def _trend_n(shown: Sequence[FloatArray], parts: Sequence[CausedVelocity], axis:
 
 
 def _levels(plates: PlateLoads, axis: int) -> FloatArray | None:
-    """(p,) N that plates read along an axis while nobody stands on them, and that is in their loads; None where that is
-    not known of each.
+    """Return the forces (p,) N that unloaded plates read along an axis and that are still in their loads; None unless
+    known for each plate.
     """
     levels = np.array([idle.left_n[axis] for idle in plates.idle or ()])
     return levels if levels.size and np.isfinite(levels).all() else None
@@ -99,7 +99,7 @@ def _plate_zero(
     context: RecordingContext, plates: PlateLoads, parts: Sequence[CausedVelocity], axis: int, all_plates: bool
 ) -> Finding | None:
     """P212: a force of one loaded plate that does not accelerate the body, unless all plates show it as well, or nobody
-    takes strides: then the body's horizontal velocity is not known so well.
+    takes strides: the body's horizontal velocity is then not known as well.
     """
     long = [part for part in parts if span_s(part.time) >= _LEAST_WINDOW_S]
     if not long or not context.has_strides:

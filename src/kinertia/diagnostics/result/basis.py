@@ -16,7 +16,7 @@ _LEAST_SHARE = 0.01
 
 
 def filters(context: ResultContext) -> Iterator[Finding]:
-    """R111, a cutoff that was chosen, and R112, impacts that count less."""
+    """R111 and R112: a cutoff that was chosen (R111), and impacts that were given less weight (R112)."""
     for trial in context.fit.trials if context.fit.settings.cutoff_hz == "gcv" else ():
         yield finding("R111", Where(trial=trial.name), cutoff_hz=Quantity(trial.kinematics.cutoff_hz, "Hz"))
     posterior = context.fit.posterior
@@ -27,7 +27,7 @@ def filters(context: ResultContext) -> Iterator[Finding]:
 
 
 def basis(context: ResultContext) -> Iterator[Finding]:
-    """What of the result is assumption, or the prior's."""
+    """Report which part of the result rests on assumptions, or on the prior."""
     fit = context.fit
     for trial in fit.trials:
         used = forces_used(trial.reactions, fit.settings, trial.motion_hz)

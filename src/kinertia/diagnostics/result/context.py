@@ -21,11 +21,11 @@ _GROUND_AXES = {"x": 0, "z": 2}
 
 @dataclass(frozen=True, eq=False)
 class ResultContext:
-    """A fit and what it was made of.
+    """A fit, and the person and recordings that it was made from.
 
     Attributes:
-        fit: as estimated.
-        ready: as prepared, before any estimate.
+        fit: the fit as estimated.
+        ready: the person as prepared, before any estimate.
     """
 
     fit: Fit
@@ -33,12 +33,12 @@ class ResultContext:
 
     @property
     def errors(self) -> Sequence[CalibrationEntry]:
-        """What the fit found of plates and synchronisation; nothing after two-level."""
+        """Calibration entries of plates and synchronisation that the fit found; none after two-level."""
         return () if self.fit.posterior is None else self.fit.posterior.instrument_errors
 
     @cached_property
     def force_masses(self) -> Mapping[str, ForceMass]:
-        """Trial -> body mass by its vertical force and its markers; of trials that show it."""
+        """Body mass by trial from its vertical force and its markers, for trials that show it."""
         owners = owners_of(self.ready.skeleton)
         masses = {trial.name: force_mass(owners, trial.kinematics.trial) for trial in self.fit.trials}
         return {name: mass for name, mass in masses.items() if mass is not None}
@@ -48,11 +48,11 @@ class ResultContext:
         return {trial.name: lab_axes(trial.kinematics) for trial in self.fit.trials}
 
     def at(self, error: CalibrationEntry) -> Where:
-        """Plate, trial and axis of an error of an instrument."""
+        """Return the plate, trial and axis of an instrument error."""
         return self.along(error.axis, error.trial, error.plate)
 
     def along(self, axis: str | None, trial: str | None, plate: str | None = None) -> Where:
-        """A plate, or all, in a trial, or in all, along an axis of the laboratory: "x" or "z", else along none.
+        """Return the place of a plate (None: all) in a trial (None: all), along a laboratory axis ("x", "z", None).
 
         An axis that is called differently in some trials has no name.
         """
@@ -66,7 +66,7 @@ class ResultContext:
 
 
 def lab_axes(kinematics: Kinematics) -> Axes:
-    """What the axes of the laboratory are called in a trial, which is turned to face +X here."""
+    """Return the axis names of the laboratory in a trial, which here is rotated to face +X."""
     trial = kinematics.trial
     fore_aft = Axes.of(trial.vertical, travel(trial.markers)).fore_aft
     across = round(kinematics.turned_deg / 90.0) % 2 == 1

@@ -29,14 +29,14 @@ def corrected(
     errors: Iterable[CalibrationEntry],
     severity: Severity | None = None,
 ) -> list[Finding]:
-    """A finding for each of these errors that was found."""
+    """List a finding for each of these errors that was found."""
     return [correction(code, headline, context.at(one), one, severity) for one in errors if one.found]
 
 
 def correction(
     code: str, headline: str, where: Where, one: CalibrationEntry, severity: Severity | None = None
 ) -> Finding:
-    """The finding of an error, with this name of its headline; what is not supported is not raised to `severity`."""
+    """Return an error's finding; `headline` names its main quantity. Unsupported ones are not raised to `severity`."""
     unsure = not one.supported
     evidence = {
         headline: Quantity(one.value, one.unit, _SD * one.prior_sd, (-one.prior_sd, one.prior_sd), one.sd),
@@ -50,8 +50,8 @@ def correction(
 
 
 def equal(errors: Sequence[CalibrationEntry], usual_sd: float = np.inf) -> bool:
-    """Whether errors of the same quantity of several plates have all been found, and differ no more than errors of
-    single plates do: by their prior SD, or this one if it is smaller.
+    """Return whether errors of the same quantity of several plates have all been found, and differ no more than errors
+    of single plates do: by their prior SD, or this one if it is smaller.
     """
     if len(errors) < _FEWEST or not all(one.found for one in errors):
         return False
@@ -61,14 +61,14 @@ def equal(errors: Sequence[CalibrationEntry], usual_sd: float = np.inf) -> bool:
 
 
 def delays(context: ResultContext) -> Iterator[Finding]:
-    """The delay of all forces, and how much more those of single trials are late."""
+    """Report the common delay of all forces, and the additional delays of single trials."""
     for one in context.errors:
         if one.quantity == DELAY:
             yield from corrected(context, "T214" if one.trial is None else "T215", "delay_s", [one])
 
 
 def zero_offsets(context: ResultContext) -> Iterator[Finding]:
-    """Zeros that were corrected, and those that all plates of a trial have alike: rather a force that none measures."""
+    """Report zero offsets that were corrected, and those that all plates of a trial share: an unmeasured force."""
     zeros = [one for one in context.errors if one.quantity == ZERO]
     yield from corrected(context, "P215", "zero_n", zeros)
     for trial, axis in dict.fromkeys((one.trial, one.axis) for one in zeros):

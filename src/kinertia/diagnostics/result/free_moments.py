@@ -28,7 +28,7 @@ _ONE_SIDED = 0.5
 
 
 def free_moments(context: ResultContext) -> Iterator[Finding]:
-    """The sign of the free moments, and what is left of them once it is right."""
+    """Report a wrong sign of the free moments, and the errors that remain once it is right."""
     posterior = context.fit.posterior
     if posterior is None:
         for trial in context.fit.trials:
@@ -49,7 +49,7 @@ def free_moments(context: ResultContext) -> Iterator[Finding]:
 
 
 def mirrored(errors: Sequence[CalibrationEntry]) -> bool:
-    """Whether errors under the feet were found that go to both sides alike."""
+    """Return whether errors were found under both feet that mirror each other: opposite signs, similar sizes."""
     off = [one.value for one in errors if one.found]
     if not off or not min(off) < 0.0 < max(off):
         return False
@@ -57,8 +57,8 @@ def mirrored(errors: Sequence[CalibrationEntry]) -> bool:
 
 
 def reversed_sign(trial: TrialFit) -> Iterator[Finding]:
-    """P265 of a trial whose free moments go with the measured motion once their sign is reversed: for an estimate that
-    has no evidence.
+    """P265: a trial whose free moments follow the measured motion once their sign is reversed, for an estimate without
+    evidence of its own.
     """
     left, loads = trial.residuals["literature"][:, VERTICAL], trial.kinematics.foot_loads
     as_is, reversed_nm = left_moments_nm(left, loads)

@@ -24,7 +24,7 @@ _LESS = ("a wrong stated mass", "support that no plate measures (handrail, walke
 
 
 def gains(context: ResultContext) -> Iterator[Finding]:
-    """Gains that were corrected, and one that all plates have alike, in all trials or in one."""
+    """Report gain errors that were corrected, and one that all plates share, in all trials or in one."""
     errors = [one for one in context.errors if one.quantity == GAIN]
     yield from corrected(context, "P223", "gain_error", _certain(errors))
     lasting = [one for one in errors if one.trial is None]
@@ -39,7 +39,7 @@ def gains(context: ResultContext) -> Iterator[Finding]:
 
 
 def _of_all(context: ResultContext, gains: Sequence[CalibrationEntry]) -> Finding:
-    """P224, with the masses that the forces of the trials correspond to."""
+    """P224: a gain error of all plates, with the masses that the forces of the trials correspond to."""
     trial, total = gains[0].trial, context.ready.carried
     sd, limit = max(one.sd for one in gains), 2.0 * gains[0].prior_sd
     evidence = {"gain_error": Quantity(tuple(one.value for one in gains), "1", limit, sd=sd)}
@@ -52,7 +52,7 @@ def _of_all(context: ResultContext, gains: Sequence[CalibrationEntry]) -> Findin
 
 
 def _certain(errors: Sequence[CalibrationEntry]) -> Iterator[CalibrationEntry]:
-    """The gain of a plate in all trials where it is certain; else what the plate has in each."""
+    """Yield the gain of a plate over all trials where that is certain, else its gain in each trial."""
     lasting = {one.plate: one for one in errors if one.trial is None}
     of_trials = {one.plate for one in errors if one.trial is not None}
     for one in errors:

@@ -14,15 +14,15 @@ from kinertia.model.coordinate_range import UNKNOWN
 from kinertia.model.range_of_motion import TOLERANCE_DEG
 
 _IMPOSSIBLE_RAD = float(np.radians(TOLERANCE_DEG))
-"""Beyond the range of anybody."""
+"""Excess beyond the range of any person."""
 _SURE = 2.0
 """SDs of an estimated angle."""
 
 
 def joint_angles(context: ResultContext) -> Iterator[Finding]:
-    """R305 of every coordinate that leaves its range in a trial, with its most extreme angle.
+    """R305: every coordinate that leaves its range in a trial, with its most extreme angle.
 
-    What is beyond by less than two SDs of the angle itself is not doubted.
+    Angles beyond the range by less than two of their own SDs are not reported.
     """
     for trial in context.fit.trials:
         for column, name in enumerate(trial.kinematics.ik.coordinates):

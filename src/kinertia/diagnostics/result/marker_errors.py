@@ -17,14 +17,14 @@ from kinertia.model.skeleton import Skeleton
 _MOVED_M = 0.03
 """Skin moves markers up to some 30 mm."""
 _DRIFTING = 3.0
-"""Times the usual SD, as in `marker_noise`."""
+"""Multiple of the usual SD from which a marker drifts, as in `marker_noise`."""
 _BACKWARDS_RAD = 0.5
 _TORSO_RAD = 0.25
 _SIDES = {"r": "right elbow", "l": "left elbow"}
 
 
 def moved_markers(context: ResultContext) -> Iterator[Finding]:
-    """Markers that drift in a trial, and those that sit elsewhere in it than in every other trial."""
+    """Report markers that drift in a trial, and markers displaced in one trial compared with every other."""
     posterior = context.fit.posterior
     if posterior is None:
         return
@@ -42,13 +42,13 @@ def moved_markers(context: ResultContext) -> Iterator[Finding]:
 
 
 def _loose(skeleton: Skeleton) -> set[str]:
-    """Labels of markers that move by themselves without being loose: on the head, and on forearms, whose skin turns."""
+    """Return labels of markers that move without being loose: on the head, and on forearms, whose skin turns."""
     forearms = {m.label for m in skeleton.markers if str(segment_of(m.segment)).startswith("forearm")}
     return forearms.union(head_markers(skeleton))
 
 
 def corrected_joints(context: ResultContext) -> Iterator[Finding]:
-    """Elbows that the static trial would bend backwards, and a torso that arms would turn under its markers."""
+    """Report elbows that the static trial would bend backwards, and a torso that arms would turn under its markers."""
     for side, rotation_rad in context.ready.elbow_rotations_rad.items():
         rotation = Quantity(rotation_rad, "rad", limit=_BACKWARDS_RAD)
         yield finding("M171", Where(part=_SIDES[side]), rotation_rad=rotation)

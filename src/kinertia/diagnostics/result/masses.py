@@ -21,12 +21,12 @@ _IDENTIFIED_SD = 2.0
 
 
 def mass_from_force_kg(literature: BodySegmentParameters, trial: TrialFit) -> float:
-    """Body mass by the vertical ground reaction of a fitted trial, with the motion of inverse kinematics."""
+    """Compute body mass (kg) from the vertical ground reaction of a fitted trial and its inverse kinematics."""
     return mass_by_force_kg(literature, trial.kinematics.foot_loads, trial.residuals["literature"])
 
 
 def forces_of_the_motion(context: ResultContext) -> Iterator[Finding]:
-    """R107, trials whose inverse kinematics moves a body of another mass than their markers do."""
+    """R107: trials whose forces give another body mass with the motion of inverse kinematics than with the markers'."""
     for trial in context.fit.trials:
         by_markers = context.force_masses.get(trial.name)
         if by_markers is None:
@@ -43,7 +43,7 @@ def forces_of_the_motion(context: ResultContext) -> Iterator[Finding]:
 
 
 def total_mass(context: ResultContext) -> Iterator[Finding]:
-    """S113, an estimated total mass that follows the plates more than the stated mass."""
+    """S113: an estimated total mass that follows the plates more than the stated mass."""
     total_kg, stated = context.fit.estimate.total_mass_kg, context.ready.carried
     limit = _TOTAL * stated.total_kg + 2.0 * stated.sd_kg
     if abs(total_kg - stated.total_kg) > limit:
@@ -55,7 +55,7 @@ def total_mass(context: ResultContext) -> Iterator[Finding]:
 
 
 def attached_items(context: ResultContext) -> Iterator[Finding]:
-    """S407, attached items of unknown mass that the trials do not distinguish from nothing."""
+    """S407: attached items of unknown mass that the trials cannot distinguish from zero."""
     estimate, posterior = context.fit.estimate, context.fit.posterior
     for item in () if posterior is None else context.ready.attached:
         row = estimate.segments.index(item.name)

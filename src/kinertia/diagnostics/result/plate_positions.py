@@ -30,8 +30,8 @@ _CERTAIN = 2.0
 
 
 def plate_positions(context: ResultContext) -> Iterator[Finding]:
-    """Positions that were corrected, once where all plates are off alike; a direction in which it may be another plate
-    that is off.
+    """Report corrected plate positions, as one finding where all plates are displaced equally, and directions in which
+    another plate may be the displaced one.
     """
     for axis in "xz":
         errors = [one for one in context.errors if (one.quantity, one.axis) == (POSITION, axis)]
@@ -45,8 +45,9 @@ def plate_positions(context: ResultContext) -> Iterator[Finding]:
 
 
 def _ambiguous(context: ResultContext, axis: str, errors: Sequence[CalibrationEntry]) -> list[Finding]:
-    """P247, where a plate seems off and another may be as well: how uncertain each is does not count, since that is
-    what is ambiguous, but plates must differ for certain."""
+    """P247: a plate seems displaced, but another may be instead. How uncertain each is does not count, since that is
+    what is ambiguous, but plates must differ for certain.
+    """
     prior, posterior = context.ready.uncertainty.instruments, context.fit.posterior
     off = [one for one in errors if one.notable and not one.contradicted_by]
     if posterior is None or prior.plate[axis].faulty_share == 0.0 or not off:
@@ -67,11 +68,11 @@ def _ambiguous(context: ResultContext, axis: str, errors: Sequence[CalibrationEn
 
 
 def position_deviations(shown: InstrumentInformation, prior: InstrumentPrior, axis: str) -> tuple[float, float]:
-    """(m, m) how well trials know positions of plates along an axis of which nothing was known before: from their
-    middle, the worst, and their middle. Columns of the same name are one plate; a single plate has no middle.
+    """Return how precisely (m, m) trials alone determine plate positions along an axis: the worst SD from their middle,
+    and the SD of their middle. Columns of the same name are one plate; a single plate has no middle.
 
     Args:
-        shown: what the trials say of plates and synchronisation, without any prior.
+        shown: information of the trials on plates and synchronisation, without any prior.
         prior: what was known of them before.
         axis: "x" or "z".
     """

@@ -40,5 +40,5 @@ RESULT_QUESTIONS: tuple[Question[ResultContext], ...] = (
 
 
 def judged(context: ResultContext) -> list[Finding]:
-    """All findings about an estimate, not yet explained by one another or by those of earlier stages."""
+    """Return all findings about an estimate, before explanation by one another or by those of earlier stages."""
     return asked((*ESTIMATE_QUESTIONS, *RESULT_QUESTIONS), context)

@@ -24,7 +24,7 @@ from kinertia.trial.rms import rms
 
 
 class Guideline(NamedTuple):
-    """OpenSim's limits of RMS and peak: beyond `good` a WARNING, beyond `acceptable` an ERROR."""
+    """OpenSim's limits of RMS and peak: a WARNING beyond `good`, an ERROR beyond `acceptable`."""
 
     code: str
     unit: str
@@ -39,18 +39,18 @@ PEAK_FORCE_SHARE = 0.05
 GOOD_MARKERS_M, ACCEPTABLE_MARKERS_M = 0.012, 0.020
 """RMS distance of the markers: OpenSim's guideline for inverse kinematics is 20 mm."""
 _WRONG_MODEL_M = 0.045
-"""Farther apart are markers of a fault-free model on nobody, wherever they sit."""
+"""RMS distance that markers of a fault-free model exceed on no person, wherever they are attached."""
 
 
 def residuals(context: ResultContext) -> Iterator[Finding]:
-    """Residual force and moment of every trial, and the distance of its markers."""
+    """Check the residual force and moment of every trial, and the distance of its markers."""
     for trial in context.fit.trials:
         yield from residuals_of(trial)
         yield from _markers(context, trial)
 
 
 def residuals_of(trial: TrialFit) -> Iterator[Finding]:
-    """R301, R302 and R303 of one trial."""
+    """R301, R302 and R303: residual forces and moments of one trial."""
     narrow, full = (_lengths(each["estimate"]) for each in (trial.residuals, trial.full_residuals))
     for guideline, judged, whole in zip((FORCE, MOMENT), narrow, full, strict=True):
         yield from _by_guideline(trial, guideline, judged, whole)
@@ -62,12 +62,12 @@ def residuals_of(trial: TrialFit) -> Iterator[Finding]:
 
 
 def _lengths(residual: np.ndarray) -> list[np.ndarray]:
-    """Lengths (w,) of force and moment of a residual (w, 6)."""
+    """Return lengths (w,) of force and moment of a residual (w, 6)."""
     return [np.linalg.norm(part, axis=1) for part in np.hsplit(residual, 2)]
 
 
 def _by_guideline(trial: TrialFit, guideline: Guideline, judged: np.ndarray, whole: np.ndarray) -> Iterator[Finding]:
-    """Of vector lengths (w,) at the motion's and at the forces' bandwidth."""
+    """Check vector lengths (w,) at the bandwidths of motion and forces against a guideline."""
     code, unit, good, acceptable = guideline
     typical, peak = rms(judged), float(judged.max())
     suffix = unit.replace(" ", "").lower()
@@ -94,7 +94,7 @@ def _by_guideline(trial: TrialFit, guideline: Guideline, judged: np.ndarray, who
 
 
 def _markers(context: ResultContext, trial: TrialFit) -> Iterator[Finding]:
-    """R304; what moves hides what is grossly wrong, and helps no more where it has moved."""
+    """R304: markers far from the model. Calibrating hides gross errors, and helps no further once it has been done."""
     apart_m = rms(trial.marker_errors_m["final"])
     if apart_m <= GOOD_MARKERS_M:
         return

@@ -23,7 +23,7 @@ _MATTERS_RAD = float(np.radians(2.0))
 
 
 def plate_rotation(context: ResultContext) -> Iterator[Finding]:
-    """A rotation that was corrected, and one that these trials would not show."""
+    """Report a rotation of all plates that was corrected, and one too small for these trials to show."""
     yield from corrected(context, "P234", "rotation_rad", [one for one in context.errors if one.quantity == ROTATION])
     if context.fit.posterior is None:
         return
@@ -33,10 +33,10 @@ def plate_rotation(context: ResultContext) -> Iterator[Finding]:
 
 
 def smallest_detectable_rad(shown: InstrumentInformation, prior: InstrumentPrior) -> float:
-    """The smallest rotation with which the trials make rotated plates likelier than fault-free ones.
+    """Return the smallest rotation (rad) at which the trials make rotated plates likelier than fault-free ones.
 
     Args:
-        shown: what the trials say of plates and synchronisation, without any prior.
+        shown: information of the trials on plates and synchronisation, without any prior.
         prior: what was known of them before, from other people of the session, too.
     """
     place = len(shown.right) - 1 - len(FLOOR_UNKNOWNS) + list(FLOOR_UNKNOWNS).index("turn")

@@ -17,10 +17,10 @@ _APART_SD = 3.0
 def session_contradictions(
     person: str, own: Sequence[CalibrationEntry], others: Sequence[CalibrationEntry]
 ) -> Iterator[Finding]:
-    """S501 of everything that one person's trials and those of the others find different.
+    """S501: instrument errors that differ between one person's trials and the others' in a session.
 
     Args:
-        person: name.
+        person: name of the person.
         own, others: errors of instruments by their trials.
     """
     by_others = {one.key: one for one in others}

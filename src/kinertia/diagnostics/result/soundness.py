@@ -39,7 +39,7 @@ _OTHER = "a body that the tables do not describe (age_years, population under [s
 
 
 def soundness(context: ResultContext) -> Iterator[Finding]:
-    """What speaks against the estimate as a whole, or against single parameters."""
+    """Report what contradicts the estimate as a whole, or single parameters."""
     fit = context.fit
     if not fit.converged:
         steps = fit.evaluations if fit.posterior is None else fit.posterior.iterations
@@ -52,7 +52,7 @@ def soundness(context: ResultContext) -> Iterator[Finding]:
 
 
 def _impossible(fit: Fit) -> Iterator[Finding]:
-    """R202; light bodies that a model has and that were kept as they are condemn nothing."""
+    """R202: impossible bodies; light bodies of a model that were kept as they are do not condemn the estimate."""
     impossible = impossible_segments(fit.estimate)
     fixed = set()
     if fit.posterior is not None:
@@ -65,14 +65,14 @@ def _impossible(fit: Fit) -> Iterator[Finding]:
 
 
 def expected_source(fit: Fit) -> str:
-    """Where what the estimate was expected to be near is from."""
+    """Return the source of the expected values."""
     if fit.more_known:
         return "the prior"
     return "the literature" if fit.file is None else "the model's own values"
 
 
 def away_from_expected(fit: Fit) -> np.ndarray:
-    """(s, 10) how far parameters are from where they were expected, in prior SDs; zero where they were kept."""
+    """Return distances (s, 10) of parameters from their expected values, in prior SDs; zero where they were fixed."""
     assert fit.posterior is not None
     scale = np.where(fit.posterior.prior_sd > 0, fit.posterior.prior_sd, np.inf)
     result: np.ndarray = (fit.estimate.table() - fit.expected.table()) / scale
@@ -80,7 +80,7 @@ def away_from_expected(fit: Fit) -> np.ndarray:
 
 
 def _far_parameters(fit: Fit) -> Iterator[Finding]:
-    """R203 of every parameter beyond CONTRADICTION_SD; those of arms, whose shoulders lack an axis, condemn nothing."""
+    """R203: every parameter beyond CONTRADICTION_SD; those of arms, whose shoulders lack an axis, condemn nothing."""
     away = away_from_expected(fit)
     beyond = np.abs(away) > CONTRADICTION_SD
     arms = np.array([str(segment_of(name)).startswith(_ARMS) for name in fit.estimate.segments])
@@ -107,7 +107,7 @@ def _parameter(fit: Fit, row: int, parameter: str) -> Where:
 
 
 def _far_centres(fit: Fit) -> Iterator[Finding]:
-    """R203 of every centre of mass that two-level has moved too far."""
+    """R203: every centre of mass that two-level has moved too far."""
     moved_m = np.linalg.norm(fit.estimate.com_m - fit.literature.com_m, axis=1)
     for row in np.flatnonzero(moved_m > CONTRADICTING_COM_M):
         yield finding(
@@ -122,8 +122,7 @@ def _far_centres(fit: Fit) -> Iterator[Finding]:
 
 
 def _unlike(whole: Unlikeness) -> Finding:
-    """R204, the likeliest causes first: joints that are found wrongly are off on both sides alike, a prosthesis is
-    not."""
+    """R204: the likeliest causes first: wrong joint centres affect both sides equally, a prosthesis does not."""
     wrong_first = (f"{_WRONG}: left and right are off alike", _WORN, _OTHER)
     causes = wrong_first if whole.both_sides else (_WORN, _OTHER, _WRONG)
     limb = next((name for name in whole.segments if name.endswith(("_r", "_l"))), None)
@@ -137,7 +136,7 @@ def _unlike(whole: Unlikeness) -> Finding:
 
 
 def _side_heavier(side: OneSided) -> Finding:
-    """R205: what is worn where the heavier side is the one that is unlike the prior, else a prosthesis first."""
+    """R205: mass asymmetry; an attached item first where the heavier side is far from the prior, else a prosthesis."""
     of_segments = " or ".join(f'"{name}"' for name in side.heavier)
     tables = " and ".join(f"[segment.{name}]" for name in side.lighter)
     worn = f"an orthosis, cast or weight on the heavier side ([[attached]] with segment = {of_segments})"

@@ -26,12 +26,12 @@ _BAND_SD = 1.96
 
 
 class Group(NamedTuple):
-    """Parameters of one kind.
+    """Parameters of one kind, such as masses or centres of mass.
 
     Attributes:
         nouns: what they are called.
-        columns: in the table of body segment parameters.
-        start: of the parameters' names.
+        columns: their columns in the table of body segment parameters.
+        start: prefix of the parameters' names.
     """
 
     nouns: str
@@ -44,7 +44,7 @@ GROUPS: Mapping[str, Group] = {
     "centres_of_mass": Group("coordinates of centres of mass", slice(1, 4), "com"),
     "inertias": Group("moments of inertia", slice(4, 7), "i"),
 }
-"""By their name among the outputs that rules affect."""
+"""Groups of parameters by their name among the outputs that rules affect."""
 _TITLES = {
     "moments": "joint moments",
     "masses": "segment masses",
@@ -56,13 +56,13 @@ _TITLES = {
 
 @dataclass(frozen=True)
 class Suitability:
-    """Whether an output may be used, and why.
+    """Suitability of an output for use, with the reason.
 
     Attributes:
         output: "joint moments", "segment masses", "centres of mass", "moments of inertia" or "motion".
         use: "use", "use with care" or "do not use".
-        reason: with a number.
-        codes: of the findings that lower it.
+        reason: reason, with a number.
+        codes: codes of the findings that lower the suitability.
 
     Examples:
         >>> for one in kinertia.suitability(fit, fit.findings):
@@ -89,11 +89,11 @@ class Informed(NamedTuple):
 
 
 def suitability(fit: Fit, findings: Iterable[Finding], left_out: Sequence[str] = ()) -> tuple[Suitability, ...]:
-    """What each output may be used for.
+    """Rate the suitability of each output.
 
     Args:
-        fit: as estimated.
-        findings: of all stages, explained and overruled.
+        fit: the fit as estimated.
+        findings: findings of all stages, explained and overruled.
         left_out: trials that were blocked and are not in the fit: then nothing is used without care.
     """
     known = [one for one in findings if one.where.trial not in left_out]
@@ -101,7 +101,7 @@ def suitability(fit: Fit, findings: Iterable[Finding], left_out: Sequence[str] =
 
 
 def informed(fit: Fit, output: str) -> Informed | None:
-    """Of the parameters of an output; None where nobody knows, after two-level, or where none was estimated."""
+    """Count informed parameters of an output; None if unknown, after two-level, or where none was estimated."""
     if fit.posterior is None:
         return None
     columns = GROUPS[output].columns
@@ -133,10 +133,10 @@ def _output(fit: Fit, name: str, findings: Sequence[Finding], left_out: Sequence
 
 
 def _lowers(one: Finding, output: str) -> int:
-    """By how many steps of _ORDER a finding lowers an output."""
+    """Return by how many steps of _ORDER a finding lowers an output."""
     if output not in one.rule.affects or not _concerns(one, output):
         return 0
-    # the person as a whole is unlike the prior whatever single parameters are
+    # the person as a whole is far from the prior, whatever single parameters are
     explained = one.muted_by is not None and one.code != "R204"
     if one.status == "ignored" or explained or one.severity < Severity.WARNING:
         return 0
@@ -144,13 +144,13 @@ def _lowers(one: Finding, output: str) -> int:
 
 
 def _concerns(one: Finding, output: str) -> bool:
-    """Whether an implausible parameter is one of the output's."""
+    """Return whether an implausible parameter belongs to the output."""
     parameter = one.evidence.get("parameter")
     return parameter is None or output not in GROUPS or str(parameter.value).startswith(GROUPS[output].start)
 
 
 def _of_parameters(fit: Fit, name: str) -> tuple[int, str]:
-    """Level and reason by what the data say of these parameters."""
+    """Return level and reason from how well the data inform these parameters."""
     shown, nouns = informed(fit, name), GROUPS[name].nouns
     if fit.posterior is None:
         return 1, "no error bars (two-level): nobody knows which of them this recording informs"
@@ -171,7 +171,7 @@ def _of_parameters(fit: Fit, name: str) -> tuple[int, str]:
 
 
 def prior_values(fit: Fit) -> str:
-    """What parameters remain that the data do not inform: literature, prior or the model's own values."""
+    """Name the source of parameters that the data do not inform: literature, prior or the model's own values."""
     source = expected_source(fit)
     return source if source.endswith("values") else f"{source.removeprefix('the ')} values"
 
@@ -198,7 +198,7 @@ def _motion(fit: Fit) -> str:
 
 
 def _half_interval(fit: Fit, of: Literal["moments", "coordinates"]) -> float | None:
-    """Half a 95 % interval, typical of rotations of the coordinates after the pelvis'; None without SDs of them."""
+    """Return half a typical 95 % interval of the rotations after the pelvis; None without their SDs."""
     sds = [getattr(trial.deviations, of)[:, 6:] for trial in fit.trials if trial.deviations is not None]
     turns = fit.skeleton.rotational[6:]
     return _BAND_SD * rms(np.concatenate(sds)[:, turns]) if sds and turns.any() else None

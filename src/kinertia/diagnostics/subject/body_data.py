@@ -18,7 +18,7 @@ _QUANTITIES = {"mass_kg": ("mass", "kg"), "height_m": ("stature", "m")}
 
 
 def stated_and_filed(context: PersonContext) -> Iterator[Finding]:
-    """S103: mass or stature of a file that differs from the one that is used."""
+    """S103: a mass or stature in a file that differs from the one used."""
     for recording in (*context.standing, *context.trials):
         for name, (quantity, unit) in _QUANTITIES.items():
             stated, filed = getattr(context.subject, name), getattr(recording.recording, name)
@@ -33,7 +33,7 @@ def stated_and_filed(context: PersonContext) -> Iterator[Finding]:
 
 
 def population(context: PersonContext) -> Iterator[Finding]:
-    """S401: a population that the tables do not describe."""
+    """S401: a population that the anthropometric tables do not describe."""
     body_kg = None if context.total_mass is None else context.total_mass.body_kg
     assumed = population_of(context.subject, body_kg).finding(context.subject)
     if assumed is not None:
@@ -55,7 +55,7 @@ def absent_markers(context: PersonContext) -> Iterator[Finding]:
 
 
 def stated_ranges(subject: Subject) -> Iterator[Finding]:
-    """S411 of each joint whose range the subject file states."""
+    """S411: each joint whose range of motion is stated in the subject file."""
     for name, degrees in (subject.ranges_deg or {}).items():
         low, high = np.radians(degrees).tolist()
         yield finding("S411", Where(part=name), range_rad=Quantity((low, high), "rad"))

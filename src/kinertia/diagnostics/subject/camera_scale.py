@@ -32,7 +32,7 @@ _FAR_M = 0.08
 _OTHER_SCALE, _ERRORS = 0.01, 3.0
 """Distances are longer or shorter than usual by more than this share, and by more standard errors."""
 _ALIKE = 2.0 / 3.0
-"""At least as many of the segments differ in the same direction."""
+"""Smallest share of the segments that differ in the same direction."""
 _SEVERAL, _SHOWN = 3, 0.5
 """A single distance of a segment is up to 4 % off by skin alone, in children's feet and shanks above all, and those of
 several segments may be so in the same direction: one with so many distances must show so much of the scale."""
@@ -42,11 +42,11 @@ _MEDIAN_ERROR = 1.25 * 1.4826
 
 @dataclass(frozen=True)
 class CameraScale:
-    """By which share distances are too long in one recording against another, beyond the usual.
+    """Share by which distances in one recording are too long compared with another, beyond the usual.
 
     Attributes:
         error, se: median share and its standard error.
-        pairs, alike, segments: how many distances, and how many of the segments differ in the same direction.
+        pairs, alike, segments: number of distances, and how many of the segments differ in the same direction.
         shown: most of it that a segment with several distances shows, as a share.
         left_m: RMS difference of the distances that is left once the scale is corrected.
     """
@@ -61,13 +61,13 @@ class CameraScale:
 
     @property
     def differs(self) -> bool:
-        """Whether another scale is the likeliest explanation."""
+        """Whether a different camera scale is the likeliest explanation."""
         far = abs(self.error) > max(_OTHER_SCALE, _ERRORS * self.se)
         alike = self.alike >= _ALIKE * self.segments and self.shown >= _SHOWN
         return far and alike and self.left_m <= SAME_SESSION_M
 
     def finding(self, trial: str, reference: str, sign: float = 1.0) -> Finding:
-        """S205 in this trial; `sign` is -1 where it is the other one."""
+        """Return S205 for this trial; `sign` is -1 where the other recording has the wrong scale."""
         return finding(
             "S205",
             Where(trial=trial),
@@ -79,16 +79,16 @@ class CameraScale:
 
 
 def camera_scale(distances: SegmentDistances, usual: float) -> CameraScale | None:
-    """The scale of a recording, against the share by which its distances are usually longer; None where it is the same
-    or too few distances show it.
+    """Estimate the scale of a recording, beyond the share by which its distances are usually longer; None where it is
+    equal or too few distances show it.
     """
     scale = _scale(distances, usual)
     return scale if scale is not None and scale.differs else None
 
 
 def trial_scales(context: PersonContext) -> Iterator[Finding]:
-    """S205 of two trials with different scales: of the one that the static trial and other trials contradict, of both
-    where neither.
+    """S205: of two trials with different scales, the one that the static trial and other trials contradict, or both
+    where neither is contradicted.
     """
     marker_set = context.marker_set
     if marker_set is None:
@@ -119,7 +119,7 @@ def _scale(distances: SegmentDistances, usual: float) -> CameraScale | None:
         return None
     shares = (after / before)[far] - 1.0
     share = float(np.median(shares))
-    # pairs with a marker in common err together: there are as many errors as markers
+    # pairs with a common marker have correlated errors: there are as many independent errors as markers
     markers = len(np.unique(distances.pairs[far]))
     error = _MEDIAN_ERROR * float(np.median(np.abs(shares - share))) / np.sqrt(markers)
     owners = distances.segments[far]

@@ -33,14 +33,14 @@ several occasions agree that they do."""
 _SAME = 0.04
 """Share by which two plates, or a plate and the stated mass, may differ and still agree: usual are 2 %."""
 _REPEATED = 0.005
-"""By which a mass by the same plates differs from one occasion to another, SD as a share."""
+"""SD, as a share, of a mass by the same plates from one occasion to another."""
 _SAME_PLACE_M = 1e-3
 """Corners of the same plate in two files."""
 _SINGLE_SUPPORT = 0.04
 """SD of a mass by one single support, as a share: velocities of the markers' centre at its ends are known to 0.14
 m/s."""
 _LOAD_KG = 2.0
-"""From which on a surplus may be something that was worn or carried."""
+"""Smallest surplus that may be something worn or carried."""
 _POUND, _UNIT_OFF = 0.45359, 0.1
 """A ratio of force to stated mass within this share of a ratio of units is likelier that of units than of people."""
 _FORCE_UNITS = {"kilograms-force": 1.0 / GRAVITY_M_S2, "pounds-force": 0.2248, "kN": 0.001}
@@ -53,7 +53,7 @@ _PLATES = "gain or zero of the plates"
 
 @dataclass(frozen=True)
 class _Occasion:
-    """A mass by force, and the trial that it is of; None of all `count` occasions together."""
+    """A mass from forces, and its trial; None for all `count` occasions together."""
 
     trial: str | None
     mass_kg: float
@@ -64,21 +64,21 @@ class _Occasion:
 
     @property
     def error_share(self) -> float:
-        """By which the stated mass may differ before nothing is computed with it."""
+        """Share by which the stated mass may differ before nothing is computed with it."""
         return ERROR_SHARE if self.count == 1 else AGREED_SHARE
 
     def allowed_kg(self, total: CarriedMass, share: float) -> float:
-        """By which the stated mass may differ."""
+        """Return by how much (kg) the stated mass may differ."""
         return share * total.total_kg + 2.0 * float(np.hypot(self.sd_kg, total.sd_kg))
 
     def differs(self, total: CarriedMass, share: float) -> bool:
-        """Whether it does by more."""
+        """Return whether the stated mass differs by more than allowed."""
         return abs(self.mass_kg - total.total_kg) > self.allowed_kg(total, share)
 
 
 def stated_mass(context: PersonContext) -> Iterator[Finding]:
-    """S111 and S112 where the stated mass is not the plates', P281 where a part of the weight is elsewhere for a
-    while.
+    """S111, S112 and P281: S111 and S112 where the stated mass contradicts the plates, P281 where part of the weight is
+    off the plates for a while.
     """
     total = context.total_mass
     if total is None:
@@ -103,8 +103,8 @@ def stated_mass(context: PersonContext) -> Iterator[Finding]:
 
 
 def masses_of_trials(context: PersonContext) -> Iterator[Finding]:
-    """S306: two trials whose forces carry different masses, of the one that static trial, other trials and stated mass
-    speak against.
+    """S306: of two trials whose forces give different masses, the one that static trial, other trials and stated mass
+    contradict.
     """
     known = {one.name: one.force_mass for one in context.trials if one.force_mass is not None}
     standing = [one.mass_kg for one in _standing(context)]
@@ -132,7 +132,7 @@ def _occasion(name: str | None, mass: ForceMass, standing: bool = False) -> _Occ
 
 
 def _by_plates(context: PersonContext) -> list[_Occasion]:
-    """By the plates that carry the whole foot, of trials that another foot beyond its plate leaves hardly a window."""
+    """Return masses by plates that support a whole foot, where another foot beyond its plate leaves hardly a window."""
     found = []
     for one in context.trials:
         weighed = one.force_mass
@@ -147,7 +147,7 @@ def _by_plates(context: PersonContext) -> list[_Occasion]:
 
 
 def _standing(context: PersonContext) -> Iterator[_Occasion]:
-    """While the person stands still with both feet on plates: in static trials, and in the course of others."""
+    """Yield masses while the person stands still with both feet on plates: in static trials, and during others."""
     for one in (*context.standing, *context.trials):
         still = one.standing_mass
         other_way = one.is_static or one.force_mass is None or one.travel.kind != "stands still"
@@ -160,7 +160,7 @@ def _standing(context: PersonContext) -> Iterator[_Occasion]:
 
 
 def _level_kg(context: PersonContext, plates: PlateLoads, loaded: Sequence[str]) -> float:
-    """What these plates read while nobody stands on them, by trials that show it, where the static trial does not."""
+    """Return the unloaded reading (kg) of these plates by trials that show it, where the static trial does not."""
     if plates.idle is None or plates.corners is None:
         return 0.0
     level_n = 0.0
@@ -178,7 +178,7 @@ def _level_kg(context: PersonContext, plates: PlateLoads, loaded: Sequence[str])
 
 
 def _together(occasions: Sequence[_Occasion]) -> list[_Occasion]:
-    """One for all where they agree, else each by itself."""
+    """Combine the masses into one where they agree, else keep each."""
     if len(occasions) < 2:
         return list(occasions)
     weights = np.array([one.sd_kg**-2 for one in occasions])
@@ -194,7 +194,7 @@ def _together(occasions: Sequence[_Occasion]) -> list[_Occasion]:
 def _contradiction(
     context: PersonContext, one: _Occasion, total: CarriedMass, witnesses: Sequence[_Occasion]
 ) -> Iterator[Finding]:
-    """S111 with the causes that the evidence speaks for, and the unit that explains it."""
+    """S111, with the causes that the evidence supports, and the unit that explains it."""
     where, ratio = Where(trial=one.trial), one.mass_kg / total.total_kg
     if _near(ratio, _POUND):
         yield finding("S112", where, ratio=Quantity(ratio, "1"))
@@ -235,7 +235,7 @@ def _agreeing(one: _Occasion, stated_kg: float, by_plate: Mapping[str, float], w
 def _causes(
     one: _Occasion, stated_kg: float, by_plate: Mapping[str, float], witnesses: Sequence[_Occasion]
 ) -> tuple[tuple[str, ...], str]:
-    """Likeliest first, and what to do about the first."""
+    """Return the causes, likeliest first, and the remedy for the first."""
     heavier = one.mass_kg > stated_kg
     other = _LOAD if heavier else _SUPPORT
     if _near(one.mass_kg / stated_kg, 1.0 / _POUND):

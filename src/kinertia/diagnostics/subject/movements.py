@@ -17,16 +17,16 @@ from kinertia.findings.quantity import Quantity
 from kinertia.trial.data import Markers
 
 SWAY_RAD, SQUAT_M = float(np.radians(12.0)), 0.15
-"""From its mean a walking trunk leans by up to 5 degrees; a walking pelvis goes up and down by up to 0.08 m."""
+"""A walking trunk leans by up to 5 degrees from its mean; a walking pelvis moves up and down by up to 0.08 m."""
 
 
 @dataclass(frozen=True)
 class InformativeMovements:
-    """How far trunk and pelvis move.
+    """Range of movement of trunk and pelvis.
 
     Attributes:
         trunk_lean_rad: largest angle of the line from pelvis to torso from its mean.
-        drop_m: from the highest to the lowest position of the pelvis.
+        drop_m: distance from the highest to the lowest position of the pelvis.
 
     >>> InformativeMovements(0.073, 0.05).sentence()
     'the trunk leans by up to 4 degrees from its mean, the pelvis moves up and down by 5 cm'
@@ -39,7 +39,7 @@ class InformativeMovements:
 
     @classmethod
     def of(cls, markers: Markers, pelvis: Sequence[str], torso: Sequence[str]) -> InformativeMovements | None:
-        """From the markers with these labels; None where no frame shows all that are ever seen of both."""
+        """Compute the movement from markers with these labels; None where no frame shows all that are ever visible."""
         middles = []
         for labels in (pelvis, torso):
             own = markers.positions[:, [markers.labels.index(label) for label in labels if label in markers.labels]]
@@ -60,16 +60,16 @@ class InformativeMovements:
 
     @property
     def sways(self) -> bool:
-        """The trunk, more than in walking."""
+        """Whether the trunk sways more than in walking."""
         return self.trunk_lean_rad > SWAY_RAD
 
     @property
     def squats(self) -> bool:
-        """Or sits down, climbs, or jumps."""
+        """Whether the person squats, or sits down, climbs, or jumps."""
         return self.drop_m > SQUAT_M
 
     def sentence(self) -> str:
-        """In words."""
+        """Describe the movement in words."""
         return (
             f"the trunk leans by up to {np.degrees(self.trunk_lean_rad):.0f} degrees from its mean, "
             f"the pelvis moves up and down by {100 * self.drop_m:.0f} cm"
@@ -98,6 +98,6 @@ def informative_movements(context: PersonContext) -> Iterator[Finding]:
 
 
 def movements_of(context: RecordingContext) -> InformativeMovements | None:
-    """How far trunk and pelvis move in a recording; None where its markers do not show both."""
+    """Compute how far trunk and pelvis move in a recording; None where its markers do not show both."""
     segments = {} if context.marker_set is None else context.marker_set.segments
     return InformativeMovements.of(context.all_markers, *(segments.get(name, ()) for name in ("pelvis", "torso")))

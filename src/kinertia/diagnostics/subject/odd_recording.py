@@ -9,11 +9,11 @@ T = TypeVar("T")
 
 
 def odd_ones(first: T, other: T, witnesses: Iterable[tuple[float, float]]) -> tuple[T, ...]:
-    """The one that more of the others are farther from; both where there are no others, or as many for either.
+    """Return the one that more of the other recordings are farther from; both where there are none, or on a tie.
 
     Args:
         first, other: the two that disagree.
-        witnesses: of every further recording, how far it is from the first and from the other.
+        witnesses: distances of every further recording from the first and from the other.
 
     >>> odd_ones("walk 1", "walk 2", [(0.001, 0.02), (0.002, 0.015)])
     ('walk 2',)

@@ -17,7 +17,7 @@ Span = tuple[float, float] | None
 
 
 def repeated_trials(context: PersonContext) -> Iterator[Finding]:
-    """Two trials whose markers (S302) or forces (S303) are the same to the last digit, over times that overlap."""
+    """S302 and S303: two trials whose markers (S302) or forces (S303) are identical over times that overlap."""
     for first, other in combinations(context.trials, 2):
         if not _overlap(first.window_s, other.window_s):
             continue
@@ -36,14 +36,14 @@ def _same(one: np.ndarray, two: np.ndarray) -> bool:
 
 
 def _same_forces(first: Recording, other: Recording) -> bool:
-    """Whether both have the same loads; without any they say nothing."""
+    """Return whether both recordings have the same loads; false where they have none."""
     if first.plates is None or other.plates is None or not np.nan_to_num(first.plates.force).any():
         return False
     return _same(first.plates.force, other.plates.force)
 
 
 def _span(recording: Recording) -> tuple[float, float]:
-    """Times (s) of the markers: pieces of one recording may come with the forces of the whole."""
+    """Return first and last time (s) of the markers: pieces of one recording may come with the forces of the whole."""
     return float(recording.markers.time[0]), float(recording.markers.time[-1])
 
 

@@ -29,18 +29,18 @@ from kinertia.trial.rms import rms
 _OTHER_PERSON = 0.05
 """Median share by which the distances may differ."""
 _MOVED_M, _MOVED_BETWEEN_M, _MOVED_SHARE = 0.03, 0.04, 0.15
-"""By which a distance differs where a marker was moved: against a static trial; between trials, where soft thighs
+"""Difference of a distance where a marker was moved: from a static trial; between trials, where soft thighs
 change shape, a length and a share."""
 _MOST_MOVED = 3
 """Where more markers were moved, all of them may have been."""
 
 
 def static_and_trials(context: PersonContext) -> Iterator[Finding]:
-    """Swapped labels (L212), another person (S203), another camera scale (S205), moved (M161) or re-applied markers
-    (S204) in trials, against the static trial.
+    """L212, S203, S205, M161 and S204: swapped labels (L212), another person (S203), another camera scale (S205), moved
+    (M161) or re-applied markers (S204) in trials, compared with the static trial.
 
-    Of several recordings in which the person stands each is compared; the one that a trial contradicts while it agrees
-    with another is the odd one itself.
+    Of several recordings in which the person stands each is compared; one that a trial contradicts while it agrees
+    with another is itself the one at fault.
     """
     marker_set = context.marker_set
     if marker_set is None:
@@ -63,8 +63,8 @@ def static_and_trials(context: PersonContext) -> Iterator[Finding]:
 
 
 def trials_of_one_person(context: PersonContext) -> Iterator[Finding]:
-    """Two trials of different people (S305), or with a marker that was moved in between (M161); of the two the one that
-    static trial and other trials contradict, both where neither.
+    """S305 and M161: two trials of different people (S305), or with a marker that was moved in between (M161); of the
+    two, the one that static trial and other trials contradict, or both where neither is contradicted.
     """
     marker_set = context.marker_set
     if marker_set is None:
@@ -95,7 +95,7 @@ def trials_of_one_person(context: PersonContext) -> Iterator[Finding]:
 def _against(
     reference: RecordingContext, trial: RecordingContext, marker_set: MarkerSet, at: str, called: str, usual: float
 ) -> Iterator[Finding]:
-    """What a recording differs in from a reference, found in the recording `at`."""
+    """Find the differences of a recording from a reference, reported in the recording `at`."""
     distances = SegmentDistances.of(reference.all_markers, trial.all_markers, marker_set)
     if not len(distances.pairs):
         return
@@ -129,7 +129,7 @@ def _against(
 
 @dataclass(frozen=True)
 class _Moved:
-    """A marker that was moved: its label, or both where only their distance shows it; by how much, to which other."""
+    """A moved marker: its label, or both labels if only their distance shows it; by how much, relative to which."""
 
     labels: tuple[str, ...]
     difference_m: float
@@ -139,8 +139,8 @@ class _Moved:
 def _moved_markers(
     distances: SegmentDistances, least_m: float, least_share: float, exchanged: Collection[str] = ()
 ) -> tuple[_Moved, ...]:
-    """The few markers without which all distances agree, but for those of exchanged labels; none where distances differ
-    without them, too.
+    """Find the few markers without which all distances agree, except those of exchanged labels; none where distances
+    differ without them, too.
     """
     off = distances.differences()
     before, after = distances.lengths()
@@ -165,7 +165,7 @@ def _moved_markers(
 
 
 def _with(distances: SegmentDistances, k: int) -> NDArray[np.bool_]:
-    """(p,) which pairs are with this marker."""
+    """Return (p,) which pairs include this marker."""
     result: NDArray[np.bool_] = (distances.pairs == k).any(axis=1)
     return result
 
@@ -182,7 +182,7 @@ def _moved_findings(moved: Sequence[_Moved], at: str, called: str) -> Iterator[F
 
 
 class _Witness(NamedTuple):
-    """How far a further recording is from the two that disagree."""
+    """Distances of a further recording from the two that disagree."""
 
     to_first: float
     to_other: float
@@ -195,7 +195,7 @@ def _witnesses(
     marker_set: MarkerSet,
     moved: Sequence[_Moved],
 ) -> list[_Witness]:
-    """Distances of the markers that were moved, else all, in further recordings: how far (m, or log of a ratio)."""
+    """Compute distances (m, or log of a ratio) of further recordings, from the moved markers, else from all."""
     about = {label for one in moved for label in one.labels}
 
     def apart(one: RecordingContext, two: RecordingContext) -> float:
@@ -213,7 +213,7 @@ def _called(context: PersonContext, reference: RecordingContext) -> str:
 
 
 def _joined(found: Sequence[Sequence[Finding]]) -> Iterator[Finding]:
-    """The same finding against several references once, with all their names."""
+    """Merge the same finding against several references into one, with all their names."""
     together: dict[tuple[str, Where], Finding] = {}
     for one in (each for own in found for each in own):
         key = one.code, one.where

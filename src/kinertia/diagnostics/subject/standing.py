@@ -16,7 +16,7 @@ _LOWEST_M = (0.008, 0.050)
 _HIGHEST_IN_MOTION_M = 0.058
 """On top of shoes markers are 53 to 60 mm above the floor while standing, and 44 to 48 mm in motion."""
 _USUAL_LOWEST_M = (0.023, 0.044)
-"""Of fourteen people of eight laboratories, with bare feet and in running shoes."""
+"""Usual height of the lowest marker, from fourteen people of eight laboratories, barefoot and in running shoes."""
 _FLAT_M = 0.04
 """Heels, and metatarsals, of seven people who stand are up to 12 mm higher on one side than on the other."""
 _WALK_M = 0.5
@@ -32,9 +32,9 @@ def standing(context: RecordingContext) -> Iterator[Finding]:
 
 
 def floor(context: PersonContext) -> Iterator[Finding]:
-    """M143: feet that stand above the floor or below it, by the lowest marker of toes, metatarsals and heels.
+    """M143: feet that stand above or below the floor, by the lowest marker of toes, metatarsals and heels.
 
-    A mere INFO where the trials show the floor where it should be: the person stands on something then, or in thick
+    It is an INFO where the trials show the floor at its height: the person then stands on something, or in thick
     soles.
     """
     static = context.static
@@ -53,7 +53,7 @@ def floor(context: PersonContext) -> Iterator[Finding]:
 
 
 def _lowest(context: RecordingContext, percentile: float) -> tuple[str, float] | None:
-    """Label and height (m) of the lowest foot marker; None where heels or metatarsals are no landmarks."""
+    """Return label and height (m) of the lowest foot marker; None where heels or metatarsals are no landmarks."""
     if context.marker_set is None:
         return None
     names = [f"{name}_{side}" for name in ("heel", "metatarsal", "toe") for side in "rl"]
@@ -70,7 +70,7 @@ def _lowest(context: RecordingContext, percentile: float) -> tuple[str, float] |
 
 
 def flat_feet(context: RecordingContext) -> Iterator[Finding]:
-    """S202: a foot that is not on the floor as the other is; a foot's axes are those of one that stands flat."""
+    """S202: a foot that is not on the floor as the other is; the axes of a foot assume that it stands flat."""
     if context.marker_set is None:
         return
     apart = {}

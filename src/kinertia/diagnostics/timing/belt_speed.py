@@ -18,7 +18,7 @@ _KM_H = 3.6
 
 
 def belt_speed(context: RecordingContext) -> Iterator[Finding]:
-    """T301: a stated speed that is not the one of the standing feet, of the foot whose speeds differ most."""
+    """T301: a stated belt speed that differs from that of the standing feet, of the foot with the larger error."""
     belt, time = context.recording.belt, context.all_markers.time
     if belt is None or context.feet is None:
         return

@@ -36,7 +36,7 @@ _DELAY_SD_S, _LEAP_S = 0.010, 0.06
 
 
 def stance_durations(context: RecordingContext) -> Iterator[Hypothesis]:
-    """T201: feet stand half or twice as long by the markers as by the plates."""
+    """T201: feet that stand half or twice as long by the markers as by the plates."""
     plates, feet, contacts = context.whole_loads, context.foot_trajectories, context.whole_contacts
     if plates is None or context.plates is None or feet is None:
         return
@@ -68,8 +68,8 @@ def stance_durations(context: RecordingContext) -> Iterator[Hypothesis]:
 
 
 def _stances(contacts: Sequence[PlateContact], feet: Feet) -> list[float]:
-    """s, how long feet stand while they are loaded; of all stance phases where none of them is loaded. Before and after
-    it, somebody may stand on a box or turn round.
+    """Return how long (s) feet stand while they are loaded, or all stance phases where none is loaded. Before and
+    after, somebody may stand on a box or turn round.
     """
     loaded = [(one.foot, one.time[0], one.time[-1]) for one in contacts]
     whole = [(k, start, end) for k, foot in enumerate(feet) for start, end, all_of_it in foot.stance_spans if all_of_it]
@@ -82,15 +82,15 @@ def _stances(contacts: Sequence[PlateContact], feet: Feet) -> list[float]:
 
 
 def _several_steps(contact: PlateContact, plates: PlateLoads) -> bool:
-    """Whether it goes from foot to foot, and no other plate takes a foot meanwhile."""
+    """Return whether the load goes from foot to foot while no other plate takes a foot."""
     meanwhile = (plates.time >= contact.time[0]) & (plates.time <= contact.time[-1])
     others = np.delete(plates.force[meanwhile, :, 1], contact.plate, axis=1)
     return contact.in_turn and not (others > CONTACT_FORCE_N).any()
 
 
 def contact_delays(context: RecordingContext) -> Iterator[Hypothesis]:
-    """Loads that begin and end earlier or later than foot contact and foot off: ever more so (T201), or by the same
-    (T211; T212 where nobody's clock is so late, or loads are under no foot even then).
+    """T201, T211 and T212: loads that begin and end earlier or later than foot contact and foot-off: increasingly
+    (T201), or equally (T211; T212 where no synchronisation is so late, or loads are under no foot even then).
     """
     plates, feet = context.plates, context.foot_trajectories
     if plates is None or feet is None:
@@ -101,7 +101,7 @@ def contact_delays(context: RecordingContext) -> Iterator[Hypothesis]:
     if delays.grows():
         yield _growing(context, plates, delays)
         return
-    # both ends say so: a plate that was left early, or a foot that drags, moves one
+    # both ends must agree: a plate that was left early, or a foot that drags, moves one end
     delay = delays.delay_s
     if abs(delay) <= _DELAY_S or min(delays.median_s * np.sign(delay)) < _DELAY_S / 2:
         return
@@ -143,7 +143,7 @@ def _growing(context: RecordingContext, plates: PlateLoads, delays: ContactDelay
 
 @dataclass(frozen=True, eq=False)
 class ContactDelays:
-    """By how much loads begin and end later than foot contact and foot off (n, 2) s, at times (n, 2) s of the plates.
+    """Delays (n, 2) s of the start and end of loads after foot contact and foot-off, at times (n, 2) s of the plates.
 
     Attributes:
         rate_error, rate_error_sd: seconds per second by which the delay grows, and its SD; infinite of one contact.
@@ -156,10 +156,10 @@ class ContactDelays:
 
     @classmethod
     def of(cls, contacts: Sequence[PlateContact], feet: Feet) -> ContactDelays | None:
-        """Of whole loads that overlap with a whole stance phase of their foot; None where there are none."""
+        """Compute the delays of whole loads that overlap with a whole stance phase of their foot; None without any."""
         rows = []
         for contact in contacts:
-            # what goes from foot to foot begins with one of them and ends with the other
+            # a load that passes from foot to foot begins with one of them and ends with the other
             if contact.in_turn or not np.isfinite(contact.end_s - contact.start_s):
                 continue
             overlaps = [
@@ -177,16 +177,16 @@ class ContactDelays:
 
     @property
     def median_s(self) -> FloatArray:
-        """(2,) s, of the beginnings and of the ends."""
+        """Median delays (2,) s of the starts and of the ends."""
         return np.asarray(np.median(self.late_s, axis=0))
 
     @property
     def delay_s(self) -> float:
-        """Mean of both."""
+        """Mean (s) of the median delays of starts and ends."""
         return float(self.median_s.mean())
 
     def grows(self) -> bool:
-        """Whether the delay changes over time, and that is no chance."""
+        """Return whether the delay changes significantly over time."""
         return (
             len(self.time) >= _FEWEST_CONTACTS
             and abs(self.rate_error) > _LEAST_RATE_ERROR
@@ -194,8 +194,8 @@ class ContactDelays:
         )
 
     def by_rate(self, start_s: float) -> float | None:
-        """The other cause of a delay: the rate error of files that begin together and part; None where contacts
-        exclude it.
+        """Return the rate error that would explain the delay, of files that begin together and diverge; None where
+        contacts exclude it.
         """
         growth = self.delay_s / max(float(np.median(self.time)) - start_s, 1e-9)
         if abs(growth) > _MOST_RATE_ERROR or abs(self.rate_error - growth) > _EXCLUDED * self.rate_error_sd:
@@ -204,7 +204,7 @@ class ContactDelays:
 
 
 def _rate_error(time: FloatArray, late: FloatArray) -> tuple[float, float]:
-    """Of beginnings and ends alike, and its SD."""
+    """Fit the rate error to starts and ends together, with its SD."""
     steps = np.flatnonzero(np.abs(np.diff(late.mean(axis=1))) > _LEAP_S) + 1
     # a delay of more than half a step is measured from the wrong stance phase
     rows = max(np.split(np.arange(len(time)), steps), key=len)

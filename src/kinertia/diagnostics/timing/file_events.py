@@ -13,7 +13,7 @@ from kinertia.trial.plate_assignment import FOOT_NAMES
 
 
 def file_events(context: RecordingContext) -> Iterator[Finding]:
-    """T311 of the event that is farthest from its forces; T312 of sides that are exchanged."""
+    """T311 and T312: the event of a file farthest from its forces (T311), or events with sides exchanged (T312)."""
     trial = context.loaded
     if not isinstance(trial, Trial):
         return

@@ -25,9 +25,9 @@ _LEAST_RATIO, _MOST_RATIO, _USUAL_RATIO, _TYPICAL_RATIO = 0.4, 1.8, (0.67, 0.99)
 
 
 def force_rate(context: RecordingContext) -> Iterator[Finding]:
-    """T202, and T201 of forces that come ever later, or ever earlier, in a measured window.
+    """T202 and T201: a wrong rate by the velocity ratio (T202); delays that grow or shrink in a measured window (T201).
 
-    Without strides the trunk bends, so that the pelvis goes its own way: the markers' centre must say the same.
+    Without strides the trunk bends, so that the pelvis moves differently: the marker-based centre must agree.
     """
     changes = context.velocity_changes
     if changes is None:
@@ -52,7 +52,7 @@ def _wrong(ratio: float) -> bool:
 
 
 def _growing_delays(context: RecordingContext) -> Iterator[Finding]:
-    """T201, of every window."""
+    """T201: delays that grow or shrink, tested in every window."""
     trial = context.trial
     if trial is None:
         return

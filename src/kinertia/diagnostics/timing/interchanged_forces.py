@@ -25,7 +25,7 @@ early, either may seem to go with the other's forces, but not both."""
 
 
 def interchanged_forces(person: PersonContext) -> Iterator[Finding]:
-    """S304 of both of two trials whose forces seem to be interchanged."""
+    """S304: two trials whose forces seem to be interchanged, one finding for each."""
     loaded = [one for one in person.trials if one.trial is not None]
     own = {one.name: _residual(one.velocities) for one in loaded}
     for pair in combinations(loaded, 2):
@@ -49,7 +49,7 @@ def _with_forces_of(one: RecordingContext, other: RecordingContext) -> float:
 
 
 def _residual(parts: Sequence[CausedVelocity]) -> float:
-    """Share of the vertical velocities of pelvis and markers' centre that forces leave; NaN where nothing tells."""
+    """Return the share of the vertical velocities of pelvis and markers that forces do not explain; NaN if unknown."""
     shown, left = [], []
     for part in parts:
         caused = without_trend(part.time, part.caused)[:, 1]

@@ -21,13 +21,13 @@ from kinertia.trial.data import FloatArray, PlateLoads
 
 _WRONG_S, _CLEARLY_BEST = 0.045, 0.5
 _LEAST_RATE, _MOST_RATE, _RATE_STEP = 1.08, 2.5, 0.01
-"""Smaller differences of rates are told by how the delay of many contacts grows (`contact_delays`)."""
+"""Range and step of rate factors; smaller errors show in the growing delay of many contacts (`contact_delays`)."""
 _LONGEST_DELAY_S, _DELAY_STEP_S = 0.25, 0.01
 
 
 @dataclass(frozen=True)
 class _Best:
-    """The rate, or the delay (s), that fits best, and how well."""
+    """The rate, or the delay (s), that fits best, and the quality of the fit."""
 
     value: float
     fit: ContactFit
@@ -82,7 +82,7 @@ def _best_delay(plates: PlateLoads, feet: Feet) -> _Best:
 def _best(
     plates: PlateLoads, feet: Feet, values: FloatArray, corrected: Callable[[FloatArray, float], FloatArray]
 ) -> _Best:
-    """The one with the smallest delays, of those that leave loads under the feet if there are such."""
+    """Return the value with the smallest delays, among those that put the loads under the feet if any do."""
     tried = []
     for value in values:
         moved = replace(plates, time=corrected(plates.time, float(value)))

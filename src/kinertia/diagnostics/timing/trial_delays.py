@@ -25,13 +25,13 @@ _LEAST_WINDOW_S = 0.8
 """Parts of half a second of one trial differ by up to 40 ms."""
 _SHORT_S = 1.0
 _APART_S, _SHORT_APART_S = 0.012, 0.018
-"""In longer windows, and in shorter ones."""
+"""Smallest notable difference of delays, in longer windows and in shorter ones."""
 _USUAL_S = (-0.004, 0.004)
 
 
 class TrialDelay(NamedTuple):
-    """By how much the forces of a trial are late (s): by the pelvis, and by the centre of all markers; and whether only
-    short windows tell.
+    """Delay (s) of the forces of a trial by the pelvis and by the marker-based centre, and whether only short windows
+    show it.
     """
 
     name: str
@@ -41,7 +41,7 @@ class TrialDelay(NamedTuple):
 
 
 def trial_delay(context: RecordingContext) -> TrialDelay | None:
-    """Over all windows that are long enough; None where none is, or nobody moves."""
+    """Compute the delay over all windows that are long enough; None where none is, or nobody moves."""
     if context.trial is None or context.travel.kind == "stands still":
         return None
     found, spans = [], []
@@ -59,14 +59,14 @@ def trial_delay(context: RecordingContext) -> TrialDelay | None:
 
 
 def trial_delays(person: PersonContext) -> Iterator[Finding]:
-    """T213: trials whose forces are late by another time than those of the others."""
+    """T213: trials whose forces have another delay than those of the other trials."""
     if len(person.trials) > 1:
         yield from uneven_delays([trial_delay(one) for one in person.trials])
 
 
 def uneven_delays(delays: Sequence[TrialDelay | None]) -> Iterator[Finding]:
-    """T213 of each trial that is apart from the middle of three and more; of two that differ both, since nobody knows
-    which of them is wrong.
+    """T213: each trial whose delay is far from the median of three and more; of two that differ both, since it is
+    unknown which of them is wrong.
     """
     known = [one for one in delays if one is not None]
     if len(known) < 2:

@@ -15,7 +15,7 @@ _ON_PLANE_M = 0.015
 _FOOT_MARKER_M, _MARKER_M = 0.08, 0.02
 """The lowest marker of a foot is lower than the former; above a floor of unknown height it is about the latter."""
 _UNMATCHED_M, _MIDDLE_M = 0.08, 0.04
-"""What a marker without a mirror image counts, and one on the plane itself, which is nobody's image."""
+"""Cost of a marker without a mirror image, and of one on the plane itself, which mirrors no other."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,17 +33,17 @@ class BodyAxes:
     asymmetry_m: float
 
     def places(self, points: FloatArray) -> FloatArray:
-        """Points (m, 3) of the ground in body axes."""
+        """Transform points (m, 3) from ground to body axes."""
         result: FloatArray = (points - self.origin) @ self.rotation.T
         return result
 
     def turned(self) -> BodyAxes:
-        """The same of a person who faces the other way."""
+        """Return the axes of the person facing the other way."""
         return BodyAxes(np.diag([-1.0, 1.0, -1.0]) @ self.rotation, self.origin, self.asymmetry_m)
 
 
 def body_axes(points: FloatArray) -> BodyAxes:
-    """The axes in which the markers are most like their own mirror image; which way is forward is still open.
+    """Find the axes in which the markers best match their mirror image; which way is forward remains open.
 
     Args:
         points: (m, 3) m in ground axes, Y up.
@@ -65,7 +65,7 @@ def _direction(angle_deg: float) -> FloatArray:
 
 
 def _mirrored(points: FloatArray, angle_deg: float) -> tuple[float, float, float]:
-    """The least cost (m) of a plane square to this direction, the angle (deg), and the plane's place along it (m)."""
+    """Return the lowest cost (m) of a mirror plane normal to this direction, the angle (deg), and its position (m)."""
     across = _direction(angle_deg)
     along = points @ across
     tree = cKDTree(points)

@@ -13,7 +13,7 @@ from kinertia.trial.data import FloatArray, Markers
 _EXACT_M = 1e-4
 _ON_FLOOR_M = 2e-3
 _SKIN_M = 3e-4
-"""By how much distances between markers on the skin change at least, in a person who stands still."""
+"""Smallest change of distances between markers on the skin of a person who stands still."""
 _RIGID_M, _RIGID_SHARE, _LONG_S = 8e-6, 0.05, 2.0
 _FEW = 0.3
 _NEIGHBOURS, _REACH_M = 8, 0.45
@@ -25,7 +25,7 @@ _OXFORD = ("HDF", "FOF", "TIB", "HLX", "TPF")
 
 
 def unusable_points(markers: Markers) -> dict[str, str]:
-    """Label -> why it is no place on the body at all: ends of bone axes, copies, projections, constants."""
+    """Return label -> reason for points that are not on the body: ends of bone axes, copies, projections, constants."""
     place = _few_frames(markers)
     found = _bone_axes(place)
     for label, own in place.items():
@@ -47,8 +47,8 @@ def unusable_points(markers: Markers) -> dict[str, str]:
 
 
 def computed_points(markers: Markers) -> dict[str, str]:
-    """Label -> how one knows that a point of the body was computed: by its name, or since it keeps its place among
-    others to a tenth of a millimetre, which skin does not.
+    """Return label -> evidence that a point of the body was computed: its name, or a constant position among others
+    within a tenth of a millimetre, which skin does not keep.
     """
     place = _few_frames(markers)
     found = {label: "a computed point by its name" for label in markers.labels if is_named_virtual(label)}
@@ -72,7 +72,7 @@ def computed_points(markers: Markers) -> dict[str, str]:
 
 
 def _few_frames(markers: Markers) -> dict[str, FloatArray]:
-    """Label -> (f, 3) m in a few frames that show all markers but those with gaps."""
+    """Return label -> positions (f, 3) m in a few frames that show all markers but those with gaps."""
     seen = markers.seen
     often = np.flatnonzero(seen.mean(axis=0) > _OFTEN)
     frames = np.flatnonzero(seen[:, often].all(axis=1))
@@ -81,7 +81,7 @@ def _few_frames(markers: Markers) -> dict[str, FloatArray]:
 
 
 def _bone_axes(place: dict[str, FloatArray]) -> dict[str, str]:
-    """Points whose labels differ in O, A, L and P at the end, and that are square to each other."""
+    """Find points whose labels end in O, A, L and P, and whose directions are perpendicular."""
     found: dict[str, str] = {}
     for stem in {label[:-1] for label in place if label[-1:] in _AXES}:
         if not all(stem + end in place for end in _AXES):
@@ -106,7 +106,7 @@ def _bone_axes(place: dict[str, FloatArray]) -> dict[str, str]:
 
 
 def _middle_of(own: FloatArray, place: dict[str, FloatArray]) -> tuple[str, str] | None:
-    """Two others whose middle it always is."""
+    """Return two other points whose midpoint this point always is."""
     labels = list(place)
     others = np.stack([place[label] for label in labels])
     for k, label in enumerate(labels[:-1]):
@@ -118,7 +118,7 @@ def _middle_of(own: FloatArray, place: dict[str, FloatArray]) -> tuple[str, str]
 
 
 def _rigid_pairs(place: dict[str, FloatArray], hinted: dict[str, bool]) -> dict[str, str]:
-    """Two points that never come nearer to each other, while others do: both were computed in one segment."""
+    """Find pairs of points at a constant distance, while others change: both were computed in one segment."""
     labels = list(place)
     if len(labels) < 3:
         return {}
@@ -136,7 +136,7 @@ def _rigid_pairs(place: dict[str, FloatArray], hinted: dict[str, bool]) -> dict[
 
 
 def _fixed_in(own: FloatArray, place: dict[str, FloatArray]) -> Sequence[str]:
-    """Three others in whose axes it never moves although they move among themselves."""
+    """Return three other points in whose axes this point never moves although they move among themselves."""
     near = sorted((float(np.linalg.norm(at - own, axis=1).mean()), other) for other, at in place.items())
     others = [other for distance, other in near if distance < _REACH_M][:_NEIGHBOURS]
     for three in combinations(others, 3):

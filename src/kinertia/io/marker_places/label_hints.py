@@ -37,12 +37,12 @@ _LEFT = re.compile(r"^(left|right)(?=[\W_]|[A-Z])|^(left|right)|(left|right)$", 
 
 
 def is_named_virtual(label: str) -> bool:
-    """Whether a label is that of a joint centre, a projection, a centre of mass or pressure, or a length."""
+    """Return whether a label is that of a joint centre, a projection, a centre of mass or pressure, or a length."""
     return _VIRTUAL.search(label) is not None
 
 
 def sides(labels: Sequence[str]) -> dict[str, tuple[str, str]]:
-    """Label -> side ("r" or "l") and the label of the other side, of labels that come in pairs of them.
+    """Return label -> side ("r" or "l") and the opposite label, for labels that come in pairs.
 
     >>> sides(["RKNE", "LKNE", "R.Heel", "C7"])
     {'RKNE': ('r', 'LKNE'), 'LKNE': ('l', 'RKNE')}
@@ -58,19 +58,19 @@ def sides(labels: Sequence[str]) -> dict[str, tuple[str, str]]:
 
 
 def roles(label: str, is_sided: bool) -> frozenset[str]:
-    """Landmarks (without their side) that a label may mean, and segments of a marker that is none in the presets."""
+    """Return landmarks (without side) that a label may mean, and segments for markers that are in no preset."""
     stem = _stem(label, is_sided)
     known = _preset_roles().get(stem, frozenset())
     return known | {name for name, pattern in _PATTERNS.items() if pattern.fullmatch(stem)}
 
 
 def _short(label: str) -> str:
-    """Right and left as single letters."""
+    """Replace right and left by single letters."""
     return _LEFT.sub(lambda found: found.group(0)[0], label)
 
 
 def _stem(label: str, is_sided: bool) -> str:
-    """The folded label without its side."""
+    """Return the folded label without its side."""
     short = folded(_short(label))
     if not is_sided:
         return short

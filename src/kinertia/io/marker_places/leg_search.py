@@ -30,7 +30,7 @@ _FOOT_HEIGHT, _FOOT_BREADTH = 0.075, 0.09
 
 @dataclass(frozen=True)
 class Found:
-    """Markers that were found.
+    """Landmarks found so far, with their markers and scores.
 
     Attributes:
         markers: landmark -> index of the marker; `metatarsal_inner_r` and the like are parts of one.
@@ -42,23 +42,23 @@ class Found:
 
     @property
     def score(self) -> float:
-        """Of all together."""
+        """Sum of all scores."""
         return sum(self.scores.values())
 
     def drop(self, *landmarks: str) -> None:
-        """Take these back."""
+        """Remove these landmarks."""
         for landmark in landmarks:
             self.markers.pop(landmark, None)
             self.scores.pop(landmark, None)
 
     def add(self, landmark: str, marker: int, score: float) -> None:
-        """Take a marker for a landmark if it fits."""
+        """Assign a marker to a landmark if it fits."""
         if score > 0 and marker not in self.markers.values():
             self.markers[landmark], self.scores[landmark] = marker, float(score)
 
 
 def find_legs(body: StandingBody) -> Found:
-    """What is found with this facing and stature; nothing without the front of a pelvis."""
+    """Find the leg landmarks with this heading and stature; none without the front of a pelvis."""
     found = Found()
     _pelvis(body, found)
     if "asis_r" in found.markers:
@@ -70,7 +70,7 @@ def find_legs(body: StandingBody) -> Found:
 
 
 def _pelvis(body: StandingBody, found: Found) -> None:
-    """Both ASIS, and behind them, in the axes of these two, both PSIS or the sacrum."""
+    """Find both ASIS and behind them, in their axes, both PSIS or the sacrum."""
     free = ASIS.score(body.places, body.stature_m) + body.named("asis")
     best: tuple[float, dict[str, tuple[int, float]]] = (0.0, {})
     for right, left in np.argwhere(free[:, None] + free[None] > 0):
@@ -96,7 +96,7 @@ def _pelvis(body: StandingBody, found: Found) -> None:
 
 
 def _back_of_pelvis(body: StandingBody, local: FloatArray, taken: tuple[int, int]) -> dict[str, tuple[int, float]]:
-    """Both PSIS, else the sacrum, in axes of the pelvis (m, 3) m; each with its score."""
+    """Find both PSIS, else the sacrum, in axes of the pelvis (m, 3) m; each with its score."""
     back: dict[str, tuple[int, float]] = {}
     for side, sign in (("r", 1.0), ("l", -1.0)):
         scores = PSIS_FROM_ASIS.score(local * [1.0, 1.0, sign], body.stature_m) + body.named("psis")
@@ -110,7 +110,7 @@ def _back_of_pelvis(body: StandingBody, local: FloatArray, taken: tuple[int, int
 
 
 def _joints(body: StandingBody, found: Found, side: str) -> None:
-    """Outer and inner markers of knee and ankle."""
+    """Find lateral and medial markers of knee and ankle."""
     asis = {one: body.outward[one][found.markers[f"asis_{one}"]] for one in "rl"}
     anchor = np.array([*((asis["r"] + asis["l"]) / 2)[:2], asis[side][2]])
     knees = _hinges(body, body.scores(KNEE_FROM_ASIS, side, anchor, "knee_lateral"), "knee", side, found)
@@ -128,7 +128,7 @@ def _joints(body: StandingBody, found: Found, side: str) -> None:
 def _hinges(
     body: StandingBody, outer: FloatArray, joint: str, side: str, found: Found
 ) -> list[tuple[float, dict[str, tuple[int, float]]]]:
-    """Scores and markers of outer sides of a joint, each with the inner one that suits it best."""
+    """List scores and markers of candidate lateral sides of a joint, each with the best matching medial one."""
     usual = INNER_KNEE if joint == "knee" else INNER_ANKLE
     taken = list(found.markers.values())
     hinges = []
@@ -146,7 +146,7 @@ def _hinges(
 
 
 def _foot(body: StandingBody, found: Found, side: str) -> None:
-    """Heel, metatarsal heads and toe, each another marker, in axes along the foot."""
+    """Find heel, metatarsal heads and toe, each with its own marker, in axes along the foot."""
     ankle = body.outward[side][found.markers[f"ankle_lateral_{side}"]]
     offsets = (body.outward[side] - ankle) / body.stature_m
     low = (body.outward[side][:, 1] < _FOOT_HEIGHT * body.stature_m) & (np.abs(offsets[:, 2]) < _FOOT_BREADTH)
@@ -170,7 +170,7 @@ def _foot(body: StandingBody, found: Found, side: str) -> None:
 
 
 def _assigned(scores: Mapping[str, FloatArray]) -> dict[str, int]:
-    """For each name the row that makes all scores together the largest; only where they are above zero."""
+    """Assign to each name the row that maximises the sum of scores, only where scores are above zero."""
     table = np.stack(list(scores.values()), axis=1)
     rows, columns = linear_sum_assignment(-np.maximum(table, 0.0))
     names = list(scores)
@@ -178,7 +178,7 @@ def _assigned(scores: Mapping[str, FloatArray]) -> dict[str, int]:
 
 
 def metatarsals(found: Mapping[str, int], side: str) -> tuple[list[int], str]:
-    """Markers whose middle is that of the metatarsal heads, and which they are."""
+    """Return the markers whose mean is the middle of the metatarsal heads, and a description."""
     inner, outer, middle = (found.get(f"metatarsal_{which}_{side}") for which in ("inner", "outer", "middle"))
     if inner is not None and outer is not None:
         return [inner, outer], "middle of the inner and the outer metatarsal heads"

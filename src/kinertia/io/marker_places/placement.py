@@ -24,24 +24,24 @@ _OFTEN = 0.25
 _FEWEST = 8
 _STATURES_M = np.geomspace(0.85, 2.1, 37)
 _SURE, _CLEAR = 30.0, 6.0
-"""Score of legs that are somebody's, and by how much the way one faces must fit better than the other."""
+"""Score of a person's legs, and by how much one heading must fit better than the other."""
 _COMPUTED = -2.0
 _POSTURES, _FULL = 7, 0.8
-"""Frames of somebody who moves that are looked at, among those with the most markers."""
+"""Number of frames of a moving person that are used, and the quantile of marker counts that they reach."""
 _APART_M = 0.02
 _OPPOSITE = {"r": "l", "l": "r"}
 
 
 @dataclass(frozen=True)
 class Placement:
-    """Where the markers of a recording are.
+    """Assignment of the markers of a recording to landmarks and segments.
 
     Attributes:
-        landmarks: landmark -> labels whose middle it is.
+        landmarks: landmark -> labels whose mean it is.
         how: landmark -> how it was found.
         segments: segment -> labels that move with it.
-        left_out: label -> why it is no marker of a segment.
-        notes: what else one should know.
+        left_out: label -> reason why it is on no segment.
+        notes: further remarks for the user.
     """
 
     landmarks: dict[str, list[str]] = field(default_factory=dict)
@@ -52,13 +52,13 @@ class Placement:
 
 
 def place_markers(recording: Recording) -> Placement:
-    """Find the landmarks of somebody who stands upright, by geometry with the labels as hints.
+    """Find the landmarks of a person who stands upright, by geometry with the labels as hints.
 
     Args:
-        recording: best a static trial; in ground axes, Y up.
+        recording: a recording, ideally a static trial; in ground axes, Y up.
 
     Returns:
-        the places; without landmarks where the markers are nobody's who stands.
+        the placement; without landmarks where the markers do not show a standing person.
     """
     markers = recording.markers
     left_out = {
@@ -90,7 +90,7 @@ def place_markers(recording: Recording) -> Placement:
 
 
 def _frames(markers: Markers) -> list[FloatArray]:
-    """Places (m, 3) in a few frames that show as many markers as any; markers that they do not show are NaN."""
+    """Return positions (m, 3) in a few frames that show as many markers as any; missing markers are NaN."""
     count = markers.seen.sum(axis=1)
     full = np.flatnonzero(count >= np.quantile(count, _FULL))
     return [markers.positions[k] for k in full[:: -(-len(full) // _POSTURES)]]
@@ -99,8 +99,8 @@ def _frames(markers: Markers) -> list[FloatArray]:
 def _best_body(
     labels: tuple[str, ...], points: FloatArray, computed: Mapping[str, str], pairs: Mapping[str, tuple[str, str]]
 ) -> tuple[StandingBody, Found, float]:
-    """The facing and stature that fit points (m, 3) best, what is found with them, and by how much they fit better than
-    the other facing.
+    """Return the heading and stature that fit points (m, 3) best, the landmarks found with them, and by how much they
+    fit better than the opposite heading.
     """
     shown = np.asarray(np.isfinite(points).all(axis=1))
     labels, points = tuple(label for label, one in zip(labels, shown, strict=True) if one), points[shown]
@@ -129,7 +129,7 @@ def _score(fit: tuple[Any, ...]) -> float:
 def _label_sides(
     labels: Sequence[str], places: FloatArray, pairs: Mapping[str, tuple[str, str]]
 ) -> tuple[tuple[str, ...], bool]:
-    """The side that each label says, and whether most say the other one than their places."""
+    """Return the side stated by each label, and whether most labels contradict their positions."""
     across = {label: place[2] for label, place in zip(labels, places, strict=True)}
     apart = [
         across[one] - across[two] for one, (side, two) in pairs.items() if side == "r" and {one, two} <= set(across)
@@ -139,7 +139,7 @@ def _label_sides(
 
 
 def _explain(result: Placement, body: StandingBody, found: Found, computed: Mapping[str, str]) -> None:
-    """Write down what was found, by the sides that the labels say."""
+    """Record what was found in the result, on the sides stated by the labels."""
     if body.mirrored:
         result.notes.append(
             "the labels say right where the person's left is, by the feet: the axes may be mirrored; labels were kept"
@@ -174,7 +174,7 @@ def _explain(result: Placement, body: StandingBody, found: Found, computed: Mapp
 
 
 def _on_side(body: StandingBody, name: str, markers: Sequence[int]) -> str:
-    """A landmark or segment on the side that the labels of these markers say, else on that of their place."""
+    """Put a landmark or segment on the side stated by the labels of these markers, else on that of their position."""
     base, _, side = name.rpartition("_")
     if side not in ("r", "l"):
         return name
@@ -185,7 +185,7 @@ def _on_side(body: StandingBody, name: str, markers: Sequence[int]) -> str:
 
 
 def _how(body: StandingBody, landmark: str, markers: Sequence[int], computed: Mapping[str, str]) -> str:
-    """By what it was found, in a few words."""
+    """Describe in a few words how a landmark was found."""
     base = landmark[:-2] if landmark.endswith(("_r", "_l")) else landmark
     at = body.places[list(markers)].mean(axis=0)
     words = [WHERE[base], f"{at[1] * 100:.0f} cm above the floor"]

@@ -11,7 +11,7 @@ from kinertia.io.marker_places.standing_body import StandingBody
 from kinertia.trial.data import FloatArray
 
 _KNEE_BAND, _ANKLE_BAND = 0.02, 0.012
-"""What is nearer to the height of a joint (shares of the stature) and no landmark is over the joint: a kneecap."""
+"""Band (shares of stature) around a joint's height in which a marker that is no landmark is on it: a kneecap."""
 _BELOW_PELVIS, _ON_PELVIS, _LUMBAR = -0.025, 0.018, 0.075
 """Heights of a pelvis' markers over its front and its back, and from which on over the front the torso begins."""
 _PELVIS_BREADTH, _LEG_BREADTH, _TRUNK_BREADTH = 0.095, 0.075, 0.135
@@ -36,7 +36,7 @@ _OF = {
 
 
 def segment_members(body: StandingBody, found: Found) -> dict[int, str]:
-    """Marker -> segment, of those that move with one; others are on joints, hands, or nobody knows where."""
+    """Return marker -> segment, for markers that move with one; others are on joints, on hands, or unknown."""
     members: dict[int, str] = {}
     for landmark, marker in found.markers.items():
         segment = _OF[landmark.split("_")[0]]
@@ -84,13 +84,13 @@ def _trunk_or_leg(body: StandingBody, found: Mapping[str, int], side: str, marke
 
 
 def _beside(at: FloatArray, lower: FloatArray, upper: FloatArray, stature: float) -> bool:
-    """Whether a marker is near the outer line of a segment, and no hand that hangs beside it."""
+    """Return whether a marker is near the lateral line of a segment, and not on a hand that hangs beside it."""
     share = np.clip((at[1] - lower[1]) / max(upper[1] - lower[1], 1e-6), 0.0, 1.0)
     return bool(at[2] < (lower + share * (upper - lower))[2] + _LEG_BREADTH * stature)
 
 
 def _arm_of(body: StandingBody, found: Mapping[str, int], side: str, marker: int) -> str:
-    """The upper arm or the forearm where a marker is along one of them."""
+    """Return the upper arm or the forearm where a marker is along one of them."""
     ends = [found.get(f"{name}_{side}") for name in ("acromion", "elbow_lateral", "wrist")]
     known = [body.places[one] for one in ends if one is not None]
     if len(known) < 3:
@@ -108,8 +108,8 @@ def _arm_of(body: StandingBody, found: Mapping[str, int], side: str, marker: int
 
 
 def wands(body: StandingBody, found: Found, members: Mapping[int, str]) -> dict[str, list[int]]:
-    """The outermost markers of thigh and shank of legs whose knee or ankle has no inner marker: with the joint's width
-    they show where its centre is (Davis et al. 1991).
+    """Return the outermost markers of thigh and shank for legs whose knee or ankle has no medial marker: with the
+    joint's width they determine the joint centre (Davis et al. 1991).
     """
     chosen = {}
     for segment, joint in (("thigh", "knee"), ("shank", "ankle")):

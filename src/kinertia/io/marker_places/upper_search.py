@@ -23,7 +23,7 @@ _WRIST_APART = (0.02, 0.06)
 
 
 def find_upper_body(body: StandingBody, found: Found) -> None:
-    """Add acromia, C7, sternal notch, elbows and wrists to what was found."""
+    """Find acromia, C7, sternal notch, elbows and wrists, and add them."""
     asis = {side: body.outward[side][found.markers[f"asis_{side}"]] for side in "rl"}
     middle = (asis["r"] + asis["l"]) / 2
     for side in "rl":
@@ -43,14 +43,14 @@ def find_upper_body(body: StandingBody, found: Found) -> None:
 
 
 def _take(found: Found, landmark: str, scores: FloatArray) -> None:
-    """The best marker that is still free."""
+    """Assign the best marker that is still free to the landmark."""
     scores = scores.copy()
     scores[list(found.markers.values())] = -np.inf
     found.add(landmark, int(np.argmax(scores)), float(scores.max()))
 
 
 def _arm(body: StandingBody, found: Found, side: str, shoulder: FloatArray) -> None:
-    """The elbow by its label and its distance from the shoulder; its inner side and the wrist by distances as well."""
+    """Find the elbow by its label and its distance from the shoulder; its medial side and the wrist by distance too."""
     own = np.where(body.is_side(side), 0.0, -np.inf)
     from_shoulder = np.linalg.norm(body.places - shoulder, axis=1)
     elbow_scores = by_distance(from_shoulder, ELBOW_FROM_ACROMION, body.stature_m) + body.named("elbow_lateral") - FOUND

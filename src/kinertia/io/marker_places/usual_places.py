@@ -12,14 +12,14 @@ import numpy as np
 from kinertia.trial.data import FloatArray
 
 FOUND = 3.0
-"""What finding a landmark counts, in units of half a chi square: without help of its label it is 2.4 SD off at most."""
+"""Score of finding a landmark, in units of half a chi square: without help of its label it is 2.4 SD off at most."""
 _NAMED, _NAMED_OTHERWISE = 4.0, -3.0
-"""What it counts that the label means the landmark, or something else."""
+"""Score of a label that means the landmark, or something else."""
 
 
 @dataclass(frozen=True)
 class Usual:
-    """Where a marker usually is, from another one or from the middle of the body on the floor.
+    """Usual position of a marker relative to another one, or to the middle of the body on the floor.
 
     Attributes:
         mean, sd: (x, y, z) as shares of the stature.
@@ -29,7 +29,7 @@ class Usual:
     sd: tuple[float, float, float]
 
     def score(self, offsets: FloatArray, stature_m: float) -> FloatArray:
-        """Of offsets (..., 3) m: above zero where they are near."""
+        """Return scores of offsets (..., 3) m: above zero where they are near."""
         off = (offsets / stature_m - np.array(self.mean)) / np.array(self.sd)
         result: FloatArray = FOUND - 0.5 * np.square(off).sum(axis=-1)
         return result
@@ -55,9 +55,9 @@ WHERE = {
     "c7": "on the midline behind the shoulders",
     "sternal_notch": "on the midline before the shoulders",
 }
-"""Each landmark in words."""
+"""Descriptions of the landmarks."""
 FREE = 1e3
-"""A deviation that leaves a coordinate open."""
+"""SD that leaves a coordinate open."""
 ASIS = Usual((0.0, 0.56, 0.0), (FREE, 0.02, FREE))
 ASIS_APART = Usual((0.0, 0.0, 0.140), (0.04, 0.015, 0.022))
 PSIS_FROM_ASIS = Usual((-0.105, 0.015, 0.028), (0.022, 0.018, 0.012))
@@ -74,24 +74,24 @@ FOOT = {
     "metatarsal_middle": Usual((0.085, -0.018, -0.018), (0.02, 0.013, 0.015)),
     "toe": Usual((0.118, -0.025, -0.022), (0.017, 0.013, 0.017)),
 }
-"""From the outer ankle, along the foot."""
+"""Positions from the lateral ankle, along the foot."""
 ACROMION_FROM_ASIS = Usual((-0.06, 0.26, 0.035), (0.05, 0.03, 0.022))
 C7_FROM_ACROMIA = Usual((-0.04, 0.025, 0.0), (0.03, 0.025, 0.012))
 NOTCH_FROM_ACROMIA = Usual((0.04, -0.015, 0.0), (0.03, 0.025, 0.008))
 ELBOW_FROM_ACROMION = (0.175, 0.025)
 WRIST_FROM_ELBOW = (0.145, 0.02)
 INNER_ELBOW = (0.055, 0.015)
-"""Distances, mean and deviation; arms may be anywhere."""
+"""Distances, mean and SD; arms may be anywhere."""
 
 
 def by_label(meant: frozenset[str], landmark: str) -> float:
-    """What a label counts for a landmark, of which these are the roles that it hints at."""
+    """Return the score of a label, with these roles that it hints at, for a landmark."""
     if not meant:
         return 0.0
     return _NAMED if landmark in meant else _NAMED_OTHERWISE
 
 
 def by_distance(distance_m: FloatArray, usual: tuple[float, float], stature_m: float) -> FloatArray:
-    """The score of markers by their distance (m) alone."""
+    """Return the score of markers by their distance (m) alone."""
     result: FloatArray = FOUND - 0.5 * np.square((distance_m / stature_m - usual[0]) / usual[1])
     return result

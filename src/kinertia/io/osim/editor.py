@@ -43,15 +43,15 @@ def write_osim(
     joint_shifts: Mapping[str, np.ndarray] | None = None,
     welds: Mapping[str, str] | None = None,
 ) -> pd.DataFrame:
-    """Write the model's file with these parameters, and tell what changed.
+    """Write the model's file with these parameters, and return what changed.
 
     Args:
-        path: of the new file.
-        model: as read.
-        bsp: of some or all of its bodies.
-        markers: by label, (3,) m in the marker's body.
-        joint_shifts: by joint with an `offset`, (3,) m by which it moves in its parent, in the parent's axes.
-        welds: by segment of `bsp` that the model has not, the body that it is welded to.
+        path: path of the new file.
+        model: the model as read.
+        bsp: parameters of some or all of its bodies.
+        markers: positions by label, (3,) m in the marker's body.
+        joint_shifts: by joint with an `offset`, its displacement (3,) m in its parent, in the parent's axes.
+        welds: by segment of `bsp` that the model lacks, the body that it is welded to.
 
     Returns:
         one row per changed property: component, property, old and new text; no rows if nothing changed.
@@ -81,7 +81,7 @@ def write_osim(
 
 
 def _replacement(element: Element, tag: str, old: Element | None, new: str) -> tuple[tuple[int, int], bytes]:
-    """Byte span and what goes there."""
+    """Return the byte span and its new content."""
     if old is not None and old.inner is not None:
         return old.inner, new.encode()
     whole = f"<{tag}>{new}</{tag}>".encode()
@@ -94,7 +94,7 @@ def _replacement(element: Element, tag: str, old: Element | None, new: str) -> t
 def _welded(
     top: Element, document: Element, parent: str, child: str, row: np.ndarray
 ) -> list[tuple[tuple[int, int], bytes]]:
-    """What goes where for one more body: of format 3 the joint stands in its body, of format 4 in a set."""
+    """Return the insertions for one more body: in format 3 the joint is in its body, in format 4 in a set."""
     ends = {}
     for tag in ("BodySet", "JointSet"):
         objects = members.child("objects") if (members := document.child(tag)) is not None else None
@@ -126,7 +126,7 @@ def _body_edits(document: Element, bsp: BodySegmentParameters) -> Iterator[_Edit
 
 
 def _marker_edits(model: OsimModel, document: Element, positions: Mapping[str, np.ndarray]) -> Iterator[_Edit]:
-    """Each marker moves in the axes of its own frame, which may be another than its body's."""
+    """Yield edits of markers, each in the axes of its own frame, which may differ from its body's."""
     known: dict[str, Marker] = {marker.label: marker for marker in model.skeleton.markers}
     for element in marker_elements(document):
         if element.name in positions:
@@ -139,7 +139,7 @@ def _marker_edits(model: OsimModel, document: Element, positions: Mapping[str, n
 
 
 def _joint_edits(model: OsimModel, document: Element, shifts: Mapping[str, np.ndarray]) -> Iterator[_Edit]:
-    """A joint moves with the frame that it hangs on (format 4) or by its own place in its parent (format 3)."""
+    """Yield edits of joints, by the frame each is attached to (format 4) or its location in its parent (format 3)."""
     elements = {element.outer: element for element in document.all()}
     for joint in model.joints:
         shift = shifts.get(joint.name)

@@ -28,7 +28,7 @@ def export_osim(path: str | Path, skeleton: Skeleton, bsp: BodySegmentParameters
     """Write the skeleton with these body segment parameters; segments that it does not have are massless.
 
     Raises:
-        ValueError: an axis follows its coordinate by a function, or rotates before another slides.
+        ValueError: an axis follows its coordinate by a function, or rotates before another translates.
     """
     rows = dict(zip(bsp.segments, bsp.table(), strict=True))
     bodies = [body_text(segment, rows.get(segment, np.zeros(10))) for segment in skeleton.segments]
@@ -60,7 +60,7 @@ def _numbers(values: Sequence[float] | np.ndarray) -> str:
 
 
 def body_text(name: str, row: np.ndarray) -> str:
-    """A body of the current formats; `row` is one of `BodySegmentParameters.table`."""
+    """Write a body of the current formats; `row` is one of `BodySegmentParameters.table`."""
     return (
         f"<Body name={_quoted(name)}><mass>{_numbers(row[:1])}</mass><mass_center>{_numbers(row[1:4])}</mass_center>"
         f"<inertia>{_numbers(row[4:])}</inertia></Body>"
@@ -75,7 +75,7 @@ def _marker(marker: Marker) -> str:
 
 
 def weld_text(parent: str, child: str) -> str:
-    """A joint of the current formats that holds one body fast in the frame of another."""
+    """Write a joint of the current formats that fixes one body in the frame of another."""
     near, far = (_frame(f"{name}_offset", f"/bodyset/{name}", np.eye(3), np.zeros(3)) for name in (parent, child))
     return (
         f"<WeldJoint name={_quoted('to_' + child)}><socket_parent_frame>{parent}_offset</socket_parent_frame>"
@@ -109,7 +109,7 @@ def _joint(joint: Joint, skeleton: Skeleton) -> str:
 
 
 def _folded(joint: Joint, skeleton: Skeleton) -> Joint:
-    """The joint without axes locked at zero, and with its two frames where locked axes at its beginning and end put
+    """Return the joint without axes locked at zero, with its two frames where locked axes at its beginning and end put
     them.
     """
     axes = [axis for axis in joint.axes if skeleton.locked.get(axis.coordinate) != 0.0 or axis.function is not None]
@@ -136,7 +136,7 @@ def _frame(name: str, parent: str, rotation: np.ndarray, translation: np.ndarray
 
 
 def _quoted(text: str) -> str:
-    """An attribute's value."""
+    """Return an attribute's value in quotes."""
     return f'"{escape(text)}"'
 
 
@@ -146,7 +146,7 @@ def _coordinate(axis: Axis) -> str:
 
 
 def _filled(kind: str, axes: Sequence[Axis], skeleton: Skeleton) -> list[str]:
-    """Three TransformAxis elements: these axes, and after them such as keep the three independent, at zero."""
+    """Return three TransformAxis elements: these axes, then axes at zero that keep the three independent."""
     directions = [np.array(axis.direction) for axis in axes]
     spare: list[np.ndarray] = []
     while len(directions) + len(spare) < 3:

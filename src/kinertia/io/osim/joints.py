@@ -41,15 +41,15 @@ Place = tuple[np.ndarray, np.ndarray]
 
 @dataclass(frozen=True)
 class JointElement:
-    """A joint as the file has it.
+    """A joint as in the file.
 
     Attributes:
-        element: in the file.
-        parent, child: bodies.
-        parent_place, child_place: the joint's frames in the bodies.
+        element: its element in the file.
+        parent, child: its bodies.
+        parent_place, child_place: frames of the joint in the bodies.
         offset: element whose translation moves the joint in its parent's own axes; None where there is none.
-        coordinates: in the file's order.
-        axes: in the order of motion.
+        coordinates: coordinates in the file's order.
+        axes: axes in the order of motion.
         constants: axes that do not move, by the name of the coordinate they are locked as.
     """
 
@@ -65,12 +65,12 @@ class JointElement:
 
     @property
     def name(self) -> str:
-        """The joint's name."""
+        """Name of the joint."""
         return self.element.name
 
 
 class Frames:
-    """Which body carries a frame, and where, in format 4."""
+    """Bodies and positions of the frames of format 4."""
 
     def __init__(self, values: Values, model: Element, bodies: Sequence[str]) -> None:
         self._values, self._bodies = values, {"ground", *bodies}
@@ -85,7 +85,7 @@ class Frames:
             self._collect(child if child.name else replace(child, attributes=owner.attributes))
 
     def offset(self, owner: str, path: str) -> Element | None:
-        """The offset frame that this path names: of this owner, of the one the path names, or the only one."""
+        """Find the offset frame with this path: of this owner, of the one in the path, or the only one."""
         *above, name = path.strip().split("/")
         for holder in (owner, above[-1] if above else owner):
             if (holder, name) in self._offsets:
@@ -94,7 +94,7 @@ class Frames:
         return known[0] if len(known) == 1 and name not in self._bodies else None
 
     def place(self, user: Element, owner: str, path: str) -> tuple[str, Place]:
-        """Body and place of the frame that this path names."""
+        """Return body and position of the frame with this path."""
         rotation, translation = np.eye(3), np.zeros(3)
         for _ in range(20):
             frame = self.offset(owner, path)
@@ -111,13 +111,13 @@ class Frames:
 
 
 def frame_place(values: Values, element: Element, orientation: str, location: str) -> Place:
-    """A frame's place by its body-fixed x-y-z angles and its location."""
+    """Return a frame's placement from its body-fixed x-y-z angles and its location."""
     angles = values.numbers(element, orientation, 3, [0.0] * 3)
     return Rotation.from_euler("XYZ", angles).as_matrix(), values.numbers(element, location, 3, [0.0] * 3)
 
 
 def read_joint(values: Values, element: Element, frames: Frames) -> JointElement:
-    """A joint of format 4."""
+    """Read a joint of format 4."""
     sockets = [values.text(element, f"socket_{side}_frame") for side in ("parent", "child")]
     (parent, parent_place), (child, child_place) = (frames.place(element, element.name, path) for path in sockets)
     offset = frames.offset(element.name, sockets[0])
@@ -129,7 +129,7 @@ def read_joint(values: Values, element: Element, frames: Frames) -> JointElement
 
 
 def read_joint_in_body(values: Values, element: Element, child: str) -> JointElement:
-    """A joint of format 3, which stands in its child's element."""
+    """Read a joint of format 3, which is in its child's element."""
     if values.flag(element, "reverse", False):
         values.fail(element, "it is reversed, expected parent before child, as OpenSim 4 saves it")
     places = (
@@ -209,7 +209,7 @@ def _custom_axes(values: Values, joint: Element, names: list[str]) -> tuple[list
 
 
 def _axis_function(values: Values, element: Element, joint: str) -> AxisFunction:
-    """The function of a TransformAxis; without one OpenSim keeps the axis at zero."""
+    """Read the function of a TransformAxis; without one OpenSim keeps the axis at zero."""
     inside = [c for c in element.children if c.tag not in ("coordinates", "axis", "coordinate")]
     if inside and inside[0].tag == "function":
         inside = inside[0].children
@@ -217,7 +217,7 @@ def _axis_function(values: Values, element: Element, joint: str) -> AxisFunction
 
 
 def simplified(axis: Axis) -> Axis:
-    """The same axis without a function where that only copies the coordinate or turns its sign."""
+    """Return the axis without a function that only copies the coordinate or reverses its sign."""
     slope = None if axis.function is None else unit_slope(axis.function)
     if slope is None:
         return axis
@@ -226,7 +226,7 @@ def simplified(axis: Axis) -> Axis:
 
 
 def coupled(axis: Axis, independent: str, function: AxisFunction) -> Axis:
-    """The axis of a coupled coordinate as an axis of the coordinate that leads it."""
+    """Return the axis of a coupled coordinate as an axis of the independent coordinate."""
     if axis.function is None:
         return simplified(replace(axis, coordinate=independent, function=function))
     whole = axis.function if unit_slope(function) == 1.0 else Composed(axis.function, function)

@@ -35,11 +35,11 @@ FUNCTIONS = (
 
 @dataclass(frozen=True)
 class Values:
-    """Reads properties of elements of one file.
+    """Reader of properties of elements of one file.
 
     Attributes:
         path: the file.
-        defaults: by tag, the element of the file's <defaults> that stands in for properties left out.
+        defaults: by tag, the element of the file's <defaults> that supplies properties left out.
     """
 
     path: Path
@@ -49,36 +49,36 @@ class Values:
         """Raise OsimError about this element.
 
         Args:
-            element: where it is in the file.
+            element: the element in the file.
             problem: what is wrong, and what is expected.
-            code: of the rule; that of an element that is not supported unless given.
-            owner: name of what the element belongs to, if it has none itself.
+            code: code of the rule; by default that of an unsupported element.
+            owner: name of the owner of the element, if it has none itself.
         """
         name = element.name if owner is None else owner
         stated = {"element": Quantity(name), "kind": Quantity(element.tag), "problem": Quantity(problem)}
         raise OsimError.about(self.path, with_evidence(code, Where(part=name or None), stated), element.line)
 
     def property(self, element: Element, tag: str) -> Element | None:
-        """The element's own property, or that of the file's defaults."""
+        """Return the element's own property, or the one in the file's defaults."""
         own = element.child(tag)
         if own is None and element.tag in self.defaults:
             return self.defaults[element.tag].child(tag)
         return own
 
     def text(self, element: Element, tag: str) -> str:
-        """Text of a property, without blanks around; empty where it is left out."""
+        """Read the text of a property, without surrounding blanks; empty where it is left out."""
         entry = self.property(element, tag)
         return "" if entry is None else entry.text.strip()
 
     def flag(self, element: Element, tag: str, otherwise: bool) -> bool:
-        """A true or false."""
+        """Read a boolean; `otherwise` where the property is left out."""
         text = self.text(element, tag).lower()
         if text not in ("true", "false", ""):
             self.fail(element, f"{tag} is '{text}', expected true or false")
         return otherwise if text == "" else text == "true"
 
     def numbers(self, element: Element, tag: str, count: int, otherwise: list[float] | None = None) -> np.ndarray:
-        """`count` finite numbers; `otherwise` where the property is left out."""
+        """Read `count` finite numbers; `otherwise` where the property is left out."""
         entry = self.property(element, tag)
         if entry is None:
             if otherwise is None:
@@ -99,10 +99,10 @@ class Values:
         return values
 
     def function(self, element: Element, owner: str) -> PiecewisePolynomial:
-        """A function of one coordinate.
+        """Read a function of one coordinate.
 
         Args:
-            element: of the function itself.
+            element: element of the function itself.
             owner: the joint or constraint, for messages.
         """
         if element.tag == "MultiplierFunction":

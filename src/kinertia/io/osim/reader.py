@@ -26,9 +26,9 @@ from kinertia.model.imported_model import Coupling, OsimJoint, OsimModel
 from kinertia.model.skeleton import Axis, Joint, Marker, Skeleton
 
 NEWEST_VERSION = 40600
-"""Of the formats known here; OpenSim 4.6 writes it."""
+"""Newest known format; OpenSim 4.6 writes it."""
 EARTHS_GRAVITY_M_S2 = (9.76, 9.84)
-"""From high mountains at the equator to the poles."""
+"""Range of gravity from high mountains at the equator to the poles."""
 _START = 0.2
 """How far from its default to the middle of its range a coordinate starts.
 
@@ -40,7 +40,7 @@ _FORMAT_3, _FORMAT_4 = range(30000, 30501), range(40000, NEWEST_VERSION + 1)
 
 
 def read_osim(path: str | Path) -> OsimModel:
-    """Read a model.
+    """Read an OpenSim model.
 
     Raises:
         FileError: no such file.
@@ -98,19 +98,19 @@ def _unknown(path: Path, version: str, line: int | None = None) -> OsimError:
 
 
 def _objects(model: Element, tag: str) -> list[Element]:
-    """The members of one of the model's sets."""
+    """Return the members of one of the model's sets."""
     model_set = model.child(tag)
     objects = None if model_set is None else model_set.child("objects")
     return [] if objects is None else objects.children
 
 
 def body_elements(model: Element) -> list[Element]:
-    """The bodies, without ground."""
+    """Return the bodies, without ground."""
     return [body for body in _objects(model, "BodySet") if body.tag == "Body" and body.name != "ground"]
 
 
 def marker_elements(model: Element) -> list[Element]:
-    """The markers."""
+    """Return the marker elements."""
     return [marker for marker in _objects(model, "MarkerSet") if marker.tag == "Marker"]
 
 
@@ -135,7 +135,7 @@ def _bsp(values: Values, bodies: Sequence[Element]) -> BodySegmentParameters:
 
 
 def _ordered(values: Values, joints: Sequence[JointElement], bodies: Sequence[Element]) -> list[JointElement]:
-    """Parents before children, the root first."""
+    """Order joints so that parents come before children, the root first."""
     names = {body.name for body in bodies}
     for joint in joints:
         for end in (joint.parent, joint.child):
@@ -159,7 +159,7 @@ def _ordered(values: Values, joints: Sequence[JointElement], bodies: Sequence[El
 
 
 def _couplings(values: Values, model: Element, joints: Sequence[JointElement]) -> tuple[Coupling, ...]:
-    """Couplings in an order in which leaders are known before those that follow them."""
+    """Return couplings in an order in which independent coordinates come before those that follow them."""
     names = {coordinate.name for joint in joints for coordinate in joint.coordinates}
     couplings = []
     for element in _objects(model, "ConstraintSet"):
@@ -196,7 +196,7 @@ def _leaders_first(values: Values, couplings: Sequence[tuple[Element, Coupling]]
 def _marker(
     values: Values, element: Element, frames: Frames | None, bodies: Sequence[str]
 ) -> tuple[Marker, np.ndarray]:
-    """A marker in its body, and the orientation of its own frame there."""
+    """Read a marker in its body, and the orientation of its own frame there."""
     location = values.numbers(element, "location", 3, [0.0] * 3)
     if frames is None:
         body, rotation, origin = values.text(element, "body"), np.eye(3), np.zeros(3)
@@ -208,7 +208,7 @@ def _marker(
 
 
 def _check_marker_names(values: Values, elements: Sequence[Element], bodies: Sequence[str]) -> None:
-    """Measured markers are told by their names, so every name must be of one marker."""
+    """Check that every marker name is unique, since measured markers are identified by name."""
     first: dict[str, str] = {}
     for element, body in zip(elements, bodies, strict=True):
         if element.name in first:
@@ -255,9 +255,9 @@ def _skeleton(
 
 
 def _ranges(joints: Sequence[JointElement], fixed: set[str]) -> dict[str, Range]:
-    """The ranges of all coordinates of these joints that move by themselves.
+    """Return the ranges of all independent coordinates of these joints.
 
-    One that ends before it begins, or of a full turn, says nothing.
+    A range that ends before it begins, or of a full turn, is ignored.
     """
     free = [c for joint in joints for c in joint.coordinates if c.name not in fixed]
     return {

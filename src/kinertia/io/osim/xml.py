@@ -17,7 +17,7 @@ _START_TAG = re.compile(rb"""<[^\s/>]+(?:[^>"']|"[^"]*"|'[^']*')*>""")
 
 
 class XmlError(ValueError):
-    """A text that is not XML as it is used here; `line` is one-based."""
+    """Error for a text that is not XML as used here; `line` is one-based."""
 
     def __init__(self, problem: str, line: int) -> None:
         self.line = line
@@ -26,7 +26,7 @@ class XmlError(ValueError):
 
 @dataclass(eq=False)
 class Element:
-    """One element.
+    """One XML element.
 
     Attributes:
         tag, attributes: as in the file.
@@ -47,15 +47,15 @@ class Element:
 
     @property
     def name(self) -> str:
-        """The attribute `name`, or nothing."""
+        """Attribute `name`, or empty."""
         return self.attributes.get("name", "")
 
     def child(self, *tags: str) -> Element | None:
-        """The first child with one of these tags."""
+        """Return the first child with one of these tags."""
         return next((child for child in self.children if child.tag in tags), None)
 
     def all(self, *tags: str) -> Iterator[Element]:
-        """All elements inside with one of these tags, or with any, however deep, in the order of the file."""
+        """Yield all descendants with one of these tags, or all, however deep, in the order of the file."""
         for child in self.children:
             if not tags or child.tag in tags:
                 yield child
@@ -63,10 +63,10 @@ class Element:
 
 
 def parse(content: bytes) -> Element:
-    """The outermost element.
+    """Parse the text and return the outermost element.
 
     Raises:
-        XmlError: the text is not XML, is in an encoding that is not known here, or nests elements without end.
+        XmlError: the text is not XML, is in an unknown encoding, or nests elements too deeply.
     """
     parser = expat.ParserCreate()
     top = Element("", {}, 0, (0, 0), None)
@@ -108,7 +108,7 @@ def parse(content: bytes) -> Element:
 
 
 def replaced(content: bytes, changes: list[tuple[tuple[int, int], bytes]]) -> bytes:
-    """The content with these byte spans replaced; spans do not overlap."""
+    """Return the content with these byte spans replaced; spans do not overlap."""
     for (start, end), new in sorted(changes, reverse=True):
         content = content[:start] + new + content[end:]
     return content
