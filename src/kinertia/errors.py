@@ -180,7 +180,7 @@ class SubjectError(KinertiaError):
     def __init__(self, field: str, value: object, problem: str) -> None:
         self.field = field
         self.value = value
-        super().__init__(problem if value is None else f"{field} = {value}: {problem}")
+        super().__init__(f"{field}: {problem}" if value is None else f"{field} = {value}: {problem}")
 
 
 class PriorError(KinertiaError):

@@ -1,7 +1,7 @@
 """Which sign of the free moments the whole estimate finds likelier, on synthetic walks."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -12,8 +12,10 @@ from command_line import fitted
 from kinertia.estimation import free_moment_sign
 from kinertia.estimation.free_moment_sign import with_likelier_sign
 from kinertia.estimation.prior import literature_prior
+from kinertia.estimation.simultaneous.calibration_entry import CalibrationEntry
 from kinertia.estimation.simultaneous.evidence import Evidence, FreeMomentSign
 from kinertia.estimation.simultaneous.fit import fit_simultaneous
+from kinertia.estimation.simultaneous.instruments import InstrumentPrior
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.kinematics import Kinematics
@@ -31,6 +33,7 @@ class Person:
     skeleton: Skeleton
     literature: BodySegmentParameters
     kinematics: tuple[Kinematics, ...]
+    uncertainty: SimpleNamespace = field(default_factory=lambda: SimpleNamespace(instruments=InstrumentPrior()))
 
 
 @pytest.fixture(scope="module")
@@ -57,6 +60,7 @@ class Posterior:
     """What of it has to do with the sign."""
 
     free_moment_sign: FreeMomentSign | None = None
+    instrument_errors: tuple[CalibrationEntry, ...] = ()
 
 
 @dataclass(frozen=True)

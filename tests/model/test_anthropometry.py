@@ -222,7 +222,7 @@ def test_limits_are_allowed() -> None:
 def test_unusable_geometry_and_source_are_refused() -> None:
     without = {name: length for name, length in LENGTHS.items() if name != "foot_total_l"}
     literature_bsp(70.0, 1.7, "male", replace(PERSON, lengths_m=without), "dumas")
-    with pytest.raises(SubjectError, match=r"foot_total_l = None: this length is missing; the 'deleva' table"):
+    with pytest.raises(SubjectError, match=r"foot_total_l: this length is missing; the 'deleva' table"):
         literature_bsp(70.0, 1.7, "male", replace(PERSON, lengths_m=without), "deleva")
     for wrong in (422.2, 0.0, float("nan")):
         with pytest.raises(SubjectError, match=r"thigh_r = .*S102"):

@@ -1,14 +1,18 @@
 """A trial without forces says where joint axes, joint centres and markers are; a knee axis that is off is found."""
 
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from kinertia import Settings, Subject, TrialInput, estimate, prepare
+from kinertia import Settings, Subject, TrialInput, estimate, prepare, prepare_subject
 from kinertia.errors import BlockedError, SettingsError
 from kinertia.estimation.simultaneous.calibration_entry import AXIS
-from kinertia.synthetic.laboratory import LabNoise, record
+from kinertia.io.trc import write_trc
+from kinertia.model.gait27 import LEG_AXIS_TILTS
+from kinertia.synthetic.laboratory import LabNoise, record, write_lab
 from kinertia.synthetic.motions import squat
 from kinertia.synthetic.noise import SkinMotion, camera_noise
 from kinertia.synthetic.walk import walk, walking_subject
@@ -144,6 +148,19 @@ def test_of_no_trial_with_forces_none_joins(lab):
     assert not screened.markers_only
     with pytest.raises(BlockedError):
         screened.usable  # noqa: B018
+
+
+def test_the_example_of_the_docs(lab, tmp_path):
+    measured, squats = lab
+    write_lab(tmp_path / "lab", measured)
+    write_trc(tmp_path / "lab" / "squats.trc", squats.markers)
+    page = (Path(__file__).parents[2] / "docs" / "subject-file.md").read_text(encoding="utf-8")
+    (example,) = [block for block in re.findall(r"```toml\n(.*?)```", page, re.DOTALL) if "kinematics" in block]
+    path = tmp_path / "lab" / "functional.toml"
+    path.write_text(example)
+    ready = prepare_subject(path)
+    assert [one.trial.name for one in ready.functional] == ["squats"]
+    assert set(LEG_AXIS_TILTS) <= set(ready.uncertainty.axes)
 
 
 @pytest.mark.slow
