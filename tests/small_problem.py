@@ -13,16 +13,16 @@ from scipy.spatial.transform import Rotation
 from generic_static import smooth_motion
 from kinertia.estimation.prior import BspPrior, literature_prior
 from kinertia.estimation.simultaneous.calibration_entry import BENDING
-from kinertia.estimation.simultaneous.given import PLACES, SKIN, STILL
+from kinertia.estimation.simultaneous.inputs import PLACES, SKIN, STILL
 from kinertia.estimation.simultaneous.instrument_term import GAINS, ZEROS
 from kinertia.estimation.simultaneous.instrument_term import PLATES as PLATE_ERRORS
 from kinertia.estimation.simultaneous.instruments import InstrumentPrior
 from kinertia.estimation.simultaneous.marker_errors import ErrorProcess
+from kinertia.estimation.simultaneous.mixture_prior import SoundOrFaulty
 from kinertia.estimation.simultaneous.observed_trial import CalibrationPrior, Observation
 from kinertia.estimation.simultaneous.plates import PLATE_UNKNOWNS, FootPlates
 from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.estimation.simultaneous.skin import SkinPatterns
-from kinertia.estimation.simultaneous.sound_or_faulty import SoundOrFaulty
 from kinertia.estimation.simultaneous.start_terms import AWAY_SD, CHANGE_SD
 from kinertia.io.osim.reader import read_osim
 from kinertia.model.anatomy import segment_of

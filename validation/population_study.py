@@ -27,8 +27,8 @@ from kinertia.estimation.simultaneous.instruments import InstrumentPrior
 from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINTY
 from kinertia.estimation.simultaneous.observation import Observations, observe
 from kinertia.estimation.simultaneous.outcome import SimultaneousResult
+from kinertia.estimation.simultaneous.prior_plausibility import unlikeness
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous
-from kinertia.estimation.simultaneous.unlike import unlikeness
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import inverse_dynamics

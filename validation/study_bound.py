@@ -12,7 +12,7 @@ import numpy as np
 
 from kinertia.estimation.calibration import marker_jacobian
 from kinertia.estimation.prior import BspPrior
-from kinertia.estimation.simultaneous.given import BSP
+from kinertia.estimation.simultaneous.inputs import BSP
 from kinertia.estimation.simultaneous.observed_trial import Observation
 from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.model.bsp import block_diagonal

@@ -8,8 +8,8 @@ import pytest
 from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.simultaneous.fisher_information import Information
 from kinertia.estimation.simultaneous.instruments import InstrumentPrior
+from kinertia.estimation.simultaneous.mixture_prior import SoundOrFaulty
 from kinertia.estimation.simultaneous.problem import MapProblem
-from kinertia.estimation.simultaneous.sound_or_faulty import SoundOrFaulty
 from kinertia.studies.drawn_people import held
 from kinertia.synthetic.walk import walking_subject
 from validation import study_bound

@@ -87,13 +87,13 @@ def compile_markers() -> None:
     """Compile the marker terms on a body at rest; they take as long as everything before the estimate."""
     import numpy as np
 
+    from kinertia.estimation.simultaneous.frame_blocks import Stretch
     from kinertia.estimation.simultaneous.marker_errors import ErrorProcess
     from kinertia.estimation.simultaneous.marker_terms import add_markers
     from kinertia.estimation.simultaneous.motion_basis import MotionBasis
     from kinertia.estimation.simultaneous.normal_equations import Gradient, NormalEquations
-    from kinertia.estimation.simultaneous.seen_markers import seen_markers
     from kinertia.estimation.simultaneous.skin import SkinPatterns
-    from kinertia.estimation.simultaneous.stretches import Stretch
+    from kinertia.estimation.simultaneous.visible_markers import seen_markers
     from kinertia.synthetic.walk import walking_subject
 
     gc.disable()

@@ -2,7 +2,7 @@
 
 In some laboratories, all files have the wrong sign of the vertical moments: the free moments are then off by twice
 their own size. The estimates with either sign show which is likelier, for all trials of a person together
-(`simultaneous.evidence`). For 28 measured trials from eight laboratories the log odds of the opposite sign are between
+(`simultaneous.model_evidence`). For 28 measured trials from eight laboratories the log odds of the opposite sign are between
 -50 and -2.6 where the sign is right. Where it is wrong, they are 12 to 59 in walks and squats; in drop jumps, which
 contain little information, 1 and 5.
 
@@ -24,11 +24,11 @@ import numpy as np
 
 from kinertia.estimation.prepared import Prepared
 from kinertia.estimation.simultaneous.calibration_entry import POSITION, CalibrationEntry
-from kinertia.estimation.simultaneous.evidence import FreeMomentSign
 from kinertia.estimation.simultaneous.fit import SimultaneousFit, held_against
 from kinertia.estimation.simultaneous.instrument_errors import OTHER_SIGN
 from kinertia.estimation.simultaneous.instruments import InstrumentPrior
-from kinertia.estimation.simultaneous.sound_or_faulty import SoundOrFaulty
+from kinertia.estimation.simultaneous.mixture_prior import SoundOrFaulty
+from kinertia.estimation.simultaneous.model_evidence import FreeMomentSign
 from kinertia.motion.dynamics import residual
 from kinertia.motion.kinematics import Kinematics
 from kinertia.trial.centre_of_pressure import FIRM_LOAD_N, free_moment, with_turned_free_moments

@@ -12,7 +12,7 @@ import numpy as np
 
 from kinertia.estimation.asymmetry import asymmetries, asymmetry_columns
 from kinertia.estimation.cycles import Kind, Stage, cycle_columns, spatiotemporal_columns
-from kinertia.estimation.fit_pictures import FitPictures
+from kinertia.estimation.figure_names import FitPictures
 from kinertia.estimation.gait_scores import GaitProfile, with_norms
 from kinertia.estimation.identifiability import evidence
 from kinertia.estimation.input_checks import known

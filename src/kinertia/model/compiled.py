@@ -40,7 +40,7 @@ SOURCES = (
     "estimation/simultaneous/root_gradient.py",
     "estimation/simultaneous/root_terms.py",
     "estimation/simultaneous/knot_interval.py",
-    "estimation/simultaneous/seen_markers.py",
+    "estimation/simultaneous/visible_markers.py",
     "estimation/simultaneous/marker_gradient.py",
     "estimation/simultaneous/marker_terms.py",
 )

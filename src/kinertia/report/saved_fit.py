@@ -11,13 +11,13 @@ from kinertia.estimation.identifiability import BaseParameters, Combination
 from kinertia.estimation.result import Fit, TrialFit
 from kinertia.estimation.simultaneous.calibration_entry import CalibrationEntry
 from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
-from kinertia.estimation.simultaneous.evidence import FreeMomentSign
 from kinertia.estimation.simultaneous.fit import Posterior
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation
 from kinertia.estimation.simultaneous.marker_noise import MarkerNoise
-from kinertia.estimation.simultaneous.one_sided import OneSided
+from kinertia.estimation.simultaneous.model_evidence import FreeMomentSign
+from kinertia.estimation.simultaneous.one_sided_mass import OneSided
 from kinertia.estimation.simultaneous.posterior_draws import PosteriorDraws, TrialDraws
-from kinertia.estimation.simultaneous.unlike import Unlikeness
+from kinertia.estimation.simultaneous.prior_plausibility import Unlikeness
 from kinertia.findings.finding import Finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where

@@ -3,7 +3,7 @@
 Candidates are measured trials of a person, or the package's synthetic motions of its own person with skin motion of
 published size in the walk, up to twice that in the others. Nothing is estimated: standard deviations follow from the
 information of each trial at the literature's parameters (`predicted.Information`), which is summed over several trials,
-except for errors that recur (`repetition`).
+except for errors that recur (`error_repetition`).
 """
 
 from __future__ import annotations

@@ -9,9 +9,9 @@ from kinertia.diagnostics.labels.swapped_markers import labels_by_model
 from kinertia.diagnostics.runner import blocking
 from kinertia.diagnostics.subject.unobserved_segments import unobserved_segments
 from kinertia.errors import BlockedError, MarkerSetError, SettingsError, TrialError
-from kinertia.estimation.arm_branch import elbow_rotations, with_elbows_that_bend_forwards
 from kinertia.estimation.calibration import Adaptation, adapt, hold_uninformed, turn_about, without_partly_shown
 from kinertia.estimation.carried_mass import CarriedMass
+from kinertia.estimation.elbow_direction import elbow_rotations, with_elbows_that_bend_forwards
 from kinertia.estimation.input_checks import complete_subject, known
 from kinertia.estimation.population import population_prior
 from kinertia.estimation.prior import literature_prior

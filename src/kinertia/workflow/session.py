@@ -14,8 +14,8 @@ from kinertia.estimation.result import Fit
 from kinertia.estimation.simultaneous.calibration_entry import CalibrationEntry, item_text, quantity_text
 from kinertia.estimation.simultaneous.instrument_errors import laboratory_errors
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation, InstrumentPrior
+from kinertia.estimation.simultaneous.mixture_prior import GaussianPrior
 from kinertia.estimation.simultaneous.plates import PLATE_ERRORS, plates_with_floor
-from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.io.session_file import PersonInstruments

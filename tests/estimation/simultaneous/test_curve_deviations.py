@@ -7,15 +7,15 @@ from kinertia.estimation.simultaneous import curve_deviations as module
 from kinertia.estimation.simultaneous.block_tridiagonal import BlockBand
 from kinertia.estimation.simultaneous.curve_deviations import curve_deviations
 from kinertia.estimation.simultaneous.gauss_newton import GaussNewton
-from kinertia.estimation.simultaneous.given import BSP, PLACES, STILL
+from kinertia.estimation.simultaneous.inputs import BSP, PLACES, STILL
 from kinertia.estimation.simultaneous.instrument_term import CLOCK, PLATES, ZEROS
 from kinertia.estimation.simultaneous.linearised import Point
+from kinertia.estimation.simultaneous.mixture_prior import GaussianPrior
 from kinertia.estimation.simultaneous.moment_derivatives import moment_derivatives
 from kinertia.estimation.simultaneous.outcome import Ended
 from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.estimation.simultaneous.skin_blocks import block_growth
 from kinertia.estimation.simultaneous.solver import _deviations, _roots_in_trials
-from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior
 from kinertia.estimation.simultaneous.static_information import StaticInformation
 from kinertia.motion.dynamics import Motion, inverse_dynamics
 from small_problem import SWITCH_S, curved_problem, point, small_problem

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 import kinertia.estimation.simultaneous.elimination as elimination
-import kinertia.estimation.simultaneous.stretches as limits
+import kinertia.estimation.simultaneous.frame_blocks as limits
 from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations, curve_deviations
+from kinertia.estimation.simultaneous.frame_blocks import Stretch, halves, joined, stretches
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.posterior_draws import _Steps
 from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous
 from kinertia.estimation.simultaneous.static_information import StaticInformation
-from kinertia.estimation.simultaneous.stretches import Stretch, halves, joined, stretches
 from kinertia.motion import two_threads
 from kinertia.synthetic.walk import walk, walking_subject
 from small_problem import point, small_ground, small_problem, small_skin

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinertia.estimation.simultaneous.given import BSP
+from kinertia.estimation.simultaneous.inputs import BSP
 from kinertia.estimation.simultaneous.knot_phases import PHASES, OfPhases, followed
 from kinertia.estimation.simultaneous.linearised import Point
 from small_problem import point, small_problem

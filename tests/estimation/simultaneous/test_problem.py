@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from kinertia.estimation.simultaneous.calibration_entry import BENDING
-from kinertia.estimation.simultaneous.given import BSP, PLACES, SKIN, STILL
+from kinertia.estimation.simultaneous.inputs import BSP, PLACES, SKIN, STILL
 from kinertia.estimation.simultaneous.instrument_term import CLOCK, DELAYS, GAINS, PLATES, ZEROS
 from kinertia.estimation.simultaneous.linearised import Point
+from kinertia.estimation.simultaneous.mixture_prior import GaussianPrior
 from kinertia.estimation.simultaneous.problem import MapProblem
-from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior
 from kinertia.model.log_cholesky import nearest_consistent
 from small_problem import curved_problem, point, residuals, small_problem
 from validation.study_bound import dense_band

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from kinertia.estimation.simultaneous.frame_blocks import Stretch, stretches
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.normal_equations import NormalEquations
 from kinertia.estimation.simultaneous.range_terms import RangeTerms, add_ranges
-from kinertia.estimation.simultaneous.stretches import Stretch, stretches
 from kinertia.model.coordinate_range import CLAMPED_SD, SD, Bounds, Range
 
 RANGES = {"elbow": Range(0.0, 2.6, clamped=True), "shoulder": Range(-1.0, 1.0, clamped=False)}

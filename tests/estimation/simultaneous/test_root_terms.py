@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from kinertia.estimation.simultaneous.given import BSP, STILL
+from kinertia.estimation.simultaneous.inputs import BSP, STILL
 from kinertia.estimation.simultaneous.root_terms import RootFrames, columns_of
 from kinertia.model.log_cholesky import by_body, dynamic_jacobian
 from kinertia.motion.dynamics import Motion, residual_terms, root_regressor

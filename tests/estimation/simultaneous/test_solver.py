@@ -7,11 +7,11 @@ from threadpoolctl import threadpool_limits
 import kinertia.estimation.simultaneous.solver as simultaneous
 from kinertia.estimation.prior import literature_prior, with_symmetry
 from kinertia.estimation.simultaneous.instruments import InstrumentPrior
+from kinertia.estimation.simultaneous.mixture_prior import SoundOrFaulty
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.observed_trial import CalibrationPrior, Observation
 from kinertia.estimation.simultaneous.plates import FLOOR_UNKNOWNS, FootPlates
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous
-from kinertia.estimation.simultaneous.sound_or_faulty import SoundOrFaulty
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.motion.smoothing import smooth
 from kinertia.synthetic.walk import SyntheticTrial, unlike_literature, walk, walking_subject

@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
+from kinertia.estimation.simultaneous.frame_blocks import Stretch
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.normal_equations import NormalEquations
 from kinertia.estimation.simultaneous.start_terms import add_start
-from kinertia.estimation.simultaneous.stretches import Stretch
 from validation.study_bound import dense_band
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from kinertia.estimation.simultaneous.cost_term import CostTerm, Solution
-from kinertia.estimation.simultaneous.given import BSP, FreedModel, Given
+from kinertia.estimation.simultaneous.inputs import BSP, FreedModel, Given
 from kinertia.estimation.simultaneous.layout import Unknowns
 from kinertia.model.bsp import block_diagonal
 from kinertia.model.log_cholesky import nearest_consistent, table_jacobian, to_log_cholesky

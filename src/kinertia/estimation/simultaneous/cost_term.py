@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from kinertia.estimation.simultaneous.given import FreedModel, Given
+from kinertia.estimation.simultaneous.frame_blocks import Stretch
+from kinertia.estimation.simultaneous.inputs import FreedModel, Given
 from kinertia.estimation.simultaneous.layout import Unknowns
+from kinertia.estimation.simultaneous.mixture_prior import GaussianPrior
 from kinertia.estimation.simultaneous.normal_equations import Gradient
 from kinertia.estimation.simultaneous.root_terms import RootFrames
-from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior
-from kinertia.estimation.simultaneous.stretches import Stretch
 from kinertia.motion.ground_reactions import GroundReactions
 
 Derivative = tuple[np.ndarray, Callable[[np.ndarray, np.ndarray], None]]

@@ -2,7 +2,7 @@
 
 They combine the uncertainty of motion, body segment parameters and calibration by the delta method: analytic
 derivatives by spline coefficients and static unknowns, times their posterior covariance. Errors that recur in every
-stride (`repetition`) do not make the motion less certain, only what many frames show of unknowns that do not move: the
+stride (`error_repetition`) do not make the motion less certain, only what many frames show of static unknowns: the
 residual uncertainty of the motion, given these, is due to the errors alone. Only the blocks near the diagonal of the
 coefficients' covariance are needed, since six splines are active in any frame; they come from the block-banded factor
 (`BlockBand.inverse_blocks`) and the static unknowns. They are scaled by the observed size of the underlying errors
@@ -19,12 +19,12 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from kinertia.estimation.simultaneous.elimination import Branch, Eliminated, Factored
+from kinertia.estimation.simultaneous.frame_blocks import Stretch
 from kinertia.estimation.simultaneous.moment_derivatives import MomentDerivatives, moment_derivatives
 from kinertia.estimation.simultaneous.motion_noise import motion_noise
 from kinertia.estimation.simultaneous.normal_equations import SPLINES_PER_BLOCK, by_splines
 from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.estimation.simultaneous.skin_blocks import block_growth
-from kinertia.estimation.simultaneous.stretches import Stretch
 from kinertia.motion.ground_reactions import GroundReactions
 from kinertia.motion.moving_windows import even_mean
 from kinertia.motion.two_threads import side_by_side

@@ -18,11 +18,11 @@ from functools import partial
 
 import numpy as np
 
+from kinertia.estimation.simultaneous.arrays_on_disk import KeptArrays
 from kinertia.estimation.simultaneous.blas import solve_lower
 from kinertia.estimation.simultaneous.block_tridiagonal import BlockBand
-from kinertia.estimation.simultaneous.kept_arrays import KeptArrays
+from kinertia.estimation.simultaneous.frame_blocks import Stretch, halves
 from kinertia.estimation.simultaneous.normal_equations import SPLINES_PER_BLOCK, Gradient, NormalEquations
-from kinertia.estimation.simultaneous.stretches import Stretch, halves
 from kinertia.model.compiled import compiled
 from kinertia.motion.two_threads import side_by_side
 

@@ -13,10 +13,10 @@ from functools import cached_property
 
 import numpy as np
 
-from kinertia.estimation.simultaneous.given import BSP
+from kinertia.estimation.simultaneous.inputs import BSP
 from kinertia.estimation.simultaneous.marker_offsets import as_displaced
+from kinertia.estimation.simultaneous.mixture_prior import GaussianPrior
 from kinertia.estimation.simultaneous.problem import MapProblem
-from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior
 from kinertia.estimation.simultaneous.static_information import StaticInformation
 from kinertia.model.bsp import block_diagonal
 from kinertia.model.log_cholesky import table_jacobian

@@ -12,19 +12,19 @@ from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.simultaneous.bandwidth import Bandwidth
 from kinertia.estimation.simultaneous.calibration_entry import CalibrationEntry
 from kinertia.estimation.simultaneous.cost_term import CostTerm
-from kinertia.estimation.simultaneous.evidence import FreeMomentSign
 from kinertia.estimation.simultaneous.impacts import down_weighted
 from kinertia.estimation.simultaneous.instrument_errors import OTHER_SIGN
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation
 from kinertia.estimation.simultaneous.marker_noise import MarkerNoise
+from kinertia.estimation.simultaneous.model_evidence import FreeMomentSign
 from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINTY, ModelUncertainty
 from kinertia.estimation.simultaneous.observation import Observations, observe, reading
 from kinertia.estimation.simultaneous.observed_trial import CalibrationPrior
 from kinertia.estimation.simultaneous.outcome import SimultaneousResult
 from kinertia.estimation.simultaneous.posterior_draws import PosteriorDraws
+from kinertia.estimation.simultaneous.prior_plausibility import Unlikeness, unlikeness
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous
 from kinertia.estimation.simultaneous.terms import TERMS
-from kinertia.estimation.simultaneous.unlike import Unlikeness, unlikeness
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.gait27 import VIRTUAL_TRUNK
 from kinertia.model.skeleton import Skeleton

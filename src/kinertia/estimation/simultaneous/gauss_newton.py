@@ -9,8 +9,8 @@ import numpy as np
 from kinertia.estimation.simultaneous.elimination import Eliminated
 from kinertia.estimation.simultaneous.linearised import Linearised, Point
 from kinertia.estimation.simultaneous.marker_offsets import Displaced
+from kinertia.estimation.simultaneous.mixture_prior import GaussianPrior
 from kinertia.estimation.simultaneous.problem import MapProblem
-from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior
 from kinertia.estimation.simultaneous.static_information import StaticInformation
 
 

@@ -16,9 +16,9 @@ from kinertia.estimation.simultaneous.calibration_entry import INTERVAL_SD
 from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
 from kinertia.estimation.simultaneous.gauss_newton import GaussNewton
 from kinertia.estimation.simultaneous.linearised import Point
+from kinertia.estimation.simultaneous.mixture_prior import GaussianPrior
 from kinertia.estimation.simultaneous.moment_derivatives import moment_derivatives
 from kinertia.estimation.simultaneous.problem import MapProblem
-from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior
 from kinertia.estimation.simultaneous.static_information import StaticInformation
 
 _MOST_FRAMES = 100

@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 
 from kinertia.estimation.simultaneous.cost_term import LoadTerm, Solution
-from kinertia.estimation.simultaneous.given import FreedModel, Given
+from kinertia.estimation.simultaneous.inputs import FreedModel, Given
 from kinertia.estimation.simultaneous.instrument_errors import FoundErrors, instrument_errors
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation
 from kinertia.estimation.simultaneous.layout import Unknowns
+from kinertia.estimation.simultaneous.mixture_prior import ErrorPriors, SoundOrFaulty
 from kinertia.estimation.simultaneous.plate_loads import GAIN
 from kinertia.estimation.simultaneous.plates import PLATE_ERRORS, ZERO_UNKNOWNS, plates_with_floor
 from kinertia.estimation.simultaneous.plumb_line import TILT_SD_RAD, mean_loads_n
-from kinertia.estimation.simultaneous.sound_or_faulty import ErrorPriors, SoundOrFaulty
 
 PLATES, CLOCK, DELAYS, ZEROS, GAINS = "plates", "clock", "delays", "zeros", "gains"
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from kinertia.estimation.simultaneous.mixture_prior import ErrorPriors, SoundOrFaulty
 from kinertia.estimation.simultaneous.plates import FLOOR_UNKNOWNS, PLATE_UNKNOWNS
-from kinertia.estimation.simultaneous.sound_or_faulty import ErrorPriors, SoundOrFaulty
 from kinertia.settings import Instruments
 from kinertia.trial.plate_names import columns_of_several_trials
 

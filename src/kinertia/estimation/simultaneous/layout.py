@@ -9,7 +9,7 @@ from typing import Literal, Self
 
 import numpy as np
 
-from kinertia.estimation.simultaneous.sound_or_faulty import ErrorPriors
+from kinertia.estimation.simultaneous.mixture_prior import ErrorPriors
 
 _SEEN_BY = ("root", "both", "markers")
 

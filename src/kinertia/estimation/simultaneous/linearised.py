@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinertia.estimation.simultaneous.elimination import Eliminated
-from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior
+from kinertia.estimation.simultaneous.mixture_prior import GaussianPrior
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from kinertia.estimation.simultaneous.marker_errors import LATER
-from kinertia.estimation.simultaneous.seen_markers import PlacedMarkers, SeenMarkers, place_markers
+from kinertia.estimation.simultaneous.visible_markers import PlacedMarkers, SeenMarkers, place_markers
 from kinertia.model.compiled import compiled, part
 from kinertia.model.kinematic_tree import hand_down
 from kinertia.model.spatial import inner

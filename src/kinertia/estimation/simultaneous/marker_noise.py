@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from kinertia.estimation.simultaneous.repetition import Repetition
+from kinertia.estimation.simultaneous.error_repetition import Repetition
 from kinertia.estimation.simultaneous.skin import SkinPatterns
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.frame_chunks import pieces
@@ -35,7 +35,7 @@ class MarkerNoise:
         sd_m: per label, standard deviation of one coordinate in one frame, m, without the part that follows the joints.
         correlation_s: time over which errors are correlated.
         wandering: labels whose standard deviation is more than three times the usual; they drift and are down-weighted.
-        repeats: number of strides in all trials together in which errors recur (`repetition`); 1: they never recur.
+        repeats: number of strides in all trials together in which errors recur (`error_repetition`); 1: never.
         displacement_sd_m: per label, standard deviation of its displacement in this trial (`displacement`), m; 0 for
             one trial.
     """

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from kinertia.estimation.simultaneous.cost_term import CostTerm, Solution
-from kinertia.estimation.simultaneous.given import PLACES, Given
+from kinertia.estimation.simultaneous.inputs import PLACES, Given
 from kinertia.estimation.simultaneous.layout import Unknowns
 
 

@@ -14,13 +14,13 @@ from typing import NamedTuple
 import numpy as np
 
 from kinertia.estimation.simultaneous.cost_term import CostTerm, InTrial
+from kinertia.estimation.simultaneous.frame_blocks import Stretch
 from kinertia.estimation.simultaneous.knot_interval import Interval, longest_run, to_border, to_splines
 from kinertia.estimation.simultaneous.marker_errors import LATER
 from kinertia.estimation.simultaneous.marker_gradient import add_gradient
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.normal_equations import NO_BORDER, Gradient, NormalEquations
-from kinertia.estimation.simultaneous.seen_markers import PlacedMarkers, SeenMarkers, place_markers, seen_markers
-from kinertia.estimation.simultaneous.stretches import Stretch
+from kinertia.estimation.simultaneous.visible_markers import PlacedMarkers, SeenMarkers, place_markers, seen_markers
 from kinertia.model.compiled import compiled, inlined, part
 from kinertia.model.kinematic_tree import hand_down
 from kinertia.model.spatial import inner

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinertia.estimation.simultaneous.axis_columns import add_bodies, take_load
-from kinertia.estimation.simultaneous.given import BSP, STILL
+from kinertia.estimation.simultaneous.inputs import BSP, STILL
 from kinertia.estimation.simultaneous.late_loads import LateLoads, late_loads
 from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.model.log_cholesky import by_body, dynamic_jacobian

@@ -1,6 +1,6 @@
 """Extracts the observations of a measured trial: frames, smoothed loads, skin patterns and marker noise.
 
-Noise is estimated by `marker_noise`. All standard deviations are inflated where errors recur (`repetition`).
+Noise is estimated by `marker_noise`. All standard deviations are inflated where errors recur (`error_repetition`).
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from kinertia.estimation.simultaneous.bandwidth import Bandwidth
+from kinertia.estimation.simultaneous.error_repetition import repeats
 from kinertia.estimation.simultaneous.impacts import impact_factors
 from kinertia.estimation.simultaneous.marker_noise import (
     MarkerNoise,
@@ -25,10 +26,9 @@ from kinertia.estimation.simultaneous.marker_noise import (
 )
 from kinertia.estimation.simultaneous.observed_trial import Observation
 from kinertia.estimation.simultaneous.plates import FootPlates, plate_middles
-from kinertia.estimation.simultaneous.repetition import repeats
 from kinertia.estimation.simultaneous.shoulder_girdle import girdle_variance
 from kinertia.estimation.simultaneous.skin import SkinPatterns, skin_patterns
-from kinertia.estimation.simultaneous.soft_parts import swing_factors
+from kinertia.estimation.simultaneous.soft_tissue import swing_factors
 from kinertia.model.skeleton import GRAVITY_M_S2, Skeleton
 from kinertia.motion.frame_chunks import pieces
 from kinertia.motion.ground_reactions import ground_reactions

@@ -11,13 +11,13 @@ import numpy as np
 from kinertia.estimation.simultaneous.calibration_entry import CalibrationEntry
 from kinertia.estimation.simultaneous.cost_term import Solution
 from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
-from kinertia.estimation.simultaneous.evidence import Evidence
 from kinertia.estimation.simultaneous.instrument_support import InstrumentSupport
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation
 from kinertia.estimation.simultaneous.linearised import Linearised, Point
+from kinertia.estimation.simultaneous.mixture_prior import GaussianPrior
+from kinertia.estimation.simultaneous.model_evidence import Evidence
 from kinertia.estimation.simultaneous.posterior_draws import PosteriorDraws
 from kinertia.estimation.simultaneous.problem import MapProblem
-from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion

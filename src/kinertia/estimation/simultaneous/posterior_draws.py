@@ -21,7 +21,7 @@ from scipy.optimize import least_squares
 
 from kinertia.estimation.simultaneous.elimination import Eliminated, Factored
 from kinertia.estimation.simultaneous.gauss_newton import GaussNewton
-from kinertia.estimation.simultaneous.given import BSP, PLACES, STILL
+from kinertia.estimation.simultaneous.inputs import BSP, PLACES, STILL
 from kinertia.estimation.simultaneous.instrument_term import InstrumentErrors
 from kinertia.estimation.simultaneous.knot_phases import OfPhases, followed
 from kinertia.estimation.simultaneous.linearised import Point

@@ -16,12 +16,12 @@ import numpy as np
 from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.simultaneous.cost_term import CostTerm, GroundLoads, InTrial, Solution
 from kinertia.estimation.simultaneous.elimination import Eliminated
-from kinertia.estimation.simultaneous.given import FreedModel, Given
+from kinertia.estimation.simultaneous.frame_blocks import Stretch, halves, joined, stretches_of_trials
+from kinertia.estimation.simultaneous.inputs import FreedModel, Given
 from kinertia.estimation.simultaneous.layout import Layout
 from kinertia.estimation.simultaneous.linearised import Linearised, Point, Slope
 from kinertia.estimation.simultaneous.normal_equations import Gradient, NormalEquations, UsedAgain
 from kinertia.estimation.simultaneous.observed_trial import CalibrationPrior, Observation
-from kinertia.estimation.simultaneous.stretches import Stretch, halves, joined, stretches_of_trials
 from kinertia.estimation.simultaneous.terms import TERMS
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.two_threads import side_by_side

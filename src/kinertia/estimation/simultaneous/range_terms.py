@@ -18,9 +18,9 @@ import numpy as np
 from scipy.special import expit
 
 from kinertia.estimation.simultaneous.cost_term import CostTerm, InTrial
+from kinertia.estimation.simultaneous.frame_blocks import Stretch
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.normal_equations import Gradient, NormalEquations
-from kinertia.estimation.simultaneous.stretches import Stretch
 from kinertia.model.coordinate_range import Bounds
 
 _ROUNDED = 0.005

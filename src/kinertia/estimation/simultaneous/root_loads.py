@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from kinertia.estimation.simultaneous.cost_term import CostTerm, InTrial
-from kinertia.estimation.simultaneous.given import BSP, FreedModel
+from kinertia.estimation.simultaneous.inputs import BSP, FreedModel
 from kinertia.estimation.simultaneous.normal_equations import Gradient, NormalEquations
 from kinertia.estimation.simultaneous.root_terms import RootFrames, add_root, columns_of
 from kinertia.motion.dynamics import Motion

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kinertia.estimation.simultaneous.given import STILL
+from kinertia.estimation.simultaneous.inputs import STILL
 from kinertia.estimation.simultaneous.layout import Layout
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.normal_equations import NO_BORDER, Gradient, NormalEquations, by_splines

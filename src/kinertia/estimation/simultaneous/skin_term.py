@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from kinertia.estimation.simultaneous.cost_term import CostTerm
-from kinertia.estimation.simultaneous.given import SKIN, FreedModel, Given
+from kinertia.estimation.simultaneous.inputs import SKIN, FreedModel, Given
 from kinertia.estimation.simultaneous.layout import Unknowns
 
 

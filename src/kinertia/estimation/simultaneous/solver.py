@@ -4,11 +4,11 @@ Unknowns are the quintic spline coefficients of every coordinate (uniform knots;
 unknowns of the cost terms that do not move in time (`terms`), some of them displaced in each of several trials
 (`marker_offsets`). The sum of the terms is minimised: squares of marker errors, root residuals and distances from the
 priors, each over its standard deviation. Priors of errors of the ground reactions are Gaussians that are adapted to the
-data (`sound_or_faulty`). Steps are Gauss-Newton (`gauss_newton`), corrected by the gradients along the way
+data (`mixture_prior`). Steps are Gauss-Newton (`gauss_newton`), corrected by the gradients along the way
 (`quasi_newton`), with all derivatives analytic. The normal matrix is block tridiagonal in time with a border of static
 unknowns (`block_tridiagonal`); its Schur complement is the information on them, and its inverse their covariance. The
 estimate is averaged over knot positions (`knot_phases`), some errors have their posterior from the profile of the cost
-(`cost_profile`), and unknowns that only displace others are added at the end (`left_out`).
+(`delay_profile`), and unknowns that only displace others are added at the end (`omitted_unknowns`).
 
 Frames in which forces change faster than the motion can follow have less weight for all unknowns that do not move
 (`impacts`). When these are found, the motion alone is made to follow the forces there, too.
@@ -24,22 +24,22 @@ from typing import NamedTuple
 import numpy as np
 
 from kinertia.estimation.prior import BspPrior
-from kinertia.estimation.simultaneous.cost_profile import CostProfile
 from kinertia.estimation.simultaneous.cost_term import CostTerm
 from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations, curve_deviations
-from kinertia.estimation.simultaneous.evidence import Evidence
+from kinertia.estimation.simultaneous.delay_profile import CostProfile
 from kinertia.estimation.simultaneous.gauss_newton import GaussNewton, MotionAlone
 from kinertia.estimation.simultaneous.instrument_support import instrument_support
 from kinertia.estimation.simultaneous.knot_phases import OfPhases, followed
-from kinertia.estimation.simultaneous.left_out import with_left_out
 from kinertia.estimation.simultaneous.linearised import Linearised, Point, Slope
 from kinertia.estimation.simultaneous.marker_offsets import as_displaced
+from kinertia.estimation.simultaneous.mixture_prior import ErrorPriors, GaussianPrior
+from kinertia.estimation.simultaneous.model_evidence import Evidence
 from kinertia.estimation.simultaneous.observed_trial import CalibrationPrior, Observation
+from kinertia.estimation.simultaneous.omitted_unknowns import with_left_out
 from kinertia.estimation.simultaneous.outcome import Ended, SimultaneousResult, result_of
 from kinertia.estimation.simultaneous.posterior_draws import of_knots, of_root, posterior_draws
 from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.estimation.simultaneous.quasi_newton import SecantPairs
-from kinertia.estimation.simultaneous.sound_or_faulty import ErrorPriors, GaussianPrior
 from kinertia.estimation.simultaneous.static_information import StaticInformation
 from kinertia.estimation.simultaneous.terms import TERMS
 from kinertia.model.skeleton import Skeleton

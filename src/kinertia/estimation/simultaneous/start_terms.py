@@ -11,8 +11,8 @@ from __future__ import annotations
 import numpy as np
 
 from kinertia.estimation.simultaneous.cost_term import CostTerm, InTrial
+from kinertia.estimation.simultaneous.frame_blocks import Stretch
 from kinertia.estimation.simultaneous.normal_equations import Gradient, NormalEquations
-from kinertia.estimation.simultaneous.stretches import Stretch
 
 CHANGE_SD, AWAY_SD = 1.0, 30.0
 """Standard deviations (rad or m): of the difference from one coefficient to the next, and of each by itself."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from kinertia.estimation.simultaneous.calibration_entry import AXIS, CENTRE, CalibrationEntry
 from kinertia.estimation.simultaneous.cost_term import CostTerm, Solution
-from kinertia.estimation.simultaneous.given import STILL, Given
+from kinertia.estimation.simultaneous.inputs import STILL, Given
 from kinertia.estimation.simultaneous.layout import Unknowns
 from kinertia.model.centre_offsets import joint_and_axis
 

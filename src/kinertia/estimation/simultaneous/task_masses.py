@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from kinertia.estimation.simultaneous.cost_term import CostTerm
-from kinertia.estimation.simultaneous.given import BSP
+from kinertia.estimation.simultaneous.inputs import BSP
 from kinertia.model.anatomy import segment_of
 from kinertia.model.skeleton import Skeleton
 

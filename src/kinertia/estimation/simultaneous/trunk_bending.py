@@ -19,10 +19,10 @@ import numpy as np
 
 from kinertia.estimation.simultaneous.calibration_entry import BENDING, CalibrationEntry
 from kinertia.estimation.simultaneous.cost_term import CostTerm, Solution
-from kinertia.estimation.simultaneous.given import FreedModel, Given
+from kinertia.estimation.simultaneous.inputs import FreedModel, Given
 from kinertia.estimation.simultaneous.layout import Unknowns
+from kinertia.estimation.simultaneous.mixture_prior import ErrorPriors, SoundOrFaulty
 from kinertia.estimation.simultaneous.root_terms import OfSegment, RootFrames
-from kinertia.estimation.simultaneous.sound_or_faulty import ErrorPriors, SoundOrFaulty
 from kinertia.model.anatomy import segment_of
 from kinertia.model.bsp import BodySegmentParameters
 

@@ -16,8 +16,8 @@ import numpy as np
 
 from kinertia.estimation.simultaneous.gauss_newton import GaussNewton
 from kinertia.estimation.simultaneous.linearised import Linearised, Point
+from kinertia.estimation.simultaneous.mixture_prior import ErrorPriors, GaussianPrior
 from kinertia.estimation.simultaneous.problem import MapProblem
-from kinertia.estimation.simultaneous.sound_or_faulty import ErrorPriors, GaussianPrior
 
 _HELD = 1e6
 """Information that fixes the delay where the profile is evaluated, relative to what is known of it."""

@@ -6,9 +6,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from kinertia.estimation.simultaneous import cost_profile
-from kinertia.estimation.simultaneous.cost_profile import CostProfile
-from kinertia.estimation.simultaneous.sound_or_faulty import ErrorPriors, GaussianPrior, SoundOrFaulty
+from kinertia.estimation.simultaneous import delay_profile
+from kinertia.estimation.simultaneous.delay_profile import CostProfile
+from kinertia.estimation.simultaneous.mixture_prior import ErrorPriors, GaussianPrior, SoundOrFaulty
 
 CLOCK, OWN = SoundOrFaulty(0.0003, 0.008, 0.3), SoundOrFaulty(0.00003, 0.01, 0.05)
 SHOWN_S, SD_S = 0.004, 0.0015
@@ -56,7 +56,7 @@ def model_of(here: Quadratic, n: int):
 def found(monkeypatch, priors) -> tuple[CostProfile, np.ndarray]:
     """And the posterior covariance of everything."""
     one, n = problem(priors), len(priors)
-    monkeypatch.setattr(cost_profile, "GaussNewton", SimpleNamespace(of=lambda problem, here: model_of(here, n)))
+    monkeypatch.setattr(delay_profile, "GaussNewton", SimpleNamespace(of=lambda problem, here: model_of(here, n)))
     gaussian, here = GaussianPrior.of(one.layout.error_priors), Quadratic(information(n, 2.0))
 
     def search(model, held: GaussianPrior) -> Place:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kinertia.estimation.prior import literature_prior, updated
-from kinertia.estimation.simultaneous.unlike import unlikeness
+from kinertia.estimation.simultaneous.prior_plausibility import unlikeness
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.synthetic.walk import walking_subject
 

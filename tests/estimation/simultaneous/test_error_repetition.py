@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from kinertia.estimation.simultaneous.repetition import Repetition, repeats
+from kinertia.estimation.simultaneous.error_repetition import Repetition, repeats
 
 STRIDE = 60
 

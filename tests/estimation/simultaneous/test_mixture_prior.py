@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from kinertia.estimation.simultaneous.sound_or_faulty import ErrorPriors, GaussianPrior, SoundOrFaulty, log_chance
+from kinertia.estimation.simultaneous.mixture_prior import ErrorPriors, GaussianPrior, SoundOrFaulty, log_chance
 
 PLATE = SoundOrFaulty(0.001, 0.015, 0.1)
 

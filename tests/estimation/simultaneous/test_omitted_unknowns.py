@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from kinertia.estimation.simultaneous.left_out import with_left_out
+from kinertia.estimation.simultaneous.omitted_unknowns import with_left_out
 
 
 @pytest.mark.parametrize("count", [1, 2])

@@ -16,8 +16,8 @@ import numpy as np
 
 from kinertia.estimation.simultaneous.gauss_newton import GaussNewton
 from kinertia.estimation.simultaneous.linearised import Slope
+from kinertia.estimation.simultaneous.mixture_prior import GaussianPrior, log_chance
 from kinertia.estimation.simultaneous.observed_trial import Observation
-from kinertia.estimation.simultaneous.sound_or_faulty import GaussianPrior, log_chance
 
 _WRONG_ODDS = 0.25
 """Prior odds of a wrong to a right sign: two of some ten laboratories had it wrong."""

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
 from kinertia.errors import KinertiaError
-from kinertia.estimation.simultaneous.kept_arrays import KeptArrays
+from kinertia.estimation.simultaneous.arrays_on_disk import KeptArrays
 
 ARRAY = arrays.arrays(
     st.sampled_from([np.float64, np.float32]), arrays.array_shapes(max_dims=3, min_side=0, max_side=4)
