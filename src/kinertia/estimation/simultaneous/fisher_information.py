@@ -32,7 +32,7 @@ class Information:
     Attributes:
         problem: the estimate at whose start it is evaluated: the observations' coordinates, the prior's mean. It holds
             each trial's own observations (`observation.Observations`): repeats are counted here.
-        repeats: (t, t) how often the errors of each trial recur in each (`repetition.repeats`).
+        repeats: (t, t) how often the errors of each trial recur in each (`error_repetition.repeats`).
     """
 
     problem: MapProblem
