@@ -58,6 +58,7 @@ _STAYS_M = 1e-4
 """SD (m) of markers that have been adapted already."""
 _FAR_M = 0.03
 _ARM_ROTATION_SD_RAD = 1.0
+_ARMS = frozenset(f"{name}_{side}" for side in "rl" for name in ARM_SEGMENTS)
 _TURNED_RAD = 0.25
 """The skin turns the markers about the torso by 2 to 6 degrees; shoulders without a third axis, in a run, by 38."""
 
@@ -87,7 +88,7 @@ class Calibrated:
 def calibrate(
     model: Gait27, trials: Sequence[Trial], acromia: Sequence[str] = (), free_axes: bool = False
 ) -> Calibrated:
-    """The skeleton of the 27-DOF model as the static trial gives it, adapted to the trials.
+    """Adapt the skeleton of the 27-DOF model, as the static trial gives it, to the trials.
 
     Markers of pelvis, legs and feet are held to the static trial by a deviation of 10 mm, those of torso and arms and
     the shoulder centres by 40 mm, free axes of knees and ankles by 5 degrees. Axes are adapted to all trials, markers
@@ -105,8 +106,7 @@ def calibrate(
     found = [one for trial in trials for one in labels_by_model(skeleton, trial)]
     everywhere = set(model.skeleton.labels).intersection(*(trial.markers.labels for trial in trials))
     skeleton, head = without_head(skeleton, acromia, everywhere)
-    upper = {"torso", *(f"{name}_{side}" for side in "rl" for name in ("upper_arm", "forearm"))}
-    marker_sd = {s: UPPER_BODY_SD_M if s in upper else LOWER_BODY_SD_M for s in model.skeleton.segments}
+    marker_sd = {s: UPPER_BODY_SD_M if s in _ARMS or s == "torso" else LOWER_BODY_SD_M for s in model.skeleton.segments}
     coordinate_sd = dict.fromkeys(SHOULDER_OFFSETS, UPPER_BODY_SD_M) | dict.fromkeys(
         ARM_ROTATIONS, _ARM_ROTATION_SD_RAD
     )
@@ -129,7 +129,7 @@ def _with_axes(
     marker_sd_m: Mapping[str, float],
     coordinate_sd: Mapping[str, float],
 ) -> Skeleton:
-    """The skeleton with the axes of knees and ankles as all trials show them; all else stays."""
+    """Return the skeleton with axes of knees and ankles adapted to all trials, and nothing else changed."""
     free = {**coordinate_sd, **dict.fromkeys(LEG_AXIS_TILTS, JOINT_AXIS_SD_RAD)}
     found = adapt(skeleton, trials, poses, marker_sd_m, free).coordinates
     return skeleton.lock({name: found[name] for name in LEG_AXIS_TILTS})
@@ -138,7 +138,7 @@ def _with_axes(
 def _of_forces(
     trials: Sequence[Trial], poses: list[InverseKinematics]
 ) -> tuple[Sequence[Trial], list[InverseKinematics]]:
-    """Trials whose forces are used, and their poses; all where there are none."""
+    """Return the trials whose forces are used, with their poses; all of them where there is none."""
     used = [k for k, trial in enumerate(trials) if trial.loads.plates] or range(len(trials))
     return [trials[k] for k in used], [poses[k] for k in used]
 
@@ -151,12 +151,11 @@ def _arms_last(
     coordinate_sd: Mapping[str, float],
 ) -> Adaptation:
     """Adapt the body without the markers of its arms, then the arms on a body that stays unchanged."""
-    arms = {f"{name}_{side}" for side in "rl" for name in ARM_SEGMENTS}
-    worn = [marker for marker in skeleton.markers if marker.segment in arms]
-    armless = skeleton.with_markers([marker for marker in skeleton.markers if marker.segment not in arms])
+    worn = [marker for marker in skeleton.markers if marker.segment in _ARMS]
+    armless = skeleton.with_markers([marker for marker in skeleton.markers if marker.segment not in _ARMS])
     body = adapt(armless, trials, poses, marker_sd_m, {})
     whole = body.skeleton.with_markers([*body.skeleton.markers, *worn])
-    staying = {segment: sd if segment in arms else _STAYS_M for segment, sd in marker_sd_m.items()}
+    staying = {segment: sd if segment in _ARMS else _STAYS_M for segment, sd in marker_sd_m.items()}
     adapted = adapt(whole, trials, poses, staying, coordinate_sd)
     return replace(adapted, moved_m={**adapted.moved_m, **body.moved_m})
 
