@@ -22,7 +22,7 @@ CORRECTED = [
     with_evidence(
         "P215",
         Where(trial="walk", plate="plate 1", **ALONG_Z),
-        {"zero_n": Quantity(6.5, "N", usual=(-2.4, 2.4), sd=0.9), **CLEAR},
+        {"zero_offset_n": Quantity(6.5, "N", usual=(-2.4, 2.4), sd=0.9), **CLEAR},
     ),
     with_evidence("T214", Where(), {"delay_s": Quantity(0.0071, "s", sd=0.0006), **CLEAR}),
 ]

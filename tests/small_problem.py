@@ -18,7 +18,7 @@ from kinertia.estimation.simultaneous.instrument_term import GAINS, ZEROS
 from kinertia.estimation.simultaneous.instrument_term import PLATES as PLATE_ERRORS
 from kinertia.estimation.simultaneous.instruments import InstrumentPrior
 from kinertia.estimation.simultaneous.marker_errors import ErrorProcess
-from kinertia.estimation.simultaneous.mixture_prior import SoundOrFaulty
+from kinertia.estimation.simultaneous.mixture_prior import FaultMixture
 from kinertia.estimation.simultaneous.observed_trial import CalibrationPrior, Observation
 from kinertia.estimation.simultaneous.plates import PLATE_UNKNOWNS, FootPlates
 from kinertia.estimation.simultaneous.problem import MapProblem
@@ -36,11 +36,11 @@ from pinocchio_model import axis_forces, pin, pinocchio_model
 
 KEPT = ("R.ASIS", "V.Sacral", "L.Shank.Front", "L.Heel", "R.Toe.Tip", "L.Elbow", "Sternum")
 """A marker or two per segment: the Jacobian does not ask whether they determine every coordinate."""
-PLATES = {name: SoundOrFaulty.certain(sd) for name, sd in zip(PLATE_UNKNOWNS, (0.02, 0.03, 0.02, 0.01), strict=True)}
-FLOOR = {"x": SoundOrFaulty.certain(0.015), "z": SoundOrFaulty(0.005, 0.02, 0.3), "turn": SoundOrFaulty.certain(0.03)}
-CLOCK = SoundOrFaulty.certain(0.01)
-ZERO_N = SoundOrFaulty(2.0, 9.0, 0.2)
-INSTRUMENTS = InstrumentPrior(PLATES, FLOOR, CLOCK, zero_n=ZERO_N)
+PLATES = {name: FaultMixture.certain(sd) for name, sd in zip(PLATE_UNKNOWNS, (0.02, 0.03, 0.02, 0.01), strict=True)}
+FLOOR = {"x": FaultMixture.certain(0.015), "z": FaultMixture(0.005, 0.02, 0.3), "turn": FaultMixture.certain(0.03)}
+CLOCK = FaultMixture.certain(0.01)
+ZERO_N = FaultMixture(2.0, 9.0, 0.2)
+INSTRUMENTS = InstrumentPrior(PLATES, FLOOR, CLOCK, zero_offset_n=ZERO_N)
 SWITCH_S = 0.1
 """When the right foot steps from one plate to another, without a flight."""
 NOISE_N = 0.7
@@ -161,7 +161,7 @@ def residuals(problem: MapProblem, k: int, coefficients: np.ndarray, static: np.
             along = [next(coefficient) for _ in range(3)]
             positions[:, m] += skin.values[:, pattern, None] * (pose.rotation[:, segment] @ along)
     errors = whitened(trial.markers - positions, *trial.marker_process)
-    loads = trial.ground.loads(trial.time + problem.loads.late_s(k, static)).reshape(len(trial.time), 2, 6)
+    loads = trial.ground.loads(trial.time + problem.loads.delay_s(k, static)).reshape(len(trial.time), 2, 6)
     *floor, angle = static[layout[PLATE_ERRORS]][-3:]
     of_plates = np.add(static[layout[PLATE_ERRORS]][:-3].reshape(-1, 4), [*floor, 0.0, 0.0])
     values = dict(zip(problem.given.plates, of_plates, strict=True))
@@ -175,7 +175,7 @@ def residuals(problem: MapProblem, k: int, coefficients: np.ndarray, static: np.
     zero_x, zero_z = np.moveaxis(own_zeros[trial.ground.carrier], -1, 0)
     middle = trial.ground.middles[trial.ground.carrier]
     zero = np.stack([zero_x, np.zeros_like(x), zero_z], axis=-1) @ trial.ground.turn.T
-    zero *= trial.ground.loaded(trial.time + problem.loads.late_s(k, static))[..., None]
+    zero *= trial.ground.loaded(trial.time + problem.loads.delay_s(k, static))[..., None]
     loads -= np.concatenate([zero, np.cross(middle, zero)], axis=-1)
     back = Rotation.from_rotvec([0.0, -angle, 0.0]).as_matrix()
     about = (loads[..., 3:] - np.cross(middle, loads[..., :3])) @ back.T

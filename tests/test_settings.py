@@ -29,4 +29,4 @@ def test_a_cutoff_that_is_none(wrong):
 def test_what_is_known_of_instruments_goes_to_other_processes(known):
     """With it all that is prepared of a person."""
     for again in (pickle.loads(pickle.dumps(known)), copy.deepcopy(known)):
-        assert (again.plate, again.floor, again.clock_s) == (known.plate, known.floor, known.clock_s)
+        assert (again.plate, again.floor, again.delay_s) == (known.plate, known.floor, known.delay_s)

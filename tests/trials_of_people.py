@@ -52,16 +52,16 @@ class Trials:
     def names(self) -> tuple[str, str, str]:
         return self.person.trials
 
-    def context(self, name: str, forces: str | None = None, late_s: float = 0.0) -> RecordingContext:
+    def context(self, name: str, forces: str | None = None, delay_s: float = 0.0) -> RecordingContext:
         """The recording of this name.
 
         Args:
             name: of the trial.
             forces: the trial whose forces it has; its own if None.
-            late_s: by how much they are late.
+            delay_s: by how much they are late.
         """
         recording = self.read(*self.person.files(name, forces))
-        plates = replace(recording.plates, time=recording.plates.time + late_s)
+        plates = replace(recording.plates, time=recording.plates.time + delay_s)
         return RecordingContext(replace(recording, plates=plates, name=name), self.marker_set)
 
     def together(self, contexts: Sequence[RecordingContext]) -> PersonContext:

@@ -53,7 +53,7 @@ PROOF = {
     "artefact_calibration": Scenario("skin motion, calibration errors", Faults("artefact", calibration=True)),
     "faults": Scenario(
         "skin motion; left plate 20 mm off, forces 10 ms late, hip centres 10 mm off",
-        Faults("artefact", hips_m=0.010, plate_m=0.020, late_s=0.010),
+        Faults("artefact", hips_m=0.010, plate_m=0.020, delay_s=0.010),
     ),
     "mixed": Scenario(
         "skin motion, two thirds of it linear in joint angles, calibration errors", Faults("mixed", calibration=True)
@@ -65,7 +65,7 @@ PROOF = {
     "walks": Scenario("skin motion, twelve strides at two paces", Faults("artefact"), others=("walk", "fast walk")),
     "faulty_walks": Scenario(
         "skin motion; left plate 20 mm off, forces 10 ms late, hip centres 10 mm off; three walks of a session",
-        Faults("artefact", hips_m=0.010, plate_m=0.020, late_s=0.010),
+        Faults("artefact", hips_m=0.010, plate_m=0.020, delay_s=0.010),
         others=("walk", "fast walk"),
     ),
     "session": Scenario(

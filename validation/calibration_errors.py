@@ -28,12 +28,12 @@ class Disturbance:
 
     Attributes:
         plate_m: displacement of the recorded right foot's plate along the walk.
-        clock_s: delay of the recorded forces.
+        delay_s: delay of the recorded forces.
         hips_m: forward displacement of both hips of the model from the person's.
     """
 
     plate_m: float = 0.0
-    clock_s: float = 0.0
+    delay_s: float = 0.0
     hips_m: float = 0.0
 
 
@@ -42,7 +42,7 @@ LARGEST = Disturbance(0.020, 0.010, 0.010)
 DISTURBANCES = {
     "nothing wrong": Disturbance(),
     "right plate 20 mm off": Disturbance(plate_m=0.020),
-    "forces 10 ms late": Disturbance(clock_s=0.010),
+    "forces 10 ms late": Disturbance(delay_s=0.010),
     "hips 10 mm off": Disturbance(hips_m=0.010),
     "all three": LARGEST,
 }
@@ -71,7 +71,7 @@ def calibrated(disturbance: Disturbance, seed: int, duration_s: float = 2.5, com
     person = unlike_literature(walking_subject(), rng)
     trial = walk(person, duration_s, trapezoid=False)
     noisy = camera_noise(trial.markers, 0.001, rng)
-    late = smooth(trial.time, trial.foot_loads.reshape(len(trial.time), 12), 40.0)(trial.time - disturbance.clock_s)
+    late = smooth(trial.time, trial.foot_loads.reshape(len(trial.time), 12), 40.0)(trial.time - disturbance.delay_s)
     loads = late.reshape(-1, 2, 6)
     loads[:, 0, 3:] += np.cross([disturbance.plate_m, 0.0, 0.0], loads[:, 0, :3])
     wrong = {name: disturbance.hips_m if "_x_" in name else 0.0 for name in HIP_OFFSETS}
@@ -90,7 +90,7 @@ def calibrated(disturbance: Disturbance, seed: int, duration_s: float = 2.5, com
     plate, delay = entries["right foot", "position", "x"], entries[None, "delay", None]
     deviations = {
         "right plate, x": (disturbance.plate_m - plate.value, plate.sd),
-        "clock": (delay.value - disturbance.clock_s, delay.sd),
+        "clock": (delay.value - disturbance.delay_s, delay.sd),
         "right hip, x": result.coordinates["hip_x_r"],
         "left hip, x": result.coordinates["hip_x_l"],
     }

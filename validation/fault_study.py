@@ -131,7 +131,7 @@ def sound_laboratories(folder: Path, count: int) -> dict[str, SubjectFile]:
         recorded = write_lab(folder / f"{number} lab", record(person, trial, noise, rng, _SAMPLES_PER_FRAME))
         measured = read_measured(read_subject(recorded), rng)
         x, z, gain, turn = (
-            float(rng.normal(0.0, prior.sound_sd))
+            float(rng.normal(0.0, prior.nominal_sd))
             for prior in (FLOOR_PRIOR["x"], FLOOR_PRIOR["z"], PLATE_PRIOR["gain"], FLOOR_PRIOR["turn"])
         )
         for change in (

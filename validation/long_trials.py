@@ -47,7 +47,7 @@ class Long:
     Attributes:
         plates_hz: samples of the force plates per second.
         kinematics_s, estimate_s: seconds of processor time.
-        clock_s: wall-clock seconds of both, in two threads where there are two cores.
+        wall_clock_s: wall-clock seconds of both, in two threads where there are two cores.
         before_mb, kinematics_mb, estimate_mb: peak memory until the data are loaded, until inverse kinematics and
             smoothing are done, and until the end.
         iterations: Gauss-Newton steps.
@@ -62,7 +62,7 @@ class Long:
     kinematics_mb: float
     estimate_mb: float
     iterations: int
-    clock_s: float
+    wall_clock_s: float
 
 
 def stride(plates_hz: float = RATE_HZ) -> tuple[SyntheticTrial, BspPrior, Markers, np.ndarray]:
@@ -114,8 +114,8 @@ def measured(minutes: float, plates_hz: float) -> Long:
     marks.append((time.process_time(), _most_mb()))
     (begun, before), (solved, kinematics_mb), (ended, estimate_mb) = marks
     spent = (solved - begun, ended - solved, before, kinematics_mb, estimate_mb)
-    clock_s = time.perf_counter() - started
-    return Long(minutes, len(trial.markers.time), plates_hz, *spent, fitted.result.iterations, clock_s)
+    wall_clock_s = time.perf_counter() - started
+    return Long(minutes, len(trial.markers.time), plates_hz, *spent, fitted.result.iterations, wall_clock_s)
 
 
 def in_own_process(minutes: float, plates_hz: float = RATE_HZ) -> Long:
@@ -150,7 +150,7 @@ def document(walks: list[Long]) -> str:
             f"{w.estimate_s:.1f}",
             str(w.iterations),
             f"{1e3 * (w.kinematics_s + w.estimate_s) / w.frames:.2f}",
-            f"{1e3 * w.clock_s / w.frames:.2f}",
+            f"{1e3 * w.wall_clock_s / w.frames:.2f}",
         ]
         for w in walks
     ]

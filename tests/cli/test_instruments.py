@@ -67,16 +67,16 @@ def test_a_fit_leaves_out_what_it_has_said_itself(session, c3d_lab, tmp_path):
 def test_what_the_laboratory_states_is_used_and_checked(c3d_lab, tmp_path):
     ready = prepare_subject(subject_with(tmp_path, c3d_lab, "plate_sd_mm = 2\nclock_sd_ms = 0.5"))
     known = ready.uncertainty.instruments
-    assert (known.plate["x"].sd, known.clock_s.sd) == (0.002, 0.0005)
+    assert (known.plate["x"].sd, known.delay_s.sd) == (0.002, 0.0005)
     outcome = run("fit", subject_with(tmp_path, c3d_lab, "plate_sd_mm = -2"), "-o", tmp_path / "out")
     assert outcome.status == 2
     assert "plate_sd_mm = -2" in outcome.err
 
 
 def test_people_who_contradict_each_other_are_named():
-    def person(name, late_s):
+    def person(name, delay_s):
         information = np.diag([1e4] * 7 + [1e8])
-        right = tuple((information @ [*[0.0] * 7, late_s]).tolist())
+        right = tuple((information @ [*[0.0] * 7, delay_s]).tolist())
         rows = tuple(map(tuple, information.tolist()))
         return PersonInstruments(name=name, files=(name,), plates=("plate 1",), information=rows, right=right)
 

@@ -96,7 +96,7 @@ def test_torques_in_newton_millimetres(lab):
     scale_forces(lab / "walk.mot", "torque", 1000.0)
     refusal = refused(lab)
     expect_found(refusal, "P203", {"trial": "walk"})
-    arms = {found["where"]["plate"]: found["evidence"]["arm_m"]["value"] for found in refusal.blocking}
+    arms = {found["where"]["plate"]: found["evidence"]["lever_arm_m"]["value"] for found in refusal.blocking}
     assert set(arms) == {"right", "left"}
     assert min(arms.values()) > 3.0
     assert_checked(lab, "P203")

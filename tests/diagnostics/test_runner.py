@@ -55,7 +55,7 @@ def test_a_correction_resolves_the_warning_about_the_same_plate():
     resolving = next(one for one in all_rules().values() if "P213" in one.resolves or "P212" in one.resolves)
     code = next(one for one in resolving.resolves if one in ("P212", "P213"))
     warned = finding(code, warning.where, level_n=Quantity(20.0, "N"))
-    corrected = finding(resolving.code, Where(trial="walk", plate="left"), zero_n=Quantity(6.0, "N"))
+    corrected = finding(resolving.code, Where(trial="walk", plate="left"), zero_offset_n=Quantity(6.0, "N"))
     result = {one.code: one for one in explained([warned, corrected])}
     assert (result[code].severity, result[code].muted_by) == (Severity.CORRECTED, resolving.code)
 

@@ -47,11 +47,11 @@ def test_more_measurements_say_more():
 
 def test_slopes_are_those_of_one_measure_at_a_time():
     man = MAN.measures_m
-    values = body_measures._told(man, 0.08)
+    values = body_measures._predicted(man, 0.08)
     slopes = body_measures._slopes(man, 0.08, values)
     for k in (*range(0, len(man), 7), NAMES.index("trunk_hip_girth")):
         moved = man * np.exp(1e-4 * np.eye(len(man))[k])
-        alone = (body_measures._told(moved, 0.08) - values).ravel() / 1e-4
+        alone = (body_measures._predicted(moved, 0.08) - values).ravel() / 1e-4
         np.testing.assert_allclose(slopes[:, k], alone, atol=1e-9)
 
 

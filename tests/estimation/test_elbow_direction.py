@@ -37,5 +37,5 @@ def test_elbows_bend_forwards_and_the_trunk_faces_where_its_markers_do(measured_
         assert np.median(q[:, names.index(f"elbow_flex_{side}")]) > np.radians(60)
     torso = ready.skeleton.pose(q).rotation[:, ready.skeleton.segments.index("torso")]
     markers = kinematics.trial.markers
-    right, left = (markers.positions[:, markers.labels.index(f"{side}.Acromium")] for side in "RL")
-    assert np.nanmean(heading_deg(torso[..., 2])) == pytest.approx(np.nanmean(heading_deg(right - left)), abs=5.0)
+    rhs, left = (markers.positions[:, markers.labels.index(f"{side}.Acromium")] for side in "RL")
+    assert np.nanmean(heading_deg(torso[..., 2])) == pytest.approx(np.nanmean(heading_deg(rhs - left)), abs=5.0)

@@ -95,6 +95,6 @@ def test_a_plate_that_only_one_of_both_signs_displaces_stays(said_by, disputed):
     )
     known = with_undisputed_plates(prior, [error])
     assert (known is not prior) == disputed
-    assert known.plate["x"].faulty_share == (0.0 if disputed else prior.plate["x"].faulty_share)
+    assert known.plate["x"].fault_probability == (0.0 if disputed else prior.plate["x"].fault_probability)
     assert known.plate["x"].sd == pytest.approx(prior.plate["x"].sd)
     assert known.plate["z"] == prior.plate["z"]

@@ -40,7 +40,7 @@ def estimate(person, mean, covariance):
     """Of one person with this prior: mean and deviations."""
     inverse = np.linalg.inv(covariance)
     posterior = np.linalg.inv(person.information + inverse)
-    return posterior @ (person.right + inverse @ mean), np.sqrt(np.diag(posterior))
+    return posterior @ (person.rhs + inverse @ mean), np.sqrt(np.diag(posterior))
 
 
 @pytest.mark.slow
@@ -63,7 +63,7 @@ def test_left_out_people_are_estimated_better_and_their_error_bars_hold():
 
 def test_where_people_say_nothing_the_mean_stays_and_bars_grow():
     _, _, people = group(np.random.default_rng(0), 20)
-    silent = [replace(one, information=np.zeros((SIZE, SIZE)), right=np.zeros(SIZE)) for one in people]
+    silent = [replace(one, information=np.zeros((SIZE, SIZE)), rhs=np.zeros(SIZE)) for one in people]
     learnt = learn(silent)
     np.testing.assert_allclose(learnt.mean, 0.0, atol=1e-12)
     np.testing.assert_allclose(np.diag(learnt.covariance), BETWEEN + WITHIN, rtol=1e-6)
@@ -88,7 +88,7 @@ def test_the_mean_of_obese_people_is_recovered_and_left_out_people_profit(fit):
 
     truth = [relative(obese.draw(rng)) for _ in range(100)]
     people = [
-        replace(seen, name=f"p{k}", right=seen.information @ body + root @ rng.standard_normal(len(sd)))
+        replace(seen, name=f"p{k}", rhs=seen.information @ body + root @ rng.standard_normal(len(sd)))
         for k, body in enumerate(truth)
     ]
     learnt, shift = learn(people[:60]), relative(obese.mean)

@@ -29,7 +29,7 @@ def test_what_is_taken_out_of_an_estimate_does_not_depend_on_its_prior():
         estimate, covariance = person.with_prior(prior)
         out = person_information("", PRIOR, prior, estimate, covariance)
         np.testing.assert_allclose(out.information, person.information, atol=1e-4 * np.abs(person.information).max())
-        np.testing.assert_allclose(out.right, person.right, atol=1e-4 * np.abs(person.right).max())
+        np.testing.assert_allclose(out.rhs, person.rhs, atol=1e-4 * np.abs(person.rhs).max())
         again, _ = out.with_prior(far)
         np.testing.assert_allclose(again.table(), person.with_prior(far)[0].table(), atol=1e-3)
 

@@ -93,7 +93,7 @@ def test_people_are_expected_from_the_four_others_within_the_deviations(monkeypa
             rest = fitted(np.delete(people, k, axis=0), np.delete(masses, k))
             monkeypatch.setattr(body_measures, "usual_build", lambda rest=rest: rest)
             body_measures._shape_and_spread.cache_clear()
-            own = body_measures._told(person, 0.08)
+            own = body_measures._predicted(person, 0.08)
             lengths = {name: person[NAMES.index(name)] for name in ("leg_knee_length", "leg_ankle_length")}
             made = {one.name: (person[j], one.sd_m) for j, one in enumerate(measures()) if one.first}
             (height_m,) = stature_m(person[None])

@@ -57,7 +57,7 @@ def test_free_moments_in_newton_millimetres_are_seen_from_their_size(write):
     turn = ground_rotation("+Z")
     plates, findings = read_cortex_forces(write(rows(free_unit=1e-3)), turn)
     expect_step(plates, turn)
-    found = only(findings, "F152", unit="N mm", arm_m=FREE_NM / 0.7)
+    found = only(findings, "F152", unit="N mm", lever_arm_m=FREE_NM / 0.7)
     assert (found.where.plate, found.severity) == ("plate 1", Severity.CORRECTED)
 
 

@@ -126,7 +126,7 @@ def test_lengths_on_a_belt_that_speeds_up(walked, trial):
     """Standing feet tell one speed for all strides; the stated one is each stride's."""
     time = walked.time
     belt = Belt(time, 0.6 + 0.5 * time)
-    way = np.array([belt.way_m(0.0, t) for t in time])
+    way = np.array([belt.distance_m(0.0, t) for t in time])
     slid = trial.markers.positions - way[:, None, None] * [1.0, 0.0, 0.0]
     kinematics = kinematics_of(walked, replace(trial, markers=replace(trial.markers, positions=slid)))
     strides = strides_of(walked.skeleton, kinematics)
@@ -237,14 +237,14 @@ def test_turning_points_are_maxima_that_rise_enough():
     assert turning_points(np.arange(5.0), 0.5) == []  # still rising at its end
 
 
-def stated(walked, late_s=0.0, exchanged=False) -> tuple[FileEvent, ...]:
+def stated(walked, delay_s=0.0, exchanged=False) -> tuple[FileEvent, ...]:
     """Every contact of both feet as a file states it."""
     other = {"r": "l", "l": "r"}
     events = []
     for side in FEET:
         for first, last in contacts(walked, side):
             for time, kind in ((first, "heel strike"), (last, "toe off")):
-                events.append(FileEvent(time + late_s, other[side] if exchanged else side, kind, "", kind))
+                events.append(FileEvent(time + delay_s, other[side] if exchanged else side, kind, "", kind))
     return tuple(sorted(events, key=lambda event: event.time_s))
 
 
@@ -259,7 +259,7 @@ def test_a_file_tells_the_events_that_plates_do_not_see(walked, trial):
     half = with_half_of_the_loads(trial)
     known = {round(first, 6) for side in FEET for first, _ in contacts(walked, side)}
     without = strides_of(walked.skeleton, kinematics_of(walked, half))
-    given = strides_of(walked.skeleton, kinematics_of(walked, replace(half, events=stated(walked, late_s=0.004))))
+    given = strides_of(walked.skeleton, kinematics_of(walked, replace(half, events=stated(walked, delay_s=0.004))))
     assert len(given) >= len(without) > 2
     by_file, by_motion = (
         [one for one in strides if min(abs(one.end_s - time - 0.004) for time in known) < 1e-9]
@@ -270,11 +270,11 @@ def test_a_file_tells_the_events_that_plates_do_not_see(walked, trial):
     assert by_motion == []
 
 
-@pytest.mark.parametrize("fault", [{"late_s": 0.05}, {"exchanged": True}])
+@pytest.mark.parametrize("fault", [{"delay_s": 0.05}, {"exchanged": True}])
 def test_events_that_forces_contradict_are_not_used(walked, trial, fault):
     half = with_half_of_the_loads(trial)
     contradicted = replace(half, events=stated(walked, **fault))
-    assert bool(contradicted_events(contradicted)) == ("late_s" in fault)
+    assert bool(contradicted_events(contradicted)) == ("delay_s" in fault)
     assert sides_exchanged(contradicted) == ("exchanged" in fault)
     expected = strides_of(walked.skeleton, kinematics_of(walked, half))
     assert strides_of(walked.skeleton, kinematics_of(walked, contradicted)) == expected

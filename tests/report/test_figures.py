@@ -237,7 +237,7 @@ def test_information_map_is_in_percent(fit, two_level):
 
 def test_markers_are_sorted_and_gaps_drawn(fit):
     trial = fit.trials[0]
-    figure = as_plotly(marker_figure(trial, wandering=(trial.kinematics.ik.labels[0],)))
+    figure = as_plotly(marker_figure(trial, drifting=(trial.kinematics.ik.labels[0],)))
     final = next(t for t in figure.data if t.name == "estimate")
     assert (np.diff(final.x) <= 1e-6).all()
     assert sum("down-weighted" in label for label in final.y) == 1

@@ -15,10 +15,10 @@ def of_values(*values, sd=1.0, prior_sd=2.0, group="delay"):
     return Shared("synchronisation: delay", group, "s", estimates)
 
 
-def folder(parent, name, late_s, mass_kg):
+def folder(parent, name, delay_s, mass_kg):
     path = parent / name
     path.mkdir()
-    late = {"value": late_s, "prior_sd": 0.002, "sd": 0.001, "unit": "s", "moved": 3.0}
+    late = {"value": delay_s, "prior_sd": 0.002, "sd": 0.001, "unit": "s", "moved": 3.0}
     delay = CalibrationEntry(kind="synchronisation", quantity="delay", **late)
     moved = {"axis": "x", "value": 0.0, "prior_sd": 0.01, "sd": 0.005, "unit": "m"}
     joint = CalibrationEntry(kind="joint", joint="hip_r", quantity="centre change", **moved)
@@ -52,7 +52,7 @@ def test_joints_and_bodies_accuse_nothing():
 
 
 def test_folders_of_results(tmp_path):
-    folders = [folder(tmp_path, name, late_s, 8.0) for name, late_s in (("a", 0.005), ("b", 0.0))]
+    folders = [folder(tmp_path, name, delay_s, 8.0) for name, delay_s in (("a", 0.005), ("b", 0.0))]
     sums = group_sums(shared(folders))
     assert {group: one.unknowns for group, one in sums.items()} == {"delay": 1, "joint": 1, "mass": 1}
     assert sums["delay"].worst == pytest.approx(12.5)

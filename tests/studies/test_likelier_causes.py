@@ -41,11 +41,11 @@ def test_nothing_is_said_of_sound_files(person, tmp_path):
 
 
 @pytest.mark.parametrize("plate", [0, 1])
-@pytest.mark.parametrize(("gain", "zero_n"), [(1.05, 0.0), (0.95, 0.0), (1.0, 30.0)])
-def test_a_gain_or_a_zero_of_one_plate_is_no_wrong_rate(person, tmp_path, plate, gain, zero_n):
+@pytest.mark.parametrize(("gain", "zero_offset_n"), [(1.05, 0.0), (0.95, 0.0), (1.0, 30.0)])
+def test_a_gain_or_a_zero_of_one_plate_is_no_wrong_rate(person, tmp_path, plate, gain, zero_offset_n):
     def change(force, time):
         force = force.copy()
-        force[:, plate] = gain * force[:, plate] + [0.0, zero_n, 0.0]
+        force[:, plate] = gain * force[:, plate] + [0.0, zero_offset_n, 0.0]
         return force
 
     codes = set(found(tmp_path, with_force(person, change)))

@@ -8,7 +8,7 @@ import pytest
 from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.simultaneous.fisher_information import Information
 from kinertia.estimation.simultaneous.instruments import InstrumentPrior
-from kinertia.estimation.simultaneous.mixture_prior import SoundOrFaulty
+from kinertia.estimation.simultaneous.mixture_prior import FaultMixture
 from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.studies.drawn_people import held
 from kinertia.synthetic.walk import walking_subject
@@ -32,7 +32,7 @@ def test_with_white_noise_alone_it_is_the_estimator_s_own(monkeypatch):
         moment_sd=0.3 * study_bound.EXACT_N,
     )
     calibration = replace(held(trial.skeleton), marker_sd_m=np.full(len(trial.skeleton.markers), 1e-8))
-    exact = SoundOrFaulty.certain(1e-9)
+    exact = FaultMixture.certain(1e-9)
     known = calibration.instruments
     plate, floor = (dict.fromkeys(names, exact) for names in (known.plate, known.floor))
     calibration = replace(calibration, instruments=InstrumentPrior(plate, floor, exact, exact, exact))

@@ -24,7 +24,7 @@ def faster():
     time = on_floor.markers.time
     speed = 0.4 + 1.6 * time / time[-1]
     belt = Belt(time, speed)
-    way = np.array([belt.way_m(0.0, t) for t in time])
+    way = np.array([belt.distance_m(0.0, t) for t in time])
     positions = on_floor.markers.positions - way[:, None, None] * [1.0, 0.0, 0.0]
     # the loads travel with the feet
     plates = on_floor.plates
@@ -72,7 +72,7 @@ def test_files(tmp_path, kind):
         text = "time_s,speed_m_s\n0,1.0\n2,2.0\n"
         path.write_text(text if kind == "csv" else text.replace(",", ";").replace(".", ","))
     belt = read_belt(path)
-    assert belt.way_m(0.0, 2.0) == pytest.approx(3.0)
+    assert belt.distance_m(0.0, 2.0) == pytest.approx(3.0)
     assert belt.velocity(np.array([1.0, 9.0]), np.array([0.0, 0.0, -3.0])).tolist() == [[0, 0, -1.5], [0, 0, -2]]
 
 
@@ -85,7 +85,7 @@ def test_files_of_two_belts(tmp_path, kind):
     else:
         path.write_text("left_m_s;time_s;right_m_s\n0,5;0;1,0\n0,5;2;2,0\n")
     belt = read_belt(path)
-    assert [belt.under(foot).way_m(0.0, 2.0) for foot in range(2)] == pytest.approx([3.0, 1.0])
+    assert [belt.under(foot).distance_m(0.0, 2.0) for foot in range(2)] == pytest.approx([3.0, 1.0])
 
 
 @pytest.mark.parametrize(
@@ -105,7 +105,7 @@ def test_files_without_speeds(tmp_path, name, text, code, evidence):
 
 def test_a_constant():
     belt = read_belt(1.5)
-    assert belt.way_m(3.0, 5.0) == pytest.approx(3.0)
+    assert belt.distance_m(3.0, 5.0) == pytest.approx(3.0)
     assert read_belt(None) is None
 
 

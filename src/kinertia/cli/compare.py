@@ -60,9 +60,9 @@ def compare(
     for name, other in others:
         compared = differences(first, other)
         changed = [f"{one.parameter} of {one.segment}" for one in compared if one.changed]
-        told = outcome_of(compared)
+        sentence = outcome_of(compared)
         if changed:
-            told += f" ({', '.join(changed[:6])}{', ...' if changed[6:] else ''})"
-        out.print(f"{name} against {first_name}: {told}")
+            sentence += f" ({', '.join(changed[:6])}{', ...' if changed[6:] else ''})"
+        out.print(f"{name} against {first_name}: {sentence}")
     out.print(f"comparison in {output / 'compare.html'}", soft_wrap=True)
     return Outcome(comparison_summary(fits))

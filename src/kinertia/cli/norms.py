@@ -63,9 +63,9 @@ def norms(
     if mixed := mixture(list(people.values())):
         out.print(f"note: {mixed}", soft_wrap=True)
     spans = {name: columns[name][0] for name in columns if name.endswith(("_min", "_max"))}
-    out.print(f"norms of {len(people)} people{_told(spans)} in {output}", soft_wrap=True)
-    told = {"file": str(output), "people": sorted(people), "convention": columns["convention"][0], "note": mixed}
-    return Outcome({**told, **spans})
+    out.print(f"norms of {len(people)} people{_spans_text(spans)} in {output}", soft_wrap=True)
+    summary = {"file": str(output), "people": sorted(people), "convention": columns["convention"][0], "note": mixed}
+    return Outcome({**summary, **spans})
 
 
 def _name(fit: Fit, folder: Path) -> str:
@@ -73,7 +73,7 @@ def _name(fit: Fit, folder: Path) -> str:
     return folder.resolve().name if fit.subject.name in {trial.name for trial in fit.trials} else fit.subject.name
 
 
-def _told(spans: dict[str, float | None]) -> str:
+def _spans_text(spans: dict[str, float | None]) -> str:
     words = []
     for name, unit in (("age_years", "years"), ("speed_m_s", "m/s")):
         low, high = spans[f"{name}_min"], spans[f"{name}_max"]

@@ -53,15 +53,15 @@ def report(
     if bands and any(trial.strides for trial in saved.fit.trials):
         columns = cycle_columns(saved.fit.trials, saved.fit.mass_kg, "estimate", MOST_STRIDES)
         write_columns(results / "cycles.csv", with_norms(columns, bands, saved.fit.skeleton), "%.6g")
-    told: dict[str, Any] = {"report": str(results / "report.html"), "norms": list(bands)}
+    summary: dict[str, Any] = {"report": str(results / "report.html"), "norms": list(bands)}
     if profile:
         write_columns(results / "gps.csv", profile.columns(), "%.6g")
         overall = profile.overall_deg
         out.print(f"Gait Profile Score {score_text(overall)}; {results / 'gps.csv'}", soft_wrap=True)
         for remark in profile.remarks:
             out.print(f"note: {remark}", soft_wrap=True)
-        told |= {"gps_deg": overall if np.isfinite(overall) else None, "remarks": list(profile.remarks)}
-    return Outcome({**told, "without_curve": without_curve})
+        summary |= {"gps_deg": overall if np.isfinite(overall) else None, "remarks": list(profile.remarks)}
+    return Outcome({**summary, "without_curve": without_curve})
 
 
 def score_text(degrees: float) -> str:

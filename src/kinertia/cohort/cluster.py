@@ -200,13 +200,13 @@ def run_jobs(client: Any, fit_person: Callable[[Job], Record], jobs: Sequence[Jo
         if future.status == "finished":
             yield future.result()
         elif future.status == "error":
-            yield Finished(job.record(FAILED, _told(future.exception()), settled=False))
+            yield Finished(job.record(FAILED, _reason(future.exception()), settled=False))
         else:
             raise KinertiaError("the Dask scheduler is gone; what is finished is kept: run the command again")
         future.release()
 
 
-def _told(error: BaseException) -> str:
+def _reason(error: BaseException) -> str:
     from distributed import KilledWorker
 
     if isinstance(error, KilledWorker):

@@ -106,8 +106,8 @@ def overruled_in_vain(people: pd.DataFrame, findings: pd.DataFrame) -> list[str]
 
 def _meaning(code: str) -> Markup:
     one = rule(code)
-    told = (code, code, one.name.replace("-", " "), one.detects, outlined(one.effect), outlined(one.remedy))
-    return Markup('<strong id="explain-{}">{} {}</strong>: {} {} {}').format(*told)
+    texts = (code, code, one.name.replace("-", " "), one.detects, outlined(one.effect), outlined(one.remedy))
+    return Markup('<strong id="explain-{}">{} {}</strong>: {} {} {}').format(*texts)
 
 
 def report_of(person: str) -> Markup:

@@ -181,14 +181,14 @@ def _unlike(measure: str, value: Quantity, expected: Quantity, **by: Quantity) -
 def _with_errors(logs: np.ndarray, covariance: np.ndarray, lumbar_m: float, found: tuple[Finding, ...]) -> MeasuredBody:
     """Build the body of measurements whose logarithms have this mean and covariance."""
     middle = np.exp(logs)
-    values = _told(middle, lumbar_m)
+    values = _predicted(middle, lumbar_m)
     by_measure = _slopes(middle, lumbar_m, values)
     errors = by_measure @ covariance @ by_measure.T
     columns = [
-        _DENSITY_SD[part] * (_told(middle, lumbar_m, {**DENSITY_KG_M3, part: 1.01 * density}) - values) / 0.01
+        _DENSITY_SD[part] * (_predicted(middle, lumbar_m, {**DENSITY_KG_M3, part: 1.01 * density}) - values) / 0.01
         for part, density in DENSITY_KG_M3.items()
     ]
-    columns.append(_LUMBAR_CUT_SD_M * (_told(middle, lumbar_m + _STEP) - values) / _STEP)
+    columns.append(_LUMBAR_CUT_SD_M * (_predicted(middle, lumbar_m + _STEP) - values) / _STEP)
     columns += _of_shapes_and_cuts(values)
     other = np.array([column.ravel() for column in columns]).T
     errors += other @ other.T
@@ -211,7 +211,7 @@ def _slopes(measures_m: np.ndarray, lumbar_m: float, values: np.ndarray) -> np.n
     for which in together:
         moved = measures_m.copy()
         moved[which] *= np.exp(_STEP)
-        change = (_told(moved, lumbar_m) - values) / _STEP
+        change = (_predicted(moved, lumbar_m) - values) / _STEP
         for k in which:
             kinds = KINDS if k in hips else _KINDS_OF_PART[keys[k][1]]
             rows = [KINDS.index(kind) for kind in kinds]
@@ -240,7 +240,9 @@ def _of_shapes_and_cuts(values: np.ndarray) -> list[np.ndarray]:
     return columns
 
 
-def _told(measures_m: np.ndarray, lumbar_m: float, density_kg_m3: Mapping[str, float] = DENSITY_KG_M3) -> np.ndarray:
+def _predicted(
+    measures_m: np.ndarray, lumbar_m: float, density_kg_m3: Mapping[str, float] = DENSITY_KG_M3
+) -> np.ndarray:
     """Return the parameters (7, 5) of a geometric body of stadium solids."""
     table = stadium_bsp(measures_m, lumbar_m, density_kg_m3).table()
     return table[np.arange(len(KINDS))[:, None], [[_column(kind, name) for name in _TELLS] for kind in KINDS]]

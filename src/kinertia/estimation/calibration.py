@@ -230,16 +230,16 @@ def _step(
     solved = np.linalg.solve(normal, np.concatenate([across, gradient], axis=-1))
     # S^T S and S^T r summed over frames; a position affects its own marker only
     k = by_still.shape[-1]
-    square, right = information.copy(), prior_pull.copy()
+    square, rhs = information.copy(), prior_pull.copy()
     square[:k, :k] += np.einsum("nri,nrj->ij", by_still, by_still)
     square[:k, k:] += by_still.sum(axis=0).T / MARKER_NOISE_M
     square[k:, :k] = square[:k, k:].T
     square[range(k, len(square)), range(k, len(square))] += seen.sum(axis=0) / MARKER_NOISE_M**2
-    right[:k] += np.einsum("nri,nr->i", by_still, residual)
-    right[k:] += residual.sum(axis=0) / MARKER_NOISE_M
+    rhs[:k] += np.einsum("nri,nr->i", by_still, residual)
+    rhs[k:] += residual.sum(axis=0) / MARKER_NOISE_M
     # (M^T S)^T (M^T M)^-1 (M^T S) is subtracted: the moving coordinates adjust
-    followed = across.reshape(-1, len(right)).T @ solved.reshape(-1, len(right) + 1)
-    step = np.linalg.solve(square - followed[:, :-1], right - followed[:, -1])
+    followed = across.reshape(-1, len(rhs)).T @ solved.reshape(-1, len(rhs) + 1)
+    step = np.linalg.solve(square - followed[:, :-1], rhs - followed[:, -1])
     return step, solved[..., -1] - solved[..., :-1] @ step
 
 

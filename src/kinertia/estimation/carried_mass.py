@@ -44,32 +44,32 @@ class CarriedMass:
         return f"{self.total_kg:.1f} kg" + (f", {beside:.1f} kg of it attached" if beside else "")
 
     @classmethod
-    def of(cls, scale_kg: float, attached: Sequence[Attached]) -> CarriedMass:
+    def of(cls, stated_mass_kg: float, attached: Sequence[Attached]) -> CarriedMass:
         """Compute the masses from the stated mass.
 
         Raises:
             PriorError: the objects weighed with the person leave no mass for the person.
         """
-        masses = [(mass_of(one, scale_kg), one.on_scale) for one in attached]
-        body = scale_kg - sum(mass for (mass, _), weighed in masses if weighed)
-        if body < min(_LIGHTEST_KG, scale_kg):
+        masses = [(mass_of(one, stated_mass_kg), one.on_scale) for one in attached]
+        body = stated_mass_kg - sum(mass for (mass, _), weighed in masses if weighed)
+        if body < min(_LIGHTEST_KG, stated_mass_kg):
             names = ", ".join(one.name for one in attached if one.on_scale)
-            problem = f"weighed with the person (on_scale = true), it leaves {body:.4g} kg of {scale_kg:.4g} kg"
+            problem = f"weighed with the person (on_scale = true), it leaves {body:.4g} kg of {stated_mass_kg:.4g} kg"
             left = {"left_kg": Quantity(body, "kg"), "name": Quantity(names), "problem": Quantity(problem)}
             found = with_evidence("S406", Where(part=names), left)
             raise PriorError(problem_of(found)).with_finding(found)
         beside = [mass for mass, weighed in masses if not weighed]
-        return cls(body, scale_kg + sum(mass for mass, _ in beside), sum(sd * sd for _, sd in beside) ** 0.5)
+        return cls(body, stated_mass_kg + sum(mass for mass, _ in beside), sum(sd * sd for _, sd in beside) ** 0.5)
 
 
-def body_sd_kg(scale_kg: float, attached: Sequence[Attached]) -> float:
+def body_sd_kg(stated_mass_kg: float, attached: Sequence[Attached]) -> float:
     """Return the standard deviation of the body's mass due to objects weighed with it, without the scale's error."""
-    variances = [mass_of(one, scale_kg)[1] ** 2 for one in attached if one.on_scale]
+    variances = [mass_of(one, stated_mass_kg)[1] ** 2 for one in attached if one.on_scale]
     return float(sum(variances) ** 0.5)
 
 
-def mass_of(attached: Attached, scale_kg: float) -> tuple[float, float]:
+def mass_of(attached: Attached, stated_mass_kg: float) -> tuple[float, float]:
     """Return the mass of one object and its standard deviation, kg, before any estimate."""
     if attached.mass_kg is None:
-        return UNKNOWN_SHARE * scale_kg, UNKNOWN_SHARE_SD * scale_kg
+        return UNKNOWN_SHARE * stated_mass_kg, UNKNOWN_SHARE_SD * stated_mass_kg
     return attached.mass_kg

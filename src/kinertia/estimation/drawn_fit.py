@@ -9,7 +9,7 @@ from scipy.interpolate import BSpline
 
 from kinertia.errors import KinertiaError
 from kinertia.estimation.result import Fit, TrialFit
-from kinertia.estimation.simultaneous.plate_loads import GAIN, put_right
+from kinertia.estimation.simultaneous.plate_loads import GAIN, corrected_loads
 from kinertia.estimation.simultaneous.posterior_draws import PosteriorDraws, TrialDraws
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
@@ -109,6 +109,6 @@ def _reactions(estimate: GroundReactions, draws: TrialDraws, number: int) -> Gro
     departures[:, GAIN] /= 1.0 + draws.plate_gain
     standing = np.ascontiguousarray(estimate.loaded)
     shared = estimate.carrier, departures, np.ascontiguousarray(draws.middles), np.ascontiguousarray(draws.turn)
-    impact = put_right(estimate.impact, np.zeros_like(standing), *shared)
-    wrench = put_right(estimate.wrench, standing, *shared) + draws.impact[number] * impact
-    return replace(estimate, time=estimate.time - draws.late_s[number], wrench=wrench, impact=impact)
+    impact = corrected_loads(estimate.impact, np.zeros_like(standing), *shared)
+    wrench = corrected_loads(estimate.wrench, standing, *shared) + draws.impact[number] * impact
+    return replace(estimate, time=estimate.time - draws.delay_s[number], wrench=wrench, impact=impact)

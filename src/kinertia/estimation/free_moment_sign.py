@@ -27,7 +27,7 @@ from kinertia.estimation.simultaneous.calibration_entry import POSITION, Calibra
 from kinertia.estimation.simultaneous.fit import SimultaneousFit, held_against
 from kinertia.estimation.simultaneous.instrument_errors import OTHER_SIGN
 from kinertia.estimation.simultaneous.instruments import InstrumentPrior
-from kinertia.estimation.simultaneous.mixture_prior import SoundOrFaulty
+from kinertia.estimation.simultaneous.mixture_prior import FaultMixture
 from kinertia.estimation.simultaneous.model_evidence import FreeMomentSign
 from kinertia.motion.dynamics import residual
 from kinertia.motion.kinematics import Kinematics
@@ -103,7 +103,7 @@ def with_undisputed_plates(known: InstrumentPrior, errors: Sequence[CalibrationE
     disputed = {one.axis for one in errors if one.quantity == POSITION and one.contradicted_by == OTHER_SIGN}
     if not disputed:
         return known
-    certain = {name: SoundOrFaulty.certain(prior.sd) for name, prior in known.plate.items() if name in disputed}
+    certain = {name: FaultMixture.certain(prior.sd) for name, prior in known.plate.items() if name in disputed}
     return replace(known, plate={**known.plate, **certain})
 
 

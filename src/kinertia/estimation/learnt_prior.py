@@ -220,7 +220,7 @@ class _Seen:
     """Information of all people's recordings: its roots (p, k, r), and the right-hand sides (p, k)."""
 
     roots: np.ndarray
-    right: np.ndarray
+    rhs: np.ndarray
 
     @classmethod
     def of(cls, root: np.ndarray, people: Sequence[PersonInformation]) -> _Seen:
@@ -228,17 +228,17 @@ class _Seen:
         values, vectors = np.linalg.eigh([root.T @ one.information @ root for one in people])
         most = int((values > _NOTHING * values.max()).sum(axis=1).max())
         roots = vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]
-        return cls(roots[:, :, len(root) - most :], np.array([root.T @ one.right for one in people]))
+        return cls(roots[:, :, len(root) - most :], np.array([root.T @ one.rhs for one in people]))
 
     def mean(self, within: np.ndarray, between: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Compute the group's mean and its covariance, given the spread within the group and of group means."""
         inner = np.linalg.inv(np.eye(self.roots.shape[2]) + self._inner(within))
         of_all = (self.roots @ inner @ self.roots.transpose(0, 2, 1)).sum(axis=0)
-        shown = self.right @ within
-        right = self.right - np.einsum("pir,prs,pjs,pj->pi", self.roots, inner, self.roots, shown, optimize=True)
+        shown = self.rhs @ within
+        rhs = self.rhs - np.einsum("pir,prs,pjs,pj->pi", self.roots, inner, self.roots, shown, optimize=True)
         covariance = np.linalg.inv(np.linalg.inv(between) + of_all)
         covariance = 0.5 * (covariance + covariance.T)
-        return covariance @ right.sum(axis=0), covariance
+        return covariance @ rhs.sum(axis=0), covariance
 
     def spread(self, within: np.ndarray, mean: np.ndarray, of_mean: np.ndarray) -> np.ndarray:
         """Return the expected sum of squares (k, k) of the people about their mean."""
@@ -247,7 +247,7 @@ class _Seen:
         # for each person: covariance given the mean, and how the expectation depends on the mean
         posterior = within - seen @ inner @ seen.transpose(0, 2, 1)
         with_mean = seen @ inner @ self.roots.transpose(0, 2, 1)
-        away = np.einsum("pij,pj->pi", posterior, self.right) - with_mean @ mean
+        away = np.einsum("pij,pj->pi", posterior, self.rhs) - with_mean @ mean
         total: np.ndarray = posterior.sum(axis=0) + away.T @ away
         total += (with_mean @ of_mean @ with_mean.transpose(0, 2, 1)).sum(axis=0)
         result: np.ndarray = 0.5 * (total + total.T)

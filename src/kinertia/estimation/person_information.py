@@ -38,13 +38,13 @@ class PersonInformation:
         name: of the person.
         literature: the person's prior from the literature; its standard deviations are the units.
         information: (10 s, 10 s) on the dynamic parameters, in relative coordinates.
-        right: (10 s,) its right-hand side.
+        rhs: (10 s,) its right-hand side.
     """
 
     name: str
     literature: BspPrior
     information: np.ndarray
-    right: np.ndarray
+    rhs: np.ndarray
 
     @property
     def segments(self) -> tuple[str, ...]:
@@ -63,14 +63,14 @@ class PersonInformation:
         def cost(relative: np.ndarray) -> float:
             _, dynamic = _relative(self.literature, body_of(relative))
             away = relative - mean
-            return float(dynamic @ (0.5 * self.information @ dynamic - self.right) + 0.5 * away @ before @ away)
+            return float(dynamic @ (0.5 * self.information @ dynamic - self.rhs) + 0.5 * away @ before @ away)
 
         relative = mean
         for _ in range(_STEPS):
             along, dynamic = _relative(self.literature, body_of(relative))
             curvature = along.T @ self.information @ along + before
             step = np.linalg.solve(
-                curvature, along.T @ (self.right - self.information @ dynamic) - before @ (relative - mean)
+                curvature, along.T @ (self.rhs - self.information @ dynamic) - before @ (relative - mean)
             )
             while np.abs(step).max() > _SETTLED and cost(relative + step) > cost(relative):
                 step = 0.5 * step

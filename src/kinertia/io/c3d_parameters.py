@@ -169,7 +169,7 @@ class ParameterSection:
             if one.group < 0 and one.name == name:
                 return -one.group
         number = 1 + max((abs(one.group) for one in self.records), default=0)
-        encoded, told = name.encode("ascii"), _DESCRIPTIONS.get(name, "").encode("ascii")
+        encoded, description = name.encode("ascii"), _DESCRIPTIONS.get(name, "").encode("ascii")
         head = struct.pack("bb", len(encoded), -number) + encoded
-        self.records.append(Record(-number, name, head, bytes([len(told)]) + told))
+        self.records.append(Record(-number, name, head, bytes([len(description)]) + description))
         return number

@@ -124,10 +124,10 @@ def _times(path: Path, samples: FloatArray, rate_hz: float, first_line: int) -> 
 def _moment_unit(path: Path, plate: str, vertical: FloatArray, free: FloatArray) -> tuple[float, list[Finding]]:
     """Return how many N m the unit of the free moment is (N m or N mm), which the file does not state (F152)."""
     loaded = np.abs(vertical) > LOAD_THRESHOLD_N
-    arm_m = float(np.median(np.abs(free[loaded] / vertical[loaded]))) if loaded.any() else 0.0
-    if arm_m <= _LONGEST_ARM_M:
+    lever_arm_m = float(np.median(np.abs(free[loaded] / vertical[loaded]))) if loaded.any() else 0.0
+    if lever_arm_m <= _LONGEST_ARM_M:
         return 1.0, []
-    found = {"arm_m": Quantity(arm_m, "m", limit=_LONGEST_ARM_M), "unit": Quantity("N mm")}
+    found = {"lever_arm_m": Quantity(lever_arm_m, "m", limit=_LONGEST_ARM_M), "unit": Quantity("N mm")}
     return _MM, [with_evidence("F152", Where(path.name, plate=plate), found)]
 
 

@@ -128,17 +128,17 @@ def _sixths_of_curvature(knots: np.ndarray, gap: np.ndarray, slope: np.ndarray) 
     """Solve the spline's tridiagonal system for second derivatives at the knots over six (k,)."""
     count = len(knots)
     matrix = np.zeros((count, count))
-    right = np.zeros(count)
+    rhs = np.zeros(count)
     inner = np.arange(1, count - 1)
     matrix[inner, inner - 1], matrix[inner, inner + 1] = gap[:-1], gap[1:]
     matrix[inner, inner] = 2.0 * (gap[:-1] + gap[1:])
-    right[1:-1] = np.diff(slope)
+    rhs[1:-1] = np.diff(slope)
     matrix[0, :2], matrix[-1, -2:] = [-gap[0], gap[0]], [gap[-1], -gap[-1]]
     if count > 3:
         second = np.diff(slope) / (knots[2:] - knots[:-2])
-        right[0] = gap[0] ** 2 * (second[1] - second[0]) / (knots[3] - knots[0])
-        right[-1] = -(gap[-1] ** 2) * (second[-1] - second[-2]) / (knots[-1] - knots[-4])
-    return np.linalg.solve(matrix, right)
+        rhs[0] = gap[0] ** 2 * (second[1] - second[0]) / (knots[3] - knots[0])
+        rhs[-1] = -(gap[-1] ** 2) * (second[-1] - second[-2]) / (knots[-1] - knots[-4])
+    return np.linalg.solve(matrix, rhs)
 
 
 def _points(x: ArrayLike, y: ArrayLike, fewest: int) -> tuple[np.ndarray, np.ndarray]:

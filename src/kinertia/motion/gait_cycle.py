@@ -131,11 +131,11 @@ def _heel_and_toe(skeleton: Skeleton, segment: str) -> tuple[np.ndarray, np.ndar
 def found_events(skeleton: Skeleton, kinematics: Kinematics) -> list[FoundEvent]:
     """Detect all heel strikes and toe offs of a trial, in order of time."""
     edges, stated = load_edges(kinematics.trial.loads), usable_events(kinematics.trial)
-    told = [*edges, *stated]
+    known = [*edges, *stated]
     events = [
         event
         for event in _from_motion(feet_under_pelvis(skeleton, kinematics))
-        if _foot_is_shown(skeleton, kinematics, event) or nearest_event(told, event, _SAME_EVENT_S) is not None
+        if _foot_is_shown(skeleton, kinematics, event) or nearest_event(known, event, _SAME_EVENT_S) is not None
     ]
     return _timed(events, gait_events(kinematics.trial), edges, stated)
 

@@ -351,10 +351,10 @@ class _System:
         trace = 1.5 + float((diagonal.imag / diagonal.real).sum()) / _STEP
         real = factors.real.copy(order="F")
         del matrix, factors, diagonal  # for long records with gaps they take some hundred MB
-        right = np.zeros((2 * n - 1, y.shape[1]), order="F")
+        rhs = np.zeros((2 * n - 1, y.shape[1]), order="F")
         for m in range(4):
-            right[places] += self.differences[:, m, None] * y[m : n - 3 + m]
-        solution, _ = lapack.dgbtrs(real, _BAND, _BAND, right, pivots, overwrite_b=1)
+            rhs[places] += self.differences[:, m, None] * y[m : n - 3 + m]
+        solution, _ = lapack.dgbtrs(real, _BAND, _BAND, rhs, pivots, overwrite_b=1)
         residual = solution[::2]
         return y - residual, np.einsum("nc,nc,n->c", residual, residual, visible.astype(float)), trace
 

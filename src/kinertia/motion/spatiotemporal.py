@@ -92,7 +92,7 @@ class _Ground:
         if self.belt is None:
             return velocity * (end_s - start_s)
         along = velocity / max(float(np.linalg.norm(velocity)), 1e-9)
-        return along * self.belt.under(FEET.index(side)).way_m(start_s, end_s)
+        return along * self.belt.under(FEET.index(side)).distance_m(start_s, end_s)
 
 
 def _path(feet: FeetUnderPelvis, ground: _Ground, stride: Stride) -> np.ndarray:

@@ -47,8 +47,8 @@ def force_figure(check: RecordingCheck) -> Figure | None:
         Panel(f"{plates.names[p]} (N)", _forces(plates, p), [*grey, *map(_contact, check.plates[p].contacts)])
         for p in shown
     ]
-    told = "; ".join(f"{check.plates[p].name}: {check.plates[p].stood_on()}" for p in shown)
-    alt = f"Forces on {len(shown)} plates of {check.recording.name} over time, contacts by foot: {told}."
+    occupants = "; ".join(f"{check.plates[p].name}: {check.plates[p].stood_on()}" for p in shown)
+    alt = f"Forces on {len(shown)} plates of {check.recording.name} over time, contacts by foot: {occupants}."
     return small_multiples(
         panels, alt, {"title": {"text": "time (s)", "standoff": 2, "font": {"size": 11}}, "range": [start, end]}
     )

@@ -93,12 +93,13 @@ def judged(compared: Sequence[Difference]) -> list[Difference]:
 
 def outcome_of(compared: Sequence[Difference]) -> str:
     """State in words how many parameters changed."""
-    told = judged(compared)
-    if not told:
+    distinguished = judged(compared)
+    if not distinguished:
         without = "no error bars" if any(one.same for one in compared) else "no segment is the same in both models"
         return f"{without}, differences only"
-    changed = sum(bool(one.changed) for one in told)
-    return f"{changed or 'none'} of {len(told)} parameters changed beyond {'their' if changed else 'its'} error bars"
+    changed = sum(bool(one.changed) for one in distinguished)
+    their = "their" if changed else "its"
+    return f"{changed or 'none'} of {len(distinguished)} parameters changed beyond {their} error bars"
 
 
 def _sd(fit: Fit) -> np.ndarray:

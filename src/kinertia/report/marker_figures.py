@@ -17,15 +17,15 @@ _ROW_PX = 17
 _LABELS = {"automargin": True, "dtick": 1, "gridcolor": "#EFEFEF"}
 
 
-def marker_figure(trial: TrialFit, wandering: tuple[str, ...] = ()) -> Figure:
+def marker_figure(trial: TrialFit, drifting: tuple[str, ...] = ()) -> Figure:
     """Draw the RMS distance (mm) between every measured and modelled marker over the window; the farthest on top.
 
-    `wandering` lists the markers that drift and are down-weighted.
+    `drifting` lists the markers that drift and are down-weighted.
     """
     labels = trial.kinematics.ik.labels
     distances_mm = {stage: 1e3 * rms_by_marker(errors) for stage, errors in trial.marker_errors_m.items()}
     order = np.argsort(-np.nan_to_num(distances_mm["final"], nan=-1.0))
-    names = [plain(labels[k]) + (" (down-weighted)" if labels[k] in wandering else "") for k in order]
+    names = [plain(labels[k]) + (" (down-weighted)" if labels[k] in drifting else "") for k in order]
     traces = [
         {
             "type": "scatter",

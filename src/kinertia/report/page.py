@@ -176,9 +176,9 @@ def _trial(fit: Fit, trial: TrialFit, k: int, count: int, truth: Truth | None) -
         ),
         "bands": trial.deviations is not None,
         "forces": forces_used(trial.reactions, fit.settings, trial.motion_hz),
-        "markers": written(marker_figure(trial, () if noise is None else noise.wandering)),
+        "markers": written(marker_figure(trial, () if noise is None else noise.drifting)),
         "marker_rows": _marker_rows(
-            trial, {} if noise is None else noise.sd_m, () if noise is None else noise.wandering
+            trial, {} if noise is None else noise.sd_m, () if noise is None else noise.drifting
         ),
         "noise": noise,
         "gaps": _written(fit_gap_figure(trial)),
@@ -227,7 +227,7 @@ def bsp_rows(fit: Fit) -> list[dict[str, Any]]:
     return rows
 
 
-def _marker_rows(trial: TrialFit, sd_m: Mapping[str, float], wandering: tuple[str, ...]) -> list[dict[str, Any]]:
+def _marker_rows(trial: TrialFit, sd_m: Mapping[str, float], drifting: tuple[str, ...]) -> list[dict[str, Any]]:
     """Return per marker the distances in mm, share of frames that show it (whole trial), and longest gap in s."""
     kinematics = trial.kinematics
     markers = kinematics.trial.markers.select(kinematics.ik.labels)
@@ -244,7 +244,7 @@ def _marker_rows(trial: TrialFit, sd_m: Mapping[str, float], wandering: tuple[st
                 "seen": 100 * float(seen[:, k].mean()),
                 "gap": longest / markers.rate_hz,
                 "sd": 1e3 * sd_m[label] if label in sd_m else None,
-                "wandering": label in wandering,
+                "drifting": label in drifting,
             }
         )
     return rows

@@ -117,7 +117,7 @@ class FitFigures(Generic[T]):
         """Draw the distance between every measured and modelled marker."""
         one = self._trial(trial)
         noise = None if self.fit.posterior is None else self.fit.posterior.marker_noise[self.fit.trials.index(one)]
-        return self._of_trial(one, marker_figure(one, () if noise is None else noise.wandering))
+        return self._of_trial(one, marker_figure(one, () if noise is None else noise.drifting))
 
     def gaps(self, trial: str | None = None) -> T:
         """Draw when markers were not visible; a sentence where all always were."""

@@ -14,7 +14,7 @@ from kinertia.estimation.prior import BspPrior, literature_prior
 from kinertia.estimation.simultaneous.bandwidth import Bandwidth
 from kinertia.estimation.simultaneous.fit import calibration_prior
 from kinertia.estimation.simultaneous.instruments import InstrumentPrior
-from kinertia.estimation.simultaneous.mixture_prior import SoundOrFaulty
+from kinertia.estimation.simultaneous.mixture_prior import FaultMixture
 from kinertia.estimation.simultaneous.observation import Observations, observe
 from kinertia.estimation.simultaneous.observed_trial import CalibrationPrior
 from kinertia.estimation.simultaneous.outcome import SimultaneousResult
@@ -99,6 +99,6 @@ def estimate_person(seed: int, case: tuple[Scenario, int]) -> EstimatedPerson:
 def held(skeleton: Skeleton) -> CalibrationPrior:
     """Return the prior without calibration: skeleton and instruments count as exact."""
     places = np.full(len(skeleton.markers), _HELD_SD_M)
-    exact = SoundOrFaulty.certain(_HELD_SD_M)
+    exact = FaultMixture.certain(_HELD_SD_M)
     plate, floor = (dict.fromkeys(names, exact) for names in (PLATE_UNKNOWNS, FLOOR_UNKNOWNS))
     return CalibrationPrior({}, places, InstrumentPrior(plate, floor, exact, exact, exact, trial_gain=exact))

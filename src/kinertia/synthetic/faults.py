@@ -50,7 +50,7 @@ class Faults:
         wobbling: share of the thighs' mass that wobbles on springs.
         gain: relative error of the right foot's plate.
         plate_m: the left foot's plate reads too far forward by this.
-        late_s: delay of the forces.
+        delay_s: delay of the forces.
     """
 
     noise: Literal["study", "artefact", "clusters", "mixed"]
@@ -62,7 +62,7 @@ class Faults:
     wobbling: float = 0.0
     gain: float = 0.0
     plate_m: float = 0.0
-    late_s: float = 0.0
+    delay_s: float = 0.0
 
 
 def measured(
@@ -138,11 +138,11 @@ class _Instruments:
     and zero offset (2, 3) N; both are rotated about the vertical.
     """
 
-    late_s: float
+    delay_s: float
     offset_m: np.ndarray
     gain: np.ndarray
     free_moment: np.ndarray
-    zero_n: np.ndarray
+    zero_offset_n: np.ndarray
     turn_rad: float = 0.0
 
     @classmethod
@@ -151,33 +151,33 @@ class _Instruments:
         plates = np.array([[each.draw(rng) for each in prior.plate.values()] for _ in range(2)])
         x, z = (prior.floor[name].draw(rng) for name in "xz")
         offset = np.column_stack([plates[:, 0] + x, np.zeros(2), plates[:, 1] + z])
-        late_s = prior.clock_s.draw(rng)
-        return cls(late_s, offset, 1.0 + plates[:, 2:3], plates[:, 3], np.zeros((2, 3)), prior.floor["turn"].draw(rng))
+        delay_s = prior.delay_s.draw(rng)
+        return cls(delay_s, offset, 1.0 + plates[:, 2:3], plates[:, 3], np.zeros((2, 3)), prior.floor["turn"].draw(rng))
 
     def in_trial(self, rng: np.random.Generator, prior: InstrumentPrior, one_of_several: bool) -> _Instruments:
         """Add what a trial has of its own: zero offsets, gains, and a delay if one of several or not checked."""
-        zero = np.array([[prior.zero_n.draw(rng), 0.0, prior.zero_n.draw(rng)] for _ in range(2)])
-        own = one_of_several or prior.clock_s.faulty_share > 0.0
-        later_s = prior.delay_s.draw(rng) if own else 0.0
+        zero = np.array([[prior.zero_offset_n.draw(rng), 0.0, prior.zero_offset_n.draw(rng)] for _ in range(2)])
+        own = one_of_several or prior.delay_s.fault_probability > 0.0
+        trial_delay_s = prior.trial_delay_s.draw(rng) if own else 0.0
         gain = self.gain + [[prior.trial_gain.draw(rng)] for _ in range(2)]
-        return replace(self, zero_n=zero, late_s=self.late_s + later_s, gain=gain)
+        return replace(self, zero_offset_n=zero, delay_s=self.delay_s + trial_delay_s, gain=gain)
 
     @classmethod
     def with_faults(cls, faults: Faults) -> _Instruments | None:
         """Make the instruments of a laboratory without calibration errors; None if they are fault-free."""
-        if not (faults.gain or faults.plate_m or faults.late_s):
+        if not (faults.gain or faults.plate_m or faults.delay_s):
             return None
         offset = np.array([[0.0, 0.0, 0.0], [faults.plate_m, 0.0, 0.0]])
-        return cls(faults.late_s, offset, 1.0 + np.array([[faults.gain], [0.0]]), np.zeros(2), np.zeros((2, 3)))
+        return cls(faults.delay_s, offset, 1.0 + np.array([[faults.gain], [0.0]]), np.zeros(2), np.zeros((2, 3)))
 
     def read(self, time: np.ndarray, loads: np.ndarray) -> np.ndarray:
         """Return the plates' readings of true loads (n, 2, 6)."""
         middles = plate_middles(FootLoads(time, loads[..., :3], loads[..., 3:]), np.arange(2))
-        wrong = turned_loads(np.asarray(CubicSpline(time, loads)(time - self.late_s)), middles, self.turn_rad)
+        wrong = turned_loads(np.asarray(CubicSpline(time, loads)(time - self.delay_s)), middles, self.turn_rad)
         wrong[..., 3:] += np.cross(self.offset_m, wrong[..., :3])
         wrong *= self.gain
         wrong[..., 4] += self.free_moment * wrong[..., 1]
-        push = np.concatenate([self.zero_n, np.cross(middles, self.zero_n)], axis=-1)
+        push = np.concatenate([self.zero_offset_n, np.cross(middles, self.zero_offset_n)], axis=-1)
         wrong += (wrong[..., 1:2] > LOAD_THRESHOLD_N) * push
         return wrong
 

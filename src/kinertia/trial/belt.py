@@ -25,9 +25,9 @@ class Belt:
         >>> belt = Belt(np.array([0.0, 2.0]), np.array([1.0, 2.0]))
         >>> belt.velocity(np.array([1.0]), np.array([-0.9, 0.0, 0.0])).tolist()
         [[-1.5, 0.0, 0.0]]
-        >>> belt.way_m(0.0, 2.0)
+        >>> belt.distance_m(0.0, 2.0)
         3.0
-        >>> Belt(np.zeros(1), np.array([[1.4, 0.7]])).under(1).way_m(0.0, 2.0)
+        >>> Belt(np.zeros(1), np.array([[1.4, 0.7]])).under(1).distance_m(0.0, 2.0)
         1.4
     """
 
@@ -47,7 +47,7 @@ class Belt:
         direction = along / length if length > _NO_WAY_M_S else np.zeros(3)
         return np.asarray(np.interp(time, self.time, self.speed_m_s)[:, None] * direction)
 
-    def way_m(self, start_s: float, end_s: float) -> float:
+    def distance_m(self, start_s: float, end_s: float) -> float:
         """Return the distance (m) that the belt covers between two times (s)."""
         between = self.time[(self.time > start_s) & (self.time < end_s)]
         at = np.array([start_s, *between, end_s])

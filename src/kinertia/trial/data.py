@@ -122,13 +122,13 @@ class TorqueColumns(NamedTuple):
     """Content of the torque columns of one plate in its file, while the plate was loaded.
 
     Attributes:
-        arm_m: median of the horizontal torque over the vertical force, m; NaN where the point of application does not
-            move, or the plate was hardly loaded.
+        lever_arm_m: median of the horizontal torque over the vertical force, m; NaN where the point of application does
+            not move, or the plate was hardly loaded.
         rms_nm: RMS torque about X, Y and Z, N m.
         belongs_to: index of the other plate whose load the torque follows; None if there is none.
     """
 
-    arm_m: float
+    lever_arm_m: float
     rms_nm: tuple[float, float, float]
     belongs_to: int | None
 
@@ -238,8 +238,8 @@ class Recording:
     @property
     def notes(self) -> tuple[str, ...]:
         """Assumptions and corrections made while reading, one sentence each."""
-        told = [one for one in self.findings if one.severity < Severity.WARNING]
-        return tuple(f"{one.where.file or self.name}: {one.message}" for one in told)
+        notes = [one for one in self.findings if one.severity < Severity.WARNING]
+        return tuple(f"{one.where.file or self.name}: {one.message}" for one in notes)
 
     @property
     def left_out(self) -> tuple[str, ...]:

@@ -21,8 +21,8 @@ class IdleReading(NamedTuple):
         level_n: median force along X, Y, Z, N; NaN if it is hardly ever unloaded.
         drift_n: linear change of the vertical force over the recording, N; NaN likewise.
         peak_n: the largest vertical force of the whole recording, N.
-        rings_s: for how long the vertical force is below zero just before foot contact and just after foot off, s; 0
-            unless it does both.
+        overshoot_s: for how long the vertical force is below zero just before foot contact and just after foot off, s;
+            0 unless it does both.
         like_steps: the vertical force rises and falls as under feet, at whatever scale.
         level_nm: median moment about the ground origin, N m; if the file has none for the unloaded plate, the moment of
             `level_n` acting at the mean centre of pressure.
@@ -35,7 +35,7 @@ class IdleReading(NamedTuple):
     level_n: tuple[float, float, float]
     drift_n: float
     peak_n: float
-    rings_s: float
+    overshoot_s: float
     like_steps: bool = False
     level_nm: tuple[float, float, float] = _NOWHERE
     twist_nm: float = 0.0

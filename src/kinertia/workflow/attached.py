@@ -44,8 +44,8 @@ def with_attached(ready: Prepared, by_itself: Collection[str] = ()) -> Prepared:
     """
     if not ready.attached or ready.prior.weighed is not None:
         return ready
-    scale_kg = known(ready.subject.mass_kg)
-    skeleton, prior = with_attached_prior(ready.skeleton, ready.prior, ready.attached, scale_kg, by_itself)
+    stated_mass_kg = known(ready.subject.mass_kg)
+    skeleton, prior = with_attached_prior(ready.skeleton, ready.prior, ready.attached, stated_mass_kg, by_itself)
     # the literature's own body, which need not be the prior's mean, and fixed segments after all others
     body, own = len(ready.prior.mean.segments), ready.literature
     names = (*prior.mean.segments, *own.segments[body:])
@@ -55,7 +55,7 @@ def with_attached(ready: Prepared, by_itself: Collection[str] = ()) -> Prepared:
         skeleton=skeleton,
         prior=prior,
         literature=BodySegmentParameters.from_table(names, table),
-        findings=(*ready.findings, *(_assumed(one, scale_kg) for one in ready.attached)),
+        findings=(*ready.findings, *(_assumed(one, stated_mass_kg) for one in ready.attached)),
     )
 
 
@@ -63,7 +63,7 @@ def with_attached_prior(
     skeleton: Skeleton,
     prior: BspPrior,
     attached: Sequence[Attached],
-    scale_kg: float,
+    stated_mass_kg: float,
     by_itself: Collection[str] = (),
 ) -> tuple[Skeleton, BspPrior]:
     """Weld attached items to a skeleton, and extend the prior of the body by them.
@@ -71,7 +71,7 @@ def with_attached_prior(
     Args:
         skeleton, prior: skeleton and prior of the body alone.
         attached: items in the order of the new segments.
-        scale_kg: mass shown by the scale.
+        stated_mass_kg: mass shown by the scale.
         by_itself: segments whose prior masses are no shares of the body's.
 
     Raises:
@@ -79,7 +79,7 @@ def with_attached_prior(
     """
     _check(skeleton, attached)
     joints = tuple(Joint(one.segment, one.name, np.eye(3), np.zeros(3), ()) for one in attached)
-    return replace(skeleton, joints=(*skeleton.joints, *joints)), _extended(prior, attached, scale_kg, by_itself)
+    return replace(skeleton, joints=(*skeleton.joints, *joints)), _extended(prior, attached, stated_mass_kg, by_itself)
 
 
 def _check(skeleton: Skeleton, attached: Sequence[Attached]) -> None:
@@ -97,9 +97,11 @@ def _check(skeleton: Skeleton, attached: Sequence[Attached]) -> None:
         taken.append(one.name)
 
 
-def _extended(prior: BspPrior, attached: Sequence[Attached], scale_kg: float, by_itself: Collection[str]) -> BspPrior:
+def _extended(
+    prior: BspPrior, attached: Sequence[Attached], stated_mass_kg: float, by_itself: Collection[str]
+) -> BspPrior:
     """Extend the prior by attached items: the heavier an item weighed with the body, the lighter the body."""
-    tables, blocks = zip(*(_expected(one, *mass_of(one, scale_kg)) for one in attached), strict=True)
+    tables, blocks = zip(*(_expected(one, *mass_of(one, stated_mass_kg)) for one in attached), strict=True)
     names = (*prior.mean.segments, *(one.name for one in attached))
     size = len(prior.covariance)
     covariance = np.zeros((10 * len(names),) * 2)
@@ -108,7 +110,7 @@ def _extended(prior: BspPrior, attached: Sequence[Attached], scale_kg: float, by
         rows = slice(size + 10 * k, size + 10 * k + 10)
         covariance[rows, rows] = block
         if attached[k].on_scale:
-            mass_kg, sd_kg = mass_of(attached[k], scale_kg)
+            mass_kg, sd_kg = mass_of(attached[k], stated_mass_kg)
             less, more = _less_body(prior, by_itself), _by_mass(tables[k], mass_kg)
             covariance[:size, :size] += sd_kg**2 * np.outer(less, less)
             covariance[:size, rows] = sd_kg**2 * np.outer(less, more)
@@ -116,7 +118,7 @@ def _extended(prior: BspPrior, attached: Sequence[Attached], scale_kg: float, by
     mean = BodySegmentParameters.from_table(names, np.concatenate([prior.mean.table(), *tables]))
     weighed = (*(True,) * len(prior.mean.segments), *(one.on_scale for one in attached))
     # the body's own rows are for a person weighed without the items that were on the scale
-    on_scale = sum(mass_of(one, scale_kg)[0] for one in attached if one.on_scale)
+    on_scale = sum(mass_of(one, stated_mass_kg)[0] for one in attached if one.on_scale)
     return replace(prior, mean=mean, covariance=covariance, mass_kg=prior.mass_kg + on_scale, weighed=weighed)
 
 
@@ -153,8 +155,8 @@ def _less_body(prior: BspPrior, by_itself: Collection[str]) -> np.ndarray:
     return change.ravel()
 
 
-def _assumed(attached: Attached, scale_kg: float) -> Finding:
-    mass_kg, sd_kg = mass_of(attached, scale_kg)
+def _assumed(attached: Attached, stated_mass_kg: float) -> Finding:
+    mass_kg, sd_kg = mass_of(attached, stated_mass_kg)
     mass = "of unknown mass, which is estimated" if attached.mass_kg is None else f"{mass_kg:.4g} +- {sd_kg:.2g} kg"
     weighed = "weighed with the person" if attached.on_scale else "not on the scale"
     source = Quantity(f"{attached.name} attached to {attached.segment}, {mass}, {weighed}")

@@ -65,7 +65,7 @@ def person_instruments(fit: Fit, files: Sequence[str]) -> PersonInstruments:
         files=tuple(files),
         plates=shown.plates,
         information=tuple(map(tuple, shown.information.tolist())),
-        right=tuple(shown.right.tolist()),
+        right=tuple(shown.rhs.tolist()),
     )
 
 
@@ -85,16 +85,16 @@ def _errors(people: Sequence[PersonInstruments], stated: Instruments) -> tuple[C
     shown, unknowns = prior.of_session(plates), prior.of_unknowns(plates)
     before = GaussianPrior.of(unknowns)
     covariance = np.linalg.inv(shown.information + before.precision)
-    after = before.updated(unknowns, covariance @ (shown.right + before.pull), covariance)
+    after = before.updated(unknowns, covariance @ (shown.rhs + before.pull), covariance)
     covariance = np.linalg.inv(shown.information + after.precision)
-    mean = covariance @ (shown.right + after.pull)
+    mean = covariance @ (shown.rhs + after.pull)
     # a foot stands on the sum of plate error and common offset
     to_plates, each = plates_with_floor(len(plates)), len(PLATE_ERRORS)
     values = to_plates @ mean[:-1]
     sd = np.sqrt(np.diag(to_plates @ covariance[:-1, :-1] @ to_plates.T))
     rows = zip(values.reshape(-1, each), sd.reshape(-1, each), strict=True)
-    clock_s = float(mean[-1]), float(np.sqrt(covariance[-1, -1]))
-    solved = laboratory_errors(dict(zip(plates, rows, strict=True)), clock_s, prior)
+    delay_s = float(mean[-1]), float(np.sqrt(covariance[-1, -1]))
+    solved = laboratory_errors(dict(zip(plates, rows, strict=True)), delay_s, prior)
     return tuple(one.entry for one in solved)
 
 

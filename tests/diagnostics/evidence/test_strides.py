@@ -39,11 +39,11 @@ def test_jumps_on_both_feet_have_none():
     assert periods(loads([(0.1, 0.5), (1.1, 1.5)], [(0.12, 0.49), (1.05, 1.52)])) == ([], [])
 
 
-@pytest.mark.parametrize("late_s", [0.0, 0.02, 0.08, 0.15])
-def test_one_landing_and_one_leaving_of_both_feet_are_no_steps(late_s):
+@pytest.mark.parametrize("delay_s", [0.0, 0.02, 0.08, 0.15])
+def test_one_landing_and_one_leaving_of_both_feet_are_no_steps(delay_s):
     """A drop jump whose second landing is not in the file, and standing up from a chair with the feet off the floor."""
-    assert periods(loads([(1.0, 1.8)], [(1.0 + late_s, 1.8 - late_s)])) == ([], [])
-    assert periods(loads([(1.0, 3.0)], [(1.0 + late_s, 3.0)])) == ([], [])
+    assert periods(loads([(1.0, 1.8)], [(1.0 + delay_s, 1.8 - delay_s)])) == ([], [])
+    assert periods(loads([(1.0, 3.0)], [(1.0 + delay_s, 3.0)])) == ([], [])
 
 
 def test_two_steps_of_a_run():

@@ -113,10 +113,10 @@ def test_delays(walk, by_s):
     assert found.evidence["delay_s"].value == pytest.approx(by_s, abs=0.035)
 
 
-@pytest.mark.parametrize("late_s", [-0.015, 0.015])
-def test_what_the_estimate_corrects_is_no_error(walk, late_s):
+@pytest.mark.parametrize("delay_s", [-0.015, 0.015])
+def test_what_the_estimate_corrects_is_no_error(walk, delay_s):
     recording, feet = walk
-    assert error_of(shifted(moved(recording, (0.02, 0.0, 0.0)), late_s), feet) is None
+    assert error_of(shifted(moved(recording, (0.02, 0.0, 0.0)), delay_s), feet) is None
 
 
 def slowed(recording, factor):

@@ -90,7 +90,7 @@ def test_a_wrong_zero_is_not_called_a_wrong_sign(walk, newton, plates, axis):
         assert len(plates) == 1
     if along[0].code == "P233":
         assert along[0].where.plate == walk.plates.names[plates[0]]
-        assert along[0].evidence["zero_n"].value == pytest.approx(newton, abs=10)
+        assert along[0].evidence["zero_offset_n"].value == pytest.approx(newton, abs=10)
         assert "the zero of the plate" in along[0].causes
 
 
@@ -174,7 +174,7 @@ def test_torques_in_newton_millimetres(walk):
     wrong = found_in(context_of(with_force(walk, lambda force: force, torque=1000.0)))
     found = [one for one in wrong if one.code == "P203"]
     assert {one.where.plate for one in found} == set(walk.plates.names)
-    assert min(one.evidence["arm_m"].value for one in found) > 0.15
+    assert min(one.evidence["lever_arm_m"].value for one in found) > 0.15
 
 
 @pytest.mark.parametrize("name", SQUATS)

@@ -52,14 +52,14 @@ def test_drop_landings_of_another_laboratory(recording_of, name):
     assert context.velocities[0].mass_kg == pytest.approx(58.8, rel=0.08)
 
 
-@pytest.mark.parametrize("late_s", [0.0, 0.08])
+@pytest.mark.parametrize("delay_s", [0.0, 0.08])
 @pytest.mark.skipif(not is_here(DROP_JUMP), reason="measured")
-def test_forces_of_a_drop_jump_that_are_late(recording_of, late_s):
+def test_forces_of_a_drop_jump_that_are_late(recording_of, delay_s):
     recording = recording_of(*DROP_JUMP)
-    late = replace(recording, plates=replace(recording.plates, time=recording.plates.time + late_s))
-    assert forces_keep_time(context_of(late)) is (late_s == 0.0)
+    late = replace(recording, plates=replace(recording.plates, time=recording.plates.time + delay_s))
+    assert forces_keep_time(context_of(late)) is (delay_s == 0.0)
     found = error_of(late)
-    assert (found is None) is (late_s == 0.0)
+    assert (found is None) is (delay_s == 0.0)
     assert found is None or found.code in ("T211", "T212")
 
 

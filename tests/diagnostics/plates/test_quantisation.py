@@ -53,7 +53,7 @@ def cut(plates):
 def test_a_fault_free_plate(noise_n):
     sound = plates(noise_n)
     assert found(sound) == []
-    assert sound.idle[0].rings_s < 0.005  # single samples of noise
+    assert sound.idle[0].overshoot_s < 0.005  # single samples of noise
 
 
 @pytest.mark.parametrize("step_n", [8.0, 20.0, 50.0])

@@ -101,7 +101,7 @@ def test_moments_about_another_point(changed, name, axis):
 
     found = columns(changed(name, other_point))
     assert [one.code for one in found] == ["P261"] * 2
-    assert [one.evidence["arm_m"].value for one in found] == pytest.approx([0.02] * 2, abs=0.002)
+    assert [one.evidence["lever_arm_m"].value for one in found] == pytest.approx([0.02] * 2, abs=0.002)
 
 
 @pytest.mark.parametrize("axis", [0, 2])

@@ -67,7 +67,7 @@ def test_zeros_that_all_plates_have_alike_are_rather_a_force_that_none_measures(
 def test_zeros_of_plates_that_differ_are_theirs(other, count):
     found = list(zero_offsets(context(*zeros(left=-22.0, right=other))))
     assert codes(found) == ["P215"] * count
-    assert found[0].evidence["zero_n"].value == -22.0
+    assert found[0].evidence["zero_offset_n"].value == -22.0
     assert found[0].where.plate == "left"
 
 

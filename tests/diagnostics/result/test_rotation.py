@@ -28,9 +28,9 @@ def test_from_there_on_rotated_plates_are_likelier(sd_deg):
     least = np.degrees(smallest_detectable_rad(shown(sd_deg), InstrumentPrior()))
 
     def odds(value):
-        wide, narrow = (np.hypot(sd_deg, np.degrees(own)) for own in (prior.faulty_sd, prior.sound_sd))
+        wide, narrow = (np.hypot(sd_deg, np.degrees(own)) for own in (prior.faulty_sd, prior.nominal_sd))
         density = [np.exp(-0.5 * (value / sd) ** 2) / sd for sd in (wide, narrow)]
-        return prior.faulty_share * density[0] / ((1 - prior.faulty_share) * density[1])
+        return prior.fault_probability * density[0] / ((1 - prior.fault_probability) * density[1])
 
     assert odds(0.99 * least) < 1.0 < odds(1.01 * least)
 

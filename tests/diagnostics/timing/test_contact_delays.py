@@ -10,10 +10,10 @@ from loads_and_feet import error_of
 from recordings import LONG_WALKS, RUNS, WALKS
 
 
-def found_in(recording, rate=1.0, late_s=0.0):
+def found_in(recording, rate=1.0, delay_s=0.0):
     """What is found in forces whose time goes at this rate, and which are later."""
     plates = recording.plates
-    time = plates.time[0] + rate * (plates.time - plates.time[0]) + late_s
+    time = plates.time[0] + rate * (plates.time - plates.time[0]) + delay_s
     feet = choose_marker_set(recording.markers.labels).foot_labels()
     feet = {side: [label for label in own if label in recording.markers.labels] for side, own in feet.items()}
     return error_of(replace(recording, plates=replace(plates, time=time)), feet)
@@ -36,18 +36,18 @@ def test_a_wrong_rate_of_a_run(run, rate):
     assert found.evidence["ratio"].value == pytest.approx(rate, abs=0.003)
 
 
-@pytest.mark.parametrize("late_s", [-0.03, 0.0, 0.03])
-def test_a_run_at_its_rate(run, late_s):
-    assert code_of(found_in(run, late_s=late_s)) != "T201"
+@pytest.mark.parametrize("delay_s", [-0.03, 0.0, 0.03])
+def test_a_run_at_its_rate(run, delay_s):
+    assert code_of(found_in(run, delay_s=delay_s)) != "T201"
 
 
 def code_of(found):
     return None if found is None else found.code
 
 
-@pytest.mark.parametrize("late_s", [-0.07, 0.07])
-def test_a_delay_over_many_contacts(run, late_s):
-    found = found_in(run, late_s=late_s)
+@pytest.mark.parametrize("delay_s", [-0.07, 0.07])
+def test_a_delay_over_many_contacts(run, delay_s):
+    found = found_in(run, delay_s=delay_s)
     assert found.code == "T211"
     assert "rate_alternative" not in found.evidence
 
@@ -87,7 +87,7 @@ def test_two_contacts_do_not_distinguish_a_rate_from_a_delay(walk):
 @pytest.mark.parametrize("name", LONG_WALKS)
 def test_three_contacts_exclude_a_rate_that_is_far_off(recording_of, name):
     """To be 100 ms late in the middle of 2.4 s, forces would have to be 10 % slow."""
-    found = found_in(recording_of(*LONG_WALKS[name]), late_s=0.1)
+    found = found_in(recording_of(*LONG_WALKS[name]), delay_s=0.1)
     assert found.code == "T211"
     assert "rate_alternative" not in found.evidence
 

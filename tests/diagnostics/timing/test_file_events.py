@@ -25,22 +25,22 @@ def found(trial, events):
     return [*file_events(SimpleNamespace(loaded=stated, at=lambda: Where(trial=trial.name)))]
 
 
-def of_loads(trial, late_s=0.0, sides=FEET):
+def of_loads(trial, delay_s=0.0, sides=FEET):
     side = dict(zip(FEET, sides, strict=True))
-    return [FileEvent(e.time_s + late_s, side[e.side], "Foot Strike", "", e.kind) for e in load_edges(trial.loads)]
+    return [FileEvent(e.time_s + delay_s, side[e.side], "Foot Strike", "", e.kind) for e in load_edges(trial.loads)]
 
 
 def test_events_with_their_forces(trial):
     assert found(trial, []) == found(trial, of_loads(trial)) == found(trial, of_loads(trial, 0.025)) == []
 
 
-@pytest.mark.parametrize("late_s", [-0.06, 0.04])
-def test_one_event_that_is_off(trial, late_s):
+@pytest.mark.parametrize("delay_s", [-0.06, 0.04])
+def test_one_event_that_is_off(trial, delay_s):
     events = of_loads(trial)
-    events[3] = FileEvent(events[3].time_s + late_s, events[3].side, "Foot Off", "", events[3].kind)
+    events[3] = FileEvent(events[3].time_s + delay_s, events[3].side, "Foot Off", "", events[3].kind)
     (one,) = found(trial, events)
     assert one.code == "T311"
-    assert one.evidence["difference_s"].value == pytest.approx(late_s)
+    assert one.evidence["difference_s"].value == pytest.approx(delay_s)
     assert one.evidence["events"].value == 1
 
 

@@ -26,20 +26,20 @@ def walk(request, recording_of):
     return recording_of(*SOUND[request.param])
 
 
-def found(recording, rate=1.0, late_s=0.0, gain=(1.0, 1.0)):
+def found(recording, rate=1.0, delay_s=0.0, gain=(1.0, 1.0)):
     """With forces whose time goes at this rate, which are later, and whose plates have other gains."""
     plates = recording.plates
-    time = plates.time[0] + rate * (plates.time - plates.time[0]) + late_s
+    time = plates.time[0] + rate * (plates.time - plates.time[0]) + delay_s
     factor = np.array(gain)[:, None]
     wrong = replace(plates, time=time, force=factor * plates.force, moment=factor * plates.moment)
     return [*force_rate(context_of(replace(recording, plates=wrong)))]
 
 
 @pytest.mark.parametrize(
-    ("late_s", "gain"), [(0.0, (1, 1)), (0.02, (1, 1)), (-0.02, (1, 1)), (0, (1.1, 1)), (0, (1, 1.1))]
+    ("delay_s", "gain"), [(0.0, (1, 1)), (0.02, (1, 1)), (-0.02, (1, 1)), (0, (1.1, 1)), (0, (1, 1.1))]
 )
-def test_forces_at_their_rate(walk, late_s, gain):
-    assert found(walk, late_s=late_s, gain=gain) == []
+def test_forces_at_their_rate(walk, delay_s, gain):
+    assert found(walk, delay_s=delay_s, gain=gain) == []
 
 
 @pytest.mark.parametrize("name", [name for name in RATES if name in SOUND])

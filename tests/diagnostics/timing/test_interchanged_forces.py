@@ -16,19 +16,19 @@ def person(request, file_of, recording_of):
     return Trials(PEOPLE[request.param], file_of, recording_of)
 
 
-@pytest.mark.parametrize("late_s", [0.0, 0.02, -0.05])
+@pytest.mark.parametrize("delay_s", [0.0, 0.02, -0.05])
 @pytest.mark.parametrize("count", [1, 2, 3])
-def test_fault_free_and_late_trials(person, count, late_s):
+def test_fault_free_and_late_trials(person, count, delay_s):
     second = person.names[1]
     for some in combinations(person.names, count):
-        trials = [person.context(name, late_s=late_s if name == second else 0.0) for name in some]
+        trials = [person.context(name, delay_s=delay_s if name == second else 0.0) for name in some]
         assert list(interchanged_forces(person.together(trials))) == []
 
 
 def test_one_late_and_the_other_early(person):
     first, second, _ = person.names
-    for late_s in (0.01, 0.015, -0.01, -0.015):
-        trials = [person.context(first, late_s=-late_s), person.context(second, late_s=late_s)]
+    for delay_s in (0.01, 0.015, -0.01, -0.015):
+        trials = [person.context(first, delay_s=-delay_s), person.context(second, delay_s=delay_s)]
         assert list(interchanged_forces(person.together(trials))) == []
 
 
@@ -44,7 +44,7 @@ def test_interchanged_force_files(person):
 def test_an_interchange_does_not_hide_the_delay_of_a_third_trial(person):
     """Chain I of the precedence."""
     first, second, third = person.names
-    trials = [person.context(first, second), person.context(second, first), person.context(third, late_s=0.1)]
+    trials = [person.context(first, second), person.context(second, first), person.context(third, delay_s=0.1)]
     for name in (first, second):
         again = person.context(name)
         trials.append(replace(again, recording=replace(again.recording, name=f"{name} again")))

@@ -43,11 +43,11 @@ def test_a_wrong_rate_is_no_delay(steps, factor):
     assert found.evidence["ratio"].value == pytest.approx(factor, rel=0.02)
 
 
-@pytest.mark.parametrize("late_s", [-0.1, 0.1])
-def test_a_delay_is_no_wrong_rate(late_s):
-    found = error_of(late(c3d_lab(FEW_STEPS), late_s), FEET)
+@pytest.mark.parametrize("delay_s", [-0.1, 0.1])
+def test_a_delay_is_no_wrong_rate(delay_s):
+    found = error_of(late(c3d_lab(FEW_STEPS), delay_s), FEET)
     assert found.code == "T211"
-    assert found.evidence["delay_s"].value == pytest.approx(late_s, abs=0.02)
+    assert found.evidence["delay_s"].value == pytest.approx(delay_s, abs=0.02)
 
 
 def test_loads_that_a_belt_takes_along_are_late():

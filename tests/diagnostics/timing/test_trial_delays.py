@@ -14,10 +14,10 @@ def person(request, file_of, recording_of):
     return Trials(PEOPLE[request.param], file_of, recording_of)
 
 
-def late_by(person, *late_s):
+def late_by(person, *delay_s):
     """The person with the first trials, whose forces are late by so much (s)."""
-    named = zip(person.names, late_s, strict=False)
-    return person.together([person.context(name, late_s=late) for name, late in named])
+    named = zip(person.names, delay_s, strict=False)
+    return person.together([person.context(name, delay_s=late) for name, late in named])
 
 
 def delays_of(findings):
@@ -34,20 +34,20 @@ def test_trials_that_share_a_time_base(person):
             assert delays_of(trial_delays(person.together(some))) == {}
 
 
-@pytest.mark.parametrize("late_s", [0.02, -0.02, 0.05])
-def test_the_delay_is_measured(person, late_s):
+@pytest.mark.parametrize("delay_s", [0.02, -0.02, 0.05])
+def test_the_delay_is_measured(person, delay_s):
     for name in person.names:
-        first, other = (trial_delay(person.context(name, late_s=late)) for late in (0.0, late_s))
-        assert other.by_pelvis_s - first.by_pelvis_s == pytest.approx(late_s, abs=0.001)
-        assert other.by_markers_s - first.by_markers_s == pytest.approx(late_s, abs=0.001)
+        first, other = (trial_delay(person.context(name, delay_s=late)) for late in (0.0, delay_s))
+        assert other.by_pelvis_s - first.by_pelvis_s == pytest.approx(delay_s, abs=0.001)
+        assert other.by_markers_s - first.by_markers_s == pytest.approx(delay_s, abs=0.001)
 
 
-@pytest.mark.parametrize("late_s", [0.02, -0.02])
-def test_of_two_both_are_named(person, late_s):
+@pytest.mark.parametrize("delay_s", [0.02, -0.02])
+def test_of_two_both_are_named(person, delay_s):
     """D11: nobody knows which of them is wrong."""
     first, second, _ = person.names
-    found = delays_of(trial_delays(late_by(person, 0.0, late_s)))
-    assert found == pytest.approx({first: -late_s, second: late_s}, abs=0.003)
+    found = delays_of(trial_delays(late_by(person, 0.0, delay_s)))
+    assert found == pytest.approx({first: -delay_s, second: delay_s}, abs=0.003)
 
 
 def test_one_of_three_is_early(person):
@@ -68,16 +68,16 @@ def test_both_ways_to_measure_have_to_agree():
 
 def test_short_windows_show_longer_delays_only():
     first = TrialDelay("a", 0.0, 0.0)
-    for late_s, names in ((0.015, set()), (0.02, {"a", "b"})):
-        assert set(delays_of(uneven_delays([first, TrialDelay("b", late_s, late_s, short=True)]))) == names
+    for delay_s, names in ((0.015, set()), (0.02, {"a", "b"})):
+        assert set(delays_of(uneven_delays([first, TrialDelay("b", delay_s, delay_s, short=True)]))) == names
 
 
-@pytest.mark.parametrize("late_s", [0.0, 0.025, -0.025])
-def test_walks_of_less_than_a_second(person, late_s):
+@pytest.mark.parametrize("delay_s", [0.0, 0.025, -0.025])
+def test_walks_of_less_than_a_second(person, delay_s):
     short = []
-    for context in late_by(person, 0.0, late_s).trials:
+    for context in late_by(person, 0.0, delay_s).trials:
         ((start_s, end_s),) = context.trial.windows()
         middle_s = (start_s + end_s) / 2
         short.append(replace(context, window_s=(middle_s - 0.45, middle_s + 0.45)))
     assert all(trial_delay(context).short for context in short)
-    assert len(delays_of(trial_delays(person.together(short)))) == (2 if late_s else 0)
+    assert len(delays_of(trial_delays(person.together(short)))) == (2 if delay_s else 0)

@@ -33,23 +33,23 @@ def test_what_is_not_positive_definite_raises(given):
 
 @pytest.mark.parametrize("transposed", [False, True])
 def test_solutions(given, transposed):
-    _, lower, right, left, exact = given
-    solution = right.copy()
+    _, lower, rhs, left, exact = given
+    solution = rhs.copy()
     blas.solve_lower(lower, solution, transposed)
-    np.testing.assert_allclose((lower.T if transposed else lower) @ solution, right, atol=10 * exact)
+    np.testing.assert_allclose((lower.T if transposed else lower) @ solution, rhs, atol=10 * exact)
     across = left.copy()
     blas.solve_lower_from_right(lower, across)
     np.testing.assert_allclose(across @ lower.T, left, atol=10 * exact)
 
 
 def test_squares_and_products_are_taken_off(given):
-    matrix, lower, right, left, exact = given
+    matrix, lower, rhs, left, exact = given
     target = matrix.copy()
-    blas.subtract_square(target, right)
-    np.testing.assert_allclose(np.tril(target), np.tril(matrix - right @ right.T), atol=100 * exact)
-    target = np.zeros((4, 3), right.dtype)
-    blas.subtract_product(target, left, right)
-    np.testing.assert_allclose(target, -left @ right, atol=10 * exact)
-    target = np.zeros((5, 3), right.dtype)
-    blas.subtract_product(target, lower, right, transposed=True)
-    np.testing.assert_allclose(target, -lower.T @ right, atol=100 * exact)
+    blas.subtract_square(target, rhs)
+    np.testing.assert_allclose(np.tril(target), np.tril(matrix - rhs @ rhs.T), atol=100 * exact)
+    target = np.zeros((4, 3), rhs.dtype)
+    blas.subtract_product(target, left, rhs)
+    np.testing.assert_allclose(target, -left @ rhs, atol=10 * exact)
+    target = np.zeros((5, 3), rhs.dtype)
+    blas.subtract_product(target, lower, rhs, transposed=True)
+    np.testing.assert_allclose(target, -lower.T @ rhs, atol=100 * exact)

@@ -24,31 +24,31 @@ def random_system(blocks: int, size: int, seed: int = 0) -> tuple[np.ndarray, np
 def test_factor_and_solutions_agree_with_dense_cholesky(blocks, size):
     dense, diagonal, below = random_system(blocks, size)
     lower = np.linalg.cholesky(dense)
-    right = np.random.default_rng(1).normal(size=(blocks * size, 3))
+    rhs = np.random.default_rng(1).normal(size=(blocks * size, 3))
     band = BlockBand.factor(diagonal, below)
-    forward = band.forward(right.reshape(blocks, size, 3))
-    np.testing.assert_allclose(forward.reshape(-1, 3), np.linalg.solve(lower, right), atol=1e-12)
-    backward = band.backward(right.reshape(blocks, size, 3))
-    np.testing.assert_allclose(backward.reshape(-1, 3), np.linalg.solve(lower.T, right), atol=1e-12)
+    forward = band.forward(rhs.reshape(blocks, size, 3))
+    np.testing.assert_allclose(forward.reshape(-1, 3), np.linalg.solve(lower, rhs), atol=1e-12)
+    backward = band.backward(rhs.reshape(blocks, size, 3))
+    np.testing.assert_allclose(backward.reshape(-1, 3), np.linalg.solve(lower.T, rhs), atol=1e-12)
     solution = band.backward(forward).reshape(-1, 3)
-    np.testing.assert_allclose(dense @ solution, right, atol=1e-10)
+    np.testing.assert_allclose(dense @ solution, rhs, atol=1e-10)
 
 
 @pytest.mark.parametrize("cut", [1, 3, 5])
 def test_two_parts_of_a_matrix_do_as_the_whole(cut):
     """What the first part leaves to the second, and takes back of it."""
     _, diagonal, below = random_system(6, 4)
-    right = np.random.default_rng(1).normal(size=(6, 4, 3))
+    rhs = np.random.default_rng(1).normal(size=(6, 4, 3))
     whole = BlockBand.factor(diagonal, below)
     first = BlockBand.factor(diagonal[:cut], below[:cut])
-    begun, rest = first.forward(right[:cut]), right[cut:].copy()
+    begun, rest = first.forward(rhs[:cut]), rhs[cut:].copy()
     reach, left = first.below[-1], diagonal[cut:].copy()
     left[0] -= reach @ reach.T
     rest[0] -= reach @ begun[-1]
     second = BlockBand.factor(left, below[cut:])
     ended = second.backward(second.forward(rest))
     solution = np.concatenate([first.backward(begun, ended[0]), ended])
-    np.testing.assert_allclose(solution, whole.backward(whole.forward(right)), atol=1e-12)
+    np.testing.assert_allclose(solution, whole.backward(whole.forward(rhs)), atol=1e-12)
     after, below_after = second.inverse_blocks()
     before, below_before = first.inverse_blocks(after[0])
     expected = whole.inverse_blocks()

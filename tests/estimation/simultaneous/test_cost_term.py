@@ -84,13 +84,13 @@ def test_its_derivatives_are_those_of_the_cost(page):
     (coefficients,), static = point(problem)
     static[problem.layout[page["BIAS"]]] = [3.0, -2.0, 1.0]
     here = Point((coefficients,), static, problem.beginning.displaced)
-    right, normal = here.like(problem.slope(here).right).static, problem.normal(0, coefficients, static)
-    np.testing.assert_allclose(right, normal.static_right + problem.prior_slope(static)[0], rtol=1e-8, atol=1e-6)
+    rhs, normal = here.like(problem.slope(here).rhs).static, problem.normal(0, coefficients, static)
+    np.testing.assert_allclose(rhs, normal.static_rhs + problem.prior_slope(static)[0], rtol=1e-8, atol=1e-6)
     for name in (page["BIAS"], "plates", "zeros", "gains"):
         step = np.zeros(len(static))
         step[problem.layout[name]] = np.random.default_rng(0).normal(size=len(step[problem.layout[name]]))
         ahead, behind = (problem.slope(replace(here, static=static + h * step)).cost for h in (1e-6, -1e-6))
-        assert -right @ step == pytest.approx((ahead - behind) / 2e-6, rel=1e-5), name
+        assert -rhs @ step == pytest.approx((ahead - behind) / 2e-6, rel=1e-5), name
 
 
 def test_it_costs_nothing_where_there_is_no_bias(page):

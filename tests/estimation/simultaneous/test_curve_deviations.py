@@ -82,28 +82,28 @@ def curves(problem, coefficients: np.ndarray, static: np.ndarray) -> dict[str, n
     }
 
 
-def derivatives_at(problem, coefficients: np.ndarray, static: np.ndarray, late_sd_s: float):
+def derivatives_at(problem, coefficients: np.ndarray, static: np.ndarray, delay_sd_s: float):
     """The motion at the dynamic frames, and `moment_derivatives` there."""
     frames = np.flatnonzero(problem.trials[0].dynamic)
     motion = [part[frames] for part in problem.model.full(problem.bases[0].evaluate(coefficients), static)]
     reactions = problem.loads.reactions(0, static)
-    return motion, moment_derivatives(problem, 0, motion, static, reactions, frames, late_sd_s)
+    return motion, moment_derivatives(problem, 0, motion, static, reactions, frames, delay_sd_s)
 
 
-def late_sd_s(problem, covariance: np.ndarray) -> float:
+def delay_sd_s(problem, covariance: np.ndarray) -> float:
     """Deviation of the delay of the forces, from the covariance (S, S) of the static unknowns."""
-    late = problem.loads.late(0)
+    late = problem.loads.delay_unknowns(0)
     return float(np.sqrt(covariance[np.ix_(late, late)].sum()))
 
 
 def dense_derivatives(
-    problem, coefficients: np.ndarray, static: np.ndarray, shares=(1.0, 1.0, 1.0), late_sd_s=0.0, grown=1.0
+    problem, coefficients: np.ndarray, static: np.ndarray, shares=(1.0, 1.0, 1.0), delay_sd_s=0.0, grown=1.0
 ) -> dict[str, np.ndarray]:
     """(d, ..., unknowns) derivatives of `curves` by all coefficients and static unknowns; with these shares of what
     places, rates and accelerations do, and times `grown` (d, c, 1) what they do to moments.
     """
     basis, frames = problem.bases[0], np.flatnonzero(problem.trials[0].dynamic)
-    motion, by = derivatives_at(problem, coefficients, static, late_sd_s)
+    motion, by = derivatives_at(problem, coefficients, static, delay_sd_s)
     d, (size, c) = len(frames), coefficients.shape
     nothing, same = np.zeros((d, c, c)), np.tile(np.eye(c), (d, 1, 1))
     still, zero = by.static, np.zeros_like(by.static)
@@ -175,14 +175,14 @@ def test_deviations_are_those_of_the_dense_covariance(estimate, noise):
     noise_n = problem.loads.reactions(0, static).noise_n * (
         curves(problem, coefficients, static)["ground_forces"] != 0.0
     )
-    late = late_sd_s(problem, full[n:, n:])
+    late = delay_sd_s(problem, full[n:, n:])
     left = derivatives_at(problem, coefficients, static, late)[1]
     more = {
         "moments": impacts + left.left,
         "powers": (impacts + left.left) * speed**2,
         "ground_forces": noise_n**2 + left.ground_left,
     }
-    by = dense_derivatives(problem, coefficients, static, late_sd_s=late)
+    by = dense_derivatives(problem, coefficients, static, delay_sd_s=late)
     by_noise = dense_derivatives(problem, coefficients, static, np.sqrt(noise), late, grown(problem, static))
     for name, derivative in by.items():
         expected = np.einsum("dri,ij,drj->dr", derivative, full, derivative, optimize=True) + more.get(name, 0.0)
@@ -214,7 +214,7 @@ def test_deviations_of_two_trials_are_those_of_one_dense_matrix(estimate, noise)
     rng = np.random.default_rng(0)
     here = pair.at(Point((coefficients,) * 2, static, tuple(rng.normal(size=3 * len(sd)) for _ in range(2))))
     gaussian = GaussianPrior.of(pair.layout.error_priors)
-    chains, information, right = dense_pair(pair, here, gaussian)
+    chains, information, rhs = dense_pair(pair, here, gaussian)
     covariance = inverse(information)
     model = GaussNewton.of(pair, here).under(gaussian)
     ended = Ended(here.point, here, gaussian, True, 1, (0.0, 0.0))
@@ -225,11 +225,11 @@ def test_deviations_of_two_trials_are_those_of_one_dense_matrix(estimate, noise)
         static_covariance / np.outer(scale, scale), covariance[:s, :s] / np.outer(scale, scale), atol=1e-4
     )
     model, answered = GaussNewton.of(pair, here).under(gaussian), here.slope.under(gaussian)[1]
-    assert answered @ model.step(answered) == pytest.approx(right @ covariance @ right, rel=1e-4)
+    assert answered @ model.step(answered) == pytest.approx(rhs @ covariance @ rhs, rel=1e-4)
 
     in_trial = pair.in_trial(0, here.point)
-    late = late_sd_s(pair, chains[0] @ covariance @ chains[0].T)
-    by = dense_derivatives(pair, coefficients, in_trial, late_sd_s=late)["moments"]
+    late = delay_sd_s(pair, chains[0] @ covariance @ chains[0].T)
+    by = dense_derivatives(pair, coefficients, in_trial, delay_sd_s=late)["moments"]
     n = coefficients.size
     normal = pair.normal(0, coefficients, in_trial)
     motion = inverse(dense_band(normal.band))
@@ -257,13 +257,13 @@ def dense_pair(pair, here, gaussian) -> tuple[list[np.ndarray], np.ndarray, np.n
     point, places = here.point, pair.layout.errors
     normals = [pair.normal(k, part, pair.in_trial(k, point)) for k, part in enumerate(point.coefficients)]
     s, wide = pair.layout.size, len(point.displaced[0])
-    sizes = [normal.right.size for normal in normals]
+    sizes = [normal.rhs.size for normal in normals]
     ends = s + 2 * wide + np.cumsum(sizes)
-    information, right = np.zeros((ends[-1],) * 2), np.zeros(ends[-1])
+    information, rhs = np.zeros((ends[-1],) * 2), np.zeros(ends[-1])
     information[:s, :s] = pair.prior_information(point.static)
-    right[:s], _ = pair.prior_slope(point.static)
+    rhs[:s], _ = pair.prior_slope(point.static)
     information[places, places] += gaussian.precision
-    right[places] += gaussian.pull - gaussian.precision @ point.static[places]
+    rhs[places] += gaussian.pull - gaussian.precision @ point.static[places]
     chains = []
     for k, normal in enumerate(normals):
         own, moving = slice(s + k * wide, s + (k + 1) * wide), slice(ends[k] - sizes[k], ends[k])
@@ -276,11 +276,11 @@ def dense_pair(pair, here, gaussian) -> tuple[list[np.ndarray], np.ndarray, np.n
         information[:, moving] += across.T
         information[moving, moving] += dense_band(normal.band)
         information[own, own] += np.eye(wide)
-        right += chain.T @ normal.static_right
-        right[moving] += normal.right.ravel()
-        right[own] -= point.displaced[k]
+        rhs += chain.T @ normal.static_rhs
+        rhs[moving] += normal.rhs.ravel()
+        rhs[own] -= point.displaced[k]
         chains.append(chain)
-    return chains, information, right
+    return chains, information, rhs
 
 
 def of_impacts(problem, coefficients: np.ndarray, static: np.ndarray) -> np.ndarray:

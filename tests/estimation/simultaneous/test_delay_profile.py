@@ -8,9 +8,9 @@ import pytest
 
 from kinertia.estimation.simultaneous import delay_profile
 from kinertia.estimation.simultaneous.delay_profile import CostProfile
-from kinertia.estimation.simultaneous.mixture_prior import ErrorPriors, GaussianPrior, SoundOrFaulty
+from kinertia.estimation.simultaneous.mixture_prior import ErrorPriors, FaultMixture, GaussianPrior
 
-CLOCK, OWN = SoundOrFaulty(0.0003, 0.008, 0.3), SoundOrFaulty(0.00003, 0.01, 0.05)
+CLOCK, OWN = FaultMixture(0.0003, 0.008, 0.3), FaultMixture(0.00003, 0.01, 0.05)
 SHOWN_S, SD_S = 0.004, 0.0015
 FOLLOWS, BODY_SD = 20.0, 0.1
 
@@ -60,18 +60,18 @@ def found(monkeypatch, priors) -> tuple[CostProfile, np.ndarray]:
     gaussian, here = GaussianPrior.of(one.layout.error_priors), Quadratic(information(n, 2.0))
 
     def search(model, held: GaussianPrior) -> Place:
-        whole, right = information(n, 1.0), np.append(np.full(n, SHOWN_S / SD_S**2), 0.0)
+        whole, rhs = information(n, 1.0), np.append(np.full(n, SHOWN_S / SD_S**2), 0.0)
         whole[:n, :n] += held.precision
-        right[:n] += held.pull
-        return Place(np.linalg.solve(whole, right))
+        rhs[:n] += held.pull
+        return Place(np.linalg.solve(whole, rhs))
 
     profile = CostProfile.of(one, here, gaussian, search(None, gaussian), search)
     root = model_of(profile.here, n).under(profile.instruments).static.root_of_covariance()
     return profile, root @ root.T
 
 
-def parts_of(prior: SoundOrFaulty) -> list[tuple[float, float]]:
-    return [(1.0 - prior.faulty_share, prior.sound_sd), (prior.faulty_share, prior.faulty_sd)]
+def parts_of(prior: FaultMixture) -> list[tuple[float, float]]:
+    return [(1.0 - prior.fault_probability, prior.nominal_sd), (prior.fault_probability, prior.faulty_sd)]
 
 
 def integrated(parts) -> tuple[float, float]:

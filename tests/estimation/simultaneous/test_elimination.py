@@ -80,8 +80,8 @@ def double(monkeypatch):
 
 def test_normal_equations_are_the_sum_over_stretches(whole, cut, here):
     expected, actual = whole.normal(0, *here), cut.gradient(0, *here)
-    close(actual.static_right, expected.static_right)
-    close(actual.right, expected.right)
+    close(actual.static_rhs, expected.static_rhs)
+    close(actual.rhs, expected.rhs)
     assert actual.cost == pytest.approx(expected.cost, rel=1e-12)
     static, band, border = (np.zeros_like(each) for each in (expected.static, expected.band, expected.border))
     for stretch in cut.stretches[0]:
@@ -96,25 +96,25 @@ def test_normal_equations_are_the_sum_over_stretches(whole, cut, here):
 
 def test_elimination_and_steps_are_those_of_the_whole(whole, cut, here, double):
     expected, actual = (each.eliminated(0, *here, DAMPING) for each in (whole, cut))
-    close(actual.gradient.right, whole.normal(0, *here).right)
+    close(actual.gradient.rhs, whole.normal(0, *here).rhs)
     close(actual.information, expected.information)
     close(actual.static_diagonal, np.diag(whole.normal(0, *here).static))
     rng = np.random.default_rng(0)
-    right, step = rng.normal(size=here[0].shape), rng.normal(0.0, 1e-3, len(here[1]))
-    (solved, lost), (in_one, lost_in_one) = actual.forward(right), expected.forward(right)
+    rhs, step = rng.normal(size=here[0].shape), rng.normal(0.0, 1e-3, len(here[1]))
+    (solved, lost), (in_one, lost_in_one) = actual.forward(rhs), expected.forward(rhs)
     close(lost, lost_in_one)
     close(actual.motion_step(solved, step), expected.motion_step(in_one, step))
 
 
 def test_elimination_is_that_of_the_dense_matrix(whole, here, double):
     normal, eliminated = whole.normal(0, *here), whole.eliminated(0, *here)
-    n, s = normal.right.size, len(here[1])
+    n, s = normal.rhs.size, len(here[1])
     band, border = dense_band(normal.band), normal.border.reshape(n, s)
     close(eliminated.information, normal.static - border.T @ np.linalg.solve(band, border), 1e-7)
     step = np.random.default_rng(0).normal(0.0, 1e-3, s)
-    solved, lost = eliminated.forward(normal.right)
-    close(lost, border.T @ np.linalg.solve(band, normal.right.ravel()), 1e-7)
-    expected = np.linalg.solve(band, normal.right.ravel() - border @ step)
+    solved, lost = eliminated.forward(normal.rhs)
+    close(lost, border.T @ np.linalg.solve(band, normal.rhs.ravel()), 1e-7)
+    expected = np.linalg.solve(band, normal.rhs.ravel() - border @ step)
     close(eliminated.motion_step(solved, step).ravel(), expected, 1e-6)
 
 
@@ -131,9 +131,9 @@ def test_single_precision_loses_nothing_that_counts(cut, here, monkeypatch):
     left = (double.static_diagonal / scale**2).max()
     off = (single.information - double.information) / np.outer(scale, scale)
     assert np.abs(off).max() < 2e-6 * left
-    right = double.gradient.right
-    difference = (single.forward(right)[1] - double.forward(right)[1]) / scale
-    assert np.abs(difference).max() < 2e-6 * left * np.linalg.norm(double.forward(right)[1] / scale)
+    rhs = double.gradient.rhs
+    difference = (single.forward(rhs)[1] - double.forward(rhs)[1]) / scale
+    assert np.abs(difference).max() < 2e-6 * left * np.linalg.norm(double.forward(rhs)[1] / scale)
 
 
 def test_deviations_of_curves_are_those_of_the_whole(whole, cut, here, double):

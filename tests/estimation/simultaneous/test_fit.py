@@ -7,7 +7,7 @@ from threadpoolctl import threadpool_limits
 
 from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.simultaneous.fit import fit_simultaneous, held_against
-from kinertia.estimation.simultaneous.instruments import CLOCK_PRIOR_S, FLOOR_PRIOR, PLATE_PRIOR
+from kinertia.estimation.simultaneous.instruments import DELAY_PRIOR_S, FLOOR_PRIOR, PLATE_PRIOR
 from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINTY, JOINT_CENTRE_SD_M
 from kinertia.synthetic.noise import camera_noise
 from kinertia.synthetic.walk import SyntheticTrial, walk, walking_subject
@@ -63,7 +63,7 @@ def test_calibration_is_told_with_its_deviations(plain):
     assert plate.prior_sd == pytest.approx(np.hypot(PLATE_PRIOR["x"].sd, FLOOR_PRIOR["x"].sd))
     assert entry_of(plain, "gain", plate="left foot").prior_sd == PLATE_PRIOR["gain"].sd
     delay = entry_of(plain, "delay")
-    assert (delay.prior_sd, delay.unit) == (CLOCK_PRIOR_S.sd, "s")
+    assert (delay.prior_sd, delay.unit) == (DELAY_PRIOR_S.sd, "s")
     assert delay.contradicted_by is None
     assert len({one.key for one in plain.posterior.calibration}) == len(plain.posterior.calibration)
     for one in plain.posterior.calibration:
@@ -156,7 +156,7 @@ def test_a_displaced_plate_is_named(trial):
 
 
 @pytest.mark.slow
-def test_a_wandering_marker_is_named(trial):
+def test_a_drifting_marker_is_named(trial):
     def wander(positions, loads):
         at = trial.markers.labels.index("R.Bicep")
         positions[:, at] += np.random.default_rng(1).normal(0.0, 0.05, positions[:, at].shape)
@@ -253,7 +253,7 @@ def test_a_horizontal_zero_is_named_and_put_right(trial, plain, axis):
     assert entry.sd < 1.5
     (found,) = of_estimate(outcome)
     assert (found.code, found.where.trial, found.where.plate) == ("P215", "walk", "left foot")
-    assert found.evidence["zero_n"].value == entry.value
+    assert found.evidence["zero_offset_n"].value == entry.value
     expected, found = (fit.foot_loads[0][10:-10, 1, axis] for fit in (plain, outcome))
     assert np.abs(found.mean() - expected.mean()) < 2.0
 
@@ -317,10 +317,10 @@ def test_a_plate_that_is_off_in_one_trial_of_three_is_not_accused(trial):
 def test_zeros_of_a_plate_that_two_trials_share_are_each_trial_s_own(trial):
     """An amplifier drifts from one to the next; the plate stays where it is."""
     kinematics = []
-    for seed, zero_n in enumerate((0.0, -8.0)):
+    for seed, zero_offset_n in enumerate((0.0, -8.0)):
         positions = camera_noise(trial.markers, 0.002, np.random.default_rng(seed)).positions
         loads = trial.foot_loads.copy()
-        force = np.where(loads[:, 1, 1:2] > 20.0, [zero_n, 0.0, 0.0], 0.0)
+        force = np.where(loads[:, 1, 1:2] > 20.0, [zero_offset_n, 0.0, 0.0], 0.0)
         loads[:, 1] += np.concatenate([force, np.cross(centre_of_pressure(loads[:, 1]), force)], axis=1)
         one = kinematics_of(trial, replace(trial.markers, positions=positions), loads)
         kinematics.append(replace(one, trial=replace(one.trial, name=f"walk {seed}")))
@@ -406,7 +406,7 @@ def test_forces_of_one_of_two_trials_are_late(trial):
     ours, theirs = (fit.result.instruments for fit in (sound, late))
     assert ours.information.shape == theirs.information.shape == (12, 12)
     for shown in (ours, theirs):
-        assert abs(shown.right[-1] / shown.information[-1, -1]) < 0.001
+        assert abs(shown.rhs[-1] / shown.information[-1, -1]) < 0.001
 
 
 @pytest.mark.slow

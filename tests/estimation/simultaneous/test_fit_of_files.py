@@ -50,4 +50,4 @@ def test_files_of_a_simultaneous_fit(of_files, tmp_path):
     noise = summary["marker_noise"][of_files.trials[0].name]
     assert noise["correlation_s"] > 0
     assert min(noise["sd_m"].values()) >= 0.001
-    assert isinstance(noise["wandering"], list)
+    assert isinstance(noise["drifting"], list)

@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinertia.estimation.simultaneous.instrument_term import CLOCK, DELAYS, InstrumentErrors
+from kinertia.estimation.simultaneous.instrument_term import CLOCK, TRIAL_DELAYS, InstrumentErrors
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation, InstrumentPrior
 from kinertia.estimation.simultaneous.plates import PLATE_ERRORS, PLATE_UNKNOWNS
 from kinertia.settings import Instruments
@@ -23,10 +23,10 @@ def test_what_a_posterior_adds_is_what_was_put_in():
     session, rng = shown(("a", "b")), np.random.default_rng(1)
     before = [(np.diag(rng.uniform(1e4, 1e6, 12)), rng.normal(size=12)) for _ in range(2)]
     covariance = np.linalg.inv(session.information + sum(each for each, _ in before))
-    mean = covariance @ (session.right + sum(each for _, each in before))
+    mean = covariance @ (session.rhs + sum(each for _, each in before))
     added = InstrumentInformation.of_posterior(("a", "b"), mean, covariance, before)
     np.testing.assert_allclose(added.information, session.information, rtol=1e-6, atol=1e-3)
-    np.testing.assert_allclose(added.right, session.right, rtol=1e-6, atol=1e-3)
+    np.testing.assert_allclose(added.rhs, session.rhs, rtol=1e-6, atol=1e-3)
 
 
 def test_a_posterior_that_knows_less_than_before_adds_nothing_negative():
@@ -49,8 +49,8 @@ def test_plates_that_are_not_there_are_marginalised(plates):
     narrow = session.among(plates, PRIOR)
     own = np.linalg.inv(narrow.information + precision[np.ix_(kept, kept)])
     np.testing.assert_allclose(own, covariance[np.ix_(kept, kept)], rtol=1e-6, atol=1e-14)
-    mean = covariance @ wide.right
-    np.testing.assert_allclose(own @ narrow.right, mean[kept], rtol=1e-6, atol=1e-12)
+    mean = covariance @ wide.rhs
+    np.testing.assert_allclose(own @ narrow.rhs, mean[kept], rtol=1e-6, atol=1e-12)
 
 
 def test_what_trials_have_of_their_own_is_marginalised():
@@ -64,8 +64,8 @@ def test_what_trials_have_of_their_own_is_marginalised():
     covariance = np.linalg.inv(whole.information + before)
     own = np.linalg.inv(without.information + np.eye(8))
     np.testing.assert_allclose(own, covariance[:8, :8])
-    mean = covariance @ (whole.right + np.append(np.zeros(8), pull))
-    np.testing.assert_allclose(own @ without.right, mean[:8])
+    mean = covariance @ (whole.rhs + np.append(np.zeros(8), pull))
+    np.testing.assert_allclose(own @ without.rhs, mean[:8])
 
 
 @pytest.mark.parametrize("clock_sd_ms", [None, 1.0, 10.0])
@@ -76,10 +76,10 @@ def test_a_trial_that_began_with_the_others_has_hardly_a_delay_of_its_own(clock_
     calibration = replace(several.calibration, instruments=prior)
     unknowns = InstrumentErrors.unknowns(replace(several.given, calibration=calibration))
     priors = {one.name: one.prior.own for one in unknowns}
-    (clock,), delays = priors[CLOCK], priors[DELAYS]
+    (clock,), delays = priors[CLOCK], priors[TRIAL_DELAYS]
     assert len(delays) == 3
-    assert clock.sound_sd == (0.0003 if clock_sd_ms is None else pytest.approx(clock_sd_ms / 1e3))
-    assert all((one.sound_sd, one.faulty_sd, one.faulty_share) == (0.00003, 0.010, 0.03) for one in delays)
+    assert clock.nominal_sd == (0.0003 if clock_sd_ms is None else pytest.approx(clock_sd_ms / 1e3))
+    assert all((one.nominal_sd, one.faulty_sd, one.fault_probability) == (0.00003, 0.010, 0.03) for one in delays)
 
 
 def test_what_is_left_without_the_trials_own_says_nothing_negative():
@@ -91,11 +91,11 @@ def test_what_is_left_without_the_trials_own_says_nothing_negative():
 
 def test_what_the_laboratory_states_replaces_the_literature():
     stated = InstrumentPrior.stated(Instruments(plate_sd_mm=2.0, clock_sd_ms=1.0))
-    assert (stated.plate["x"].sd, stated.plate["z"].faulty_share, stated.clock_s.sd) == (0.002, 0.0, 0.001)
+    assert (stated.plate["x"].sd, stated.plate["z"].fault_probability, stated.delay_s.sd) == (0.002, 0.0, 0.001)
     assert stated.plate["gain"] == PRIOR.plate["gain"]
     gain = InstrumentPrior.stated(Instruments(gain_sd_percent=0.2))
-    assert (gain.plate["gain"].sd, gain.plate["gain"].faulty_share) == (0.002, 0.0)
-    assert (gain.plate["x"], gain.clock_s) == (PRIOR.plate["x"], PRIOR.clock_s)
+    assert (gain.plate["gain"].sd, gain.plate["gain"].fault_probability) == (0.002, 0.0)
+    assert (gain.plate["x"], gain.delay_s) == (PRIOR.plate["x"], PRIOR.delay_s)
     assert np.hypot(stated.plate["x"].sd, stated.floor["x"].sd) == pytest.approx(0.002, rel=0.01)
     assert (
         InstrumentPrior.stated(Instruments()) == replace(PRIOR) or InstrumentPrior.stated(Instruments()).session == ()
@@ -108,9 +108,9 @@ def test_columns_of_the_same_name_have_faults_in_common():
     covariance = prior.of_unknowns(names).covariance
     correlation = covariance / np.sqrt(np.outer(np.diag(covariance), np.diag(covariance)))
     for unknown in range(len(PLATE_UNKNOWNS)):
-        right, left, again = (unknown + len(PLATE_UNKNOWNS) * plate for plate in (0, 1, 2))
-        assert 0.4 < correlation[right, again] < 0.5
-        assert correlation[right, left] == 0.0
+        rhs, left, again = (unknown + len(PLATE_UNKNOWNS) * plate for plate in (0, 1, 2))
+        assert 0.4 < correlation[rhs, again] < 0.5
+        assert correlation[rhs, left] == 0.0
     assert prior.of_unknowns(("plate 1", "plate 2")).common == ()
     assert InstrumentPrior.stated(Instruments(plate_sd_mm=1.0, gain_sd_percent=0.5)).of_unknowns(names).covariance[
         0, 8
@@ -126,7 +126,7 @@ def test_the_session_counts_in_the_normal_equations():
     places, static = problem.layout.laboratory, problem.layout.start.copy()
     static[places] = np.random.default_rng(2).normal(0.0, 0.01, places.stop - places.start)
     before, information = (each.prior_information(static) for each in (problem, with_session))
-    (right_before, cost_before), (right, cost) = (each.prior_slope(static) for each in (problem, with_session))
+    (right_before, cost_before), (rhs, cost) = (each.prior_slope(static) for each in (problem, with_session))
     np.testing.assert_allclose((information - before)[places, places], 2.0 * session.information)
 
     def extra(values):
@@ -139,11 +139,11 @@ def test_the_session_counts_in_the_normal_equations():
         h = np.zeros(places.stop - places.start)
         h[i] = 1e-4
         slope = (extra(static[places] + h) - extra(static[places] - h)) / 2e-4
-        assert slope == pytest.approx(-(right - right_before)[places][i], rel=1e-6, abs=1e-3)
+        assert slope == pytest.approx(-(rhs - right_before)[places][i], rel=1e-6, abs=1e-3)
 
 
 def test_who_has_checked_the_gain_has_checked_that_of_the_trial():
-    assert InstrumentPrior().trial_gain.faulty_share > 0.0
+    assert InstrumentPrior().trial_gain.fault_probability > 0.0
     checked = InstrumentPrior.stated(Instruments(gain_sd_percent=0.5)).trial_gain
     assert checked.sd < 0.002
 
@@ -153,7 +153,7 @@ def test_a_single_trial_may_be_late_by_itself_unless_its_clock_has_been_checked(
     one = small_problem()
     known = InstrumentPrior.stated(Instruments(clock_sd_ms=clock_sd_ms))
     problem = type(one)(one.skeleton, one.prior, replace(one.calibration, instruments=known), one.trials)
-    assert problem.layout[DELAYS].stop - problem.layout[DELAYS].start == expected
+    assert problem.layout[TRIAL_DELAYS].stop - problem.layout[TRIAL_DELAYS].start == expected
 
 
 @pytest.mark.parametrize(

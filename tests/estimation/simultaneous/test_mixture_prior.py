@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from kinertia.estimation.simultaneous.mixture_prior import ErrorPriors, GaussianPrior, SoundOrFaulty, log_chance
+from kinertia.estimation.simultaneous.mixture_prior import ErrorPriors, FaultMixture, GaussianPrior, log_chance
 
-PLATE = SoundOrFaulty(0.001, 0.015, 0.1)
+PLATE = FaultMixture(0.001, 0.015, 0.1)
 
 
 def normal(x: float, mean: float, sd: float) -> float:
@@ -16,7 +16,7 @@ def normal(x: float, mean: float, sd: float) -> float:
 
 
 def density(x: float) -> float:
-    return 0.9 * normal(x, 0.0, PLATE.sound_sd) + 0.1 * normal(x, 0.0, PLATE.faulty_sd)
+    return 0.9 * normal(x, 0.0, PLATE.nominal_sd) + 0.1 * normal(x, 0.0, PLATE.faulty_sd)
 
 
 @pytest.mark.parametrize(("mean", "sd"), [(0.0, 0.002), (0.004, 0.002), (-0.012, 0.006), (0.02, 0.003)])
@@ -36,22 +36,22 @@ def test_one_quantity_has_the_mean_and_deviation_of_the_product(mean, sd):
 
 
 def test_a_certain_prior_stays_what_it_is():
-    priors = ErrorPriors((SoundOrFaulty.certain(0.01), SoundOrFaulty.certain(0.2)))
+    priors = ErrorPriors((FaultMixture.certain(0.01), FaultMixture.certain(0.2)))
     covariance = np.array([[2e-5, 1e-5], [1e-5, 0.01]])
     updated = GaussianPrior.of(priors).updated(priors, np.array([0.02, -0.1]), covariance)
     np.testing.assert_allclose(updated.precision, np.diag([1e4, 25.0]), atol=1e-6)
     np.testing.assert_allclose(updated.pull, 0.0, atol=1e-9)
 
 
-def posterior(priors, data, right):
+def posterior(priors, data, rhs):
     """Mean and covariance of quantities that data (k, k) and right (k,) tell of."""
     priors = priors if isinstance(priors, ErrorPriors) else ErrorPriors(tuple(priors))
     sites = GaussianPrior.of(priors)
     for _ in range(3):
         covariance = np.linalg.inv(data + sites.precision)
-        sites = sites.updated(priors, covariance @ (right + sites.pull), covariance)
+        sites = sites.updated(priors, covariance @ (rhs + sites.pull), covariance)
     covariance = np.linalg.inv(data + sites.precision)
-    return covariance @ (right + sites.pull), covariance
+    return covariance @ (rhs + sites.pull), covariance
 
 
 def test_the_plate_that_is_off_takes_the_whole_error():
@@ -71,7 +71,7 @@ def test_sound_plates_stay_where_they_are():
     data = np.eye(1) / 0.006**2
     mean, covariance = posterior([PLATE], data, data @ [0.005])
     assert 0.0 < mean[0] < 0.0008
-    assert PLATE.sound_sd < np.sqrt(covariance[0, 0]) < 0.004
+    assert PLATE.nominal_sd < np.sqrt(covariance[0, 0]) < 0.004
 
 
 def test_nothing_jumps():
@@ -110,21 +110,24 @@ def test_the_plates_that_are_off_take_the_whole_error_in_every_trial():
 @pytest.mark.parametrize("count", [1, 4, 7])
 def test_the_posterior_is_that_of_all_ways_to_be_sound_or_faulty(count):
     rng = np.random.default_rng(count)
-    priors = [SoundOrFaulty(0.001, 0.015, share) for share in rng.uniform(0.02, 0.3, count)]
+    priors = [FaultMixture(0.001, 0.015, share) for share in rng.uniform(0.02, 0.3, count)]
     jacobian = rng.normal(size=(2 * count, count)) / 0.006
-    data, right = jacobian.T @ jacobian, jacobian.T @ rng.normal(0.0, 2.0, 2 * count)
+    data, rhs = jacobian.T @ jacobian, jacobian.T @ rng.normal(0.0, 2.0, 2 * count)
     weights, means, covariances = [], [], []
     for way in product([False, True], repeat=count):
-        sd = np.array([prior.faulty_sd if off else prior.sound_sd for off, prior in zip(way, priors, strict=True)])
-        share = [prior.faulty_share if off else 1 - prior.faulty_share for off, prior in zip(way, priors, strict=True)]
+        sd = np.array([prior.faulty_sd if off else prior.nominal_sd for off, prior in zip(way, priors, strict=True)])
+        share = [
+            prior.fault_probability if off else 1 - prior.fault_probability
+            for off, prior in zip(way, priors, strict=True)
+        ]
         covariances.append(np.linalg.inv(data + np.diag(sd**-2.0)))
-        means.append(covariances[-1] @ right)
+        means.append(covariances[-1] @ rhs)
         size = np.linalg.slogdet(covariances[-1])[1] - 2.0 * np.log(sd).sum()
-        weights.append(np.log(share).sum() + 0.5 * (right @ means[-1] + size))
+        weights.append(np.log(share).sum() + 0.5 * (rhs @ means[-1] + size))
     weight = np.exp(np.array(weights) - max(weights))
     mean = np.average(means, axis=0, weights=weight)
     covariance = np.average(covariances, axis=0, weights=weight) + np.cov(np.transpose(means), aweights=weight, ddof=0)
-    got, spread = posterior(priors, data, right)
+    got, spread = posterior(priors, data, rhs)
     np.testing.assert_allclose(got, mean, atol=1e-7)
     np.testing.assert_allclose(spread, covariance, atol=1e-9)
 
@@ -155,23 +158,23 @@ def test_drawn_instruments_have_the_prior_s_deviation():
 
 def test_chance_of_data_is_their_mean_under_the_priors():
     """Of two errors that are added to a common one, against sums over a fine grid."""
-    own, both = SoundOrFaulty(0.3, 2.0, 0.2), SoundOrFaulty(0.5, 1.5, 0.1)
+    own, both = FaultMixture(0.3, 2.0, 0.2), FaultMixture(0.5, 1.5, 0.1)
     priors = ErrorPriors((own, own), ((both, (0, 1)),))
     data = np.array([[2.0, 0.5], [0.5, 1.0]])
     grid = np.linspace(-9.0, 9.0, 181)
 
     def density(prior):
-        parts = ((1.0 - prior.faulty_share, prior.sound_sd), (prior.faulty_share, prior.faulty_sd))
+        parts = ((1.0 - prior.fault_probability, prior.nominal_sd), (prior.fault_probability, prior.faulty_sd))
         return sum(share / sd * np.exp(-0.5 * (grid / sd) ** 2) for share, sd in parts)
 
     a, b, c = np.meshgrid(grid, grid, grid, indexing="ij", sparse=True)
     x, y = a + c, b + c
     each = density(own)[:, None, None] * density(own)[None, :, None] * density(both)[None, None, :]
 
-    def summed(right):
+    def summed(rhs):
         square = data[0, 0] * x**2 + 2 * data[0, 1] * x * y + data[1, 1] * y**2
-        return np.log((each * np.exp(right[0] * x + right[1] * y - 0.5 * square)).sum())
+        return np.log((each * np.exp(rhs[0] * x + rhs[1] * y - 0.5 * square)).sum())
 
     rights = [np.array([3.0, -1.0]), np.array([0.2, 0.1])]
-    found = [log_chance(priors, data, right) for right in rights]
+    found = [log_chance(priors, data, rhs) for rhs in rights]
     assert found[0] - found[1] == pytest.approx(summed(rights[0]) - summed(rights[1]), abs=0.02)

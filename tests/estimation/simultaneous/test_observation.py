@@ -44,7 +44,7 @@ def test_effective_deviation_of_white_noise_is_its_deviation(trial, white):
     assert noise.correlation_s == pytest.approx(1.0 / trial.markers.rate_hz, rel=0.2)
     assert np.median(seen.marker_sd) == pytest.approx(0.005, rel=0.15)
     assert seen.marker_frames == pytest.approx(1.0, abs=0.2)
-    assert noise.wandering == ()
+    assert noise.drifting == ()
 
 
 def test_slow_noise_is_alike_from_frame_to_frame(trial, white):
@@ -64,14 +64,14 @@ def test_exact_markers_keep_a_smallest_deviation(trial):
     assert np.isfinite(seen.marker_sd).all()
 
 
-def test_a_wandering_marker_counts_less_and_is_named(trial):
+def test_a_drifting_marker_counts_less_and_is_named(trial):
     rng = np.random.default_rng(0)
     noisy = camera_noise(trial.markers, 0.002, rng)
     at = noisy.labels.index("R.Thigh.Front")
     positions = noisy.positions.copy()
     positions[:, at] += rng.normal(0.0, 0.02, positions[:, at].shape)
     seen, noise = observed(trial, replace(noisy, positions=positions))
-    assert noise.wandering == ("R.Thigh.Front",)
+    assert noise.drifting == ("R.Thigh.Front",)
     assert max(noise.sd_m, key=lambda label: noise.sd_m[label]) == "R.Thigh.Front"
     assert seen.marker_sd[at] > 3.0 * np.median(seen.marker_sd)
 
@@ -145,8 +145,8 @@ def test_markers_off_their_places_are_not_noise(trial):
     kinematics = kinematics_of(trial, noisy)
     places = trial.skeleton.marker_locals + rng.normal(0.0, 0.01, trial.skeleton.marker_locals.shape)
     moved = trial.skeleton.with_places(places)
-    (right, _), (wrong, _) = (alone(skeleton, kinematics) for skeleton in (trial.skeleton, moved))
-    np.testing.assert_allclose(wrong.marker_sd, right.marker_sd, rtol=1e-6)
+    (rhs, _), (wrong, _) = (alone(skeleton, kinematics) for skeleton in (trial.skeleton, moved))
+    np.testing.assert_allclose(wrong.marker_sd, rhs.marker_sd, rtol=1e-6)
 
 
 def test_trials_of_one_person(trial):

@@ -40,18 +40,18 @@ def test_loads_are_put_right_step_by_step(given):
         load[3:] += np.cross(x * turn[:, 0] + z * turn[:, 2], load[:3])
         load[4] += free * load[1]
         expected[i, foot] = (1.0 + gain) * load
-    np.testing.assert_allclose(plate_loads.put_right(*given), expected, rtol=1e-12, atol=1e-9)
+    np.testing.assert_allclose(plate_loads.corrected_loads(*given), expected, rtol=1e-12, atol=1e-9)
 
 
 @pytest.mark.parametrize("error", range(len(UNITS)))
 @pytest.mark.parametrize("plate", range(PLATES))
 def test_derivatives_are_those_of_the_loads(given, plate, error):
     loads, loaded, carrier, plates, middles, turn = given
-    by = plate_loads.by_plate(plate_loads.put_right(*given), loaded, carrier, plates, middles, turn)
+    by = plate_loads.by_plate(plate_loads.corrected_loads(*given), loaded, carrier, plates, middles, turn)
     assert by.shape == (N, 2, 6, PLATES, len(UNITS))
     step, sides = 1e-4 * UNITS[error], []
     for sign in (1.0, -1.0):
         moved = plates.copy()
         moved[plate, error] += sign * step
-        sides.append(plate_loads.put_right(loads, loaded, carrier, moved, middles, turn))
+        sides.append(plate_loads.corrected_loads(loads, loaded, carrier, moved, middles, turn))
     np.testing.assert_allclose(by[..., plate, error], (sides[0] - sides[1]) / (2.0 * step), rtol=1e-6, atol=1e-5)

@@ -5,7 +5,7 @@ import pytest
 
 from kinertia.estimation.simultaneous.calibration_entry import BENDING
 from kinertia.estimation.simultaneous.inputs import BSP, PLACES, SKIN, STILL
-from kinertia.estimation.simultaneous.instrument_term import CLOCK, DELAYS, GAINS, PLATES, ZEROS
+from kinertia.estimation.simultaneous.instrument_term import CLOCK, GAINS, PLATES, TRIAL_DELAYS, ZEROS
 from kinertia.estimation.simultaneous.linearised import Point
 from kinertia.estimation.simultaneous.mixture_prior import GaussianPrior
 from kinertia.estimation.simultaneous.problem import MapProblem
@@ -48,23 +48,23 @@ def test_gradient_of_static_unknowns(problem, here, kind):
     part = problem.layout[kind]
     step = np.zeros_like(static)
     step[part] = np.random.default_rng(0).normal(size=step[part].shape)
-    right = problem.normal(0, coefficients, static).static_right + problem.prior_slope(static)[0]
+    rhs = problem.normal(0, coefficients, static).static_rhs + problem.prior_slope(static)[0]
     slope = sloped(lambda h: cost(problem, coefficients, static + h * step), 1e-6)
-    assert -right @ step == pytest.approx(slope, rel=1e-5)
+    assert -rhs @ step == pytest.approx(slope, rel=1e-5)
 
 
 def test_gradient_of_delays():
     """Those of a trial say nothing of another."""
     pair = small_problem(2)
     coefficients, static = point(pair)
-    delays = np.arange(len(static))[pair.layout[DELAYS]]
+    delays = np.arange(len(static))[pair.layout[TRIAL_DELAYS]]
     assert len(delays) == 2
     for k in range(2):
         normal = pair.normal(k, coefficients[k], static)
-        assert normal.static_right[delays[1 - k]] == 0.0
+        assert normal.static_rhs[delays[1 - k]] == 0.0
         step = np.eye(len(static))[delays[k]]
         slope = sloped(lambda h, k=k, step=step: pair.normal(k, coefficients[k], static + h * step).cost, 1e-6)
-        assert -normal.static_right[delays[k]] == pytest.approx(slope, rel=1e-5)
+        assert -normal.static_rhs[delays[k]] == pytest.approx(slope, rel=1e-5)
 
 
 @pytest.mark.parametrize("coordinate", ["pelvis_tx", "pelvis_list", "hip_flexion_r", "ankle_angle_l", "arm_add_l"])
@@ -74,7 +74,7 @@ def test_gradient_of_the_motion(problem, here, coordinate):
     column = problem.skeleton.coordinates.index(coordinate)
     step[:, column] = np.random.default_rng(0).normal(size=len(step))
     slope = sloped(lambda h: cost(problem, coefficients + h * step, static), 1e-6)
-    assert -(problem.normal(0, coefficients, static).right * step).sum() == pytest.approx(slope, rel=1e-5)
+    assert -(problem.normal(0, coefficients, static).rhs * step).sum() == pytest.approx(slope, rel=1e-5)
 
 
 def test_cost_is_half_the_sum_of_squares(any_problem):
@@ -115,8 +115,8 @@ def test_normal_equations_are_those_of_a_dense_jacobian(any_problem):
         ]
     )
     assert (np.abs(normal_matrix - dense) <= tolerance).all()
-    right = np.concatenate([normal.right.ravel(), normal.static_right])
-    np.testing.assert_allclose(-right, gradient, atol=1e-6 * np.abs(gradient).max())
+    rhs = np.concatenate([normal.rhs.ravel(), normal.static_rhs])
+    np.testing.assert_allclose(-rhs, gradient, atol=1e-6 * np.abs(gradient).max())
 
 
 def test_a_gradient_alone_is_that_of_the_normal_equations(any_problem):
@@ -124,7 +124,7 @@ def test_a_gradient_alone_is_that_of_the_normal_equations(any_problem):
     (coefficients,), static = point(problem)
     expected, actual = problem.normal(0, coefficients, static), problem.gradient(0, coefficients, static)
     assert actual.cost == pytest.approx(expected.cost, rel=1e-12)
-    for ours, theirs in ((actual.right, expected.right), (actual.static_right, expected.static_right)):
+    for ours, theirs in ((actual.rhs, expected.rhs), (actual.static_rhs, expected.static_rhs)):
         np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-9 * np.abs(theirs).max())
 
 
@@ -140,24 +140,24 @@ def test_a_slope_is_the_derivative_of_the_cost_by_everything(problem):
     gaussian = GaussianPrior.of(pair.layout.error_priors)
     slope, at = pair.slope(here), pair.at(here)
     assert at.slope.cost == pytest.approx(slope.cost, rel=1e-12)
-    np.testing.assert_allclose(at.slope.right, slope.right, atol=1e-9 * np.abs(slope.right).max())
-    right = slope.under(gaussian)[1]
-    sizes = 1.0 / np.maximum(np.abs(right), 1.0)
+    np.testing.assert_allclose(at.slope.rhs, slope.rhs, atol=1e-9 * np.abs(slope.rhs).max())
+    rhs = slope.under(gaussian)[1]
+    sizes = 1.0 / np.maximum(np.abs(rhs), 1.0)
     for _ in range(5):
-        step = rng.normal(size=len(right)) * sizes
+        step = rng.normal(size=len(rhs)) * sizes
         found = sloped(lambda h, s=step: pair.slope(here.like(here.vector + h * s)).under(gaussian)[0], 1e-5)
-        assert -right @ step == pytest.approx(found, rel=1e-4, abs=1e-6 * np.abs(right * step).sum())
+        assert -rhs @ step == pytest.approx(found, rel=1e-4, abs=1e-6 * np.abs(rhs * step).sum())
 
 
 def test_prior_information_is_the_derivative_of_its_gradient(problem):
     """At the prior's mean the gaps vanish, so that Gauss-Newton is exact there."""
     static = problem.layout.start
-    information, (right, value) = problem.prior_information(static), problem.prior_slope(static)
+    information, (rhs, value) = problem.prior_information(static), problem.prior_slope(static)
     # without that of the instruments, about which this says nothing
     places = problem.layout.errors
     information[places, places] += GaussianPrior.of(problem.layout.error_priors).precision
     scale = 1.0 / np.sqrt(np.diag(information))
-    np.testing.assert_allclose(right * scale, 0.0, atol=1e-6)
+    np.testing.assert_allclose(rhs * scale, 0.0, atol=1e-6)
     assert value == pytest.approx(0.0, abs=1e-12)
     h = 1e-5
     information = problem.prior_information(static)
@@ -222,7 +222,7 @@ def test_displacements_move_the_markers_of_their_trial_only(problem, here):
     parts = problem.layout[ZEROS], problem.layout[GAINS], problem.layout[BENDING]
     where = np.repeat([part.stop for part in parts], [part.stop - part.start for part in parts])
     same = np.insert(static, where, static[parts[0].start : parts[-1].stop])
-    on_time = np.insert(same, [pair.layout[DELAYS].start] * 2, 0.0)
+    on_time = np.insert(same, [pair.layout[TRIAL_DELAYS].start] * 2, 0.0)
     at = Point((coefficients, coefficients), on_time, (own.ravel(), np.zeros(own.size)))
     moved = pair.in_trial(0, at)[pair.layout[PLACES]].reshape(-1, 3) - on_time[pair.layout[PLACES]].reshape(-1, 3)
     np.testing.assert_allclose(moved, sd[:, None] * own, atol=1e-15)
@@ -254,21 +254,21 @@ def test_bends_are_what_gauss_newton_leaves_out(problem, here, place):
     static[problem.layout[BSP]].reshape(-1, 10)[:, 7:] = 0.0
     rows = np.arange(problem.layout[BSP].stop).reshape(-1, 10)[:, place]
 
-    def right(values):
+    def rhs(values):
         place = Point((coefficients,), values, problem.beginning.displaced)
-        return place.like(problem.slope(place).right).static
+        return place.like(problem.slope(place).rhs).static
 
     informed = problem.prior_information(static) + problem.normal(0, coefficients, static).static
-    bends = problem.bends(right(static))
+    bends = problem.bends(rhs(static))
     assert (bends[rows] >= 0.0).all()
-    pulled = [row for row in rows if right(static)[row] < 0.0]
+    pulled = [row for row in rows if rhs(static)[row] < 0.0]
     assert pulled
     step = 1e-5
     for row in pulled:
         change = np.zeros_like(static)
         change[row] = step
-        second = -(right(static + change)[row] - right(static - change)[row]) / (2.0 * step)
+        second = -(rhs(static + change)[row] - rhs(static - change)[row]) / (2.0 * step)
         left_out = second - informed[row, row]
         assert bends[row] == pytest.approx(left_out, rel=1e-3)
-    others = [row for row in rows if right(static)[row] > 0.0]
+    others = [row for row in rows if rhs(static)[row] > 0.0]
     np.testing.assert_array_equal(bends[others], 0.0)

@@ -21,14 +21,14 @@ def test_a_step_repeats_the_last_pair(seed, n):
     pairs = SecantPairs.none(n)
     for step in rng.normal(size=(2, n)):
         pairs = pairs.with_pair(step, true @ step, expected=float(step @ true @ step))
-    answer = pairs.step(pairs.changes[-1], lambda right: np.linalg.solve(known, right))
+    answer = pairs.step(pairs.changes[-1], lambda rhs: np.linalg.solve(known, rhs))
     np.testing.assert_allclose(answer, pairs.steps[-1], rtol=1e-6, atol=1e-8)
 
 
 def test_without_pairs_the_known_quadratic_answers():
-    known, right = spd(0, 4), np.arange(4.0)
-    answer = SecantPairs.none(4).step(right, lambda each: np.linalg.solve(known, each))
-    np.testing.assert_array_equal(answer, np.linalg.solve(known, right))
+    known, rhs = spd(0, 4), np.arange(4.0)
+    answer = SecantPairs.none(4).step(rhs, lambda each: np.linalg.solve(known, each))
+    np.testing.assert_array_equal(answer, np.linalg.solve(known, rhs))
 
 
 def test_it_finds_the_optimum_of_a_quadratic_that_is_known_badly():
@@ -36,10 +36,10 @@ def test_it_finds_the_optimum_of_a_quadratic_that_is_known_badly():
     n, rng = 30, np.random.default_rng(0)
     basis = np.linalg.qr(rng.normal(size=(n, n)))[0]
     wrong = np.repeat([0.5, 1.0, 2.2], 10)
-    true, right, x = basis @ np.diag(wrong) @ basis.T, rng.normal(size=n), np.zeros(n)
-    pairs, best = SecantPairs.none(n), np.linalg.solve(true, right)
+    true, rhs, x = basis @ np.diag(wrong) @ basis.T, rng.normal(size=n), np.zeros(n)
+    pairs, best = SecantPairs.none(n), np.linalg.solve(true, rhs)
     for _ in range(8):
-        left = right - true @ x
+        left = rhs - true @ x
         step = pairs.step(left, lambda each: each.copy())
         step *= (left @ step) / (step @ true @ step)
         x, pairs = x + step, pairs.with_pair(step, true @ step, float(step @ step))

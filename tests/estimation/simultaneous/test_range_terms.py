@@ -54,8 +54,8 @@ def test_derivatives_are_those_of_the_cost():
         back[i, j] -= step
         two = [normal_at(one, Stretch.whole(basis)) for one in (there, back)]
         slope = (two[0].cost - two[1].cost) / (2 * step)
-        assert slope == pytest.approx(-whole.right[i, j], rel=1e-5, abs=1e-3)
-        bends = -(two[0].right - two[1].right)[i : i + 6] / (2 * step)
+        assert slope == pytest.approx(-whole.rhs[i, j], rel=1e-5, abs=1e-3)
+        bends = -(two[0].rhs - two[1].rhs)[i : i + 6] / (2 * step)
         np.testing.assert_allclose(bends[:, j], whole.band[i, : len(bends), j, j], rtol=1e-4, atol=1e-3)
     parts = stretches(basis, 6)
     assert len(parts) > 1

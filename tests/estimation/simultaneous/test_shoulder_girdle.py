@@ -30,18 +30,18 @@ def test_the_girdle_carries_all_markers_of_the_arm_that_swings(skeleton):
     every = np.ones(len(skeleton.markers), dtype=bool)
     variance = girdle_variance(skeleton, swung(skeleton, "arm_flex_r"), every)
     expected = np.square(CLAVICLE_M * CLAVICLE_PER_ARM * np.sin(np.radians(20.0))) / 3.0
-    right = of(skeleton, "_r")
-    assert variance[right] == pytest.approx(right.sum() * expected, rel=0.02)
-    assert not variance[~right].any()
+    rhs = of(skeleton, "_r")
+    assert variance[rhs] == pytest.approx(rhs.sum() * expected, rel=0.02)
+    assert not variance[~rhs].any()
 
 
 def test_markers_that_the_trial_lacks_do_not_count(skeleton):
     q, every = swung(skeleton, "arm_flex_r"), np.ones(len(skeleton.markers), dtype=bool)
     fewer = every.copy()
     fewer[np.flatnonzero(of(skeleton, "_r"))[0]] = False
-    right = of(skeleton, "_r") & fewer
-    ratio = girdle_variance(skeleton, q, fewer)[right] / girdle_variance(skeleton, q, every)[right]
-    assert ratio == pytest.approx((right.sum()) / (right.sum() + 1.0))
+    rhs = of(skeleton, "_r") & fewer
+    ratio = girdle_variance(skeleton, q, fewer)[rhs] / girdle_variance(skeleton, q, every)[rhs]
+    assert ratio == pytest.approx((rhs.sum()) / (rhs.sum() + 1.0))
 
 
 @pytest.mark.parametrize("name", ["elbow_flex_r", "pelvis_tilt", "lumbar_extension"])

@@ -7,7 +7,7 @@ from threadpoolctl import threadpool_limits
 import kinertia.estimation.simultaneous.solver as simultaneous
 from kinertia.estimation.prior import literature_prior, with_symmetry
 from kinertia.estimation.simultaneous.instruments import InstrumentPrior
-from kinertia.estimation.simultaneous.mixture_prior import SoundOrFaulty
+from kinertia.estimation.simultaneous.mixture_prior import FaultMixture
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.observed_trial import CalibrationPrior, Observation
 from kinertia.estimation.simultaneous.plates import FLOOR_UNKNOWNS, FootPlates
@@ -19,7 +19,7 @@ from validation.calibration_errors import DISTURBANCES, calibrated
 
 SPACING_S = 0.05
 PLATES = {"x": 0.005, "z": 0.005, "gain": 0.02, "free moment": 0.001}
-EXACT = SoundOrFaulty.certain(1e-9)
+EXACT = FaultMixture.certain(1e-9)
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -46,7 +46,7 @@ def trial(person):
 
 @pytest.fixture(scope="module")
 def calibration(trial):
-    plates, clock = {name: SoundOrFaulty.certain(sd) for name, sd in PLATES.items()}, SoundOrFaulty.certain(0.005)
+    plates, clock = {name: FaultMixture.certain(sd) for name, sd in PLATES.items()}, FaultMixture.certain(0.005)
     return CalibrationPrior(
         {},
         np.full(len(trial.skeleton.markers), 0.005),
@@ -148,10 +148,10 @@ def test_markers_displaced_in_one_trial_are_found_and_hurt_nothing(trial, prior,
 
     free, stiff = estimate(0.01), estimate(0.0)
     assert free.converged
-    apart = free.displacements_m[1] - free.displacements_m[0]
+    apart = free.marker_offsets_m[1] - free.marker_offsets_m[0]
     assert apart[thighs].mean(axis=0) == pytest.approx([0.01, 0.0, 0.0], abs=0.003)
     assert not apart[~thighs].any()
-    assert not np.any(stiff.displacements_m)
+    assert not np.any(stiff.marker_offsets_m)
     assert free.cost[1] < 0.9 * stiff.cost[1]
     hips = [i for i, name in enumerate(trial.skeleton.coordinates) if name.startswith("hip_flexion")]
     off = [np.abs(result.motions[0].q - trial.motion.q)[:, hips].mean() for result in (free, stiff)]

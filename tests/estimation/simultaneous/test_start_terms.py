@@ -22,7 +22,7 @@ def test_a_constant_offset_is_free_however_long_the_trial():
     offset = np.full((12_000, 2), 0.1)
     normal = terms(offset)
     assert normal.cost < 0.2
-    assert np.abs(normal.right).max() < 2e-4
+    assert np.abs(normal.rhs).max() < 2e-4
 
 
 def test_what_nothing_shows_goes_where_its_neighbours_go():
@@ -39,6 +39,6 @@ def test_terms_are_those_of_their_cost():
     moved, step = rng.normal(size=(2, 9, 3))
     normal = terms(moved)
     ahead, behind = (terms(moved + sign * step) for sign in (1.0, -1.0))
-    assert (behind.cost - ahead.cost) / 2.0 == pytest.approx((normal.right * step).sum())
+    assert (behind.cost - ahead.cost) / 2.0 == pytest.approx((normal.rhs * step).sum())
     bent = step.ravel() @ dense_band(normal.band) @ step.ravel()
     assert ahead.cost + behind.cost - 2.0 * normal.cost == pytest.approx(bent)

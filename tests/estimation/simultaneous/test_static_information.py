@@ -20,10 +20,10 @@ def test_root_gives_the_inverse(singular_first, n):
 
 def test_first_unknowns_alone_are_those_of_all_together(singular_first):
     information = StaticInformation.of(singular_first, 6)
-    right = np.arange(9.0)
+    rhs = np.arange(9.0)
     np.testing.assert_allclose(
-        np.linalg.solve(information.first, information.first_of(right)),
-        np.linalg.solve(singular_first, right)[:6],
+        np.linalg.solve(information.first, information.first_of(rhs)),
+        np.linalg.solve(singular_first, rhs)[:6],
         rtol=1e-8,
     )
     covariance = np.linalg.inv(singular_first)[:6, :6]

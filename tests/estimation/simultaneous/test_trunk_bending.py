@@ -50,6 +50,6 @@ def test_every_trial_has_a_trunk_of_its_own():
     trunks = np.arange(len(static))[pair.layout[BENDING]]
     assert len(trunks) == 2
     for k in range(2):
-        right = pair.gradient(k, coefficients[k], static).static_right[trunks]
-        assert right[k] != 0.0
-        assert right[1 - k] == 0.0
+        rhs = pair.gradient(k, coefficients[k], static).static_rhs[trunks]
+        assert rhs[k] != 0.0
+        assert rhs[1 - k] == 0.0

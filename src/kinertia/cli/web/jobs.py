@@ -45,8 +45,8 @@ class Job(Work):
         if ended.status in _ENDED_FROM_OUTSIDE:
             return {"how": "failed", "message": _OUTSIDE}
         path.write_text(ended.log, encoding="utf-8")
-        told = ended.log.strip().rpartition("\n")[2] or f"its process ended with status {ended.status}"
-        sentence = f"Kinertia failed, which it should not on any input ({told}); please send {path} to its developers"
+        reason = ended.log.strip().rpartition("\n")[2] or f"its process ended with status {ended.status}"
+        sentence = f"Kinertia failed, which it should not on any input ({reason}); please send {path} to its developers"
         return {"how": "failed", "message": sentence}
 
 

@@ -38,8 +38,8 @@ def _environment() -> jinja2.Environment:
 def page(request: Request, template: str, status: int = 200, **content: Any) -> HTMLResponse:
     """Render a page; `root` in it is where the application's addresses begin."""
     root, preparing = request.scope["root_path"], request.app.state.jobs.preparing
-    told = "" if preparing is None else time_left(preparing)
-    shared = {"root": root, "version": VERSION, "preparing": preparing is not None, "preparing_left": told}
+    left = "" if preparing is None else time_left(preparing)
+    shared = {"root": root, "version": VERSION, "preparing": preparing is not None, "preparing_left": left}
     text = _environment().get_template(template).render(**shared, **content)
     return HTMLResponse(text.encode("utf-8", errors="replace"), status)
 

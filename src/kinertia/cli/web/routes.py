@@ -343,11 +343,11 @@ def _copied(person: Person, folder: Path) -> None:
 async def _not_found(request: Request, error: Exception) -> Response:
     """Show that something was not found, in a page; scripts get it as JSON."""
     assert isinstance(error, HTTPException)
-    return _told(request, error.detail, error.status_code)
+    return _error_page(request, error.detail, error.status_code)
 
 
 async def _trouble(request: Request, error: Exception) -> Response:
-    return _told(request, str(error), 422)
+    return _error_page(request, str(error), 422)
 
 
 async def _no_file(request: Request, error: Exception) -> Response:
@@ -355,7 +355,7 @@ async def _no_file(request: Request, error: Exception) -> Response:
     assert isinstance(error, OSError)
     where = "" if error.filename is None else f"{error.filename}: "
     sentence = f"{where}{error.strerror or error}; check the path, its permissions and the space on the disk"
-    return _told(request, sentence, 500)
+    return _error_page(request, sentence, 500)
 
 
 async def _failed(request: Request, error: Exception) -> Response:
@@ -365,10 +365,10 @@ async def _failed(request: Request, error: Exception) -> Response:
         f"Kinertia failed, which it should not on any input ({problem}); "
         "please send what its terminal shows to its developers"
     )
-    return _told(request, sentence, 500)
+    return _error_page(request, sentence, 500)
 
 
-def _told(request: Request, sentence: str, status: int) -> Response:
+def _error_page(request: Request, sentence: str, status: int) -> Response:
     if "application/json" in request.headers.get("accept", ""):
         return JSONResponse({"problem": sentence}, status)
     content: dict[str, Any] = {"sentence": sentence}

@@ -45,7 +45,7 @@ class Work:
         self.stage = ""
         self.share = 0.0
         self.cancelled = False
-        self._since = self._told = time.monotonic()
+        self._since = self._reported = time.monotonic()
         self._process: subprocess.Popen[str] | None = None
         self._lock = threading.Lock()
 
@@ -53,8 +53,8 @@ class Work:
         """Estimate the time left of this stage from how long its share took; None as long as it is unknown."""
         if not 0.0 < self.share < 1.0:
             return None
-        left_when_told = (self._told - self._since) * (1.0 - self.share) / self.share
-        return max(left_when_told - (time.monotonic() - self._told), 1.0)
+        left_when_told = (self._reported - self._since) * (1.0 - self.share) / self.share
+        return max(left_when_told - (time.monotonic() - self._reported), 1.0)
 
     def cancel(self) -> None:
         """Cancel the work, whatever its stage; may be called from any thread."""
@@ -77,18 +77,18 @@ class Work:
         listener.start()
         error = ""
         for line in process.stdout:
-            told = _line(line)
-            error = told.get("error", error)
-            if "stage" in told:
-                self._moved(told["stage"], told["share"])
+            message = _line(line)
+            error = message.get("error", error)
+            if "stage" in message:
+                self._moved(message["stage"], message["share"])
         status = process.wait()
         listener.join()
         return End(status, error, "".join(said))
 
     def _moved(self, stage: str, share: float) -> None:
-        self._told = time.monotonic()
+        self._reported = time.monotonic()
         if stage != self.stage:
-            self._since = self._told
+            self._since = self._reported
         self.stage, self.share = stage, share
 
 
@@ -108,7 +108,7 @@ def _started(command: Sequence[str]) -> subprocess.Popen[str]:
 def _line(text: str) -> dict[str, Any]:
     """Parse a line of a worker; empty where it is not one of ours."""
     try:
-        told = json.loads(text)
+        message = json.loads(text)
     except ValueError:
         return {}
-    return told if isinstance(told, dict) else {}
+    return message if isinstance(message, dict) else {}

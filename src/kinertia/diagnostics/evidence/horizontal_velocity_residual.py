@@ -48,7 +48,7 @@ class VelocityResidual:
     without_trend: float
     plate_reversed: FloatArray
     plate_zeroed: FloatArray
-    zero_n: FloatArray
+    zero_offset_n: FloatArray
     scaled: tuple[Scaled, ...]
 
     @classmethod
@@ -57,16 +57,16 @@ class VelocityResidual:
         body = _centred([(part.pelvis[:, axis] + part.centre[:, axis]) / 2 for part in parts])
         caused = _centred([part.caused[:, axis] for part in parts])
         off = caused - body
-        reversed_, zeroed, zero_n, scaled = [], [], [], [_scaled(None, off, caused)]
+        reversed_, zeroed, zero_offset_n, scaled = [], [], [], [_scaled(None, off, caused)]
         for p, own_force in enumerate(np.moveaxis(force, 1, 0)):
             own, one_newton = (
                 _centred([part.by(time, each) for part in parts])
                 for each in (own_force[:, axis], (own_force[:, 1] > 0.0).astype(float))
             )
-            zero_n.append(float(one_newton @ off) / max(float(one_newton @ one_newton), 1e-12))
+            zero_offset_n.append(float(one_newton @ off) / max(float(one_newton @ one_newton), 1e-12))
             scaled.append(_scaled(p, off, own))
             reversed_.append(np.std(off - 2.0 * own))
-            zeroed.append(np.std(off - zero_n[-1] * one_newton))
+            zeroed.append(np.std(off - zero_offset_n[-1] * one_newton))
         trends = np.concatenate(
             [without_trend(part.time, part.caused[:, axis] - part.centre[:, axis]) for part in parts]
         )
@@ -76,7 +76,7 @@ class VelocityResidual:
             float(np.std(trends)),
             np.array(reversed_),
             np.array(zeroed),
-            np.array(zero_n),
+            np.array(zero_offset_n),
             tuple(scaled),
         )
 

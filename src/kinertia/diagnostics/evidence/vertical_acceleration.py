@@ -20,7 +20,7 @@ _STEPS = 5
 
 
 @dataclass(frozen=True)
-class UpsAndDowns:
+class VerticalVelocityFit:
     """Fit of shown(t) = factor * (caused(t + delay + growth * t) + gain * own(t)), up to a zero offset and a level.
 
     Attributes:
@@ -30,14 +30,14 @@ class UpsAndDowns:
     """
 
     delay_s: float
-    growth: float
+    rate_error: float
     gain: float
     left: float
 
 
 def vertical_match(
     part: CausedVelocity, shown: FloatArray, own: FloatArray | None = None, growing: bool = False
-) -> UpsAndDowns | None:
+) -> VerticalVelocityFit | None:
     """Fit the vertical velocity by Gauss-Newton; None where the velocities do not follow the forces.
 
     Args:
@@ -48,9 +48,9 @@ def vertical_match(
     """
     after = part.time - part.time.mean()
     caused, accelerated = part.caused[:, 1], np.gradient(part.caused[:, 1], part.time)
-    delay = growth = 0.0
+    delay = rate_error = 0.0
     for _ in range(_STEPS):
-        at = part.time + delay + growth * after
+        at = part.time + delay + rate_error * after
         inside = (at >= part.time[0]) & (at <= part.time[-1])
         if inside.sum() < len(at) / 2:
             return None
@@ -64,15 +64,15 @@ def vertical_match(
         if solution[0] <= 0.0:
             return None
         delay += float(solution[1] / solution[0])
-        growth += float(solution[4] / solution[0]) if growing else 0.0
+        rate_error += float(solution[4] / solution[0]) if growing else 0.0
     gain = 0.0 if own is None else float(solution[-1] / solution[0])
     left = float(np.std(wanted - terms @ solution) / max(float(np.std(wanted)), 1e-12))
-    return UpsAndDowns(delay, growth, gain, left)
+    return VerticalVelocityFit(delay, rate_error, gain, left)
 
 
 def vertical_match_of(
     part: CausedVelocity, own: FloatArray | None = None, growing: bool = False
-) -> Sequence[UpsAndDowns]:
+) -> Sequence[VerticalVelocityFit]:
     """Fit pelvis and marker-based centre of mass; empty where either does not follow the forces."""
     found = [vertical_match(part, shown, own, growing) for shown in (part.pelvis, part.centre)]
     return [one for one in found if one is not None] if all(found) else []

@@ -43,10 +43,14 @@ def axes_and_units(context: RecordingContext) -> Iterator[Finding]:
             unit=Quantity("kN or multiples of body weight"),
         )
     for name, wrench in loaded_wrenches(plates, _FEWEST):
-        arm_m = float(np.median(np.abs(free_moment(wrench)) / wrench[:, 1]))
-        if arm_m > _LONGEST_ARM_M:
+        lever_arm_m = float(np.median(np.abs(free_moment(wrench)) / wrench[:, 1]))
+        if lever_arm_m > _LONGEST_ARM_M:
             usual = (0.0, _USUAL_ARM_M)
-            yield finding("P203", context.at(plate=name), arm_m=Quantity(arm_m, "m", limit=_LONGEST_ARM_M, usual=usual))
+            yield finding(
+                "P203",
+                context.at(plate=name),
+                lever_arm_m=Quantity(lever_arm_m, "m", limit=_LONGEST_ARM_M, usual=usual),
+            )
 
 
 def _peak_of_weak_loads(plates: PlateLoads) -> float | None:

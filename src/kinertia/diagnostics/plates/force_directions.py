@@ -144,7 +144,10 @@ def _reversed_plate(
     if left < DISTINGUISHABLE * zeroed:
         causes = (sign, corners)
     else:  # a foot that pushes to one side all the time looks the same with another zero
-        evidence |= {"zero_n": Quantity(float(residual.zero_n[zero]), "N"), "zero_of": Quantity(plates.names[zero])}
+        evidence |= {
+            "zero_offset_n": Quantity(float(residual.zero_offset_n[zero]), "N"),
+            "zero_of": Quantity(plates.names[zero]),
+        }
     where = context.at(plate=plates.names[best], **context.along(axis))
     yield _Hypothesis(with_evidence("P233", where, evidence, causes=causes), left)
 

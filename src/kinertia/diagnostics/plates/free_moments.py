@@ -58,12 +58,12 @@ def _columns(context: RecordingContext, plates: PlateLoads) -> Iterator[Finding]
             yield finding(
                 "P262", context.at(plate=name, **context.along(2 if z > x else 0)), rms_nm=Quantity(one.rms_nm, "N m")
             )
-        elif one.arm_m > _COLUMNS_ARM_M:
+        elif one.lever_arm_m > _COLUMNS_ARM_M:
             usual = (0.0, _USUAL_COLUMNS_ARM_M)
             yield finding(
                 "P261",
                 context.at(plate=name),
-                arm_m=Quantity(one.arm_m, "m", limit=_COLUMNS_ARM_M, usual=usual),
+                lever_arm_m=Quantity(one.lever_arm_m, "m", limit=_COLUMNS_ARM_M, usual=usual),
                 horizontal_rms_nm=Quantity(across, "N m"),
                 method=Quantity("columns"),
             )
@@ -71,7 +71,7 @@ def _columns(context: RecordingContext, plates: PlateLoads) -> Iterator[Finding]
 
 def _is_rotated(columns: TorqueColumns, across_nm: float) -> bool:
     """Return whether a free moment is in the column of a horizontal axis: the columns are of its size."""
-    some = columns.arm_m > 0.0 and _SOME_NM < across_nm < _LARGEST_NM
+    some = columns.lever_arm_m > 0.0 and _SOME_NM < across_nm < _LARGEST_NM
     return bool(some and columns.rms_nm[1] < _LITTLE * across_nm)
 
 
@@ -83,13 +83,13 @@ def _about_fixed_point(
         if name in explained:
             continue
         torque = free_moment(wrench)
-        arm_m = float(np.percentile(np.abs(torque) / wrench[:, 1], _USUAL_PERCENT))
+        lever_arm_m = float(np.percentile(np.abs(torque) / wrench[:, 1], _USUAL_PERCENT))
         point, left = _fixed_point(wrench, torque)
-        if arm_m > _LONG_ARM_M and rms(torque) > _ACCOUNTED * rms(left):
+        if lever_arm_m > _LONG_ARM_M and rms(torque) > _ACCOUNTED * rms(left):
             yield finding(
                 "P261",
                 context.at(plate=name),
-                arm_m=Quantity(arm_m, "m", limit=_LONG_ARM_M, usual=(0.0, 0.023)),
+                lever_arm_m=Quantity(lever_arm_m, "m", limit=_LONG_ARM_M, usual=(0.0, 0.023)),
                 rms_nm=Quantity(rms(torque), "N m"),
                 left_rms_nm=Quantity(rms(left), "N m", limit=rms(torque) / _ACCOUNTED),
                 point_m=Quantity((float(point[0]), float(point[1])), "m"),

@@ -41,12 +41,12 @@ def quantisation(context: RecordingContext) -> Iterator[Finding]:
         if step_m > _COARSE_M:
             yield finding("P106", context.at(plate=name), step_m=Quantity(step_m, "m", limit=_COARSE_M))
     for name, idle in zip(plates.names, plates.idle or (), strict=plates.idle is not None):
-        if idle.rings_s > _OVERSHOOT_S:
+        if idle.overshoot_s > _OVERSHOOT_S:
             yield finding(
                 "P108",
                 context.at(plate=name),
-                overshoot_s=Quantity(idle.rings_s, "s", limit=_OVERSHOOT_S, usual=(0.0, 0.003)),
-                cutoff_hz=Quantity(_OVERSHOOT_HZ_S / idle.rings_s, "Hz"),
+                overshoot_s=Quantity(idle.overshoot_s, "s", limit=_OVERSHOOT_S, usual=(0.0, 0.003)),
+                cutoff_hz=Quantity(_OVERSHOOT_HZ_S / idle.overshoot_s, "Hz"),
             )
 
 

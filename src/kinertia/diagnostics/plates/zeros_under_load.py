@@ -106,18 +106,18 @@ def _plate_zero(
         return None
     residual = VelocityResidual.of(plates.time, plates.force, long, axis)
     best = int(np.argmin(residual.plate_zeroed))
-    zero_n, zeroed = float(residual.zero_n[best]), float(residual.plate_zeroed[best])
+    zero_offset_n, zeroed = float(residual.zero_offset_n[best]), float(residual.plate_zeroed[best])
     limit_m_s = min(_ZEROED * residual.as_read, _USUAL_RESIDUAL_M_S)
     if residual.as_read < _LEAST_RESIDUAL_M_S or zeroed > limit_m_s:
         return None
     limit_n = _PLATE_ZERO_N * max(1.0, _WINDOW_S / max(span_s(part.time) for part in long))
-    if abs(zero_n) < limit_n or min(one.residual for one in residual.scaled) < CLEARLY_BEST * zeroed:
+    if abs(zero_offset_n) < limit_n or min(one.residual for one in residual.scaled) < CLEARLY_BEST * zeroed:
         return None
     names = [plates.names[p] for p in np.flatnonzero(residual.plate_zeroed * CLEARLY_BEST < zeroed)]
     if all_plates and not (len(names) == 1 and zeroed < CLEARLY_BEST * residual.without_trend):
         return None
     evidence = {
-        "offset_n": Quantity(zero_n, "N", limit=limit_n, usual=(-9.0, 9.0)),
+        "offset_n": Quantity(zero_offset_n, "N", limit=limit_n, usual=(-9.0, 9.0)),
         "velocity_residual_m_s": residual.once(zeroed, limit_m_s),
     }
     levels = _levels(plates, axis)

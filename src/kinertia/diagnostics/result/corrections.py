@@ -70,7 +70,7 @@ def delays(context: ResultContext) -> Iterator[Finding]:
 def zero_offsets(context: ResultContext) -> Iterator[Finding]:
     """Report zero offsets that were corrected, and those that all plates of a trial share: an unmeasured force."""
     zeros = [one for one in context.errors if one.quantity == ZERO]
-    yield from corrected(context, "P215", "zero_n", zeros)
+    yield from corrected(context, "P215", "zero_offset_n", zeros)
     for trial, axis in dict.fromkeys((one.trial, one.axis) for one in zeros):
         own = [one for one in zeros if (one.trial, one.axis) == (trial, axis)]
         if equal(own):
@@ -79,5 +79,5 @@ def zero_offsets(context: ResultContext) -> Iterator[Finding]:
                 "P214",
                 context.along(axis, trial),
                 force_n=Quantity(float(np.mean(read_n)), "N", sd=max(one.sd for one in own)),
-                zero_n=Quantity(read_n, "N", limit=2.0 * own[0].prior_sd),
+                zero_offset_n=Quantity(read_n, "N", limit=2.0 * own[0].prior_sd),
             )

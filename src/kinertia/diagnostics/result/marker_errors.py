@@ -31,7 +31,7 @@ def moved_markers(context: ResultContext) -> Iterator[Finding]:
     loose = _loose(context.fit.skeleton)
     for trial, noise in zip(context.fit.trials, posterior.marker_noise, strict=True):
         usual_m = float(np.median(list(noise.sd_m.values())))
-        for label in (one for one in noise.wandering if one not in loose):
+        for label in (one for one in noise.drifting if one not in loose):
             sd = Quantity(noise.sd_m[label], "m", limit=_DRIFTING * usual_m)
             yield finding("M163", Where(trial=trial.name, markers=(label,)), sd_m=sd, usual_sd_m=Quantity(usual_m, "m"))
     for trial, distances in zip(context.fit.trials, posterior.marker_distances_m, strict=False):

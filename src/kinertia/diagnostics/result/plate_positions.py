@@ -50,7 +50,7 @@ def _ambiguous(context: ResultContext, axis: str, errors: Sequence[CalibrationEn
     """
     prior, posterior = context.ready.uncertainty.instruments, context.fit.posterior
     off = [one for one in errors if one.notable and not one.contradicted_by]
-    if posterior is None or prior.plate[axis].faulty_share == 0.0 or not off:
+    if posterior is None or prior.plate[axis].fault_probability == 0.0 or not off:
         return []
     apart_m, each_m = position_deviations(posterior.instruments, prior, axis)
     values = [one.value for one in errors]
@@ -85,7 +85,7 @@ def position_deviations(shown: InstrumentInformation, prior: InstrumentPrior, ax
     places = set(along)
     for k, (one, members) in enumerate(priors.common):
         if members[0] in places:
-            common[k], own[list(members)] = _OPEN_M, one.sound_sd
+            common[k], own[list(members)] = _OPEN_M, one.nominal_sd
             places = places.difference(members) | {len(own) + k}
     if len(places) < 2:
         return np.inf, 0.0

@@ -39,7 +39,7 @@ def smallest_detectable_rad(shown: InstrumentInformation, prior: InstrumentPrior
         shown: information of the trials on plates and synchronisation, without any prior.
         prior: what was known of them before, from other people of the session, too.
     """
-    place = len(shown.right) - 1 - len(FLOOR_UNKNOWNS) + list(FLOOR_UNKNOWNS).index("turn")
+    place = len(shown.rhs) - 1 - len(FLOOR_UNKNOWNS) + list(FLOOR_UNKNOWNS).index("turn")
     unknowns = prior.of_unknowns(shown.plates).own
     precision = np.array([0.0 if k == place else 1.0 / one.sd**2 for k, one in enumerate(unknowns)])
     information = shown.information + prior.of_session(shown.plates).information + np.diag(precision)

@@ -25,7 +25,7 @@ def belt_speed(context: RecordingContext) -> Iterator[Finding]:
     speeds = standing_speeds(context.all_markers, context.feet)
     if speeds is None:
         return
-    stated = [belt.under(foot).way_m(*time[[0, -1]]) / float(np.ptp(time)) for foot in range(2)]
+    stated = [belt.under(foot).distance_m(*time[[0, -1]]) / float(np.ptp(time)) for foot in range(2)]
     pairs = list(zip(stated, speeds, strict=True))
     excess = [abs(one - other) / max(_APART * max(one, other), LEAST_BELT_M_S) for one, other in pairs]
     worst = int(np.argmax(excess))

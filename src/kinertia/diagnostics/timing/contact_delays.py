@@ -150,7 +150,7 @@ class ContactDelays:
     """
 
     time: FloatArray
-    late_s: FloatArray
+    delays_s: FloatArray
     rate_error: float
     rate_error_sd: float
 
@@ -178,7 +178,7 @@ class ContactDelays:
     @property
     def median_s(self) -> FloatArray:
         """Median delays (2,) s of the starts and of the ends."""
-        return np.asarray(np.median(self.late_s, axis=0))
+        return np.asarray(np.median(self.delays_s, axis=0))
 
     @property
     def delay_s(self) -> float:
@@ -197,10 +197,10 @@ class ContactDelays:
         """Return the rate error that would explain the delay, of files that begin together and diverge; None where
         contacts exclude it.
         """
-        growth = self.delay_s / max(float(np.median(self.time)) - start_s, 1e-9)
-        if abs(growth) > _MOST_RATE_ERROR or abs(self.rate_error - growth) > _EXCLUDED * self.rate_error_sd:
+        rate_error = self.delay_s / max(float(np.median(self.time)) - start_s, 1e-9)
+        if abs(rate_error) > _MOST_RATE_ERROR or abs(self.rate_error - rate_error) > _EXCLUDED * self.rate_error_sd:
             return None
-        return growth / (1.0 - growth)
+        return rate_error / (1.0 - rate_error)
 
 
 def _rate_error(time: FloatArray, late: FloatArray) -> tuple[float, float]:

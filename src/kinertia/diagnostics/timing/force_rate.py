@@ -66,10 +66,10 @@ def _growing_delays(context: RecordingContext) -> Iterator[Finding]:
         gains = vertical_match_of(part, own=part.by(trial.loads.time, trial.loads.force[:, 0, 1]))
         if any(one.left > other.left for one, other in zip(found, gains, strict=False)):
             continue
-        delay, growth = np.array([one.delay_s for one in found]), np.array([one.growth for one in found])
-        if np.abs(growth).min() < _LEAST_GROWTH or abs(np.sign(growth).sum()) < len(growth):
+        delay, rate_error = np.array([one.delay_s for one in found]), np.array([one.rate_error for one in found])
+        if np.abs(rate_error).min() < _LEAST_GROWTH or abs(np.sign(rate_error).sum()) < len(rate_error):
             continue
-        mean = float(growth.mean())
+        mean = float(rate_error.mean())
         begin, end = (float(delay.mean()) + mean * half * np.ptp(part.time) / 2 for half in (-1, 1))
         yield finding(
             "T201",
@@ -77,6 +77,6 @@ def _growing_delays(context: RecordingContext) -> Iterator[Finding]:
             Severity.WARNING,
             ratio=Quantity(1.0 / (1.0 - mean), "1"),
             delay_s=Quantity((float(begin), float(end)), "s"),
-            growth=Quantity(mean, "1", limit=_LEAST_GROWTH, usual=(-0.004, 0.004)),
+            rate_error=Quantity(mean, "1", limit=_LEAST_GROWTH, usual=(-0.004, 0.004)),
             method=Quantity("vertical velocity"),
         )

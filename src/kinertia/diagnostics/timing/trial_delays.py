@@ -74,13 +74,13 @@ def uneven_delays(delays: Sequence[TrialDelay | None]) -> Iterator[Finding]:
     values = np.array([[one.by_pelvis_s, one.by_markers_s] for one in known])
     usual = values[::-1] if len(known) == 2 else np.broadcast_to(np.median(values, axis=0), values.shape)
     limit_s = _SHORT_APART_S if any(one.short for one in known) else _APART_S
-    for one, others, late_s in zip(known, usual, values - usual, strict=True):
-        if np.abs(late_s).min() <= limit_s or late_s.prod() <= 0:
+    for one, others, delays_s in zip(known, usual, values - usual, strict=True):
+        if np.abs(delays_s).min() <= limit_s or delays_s.prod() <= 0:
             continue
         yield finding(
             "T213",
             Where(trial=one.name),
-            delay_s=Quantity(float(late_s.mean()), "s", limit=limit_s, usual=_USUAL_S),
+            delay_s=Quantity(float(delays_s.mean()), "s", limit=limit_s, usual=_USUAL_S),
             by_pelvis_s=Quantity(one.by_pelvis_s, "s"),
             by_markers_s=Quantity(one.by_markers_s, "s"),
             others_s=Quantity(tuple(float(each) for each in others), "s"),

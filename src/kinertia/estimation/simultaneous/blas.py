@@ -28,10 +28,10 @@ def cholesky(matrix: np.ndarray) -> None:
     matrix[_above(k)] = 0.0
 
 
-def solve_lower(lower: np.ndarray, right: np.ndarray, transposed: bool = False) -> None:
+def solve_lower(lower: np.ndarray, rhs: np.ndarray, transposed: bool = False) -> None:
     """Replace a right-hand side (k, m) by L^-1 times it, or by L^-T times it if `transposed`."""
-    k, m = right.shape
-    _call("trsm", b"R", b"U", b"T" if transposed else b"N", b"N", m, k, 1.0, lower, k, right, m)
+    k, m = rhs.shape
+    _call("trsm", b"R", b"U", b"T" if transposed else b"N", b"N", m, k, 1.0, lower, k, rhs, m)
 
 
 def solve_lower_from_right(lower: np.ndarray, left: np.ndarray) -> None:
@@ -46,10 +46,10 @@ def subtract_square(target: np.ndarray, factor: np.ndarray) -> None:
     _call("syrk", b"U", b"T", k, m, -1.0, factor, m, 1.0, target, k)
 
 
-def subtract_product(target: np.ndarray, left: np.ndarray, right: np.ndarray, transposed: bool = False) -> None:
+def subtract_product(target: np.ndarray, left: np.ndarray, rhs: np.ndarray, transposed: bool = False) -> None:
     """Subtract A B, or A^T B if `transposed`, from a matrix (k, m); B is (n, m)."""
-    (k, m), n = target.shape, len(right)
-    _call("gemm", b"N", b"T" if transposed else b"N", m, k, n, -1.0, right, m, left, left.shape[1], 1.0, target, m)
+    (k, m), n = target.shape, len(rhs)
+    _call("gemm", b"N", b"T" if transposed else b"N", m, k, n, -1.0, rhs, m, left, left.shape[1], 1.0, target, m)
 
 
 def _call(name: str, *arguments: _Argument) -> None:

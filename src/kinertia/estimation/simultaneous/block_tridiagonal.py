@@ -60,18 +60,18 @@ class BlockBand:
         """Return the factor in this precision, converted to single precision if requested."""
         return self._single if precision == np.float32 else self
 
-    def forward(self, right: np.ndarray, in_place: bool = False) -> np.ndarray:
+    def forward(self, rhs: np.ndarray, in_place: bool = False) -> np.ndarray:
         """Solve L x = right; right is (b, k, m), of the factor's precision, and may be overwritten if `in_place`."""
-        result = right if in_place else right.copy()
+        result = rhs if in_place else rhs.copy()
         for i in range(len(result)):
             if i:
                 subtract_product(result[i], self.below[i - 1], result[i - 1])
             solve_lower(self.diagonal[i], result[i])
         return result
 
-    def backward(self, right: np.ndarray, after: np.ndarray | None = None, in_place: bool = False) -> np.ndarray:
+    def backward(self, rhs: np.ndarray, after: np.ndarray | None = None, in_place: bool = False) -> np.ndarray:
         """Solve L^T x = right (b, k, m); `after` (k, m) is the next block of the solution if the matrix continues."""
-        result, known = right if in_place else right.copy(), after
+        result, known = rhs if in_place else rhs.copy(), after
         for i in range(len(result) - 1, -1, -1):
             if known is not None:
                 subtract_product(result[i], self.below[i], known, transposed=True)

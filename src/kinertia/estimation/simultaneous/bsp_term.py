@@ -41,7 +41,7 @@ class BodySegments(CostTerm):
         mass_row = prior.on_scale @ jacobian[0::10] / prior.mass_sd_kg
         into[theta, theta] += jacobian.T @ self._information @ jacobian + np.outer(mass_row, mass_row)
 
-    def add_pull(self, right: np.ndarray, static: np.ndarray) -> float:
+    def add_pull(self, rhs: np.ndarray, static: np.ndarray) -> float:
         """Add the right-hand side of the table's prior and of the scale's total mass; return their sum of squares."""
         prior, theta = self.given.prior, self._at
         bsp, by_own = self.model.bsp(static), table_jacobian(static[theta])
@@ -49,14 +49,14 @@ class BodySegments(CostTerm):
         mass_gap = (float(prior.on_scale @ bsp.mass_kg) - prior.mass_kg) / prior.mass_sd_kg
         pulls = (self._information @ gap).reshape(-1, 10)
         pulls[:, 0] += mass_gap / prior.mass_sd_kg * prior.on_scale
-        right[theta] -= np.einsum("bi,bij->bj", pulls, by_own).ravel()
+        rhs[theta] -= np.einsum("bi,bij->bj", pulls, by_own).ravel()
         return float(gap @ self._information @ gap) + mass_gap**2
 
     def shorten(self, step: np.ndarray) -> None:
         """Limit the change of every logarithm to one."""
         step[self._logs] = np.clip(step[self._logs], -1.0, 1.0)
 
-    def add_bends(self, into: np.ndarray, right: np.ndarray) -> None:
+    def add_bends(self, into: np.ndarray, rhs: np.ndarray) -> None:
         """Add second derivatives by logarithms that Gauss-Newton leaves out, where the cost falls with the logarithm.
 
         The data may favour a mass or a second moment below zero. Towards zero the first derivatives vanish, and with
@@ -64,7 +64,7 @@ class BodySegments(CostTerm):
         none. A cost F of exp(x) has the second derivative F'' exp(2 x) + F' exp(x), and the last term is the slope by
         x; by the logarithm of a square root it is twice the slope.
         """
-        slope = -right[self._logs].reshape(-1, 4)
+        slope = -rhs[self._logs].reshape(-1, 4)
         into[self._logs] += (np.maximum(slope, 0.0) * [1.0, 2.0, 2.0, 2.0]).ravel()
 
     def read(self, solution: Solution) -> dict[str, Any]:

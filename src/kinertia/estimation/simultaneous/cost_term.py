@@ -81,11 +81,11 @@ class CostTerm:
     def add_information(self, into: np.ndarray, static: np.ndarray) -> None:
         """Add the information (S, S) of a prior of its own."""
 
-    def add_pull(self, right: np.ndarray, static: np.ndarray) -> float:
+    def add_pull(self, rhs: np.ndarray, static: np.ndarray) -> float:
         """Add minus the derivatives (S,) of half the sum of squares of its own prior; return the sum."""
         return 0.0
 
-    def add_bends(self, into: np.ndarray, right: np.ndarray) -> None:
+    def add_bends(self, into: np.ndarray, rhs: np.ndarray) -> None:
         """Add what Gauss-Newton leaves out to the diagonal (S,) of the information, from the right-hand side (S,)."""
 
     def shorten(self, step: np.ndarray) -> None:
@@ -117,11 +117,11 @@ class LoadTerm(CostTerm):
     Load terms correct the loads one after the other, in the order of the list.
     """
 
-    def late(self, k: int) -> list[int]:
+    def delay_unknowns(self, k: int) -> list[int]:
         """Return the indices of the unknowns whose sum is the delay of the forces of trial k."""
         return []
 
-    def put_right(
+    def corrected_loads(
         self, k: int, static: np.ndarray, loads: np.ndarray, loaded: np.ndarray, carrier: np.ndarray
     ) -> np.ndarray:
         """Correct loads on the feet (n, 2, 6) for this term's errors, linearly in the loads and in `loaded`.
@@ -138,7 +138,7 @@ class LoadTerm(CostTerm):
     def by_unknowns(
         self, k: int, static: np.ndarray, loads: np.ndarray, loaded: np.ndarray, carrier: np.ndarray
     ) -> np.ndarray:
-        """Return the derivatives (n, 2, 6, ...) of the output of `put_right` by the unknowns.
+        """Return the derivatives (n, 2, 6, ...) of the output of `corrected_loads` by the unknowns.
 
         `loads` are corrected by all terms: the derivatives of any but the last must not depend on them.
         """
@@ -156,34 +156,34 @@ class GroundLoads:
         self._trials, self._grounds = given.trials, given.grounds
         self._terms = [term for term in terms if isinstance(term, LoadTerm)]
 
-    def late(self, k: int) -> list[int]:
+    def delay_unknowns(self, k: int) -> list[int]:
         """Return the indices of the unknowns whose sum is the delay of the forces of trial k."""
-        return [at for term in self._terms for at in term.late(k)]
+        return [at for term in self._terms for at in term.delay_unknowns(k)]
 
-    def late_s(self, k: int, static: np.ndarray) -> float:
+    def delay_s(self, k: int, static: np.ndarray) -> float:
         """Return the delay (s) of the forces of trial k."""
-        return float(static[self.late(k)].sum())
+        return float(static[self.delay_unknowns(k)].sum())
 
     def on_feet(
         self, k: int, static: np.ndarray, derivative: int = 0, frames: slice | np.ndarray = slice(None)
     ) -> np.ndarray:
         """Return corrected loads (n, 2, 6) on the feet at the frames of trial k, or their time derivatives."""
-        ground, at = self._grounds[k], self._trials[k].time[frames] + self.late_s(k, static)
+        ground, at = self._grounds[k], self._trials[k].time[frames] + self.delay_s(k, static)
         loads = ground.loads(at, derivative).reshape(len(at), 2, 6)
-        return self._put_right(k, static, loads, ground.loaded(at, derivative), ground.carrier[frames])
+        return self._corrected(k, static, loads, ground.loaded(at, derivative), ground.carrier[frames])
 
     def reactions(self, k: int, static: np.ndarray) -> GroundReactions:
         """Return corrected loads for the joint moments of trial k, on the time base of the markers."""
         raw = self._grounds[k].reactions
-        wrench = self._put_right(k, static, raw.wrench, raw.loaded, raw.carrier)
-        impact = self._put_right(k, static, raw.impact, np.zeros(raw.carrier.shape), raw.carrier)
-        return replace(raw, time=raw.time - self.late_s(k, static), wrench=wrench, impact=impact)
+        wrench = self._corrected(k, static, raw.wrench, raw.loaded, raw.carrier)
+        impact = self._corrected(k, static, raw.impact, np.zeros(raw.carrier.shape), raw.carrier)
+        return replace(raw, time=raw.time - self.delay_s(k, static), wrench=wrench, impact=impact)
 
-    def _put_right(
+    def _corrected(
         self, k: int, static: np.ndarray, loads: np.ndarray, loaded: np.ndarray, carrier: np.ndarray
     ) -> np.ndarray:
         for term in self._terms:
-            loads = term.put_right(k, static, loads, loaded, carrier)
+            loads = term.corrected_loads(k, static, loads, loaded, carrier)
         return loads
 
     def by_errors(
@@ -198,14 +198,14 @@ class GroundLoads:
             by = term.by_unknowns(k, static, loads, loaded, carrier)
             for later in self._terms[place + 1 :]:
                 columns = np.moveaxis(by.reshape(*loads.shape, -1), -1, 0)
-                right = [later.put_right(k, static, one, nothing, carrier) for one in columns]
-                by = np.stack(right, axis=-1).reshape(by.shape)
+                rhs = [later.corrected_loads(k, static, one, nothing, carrier) for one in columns]
+                by = np.stack(rhs, axis=-1).reshape(by.shape)
             yield by, partial(term.add_by_unknowns, k)
 
     def root(self, k: int, static: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, tuple[Derivative, ...]]:
         """Return the sum (d, 6) of the loads on both feet, and its derivatives (d, 6, ...) by all errors but delays."""
         loads = self.on_feet(k, static, 0, frames)
-        loaded = self._grounds[k].loaded(self._trials[k].time[frames] + self.late_s(k, static))
+        loaded = self._grounds[k].loaded(self._trials[k].time[frames] + self.delay_s(k, static))
         every = self.by_errors(k, static, loads, loaded, frames)
         return loads.sum(axis=1), tuple((by.sum(axis=1), add) for by, add in every)
 

@@ -83,7 +83,7 @@ def curve_deviations(
     """
     basis, frames = problem.bases[k], np.flatnonzero(problem.trials[k].dynamic)
     size = (len(frames), coefficients.shape[1])
-    late_sd_s = float(np.linalg.norm(root[problem.loads.late(k)].sum(axis=0)))
+    delay_sd_s = float(np.linalg.norm(root[problem.loads.delay_unknowns(k)].sum(axis=0)))
     curves = _Curves(
         problem,
         k,
@@ -93,7 +93,7 @@ def curve_deviations(
         # errors that recur count more often only for what does not move
         np.sqrt(motion_noise(problem, k, coefficients, static) / problem.trials[k].repeats),
         frames,
-        late_sd_s,
+        delay_sd_s,
         block_growth(problem, k, static, problem.trials[k].time[frames]),
         CurveDeviations.filled(*size, 0.0),
         np.empty(size),
@@ -122,7 +122,7 @@ class _Curves:
         reactions: loads for the joint moments.
         shares: as in `_Seen`.
         frames: (d,) indices of the dynamic frames.
-        late_sd_s: standard deviation of the delay of the forces.
+        delay_sd_s: standard deviation of the delay of the forces.
         grown: (d, c) factors on the corresponding standard deviations of the moments (`skin_blocks.block_growth`).
         variance: of the curves.
         impact: (d, c) as in `MomentDerivatives`.
@@ -136,7 +136,7 @@ class _Curves:
     reactions: GroundReactions
     shares: np.ndarray
     frames: np.ndarray
-    late_sd_s: float
+    delay_sd_s: float
     grown: np.ndarray
     variance: CurveDeviations
     impact: np.ndarray
@@ -154,7 +154,7 @@ class _Curves:
         problem, basis, chosen = self.problem, self.problem.bases[self.k], self.frames[rows]
         in_root = problem.layout.in_root
         motion = problem.model.full(basis.evaluate(self.coefficients, chosen), self.static)
-        by = moment_derivatives(problem, self.k, motion, self.static, self.reactions, chosen, self.late_sd_s)
+        by = moment_derivatives(problem, self.k, motion, self.static, self.reactions, chosen, self.delay_sd_s)
         self.impact[rows], self.speed[rows] = by.impact, motion[1][:, problem.moving]
         values = basis.values[:, chosen]
         seen = _Seen.of(by, self.speed[rows], basis.first[chosen], values, self.shares, self.grown[rows])

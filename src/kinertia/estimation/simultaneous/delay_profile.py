@@ -72,9 +72,9 @@ class CostProfile:
         if not curve > 0.0:
             return unchanged
         shown = np.full((len(own), len(own)), 2.0 * curve)
-        right = np.full(len(own), 2.0 * curve * values.sum() - slope)
-        gaussian = GaussianPrior.given(ErrorPriors(tuple(priors)), shown, right)
-        found = np.linalg.solve(shown + gaussian.precision, right + gaussian.pull)
+        rhs = np.full(len(own), 2.0 * curve * values.sum() - slope)
+        gaussian = GaussianPrior.given(ErrorPriors(tuple(priors)), shown, rhs)
+        found = np.linalg.solve(shown + gaussian.precision, rhs + gaussian.pull)
         linear = (known - instruments.precision[np.ix_(own, own)]).mean()
         information = here.information.copy()
         information[np.ix_(late, late)] += shown - linear

@@ -121,7 +121,7 @@ class Branch:
             s = normal.border.shape[2]
             if k == 0:
                 size = max(each.touched.stop for each in stretches)
-                whole = Gradient.zero(size, normal.right.shape[1], len(normal.static_right))
+                whole = Gradient.zero(size, normal.rhs.shape[1], len(normal.static_rhs))
                 diagonal, information = np.zeros(s), np.zeros((s, s))
             whole.add(normal, stretch.touched)
             information += normal.static[:s, :s]
@@ -151,7 +151,7 @@ class Branch:
         backwards = self.last.backwards
         return Factored(_eliminated(self.stretches[k], backwards), backwards, BlockBand(diagonal, below), border)
 
-    def forward(self, right: np.ndarray) -> tuple[list[np.ndarray], np.ndarray, np.ndarray]:
+    def forward(self, rhs: np.ndarray) -> tuple[list[np.ndarray], np.ndarray, np.ndarray]:
         """Apply L^-1 to a right-hand side (size, c) of the motion; return it per time block (b, k, 1).
 
         The other two results are what is to be subtracted from the right-hand sides of the static unknowns (S,) and of
@@ -159,7 +159,7 @@ class Branch:
         """
         solved, lost, carried = [], np.zeros(len(self.information)), np.zeros((len(self.end.diagonal), 1))
         for part in self.inwards():
-            flat = part.in_blocks(right)
+            flat = part.in_blocks(rhs)
             flat[:1] -= carried
             motion = part.band.forward(flat, in_place=True)
             carried = part.band.below[-1] @ motion[-1]
@@ -219,10 +219,10 @@ class Eliminated:
     @classmethod
     def _of(cls, stretches: Sequence[Stretch], branch_of: Callable[[Sequence[Stretch]], Branch]) -> Eliminated:
         branches = tuple(side_by_side(branch_of, [half for half in halves(stretches) if half]))
-        size, (_, c) = stretches[-1].splines.stop, branches[0].gradient.right.shape
-        whole = Gradient.zero(size, c, len(branches[0].gradient.static_right))
+        size, (_, c) = stretches[-1].splines.stop, branches[0].gradient.rhs.shape
+        whole = Gradient.zero(size, c, len(branches[0].gradient.static_rhs))
         for branch in branches:
-            whole.add(branch.gradient, slice(0, len(branch.gradient.right)))
+            whole.add(branch.gradient, slice(0, len(branch.gradient.rhs)))
         diagonal, border = (sum(getattr(each.end, name) for each in branches) for name in ("diagonal", "border"))
         start = branches[0].last.splines.stop
         splines = slice(start, min(start + SPLINES_PER_BLOCK, size))
@@ -235,20 +235,20 @@ class Eliminated:
         known: np.ndarray = np.sum([branch.static_diagonal for branch in branches], axis=0)
         return cls(whole, known, information, branches, middle)
 
-    def forward(self, right: np.ndarray) -> tuple[list[list[np.ndarray]], np.ndarray]:
+    def forward(self, rhs: np.ndarray) -> tuple[list[list[np.ndarray]], np.ndarray]:
         """Apply L^-1 to a right-hand side (size, c) of the motion, per branch and block (b, k, 1), then the middle.
 
         The second result is what is to be subtracted from the right-hand side of the static unknowns (S,).
         """
-        halves = side_by_side(lambda branch: branch.forward(right), self.branches)
-        flat = self.middle.in_blocks(right) - sum(carried for _, _, carried in halves)
+        halves = side_by_side(lambda branch: branch.forward(rhs), self.branches)
+        flat = self.middle.in_blocks(rhs) - sum(carried for _, _, carried in halves)
         middle = self.middle.band.forward(flat, in_place=True)
         lost = taken(self.middle, middle) + sum(lost for _, lost, _ in halves)
         return [*(solved for solved, _, _ in halves), [middle]], lost
 
     def motion_step(self, solved: Sequence[Sequence[np.ndarray]], static: np.ndarray) -> np.ndarray:
         """Return the motion's step (size, c) for a step (S,) of the static unknowns; `solved` is from `forward`."""
-        result = np.empty_like(self.gradient.right)
+        result = np.empty_like(self.gradient.rhs)
         *halves, (middle,) = solved
         (block,) = write_step(self.middle, middle, static, result)
         side_by_side(

@@ -185,7 +185,7 @@ def fit_simultaneous(
         uncertainty.whole(result.bsp),
         calibrated,
         tuple(
-            calibrated.with_places(calibrated.marker_locals + (0.0 if staying else m)) for m in result.displacements_m
+            calibrated.with_places(calibrated.marker_locals + (0.0 if staying else m)) for m in result.marker_offsets_m
         ),
         posterior,
         motions,
@@ -242,7 +242,7 @@ def _marker_distances(result: SimultaneousResult, trials: Sequence[Kinematics]) 
     """Return, per trial, the distance (m) of each marker from its position in the nearest of the other trials."""
     labels = result.skeleton.labels
     shown = np.array([np.isin(labels, k.ik.labels) for k in trials])
-    places = np.where(shown[..., None], result.displacements_m, np.nan)
+    places = np.where(shown[..., None], result.marker_offsets_m, np.nan)
     distances = []
     for k in range(len(trials)):
         away = np.linalg.norm(places[k] - np.delete(places, k, axis=0), axis=-1)

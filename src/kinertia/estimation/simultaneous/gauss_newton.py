@@ -50,9 +50,9 @@ class GaussNewton:
         first[places, places] += instruments.precision
         return replace(self, static=replace(self.rest, first=first))
 
-    def step(self, right: np.ndarray) -> np.ndarray:
+    def step(self, rhs: np.ndarray) -> np.ndarray:
         """Solve for the step of all unknowns; it and the right-hand side are ordered as in `Point.vector`."""
-        pull = self.here.point.like(right)
+        pull = self.here.point.like(rhs)
         static, solved, rests = pull.static.copy(), [], []
         places, sds = self.problem.layout.displaced, self.problem.displaced_sd
         for k, (trial, displaced) in enumerate(zip(self.here.trials, self.displaced, strict=True)):
@@ -99,9 +99,9 @@ class MotionAlone:
         """Return it unchanged: the instruments' Gaussian does not concern the motion."""
         return self
 
-    def step(self, right: np.ndarray) -> np.ndarray:
+    def step(self, rhs: np.ndarray) -> np.ndarray:
         """Solve for the step of the motions alone; the steps of all other unknowns are zero."""
-        pull = self.point.like(right)
+        pull = self.point.like(rhs)
         trials = zip(self.trials, pull.coefficients, strict=True)
         motions = [trial.motion_step(trial.forward(own)[0], np.zeros(0)).ravel() for trial, own in trials]
-        return np.concatenate([*motions, np.zeros(len(right) - sum(motion.size for motion in motions))])
+        return np.concatenate([*motions, np.zeros(len(rhs) - sum(motion.size for motion in motions))])

@@ -52,7 +52,7 @@ class FoundErrors:
 
     Attributes:
         plates: per plate its errors (5,), in the order of PLATE_ERRORS, and their posterior standard deviations (5,).
-        clock_s: the synchronisation delay and its posterior standard deviation, s.
+        delay_s: the synchronisation delay and its posterior standard deviation, s.
         delays_s: per trial the additional delay of its forces, and its posterior standard deviation, s; none for a
             single trial whose synchronisation has been checked.
         zeros_n: per trial and plate the zero offsets (2,), in the order of ZERO_UNKNOWNS, and their posterior standard
@@ -62,7 +62,7 @@ class FoundErrors:
     """
 
     plates: dict[str, tuple[np.ndarray, np.ndarray]]
-    clock_s: tuple[float, float]
+    delay_s: tuple[float, float]
     delays_s: tuple[tuple[float, float], ...]
     zeros_n: tuple[dict[str, tuple[np.ndarray, np.ndarray]], ...]
     gains: tuple[dict[str, tuple[float, float]], ...]
@@ -95,7 +95,7 @@ def instrument_errors(
     """
     moved, contradicted = support
     elsewhere = _session_says_otherwise(found.instruments, prior)
-    shared = list(laboratory_errors(found.plates, found.clock_s, prior))
+    shared = list(laboratory_errors(found.plates, found.delay_s, prior))
     own = {(one.plate, one.quantity, one.axis): one for _, _, one in shared}
     errors = []
     for place, value, one in (*shared, *_of_trials(found, prior, trials, own_place)):
@@ -108,7 +108,7 @@ def instrument_errors(
 
 
 def laboratory_errors(
-    plates: Mapping[str, tuple[np.ndarray, np.ndarray]], clock_s: tuple[float, float], prior: InstrumentPrior
+    plates: Mapping[str, tuple[np.ndarray, np.ndarray]], delay_s: tuple[float, float], prior: InstrumentPrior
 ) -> Iterator[Solved]:
     """Yield the errors that all trials share, without support.
 
@@ -118,7 +118,7 @@ def laboratory_errors(
     Args:
         plates: per plate (5,) values of PLATE_ERRORS, as the estimate solves for them, and (5,) their standard
             deviations.
-        clock_s: the delay of the forces, and its standard deviation.
+        delay_s: the delay of the forces, and its standard deviation.
         prior: of the instruments.
     """
     floor = len(PLATE_UNKNOWNS) * len(plates)
@@ -131,18 +131,18 @@ def laboratory_errors(
             common_sd = prior.floor[unknown].sd if unknown in prior.floor else 0.0
             prior_sd = float(np.hypot(prior.plate[unknown].sd, common_sd))
             yield _of_plate(next(places), unknown, value, prior_sd, sd, plate=plate)
-    yield _delay(floor + len(FLOOR_UNKNOWNS), clock_s, prior.clock_s.sd)
+    yield _delay(floor + len(FLOOR_UNKNOWNS), delay_s, prior.delay_s.sd)
 
 
 def _of_trials(found: FoundErrors, prior: InstrumentPrior, trials: Sequence[str], first: int) -> Iterator[Solved]:
     """Yield the errors that are specific to trials; for gains, a plate's total gain error in the trial."""
     places = count(first)
-    for trial, delay_s in zip(trials, found.delays_s, strict=False):
-        yield _delay(next(places), delay_s, prior.delay_s.sd, trial)
+    for trial, trial_delay_s in zip(trials, found.delays_s, strict=False):
+        yield _delay(next(places), trial_delay_s, prior.trial_delay_s.sd, trial)
     for trial, zeros in zip(trials, found.zeros_n, strict=True):
         for plate, (values, sds) in zeros.items():
             for unknown, value, sd in zip(ZERO_UNKNOWNS, values, sds, strict=True):
-                yield _of_plate(next(places), unknown, value, prior.zero_n.sd, sd, plate=plate, trial=trial)
+                yield _of_plate(next(places), unknown, value, prior.zero_offset_n.sd, sd, plate=plate, trial=trial)
     gain_sd = float(np.hypot(prior.plate["gain"].sd, prior.trial_gain.sd))
     for trial, gains in zip(trials, found.gains, strict=True):
         for plate, (gain, sd) in gains.items():
@@ -178,8 +178,8 @@ def _of_plate(
     return Solved(place, value, entry)
 
 
-def _delay(place: int, delay_s: tuple[float, float], prior_sd: float, trial: str | None = None) -> Solved:
-    value, sd = delay_s
+def _delay(place: int, trial_delay_s: tuple[float, float], prior_sd: float, trial: str | None = None) -> Solved:
+    value, sd = trial_delay_s
     entry = CalibrationEntry(
         kind="synchronisation", trial=trial, quantity=DELAY, value=value, prior_sd=prior_sd, sd=sd, unit="s"
     )
@@ -208,4 +208,4 @@ def _alone(shown: InstrumentInformation, prior: InstrumentPrior) -> tuple[np.nda
     """Return values (k,) and standard deviations (k,) from some trials alone, if any instrument may be faulty."""
     faulty = np.array([one.faulty_sd for one in prior.of_unknowns(shown.plates).own])
     covariance = np.linalg.inv(shown.information + np.diag(faulty**-2.0))
-    return covariance @ shown.right, np.sqrt(np.diag(covariance))
+    return covariance @ shown.rhs, np.sqrt(np.diag(covariance))

@@ -52,15 +52,15 @@ def instrument_support(
         gaussian: replaces the priors of the instruments.
         curves: standard deviations of the trials' curves.
     """
-    root, late = model.static.root_of_covariance(), model.problem.loads.late
-    late_sd_s = [float(np.linalg.norm(root[late(k)].sum(axis=0))) for k in range(len(curves))]
-    each_trial = enumerate(zip(curves, late_sd_s, strict=True))
+    root, late = model.static.root_of_covariance(), model.problem.loads.delay_unknowns
+    delay_sd_s = [float(np.linalg.norm(root[late(k)].sum(axis=0))) for k in range(len(curves))]
+    each_trial = enumerate(zip(curves, delay_sd_s, strict=True))
     moved = [moved_moments(model.problem, k, point, *each) for k, each in each_trial]
     return InstrumentSupport(np.max(moved, axis=0), trials_apart(model, gaussian))
 
 
 def moved_moments(
-    problem: MapProblem, k: int, point: Point, curves: CurveDeviations, late_sd_s: float = 0.0
+    problem: MapProblem, k: int, point: Point, curves: CurveDeviations, delay_sd_s: float = 0.0
 ) -> np.ndarray:
     """Compute `InstrumentSupport.moved` (k,) in one trial, from derivatives of its joint moments at fixed motion.
 
@@ -72,7 +72,7 @@ def moved_moments(
     some = np.unique(np.linspace(0, len(dynamic) - 1, min(_MOST_FRAMES, len(dynamic))).astype(int))
     frames, static = dynamic[some], problem.in_trial(k, point)
     motion = problem.model.full(problem.bases[k].evaluate(point.coefficients[k], frames), static)
-    by = moment_derivatives(problem, k, motion, static, problem.loads.reactions(k, static), frames, late_sd_s)
+    by = moment_derivatives(problem, k, motion, static, problem.loads.reactions(k, static), frames, delay_sd_s)
     change = np.abs(by.static[:, _ROOT:, instruments])
     result: np.ndarray = (change / (INTERVAL_SD * curves.moments[some][:, _ROOT:, None])).max(axis=(0, 1))
     return result
@@ -90,7 +90,7 @@ def trials_apart(model: GaussNewton, gaussian: GaussianPrior) -> np.ndarray:
         return result
     rights = _rights(model)
     prior_right = here.point.like(here.slope.under(gaussian)[1]).static
-    prior_right = prior_right - sum(trial.gradient.static_right for trial in here.trials)
+    prior_right = prior_right - sum(trial.gradient.static_rhs for trial in here.trials)
     prior = here.information.copy()
     prior[layout.errors, layout.errors] += gaussian.precision
     every = sum(each.information for each in model.displaced)
@@ -108,18 +108,18 @@ def trials_apart(model: GaussNewton, gaussian: GaussianPrior) -> np.ndarray:
 
 def _rights(model: GaussNewton) -> list[np.ndarray]:
     """Return, per trial, the right-hand side (S,) on the static unknowns, motion and displacements eliminated."""
-    pull, places = model.here.point.like(model.here.slope.right), model.problem.layout.displaced
+    pull, places = model.here.point.like(model.here.slope.rhs), model.problem.layout.displaced
     result = []
     for k, (trial, displaced) in enumerate(zip(model.here.trials, model.displaced, strict=True)):
         _, lost = trial.forward(pull.coefficients[k])
         own = pull.displaced[k] - model.problem.displaced_sd[k] * lost[places]
-        result.append(trial.gradient.static_right - lost - own @ displaced.gain)
+        result.append(trial.gradient.static_rhs - lost - own @ displaced.gain)
     return result
 
 
-def _posterior(information: np.ndarray, right: np.ndarray, first: int, places: slice) -> tuple[np.ndarray, np.ndarray]:
+def _posterior(information: np.ndarray, rhs: np.ndarray, first: int, places: slice) -> tuple[np.ndarray, np.ndarray]:
     """Return steps (k,) of the unknowns at these indices, and their standard deviations (k,)."""
     found = StaticInformation.of(information, first)
     covariance = np.linalg.inv(found.first)
     variance = np.maximum(np.diag(covariance)[places], 0.0)
-    return found.solution(right)[places], np.sqrt(variance)
+    return found.solution(rhs)[places], np.sqrt(variance)

@@ -11,12 +11,12 @@ from kinertia.estimation.simultaneous.inputs import FreedModel, Given
 from kinertia.estimation.simultaneous.instrument_errors import FoundErrors, instrument_errors
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation
 from kinertia.estimation.simultaneous.layout import Unknowns
-from kinertia.estimation.simultaneous.mixture_prior import ErrorPriors, SoundOrFaulty
+from kinertia.estimation.simultaneous.mixture_prior import ErrorPriors, FaultMixture
 from kinertia.estimation.simultaneous.plate_loads import GAIN
 from kinertia.estimation.simultaneous.plates import PLATE_ERRORS, ZERO_UNKNOWNS, plates_with_floor
 from kinertia.estimation.simultaneous.plumb_line import TILT_SD_RAD, mean_loads_n
 
-PLATES, CLOCK, DELAYS, ZEROS, GAINS = "plates", "clock", "delays", "zeros", "gains"
+PLATES, CLOCK, TRIAL_DELAYS, ZEROS, GAINS = "plates", "clock", "delays", "zeros", "gains"
 
 
 class InstrumentErrors(LoadTerm):
@@ -34,10 +34,10 @@ class InstrumentErrors(LoadTerm):
         shared = known.of_unknowns(given.plates)
         # one trial of a session is one of several, and so may be one whose synchronisation nobody has checked
         count = sum(bool(trial.ground.plates) for trial in trials)
-        late = count > 1 or known.session or known.clock_s.faulty_share > 0.0
+        delay_unknowns = count > 1 or known.session or known.delay_s.fault_probability > 0.0
         plates = sum(len(trial.ground.plates) for trial in trials)
 
-        def of_trials(prior: SoundOrFaulty, count: int) -> ErrorPriors:
+        def of_trials(prior: FaultMixture, count: int) -> ErrorPriors:
             return ErrorPriors((prior,) * count)
 
         return (
@@ -45,8 +45,8 @@ class InstrumentErrors(LoadTerm):
                 PLATES, "m, 1, N m/N or rad", ErrorPriors(shared.own[:-1], shared.common), of_laboratory=True
             ),
             Unknowns.errors(CLOCK, "s", ErrorPriors(shared.own[-1:]), of_laboratory=True),
-            Unknowns.errors(DELAYS, "s", of_trials(known.delay_s, count if late else 0)),
-            Unknowns.errors(ZEROS, "N", of_trials(known.zero_n, len(ZERO_UNKNOWNS) * plates)),
+            Unknowns.errors(TRIAL_DELAYS, "s", of_trials(known.trial_delay_s, count if delay_unknowns else 0)),
+            Unknowns.errors(ZEROS, "N", of_trials(known.zero_offset_n, len(ZERO_UNKNOWNS) * plates)),
             Unknowns.errors(GAINS, "1", of_trials(known.trial_gain, plates)),
         )
 
@@ -62,12 +62,12 @@ class InstrumentErrors(LoadTerm):
         at = self.layout.laboratory
         into[at, at] += self._session.information
 
-    def add_pull(self, right: np.ndarray, static: np.ndarray) -> float:
+    def add_pull(self, rhs: np.ndarray, static: np.ndarray) -> float:
         """Add the right-hand side from other people of the session, and return the change in twice the cost."""
         own, shown = static[self.layout.laboratory], self._session
         pull = shown.information @ own
-        right[self.layout.laboratory] += shown.right - pull
-        return float(own @ (pull - 2.0 * shown.right))
+        rhs[self.layout.laboratory] += shown.rhs - pull
+        return float(own @ (pull - 2.0 * shown.rhs))
 
     def left_out(self, static: np.ndarray) -> np.ndarray:
         """Zeros along either axis that a tilt of all plates makes (`plumb_line`)."""
@@ -77,23 +77,23 @@ class InstrumentErrors(LoadTerm):
                 result[places, axis] = TILT_SD_RAD * mean_loads_n(trial)
         return result
 
-    def late(self, k: int) -> list[int]:
+    def delay_unknowns(self, k: int) -> list[int]:
         """Return the indices of the synchronisation delay and of the trial's own delay."""
-        delays = self.layout[DELAYS]
+        delays = self.layout[TRIAL_DELAYS]
         return [self.layout[CLOCK].start, *range(delays.start, delays.stop)[k : k + 1]]
 
     def profiled(self) -> list[int]:
         """Return the delays of a single trial with forces, if it is undetermined whether they are delayed."""
-        places, priors = self.late(0), self.layout.error_priors.own
+        places, priors = self.delay_unknowns(0), self.layout.error_priors.own
         own = [priors[at - self.layout.errors.start] for at in places]
-        uncertain = any(0.0 < prior.faulty_share < 1.0 for prior in own)
+        uncertain = any(0.0 < prior.fault_probability < 1.0 for prior in own)
         return places if uncertain and sum(map(bool, self._own)) < 2 else []
 
-    def put_right(
+    def corrected_loads(
         self, k: int, static: np.ndarray, loads: np.ndarray, loaded: np.ndarray, carrier: np.ndarray
     ) -> np.ndarray:
         """Correct loads for all errors but delays."""
-        return self.given.grounds[k].put_right(loads, loaded, carrier, self.plates_in(k, static))
+        return self.given.grounds[k].corrected_loads(loads, loaded, carrier, self.plates_in(k, static))
 
     def by_unknowns(
         self, k: int, static: np.ndarray, loads: np.ndarray, loaded: np.ndarray, carrier: np.ndarray
@@ -139,8 +139,8 @@ class InstrumentErrors(LoadTerm):
         zeros = [(trial.ground.plates, self.zeros_of(k)) for k, trial in enumerate(trials)]
         found = FoundErrors(
             plates=dict(zip(plates, zip(shared, shared_sd, strict=True), strict=True)),
-            clock_s=solution.pairs(self.layout[CLOCK])[0],
-            delays_s=tuple(solution.pairs(self.layout[DELAYS])),
+            delay_s=solution.pairs(self.layout[CLOCK])[0],
+            delays_s=tuple(solution.pairs(self.layout[TRIAL_DELAYS])),
             zeros_n=tuple(dict(zip(names, zip(values[at], sd[at], strict=True), strict=True)) for names, at in zeros),
             gains=tuple(self._gains(k, solution) for k in range(len(trials))),
             instruments=self._shown(solution),
@@ -151,7 +151,7 @@ class InstrumentErrors(LoadTerm):
             self.given.calibration.instruments,
             [trial.name for trial in trials],
             (solution.moved, solution.contradicted),
-            self.layout[DELAYS].start - first,
+            self.layout[TRIAL_DELAYS].start - first,
         )
         return {"calibration": entries, "instruments": found.instruments}
 
@@ -169,8 +169,8 @@ class InstrumentErrors(LoadTerm):
         """Return the information of the trials on the laboratory's instruments, without prior knowledge."""
         prior, session, every = solution.gaussian, self._session, self.layout.errors
         mean, covariance = solution.static[every], solution.covariance[every, every]
-        own = slice(len(session.right), len(mean))
+        own = slice(len(session.rhs), len(mean))
         more = (0, own.stop - own.start)
-        before = ((prior.precision, prior.pull), (np.pad(session.information, more), np.pad(session.right, more)))
+        before = ((prior.precision, prior.pull), (np.pad(session.information, more), np.pad(session.rhs, more)))
         shown = InstrumentInformation.of_posterior(self.given.plates, mean, covariance, before)
         return shown.without_own(prior.precision[own, own], prior.pull[own])

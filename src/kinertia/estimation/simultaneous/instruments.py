@@ -7,42 +7,42 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from kinertia.estimation.simultaneous.mixture_prior import ErrorPriors, SoundOrFaulty
+from kinertia.estimation.simultaneous.mixture_prior import ErrorPriors, FaultMixture
 from kinertia.estimation.simultaneous.plates import FLOOR_UNKNOWNS, PLATE_UNKNOWNS
 from kinertia.settings import Instruments
 from kinertia.trial.plate_names import columns_of_several_trials
 
-FAULTY_SHARE = 0.05
-PLATE_PRIOR: Mapping[str, SoundOrFaulty] = {
-    "x": SoundOrFaulty(0.0005, 0.015, FAULTY_SHARE),
-    "z": SoundOrFaulty(0.0005, 0.015, FAULTY_SHARE),
-    "gain": SoundOrFaulty(0.002, 0.03, FAULTY_SHARE),
-    "free moment": SoundOrFaulty(0.0003, 0.003, FAULTY_SHARE),
+FAULT_PROBABILITY = 0.05
+PLATE_PRIOR: Mapping[str, FaultMixture] = {
+    "x": FaultMixture(0.0005, 0.015, FAULT_PROBABILITY),
+    "z": FaultMixture(0.0005, 0.015, FAULT_PROBABILITY),
+    "gain": FaultMixture(0.002, 0.03, FAULT_PROBABILITY),
+    "free moment": FaultMixture(0.0003, 0.003, FAULT_PROBABILITY),
 }
 """Names and units as in PLATE_UNKNOWNS. Place: centres of pressure of four commercial plates were off by 2.3, 2.6, 11.8
 and 14.0 mm on average (Cedraro et al. 2011, Gait Posture 33:724), part of it a constant; sound plates and others. Gain:
 scale and plates of a laboratory may differ by 2 % before it is worth a warning. Free moment: a tenth of a percent of
 the vertical force at 0.3 m, and ten times that (no source)."""
-FLOOR_PRIOR: Mapping[str, SoundOrFaulty] = {
-    "x": SoundOrFaulty(0.0005, 0.005, FAULTY_SHARE),
-    "z": SoundOrFaulty(0.0005, 0.005, FAULTY_SHARE),
-    "turn": SoundOrFaulty(float(np.radians(0.1)), float(np.radians(2.0)), FAULTY_SHARE),
+FLOOR_PRIOR: Mapping[str, FaultMixture] = {
+    "x": FaultMixture(0.0005, 0.005, FAULT_PROBABILITY),
+    "z": FaultMixture(0.0005, 0.005, FAULT_PROBABILITY),
+    "turn": FaultMixture(float(np.radians(0.1)), float(np.radians(2.0)), FAULT_PROBABILITY),
 }
 """Names and units as in FLOOR_UNKNOWNS: plates and cameras were surveyed in different axes. Turn: corners of a plate of
 half a metre are surveyed to a millimetre, and a frame laid on the floor by eye is a few degrees askew (no source)."""
-CLOCK_PRIOR_S = SoundOrFaulty(0.0003, 0.008, 0.3)
+DELAY_PRIOR_S = FaultMixture(0.0003, 0.008, 0.3)
 """Apparent delay of the forces; soft tissue may contribute. Synchronous: half a sample of the plates. Delayed:
 published recordings show 7, 7, 7, 8.4, 13.5, -12 and 0.2 ms, and twelve children on one pair of plates 9 ms. Delays are
 assumed rarer than among these: where forces are synchronous, equal odds cost ankle moments 5 %, these 1 to 2 %."""
-DELAY_PRIOR_S = SoundOrFaulty(0.00003, 0.010, 0.03)
+TRIAL_DELAY_PRIOR_S = FaultMixture(0.00003, 0.010, 0.03)
 """Delay of one trial, besides the synchronisation delay: cameras and plates that start together do so in every trial;
 of two runs on one treadmill, forces of the first are delayed by 8.4 ms and of the second by 13.5. A laboratory that has
 tested the synchronisation has not tested every trial."""
-ZERO_PRIOR_N = SoundOrFaulty(1.0, 10.0, FAULTY_SHARE)
+ZERO_PRIOR_N = FaultMixture(1.0, 10.0, FAULT_PROBABILITY)
 """Zero offset of horizontal forces. Unloaded, four plates of published trials read 0.2 to 3 N and a fifth one 12 N;
 under people who stand still, two plates together read 2 N."""
 
-TRIAL_GAIN_PRIOR = SoundOrFaulty(0.001, 0.03, 0.3)
+TRIAL_GAIN_PRIOR = FaultMixture(0.001, 0.03, 0.3)
 """Gain error of a plate in one trial, besides that in all trials. One person weighed 60 kg standing and squatting, and
 63.5 to 64 walking on the same plates of one session: two trials of seven are 4 % off the others."""
 
@@ -57,7 +57,7 @@ class InstrumentInformation:
     Attributes:
         plates: names.
         information: (k, k) of normal equations in m, 1, N m/N, rad and s.
-        right: (k,) their right-hand side: information times the values from these trials.
+        rhs: (k,) their right-hand side: information times the values from these trials.
 
     >>> shown = InstrumentInformation(("left",), np.eye(8), np.zeros(8))
     >>> shown.among(("right", "left"), InstrumentPrior()).information.shape
@@ -66,7 +66,7 @@ class InstrumentInformation:
 
     plates: tuple[str, ...]
     information: np.ndarray
-    right: np.ndarray
+    rhs: np.ndarray
 
     @classmethod
     def of_posterior(
@@ -78,19 +78,19 @@ class InstrumentInformation:
         """
         after = np.linalg.inv(covariance)
         information = after - sum(each for each, _ in before)
-        right = after @ mean - sum(each for _, each in before)
-        return cls(tuple(plates), *_never_negative(information, right, np.sqrt(np.diag(after))))
+        rhs = after @ mean - sum(each for _, each in before)
+        return cls(tuple(plates), *_never_negative(information, rhs, np.sqrt(np.diag(after))))
 
     def without_own(self, precision: np.ndarray, pull: np.ndarray) -> InstrumentInformation:
         """Eliminate the t unknowns that are specific to trials, which come last, given their prior: (t, t), (t,)."""
-        size = len(self.right) - len(pull)
+        size = len(self.rhs) - len(pull)
         across = self.information[:size, size:]
         own = self.information[size:, size:] + precision
-        through = np.linalg.solve(own, np.column_stack([across.T, self.right[size:] + pull]))
+        through = np.linalg.solve(own, np.column_stack([across.T, self.rhs[size:] + pull]))
         information = self.information[:size, :size] - across @ through[:, :-1]
         scale = np.sqrt(np.maximum(np.diag(self.information)[:size], np.finfo(float).tiny))
         return InstrumentInformation(
-            self.plates, *_never_negative(information, self.right[:size] - across @ through[:, -1], scale)
+            self.plates, *_never_negative(information, self.rhs[:size] - across @ through[:, -1], scale)
         )
 
     def among(self, plates: Sequence[str], prior: InstrumentPrior) -> InstrumentInformation:
@@ -100,22 +100,22 @@ class InstrumentInformation:
         here = np.concatenate([each * every.index(name) + np.arange(each) for name in self.plates]).astype(int)
         size = each * len(every)
         here = np.concatenate([here, size + np.arange(len(FLOOR_UNKNOWNS) + 1)])
-        information, right = np.zeros((size + len(FLOOR_UNKNOWNS) + 1,) * 2), np.zeros(size + len(FLOOR_UNKNOWNS) + 1)
-        information[np.ix_(here, here)], right[here] = self.information, self.right
+        information, rhs = np.zeros((size + len(FLOOR_UNKNOWNS) + 1,) * 2), np.zeros(size + len(FLOOR_UNKNOWNS) + 1)
+        information[np.ix_(here, here)], rhs[here] = self.information, self.rhs
         other = np.arange(each * len(plates), size)
-        kept = np.setdiff1d(np.arange(len(right)), other)
+        kept = np.setdiff1d(np.arange(len(rhs)), other)
         deviations = np.tile([prior.plate[name].sd for name in PLATE_UNKNOWNS], len(every) - len(plates))
         own = information[np.ix_(other, other)] + np.diag(1.0 / np.square(deviations))
-        through = np.linalg.solve(own, np.column_stack([information[np.ix_(other, kept)], right[other]]))
+        through = np.linalg.solve(own, np.column_stack([information[np.ix_(other, kept)], rhs[other]]))
         across = information[np.ix_(kept, other)]
         return InstrumentInformation(
             tuple(plates),
             information[np.ix_(kept, kept)] - across @ through[:, :-1],
-            right[kept] - across @ through[:, -1],
+            rhs[kept] - across @ through[:, -1],
         )
 
 
-def _never_negative(information: np.ndarray, right: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _never_negative(information: np.ndarray, rhs: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Remove directions in which the information, over its scale, is negative.
 
     They may result from rounding, and from replacing a mixture of two components by one Gaussian.
@@ -123,7 +123,7 @@ def _never_negative(information: np.ndarray, right: np.ndarray, scale: np.ndarra
     values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
     kept = vectors[:, values > 0.0]
     scaled = kept * scale[:, None]
-    return scaled * values[values > 0.0] @ scaled.T, scale * (kept @ (kept.T @ (right / scale)))
+    return scaled * values[values > 0.0] @ scaled.T, scale * (kept @ (kept.T @ (rhs / scale)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,23 +133,23 @@ class InstrumentPrior:
     Attributes:
         plate: prior of each of PLATE_UNKNOWNS, for every plate on its own.
         floor: prior of each of FLOOR_UNKNOWNS, for all plates together.
-        clock_s: prior of the delay between forces and markers.
+        delay_s: prior of the delay between forces and markers.
         delay_s: prior of the additional delay of the forces of one of several trials.
         zero_n: prior of the zero offsets of each plate's horizontal forces in each trial.
         trial_gain: prior of each plate's additional gain error in each trial.
         session: information from other people measured with the same instruments.
 
     >>> stated = InstrumentPrior.stated(Instruments(plate_sd_mm=1.0))
-    >>> stated.plate["x"].sd, stated.clock_s == InstrumentPrior().clock_s
+    >>> stated.plate["x"].sd, stated.delay_s == InstrumentPrior().delay_s
     (0.001, True)
     """
 
-    plate: Mapping[str, SoundOrFaulty] = field(default_factory=lambda: PLATE_PRIOR)
-    floor: Mapping[str, SoundOrFaulty] = field(default_factory=lambda: FLOOR_PRIOR)
-    clock_s: SoundOrFaulty = CLOCK_PRIOR_S
-    delay_s: SoundOrFaulty = DELAY_PRIOR_S
-    zero_n: SoundOrFaulty = ZERO_PRIOR_N
-    trial_gain: SoundOrFaulty = TRIAL_GAIN_PRIOR
+    plate: Mapping[str, FaultMixture] = field(default_factory=lambda: PLATE_PRIOR)
+    floor: Mapping[str, FaultMixture] = field(default_factory=lambda: FLOOR_PRIOR)
+    delay_s: FaultMixture = DELAY_PRIOR_S
+    trial_delay_s: FaultMixture = TRIAL_DELAY_PRIOR_S
+    zero_offset_n: FaultMixture = ZERO_PRIOR_N
+    trial_gain: FaultMixture = TRIAL_GAIN_PRIOR
     session: tuple[InstrumentInformation, ...] = ()
 
     @classmethod
@@ -161,18 +161,18 @@ class InstrumentPrior:
         """
         result = cls(session=tuple(session))
         if instruments.plate_sd_mm is not None:
-            place, none = (SoundOrFaulty.certain(mm / 1e3) for mm in (instruments.plate_sd_mm, _NO_FLOOR_MM))
+            place, none = (FaultMixture.certain(mm / 1e3) for mm in (instruments.plate_sd_mm, _NO_FLOOR_MM))
             result = replace(
                 result,
                 plate={**result.plate, **dict.fromkeys(_PLACE, place)},
                 floor={**result.floor, **dict.fromkeys(_PLACE, none)},
             )
         if instruments.gain_sd_percent is not None:
-            gain = SoundOrFaulty.certain(instruments.gain_sd_percent / 100.0)
-            of_trials = SoundOrFaulty.certain(TRIAL_GAIN_PRIOR.sound_sd)
+            gain = FaultMixture.certain(instruments.gain_sd_percent / 100.0)
+            of_trials = FaultMixture.certain(TRIAL_GAIN_PRIOR.nominal_sd)
             result = replace(result, plate={**result.plate, "gain": gain}, trial_gain=of_trials)
         if instruments.clock_sd_ms is not None:
-            result = replace(result, clock_s=SoundOrFaulty.certain(instruments.clock_sd_ms / 1e3))
+            result = replace(result, delay_s=FaultMixture.certain(instruments.clock_sd_ms / 1e3))
         return result
 
     def of_unknowns(self, plates: Sequence[str]) -> ErrorPriors:
@@ -184,23 +184,23 @@ class InstrumentPrior:
         names = list(PLATE_UNKNOWNS)
         own = [self.plate[name] for _ in plates for name in names]
         common = [
-            (SoundOrFaulty(_HARDLY * prior.sound_sd, prior.faulty_sd, prior.faulty_share), tuple(places))
+            (FaultMixture(_HARDLY * prior.nominal_sd, prior.faulty_sd, prior.fault_probability), tuple(places))
             for column in columns_of_several_trials(plates)
             for k, prior in enumerate(self.plate[name] for name in names)
-            if (places := [len(names) * plate + k for plate in column]) and prior.faulty_share > 0.0
+            if (places := [len(names) * plate + k for plate in column]) and prior.fault_probability > 0.0
         ]
         floor = [self.floor[name] for name in FLOOR_UNKNOWNS]
-        return ErrorPriors((*own, *floor, self.clock_s), tuple(common))
+        return ErrorPriors((*own, *floor, self.delay_s), tuple(common))
 
     def of_session(self, plates: Sequence[str]) -> InstrumentInformation:
         """Return the information of the session's other people on these plates, combined."""
         size = len(PLATE_UNKNOWNS) * len(plates) + len(FLOOR_UNKNOWNS) + 1
-        information, right = np.zeros((size, size)), np.zeros(size)
+        information, rhs = np.zeros((size, size)), np.zeros(size)
         for each in self.session:
             shown = each.among(plates, self)
             information += shown.information
-            right += shown.right
-        return InstrumentInformation(tuple(plates), information, right)
+            rhs += shown.rhs
+        return InstrumentInformation(tuple(plates), information, rhs)
 
 
 _HARDLY = 0.1

@@ -51,7 +51,7 @@ def to_splines(
     reach: np.ndarray,
     band: np.ndarray,
     border: np.ndarray,
-    right: np.ndarray,
+    rhs: np.ndarray,
     bordered: bool,
 ) -> None:
     """Weight the terms of an interval with pairs of the active splines.
@@ -59,7 +59,7 @@ def to_splines(
     `reach` (c, r, 2) are the runs of columns of S that each coordinate is coupled to. Terms across the frames after the
     interval are left for the next one. The border is left out if not `bordered`.
     """
-    n, size, c, at, most = len(first), len(band), right.shape[1], first[start], len(interval.gradient)
+    n, size, c, at, most = len(first), len(band), rhs.shape[1], first[start], len(interval.gradient)
     own = np.zeros((1 + LATER, most, _TOGETHER))
     for k in range(start, end):
         for later in range(min(LATER, n - 1 - k) + 1):
@@ -67,7 +67,7 @@ def to_splines(
                 own[later, k - start, first[k + later] - at + i] = values[k + later, i]
         for i in range(6):
             for j in range(c):
-                right[at + i, j] += own[0, k - start, i] * interval.gradient[k - start, j]
+                rhs[at + i, j] += own[0, k - start, i] * interval.gradient[k - start, j]
     products, pair = np.dot(_pair_weights(own), interval.squares), 0
     for i in range(_TOGETHER):
         for j in range(i, _TOGETHER):

@@ -47,20 +47,20 @@ class Slope:
     Attributes:
         point: the point.
         cost: half the sum of squares of everything.
-        right: minus its derivatives by all unknowns, as `Point.vector` has them.
+        rhs: minus its derivatives by all unknowns, as `Point.vector` has them.
         instruments: slice of the instruments' unknowns in the vector.
     """
 
     point: Point
     cost: float
-    right: np.ndarray
+    rhs: np.ndarray
     instruments: slice
 
     def under(self, prior: GaussianPrior) -> tuple[float, np.ndarray]:
         """Return cost and right-hand side with this Gaussian for the instruments."""
-        values, right = self.point.vector[self.instruments], self.right.copy()
-        right[self.instruments] += prior.pull - prior.precision @ values
-        return self.cost + prior.cost(values), right
+        values, rhs = self.point.vector[self.instruments], self.rhs.copy()
+        rhs[self.instruments] += prior.pull - prior.precision @ values
+        return self.cost + prior.cost(values), rhs
 
 
 @dataclass(frozen=True)

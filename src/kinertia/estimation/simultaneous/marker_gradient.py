@@ -19,8 +19,8 @@ def add_gradient(
     values: np.ndarray,
     own: tuple[int, int],
     still: int,
-    right: np.ndarray,
-    static_right: np.ndarray,
+    rhs: np.ndarray,
+    static_rhs: np.ndarray,
 ) -> float:
     """Add J^T W r (size, c) and S^T W r (s,) of frames own[0] to own[1] - 1, and return r^T W r.
 
@@ -28,7 +28,7 @@ def add_gradient(
     """
     n, m = markers.own.shape
     start, stop = own
-    c, a = right.shape[1], len(markers.column)
+    c, a = rhs.shape[1], len(markers.column)
     placed = PlacedMarkers(np.empty((5, a, 6)), np.empty((5, m, 3)), np.empty((5, m, 3)), np.empty((5, m, 3, 3)))
     pull, forces, cost = np.empty((m, 3)), np.empty((a, 6)), 0.0
     for k in range(max(start - LATER, 0), min(start + LATER, n)):
@@ -44,17 +44,17 @@ def add_gradient(
             skin = markers.columns[i] - 3 * markers.first[i]
             for r in range(3):
                 along = turned[i, 0, r] * pull[i, 0] + turned[i, 1, r] * pull[i, 1] + turned[i, 2, r] * pull[i, 2]
-                static_right[still + 3 * i + r] += along
+                static_rhs[still + 3 * i + r] += along
                 for g in range(markers.first[i], markers.last[i]):
-                    static_right[skin + 3 * g + r] += markers.patterns[k, g] * along
+                    static_rhs[skin + 3 * g + r] += markers.patterns[k, g] * along
         hand_down(markers.tree.parent, forces)
         for j in range(a):
             force = markers.slopes[k, j] * inner(axes, j, forces, j)
             if markers.column[j] < c:
                 for i in range(6):
-                    right[first[k] + i, markers.column[j]] += values[k, i] * force
+                    rhs[first[k] + i, markers.column[j]] += values[k, i] * force
             else:
-                static_right[markers.column[j] - c] += force
+                static_rhs[markers.column[j] - c] += force
     return cost
 
 

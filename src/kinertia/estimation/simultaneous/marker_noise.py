@@ -34,7 +34,7 @@ class MarkerNoise:
     Attributes:
         sd_m: per label, standard deviation of one coordinate in one frame, m, without the part that follows the joints.
         correlation_s: time over which errors are correlated.
-        wandering: labels whose standard deviation is more than three times the usual; they drift and are down-weighted.
+        drifting: labels whose standard deviation is more than three times the usual; they drift and are down-weighted.
         repeats: number of strides in all trials together in which errors recur (`error_repetition`); 1: never.
         displacement_sd_m: per label, standard deviation of its displacement in this trial (`displacement`), m; 0 for
             one trial.
@@ -42,7 +42,7 @@ class MarkerNoise:
 
     sd_m: Mapping[str, float]
     correlation_s: float
-    wandering: tuple[str, ...]
+    drifting: tuple[str, ...]
     repeats: float = 1.0
     displacement_sd_m: Mapping[str, float] = field(default_factory=dict)
 
@@ -82,10 +82,10 @@ class WithoutSkin:
             x = np.concatenate([(part - mean) / np.sqrt(f) for part, mean, f in zip(here, middle, frames, strict=True)])
             y = np.concatenate([e[shown, m] / np.sqrt(f) for e, shown, f in zip(varying, seen, frames, strict=True)])
             weight = np.concatenate([np.full(shown.sum(), f) for shown, f in zip(seen, frames, strict=True)])[:, None]
-            square, right, left = x.T @ x, x.T @ y, y
+            square, rhs, left = x.T @ x, x.T @ y, y
             for _ in range(_ROUNDS):
                 variance = max(float((weight * np.square(left)).mean()), SMALLEST_MARKER_SD_M**2 / 10.0)
-                slopes = np.linalg.solve(square + variance * np.eye(last - first), right)
+                slopes = np.linalg.solve(square + variance * np.eye(last - first), rhs)
                 left = y - x @ slopes
             parts = np.split(left * np.sqrt(weight), np.cumsum([shown.sum() for shown in seen])[:-1])
             for rest, shown, part in zip(rests, seen, parts, strict=True):

@@ -47,14 +47,14 @@ class Displaced:
         half = solve_triangular(factor, border, lower=True)
         return cls(information - half.T @ half, solve_triangular(factor, half, lower=True, trans="T"), factor)
 
-    def rest(self, right: np.ndarray) -> np.ndarray:
+    def rest(self, rhs: np.ndarray) -> np.ndarray:
         """Return the step (k,) of the displacements for this right-hand side (k,), with the static unknowns constant.
 
         The static unknowns receive `-right @ gain` of it.
         """
         if self.factor is None:
-            return np.zeros_like(right)
-        half = solve_triangular(self.factor, right, lower=True)
+            return np.zeros_like(rhs)
+        half = solve_triangular(self.factor, rhs, lower=True)
         result: np.ndarray = solve_triangular(self.factor, half, lower=True, trans="T")
         return result
 

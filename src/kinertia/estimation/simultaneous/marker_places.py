@@ -33,4 +33,4 @@ class MarkerPlaces(CostTerm):
 
     def read(self, solution: Solution) -> dict[str, Any]:
         """Return the displacements of the markers of each trial from their positions."""
-        return {"displacements_m": tuple(own.reshape(-1, 3) for own in solution.displaced)}
+        return {"marker_offsets_m": tuple(own.reshape(-1, 3) for own in solution.displaced)}

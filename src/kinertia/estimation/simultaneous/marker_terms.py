@@ -31,7 +31,7 @@ class _Static(NamedTuple):
     """The static terms S^T W S (s, s), S^T W r (s,) and r^T W r (1,)."""
 
     square: np.ndarray
-    right: np.ndarray
+    rhs: np.ndarray
     cost: np.ndarray
 
 
@@ -70,11 +70,11 @@ def add_markers(
     own = (stretch.frames.start - near.start, stretch.frames.stop - near.start)
     first, values = basis.first[near] - stretch.splines.start, basis.values[0][near]
     if not isinstance(into, NormalEquations):
-        into.cost += 0.5 * add_gradient(markers, first, values, own, still, into.right, into.static_right[columns])
+        into.cost += 0.5 * add_gradient(markers, first, values, own, still, into.rhs, into.static_rhs[columns])
         return
-    static = _Static(into.static[columns, columns], into.static_right[columns], np.zeros(1))
+    static = _Static(into.static[columns, columns], into.static_rhs[columns], np.zeros(1))
     border = into.border[..., columns] if into.bordered else NO_BORDER
-    _add(markers, first, values, own, still, into.band, border, into.right, static, into.bordered)
+    _add(markers, first, values, own, still, into.band, border, into.rhs, static, into.bordered)
     into.cost += 0.5 * float(static.cost[0])
 
 
@@ -87,7 +87,7 @@ def _add(
     still: int,
     band: np.ndarray,
     border: np.ndarray,
-    right: np.ndarray,
+    rhs: np.ndarray,
     static: _Static,
     bordered: bool,
 ) -> None:
@@ -97,7 +97,7 @@ def _add(
     """
     n, m = markers.own.shape
     start, stop = own
-    c, a, s = band.shape[2], len(markers.column), len(static.right)
+    c, a, s = band.shape[2], len(markers.column), len(static.rhs)
     reach, pairs = _reach(markers, c, still), _pairs(markers.tree.parent)
     placed = PlacedMarkers(np.empty((5, a, 6)), np.empty((5, m, 3)), np.empty((5, m, 3)), np.empty((5, m, 3, 3)))
     most = longest_run(first)
@@ -116,7 +116,7 @@ def _add(
             _frame(markers, k, k - start, still, pairs, placed, interval, static, bordered)
             for later in range(1, min(LATER, n - 1 - k) + 1):
                 _pair(markers, k, later, k - start, pairs, placed, interval, static)
-        to_splines(first, values, start, end, interval, reach, band, border, right, bordered)
+        to_splines(first, values, start, end, interval, reach, band, border, rhs, bordered)
         start = end
     for row in range(min(LATER, n - stop) if bordered else 0):
         # of the frames after them, only their coupling to the last of these
@@ -163,7 +163,7 @@ def _frame(
         if column[j] < c:
             gradient[column[j]] += force
         else:
-            static.right[column[j] - c] += force
+            static.rhs[column[j] - c] += force
         met_force(sums, j, axes, j, met)
         i = j
         while i >= 0:
@@ -218,7 +218,7 @@ def _by_place(
     c, here = interval.gradient.shape[1], k % 5
     parent, column, slopes = markers.tree.parent, markers.column, markers.slopes
     axes, at, turned, errors = placed.axes[here], placed.places[here], placed.turned[here], placed.errors[here]
-    across, square, right = interval.across[row], static.square, static.right
+    across, square, rhs = interval.across[row], static.square, static.rhs
     most = directions.shape[2]
     own, values, velocity = np.empty((3, most)), np.empty(most), np.empty(3)
     for m in range(len(markers.carrier)):
@@ -234,7 +234,7 @@ def _by_place(
             for g in range(count // 3):
                 pattern = 1.0 if g == 0 else markers.patterns[k, first + g - 1]
                 one = i + (place if g == 0 else skin + 3 * g)
-                right[one] += pattern * along
+                rhs[one] += pattern * along
                 for j in range(3):
                     square[one, place + j] += pattern * own[i, j]
                 for j in range(3, count):

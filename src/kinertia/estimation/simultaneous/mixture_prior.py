@@ -31,51 +31,51 @@ _UNLIKELY = -15.0
 
 
 @dataclass(frozen=True)
-class SoundOrFaulty:
+class FaultMixture:
     """Prior of a quantity with zero mean: a narrow Gaussian and, with the fault probability, a wide one.
 
     Attributes:
-        sound_sd, faulty_sd: standard deviations of the components.
-        faulty_share: fault probability, 0 to 1.
+        nominal_sd, faulty_sd: standard deviations of the components.
+        fault_probability: fault probability, 0 to 1.
 
-    >>> SoundOrFaulty(0.001, 0.015, 0.2).sd
+    >>> FaultMixture(0.001, 0.015, 0.2).sd
     0.00676...
     """
 
-    sound_sd: float
+    nominal_sd: float
     faulty_sd: float
-    faulty_share: float
+    fault_probability: float
 
     @classmethod
-    def certain(cls, sd: float) -> SoundOrFaulty:
+    def certain(cls, sd: float) -> FaultMixture:
         """Return a plain Gaussian."""
         return cls(sd, sd, 0.0)
 
     @property
     def sd(self) -> float:
         """Standard deviation of both components together."""
-        share = self.faulty_share
-        return float(np.sqrt((1.0 - share) * self.sound_sd**2 + share * self.faulty_sd**2))
+        share = self.fault_probability
+        return float(np.sqrt((1.0 - share) * self.nominal_sd**2 + share * self.faulty_sd**2))
 
     def least_told(self, sd: float) -> float:
         """Return the smallest error that data with this standard deviation attribute to a fault with odds above one.
 
         It is infinite if there is only one component.
 
-        >>> prior = SoundOrFaulty(0.1, 2.0, 0.05)
+        >>> prior = FaultMixture(0.1, 2.0, 0.05)
         >>> round(prior.least_told(0.3), 2), round(prior.least_told(1.6), 2)
         (0.99, 5.37)
         """
-        if not 0.0 < self.faulty_share < 1.0:
+        if not 0.0 < self.fault_probability < 1.0:
             return float("inf")
-        sound, faulty = (float(np.hypot(sd, own)) for own in (self.sound_sd, self.faulty_sd))
-        odds = np.log((1.0 - self.faulty_share) / self.faulty_share * faulty / sound)
+        sound, faulty = (float(np.hypot(sd, own)) for own in (self.nominal_sd, self.faulty_sd))
+        odds = np.log((1.0 - self.fault_probability) / self.fault_probability * faulty / sound)
         return float(np.sqrt(2.0 * odds / (sound**-2 - faulty**-2)))
 
     def draw(self, rng: np.random.Generator) -> float:
         """Draw one instrument's error."""
-        faulty = rng.random() < self.faulty_share
-        return float(rng.normal(0.0, self.faulty_sd if faulty else self.sound_sd))
+        faulty = rng.random() < self.fault_probability
+        return float(rng.normal(0.0, self.faulty_sd if faulty else self.nominal_sd))
 
 
 @dataclass(frozen=True)
@@ -86,14 +86,14 @@ class ErrorPriors:
         own: prior of each one's own part.
         common: priors of common parts, each with the indices of the errors that share it.
 
-    >>> plate = SoundOrFaulty(0.001, 0.015, 0.2)
+    >>> plate = FaultMixture(0.001, 0.015, 0.2)
     >>> ErrorPriors((plate, plate), ((plate, (0, 1)),)).covariance.round(6)
     array([[9.2e-05, 4.6e-05],
            [4.6e-05, 9.2e-05]])
     """
 
-    own: tuple[SoundOrFaulty, ...]
-    common: tuple[tuple[SoundOrFaulty, tuple[int, ...]], ...] = ()
+    own: tuple[FaultMixture, ...]
+    common: tuple[tuple[FaultMixture, tuple[int, ...]], ...] = ()
 
     @classmethod
     def joined(cls, every: Sequence[ErrorPriors]) -> ErrorPriors:
@@ -105,7 +105,7 @@ class ErrorPriors:
         return cls(tuple(prior for each in every for prior in each.own), tuple(common))
 
     @cached_property
-    def parts(self) -> tuple[SoundOrFaulty, ...]:
+    def parts(self) -> tuple[FaultMixture, ...]:
         """Priors of all parts, which are independent: (k + c)."""
         return (*self.own, *(prior for prior, _ in self.common))
 
@@ -156,15 +156,15 @@ class GaussianPrior:
         return GaussianPrior.given(priors, information - self.precision, information @ mean - self.pull)
 
     @classmethod
-    def given(cls, priors: ErrorPriors, data: np.ndarray, right: np.ndarray) -> GaussianPrior:
+    def given(cls, priors: ErrorPriors, data: np.ndarray, rhs: np.ndarray) -> GaussianPrior:
         """Return that Gaussian for data with this information (k, k) and right-hand side (k,)."""
         parts = priors.of_parts
-        middle, whole = _posterior(priors.parts, parts.T @ data @ parts, parts.T @ right)
+        middle, whole = _posterior(priors.parts, parts.T @ data @ parts, parts.T @ rhs)
         middle, information = parts @ middle, np.linalg.inv(parts @ whole @ parts.T)
-        return cls(information - data, information @ middle - right)
+        return cls(information - data, information @ middle - rhs)
 
 
-def _posterior(priors: Sequence[SoundOrFaulty], data: np.ndarray, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _posterior(priors: Sequence[FaultMixture], data: np.ndarray, rhs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return mean (k,) and covariance (k, k) of the posterior, a sum of Gaussians.
 
     Each is weighted by the probability of its combination of faults after data with this information (k, k) and
@@ -172,9 +172,9 @@ def _posterior(priors: Sequence[SoundOrFaulty], data: np.ndarray, right: np.ndar
     likeliest so far.
     """
     change, log_odds = _faults(priors)
-    ways = _Ways.sound(priors, data, right)
+    ways = _Ways.sound(priors, data, rhs)
     likeliest = float(ways.log_weight[0])
-    weight, first, second = 0.0, np.zeros(len(right)), np.zeros_like(data)
+    weight, first, second = 0.0, np.zeros(len(rhs)), np.zeros_like(data)
     while len(ways.log_weight) and ways.log_weight.max() > likeliest + _UNLIKELY:
         now = max(likeliest, float(ways.log_weight.max()))
         before, own = np.exp(likeliest - now), np.exp(ways.log_weight - now)
@@ -186,16 +186,16 @@ def _posterior(priors: Sequence[SoundOrFaulty], data: np.ndarray, right: np.ndar
     return middle, second / weight - np.outer(middle, middle)
 
 
-def log_chance(priors: ErrorPriors, data: np.ndarray, right: np.ndarray) -> float:
+def log_chance(priors: ErrorPriors, data: np.ndarray, rhs: np.ndarray) -> float:
     """Return the log probability of data under these priors, up to a constant that depends on the priors alone.
 
     It is the logarithm of the mean of exp(right x - x data x / 2) over errors x, for data with this information (k, k)
     and right-hand side (k,).
     """
     parts = priors.of_parts
-    data, right = parts.T @ data @ parts, parts.T @ right
+    data, rhs = parts.T @ data @ parts, parts.T @ rhs
     change, log_odds = _faults(priors.parts)
-    ways = _Ways.sound(priors.parts, data, right)
+    ways = _Ways.sound(priors.parts, data, rhs)
     weights = [ways.log_weight]
     while len(ways.log_weight) and ways.log_weight.max() > max(map(np.max, weights)) + _UNLIKELY:
         ways = ways.one_fault_more(change, log_odds)
@@ -203,14 +203,14 @@ def log_chance(priors: ErrorPriors, data: np.ndarray, right: np.ndarray) -> floa
     return float(np.logaddexp.reduce(np.concatenate(weights)))
 
 
-def _faults(priors: Sequence[SoundOrFaulty]) -> tuple[np.ndarray, np.ndarray]:
+def _faults(priors: Sequence[FaultMixture]) -> tuple[np.ndarray, np.ndarray]:
     """Return the change by a fault of each quantity (k,) of its precision and of a combination's log prior.
 
     The latter includes the ratio of the components' standard deviations; it is -inf if there is only one component.
     """
-    change = np.array([prior.faulty_sd**-2.0 - prior.sound_sd**-2.0 for prior in priors])
-    share = np.array([prior.faulty_share for prior in priors])
-    shorter = np.log([prior.sound_sd / prior.faulty_sd for prior in priors])
+    change = np.array([prior.faulty_sd**-2.0 - prior.nominal_sd**-2.0 for prior in priors])
+    share = np.array([prior.fault_probability for prior in priors])
+    shorter = np.log([prior.nominal_sd / prior.faulty_sd for prior in priors])
     with np.errstate(divide="ignore"):
         return change, np.log(share / (1.0 - share)) + shorter
 
@@ -231,12 +231,12 @@ class _Ways:
     spread: np.ndarray
 
     @classmethod
-    def sound(cls, priors: Sequence[SoundOrFaulty], data: np.ndarray, right: np.ndarray) -> _Ways:
+    def sound(cls, priors: Sequence[FaultMixture], data: np.ndarray, rhs: np.ndarray) -> _Ways:
         """Return the combination without a fault."""
-        spread = np.linalg.inv(data + np.diag([prior.sound_sd**-2.0 for prior in priors]))
-        centre = spread @ right
-        log_weight = 0.5 * (centre @ right + np.linalg.slogdet(spread)[1])
-        return cls(np.zeros((1, len(right)), dtype=bool), np.array([log_weight]), centre[None], spread[None])
+        spread = np.linalg.inv(data + np.diag([prior.nominal_sd**-2.0 for prior in priors]))
+        centre = spread @ rhs
+        log_weight = 0.5 * (centre @ rhs + np.linalg.slogdet(spread)[1])
+        return cls(np.zeros((1, len(rhs)), dtype=bool), np.array([log_weight]), centre[None], spread[None])
 
     def one_fault_more(self, change: np.ndarray, log_odds: np.ndarray) -> _Ways:
         """Return the likeliest that add a fault (`_faults`) to one of these, by rank-one updates (Sherman-Morrison)."""

@@ -58,13 +58,13 @@ def log_evidence(slope: Slope, model: GaussNewton, gaussian: GaussianPrior) -> f
         model: the quadratic there, under the Gaussian.
         gaussian: replaces the priors of the instruments.
     """
-    cost, right = slope.under(gaussian)
-    step = model.step(right)
+    cost, rhs = slope.under(gaussian)
+    step = model.step(rhs)
     mean, covariance = model.of_instruments(slope.point, step)
     after = np.linalg.inv(covariance)
     data, pulled = after - gaussian.precision, after @ mean - gaussian.pull
     # lowest cost of all else, with the instruments as at the optimum
-    lowest = cost - 0.5 * float(right @ step) - gaussian.cost(mean)
+    lowest = cost - 0.5 * float(rhs @ step) - gaussian.cost(mean)
     at_none = lowest - 0.5 * float(mean @ data @ mean) + float(pulled @ mean)
     return log_chance(model.problem.layout.error_priors, data, pulled) - at_none
 

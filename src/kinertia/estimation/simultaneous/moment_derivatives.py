@@ -49,7 +49,7 @@ def moment_derivatives(
     static: np.ndarray,
     reactions: GroundReactions,
     frames: np.ndarray,
-    late_sd_s: float = 0.0,
+    delay_sd_s: float = 0.0,
 ) -> MomentDerivatives:
     """Compute the derivatives of `dynamics.inverse_dynamics` at d frames of trial k.
 
@@ -60,7 +60,7 @@ def moment_derivatives(
         static: the estimate.
         reactions: `GroundLoads.reactions` there.
         frames: (d,) indices.
-        late_sd_s: standard deviation of the delay of the forces, over which derivatives by it are averaged.
+        delay_sd_s: standard deviation of the delay of the forces, over which derivatives by it are averaged.
     """
     skeleton, layout = problem.model.placed(static), problem.layout
     q, qd, qdd = motion
@@ -77,7 +77,7 @@ def moment_derivatives(
     shown = regressor(skeleton.tree, skeleton.gravity_m_s2, *state, np.zeros((len(q), 3)))[:, :, carrying]
     shown = by_body(shown.reshape(len(q), 6, -1), dynamic_jacobian(static[layout[BSP]]))
     add_bodies(*axes, skeleton.support[carrying], shown, by_static)
-    late = late_loads(reactions, problem.trials[k].time[frames], late_sd_s)
+    late = late_loads(reactions, problem.trials[k].time[frames], delay_sd_s)
     loads, by_load = _loads(problem, k, static, reactions, frames, late)
     fast = reactions.impact_at(problem.trials[k].time[frames])
     left = np.zeros((len(late.left), *tau.shape))
@@ -112,5 +112,5 @@ def _loads(
     for by, add in problem.loads.by_errors(k, static, loads, reactions.loaded_at(time), frames):
         for foot, own in enumerate(by_load):
             add(own, by[:, foot])
-    by_load[..., problem.loads.late(k)] = late.slope.transpose(1, 0, 2)[..., None]
+    by_load[..., problem.loads.delay_unknowns(k)] = late.slope.transpose(1, 0, 2)[..., None]
     return np.ascontiguousarray(loads.transpose(1, 0, 2)), by_load

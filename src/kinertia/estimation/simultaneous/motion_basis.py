@@ -64,7 +64,7 @@ class MotionBasis:
                     band[b - a] += np.bincount(self.active[:, a], value[:, a] * value[:, b], self.size)
             rows = np.arange(0, value.size + 1, _ACTIVE)
             every = csr_array((value.ravel(), self.active.ravel(), rows), (len(value), self.size))
-            right = every.T @ filled[:, columns]
+            rhs = every.T @ filled[:, columns]
             band[0] += _RIDGE
-            coefficients[:, columns] = solveh_banded(band, right, lower=True)
+            coefficients[:, columns] = solveh_banded(band, rhs, lower=True)
         return coefficients

@@ -26,8 +26,8 @@ class Gradient:
     The derivatives are by the motion (size, c) and by the static unknowns (S,).
     """
 
-    right: np.ndarray
-    static_right: np.ndarray
+    rhs: np.ndarray
+    static_rhs: np.ndarray
     cost: float
 
     @classmethod
@@ -37,8 +37,8 @@ class Gradient:
 
     def add(self, part: Gradient, splines: slice) -> None:
         """Add the gradient of a time block whose frames involve these splines."""
-        self.right[splines] += part.right
-        self.static_right += part.static_right
+        self.rhs[splines] += part.rhs
+        self.static_rhs += part.static_rhs
         self.cost += part.cost
 
 
@@ -47,7 +47,7 @@ class NormalEquations(Gradient):
     """Gradient with the Gauss-Newton second derivatives: band (size, 7, c, c), border (size, c, S), static (S, S).
 
     Row i of the band has the blocks of splines i and i, i + 1, ... For the motion alone the border has no columns, and
-    only band and `right` count.
+    only band and `rhs` count.
     """
 
     band: np.ndarray
@@ -73,7 +73,7 @@ class NormalEquations(Gradient):
 
     def cleared(self) -> Self:
         """Fill the arrays with zeros, and return the same equations."""
-        for array in (self.right, self.static_right, self.band, self.border, self.static):
+        for array in (self.rhs, self.static_rhs, self.band, self.border, self.static):
             array.fill(0.0)
         self.cost = 0.0
         return self
@@ -108,8 +108,8 @@ class UsedAgain:
 
     def back(self, normal: NormalEquations) -> None:
         """Return normal equations that are no longer needed to the pool."""
-        size, coordinates = normal.right.shape
-        self._free[size, coordinates, len(normal.static_right), normal.bordered].append(normal)
+        size, coordinates = normal.rhs.shape
+        self._free[size, coordinates, len(normal.static_rhs), normal.bordered].append(normal)
 
 
 @compiled

@@ -36,7 +36,7 @@ class SimultaneousResult:
         foot_loads: per trial (n, 2, 6) loads on the feet, corrected for instrument errors, at the motion's bandwidth.
         reactions: per trial the loads for the joint moments, corrected for instrument errors.
         motions: per trial q, qd, qdd at its frames.
-        displacements_m: per trial (m, 3) displacements of its markers from their positions in the segments.
+        marker_offsets_m: per trial (m, 3) displacements of its markers from their positions in the segments.
         curve_deviations: per trial the posterior standard deviations of its curves at its dynamic frames.
         calibration: entries of all quantities that terms calibrate.
         instruments: information of these trials on plates and synchronisation, which can be added to that of others.
@@ -55,7 +55,7 @@ class SimultaneousResult:
     foot_loads: tuple[np.ndarray, ...]
     reactions: tuple[GroundReactions, ...]
     motions: tuple[Motion, ...]
-    displacements_m: tuple[np.ndarray, ...]
+    marker_offsets_m: tuple[np.ndarray, ...]
     curve_deviations: tuple[CurveDeviations, ...]
     calibration: tuple[CalibrationEntry, ...]
     instruments: InstrumentInformation
@@ -68,7 +68,7 @@ class SimultaneousResult:
 
     def of_first(self, count: int) -> SimultaneousResult:
         """Return the result with the first `count` trials only."""
-        names = ("foot_loads", "reactions", "motions", "displacements_m", "curve_deviations")
+        names = ("foot_loads", "reactions", "motions", "marker_offsets_m", "curve_deviations")
         return replace(self, **{name: getattr(self, name)[:count] for name in names})
 
 

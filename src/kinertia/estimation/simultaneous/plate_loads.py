@@ -16,7 +16,7 @@ X, Z, GAIN, FREE_MOMENT, TURN, ZERO_X, ZERO_Z = range(7)
 
 
 @compiled
-def put_right(
+def corrected_loads(
     loads: np.ndarray,
     loaded: np.ndarray,
     carrier: np.ndarray,
@@ -44,7 +44,7 @@ def put_right(
                 _push(axis, middles[plate], turn, push)
                 for k in range(6):
                     own[k] -= loaded[i, foot] * plates[plate, zero] * push[k]
-            _put_right(own, middles[plate], plates[plate], turn, result[i, foot])
+            _correct(own, middles[plate], plates[plate], turn, result[i, foot])
     return result
 
 
@@ -57,7 +57,7 @@ def by_plate(
     middles: np.ndarray,
     turn: np.ndarray,
 ) -> np.ndarray:
-    """Compute the derivatives (n, 2, 6, p, 7) of the output of `put_right` by the plates' errors.
+    """Compute the derivatives (n, 2, 6, p, 7) of the output of `corrected_loads` by the plates' errors.
 
     The arguments are the same, except that `loads` (n, 2, 6) are corrected.
     """
@@ -68,7 +68,7 @@ def by_plate(
     for plate in range(len(plates)):
         for k, axis in enumerate((0, 2)):
             _push(axis, middles[plate], turn, push)
-            _put_right(push, middles[plate], plates[plate], turn, pushed[plate, k])
+            _correct(push, middles[plate], plates[plate], turn, pushed[plate, k])
     place = np.empty(3)
     for i in range(n):
         for foot in range(feet):
@@ -97,7 +97,7 @@ def _push(axis: int, middle: np.ndarray, turn: np.ndarray, out: np.ndarray) -> N
 
 
 @part
-def _put_right(load: np.ndarray, middle: np.ndarray, wrong: np.ndarray, turn: np.ndarray, out: np.ndarray) -> None:
+def _correct(load: np.ndarray, middle: np.ndarray, wrong: np.ndarray, turn: np.ndarray, out: np.ndarray) -> None:
     """Write the plate load (6,), corrected for all errors except zero offsets, into `out`."""
     x, y, z = middle[0], middle[1], middle[2]
     fx, fy, fz = load[0], load[1], load[2]

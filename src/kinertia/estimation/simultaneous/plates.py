@@ -118,9 +118,11 @@ class FootPlates:
         """
         return plate_loads.by_plate(*self._as_compiled(loads, loaded, carrier, plates))
 
-    def put_right(self, loads: np.ndarray, loaded: np.ndarray, carrier: np.ndarray, plates: np.ndarray) -> np.ndarray:
+    def corrected_loads(
+        self, loads: np.ndarray, loaded: np.ndarray, carrier: np.ndarray, plates: np.ndarray
+    ) -> np.ndarray:
         """Correct loads (k, 2, 6) on plates (k, 2) with errors (p, 7), with zero offsets where `loaded` (k, 2)."""
-        return plate_loads.put_right(*self._as_compiled(loads, loaded, carrier, plates))
+        return plate_loads.corrected_loads(*self._as_compiled(loads, loaded, carrier, plates))
 
     def _as_compiled(self, *arrays: np.ndarray) -> tuple[np.ndarray, ...]:
         """Return the arguments of `plate_loads`: these, the middles and the rotation, all contiguous."""

@@ -56,7 +56,7 @@ class TrialDraws:
         plate_gain: (p,) the estimated gains.
         middles: (p, 3) m, about which plates are rotated.
         turn: (3, 3) from the laboratory's axes to the trial's.
-        late_s: (n,) additional delay of the forces, s.
+        delay_s: (n,) additional delay of the forces, s.
         impact: (n,) share of the impact transients (`GroundReactions.impact`) that is added.
     """
 
@@ -66,7 +66,7 @@ class TrialDraws:
     plate_gain: np.ndarray
     middles: np.ndarray
     turn: np.ndarray
-    late_s: np.ndarray
+    delay_s: np.ndarray
     impact: np.ndarray
 
 
@@ -215,9 +215,9 @@ class _Steps:
         The first in the order of elimination, it is `after` of the part eliminated before.
         """
         follow = -(part.border @ self.static.astype(part.border.dtype)).astype(float)
-        right = np.concatenate([follow, self.random.standard_normal(follow.shape)], axis=2)
-        blocks = part.band.backward(np.ascontiguousarray(right), after, in_place=True)
-        flat = part.in_order(blocks).reshape(-1, right.shape[2]).T
+        rhs = np.concatenate([follow, self.random.standard_normal(follow.shape)], axis=2)
+        blocks = part.band.backward(np.ascontiguousarray(rhs), after, in_place=True)
+        flat = part.in_order(blocks).reshape(-1, rhs.shape[2]).T
         count, _, c = self.into.shape
         own = self.into[:, part.splines]
         own[:] = flat.reshape(count, -1, c)[:, : own.shape[1]]
@@ -299,6 +299,6 @@ def _trial_draws(
         plates[:, GAIN],
         ground.middles,
         ground.turn,
-        np.array([loads.late_s(k, each) for each in static]) - loads.late_s(k, estimate),
+        np.array([loads.delay_s(k, each) for each in static]) - loads.delay_s(k, estimate),
         random.standard_normal(len(static)),
     )

@@ -88,11 +88,11 @@ class MapProblem:
             term.shorten(step[before : before + self.layout.size])
         return step
 
-    def bends(self, right: np.ndarray) -> np.ndarray:
+    def bends(self, rhs: np.ndarray) -> np.ndarray:
         """Return what Gauss-Newton leaves out of the information's diagonal (S,), from the right-hand side (S,)."""
         result = np.zeros(self.layout.size)
         for term in self.terms:
-            term.add_bends(result, right)
+            term.add_bends(result, rhs)
         return result
 
     def prior_information(self, static: np.ndarray) -> np.ndarray:
@@ -105,11 +105,11 @@ class MapProblem:
     def prior_slope(self, static: np.ndarray) -> tuple[np.ndarray, float]:
         """Return minus the derivatives (S,) of half the sum of squares of the same priors, and that half."""
         away, weight = static - self.layout.start, self.layout.weight
-        right = -weight * away
+        rhs = -weight * away
         cost = float(np.sum(weight * np.square(away)))
         for term in self.terms:
-            cost += term.add_pull(right, static)
-        return right, 0.5 * cost
+            cost += term.add_pull(rhs, static)
+        return rhs, 0.5 * cost
 
     def left_out(self, static: np.ndarray) -> np.ndarray:
         """Return the displacements (S, u) of the unknowns by unknowns of unit SD that are left out of the vector."""
@@ -138,16 +138,16 @@ class MapProblem:
 
     def _slope(self, point: Point, gradients: Sequence[Gradient]) -> Slope:
         """Add the priors to the trials' gradients."""
-        right, cost = self.prior_slope(point.static)
+        rhs, cost = self.prior_slope(point.static)
         rows, motions, displaced = zip(gradients, self.displaced_sd, point.displaced, strict=True), [], []
         for gradient, sd, own in rows:
-            right = right + gradient.static_right
+            rhs = rhs + gradient.static_rhs
             cost += gradient.cost + 0.5 * float(own @ own)
-            motions.append(gradient.right)
-            displaced.append(sd * gradient.static_right[self.layout.displaced] - own)
+            motions.append(gradient.rhs)
+            displaced.append(sd * gradient.static_rhs[self.layout.displaced] - own)
         before, places = sum(motion.size for motion in motions), self.layout.errors
         errors = slice(before + places.start, before + places.stop)
-        return Slope(point, cost, Point(tuple(motions), right, tuple(displaced)).vector, errors)
+        return Slope(point, cost, Point(tuple(motions), rhs, tuple(displaced)).vector, errors)
 
     def in_trial(self, k: int, point: Point) -> np.ndarray:
         """Return the static unknowns (S,) as they are in trial k, with its displacements."""

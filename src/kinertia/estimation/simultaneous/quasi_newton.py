@@ -27,7 +27,7 @@ class SecantPairs:
         changes: (k, n).
 
     >>> pairs = SecantPairs.none(2).with_pair(np.array([1.0, 0.0]), np.array([2.0, 0.0]), expected=1.0)
-    >>> pairs.step(np.array([4.0, 3.0]), lambda right: right)
+    >>> pairs.step(np.array([4.0, 3.0]), lambda rhs: rhs)
     array([2., 3.])
     """
 
@@ -53,9 +53,9 @@ class SecantPairs:
         changes[:, places] += self.steps[:, places] @ more
         return SecantPairs(self.steps, changes)
 
-    def step(self, right: np.ndarray, known: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+    def step(self, rhs: np.ndarray, known: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
         """Compute the step (n,) for a right-hand side, given `known`, which computes it without these pairs."""
-        left, shares = right.copy(), np.zeros(len(self.steps))
+        left, shares = rhs.copy(), np.zeros(len(self.steps))
         inverse = 1.0 / np.einsum("kn,kn->k", self.steps, self.changes)
         for k in range(len(shares) - 1, -1, -1):
             shares[k] = inverse[k] * (self.steps[k] @ left)

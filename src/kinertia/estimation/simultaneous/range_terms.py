@@ -94,7 +94,7 @@ def add_ranges(into: Gradient, basis: MotionBasis, stretch: Stretch, bounds: Bou
     at = basis.first[stretch.frames][paying] - stretch.splines.start
     columns = np.arange(q.shape[1])
     for i in range(values.shape[1]):
-        np.add.at(into.right, at + i, values[:, i, None] * terms.pull[paying])
+        np.add.at(into.rhs, at + i, values[:, i, None] * terms.pull[paying])
         if isinstance(into, NormalEquations):
             for j in range(i, values.shape[1]):
                 square = (values[:, i] * values[:, j])[:, None] * terms.curvature[paying]

@@ -39,16 +39,16 @@ def add_root_gradient(
     sd: np.ndarray,
     columns: Columns,
     basis: tuple[np.ndarray, np.ndarray],
-    right: np.ndarray,
-    static_right: np.ndarray,
+    rhs: np.ndarray,
+    static_rhs: np.ndarray,
 ) -> tuple[float, np.ndarray, np.ndarray]:
     """Add minus the gradient of half the sum of squares by the motion (size, c) and by static coordinates (S,).
 
     Args:
         tree, gravity_m_s2, bodies, motion, bends, root, wrench, sd, columns: as in `root_columns`.
-        basis: (n,) the first active spline of each frame among those of `right`, and (3, n, 6) values of the active
+        basis: (n,) the first active spline of each frame among those of `rhs`, and (3, n, 6) values of the active
             ones and their first two derivatives.
-        right, static_right: arrays to which it is added.
+        rhs, static_rhs: arrays to which it is added.
 
     Returns:
         Half the sum of squares; its derivatives by the parameters of each segment's body (b, 10); and minus those by
@@ -79,7 +79,7 @@ def add_root_gradient(
             cost += 0.5 * left[r] * pull[r]
         by_ground[k] = pull
         _at_origin(by_ground[k], about[k])
-        _moving_centre(left, pull, slides, first[k], values[0, k], right)
+        _moving_centre(left, pull, slides, first[k], values[0, k], rhs)
         _by_bodies(tree, frame, rotation, translation, by_ground[k], columns.segments, by_bodies)
         for j in range(count):
             _by_axis(frame, by_ground, k, j, by)
@@ -89,11 +89,11 @@ def add_root_gradient(
                 by[1] = rate * bend[0] + acceleration * 2.0 * bend[1]
                 by[2] = acceleration * bend[0]
             if columns.still[j] >= 0:
-                static_right[columns.still[j]] -= by[0]
+                static_rhs[columns.still[j]] -= by[0]
             if columns.moving[j] >= 0:
                 for i in range(6):
                     along = values[0, k, i] * by[0] + values[1, k, i] * by[1] + values[2, k, i] * by[2]
-                    right[first[k] + i, columns.moving[j]] -= along
+                    rhs[first[k] + i, columns.moving[j]] -= along
     return cost, by_bodies, by_ground
 
 
@@ -108,7 +108,7 @@ def _at_origin(pull: np.ndarray, about: np.ndarray) -> None:
 
 @part
 def _moving_centre(
-    left: np.ndarray, pull: np.ndarray, slides: np.ndarray, first: int, values: np.ndarray, right: np.ndarray
+    left: np.ndarray, pull: np.ndarray, slides: np.ndarray, first: int, values: np.ndarray, rhs: np.ndarray
 ) -> None:
     """Add the change of the moment because its centre moves with the first three coordinates."""
     for c in range(3):
@@ -116,7 +116,7 @@ def _moving_centre(
         by = (y * left[2] - z * left[1]) * pull[3]
         by += (z * left[0] - x * left[2]) * pull[4] + (x * left[1] - y * left[0]) * pull[5]
         for i in range(6):
-            right[first + i, c] += values[i] * by
+            rhs[first + i, c] += values[i] * by
 
 
 @part

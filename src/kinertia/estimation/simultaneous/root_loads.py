@@ -44,7 +44,7 @@ class RootLoads(CostTerm):
             wrench=wrench,
             by_errors=by_errors,
             by_single=here.loads.on_feet(k, static, 1, frames).sum(axis=1)[..., None],
-            at=(here.loads.late(k),),
+            at=(here.loads.delay_unknowns(k),),
             sd=self.given.trials[k].root_sd(frames),
             frames=frames,
             static=self.layout.in_root.stop,

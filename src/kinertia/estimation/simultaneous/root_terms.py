@@ -121,18 +121,18 @@ class RootFrames:
         """
         of_basis = basis.first[self.frames] - start, np.ascontiguousarray(basis.values[:, self.frames])
         cost, by_bodies, pulls = add_root_gradient(
-            *self._moving, self.wrench, self.sd, columns, of_basis, into.right, into.static_right
+            *self._moving, self.wrench, self.sd, columns, of_basis, into.rhs, into.static_rhs
         )
         into.cost += cost
-        into.static_right[: self.theta.size] -= np.einsum("bi,bij->bj", by_bodies, dynamic_jacobian(self.theta)).ravel()
+        into.static_rhs[: self.theta.size] -= np.einsum("bi,bij->bj", by_bodies, dynamic_jacobian(self.theta)).ravel()
         by_static = np.zeros((1, 1, self.static))
         for by, add in self.by_errors:
             add(by_static, np.einsum("nr,nr...->...", pulls, by)[None, None])
         for places, pull in zip(self.at, np.einsum("nr,nre->e", pulls, self.by_single), strict=True):
             by_static[:, :, places] += pull
-        into.static_right[: self.static] += by_static[0, 0]
+        into.static_rhs[: self.static] += by_static[0, 0]
         for one in self.of_segments:
-            into.static_right[one.place] -= by_bodies[one.row] @ one.parameters
+            into.static_rhs[one.place] -= by_bodies[one.row] @ one.parameters
 
     @property
     def _moving(self) -> _Moving:
@@ -176,14 +176,14 @@ def add_root(into: NormalEquations, columns: slice, basis: MotionBasis, start: i
     left, knots = root.left, basis.first[root.frames]
     (_, _, c), wide = root.q.shape, root.static.shape[2]
     flat = root.static.reshape(-1, wide)
-    into.static_right[columns] -= flat.T @ left.ravel()
+    into.static_rhs[columns] -= flat.T @ left.ravel()
     into.cost += 0.5 * float(np.square(left).sum())
     intervals, begins = np.unique(knots, return_index=True)
     values = np.ascontiguousarray(basis.values[:, root.frames])
     pulls = [(left[:, None] @ by)[:, 0] for by in (root.q, root.qd, root.qdd)]
     for i in range(6):
         each = sum(value[:, i, None] * pull for value, pull in zip(values, pulls, strict=True))
-        into.right[intervals - start + i] -= np.add.reduceat(each, begins, axis=0)
+        into.rhs[intervals - start + i] -= np.add.reduceat(each, begins, axis=0)
     if into.bordered:
         into.static[columns, columns] += flat.T @ flat
     rows = by_splines(values, root.q, root.qd, root.qdd)

@@ -27,9 +27,9 @@ class Skin(CostTerm):
         at = self.layout[SKIN]
         into[at, at] += self._information
 
-    def add_pull(self, right: np.ndarray, static: np.ndarray) -> float:
+    def add_pull(self, rhs: np.ndarray, static: np.ndarray) -> float:
         """Add the right-hand side of the coefficients' prior, and return its sum of squares."""
         own = static[self.layout[SKIN]]
         pull = self._information @ own
-        right[self.layout[SKIN]] -= pull
+        rhs[self.layout[SKIN]] -= pull
         return float(own @ pull)

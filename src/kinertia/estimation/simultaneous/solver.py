@@ -147,7 +147,7 @@ def _searched(problem: MapProblem, progress: Callable[[float], None]) -> Ended:
         damping = _LEAST_DAMPING if last else damping
         here = problem.at(at.slope.point, damping)
         scale = np.maximum(scale, np.diag(here.information) + sum(trial.static_diagonal for trial in here.trials))
-        static = here.point.like(here.slope.right).static
+        static = here.point.like(here.slope.rhs).static
         model = GaussNewton.of(problem, here, damping * scale + problem.bends(static))
         progress(iterations / (iterations + max(_USUAL_ITERATIONS - iterations, _LEFT_ITERATIONS)))
         if last:
@@ -193,8 +193,8 @@ class _Judged(NamedTuple):
         if np.isfinite(away).all() and away @ information @ away < alike:
             return self
         gaussian = self.gaussian.updated(priors, mean, covariance)
-        right = information @ mean - self.gaussian.pull + gaussian.pull
-        return _Judged(gaussian, np.linalg.solve(information - self.gaussian.precision + gaussian.precision, right))
+        rhs = information @ mean - self.gaussian.pull + gaussian.pull
+        return _Judged(gaussian, np.linalg.solve(information - self.gaussian.precision + gaussian.precision, rhs))
 
 
 class _Place(NamedTuple):
@@ -215,7 +215,7 @@ def _continued(problem: MapProblem, point: Point, judged: _Judged) -> Point:
     at = _Place(problem.slope(point), judged)
     for _ in range(_MOST_CONTINUED):
         here = problem.at(at.slope.point, _LEAST_DAMPING)
-        model = GaussNewton.of(problem, here, problem.bends(here.point.like(here.slope.right).static))
+        model = GaussNewton.of(problem, here, problem.bends(here.point.like(here.slope.rhs).static))
         at = _descended(problem, model, at._replace(slope=here.slope), False, _CONTINUED)
         if at.converged:
             break
@@ -233,7 +233,7 @@ def _descended(
 ) -> _Place:
     """Take quasi-Newton steps with one quadratic, as long as they are worthwhile."""
     slope, judged = at.slope, at.judged
-    pairs, places, began = SecantPairs.none(len(slope.right)), slope.instruments, np.inf
+    pairs, places, began = SecantPairs.none(len(slope.rhs)), slope.instruments, np.inf
     for count in range(_MOST_GRADIENTS):
         step, promised = _answer(slope, model, pairs, judged)
         if judging and isinstance(model, GaussNewton):
@@ -251,7 +251,7 @@ def _descended(
         if there is None:
             break
         taken = there.point.vector - slope.point.vector
-        change = slope.right - there.right
+        change = slope.rhs - there.rhs
         change[places] += judged.gaussian.precision @ taken[places]
         expected = 2.0 * promised * float(taken @ step) / float(step @ step)
         slope, pairs = there, pairs.with_pair(taken, change, expected)
@@ -262,9 +262,9 @@ def _answer(
     slope: Slope, model: GaussNewton | MotionAlone, pairs: SecantPairs, judged: _Judged
 ) -> tuple[np.ndarray, float]:
     """Return the step of all unknowns, and its predicted decrease of the cost."""
-    right = slope.under(judged.gaussian)[1]
-    step = pairs.step(right, model.under(judged.gaussian).step)
-    return step, 0.5 * float(right @ step)
+    rhs = slope.under(judged.gaussian)[1]
+    step = pairs.step(rhs, model.under(judged.gaussian).step)
+    return step, 0.5 * float(rhs @ step)
 
 
 def _judged_again(
@@ -282,7 +282,7 @@ def _moved(problem: MapProblem, slope: Slope, step: np.ndarray) -> Slope:
 
 def _last_step(problem: MapProblem, model: GaussNewton, at: _Place) -> _Place:
     """Take a step with the last quadratic, if the search has converged and the step is short."""
-    slope, judged, pairs = model.here.slope, at.judged, SecantPairs.none(len(model.here.slope.right))
+    slope, judged, pairs = model.here.slope, at.judged, SecantPairs.none(len(model.here.slope.rhs))
     if not at.converged:
         return _Place(slope, judged)
     step, _ = _answer(slope, model, pairs, judged)

@@ -37,9 +37,9 @@ def add_start(into: Gradient, stretch: Stretch, moved: np.ndarray) -> None:
     own, following = moved[stretch.splines], moved[stretch.splines.start + 1 : stretch.splines.stop + 1]
     count, pairs = len(own), min(len(following), stretch.size - 1)
     change = following[:pairs] - own[:pairs]
-    into.right[:count] -= own / AWAY_SD**2
-    into.right[:pairs] += change / CHANGE_SD**2
-    into.right[1 : pairs + 1] -= change / CHANGE_SD**2
+    into.rhs[:count] -= own / AWAY_SD**2
+    into.rhs[:pairs] += change / CHANGE_SD**2
+    into.rhs[1 : pairs + 1] -= change / CHANGE_SD**2
     into.cost += 0.5 * float(np.square(own / AWAY_SD).sum() + np.square(change / CHANGE_SD).sum())
     if isinstance(into, NormalEquations):
         each = np.arange(moved.shape[1])

@@ -51,17 +51,17 @@ class StaticInformation:
         across = solve_triangular(factor, information[n:, :n], lower=True)
         return cls(information[:n, :n] - across.T @ across, factor, across)
 
-    def first_of(self, right: np.ndarray) -> np.ndarray:
+    def first_of(self, rhs: np.ndarray) -> np.ndarray:
         """Reduce the right-hand side (S,) of normal equations to the first n unknowns (n,)."""
         n = len(self.first)
-        result: np.ndarray = right[:n] - self.across.T @ solve_triangular(self.factor, right[n:], lower=True)
+        result: np.ndarray = rhs[:n] - self.across.T @ solve_triangular(self.factor, rhs[n:], lower=True)
         return result
 
-    def solution(self, right: np.ndarray) -> np.ndarray:
+    def solution(self, rhs: np.ndarray) -> np.ndarray:
         """Solve the normal equations for a right-hand side (S,); returns all unknowns (S,)."""
         n = len(self.first)
-        first = np.linalg.solve(self.first, self.first_of(right))
-        last = solve_triangular(self.factor, right[n:], lower=True) - self.across @ first
+        first = np.linalg.solve(self.first, self.first_of(rhs))
+        last = solve_triangular(self.factor, rhs[n:], lower=True) - self.across @ first
         return np.concatenate([first, solve_triangular(self.factor, last, lower=True, trans="T")])
 
     def root_of_covariance(self) -> np.ndarray:

@@ -21,12 +21,12 @@ from kinertia.estimation.simultaneous.calibration_entry import BENDING, Calibrat
 from kinertia.estimation.simultaneous.cost_term import CostTerm, Solution
 from kinertia.estimation.simultaneous.inputs import FreedModel, Given
 from kinertia.estimation.simultaneous.layout import Unknowns
-from kinertia.estimation.simultaneous.mixture_prior import ErrorPriors, SoundOrFaulty
+from kinertia.estimation.simultaneous.mixture_prior import ErrorPriors, FaultMixture
 from kinertia.estimation.simultaneous.root_terms import OfSegment, RootFrames
 from kinertia.model.anatomy import segment_of
 from kinertia.model.bsp import BodySegmentParameters
 
-BENDING_PRIOR_M = SoundOrFaulty(0.001, 0.02, 0.1)
+BENDING_PRIOR_M = FaultMixture(0.001, 0.02, 0.1)
 """Prior of kappa over the body's mass: a trunk that is rigid, and one that bends. Under a prior of 0.015 m, a person of
 63 kg had 0.4 to 0.8 kg m in walks, 1.0 swaying, 1.4 to 2.3 in jumps and 2.5 in squats: 0.006 to 0.04 m. Walks hardly
 determine it, and if it is zero, a wide prior makes the trunk's centre of mass less certain: so it needs evidence."""
@@ -67,10 +67,10 @@ class BendingTrunk:
         return cls(row, parameters, mass_kg)
 
     @property
-    def prior(self) -> SoundOrFaulty:
+    def prior(self) -> FaultMixture:
         """Prior of kappa, kg m."""
         known = BENDING_PRIOR_M
-        return SoundOrFaulty(self.mass_kg * known.sound_sd, self.mass_kg * known.faulty_sd, known.faulty_share)
+        return FaultMixture(self.mass_kg * known.nominal_sd, self.mass_kg * known.faulty_sd, known.fault_probability)
 
     def bent(self, bsp: BodySegmentParameters, kappa: float) -> BodySegmentParameters:
         """Return parameters with the effect of a bending trunk on motion; they need not be physically possible."""
