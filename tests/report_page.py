@@ -8,6 +8,9 @@ from html.parser import HTMLParser
 
 import numpy as np
 
+TRACE_TYPES = ("bar", "scatter", "scatter3d")
+"""Types of traces that figures have; the last one in notebooks only."""
+
 
 class Elements(HTMLParser):
     """Tags with their attributes, and the text outside of scripts and styles."""

@@ -20,7 +20,7 @@ from kinertia.estimation.simultaneous.instruments import InstrumentPrior
 from kinertia.estimation.simultaneous.marker_errors import ErrorProcess
 from kinertia.estimation.simultaneous.mixture_prior import FaultMixture
 from kinertia.estimation.simultaneous.observed_trial import CalibrationPrior, Observation
-from kinertia.estimation.simultaneous.plates import PLATE_UNKNOWNS, FootPlates
+from kinertia.estimation.simultaneous.plates import PLATE_UNKNOWNS, FootPlates, plate_middles
 from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.estimation.simultaneous.skin import SkinPatterns
 from kinertia.estimation.simultaneous.start_terms import AWAY_SD, CHANGE_SD
@@ -29,8 +29,9 @@ from kinertia.model.anatomy import segment_of
 from kinertia.model.gait27 import HIP_OFFSETS
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.ground_reactions import GroundReactions
-from kinertia.motion.smoothing import smooth
+from kinertia.motion.smoothing import SmoothedSpline, smooth
 from kinertia.synthetic.walk import SyntheticTrial, walk, walking_subject
+from kinertia.trial.data import FootLoads
 from osim_text import CUSTOM_ROOT, FREE, LINEAR, ZERO, joint, model, transform
 from pinocchio_model import axis_forces, pin, pinocchio_model
 
@@ -46,6 +47,16 @@ SWITCH_S = 0.1
 NOISE_N = 0.7
 """Of the plates, in the forces for joint moments."""
 LOCKED = (*HIP_OFFSETS[:3], "knee_tilt_1_l", "knee_tilt_2_l")
+
+
+def one_plate_per_foot(loads: SmoothedSpline, n_frames: int) -> FootPlates:
+    """A plate under each foot, recorded in the trial's axes; nothing is faster than the smoothed loads."""
+    wrench = loads(loads.time).reshape(-1, 2, 6)
+    on = [np.tile([0, 1], (count, 1)) for count in (len(wrench), n_frames)]
+    reactions = GroundReactions(loads.time, wrench, on[0], np.zeros_like(wrench), None)
+    middles = plate_middles(FootLoads(loads.time, wrench[..., :3], wrench[..., 3:]), np.arange(2))
+    loaded = smooth(loads.time, reactions.loaded, float(np.median(loads.cutoff_hz)))
+    return FootPlates(loads, loaded, reactions, ("right foot", "left foot"), on[1], np.eye(3), middles)
 
 
 def small_trial() -> SyntheticTrial:
@@ -130,7 +141,7 @@ def curved_problem(path: Path) -> MapProblem:
         q=motion.q,
         spacing_s=0.1,
         dynamic=np.arange(13) > 1,
-        ground=FootPlates.one_per_foot(smooth(time, rng.normal(upward, 50.0, (13, 12)), 15.0), 13),
+        ground=one_plate_per_foot(smooth(time, rng.normal(upward, 50.0, (13, 12)), 15.0), 13),
         force_sd=6.0,
         moment_sd=2.0,
         skin=small_skin(skeleton, 13),

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
-from threadpoolctl import threadpool_limits
 
+from kinertia.studies.parallel import in_parallel
 from validation.accuracy_study import SCENARIOS, run_accuracy
 from validation.accuracy_tables import JOINT_CAPTION, accuracy_markdown, moments_markdown
 from validation.calibration_errors import DISTURBANCES, Calibrated, calibrated, calibration_section
@@ -133,11 +130,6 @@ smooth synthetic walk, which has no impacts.
 """
 
 
-def _in_parallel(task: Callable[[Any], Any], cases: Sequence[Any]) -> list[Any]:
-    with ProcessPoolExecutor(2, mp_context=get_context("spawn"), initializer=threadpool_limits, initargs=(1,)) as pool:
-        return list(pool.map(task, cases))
-
-
 def _calibrated(case: tuple[str, int]) -> Calibrated:
     return calibrated(DISTURBANCES[case[0]], case[1])
 
@@ -159,10 +151,10 @@ def main(
     laboratories = run_accuracy(SCENARIOS, people, seed, workers)
     sections |= {"error_bars": accuracy_markdown(laboratories), "moments": moments_markdown(laboratories)}
     seeds = range(5)
-    outcomes = _in_parallel(_calibrated, [(name, seed) for name in DISTURBANCES for seed in seeds])
+    outcomes = in_parallel(_calibrated, [(name, seed) for name in DISTURBANCES for seed in seeds], workers)
     by_name = {name: outcomes[i * len(seeds) : (i + 1) * len(seeds)] for i, name in enumerate(DISTURBANCES)}
     sections["calibration"] = calibration_section(by_name)
-    draws = _in_parallel(study_draw, range(20))
+    draws = in_parallel(study_draw, range(20), workers)
     sections |= {"study": study_section(draws, bound_rows(len(draws))), "draws": str(len(draws))}
     try:
         data_folder()

@@ -18,7 +18,7 @@ from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.simultaneous.fisher_information import Information
 from kinertia.estimation.simultaneous.observed_trial import Observation
 from kinertia.estimation.simultaneous.problem import MapProblem
-from kinertia.model.joint_names import JOINTS
+from kinertia.report.truth_comparison import JOINTS
 from kinertia.studies.drawn_people import Scenario, estimate_person
 from kinertia.studies.parallel import in_parallel
 from kinertia.synthetic.faults import Faults

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from kinertia.findings.display import filled, names_in
+from kinertia.findings.display import filled
 from kinertia.findings.rule import all_rules
 from kinertia.findings.where import Where
+from template_names import names_in
 
 ROOT = Path(__file__).parents[2]
 RULES = all_rules()

@@ -2,7 +2,7 @@
 
 import pytest
 
-from kinertia.findings.display import axis_text, filled, first_few, names_in, outlined, shown
+from kinertia.findings.display import axis_text, filled, first_few, outlined, shown
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 
@@ -92,4 +92,3 @@ def test_long_lists_are_cut():
 def test_a_template_without_evidence_is_readable():
     assert outlined("{level_n} {error_nm_n:+} {mass_by_force_kg} {plate}") == "<level> <error> <mass by force> <plate>"
     assert outlined("{share:%}", "*{}*") == "*share*"
-    assert names_in("{level_n:+} along {axis}") == ("level_n", "axis")

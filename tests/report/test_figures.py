@@ -18,7 +18,6 @@ from kinertia.report.figure import Figure, compact
 from kinertia.report.marker_figures import fit_gap_figure, marker_figure, rms_by_marker
 from kinertia.report.page import render
 from kinertia.report.panels import Panel, small_multiples
-from kinertia.report.plotly_script import TRACE_TYPES
 from kinertia.report.plots import as_plotly
 from kinertia.report.style import BLUE, between
 from kinertia.report.time_figures import (
@@ -32,7 +31,7 @@ from kinertia.report.time_figures import (
 from kinertia.report.wording import LITERATURE
 from kinertia.trial.data import FootLoads, Markers, Trial
 from kinertia.trial.gait_events import gait_events
-from report_page import figures_of, numbers
+from report_page import TRACE_TYPES, figures_of, numbers
 
 
 @pytest.mark.parametrize("which", ["fit", "two_level"])

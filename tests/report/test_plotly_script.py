@@ -9,8 +9,9 @@ import pytest
 
 from kinertia.report import plotly_script
 from kinertia.report.figure import Figure
-from kinertia.report.plotly_script import TRACE_TYPES, packed_script, script_path
+from kinertia.report.plotly_script import packed_script, script_path
 from kinertia.report.result_page import Part, render_parts
+from report_page import TRACE_TYPES
 
 
 @pytest.fixture

@@ -95,11 +95,6 @@ def outlined(template: str, mark: str = "<{}>") -> str:
     return _FIELD.sub(lambda field: mark.format(_UNIT_SUFFIX.sub("", field.group(1)).replace("_", " ")), template)
 
 
-def names_in(template: str) -> tuple[str, ...]:
-    """Return the evidence and places that a sentence of the catalogue refers to, in order."""
-    return tuple(field.group(1) for field in _FIELD.finditer(template))
-
-
 def _places(where: Where) -> dict[str, Callable[[], str]]:
     span = where.span_s or (float("nan"), float("nan"))
     return {

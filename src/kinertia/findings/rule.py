@@ -11,7 +11,6 @@ from typing import Any
 
 FAMILIES = ("F", "M", "L", "P", "T", "S", "O", "R")
 STAGES = ("file", "recording", "person", "kinematics", "estimate", "result")
-OUTPUTS = ("motion", "moments", "masses", "centres_of_mass", "inertias")
 
 
 @dataclass(frozen=True)

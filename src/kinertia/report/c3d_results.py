@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from kinertia.errors import FileError
+from kinertia.estimation.drawn_fit import drawn_fit
 from kinertia.estimation.result import Fit, TrialFit
 from kinertia.io.c3d_event_writer import EventToWrite
 from kinertia.io.c3d_outputs import C3dFrames, OutputPoint, frames_of, too_many, with_outputs
@@ -21,8 +22,7 @@ from kinertia.io.trial_files import trial_file
 from kinertia.model.bsp import PARAMETERS
 from kinertia.motion.gait_cycle import found_events
 from kinertia.motion.joint_wrench import leg_joints
-from kinertia.motion.model_outputs import CONVENTIONS, UNITS, Convention, ModelOutput, model_outputs
-from kinertia.report.drawn_departures import departures
+from kinertia.motion.model_outputs import CONVENTIONS, UNITS, Convention, Departures, ModelOutput, model_outputs
 from kinertia.report.saved_fit import SavedFit
 from kinertia.report.stride_measures import stride_measures
 from kinertia.trial.data import Recording
@@ -30,6 +30,8 @@ from kinertia.trial.data import Recording
 SUFFIX = "Kinertia"
 """Ends all labels where the file has outputs of the same names already."""
 SD = "SD"
+_MOST_DRAWS = 100
+"""A correlation is known to 0.1 or better from so many."""
 NO_DEVIATION = -1.0
 """Value on axes without an SD, where a point has others: readers take a point with any NaN for missing."""
 _PLUG_IN_GAIT = ({"LASI", "RASI", "LTHI", "RTHI", "LTIB", "RTIB"}, {"LASI", "RASI", "LTHI", "RTHI", "SACR"})
@@ -73,7 +75,7 @@ def usual_convention(fit: Fit) -> Convention:
 
 def outputs_of(fit: Fit, trial: TrialFit, convention: Convention) -> list[ModelOutput]:
     """Model outputs of the estimate over the trial's measured frames; posterior draws tell how errors go together."""
-    loads, body, drawn = trial.reactions.at(trial.time), fit.estimate, departures(fit, trial)
+    loads, body, drawn = trial.reactions.at(trial.time), fit.estimate, _departures(fit, trial)
     return model_outputs(trial.skeleton, body, trial.motion, loads, fit.mass_kg, convention, trial.deviations, drawn)
 
 
@@ -228,3 +230,21 @@ def _own(
     if files:
         own["FILES"], own["SHA256"] = (list(files), None), (list(files.values()), None)
     return own
+
+
+def _departures(fit: Fit, trial: TrialFit) -> Departures | None:
+    """Of a trial of a fit, at its measured frames; None of a fit that keeps no draws."""
+    if fit.posterior is None or fit.posterior.draws is None:
+        return None
+    k, kept = [one.name for one in fit.trials].index(trial.name), fit.posterior.draws
+    own = replace(kept, trials=(kept.trials[k],))
+    alone = replace(fit, trials=(trial,), posterior=replace(fit.posterior, draws=own))
+    here = _curves(trial)
+    drawn = [_curves(drawn_fit(alone, number).trials[0]) for number in range(min(kept.count, _MOST_DRAWS))]
+    return Departures(*(np.array(each) - at for each, at in zip(zip(*drawn, strict=True), here, strict=True)))
+
+
+def _curves(trial: TrialFit) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Coordinates, moments and powers (w, c)."""
+    moments = trial.joint_loads["estimate"]
+    return trial.motion.q, moments, moments * trial.motion.qd

@@ -15,8 +15,6 @@ from kinertia.errors import FileError
 from kinertia.io.output_folder import write_then_rename
 from kinertia.model.compiled import cache_folder
 
-TRACE_TYPES = ("bar", "scatter", "scatter3d")
-"""Types of traces that figures have; the last one in notebooks only."""
 _BEST = 9
 
 

@@ -10,9 +10,20 @@ import numpy as np
 
 from kinertia.estimation.result import Fit
 from kinertia.model.bsp import BodySegmentParameters
-from kinertia.model.joint_names import JOINTS
 from kinertia.trial.rms import rms
 
+JOINTS = {
+    "hip flexion": ("hip_flexion",),
+    "hip adduction": ("hip_adduction",),
+    "hip rotation": ("hip_rotation",),
+    "knee": ("knee",),
+    "ankle": ("ankle", "subtalar"),
+    "lumbar extension": ("lumbar_extension",),
+    "lumbar bending": ("lumbar_bending",),
+    "lumbar rotation": ("lumbar_rotation",),
+    "arms": ("arm", "elbow"),
+}
+"""Beginnings of the names of each joint's coordinates, left and right."""
 _PARAMETERS = (("mass (kg)", 1.0, 2), ("centre of mass (mm)", 1e3, 0), ("moments of inertia (kg m2)", 1.0, 4))
 
 

@@ -10,12 +10,11 @@ from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.simultaneous.instruments import InstrumentPrior
 from kinertia.estimation.simultaneous.linearised import Point
 from kinertia.estimation.simultaneous.observed_trial import CalibrationPrior, Observation
-from kinertia.estimation.simultaneous.plates import FootPlates
 from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous
 from kinertia.motion.smoothing import smooth
 from kinertia.synthetic.walk import unlike_literature, walk, walking_subject
-from small_problem import point, small_problem
+from small_problem import one_plate_per_foot, point, small_problem
 
 BIAS_NM = 4.0
 
@@ -54,7 +53,7 @@ def observation(trial, bias_nm: float) -> Observation:
         q=trial.motion.q,
         spacing_s=0.05,
         dynamic=np.ones(len(time), dtype=bool),
-        ground=FootPlates.one_per_foot(smooth(time, loads.reshape(len(time), 12), 25.0), len(time)),
+        ground=one_plate_per_foot(smooth(time, loads.reshape(len(time), 12), 25.0), len(time)),
         force_sd=3.0,
         moment_sd=1.0,
     )

@@ -10,11 +10,12 @@ from kinertia.estimation.simultaneous.instruments import InstrumentPrior
 from kinertia.estimation.simultaneous.mixture_prior import FaultMixture
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.observed_trial import CalibrationPrior, Observation
-from kinertia.estimation.simultaneous.plates import FLOOR_UNKNOWNS, FootPlates
+from kinertia.estimation.simultaneous.plates import FLOOR_UNKNOWNS
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.motion.smoothing import smooth
 from kinertia.synthetic.walk import SyntheticTrial, unlike_literature, walk, walking_subject
+from small_problem import one_plate_per_foot
 from validation.calibration_errors import DISTURBANCES, calibrated
 
 SPACING_S = 0.05
@@ -68,7 +69,7 @@ def observation(trial: SyntheticTrial, frames: slice = slice(None), noise_m: flo
         q=trial.motion.q[frames],
         spacing_s=SPACING_S,
         dynamic=np.ones(len(time[frames]), dtype=bool),
-        ground=FootPlates.one_per_foot(smooth(time, loads, 25.0), len(time[frames])),
+        ground=one_plate_per_foot(smooth(time, loads, 25.0), len(time[frames])),
         force_sd=3.0,
         moment_sd=1.0,
     )

@@ -34,7 +34,6 @@ class PlateCheck:
         contacts: in the order of time.
         outside_share: share of reliably loaded samples whose centre of pressure is off the plate; None where the file
             has no corners or nothing is loaded.
-        outside_m: how far off, 95th percentile of those samples; 0 where none is.
     """
 
     name: str
@@ -42,7 +41,6 @@ class PlateCheck:
     peak_n: float
     contacts: tuple[Contact, ...]
     outside_share: float | None
-    outside_m: float
 
     def stood_on(self) -> str:
         """Describe which foot was on the plate when; of many contacts, their number."""
@@ -86,9 +84,9 @@ def _check_plate(recording: Recording, p: int, feet: FootMarkers | None) -> Plat
             for foot, name in enumerate(FEET)
             for contact in _contacts(loads.time, loads.force[:, foot, 1] > 0, name)
         ]
-    share, distance = off_plate(plates, p) or (None, 0.0)
+    share, _ = off_plate(plates, p) or (None, 0.0)
     ordered = tuple(sorted(contacts, key=lambda contact: contact.start_s))
-    return PlateCheck(plates.names[p], plates.declared_feet[p], float(vertical.max()), ordered, share, distance)
+    return PlateCheck(plates.names[p], plates.declared_feet[p], float(vertical.max()), ordered, share)
 
 
 def _contacts(time: FloatArray, loaded: BoolArray, foot: str | None) -> list[Contact]:

@@ -16,7 +16,7 @@ import numpy as np
 
 from kinertia.estimation.simultaneous import plate_loads
 from kinertia.motion.ground_reactions import GroundReactions
-from kinertia.motion.smoothing import SmoothedSpline, smooth
+from kinertia.motion.smoothing import SmoothedSpline
 from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.data import LOAD_THRESHOLD_N, FootLoads
 
@@ -87,19 +87,6 @@ class FootPlates:
     carrier: np.ndarray
     turn: np.ndarray
     middles: np.ndarray
-
-    @classmethod
-    def one_per_foot(cls, loads: SmoothedSpline, n_frames: int) -> FootPlates:
-        """Make ground reactions with a separate plate under each foot, recorded in the trial's axes.
-
-        They contain nothing faster than the smoothed loads.
-        """
-        wrench = loads(loads.time).reshape(-1, 2, 6)
-        on = [np.tile([0, 1], (count, 1)) for count in (len(wrench), n_frames)]
-        reactions = GroundReactions(loads.time, wrench, on[0], np.zeros_like(wrench), None)
-        middles = plate_middles(FootLoads(loads.time, wrench[..., :3], wrench[..., 3:]), np.arange(2))
-        loaded = smooth(loads.time, reactions.loaded, float(np.median(loads.cutoff_hz)))
-        return cls(loads, loaded, reactions, ("right foot", "left foot"), on[1], np.eye(3), middles)
 
     def among(self, plates: Sequence[str]) -> FootPlates:
         """Return the reactions with these plates (a session's), which include its own."""
