@@ -88,6 +88,14 @@ def test_somebody_who_stands_on_a_box_or_in_thick_soles(standing, rise_m):
     assert (found.code, found.severity) == ("M143", Severity.INFO)
 
 
+@pytest.mark.parametrize(("in_motion_m", "severity"), [(0.048, Severity.INFO), (0.052, Severity.WARNING)])
+def test_a_floor_too_low_by_hardly_more_than_soles_is_told_by_the_feet_in_motion(standing, in_motion_m, severity):
+    (far,) = floor(person(risen(standing, 0.06)))
+    lowest_m = far.evidence["height_m"].value - 0.06
+    (found,) = floor(person(risen(standing, 0.055 - lowest_m), risen(standing, in_motion_m - lowest_m)))
+    assert (found.code, found.severity) == ("M143", severity)
+
+
 def test_feet_that_are_not_marked_enough(standing):
     marks = {name: own for name, own in standing.marker_set.landmarks.items() if "heel" not in name}
     assert list(floor(person(replace(standing, marker_set=replace(standing.marker_set, landmarks=marks))))) == []

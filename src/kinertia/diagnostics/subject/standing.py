@@ -12,9 +12,10 @@ from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.quantity import Quantity
 
 _LOWEST_M = (0.008, 0.050)
-"""A marker's own radius is 5 mm and more; soles are under both feet, and markers on the side of a foot are low."""
-_HIGHEST_IN_MOTION_M = 0.058
-"""On top of shoes markers are 53 to 60 mm above the floor while standing, and 44 to 48 mm in motion."""
+"""A marker's own radius is 5 mm and more; soles are under both feet, and markers on the side of a foot are low.
+
+On top of shoes markers are 53 to 60 mm above the floor while standing, but 44 to 48 mm in motion.
+"""
 _USUAL_LOWEST_M = (0.023, 0.044)
 """Usual height of the lowest marker, from fourteen people of eight laboratories, barefoot and in running shoes."""
 _FLAT_M = 0.04
@@ -46,7 +47,7 @@ def floor(context: PersonContext) -> Iterator[Finding]:
     if low <= height_m <= high:
         return
     in_trials = [one for one in (_lowest(trial, _IN_MOTION) for trial in context.trials) if one is not None]
-    shared = all(own_m < low if height_m < low else own_m > _HIGHEST_IN_MOTION_M for _, own_m in in_trials)
+    shared = all(own_m < low if height_m < low else own_m > high for _, own_m in in_trials)
     height = Quantity(height_m, "m", limit=low if height_m < low else high, usual=_USUAL_LOWEST_M)
     found = finding("M143", static.at(markers=(label,)), height_m=height)
     yield found if shared else replace(found, severity=Severity.INFO)
