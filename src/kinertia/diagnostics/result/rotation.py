@@ -44,4 +44,4 @@ def smallest_detectable_rad(shown: InstrumentInformation, prior: InstrumentPrior
     precision = np.array([0.0 if k == place else 1.0 / one.sd**2 for k, one in enumerate(unknowns)])
     information = shown.information + prior.of_session(shown.plates).information + np.diag(precision)
     deviation = float(np.sqrt(np.linalg.inv(information)[place, place]))
-    return unknowns[place].least_told(deviation)
+    return unknowns[place].smallest_detectable(deviation)

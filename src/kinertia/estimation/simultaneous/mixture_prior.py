@@ -57,13 +57,13 @@ class FaultMixture:
         share = self.fault_probability
         return float(np.sqrt((1.0 - share) * self.nominal_sd**2 + share * self.faulty_sd**2))
 
-    def least_told(self, sd: float) -> float:
+    def smallest_detectable(self, sd: float) -> float:
         """Return the smallest error that data with this standard deviation attribute to a fault with odds above one.
 
         It is infinite if there is only one component.
 
         >>> prior = FaultMixture(0.1, 2.0, 0.05)
-        >>> round(prior.least_told(0.3), 2), round(prior.least_told(1.6), 2)
+        >>> round(prior.smallest_detectable(0.3), 2), round(prior.smallest_detectable(1.6), 2)
         (0.99, 5.37)
         """
         if not 0.0 < self.fault_probability < 1.0:
