@@ -12,7 +12,7 @@ from kinertia.estimation.simultaneous.layout import Unknowns
 from kinertia.model.bsp import block_diagonal
 from kinertia.model.log_cholesky import nearest_consistent, table_jacobian, to_log_cholesky
 
-_LEAST_INFORMATION = 0.01
+LEAST_INFORMATION = 0.01
 """Of every parameter, so that none has a standard deviation above ten. Where the data favour a second moment below
 zero, its logarithm falls until neither data nor prior hold it; what is computed from its variance is then noise, and
 its exponential may have any size."""
@@ -45,7 +45,7 @@ class BodySegments(CostTerm):
         jacobian = block_diagonal(table_jacobian(static[theta]))
         mass_row = prior.on_scale @ jacobian[0::10] / prior.mass_sd_kg
         into[theta, theta] += jacobian.T @ self._information @ jacobian + np.outer(mass_row, mass_row)
-        into[theta, theta] += _LEAST_INFORMATION * np.eye(theta.stop - theta.start)
+        into[theta, theta] += LEAST_INFORMATION * np.eye(theta.stop - theta.start)
 
     def add_pull(self, rhs: np.ndarray, static: np.ndarray) -> float:
         """Add the right-hand side of the table's prior and of the scale's total mass; return their sum of squares."""
