@@ -4,7 +4,7 @@ import pytest
 from generic_static import generic_model, smooth_motion
 from kinertia.errors import TrialError
 from kinertia.estimation import calibration
-from kinertia.estimation.calibration import first_poses, sampled, turn_about
+from kinertia.estimation.calibration import AdaptationInputs, first_poses, sampled, turn_about
 from kinertia.estimation.elbow_direction import elbow_rotations, with_elbows_that_bend_forwards
 from kinertia.model.gait27 import ARM_COORDINATES, ARM_ROTATIONS, SHOULDER_OFFSETS
 from kinertia.model.skeleton import Marker
@@ -40,7 +40,7 @@ def deviations(skeleton, lower=0.01, upper=0.04) -> dict[str, float]:
 
 def adapt(skeleton, recordings, *deviations):
     trials = [trial(markers) for markers in recordings]
-    return calibration.adapt(skeleton, trials, first_poses(skeleton, trials), *deviations)
+    return calibration.adapt(skeleton, AdaptationInputs(trials, first_poses(skeleton, trials), *deviations))
 
 
 def hold_uninformed(skeleton, trials, may_hold):
@@ -184,7 +184,9 @@ def test_straight_elbows_keep_the_arms_as_the_static_trial_has_them(skeleton):
     walk = trial(straight_arms(skeleton))
     same, poses = with_elbows_that_bend_forwards(skeleton, [walk])
     assert same.locked == skeleton.locked
-    adapted = calibration.adapt(same, [walk], poses, deviations(same), dict.fromkeys(ARM_ROTATIONS, 1.0))
+    adapted = calibration.adapt(
+        same, AdaptationInputs([walk], poses, deviations(same), dict.fromkeys(ARM_ROTATIONS, 1.0))
+    )
     assert adapted.coordinates == pytest.approx({name: skeleton.locked[name] for name in ARM_ROTATIONS}, abs=1e-3)
 
 
@@ -193,7 +195,7 @@ def test_no_calibration_bends_an_elbow_backwards(skeleton):
     walk = trial(straight_arms(skeleton, hyperextended=0.4))
     turned, poses = with_elbows_that_bend_forwards(skeleton, [walk])
     sd = dict.fromkeys(ARM_ROTATIONS, 1.0)
-    adapted = calibration.adapt(turned, [walk], poses, deviations(turned), sd).skeleton
+    adapted = calibration.adapt(turned, AdaptationInputs([walk], poses, deviations(turned), sd)).skeleton
     (ik,) = first_poses(adapted, [walk])
     elbows = ik.q[:, [ik.coordinates.index(f"elbow_flex_{side}") for side in "rl"]]
     assert elbows.min() >= np.radians(-5.0) - 1e-9

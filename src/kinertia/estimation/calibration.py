@@ -34,6 +34,23 @@ _FEWEST_TO_TURN = 3
 """Fewest markers that determine a rotation of their segment."""
 
 
+@dataclass(frozen=True, eq=False)
+class AdaptationInputs:
+    """What a skeleton is adapted to, and how far it may move.
+
+    Attributes:
+        trials: the trials it will be used for.
+        poses: their `first_poses`; coordinates that have been locked since are ignored.
+        marker_sd_m: per segment, prior standard deviation of its markers' positions (m, each axis).
+        coordinate_sd: per locked coordinate to adapt, its prior standard deviation (rad or m).
+    """
+
+    trials: Sequence[Trial]
+    poses: Sequence[InverseKinematics]
+    marker_sd_m: Mapping[str, float]
+    coordinate_sd: Mapping[str, float]
+
+
 @dataclass(frozen=True)
 class Adaptation:
     """Outcome of `adapt`.
@@ -54,33 +71,21 @@ def first_poses(skeleton: Skeleton, trials: Sequence[Trial]) -> list[InverseKine
     return [solve_ik(skeleton, sampled(trial.markers), trial.name, gain_tolerance_m2=_ENOUGH_M2) for trial in trials]
 
 
-def adapt(
-    skeleton: Skeleton,
-    trials: Sequence[Trial],
-    poses: Sequence[InverseKinematics],
-    marker_sd_m: Mapping[str, float],
-    coordinate_sd: Mapping[str, float],
-) -> Adaptation:
-    """Adapt marker positions and locked coordinates to trials, with the skeleton as the prior.
-
-    Args:
-        skeleton: from the static trial.
-        trials: the trials it will be used for.
-        poses: their `first_poses`; coordinates that have been locked since are ignored.
-        marker_sd_m: per segment, prior standard deviation of its markers' positions (m, each axis).
-        coordinate_sd: per locked coordinate to adapt, its prior standard deviation (rad or m).
+def adapt(skeleton: Skeleton, given: AdaptationInputs) -> Adaptation:
+    """Adapt marker positions and locked coordinates to trials, with the skeleton of the static trial as the prior.
 
     Frames whose visible markers do not determine every coordinate are left out.
 
     Raises:
         TrialError: no frame of any trial remains.
     """
+    trials, coordinate_sd = given.trials, given.coordinate_sd
     present = {label for trial in trials for label in trial.markers.labels}
     kept = [marker for marker in skeleton.markers if marker.label in present]
     rest = [marker for marker in skeleton.markers if marker.label not in present]
     base = skeleton.with_markers(kept)
     measured = np.concatenate([sampled(trial.markers).arranged(base.labels) for trial in trials])
-    start = np.concatenate([ik.q[:, [ik.coordinates.index(name) for name in base.coordinates]] for ik in poses])
+    start = np.concatenate([ik.q[:, [ik.coordinates.index(name) for name in base.coordinates]] for ik in given.poses])
     seen = np.isfinite(start).all(axis=1)
     if not seen.any():
         raise TrialError(
@@ -97,7 +102,7 @@ def adapt(
     moving_at = np.array([columns[name] for name in base.coordinates])
     prior = np.concatenate([[base.locked[name] for name in still], base.marker_locals.ravel()])
     deviation = np.concatenate(
-        [list(coordinate_sd.values()), np.repeat([marker_sd_m[marker.segment] for marker in kept], 3)]
+        [list(coordinate_sd.values()), np.repeat([given.marker_sd_m[marker.segment] for marker in kept], 3)]
     )
     information = np.diag(1.0 / deviation**2)
     static = prior.copy()

@@ -9,7 +9,14 @@ from kinertia.diagnostics.labels.swapped_markers import labels_by_model
 from kinertia.diagnostics.runner import blocking
 from kinertia.diagnostics.subject.unobserved_segments import unobserved_segments
 from kinertia.errors import BlockedError, MarkerSetError, SettingsError, TrialError
-from kinertia.estimation.calibration import Adaptation, adapt, hold_uninformed, turn_about, without_partly_shown
+from kinertia.estimation.calibration import (
+    Adaptation,
+    AdaptationInputs,
+    adapt,
+    hold_uninformed,
+    turn_about,
+    without_partly_shown,
+)
 from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.estimation.elbow_direction import elbow_rotations, with_elbows_that_bend_forwards
 from kinertia.estimation.input_checks import complete_subject, known
@@ -39,7 +46,6 @@ from kinertia.model.head_markers import without_head
 from kinertia.model.marker_set import MarkerSet
 from kinertia.model.skeleton import Skeleton
 from kinertia.model.upper_body import ARM_SEGMENTS
-from kinertia.motion.inverse_kinematics import InverseKinematics
 from kinertia.motion.kinematics import facing
 from kinertia.motion.single_blas_thread import one_blas_thread
 from kinertia.motion.stance_pose import stance_pose
@@ -110,53 +116,40 @@ def calibrate(
     coordinate_sd = dict.fromkeys(SHOULDER_OFFSETS, UPPER_BODY_SD_M) | dict.fromkeys(
         ARM_ROTATIONS, _ARM_ROTATION_SD_RAD
     )
+    given = AdaptationInputs(trials, poses, marker_sd, coordinate_sd)
     if free_axes:
-        skeleton = _with_axes(skeleton, trials, poses, marker_sd, coordinate_sd)
-    trials, poses = _of_forces(trials, poses)
-    adapted = adapt(skeleton, trials, poses, marker_sd, coordinate_sd)
+        skeleton = _with_axes(skeleton, given)
+    given = _of_forces(given)
+    adapted = adapt(skeleton, given)
     torso_rad: float | None = turn_about("torso", skeleton.markers, adapted.skeleton.markers)
     if torso_rad is not None and torso_rad > _TURNED_RAD:
-        adapted = _arms_last(skeleton, trials, poses, marker_sd, coordinate_sd)
+        adapted = _arms_last(skeleton, given)
     else:
         torso_rad = None
     return Calibrated(adapted.skeleton, found, adapted.moved_m, elbows, torso_rad, head)
 
 
-def _with_axes(
-    skeleton: Skeleton,
-    trials: Sequence[Trial],
-    poses: Sequence[InverseKinematics],
-    marker_sd_m: Mapping[str, float],
-    coordinate_sd: Mapping[str, float],
-) -> Skeleton:
+def _with_axes(skeleton: Skeleton, given: AdaptationInputs) -> Skeleton:
     """Return the skeleton with axes of knees and ankles adapted to all trials, and nothing else changed."""
-    free = {**coordinate_sd, **dict.fromkeys(LEG_AXIS_TILTS, JOINT_AXIS_SD_RAD)}
-    found = adapt(skeleton, trials, poses, marker_sd_m, free).coordinates
+    free = {**given.coordinate_sd, **dict.fromkeys(LEG_AXIS_TILTS, JOINT_AXIS_SD_RAD)}
+    found = adapt(skeleton, replace(given, coordinate_sd=free)).coordinates
     return skeleton.lock({name: found[name] for name in LEG_AXIS_TILTS})
 
 
-def _of_forces(
-    trials: Sequence[Trial], poses: list[InverseKinematics]
-) -> tuple[Sequence[Trial], list[InverseKinematics]]:
-    """Return the trials whose forces are used, with their poses; all of them where there is none."""
-    used = [k for k, trial in enumerate(trials) if trial.loads.plates] or range(len(trials))
-    return [trials[k] for k in used], [poses[k] for k in used]
+def _of_forces(given: AdaptationInputs) -> AdaptationInputs:
+    """Leave the trials whose forces are used, with their poses; all of them where there is none."""
+    used = [k for k, trial in enumerate(given.trials) if trial.loads.plates] or range(len(given.trials))
+    return replace(given, trials=[given.trials[k] for k in used], poses=[given.poses[k] for k in used])
 
 
-def _arms_last(
-    skeleton: Skeleton,
-    trials: Sequence[Trial],
-    poses: Sequence[InverseKinematics],
-    marker_sd_m: Mapping[str, float],
-    coordinate_sd: Mapping[str, float],
-) -> Adaptation:
+def _arms_last(skeleton: Skeleton, given: AdaptationInputs) -> Adaptation:
     """Adapt the body without the markers of its arms, then the arms on a body that stays unchanged."""
     worn = [marker for marker in skeleton.markers if marker.segment in _ARMS]
     armless = skeleton.with_markers([marker for marker in skeleton.markers if marker.segment not in _ARMS])
-    body = adapt(armless, trials, poses, marker_sd_m, {})
+    body = adapt(armless, replace(given, coordinate_sd={}))
     whole = body.skeleton.with_markers([*body.skeleton.markers, *worn])
-    staying = {segment: sd if segment in _ARMS else _STAYS_M for segment, sd in marker_sd_m.items()}
-    adapted = adapt(whole, trials, poses, staying, coordinate_sd)
+    staying = {segment: sd if segment in _ARMS else _STAYS_M for segment, sd in given.marker_sd_m.items()}
+    adapted = adapt(whole, replace(given, marker_sd_m=staying))
     return replace(adapted, moved_m={**adapted.moved_m, **body.moved_m})
 
 

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from kinertia.diagnostics.model.model_on_person import moved_markers
-from kinertia.estimation.calibration import adapt, first_poses, hold_uninformed
+from kinertia.estimation.calibration import AdaptationInputs, adapt, first_poses, hold_uninformed
 from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.estimation.estimated_bodies import estimated_bodies
 from kinertia.estimation.input_checks import complete_subject, known
@@ -53,7 +53,8 @@ def opensim_model(screened: Screened, trials: Sequence[Turned], model: OsimModel
     skeleton, idle = hold_uninformed(skeleton, measured, poses, may_hold)
     moved: list[Finding] = []
     if person.calibrate:
-        skeleton = adapt(with_centre_offsets(model, skeleton), measured, poses, _marker_sd(skeleton), {}).skeleton
+        given = AdaptationInputs(measured, poses, _marker_sd(skeleton), {})
+        skeleton = adapt(with_centre_offsets(model, skeleton), given).skeleton
         moved = list(moved_markers(model.skeleton, skeleton, [trial.markers for trial in measured]))
     body_kg = CarriedMass.of(known(subject.mass_kg), person.attached).body_kg
     own, factor = at_mass(model.bsp, body_kg)
