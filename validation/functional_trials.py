@@ -52,16 +52,18 @@ class Case:
     squats: bool = False
     fast_walk: bool = False
     joints: tuple[str, ...] = ("knee",)
-    joint_axes: bool = False
+    joint_axes: bool | None = None
 
 
 CASES = (
     Case("one walk"),
     Case("one walk, `joint_axes = true`", joint_axes=True),
+    Case("two walks, `joint_axes = false`", fast_walk=True, joint_axes=False),
     Case("two walks", fast_walk=True),
+    Case("two walks, all axes where the static trial has them", fast_walk=True, joints=()),
     Case("one walk, squats without forces", squats=True),
-    Case("the same, ankle axes off, too", squats=True, joints=("knee", "ankle")),
-    Case("the same, all axes where the static trial has them", squats=True, joints=()),
+    Case("walk and squats, ankle axes off, too", squats=True, joints=("knee", "ankle")),
+    Case("walk and squats, all axes where the static trial has them", squats=True, joints=()),
 )
 
 

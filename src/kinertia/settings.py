@@ -217,10 +217,10 @@ class Settings(Table):
         default="auto",
         description='simultaneous; forces in joint moments: "auto" (as measured, without impacts), "none" or Hz',
     )
-    joint_axes: bool = Field(
-        default=False,
-        description="simultaneous, built-in model; true: axes of knees, ankles, elbows are calibrated too, as with a "
-        'trial of use = "kinematics"',
+    joint_axes: bool | None = Field(
+        default=None,
+        description="built-in model; whether axes of knees, ankles and elbows are estimated; left out: with two walks, "
+        'squats or a trial of use = "kinematics"',
     )
     hip_centre: Literal["bell", "harrington"] = Field(
         default="bell", description='hip joint centres from the pelvis: "bell" or "harrington"'

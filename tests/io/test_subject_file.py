@@ -91,7 +91,7 @@ def test_reads_everything(folder):
         "bsp": "deleva",
         "symmetry": False,
         "cutoff_hz": 6.0,
-        "joint_axes": False,
+        "joint_axes": None,
         "hip_centre": "harrington",
         "force_cutoff_hz": "none",
     }
@@ -109,7 +109,7 @@ def test_least_file_gets_defaults(folder):
         "bsp": "dumas",
         "symmetry": True,
         "cutoff_hz": "gcv",
-        "joint_axes": False,
+        "joint_axes": None,
         "hip_centre": "bell",
         "force_cutoff_hz": "auto",
     }

@@ -37,6 +37,7 @@ LUMBAR_OFFSETS = tuple(f"lumbar_{axis}" for axis in "xyz")
 AXIS_TILTS = tuple(f"{name}_tilt_{i}_{side}" for side in "rl" for name in ("knee", "ankle", "elbow") for i in "12")
 LEG_AXIS_TILTS = tuple(name for name in AXIS_TILTS if not name.startswith("elbow"))
 ARM_ROTATIONS = tuple(f"{name}_{side}" for side in "rl" for name in ("arm_rot", "pro_sup"))
+KNEES = ("knee_angle_r", "knee_angle_l")
 ELBOWS = ("elbow_flex_r", "elbow_flex_l")
 
 ARM_COORDINATES = tuple(f"{name}_{side}" for side in "rl" for name in ("arm_flex", "arm_add", "elbow_flex"))

@@ -20,6 +20,7 @@ from kinertia.estimation.calibration import (
 from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.estimation.elbow_direction import elbow_rotations, with_elbows_that_bend_forwards
 from kinertia.estimation.input_checks import complete_subject, known
+from kinertia.estimation.knee_excursion import show_knee_axes
 from kinertia.estimation.population import population_prior
 from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.simultaneous.model_uncertainty import (
@@ -80,6 +81,7 @@ class Calibrated:
         elbow_rotations_rad: side -> rotation of the elbow axis, where it was rotated.
         torso_rotation_rad: rotation of the torso under its markers that was prevented.
         head: labels of the markers on the head, where they are left out.
+        free_axes: whether axes of joints are uncertain.
     """
 
     skeleton: Skeleton
@@ -88,17 +90,19 @@ class Calibrated:
     elbow_rotations_rad: Mapping[str, float]
     torso_rotation_rad: float | None
     head: tuple[str, ...]
+    free_axes: bool
 
 
 @one_blas_thread
 def calibrate(
-    model: Gait27, trials: Sequence[Trial], acromia: Sequence[str] = (), free_axes: bool = False
+    model: Gait27, trials: Sequence[Trial], acromia: Sequence[str] = (), free_axes: bool | None = None
 ) -> Calibrated:
     """Adapt the skeleton of the 27-DOF model, as the static trial gives it, to the trials.
 
     Markers of pelvis, legs and feet are held to the static trial by a deviation of 10 mm, those of torso and arms and
-    the shoulder centres by 40 mm, free axes of knees and ankles by 5 degrees. Axes are adapted to all trials, markers
-    to those with forces: a squat draws skin, and with it ankles, 5 mm away from where a walk's joint moments need them.
+    the shoulder centres by 40 mm, free axes of knees and ankles by 5 degrees; where `free_axes` is None, they are free
+    if the trials show those of the knees. Axes are adapted to all trials, markers to those with forces: a squat draws
+    skin, and with it ankles, 5 mm away from where a walk's joint moments need them.
     Where arms have turned the torso under its markers, since the model's shoulders lack an axis, the rest of the body
     is adapted without them. Markers on the head are left out where three others show the trunk, which the acromia
     (labels), that move with the arms, do not.
@@ -107,6 +111,7 @@ def calibrate(
     complete = without_partly_shown(skeleton, poses, ARM_COORDINATES)
     if complete.markers != skeleton.markers:
         skeleton, poses = with_elbows_that_bend_forwards(complete, trials)
+    free_axes = show_knee_axes(poses) if free_axes is None else free_axes
     elbows = elbow_rotations(model.skeleton, skeleton)
     skeleton, _ = hold_uninformed(skeleton, trials, poses, dict.fromkeys(ARM_COORDINATES, 0.0))
     found = [one for trial in trials for one in labels_by_model(skeleton, trial)]
@@ -126,7 +131,7 @@ def calibrate(
         adapted = _arms_last(skeleton, given)
     else:
         torso_rad = None
-    return Calibrated(adapted.skeleton, found, adapted.moved_m, elbows, torso_rad, head)
+    return Calibrated(adapted.skeleton, found, adapted.moved_m, elbows, torso_rad, head, free_axes)
 
 
 def _with_axes(skeleton: Skeleton, given: AdaptationInputs) -> Skeleton:
@@ -205,13 +210,12 @@ def built_in_model(screened: Screened, trials: Sequence[Turned], settings: Setti
     )
     model, facing_x = _with_trunk(model, facing_x)
     model = replace(model, skeleton=with_stated_ranges(model.skeleton, subject))
-    functional = any(not one.trial.loads.plates for one in facing_x)
-    free_axes = settings.joint_axes or landmarks.of_walk or functional
-    calibrated = calibrate(model, [one.trial for one in facing_x], landmarks.acromia, free_axes)
+    stated_axes = _free_axes(facing_x, landmarks, settings)
+    calibrated = calibrate(model, [one.trial for one in facing_x], landmarks.acromia, stated_axes)
     found = [*landmarks.findings, *calibrated.findings]
     left = _unblocked(facing_x, screened, [*screened.findings, *found])
     if len(left) < len(facing_x):  # the skeleton is adapted to those that are used
-        calibrated = calibrate(model, [one.trial for one in left], landmarks.acromia, free_axes)
+        calibrated = calibrate(model, [one.trial for one in left], landmarks.acromia, stated_axes)
     body_kg = CarriedMass.of(known(subject.mass_kg), person.attached).body_kg
     literature = literature_bsp(body_kg, height_m, sex, model.geometry, settings.bsp)
     return PersonModel(
@@ -220,7 +224,7 @@ def built_in_model(screened: Screened, trials: Sequence[Turned], settings: Setti
         trials=left,
         skeleton=calibrated.skeleton,
         prior=population_prior(literature_prior(literature), subject, body_kg).prior,
-        uncertainty=_uncertainty(free_axes, landmarks.of_walk),
+        uncertainty=_uncertainty(calibrated.free_axes, landmarks.of_walk),
         findings=(*found, *_adapted(calibrated), *unobserved_segments(calibrated.skeleton)),
         elbow_rotations_rad=calibrated.elbow_rotations_rad,
         torso_rotation_rad=calibrated.torso_rotation_rad,
@@ -246,6 +250,15 @@ def _stance_of(person: Person, trials: Sequence[Turned], marker_set: MarkerSet) 
     )
     found = finding("S207", Where(trial=walk.name), centre_sd_m=Quantity(WITHOUT_STATIC * JOINT_CENTRE_SD_M, "m"))
     return _Landmarks(static, named, (found,))
+
+
+def _free_axes(trials: Sequence[Turned], landmarks: _Landmarks, settings: Settings) -> bool | None:
+    """Tell whether axes of joints are uncertain; None: if the trials show them."""
+    if settings.joint_axes is not None:
+        return settings.joint_axes
+    if landmarks.of_walk or any(not one.trial.loads.plates for one in trials):
+        return True
+    return None if settings.method == "simultaneous" else False
 
 
 def _uncertainty(free_axes: bool, without_static: bool) -> ModelUncertainty:
