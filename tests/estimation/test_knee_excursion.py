@@ -1,4 +1,4 @@
-"""Two trials with a stride of both legs, or one with a squat, show the axes of the knees; one walk or standing does not."""
+"""Two trials with a stride of both legs, or one with a squat, show the axes of the knees."""
 
 from types import SimpleNamespace
 

@@ -34,6 +34,9 @@ _LEAST_CLEARANCE_M = 0.01
 _LEAST_SPEED_M_S = 0.1
 _FEWEST_TO_JUDGE, _FAR_BEYOND = 3, 3.0
 """With at least so many landings, one that is so many times as fast as usual is excluded."""
+_STANCE, _SLOW_LANDING = 0.9, 2.0
+"""With fewer, which may be slow by chance, a foot has landed that is as slow as in this share of the frames under load,
+if it is at most so many times as fast as the landings."""
 
 _ALL_CARRIED = 0.85
 """While plates carry this share of their usual load, a foot that does not move is held in the air."""
@@ -74,9 +77,9 @@ def ground_contact(markers: Markers, loads: FootLoads, feet: FootMarkers, belt: 
 
     A loaded foot is on the ground by definition. A foot without load is on the ground while one of its markers
     is as low and as slow against the ground as the markers of loaded feet are in this trial: it lands when
-    that speed falls to the speed seen where a plate starts to be loaded, and leaves when it rises to the
-    speed seen where a plate ceases to be. Up to `CONTACT_SLACK_S` of such ground contact right before or
-    after a load is the markers' inaccuracy; what remains is widened by `CONTACT_MARGIN_S`.
+    that speed falls to the speed seen where a plate starts to be loaded, or to that of most frames under load, and
+    leaves when it rises to the speed seen where a plate ceases to be loaded. Up to `CONTACT_SLACK_S` of such ground
+    contact right before or after a load is the markers' inaccuracy; what remains is widened by `CONTACT_MARGIN_S`.
 
     A foot without load that stands still, at whatever height, is on a step, a box or the frame of a treadmill if the
     plates carry less than usual meanwhile; from landing to leaving, as above.
@@ -126,8 +129,11 @@ def _learned(moves: Sequence[FootMotion], loaded: BoolArray) -> tuple[float, flo
                 landing.append(_halfway(speed[first - 1], speed[first]))
             if last < len(speed) - 1:
                 leaving.append(_halfway(speed[last + 1], speed[last]))
-    usual = _largest(np.concatenate(loaded_speed))
+    speeds = np.concatenate(loaded_speed)
+    usual = _largest(speeds)
     land = max(_LEAST_SPEED_M_S, _usual(landing) or usual)
+    if len(landing) < _FEWEST_TO_JUDGE:
+        land = max(land, min(_SLOW_LANDING * land, float(np.quantile(speeds, _STANCE))))
     return clearance, land, max(land, _usual(leaving) or usual)
 
 
