@@ -15,7 +15,7 @@ from kinertia.report.body_figure import body_figure
 from kinertia.report.bsp_figures import change_figure, departure_figure, departures, information_figure
 from kinertia.report.coordinate_titles import panels_of, title_of
 from kinertia.report.figure import Figure, compact
-from kinertia.report.marker_figures import fit_gap_figure, marker_figure, rms_by_marker
+from kinertia.report.marker_figures import fit_gap_figure, marker_figure
 from kinertia.report.page import render
 from kinertia.report.panels import Panel, small_multiples
 from kinertia.report.plots import as_plotly
@@ -31,6 +31,7 @@ from kinertia.report.time_figures import (
 from kinertia.report.wording import LITERATURE
 from kinertia.trial.data import FootLoads, Markers, Trial
 from kinertia.trial.gait_events import gait_events
+from kinertia.trial.rms import rms_by_marker
 from report_page import TRACE_TYPES, figures_of, numbers
 
 

@@ -11,6 +11,7 @@ from kinertia.report import style
 from kinertia.report.figure import Figure, compact
 from kinertia.report.panels import base_layout, plain
 from kinertia.trial.data import Markers
+from kinertia.trial.rms import rms_by_marker
 from kinertia.trial.sampled_time import runs
 
 _ROW_PX = 17
@@ -54,15 +55,6 @@ def marker_figure(trial: TrialFit, drifting: tuple[str, ...] = ()) -> Figure:
         "yaxis": {**_LABELS, "range": [len(names) - 0.3, -0.7]},
     }
     return Figure(traces, layout)
-
-
-def rms_by_marker(errors_m: np.ndarray) -> np.ndarray:
-    """Return the RMS (m,) of distances (w, m) over the frames that show the marker; NaN for one never visible."""
-    seen = np.isfinite(errors_m)
-    total = np.square(np.where(seen, errors_m, 0.0)).sum(axis=0)
-    with np.errstate(invalid="ignore"):
-        result: np.ndarray = np.sqrt(total / seen.sum(axis=0))
-        return result
 
 
 def gap_figure(markers: Markers, windows_s: Sequence[tuple[float, float]], name: str) -> Figure | None:

@@ -37,7 +37,7 @@ from kinertia.report.file_outputs import beside_view
 from kinertia.report.finding_view import FindingView
 from kinertia.report.gait_profile_view import profile_view
 from kinertia.report.headline import held_sentence, hidden_combinations, words
-from kinertia.report.marker_figures import fit_gap_figure, marker_figure, rms_by_marker
+from kinertia.report.marker_figures import fit_gap_figure, marker_figure
 from kinertia.report.rendering import rendered
 from kinertia.report.scene import view
 from kinertia.report.skeleton_view import scene
@@ -52,7 +52,7 @@ from kinertia.report.time_figures import (
 from kinertia.report.truth_comparison import Truth, truth_rows
 from kinertia.report.wording import INTERVAL_SD, asymmetry_sentences, decimals, expected_of, fixed, read_in, start_of
 from kinertia.trial.gait_events import gait_events
-from kinertia.trial.rms import rms_length
+from kinertia.trial.rms import rms_by_marker, rms_length
 from kinertia.trial.sampled_time import runs
 
 MOST_TRIALS = 6

@@ -11,6 +11,8 @@ from kinertia.diagnostics.result.residuals import residuals
 from kinertia.model.coordinate_range import Range
 
 FRAMES = 50
+SEGMENTS = {"RASI": "pelvis", "RANK": "tibia_r", "RWRA": "hand_r"}
+MARKERS = [SimpleNamespace(label=label, segment=segment) for label, segment in SEGMENTS.items()]
 
 
 def found(force_n=0.0, moment_nm=0.0, external_n=800.0, markers_m=0.008, full=1.0, **changes):
@@ -28,8 +30,9 @@ def found(force_n=0.0, moment_nm=0.0, external_n=800.0, markers_m=0.008, full=1.
         motion_hz=12.0,
         residuals={"estimate": residual},
         full_residuals={"estimate": full * residual},
-        kinematics=SimpleNamespace(foot_loads=loads),
-        marker_errors_m={"final": np.full((FRAMES, 3), markers_m)},
+        kinematics=SimpleNamespace(foot_loads=loads, ik=SimpleNamespace(labels=tuple(SEGMENTS))),
+        marker_errors_m={"final": np.tile(np.broadcast_to(markers_m, 3), (FRAMES, 1))},
+        skeleton=SimpleNamespace(markers=MARKERS),
     )
     fit = SimpleNamespace(**{"trials": (trial,), "file": None, "skeleton": SimpleNamespace(locked={}), **changes})
     answers = list(residuals(ResultContext(fit, None)))
@@ -87,6 +90,16 @@ def test_markers_by_the_guideline(markers_m, expected):
     of_model = found(markers_m=markers_m, file=object())
     assert levels(of_model).get("R304") == expected
     assert expected is None or "--calibrate" in of_model["R304"].remedy
+
+
+def test_arms_that_the_model_cannot_follow_bar_nothing():
+    """Raised arms, 80 mm off, beside legs that fit: 46 mm RMS."""
+    one = found(markers_m=[0.008, 0.008, 0.08])["R304"]
+    assert one.severity.name == "WARNING"
+    assert one.evidence["legs_m"].value == pytest.approx(0.008)
+    assert one.where.markers[0] == "RWRA"
+    assert "arms" in one.effect
+    assert found(markers_m=[0.03, 0.03, 0.008])["R304"].severity.name == "ERROR"
 
 
 def test_nobody_is_advised_to_let_move_what_moves_already_or_is_grossly_wrong():

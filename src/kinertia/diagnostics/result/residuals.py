@@ -19,8 +19,9 @@ from kinertia.estimation.result import TrialFit
 from kinertia.findings.finding import Finding, Severity, finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
+from kinertia.model.anatomy import segment_of
 from kinertia.model.centre_offsets import centre_offsets
-from kinertia.trial.rms import rms
+from kinertia.trial.rms import rms, rms_by_marker
 
 
 class Guideline(NamedTuple):
@@ -38,6 +39,8 @@ PEAK_FORCE_SHARE = 0.05
 """Largest share of the peak external force that the peak residual force may have."""
 GOOD_MARKERS_M, ACCEPTABLE_MARKERS_M = 0.012, 0.020
 """RMS distance of the markers: OpenSim's guideline for inverse kinematics is 20 mm."""
+_LEGS = ("pelvis", "thigh", "shank", "foot")
+_WORST_MARKERS = 3
 _WRONG_MODEL_M = 0.045
 """RMS distance that markers of a fault-free model exceed on no person, wherever they are attached."""
 
@@ -94,18 +97,29 @@ def _by_guideline(trial: TrialFit, guideline: Guideline, judged: np.ndarray, who
 
 
 def _markers(context: ResultContext, trial: TrialFit) -> Iterator[Finding]:
-    """R304: markers far from the model. Calibrating hides gross errors, and helps no further once it has been done."""
-    apart_m = rms(trial.marker_errors_m["final"])
+    """R304: markers far from the model. Calibrating hides gross errors, and helps no further once it has been done.
+
+    Arms and trunk move in ways that the model's shoulders cannot, and bar nothing: an error is one of pelvis and legs.
+    """
+    errors_m, labels = trial.marker_errors_m["final"], trial.kinematics.ik.labels
+    segments = {marker.label: str(segment_of(marker.segment)) for marker in trial.skeleton.markers}
+    of_legs = np.array([segments[label].startswith(_LEGS) for label in labels])
+    apart_m = rms(errors_m)
+    legs_m = rms(errors_m[:, of_legs]) if of_legs.any() else apart_m
     if apart_m <= GOOD_MARKERS_M:
         return
+    worst = np.argsort(-np.nan_to_num(rms_by_marker(errors_m)))[:_WORST_MARKERS]
+    far = "Joint angles" if legs_m > GOOD_MARKERS_M else "Joint angles of trunk and arms"
     wrong = apart_m > _WRONG_MODEL_M or bool(centre_offsets(context.fit.skeleton))
     calibrate = context.fit.file is not None and not wrong
     check = "check that the model was scaled to this person, and all labels"
     advice = "let markers and joint centres move (--calibrate)" if calibrate else check
     yield finding(
         "R304",
-        Where(trial=trial.name),
-        Severity.ERROR if apart_m > ACCEPTABLE_MARKERS_M else None,
+        Where(trial=trial.name, markers=tuple(labels[i] for i in worst)),
+        Severity.ERROR if legs_m > ACCEPTABLE_MARKERS_M else None,
         rms_m=Quantity(apart_m, "m", limit=GOOD_MARKERS_M),
+        legs_m=Quantity(legs_m, "m", limit=ACCEPTABLE_MARKERS_M),
+        angles=Quantity(far),
         advice=Quantity(advice[0].upper() + advice[1:]),
     )
