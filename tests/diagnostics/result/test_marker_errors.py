@@ -25,10 +25,18 @@ def test_heads_and_the_skin_of_forearms_turn_without_a_loose_marker():
     assert list(moved_markers(context(marker_noise=(noise,)))) == []
 
 
-@pytest.mark.parametrize(("away_m", "expected"), [(0.029, []), (0.031, ["M162"])])
-def test_a_marker_that_sits_elsewhere_than_in_every_other_trial(away_m, expected):
-    quiet = MarkerNoise({"A": 0.002}, 0.2, ())
-    distances = ({"A": 0.001}, {"A": away_m})
+@pytest.mark.parametrize(
+    ("label", "away_m", "expected"),
+    [
+        ("R.ASIS", 0.029, []),
+        ("R.ASIS", 0.031, ["M162"]),
+        ("R.Acromium", 0.07, []),  # raised arms take it along
+        ("R.Acromium", 0.08, ["M162"]),
+    ],
+)
+def test_a_marker_that_sits_elsewhere_than_in_every_other_trial(label, away_m, expected):
+    quiet = MarkerNoise({label: 0.002}, 0.2, ())
+    distances = ({label: 0.001}, {label: away_m})
     found = list(moved_markers(context(trials=TWO, marker_noise=(quiet, quiet), marker_distances_m=distances)))
     assert codes(found) == expected
     assert [one.where.trial for one in found] == ["run"] * len(expected)

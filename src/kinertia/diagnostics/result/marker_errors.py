@@ -16,6 +16,9 @@ from kinertia.model.skeleton import Skeleton
 
 _MOVED_M = 0.03
 """Skin moves markers up to some 30 mm."""
+_SHOULDER_M, _CLAVICLE_M = 0.12, 0.045
+"""Markers so close to a shoulder joint move by as much more with the clavicle, while the arm is raised: its length
+times 17 degrees."""
 _DRIFTING = 3.0
 """Multiple of the usual SD from which a marker drifts, as in `marker_noise`."""
 _BACKWARDS_RAD = 0.5
@@ -28,7 +31,7 @@ def moved_markers(context: ResultContext) -> Iterator[Finding]:
     posterior = context.fit.posterior
     if posterior is None:
         return
-    loose = _loose(context.fit.skeleton)
+    loose, shoulders = _loose(context.fit.skeleton), _at_shoulders(context.fit.skeleton)
     for trial, noise in zip(context.fit.trials, posterior.marker_noise, strict=True):
         usual_m = float(np.median(list(noise.sd_m.values())))
         for label in (one for one in noise.drifting if one not in loose):
@@ -36,8 +39,9 @@ def moved_markers(context: ResultContext) -> Iterator[Finding]:
             yield finding("M163", Where(trial=trial.name, markers=(label,)), sd_m=sd, usual_sd_m=Quantity(usual_m, "m"))
     for trial, distances in zip(context.fit.trials, posterior.marker_distances_m, strict=False):
         for label, away_m in distances.items():
-            if away_m > _MOVED_M:
-                away = Quantity(away_m, "m", limit=_MOVED_M)
+            limit_m = _MOVED_M + (_CLAVICLE_M if label in shoulders else 0.0)
+            if away_m > limit_m:
+                away = Quantity(away_m, "m", limit=limit_m)
                 yield finding("M162", Where(trial=trial.name, markers=(label,)), difference_m=away)
 
 
@@ -45,6 +49,21 @@ def _loose(skeleton: Skeleton) -> set[str]:
     """Return labels of markers that move without being loose: on the head, and on forearms, whose skin turns."""
     forearms = {m.label for m in skeleton.markers if str(segment_of(m.segment)).startswith("forearm")}
     return forearms.union(head_markers(skeleton))
+
+
+def _at_shoulders(skeleton: Skeleton) -> set[str]:
+    """Return labels of the trunk's markers over the shoulder joints."""
+    centres = [
+        (joint.parent, joint.translation)
+        for joint in skeleton.joints
+        if str(segment_of(joint.child)).startswith("upper_arm")
+    ]
+    return {
+        marker.label
+        for marker in skeleton.markers
+        for parent, centre in centres
+        if marker.segment == parent and np.linalg.norm(np.subtract(marker.position, centre)) < _SHOULDER_M
+    }
 
 
 def corrected_joints(context: ResultContext) -> Iterator[Finding]:
