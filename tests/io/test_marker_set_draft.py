@@ -170,6 +170,17 @@ def test_a_marker_that_is_hardly_ever_seen_is_not_used(tmp_path):
     assert "R.Heel: seen in 20 % of the frames only" in text
 
 
+def test_what_one_side_lacks_is_placed_as_on_the_other_by_its_label(tmp_path):
+    """A right foot that is lifted, as in every frame of a walk, is not where a standing person has it."""
+    static = generic_static()
+    for label in ("R.Heel", "R.Toe.Tip", "R.Midfoot.Lat", "R.Midfoot.Sup"):
+        if label in static.markers.labels:
+            static.markers.positions[:, static.markers.labels.index(label)] += np.array([-0.3, 0.35, 0.0])
+    draft, text = drafted(tmp_path, static)
+    assert draft.landmarks["heel_r"] == ("R.Heel",)
+    assert "as on the other side, by its label" in text
+
+
 @pytest.mark.parametrize("name", [name for name, (file, _) in STANDING.items() if here([file])])
 def test_legs_of_measured_laboratories_are_complete(tmp_path, name, recording_of):
     file, expected = STANDING[name]

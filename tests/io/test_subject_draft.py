@@ -221,6 +221,9 @@ def test_init_with_one_recording_leaves_the_other_to_fill_in(tmp_path, name):
     text = init_subject(tmp_path)
     missing = '# markers = "walk.trc"' if name == "static.trc" else '# static = "static.trc"'
     assert f"{missing}  # FILL IN" in text
+    if name == "walk.trc":
+        assert draft(tmp_path, completed(text)).model.static is None  # the walk has to do
+        return
     with pytest.raises(FileError):
         draft(tmp_path, completed(text))
 
@@ -229,7 +232,7 @@ def test_init_explains_every_setting(tmp_path):
     (tmp_path / "walk.trc").touch()
     lines = init_subject(tmp_path).splitlines()
     for name in Settings.model_fields:
-        assert any(re.match(rf"{name} = .+  # .{{10,}}", line) for line in lines)
+        assert any(re.match(rf"(# )?{name} = .+  # .{{10,}}", line) for line in lines)
 
 
 def test_init_without_recordings(tmp_path):
@@ -348,6 +351,19 @@ def test_init_drafts_a_marker_set_where_no_preset_fits(tmp_path):
     again = init_files(tmp_path)
     assert set(again) == {"subject.toml"}, "what is there is left alone"
     assert again["subject.toml"] == files["subject.toml"]
+
+
+def test_init_drafts_a_marker_set_from_a_walk_where_nobody_stands(tmp_path):
+    """Labels that no preset knows."""
+    labels = {f"{name[0]}Q{name[2:]}" if name[1] == "." else name: at for name, at in standing_positions().items()}
+    walk = recording(labels, frames=100)
+    walk.markers.positions[:, :, 0] += 1.2 * walk.markers.time[:, None]
+    write_trc(tmp_path / "walk1.trc", walk.markers)
+    files = init_files(tmp_path)
+    assert set(files) == {"subject.toml", "markers.toml"}
+    assert '# static = "static.trc"  # FILL IN' in files["subject.toml"]
+    (tmp_path / "markers.toml").write_text(files["markers.toml"], encoding="utf-8")
+    assert {"heel_r", "heel_l", "asis_r"} <= set(read_marker_set(tmp_path / "markers.toml").landmarks)
 
 
 def test_init_drafts_no_marker_set_where_a_preset_fits(tmp_path):

@@ -356,7 +356,6 @@ def test_an_opensim_model_needs_neither_static_trial_nor_sex(folder):
     [
         ("osim = ", 'static = "static.trc"\nosim = ', 5, "F193", {"one": "osim", "other": "static"}),
         ("osim = ", 'markers = "plug-in-gait"\nosim = ', 5, "F193", {"one": "osim", "other": "markers"}),
-        ('osim = "scaled.osim"', "", 4, "F191", {"entry": "[model] lacks 'static'"}),
         ('osim = "scaled.osim"', 'static = "static.trc"', 1, "F191", {"entry": "[subject] lacks 'sex'"}),
         ("[[trial]]", '[settings]\nmethod = "two-level"\n[[trial]]', 8, "F193", {"one": "two-level", "other": "osim"}),
         ('osim = "scaled.osim"', 'osim = "scald.osim"', 5, "F101", {"key": "osim", "nearest": "scaled.osim"}),

@@ -49,7 +49,9 @@ def init(
     for note in notes:
         out.print(note, soft_wrap=True)
     if MARKER_SET in files:
-        out.print(f"no marker-set preset fits: wrote {own}, drafted from the static trial; check it", soft_wrap=True)
+        out.print(
+            f"no marker-set preset fits: wrote {own}, drafted from where the markers are; check it", soft_wrap=True
+        )
     out.print(f"wrote {path}: fill in what it asks for, then run: kinertia check {path}", soft_wrap=True)
     asked = [line.removeprefix("# ").partition(" =")[0] for line in lines if FILL_IN in line]
     marker_set = str(own) if MARKER_SET in files else None

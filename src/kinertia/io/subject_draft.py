@@ -10,16 +10,18 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from kinertia.errors import FileError, KinertiaError
+from kinertia.errors import FileError, KinertiaError, MarkerSetError
 from kinertia.findings.quantity import Quantity
 from kinertia.io.file_names import RESULT_FILES, missing_file
 from kinertia.io.marker_set_draft import draft_marker_set, preset_of
+from kinertia.io.marker_set_file import marker_set_of
 from kinertia.io.measures_file import is_measures_sheet
 from kinertia.io.qualisys import plates_beside
 from kinertia.io.recording import CORTEX, MARKER_FILES, read_recording
 from kinertia.io.subject_tables import Model, PriorFiles, TrialFiles
 from kinertia.io.subject_text import entry_line
 from kinertia.settings import Settings, Subject, Table
+from kinertia.trial.data import Recording
 from kinertia.trial.stillness import STILL_M_S, speed_m_s
 
 FILL_IN = "  # FILL IN: "
@@ -30,6 +32,7 @@ _FORCE_NAME = re.compile("force|grf", re.IGNORECASE)
 _FORCES = re.compile(r"<force_identifier>\s*(\S+?)\s*</force_identifier>")
 _LISTED = 6
 SUBJECT, MARKER_SET = "subject.toml", "markers.toml"
+_NO_STATIC = "; none was found: without one, joint centres come from a walk, less exactly"
 NO_FORCES = "# No forces were found for"
 """Beginning of the line about a trial without forces."""
 
@@ -75,10 +78,10 @@ def init_files(folder: str | Path, nearby: bool = True, marker_set: bool = True)
     if others:
         text += [f"# Left out (another subject's, another static trial, or also there as C3D): {', '.join(others)}."]
     text += ["", "[subject]", *_subject_lines([file for file in (static, *trials) if file in c3d])]
-    wanted = marker_set and static is not None and not (folder / MARKER_SET).exists()
-    own = _drafted_set(static) if wanted and static else ""
+    wanted = marker_set and not by_model and not (folder / MARKER_SET).exists()
+    own = _drafted_set(static, trials) if wanted else ""
     guessed = static is not None and not STATIC_NAME.search(static.stem)
-    note = " (the shortest in which nobody moves)" if guessed else ""
+    note = " (the shortest in which nobody moves)" if guessed else "" if static else _NO_STATIC
     text += ["", "[model]"]
     if by_model:
         text += [_entry(Model, "osim", models[0].name)]
@@ -102,17 +105,31 @@ def init_files(folder: str | Path, nearby: bool = True, marker_set: bool = True)
     sheets = [] if by_model else [file.name for file in files if is_measures_sheet(file)]
     if sheets:
         text += ["", "[prior]", _entry(PriorFiles, "measures", sheets[0] if len(sheets) == 1 else None, sheets[0])]
-    text += ["", "[settings]", *(_entry(Settings, *item) for item in Settings().model_dump().items()), ""]
+    stated = Settings().model_dump(exclude_none=True)
+    text += ["", "[settings]", *(_entry(Settings, *item) for item in stated.items())]
+    text += ["# " + _entry(Settings, "joint_axes", True), ""]
     return {SUBJECT: "\n".join(text)} | ({MARKER_SET: own} if own else {})
 
 
-def _drafted_set(static: Path) -> str:
-    """Draft a marker set for a static trial that no preset can model; empty where one can, or nothing can be read."""
-    recording = _recording(static)
-    if recording is None:
+def _drafted_set(static: Path | None, trials: Sequence[Path]) -> str:
+    """Draft a marker set for a static trial, or else a walk, that no preset fits; empty where one does, or nothing can
+    be read.
+    """
+    file = static or next(iter(trials), None)
+    recording = file and _recording(file)
+    if file is None or recording is None:
         return ""
     recording = recording.without_empty_markers()
-    return "" if preset_of(recording) else draft_marker_set(recording, static.parent.name).text
+    fits = preset_of(recording) if static else _is_known(recording)
+    return "" if fits else draft_marker_set(recording, file.parent.name).text
+
+
+def _is_known(walk: Recording) -> bool:
+    try:
+        marker_set_of(walk.markers)
+    except MarkerSetError:
+        return False
+    return True
 
 
 def _expect_files(folder: Path) -> list[Path]:

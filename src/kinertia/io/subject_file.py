@@ -165,7 +165,7 @@ def subject_from_options(content: Mapping[str, Any]) -> SubjectFile:
         result = SubjectFile.model_validate(content, context={"folder": Path.cwd()})
     except ValidationError as error:
         raise _settings_error(_finding(error.errors()[0])) from None
-    if lack := _incomplete(result, needs_static=False):
+    if lack := _incomplete(result):
         raise _settings_error(lack[1])
     return result
 
@@ -174,16 +174,9 @@ def _settings_error(found: Finding) -> SettingsError:
     return SettingsError(problem_of(found)).with_finding(found)
 
 
-def _incomplete(
-    wanted: SubjectFile, needs_static: bool = True, needs_sex: bool = True
-) -> tuple[Location, Finding] | None:
-    """Return the place and finding of entries that are missing, or not allowed, for the kind of model.
-
-    A subject file without a static trial has forgotten it; a command without one may mean it (S207).
-    """
+def _incomplete(wanted: SubjectFile, needs_sex: bool = True) -> tuple[Location, Finding] | None:
+    """Return the place and finding of entries that are missing, or not allowed, for the kind of model."""
     model = wanted.model
-    if needs_static and model.static is None and model.osim is None:
-        return ("model", "static"), _finding({"loc": ("model", "static"), "type": "missing"})
     if needs_sex and wanted.subject.sex is None and model.osim is None:
         return ("subject", "sex"), _no_sex(wanted)
     if lack := _two_models(model.static, model.markers, model.osim, model.calibrate):

@@ -17,7 +17,6 @@ WHOLE = f"[subject]\nsex = 'male'\nmass_kg = 70\nheight_m = 1.8\n[model]\n{STATI
     ("written", "instead", "plain", "as_the_command_line"),
     [
         ("sex = 'male'\n", "", "Sex is missing: fill it in", "[subject] lacks 'sex'"),
-        (STATIC, "", "No file is used as the static trial", "[model] lacks 'static'"),
         (WALK, "", "No file is used as a walk", "[[trial]]: there is no such heading"),
         (WALK, "[[trial]]\n", "No file is used as a walk", "[[trial]] lacks 'markers'"),
         ("mass_kg = 70\n", "mass_kg = 7000\n", "", "S102"),

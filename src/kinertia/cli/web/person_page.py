@@ -176,7 +176,6 @@ def _result_files(person: Person) -> list[str]:
 
 _CHOOSE = "choose one in the table above, or add its file"
 _PLAIN = (
-    (re.compile(r"\[model\] lacks 'static'"), f"No file is used as the static trial: {_CHOOSE}."),
     (
         re.compile(r"\[\[trial\]\](: there is no such heading| lacks 'markers')"),
         f"No file is used as a walk: {_CHOOSE}.",

@@ -86,6 +86,7 @@ def place_markers(recording: Recording) -> Placement:
         result.notes.append("which way the person faces is not clear: check left and right")
     find_upper_body(body, found)
     _explain(result, body, found, computed)
+    _complete_by_label(result, pairs)
     return result
 
 
@@ -171,6 +172,27 @@ def _explain(result: Placement, body: StandingBody, found: Found, computed: Mapp
         if label not in computed:
             result.segments.setdefault(_on_side(body, segment, [marker]), []).append(label)
     result.left_out.update(computed)
+
+
+def _complete_by_label(result: Placement, pairs: Mapping[str, tuple[str, str]]) -> None:
+    """Place what was found on one side only on the other side, too, if its markers have counterparts by label."""
+    placed = {label for own in (*result.landmarks.values(), *result.segments.values()) for label in own}
+
+    def counterparts(own: Sequence[str]) -> list[str]:
+        there = [pairs[label][1] for label in own if label in pairs]
+        return [label for label in there if label not in placed and label not in result.left_out]
+
+    for name, own in list(result.landmarks.items()):
+        base, _, side = name.rpartition("_")
+        other = f"{base}_{_OPPOSITE.get(side)}"
+        there = counterparts(own)
+        if side in _OPPOSITE and other not in result.landmarks and len(there) == len(own):
+            result.landmarks[other] = there
+            result.how[other] = "as on the other side, by its label"
+    for name, own in list(result.segments.items()):
+        base, _, side = name.rpartition("_")
+        if side in _OPPOSITE and (there := counterparts(own)):
+            result.segments.setdefault(f"{base}_{_OPPOSITE[side]}", []).extend(there)
 
 
 def _on_side(body: StandingBody, name: str, markers: Sequence[int]) -> str:
