@@ -116,7 +116,7 @@ def _drafted_set(static: Path | None, trials: Sequence[Path]) -> str:
     be read.
     """
     file = static or next(iter(trials), None)
-    recording = file and _recording(file)
+    recording = _recording(file) if file else None
     if file is None or recording is None:
         return ""
     recording = recording.without_empty_markers()
