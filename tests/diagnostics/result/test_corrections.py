@@ -132,3 +132,6 @@ def test_delays_of_all_forces_and_of_one_trial():
         ("T215", "run", -0.02),
     ]
     assert list(delays(context(replace(late, sd=0.006)))) == []
+    alone = replace(own, trial="walk", value=-0.03)  # its total: there are no other trials that it could differ from
+    (found_alone,) = delays(context(late, alone, trials={"walk": walking()}))
+    assert (found_alone.code, found_alone.evidence["delay_s"].value) == ("T214", -0.03)

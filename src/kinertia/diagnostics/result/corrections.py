@@ -61,10 +61,13 @@ def equal(errors: Sequence[CalibrationEntry], usual_sd: float = np.inf) -> bool:
 
 
 def delays(context: ResultContext) -> Iterator[Finding]:
-    """Report the common delay of all forces, and the additional delays of single trials."""
-    for one in context.errors:
-        if one.quantity == DELAY:
-            yield from corrected(context, "T214" if one.trial is None else "T215", "delay_s", [one])
+    """Report the common delay of all forces, and the additional delays of several trials; of one trial its total."""
+    common = [one for one in context.errors if one.quantity == DELAY and one.trial is None]
+    own = [one for one in context.errors if one.quantity == DELAY and one.trial is not None]
+    if own and len(context.fit.trials) == 1:
+        common, own = own, []
+    yield from corrected(context, "T214", "delay_s", common)
+    yield from corrected(context, "T215", "delay_s", own)
 
 
 def zero_offsets(context: ResultContext) -> Iterator[Finding]:

@@ -53,8 +53,8 @@ class FoundErrors:
     Attributes:
         plates: per plate its errors (5,), in the order of PLATE_ERRORS, and their posterior standard deviations (5,).
         delay_s: the synchronisation delay and its posterior standard deviation, s.
-        delays_s: per trial the additional delay of its forces, and its posterior standard deviation, s; none for a
-            single trial whose synchronisation has been checked.
+        delays_s: per trial the additional delay of its forces, and its posterior standard deviation, s; of a single
+            trial the total delay, or none if its synchronisation has been checked.
         zeros_n: per trial and plate the zero offsets (2,), in the order of ZERO_UNKNOWNS, and their posterior standard
             deviations (2,).
         gains: per trial and plate the total gain in the trial, and its posterior standard deviation.
@@ -135,10 +135,14 @@ def laboratory_errors(
 
 
 def _of_trials(found: FoundErrors, prior: InstrumentPrior, trials: Sequence[str], first: int) -> Iterator[Solved]:
-    """Yield the errors that are specific to trials; for gains, a plate's total gain error in the trial."""
+    """Yield the errors that are specific to trials; for gains, a plate's total gain error in the trial.
+
+    The delay of a single trial is its total, too: nothing separates its own from that of all trials.
+    """
     places = count(first)
+    shared_sd = prior.delay_s.sd if len(found.delays_s) == 1 else 0.0
     for trial, trial_delay_s in zip(trials, found.delays_s, strict=False):
-        yield _delay(next(places), trial_delay_s, prior.trial_delay_s.sd, trial)
+        yield _delay(next(places), trial_delay_s, float(np.hypot(prior.trial_delay_s.sd, shared_sd)), trial)
     for trial, zeros in zip(trials, found.zeros_n, strict=True):
         for plate, (values, sds) in zeros.items():
             for unknown, value, sd in zip(ZERO_UNKNOWNS, values, sds, strict=True):

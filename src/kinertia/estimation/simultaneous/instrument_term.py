@@ -140,7 +140,7 @@ class InstrumentErrors(LoadTerm):
         found = FoundErrors(
             plates=dict(zip(plates, zip(shared, shared_sd, strict=True), strict=True)),
             delay_s=solution.pairs(self.layout[CLOCK])[0],
-            delays_s=tuple(solution.pairs(self.layout[TRIAL_DELAYS])),
+            delays_s=self._delays(solution),
             zeros_n=tuple(dict(zip(names, zip(values[at], sd[at], strict=True), strict=True)) for names, at in zeros),
             gains=tuple(self._gains(k, solution) for k in range(len(trials))),
             instruments=self._shown(solution),
@@ -154,6 +154,14 @@ class InstrumentErrors(LoadTerm):
             self.layout[TRIAL_DELAYS].start - first,
         )
         return {"calibration": entries, "instruments": found.instruments}
+
+    def _delays(self, solution: Solution) -> tuple[tuple[float, float], ...]:
+        """Return the additional delays of several trials, or a single trial's total, with standard deviations, s."""
+        own = solution.pairs(self.layout[TRIAL_DELAYS])
+        if len(own) != 1:
+            return tuple(own)
+        both = self.delay_unknowns(0)
+        return ((float(solution.static[both].sum()), float(np.sqrt(solution.covariance[np.ix_(both, both)].sum()))),)
 
     def _gains(self, k: int, solution: Solution) -> dict[str, tuple[float, float]]:
         """Return the total gain errors of a trial's plates, and their standard deviations."""
