@@ -64,6 +64,27 @@ def test_the_sign_of_one_plate_in_a_run(run, plate, axis):
 
 
 @pytest.mark.parametrize("plate", [0, 1])
+@pytest.mark.parametrize("kind", ["exchanged", "rotated"])
+def test_the_axes_of_one_plate(walk, plate, kind):
+    def misread(force):
+        wrong = force.copy()
+        wrong[:, plate, 0], wrong[:, plate, 2] = force[:, plate, 2], force[:, plate, 0]
+        if kind == "rotated":
+            wrong[:, plate, 2] *= -1.0
+        return wrong
+
+    context = context_of(with_force(walk, misread))
+    found = [*force_directions(context)]
+    if not found:  # a plate that hardly counts in the frames that do, such as one of subject A
+        apart = context.velocity_changes.caused - context.velocity_changes.centre
+        assert np.linalg.norm(apart[:, [0, 2]].std(axis=0)) < 0.1
+        return
+    assert [(one.code, one.evidence["plate"].value) for one in found] == [("P236", walk.plates.names[plate])]
+    before, after = found[0].evidence["velocity_residual_m_s"].value
+    assert after < 0.8 * before
+
+
+@pytest.mark.parametrize("plate", [0, 1])
 def test_both_signs_of_one_plate(walk, plate):
     """As of a plate whose corners are in the wrong order: one finding for each axis."""
     signs = np.ones((2, 3))

@@ -95,6 +95,28 @@ def rotated_residual(parts: Sequence[CausedVelocity], angle: float) -> float:
     return float(np.sqrt(np.mean(np.square(np.abs(caused * np.exp(-1j * angle) - (pelvis + centre) / 2)))))
 
 
+def misread_plate_residuals(time: FloatArray, force: FloatArray, parts: Sequence[CausedVelocity]) -> FloatArray:
+    """Compute the residuals (p, r) m/s of both horizontal axes if one plate's axes are rotated or exchanged.
+
+    Args:
+        time, force: (k,) s and (k, p, 3) N of plates.
+        parts: windows of the trial.
+
+    Returns:
+        per plate the residual if its axes are exchanged with either sign, or rotated by 90 degrees either way.
+    """
+    body, caused = (
+        _centred([each[:, 2] + 1j * each[:, 0] for each in of_parts])
+        for of_parts in ([(part.pelvis + part.centre) / 2 for part in parts], [part.caused for part in parts])
+    )
+    residuals = []
+    for own_force in np.moveaxis(force, 1, 0):
+        own = _centred([part.by(time, own_force[:, 2]) + 1j * part.by(time, own_force[:, 0]) for part in parts])
+        true = (1j * own.conj(), -1j * own.conj(), 1j * own, -1j * own)
+        residuals.append([np.sqrt(np.mean(np.square(np.abs(caused - body - own + each)))) for each in true])
+    return np.array(residuals)
+
+
 def _scaled(plate: int | None, off: FloatArray, own: FloatArray) -> Scaled:
     share = float(own @ off) / max(float(own @ own), 1e-12)
     return Scaled(plate, 1.0 / (1.0 - share) if share < 1.0 else np.inf, float(np.std(off - share * own)))
