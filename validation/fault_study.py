@@ -57,11 +57,12 @@ class JointMoments:
 
 @dataclass(frozen=True, eq=False)
 class SoundWalk:
-    """A fault-free walk: its findings, and its joint moments; None where it cannot be fitted."""
+    """A fault-free walk: its findings by fit and by check, and its joint moments; None where it cannot be fitted."""
 
     name: str
     subject: SubjectFile
     findings: tuple[Finding, ...]
+    checked: tuple[Finding, ...]
     moments: JointMoments | None
 
 
@@ -158,14 +159,15 @@ def _sound(case: tuple[str, SubjectFile]) -> SoundWalk:
     name, subject = case
     with TemporaryDirectory() as folder:
         path = write_person(Path(folder), _person(subject, name))
-        findings, moments = checked(path), None
+        by_check = checked(path)
+        findings, moments = by_check, None
         try:
             fit = fit_subject(path)
         except KinertiaError as error:
-            findings = findings_of(error) or findings
+            findings = findings_of(error) or by_check
         else:
             findings, moments = fit.findings, moments_of(fit)
-    return SoundWalk(name, subject, findings, moments)
+    return SoundWalk(name, subject, findings, by_check, moments)
 
 
 def _spoilt(case: tuple[SoundWalk, str]) -> FaultOutcome:
@@ -181,7 +183,7 @@ def outcome_of(sound: SoundWalk, mistake: Mistake) -> FaultOutcome:
         return case
     with TemporaryDirectory() as folder:
         path = write_person(Path(folder), person)
-        by_check = judged(case, mistake, sound.findings, checked(path), "check")
+        by_check = judged(case, mistake, sound.checked, checked(path), "check")
         if by_check is not None and by_check.outcome == "named":
             return by_check
         try:

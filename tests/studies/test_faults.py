@@ -144,8 +144,8 @@ def test_changes_are_counted_in_deviations():
 def outcomes():
     """Of two walks and three mistakes, made up."""
     walks = [
-        SoundWalk("one", None, (), None),
-        SoundWalk("other", None, FAULTY, JointMoments(None, (), None, None)),
+        SoundWalk("one", None, (), (), None),
+        SoundWalk("other", None, FAULTY, FAULTY, JointMoments(None, (), None, None)),
     ]
     of_mistakes = [
         FaultOutcome("one", "a", "named", "P213", "said", "check"),
@@ -155,7 +155,7 @@ def outcomes():
         FaultOutcome("one", "c", "harmless", change_sd=0.5, change_nm=1.0),
         FaultOutcome("other", "c", "warned", "M113", "other", "check"),
     ]
-    laboratories = [SoundWalk("laboratory 1", None, (), JointMoments(None, (), None, None))]
+    laboratories = [SoundWalk("laboratory 1", None, (), (), JointMoments(None, (), None, None))]
     return walks, of_mistakes, laboratories
 
 

@@ -12,6 +12,7 @@ from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.data import Markers, PlateLoads
 from kinertia.trial.sampled_time import runs
 from loads_and_feet import doubted, error_of, place_findings
+from plate_findings import codes, context_of, found_in
 from recordings import RUNS, SQUATS, WALKS
 from walk_on_plates import ALL_STEPS
 from walk_on_plates import FEET as SIMPLE_FEET
@@ -73,6 +74,20 @@ def test_offsets_across_the_walk(name, walk, offset_m):
     (found,) = [one for one in place_findings(moved(recording, (0.0, 0.0, offset_m)), feet) if one.code == "P243"]
     assert found.severity is Severity.WARNING
     assert found.evidence["offset_m"].value[1] == pytest.approx(offset_m + BESIDE_M.get(name, 0.0), abs=0.01)
+
+
+def test_a_foot_that_lacks_a_marker_is_not_a_displaced_laboratory(name, walk):
+    """Its line from heel to toe is then another one than the other foot's."""
+    recording, feet = walk
+    toes = {
+        label for label in choose_marker_set(recording.markers.labels).landmarks.get("toe_r", ()) if label in feet["r"]
+    }
+    if not toes or len(feet["r"]) < 3:
+        return
+    positions = recording.markers.positions.copy()
+    positions[:, [recording.markers.labels.index(label) for label in toes]] = np.nan
+    lacking = replace(recording, markers=replace(recording.markers, positions=positions))
+    assert "P243" not in codes(found_in(context_of(lacking)))
 
 
 @pytest.mark.parametrize("offset_m", [0.3, -0.3])

@@ -20,7 +20,12 @@ from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.contact_fit import Hypothesis
 from kinertia.diagnostics.evidence.plate_contacts import FAR_M, PlateContact, displaced
 from kinertia.diagnostics.evidence.vertical_acceleration import MOST_LEFT, vertical_match_of
-from kinertia.diagnostics.plates.heel_landing import goes_forwards, lands_on_heels, shows_whole_feet
+from kinertia.diagnostics.plates.heel_landing import (
+    goes_forwards,
+    lands_on_heels,
+    shows_feet_alike,
+    shows_whole_feet,
+)
 from kinertia.diagnostics.plates.interchanged_plates import interchanged_plates
 from kinertia.diagnostics.plates.rotated_plates import rotated_plates
 from kinertia.diagnostics.timing.contact_delays import contact_delays, stance_durations
@@ -69,7 +74,7 @@ def loads_and_feet(context: RecordingContext) -> Iterator[Finding]:
         yield _with_runners_up([one.finding for one in ranked])
         return
     yield from _stray(context)
-    if goes_forwards(context):
+    if goes_forwards(context) and shows_feet_alike(context):
         yield from _offset(context)
 
 

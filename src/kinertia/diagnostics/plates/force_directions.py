@@ -177,11 +177,14 @@ def _misread_plate(
     residual = float(left.min())
     if residual > limit:
         return None
-    evidence = {
-        "velocity_residual_m_s": Quantity((as_read, residual), "m/s", limit=limit),
-        "rivals_m_s": Quantity(rivals, "m/s"),
-    }
-    return _Hypothesis(finding("P236", context.at(), plate=Quantity(plates.names[best]), **evidence), residual)
+    found = finding(
+        "P236",
+        context.at(),
+        plate=Quantity(plates.names[best]),
+        velocity_residual_m_s=Quantity((as_read, residual), "m/s", limit=limit),
+        rivals_m_s=Quantity(rivals, "m/s"),
+    )
+    return _Hypothesis(found, residual)
 
 
 def _best_explained(plates: PlateLoads, parts: Sequence[CausedVelocity], axis: int) -> VelocityResidual:

@@ -21,6 +21,18 @@ def goes_forwards(context: RecordingContext) -> bool:
     return shows_whole_feet(context) and not context.walks_backwards
 
 
+def shows_feet_alike(context: RecordingContext) -> bool:
+    """Return whether the same landmarks of both feet are visible: else their lines from heel to toe are not alike."""
+    if context.marker_set is None:
+        return False
+    names = [name for end in _ENDS for name in end]
+    shown = [
+        [not context.seen_labels.isdisjoint(context.marker_set.landmarks.get(f"{name}_{side}", ())) for name in names]
+        for side in "rl"
+    ]
+    return shown[0] == shown[1]
+
+
 def shows_whole_feet(context: RecordingContext) -> bool:
     """Return whether heel and forefoot of both feet are visible: loads are between them, foot-off is not heel-off."""
     feet, marker_set = context.foot_trajectories, context.marker_set
