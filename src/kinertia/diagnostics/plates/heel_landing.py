@@ -22,15 +22,14 @@ def goes_forwards(context: RecordingContext) -> bool:
 
 
 def shows_feet_alike(context: RecordingContext) -> bool:
-    """Return whether the same landmarks of both feet are visible: else their lines from heel to toe are not alike."""
+    """Return whether the same markers of both feet are visible: else their lines from heel to toe are not alike."""
     if context.marker_set is None:
         return False
-    names = [name for end in _ENDS for name in end]
-    shown = [
-        [not context.seen_labels.isdisjoint(context.marker_set.landmarks.get(f"{name}_{side}", ())) for name in names]
-        for side in "rl"
-    ]
-    return shown[0] == shown[1]
+    landmarks, seen = context.marker_set.landmarks, context.seen_labels
+    right, left = (
+        [len(seen.intersection(landmarks.get(f"{name}_{side}", ()))) for end in _ENDS for name in end] for side in "rl"
+    )
+    return right == left
 
 
 def shows_whole_feet(context: RecordingContext) -> bool:
