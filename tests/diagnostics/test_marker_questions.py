@@ -73,3 +73,18 @@ def test_one_fault_has_one_cause(fault, code, severity, recording_of):
     context = context_of(changed(walk, fault), choose_marker_set(walk.labels))
     open_findings = [one for one in explained(asked(MOTION, context)) if one.is_open]
     assert {(one.code, one.severity) for one in open_findings} == {(code, severity)}
+
+
+def test_labels_that_change_sides_are_no_missing_frames(recording_of):
+    """Most markers jump at once, to where their counterparts were."""
+    walk = recording_of("synthetic/walk.c3d").markers
+    twins = [label.translate(str.maketrans("RL", "LR", "")) if label[:1] in "RL" else label for label in walk.labels]
+    order = [walk.labels.index(twin) if twin in walk.labels else k for k, twin in enumerate(twins)]
+    assert sum(k != own for k, own in enumerate(order)) > len(order) / 2
+
+    def exchanged(places, time):
+        places[180:] = places[180:, order]
+
+    context = context_of(changed(walk, exchanged), choose_marker_set(walk.labels))
+    open_findings = [one for one in explained(asked(MOTION, context)) if one.is_open]
+    assert {one.code for one in open_findings} == {"L211"}
