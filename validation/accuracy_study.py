@@ -174,10 +174,10 @@ def run_draw(seed: int, case: tuple[Scenario, int]) -> Draw:
     drawn = estimate_person(seed, case)
     person, prior, trials, seen, result = drawn.person, drawn.prior, drawn.trials, drawn.seen, drawn.result
     trial = trials[0]
-    true = [at_truth(o, truth) for o, truth in zip(seen.alone, trials, strict=True)]
+    true = [at_truth(o, truth) for o, truth in zip(seen.separate, trials, strict=True)]
     there = MapProblem(trial.skeleton, replace(prior, mean=person.bsp), drawn.calibration, true)
     bound = Information(there, seen.repeats).root(range(len(true)))
-    inside = np.flatnonzero(seen.alone[0].dynamic)
+    inside = np.flatnonzero(seen.separate[0].dynamic)
     after = Outcome(result.skeleton, result.bsp, result.motions[0].cut(inside), result.reactions[0])
     return Draw(
         drawn.errors,

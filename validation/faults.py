@@ -102,7 +102,7 @@ def faults_markdown(
         summary=faults_sentence(sound, outcomes, laboratories),
         table=_table(["fault", *(walk.name for walk in sound)], [*most, [f"**{cell}**" for cell in last]]),
         codes=_table(_CODE_HEADINGS, code_rows([*sound, *laboratories], outcomes)),
-        sound="\n".join(f"- {sentence}" for sentence in _said_of_sound([*sound, *laboratories])),
+        sound="\n".join(f"- {sentence}" for sentence in _findings_of_sound([*sound, *laboratories])),
     )
 
 
@@ -157,7 +157,7 @@ def _count(walks: Sequence[SoundWalk], least: Severity) -> int:
     return sum(walk.moments is None or any(one.severity >= least for one in reported(walk.findings)) for walk in walks)
 
 
-def _said_of_sound(sound: Sequence[SoundWalk]) -> list[str]:
+def _findings_of_sound(sound: Sequence[SoundWalk]) -> list[str]:
     """List the findings in fault-free walks."""
     found = ("; ".join(f"{one.code} {one.message}" for one in reported(walk.findings)) or "nothing" for walk in sound)
     return [f"{walk.name}: {sentences}" for walk, sentences in zip(sound, found, strict=True)]

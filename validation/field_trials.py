@@ -22,7 +22,7 @@ import typer
 
 from kinertia.cli.app import main as kinertia
 from validation.measured_data import data_folder
-from validation.measured_trials import severe, table, told, unexplained
+from validation.measured_trials import messages_of, severe, table, unexplained
 from validation.page import write_page
 from validation.walks import fit_arguments
 
@@ -144,7 +144,7 @@ def document(outcomes: Sequence[tuple[Case, Outcome]]) -> str:
         codes = " ".join(dict.fromkeys(one["code"] for one in severe(outcome.content))) or "-"
         end = [str(outcome.status), str(outcome.tries), codes, outcome.residuals(), f"{outcome.seconds:.0f}"]
         rows.append([case.title, case.truth, f"no: {against}" if against else "yes", *end])
-        messages += [f"- {case.title}: {message}" for message in dict.fromkeys(told(outcome.content))]
+        messages += [f"- {case.title}: {message}" for message in dict.fromkeys(messages_of(outcome.content))]
     heads = ["recording", "what is true of it", "as it should be", "exit status", "tries", "findings"]
     heads += ["residuals (N, N m), literature → estimate", "s"]
     good = sum(row[2] == "yes" for row in rows)
@@ -182,7 +182,7 @@ def main(
             outcomes.append((case, outcome))
             against = case.against(outcome) or "yes"
             print(f"{case.title}: {against} (status {outcome.status}, {outcome.seconds:.0f} s)", flush=True)
-            for message in told(outcome.content):
+            for message in messages_of(outcome.content):
                 print(f"    {message}", flush=True)
     if not part:
         write_page("field-trials", document(outcomes))

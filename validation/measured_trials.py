@@ -38,7 +38,7 @@ def severe(run: Mapping[str, Any]) -> list[dict[str, Any]]:
     return [one for one in unexplained(run) if one["severity"] in ("WARNING", "ERROR")]
 
 
-def told(run: Mapping[str, Any]) -> list[str]:
+def messages_of(run: Mapping[str, Any]) -> list[str]:
     """Return code and message of findings that lower a verdict."""
     return [f"{one['code']} {one['message']}" for one in severe(run)]
 
@@ -96,7 +96,7 @@ def document(runs: dict[str, dict[str, Any]]) -> str:
         ["walk", *times],
         ([WALKS[name], *(f"{t['seconds'][stage]:.2f}" for stage in times)] for name, t in trials.items()),
     )
-    warnings = "\n".join(f"- {WALKS[name]}: {each}" for name, run in runs.items() for each in told(run))
+    warnings = "\n".join(f"- {WALKS[name]}: {each}" for name, run in runs.items() for each in messages_of(run))
     return f"""# Measured trials
 
 What `kinertia fit` gives on four measured walks, one trial each, with its default settings.

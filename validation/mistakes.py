@@ -34,23 +34,23 @@ def _subject(**factors: float) -> Change:
 
     def change(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPerson:
         stated = {key: factor * getattr(person.subject, key) for key, factor in factors.items()}
-        return _said(person, stated)
+        return _restated(person, stated)
 
     return change
 
 
 def _more(**terms: float) -> Change:
     def change(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPerson:
-        return _said(person, {key: getattr(person.subject, key) + term for key, term in terms.items()})
+        return _restated(person, {key: getattr(person.subject, key) + term for key, term in terms.items()})
 
     return change
 
 
 def _other_sex(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPerson:
-    return _said(person, {"sex": {"male": "female", "female": "male"}[person.subject.sex or "male"]})
+    return _restated(person, {"sex": {"male": "female", "female": "male"}[person.subject.sex or "male"]})
 
 
-def _said(person: MeasuredPerson, stated: dict[str, object]) -> MeasuredPerson:
+def _restated(person: MeasuredPerson, stated: dict[str, object]) -> MeasuredPerson:
     """Change stated data in the subject file, and in the static trial where they are stated as well."""
     known = {key: value for key, value in stated.items() if getattr(person.static, key, None) is not None}
     static = replace(person.static, **known)  # type: ignore[arg-type]

@@ -41,4 +41,4 @@ def observation_of(
 ) -> Observation:
     """Return the observation of a synthetic trial with these markers and foot loads (n, 2, 6)."""
     kinematics = kinematics_of(trial, markers, loads)
-    return observe(trial.skeleton, [kinematics], trial.bsp.total_mass_kg, [bandwidth]).together[0]
+    return observe(trial.skeleton, [kinematics], trial.bsp.total_mass_kg, [bandwidth]).pooled[0]

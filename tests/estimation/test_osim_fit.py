@@ -16,7 +16,7 @@ from kinertia.io.sto import read_sto
 from kinertia.io.trc import read_trc
 from recordings import FITTED
 from validation import osim_models
-from validation.measured_trials import told
+from validation.measured_trials import messages_of
 
 CASES = [
     case if case[0] == "synthetic" or case == ("gait2354", False) else pytest.param(*case, marks=pytest.mark.slow)
@@ -144,7 +144,7 @@ def test_page_of_models(fit_with_model):
         residual = trial["residual_force_rms_N"]["estimate"], trial["residual_moment_rms_Nm"]["estimate"]
         cells = rf"\| {trial['marker_rms_m']['final'] * 1e3:.1f} \|.*\| {residual[0]:.1f} \|.*\| {residual[1]:.1f} \|"
         assert re.search(rf"\| {title}: subject01_walk1 .*{cells}", page)
-        for each in told(summary):
+        for each in messages_of(summary):
             assert f"- {title}: {each}" in page
 
 

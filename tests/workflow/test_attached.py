@@ -148,7 +148,7 @@ def test_an_unknown_mass_is_found_within_its_error_bar_and_moments_are_better_fo
     for seed in range(4):
         trial, prior, skeleton, recorded = carrying(np.random.default_rng(seed))
         seen = observe(skeleton, recorded, prior.mass_kg, Bandwidth.of(recorded))
-        result = estimate_simultaneous(skeleton, prior, calibration_prior(skeleton), seen.together)
+        result = estimate_simultaneous(skeleton, prior, calibration_prior(skeleton), seen.pooled)
         assert result.converged
         error = result.bsp.mass_kg[-1] - trial.bsp.mass_kg[-1]
         sd = np.sqrt(result.bsp_covariance[-10, -10])

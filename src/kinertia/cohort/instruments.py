@@ -56,8 +56,8 @@ def drift(rows: pd.DataFrame) -> Iterator[Part]:
     panels = [_panel(str(unknown), colours, of) for unknown, of in dated.groupby("unknown", sort=False)]
     people, days = dated["person"].nunique(), dated["date"].nunique()
     without = rows["person"].nunique() - people
-    said = f"{people} people on {days} day{'s' if days > 1 else ''}"
-    text = (f"{said}; of {without} no date is known." if without else f"{said}.",)
+    counts = f"{people} people on {days} day{'s' if days > 1 else ''}"
+    text = (f"{counts}; of {without} no date is known." if without else f"{counts}.",)
     figure = small_multiples(panels, "Plates and clock over time, one panel for each kind of error.", {"type": "date"})
     caption = (
         "How far plates and clock are off by all people of a day together, with 95 % intervals. The estimate starts "

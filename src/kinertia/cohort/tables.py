@@ -250,8 +250,8 @@ def _instruments(fit: Fit, day: date | None, with_session: bool) -> dict[str, An
     """Return the person's information on plates and synchronisation; nothing by the two-level method."""
     errors = () if fit.posterior is None else fit.posterior.instrument_errors
     columns = {name: values for name, values in calibration_columns(errors).items() if name in _COLUMNS["instruments"]}
-    said = {"date": None if day is None else day.isoformat(), "with_session": with_session}
-    return {**{name: [value] * len(errors) for name, value in said.items()}, **columns}
+    shared = {"date": None if day is None else day.isoformat(), "with_session": with_session}
+    return {**{name: [value] * len(errors) for name, value in shared.items()}, **columns}
 
 
 def _scores(person: str, folder: Path, norms: Mapping[str, Norm]) -> dict[str, Any]:

@@ -141,8 +141,8 @@ def measured_body(
     except PriorError as error:
         if implausible:  # the likelier cause, in the words of the form
             blocking = [one.at(Severity.ERROR) for one in implausible]
-            told = "; ".join(one.message for one in blocking[:_FEW])
-            raise PriorError(f"no body has these girths and lengths: {told}").with_finding(blocking[0]) from error
+            reasons = "; ".join(one.message for one in blocking[:_FEW])
+            raise PriorError(f"no body has these girths and lengths: {reasons}").with_finding(blocking[0]) from error
         raise
 
 
@@ -248,9 +248,9 @@ def _predicted(
     return table[np.arange(len(KINDS))[:, None], [[_column(kind, name) for name in _TELLS] for kind in KINDS]]
 
 
-def _column(kind: str, told: str) -> int:
+def _column(kind: str, measured: str) -> int:
     along = "com_x" if kind == "foot_r" else "com_y"
-    return PARAMETERS.index(along if told == "com" else told)
+    return PARAMETERS.index(along if measured == "com" else measured)
 
 
 def with_measures(
@@ -284,8 +284,8 @@ def with_measures(
     seen = np.zeros((body.values.size, 10 * len(names)))
     for i, kind in enumerate(KINDS):
         both = [name for name in names if name in (kind, kind.removesuffix("_r") + "_l") and name not in artificial]
-        for name, (j, told) in product(both, enumerate(_TELLS)):
-            seen[len(_TELLS) * i + j, 10 * names.index(name) + _column(kind, told)] = 1.0 / len(both)
+        for name, (j, measured) in product(both, enumerate(_TELLS)):
+            seen[len(_TELLS) * i + j, 10 * names.index(name) + _column(kind, measured)] = 1.0 / len(both)
     kept = _with_whole_trunk()
     kept = kept[(kept @ seen).any(axis=1)]  # where both sides are prostheses nothing was measured
     seen, values, errors = kept @ seen, kept @ body.values.ravel(), kept @ body.covariance @ kept.T

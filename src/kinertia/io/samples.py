@@ -64,10 +64,10 @@ def sample_walk(progress: Callable[[str, float], None] = lambda stage, share: No
         )
     for k, name in enumerate(missing):
         share = _Share(partial(_of_all, progress, k, len(missing)))
-        share.tell(0.0)
+        share.report(0.0)
         if failure := _downloaded(name, folder, share):
             raise _unavailable(folder, missing[k:], failure)
-        share.tell(1.0)
+        share.report(1.0)
     return folder
 
 
@@ -150,14 +150,14 @@ class _Share:
     def __init__(self, progress: Callable[[float], None]) -> None:
         self._progress, self._done, self.total = progress, 0, 0
 
-    def tell(self, share: float) -> None:
+    def report(self, share: float) -> None:
         """Report the share of the file received, from 0 to 1."""
         self._progress(share)
 
     def update(self, count: int) -> None:
         """Count this many more bytes as received."""
         self._done += count
-        self.tell(min(self._done / self.total, 1.0) if self.total else 0.0)
+        self.report(min(self._done / self.total, 1.0) if self.total else 0.0)
 
     def reset(self) -> None:
         """Restart from zero."""

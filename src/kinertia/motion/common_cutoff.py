@@ -69,9 +69,9 @@ def _motion_ends_hz(trial: Trial) -> float:
     if len(time) < _FEWEST:
         return ENDS_HZ[-1]
     # means over a hundredth of a second retain what is faster than a cutoff at 15 Hz
-    together = max(1, int((len(time) - 1) / span_s(time) / _ENOUGH_HZ))
-    count = len(time) // together
-    time, force = (part[: count * together].reshape(count, together, -1).mean(axis=1) for part in (time, force))
+    per_sample = max(1, int((len(time) - 1) / span_s(time) / _ENOUGH_HZ))
+    count = len(time) // per_sample
+    time, force = (part[: count * per_sample].reshape(count, per_sample, -1).mean(axis=1) for part in (time, force))
     limit = LEFT_SHARE_OF_WEIGHT * force[:, 1].mean()
     for hz in ENDS_HZ:
         left = force - smooth(time[:, 0], force, hz)(time[:, 0])

@@ -109,28 +109,28 @@ def _sd(fit: Fit) -> np.ndarray:
 def remarks(fits: Mapping[str, Fit]) -> list[str]:
     """List limitations of a comparison."""
     (name, first), *others = fits.items()
-    said = []
+    notes = []
     for other_name, other in others:
         if abs(first.mass_kg - other.mass_kg) > 0.1 * first.mass_kg:
-            said.append(
+            notes.append(
                 f"{name} is of {first.mass_kg:.1f} kg, {other_name} of {other.mass_kg:.1f} kg: is it the same person?"
             )
         lacking = sorted(set(first.estimate.segments) ^ set(other.estimate.segments))
         if lacking:
-            said.append(f"{name} and {other_name} do not share these segments: {', '.join(lacking)}")
+            notes.append(f"{name} and {other_name} do not share these segments: {', '.join(lacking)}")
         if unlike := sorted({segment_name(one.segment) for one in differences(first, other) if not one.same}):
-            said.append(
+            notes.append(
                 f"{name} and {other_name} are of different models: origin and extent differ of {', '.join(unlike)}, "
                 "which have other joints or neighbours, so that nothing tells whether their parameters changed"
             )
-        said += [
+        notes += [
             sentence for joint in _MOMENTS if (sentence := _sign_remark(joint, (name, first), (other_name, other)))
         ]
     without = [one for one, fit in fits.items() if fit.posterior is None]
     if without:
-        whom = f"{name}, which all are compared with" if name in without else ", ".join(without)
-        said.append(f"the two-level method gives no error bars, so nothing tells a change from chance: {whom}")
-    return said
+        subjects = f"{name}, which all are compared with" if name in without else ", ".join(without)
+        notes.append(f"the two-level method gives no error bars, so nothing tells a change from chance: {subjects}")
+    return notes
 
 
 def _sign_remark(joint: str, first: tuple[str, Fit], other: tuple[str, Fit]) -> str:

@@ -250,8 +250,8 @@ def _strides(curves: Sequence[CycleCurve]) -> dict[str, Any]:
     """Draw all strides as one line with gaps between them."""
     x = np.tile(np.append(PERCENT, 100), len(curves)).astype(np.uint8)
     y = np.concatenate([np.append(one.value, np.nan) for one in curves])
-    said = [f"{plain(one.trial)}, {style.SIDES[one.stride.side][0]} stride {one.stride.number}" for one in curves]
-    hover = "%{x:.0f} %: %{y:.3g}<extra>" + (said[0] if len(said) == 1 else "%{fullData.name}") + "</extra>"
+    titles = [f"{plain(one.trial)}, {style.SIDES[one.stride.side][0]} stride {one.stride.number}" for one in curves]
+    hover = "%{x:.0f} %: %{y:.3g}<extra>" + (titles[0] if len(titles) == 1 else "%{fullData.name}") + "</extra>"
     return {"type": "scatter", "mode": "lines", "x": x, "y": compact(y), "hovertemplate": hover}
 
 

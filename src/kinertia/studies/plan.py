@@ -109,7 +109,7 @@ def plan_measured(
     def information_of(chosen: Sequence[int]) -> Information:
         seen = observed(used, prior, [trials[k] for k in chosen], [bandwidths[k] for k in chosen], uncertainty)
         calibration = calibration_prior(used, uncertainty, seen.misplaced_m)
-        return Information(MapProblem(used, prior, calibration, seen.alone), seen.repeats)
+        return Information(MapProblem(used, prior, calibration, seen.separate), seen.repeats)
 
     everything = tuple(range(len(trials)))
     whole = information_of(everything)

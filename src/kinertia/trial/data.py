@@ -276,8 +276,8 @@ class FootLoads:
         on_plate: (k, 2) index of the plate that each foot stands on, or is nearest in time to standing on; left out
             where each foot has a plate of its own.
         noise_n: standard deviation of the vertical force of the noisiest plate while unloaded, N.
-        together: (k,) True where both feet stand on one plate, whose load is assigned to one of them; left out where
-            they never do.
+        on_shared_plate: (k,) True where both feet stand on one plate, whose load is assigned to one of them; left out
+            where they never do.
         corners: (p, 4, 3) m of every plate, or None where the files have none.
 
     Examples:
@@ -292,7 +292,7 @@ class FootLoads:
     plates: tuple[str, ...] = ("right foot", "left foot")
     on_plate: npt.NDArray[np.int_] | None = None
     noise_n: float = 0.0
-    together: BoolArray | None = None
+    on_shared_plate: BoolArray | None = None
     corners: FloatArray | None = None
 
     def __post_init__(self) -> None:
@@ -361,10 +361,10 @@ class Trial:
 
     def carried_windows(self) -> list[tuple[float, float]]:
         """Return windows (s) in which the sum of all loads is known, longest first; both feet may be on one plate."""
-        if self.loads.together is None:
+        if self.loads.on_shared_plate is None:
             return self.windows()
-        together = self.loads.together[nearest_samples(self.loads.time, self.markers.time)]
-        return windows(self.markers.time, self.measured | together)
+        on_shared_plate = self.loads.on_shared_plate[nearest_samples(self.loads.time, self.markers.time)]
+        return windows(self.markers.time, self.measured | on_shared_plate)
 
     def _repr_html_(self) -> str:
         """Return the HTML summary for a notebook: frames, markers and their gaps, measured windows, notes."""

@@ -32,7 +32,7 @@ LONGEST_FLIGHT_S = 1.0
 # Below these, markers of a stationary foot differ by noise only.
 _LEAST_CLEARANCE_M = 0.01
 _LEAST_SPEED_M_S = 0.1
-_FEWEST_TO_JUDGE, _FAR_BEYOND = 3, 3.0
+_FEWEST_TO_JUDGE, _OUTLIER_FACTOR = 3, 3.0
 """With at least so many landings, one that is so many times as fast as usual is excluded."""
 _STANCE, _SLOW_LANDING = 0.9, 2.0
 """With fewer, which may be slow by chance, a foot has landed that is as slow as in this share of the frames under load,
@@ -53,17 +53,17 @@ class GroundContact:
         loaded: (n, 2) True where the right, left foot stands on a loaded plate.
         ground: (n, 2) True where the foot is on the ground, loaded or not.
         inside: (n,) True within the recorded forces.
-        together: (n,) True where one plate carries both feet, so that only the sum of their loads is known.
+        on_shared_plate: (n,) True where one plate carries both feet, so that only the sum of their loads is known.
     """
 
     loaded: BoolArray
     ground: BoolArray
     inside: BoolArray
-    together: BoolArray
+    on_shared_plate: BoolArray
 
     def measured(self, time: FloatArray) -> BoolArray:
         """Return the mask (n,) of frames with complete contact: every foot on the ground stands on a loaded plate."""
-        measured = self.inside & ~self.together & np.asarray(self.loaded | ~self.ground).all(axis=1)
+        measured = self.inside & ~self.on_shared_plate & np.asarray(self.loaded | ~self.ground).all(axis=1)
         flight = measured & ~self.ground.any(axis=1)
         for first, last in runs(flight):
             between = first > 0 and last < len(time) - 1 and measured[first - 1] and measured[last + 1]
@@ -109,8 +109,10 @@ def ground_contact(markers: Markers, loads: FootLoads, feet: FootMarkers, belt: 
                 if carried[first : last + 1].mean() < _ALL_CARRIED:
                     planted |= _stand(move.over(first, last).planted(clearance, landing, leaving), first, last)
             ground[:, foot] |= _off_plates(planted, loaded[:, foot], markers.time)
-    together = np.zeros(len(inside), dtype=bool) if loads.together is None else loads.together[nearest] & inside
-    return GroundContact(loaded, ground, inside, together)
+    on_shared_plate = (
+        np.zeros(len(inside), dtype=bool) if loads.on_shared_plate is None else loads.on_shared_plate[nearest] & inside
+    )
+    return GroundContact(loaded, ground, inside, on_shared_plate)
 
 
 def _learned(moves: Sequence[FootMotion], loaded: BoolArray) -> tuple[float, float, float]:
@@ -152,7 +154,7 @@ def _usual(speeds: Sequence[float]) -> float:
     values = np.array(speeds)
     finite = values[np.isfinite(values)]
     if finite.size >= _FEWEST_TO_JUDGE:
-        finite = finite[finite <= _FAR_BEYOND * np.median(finite)]
+        finite = finite[finite <= _OUTLIER_FACTOR * np.median(finite)]
     return _largest(finite)
 
 

@@ -97,7 +97,7 @@ def assign_plates(recording: Recording, feet: FootMarkers) -> tuple[FootLoads, t
     shorter than `SHORTEST_CONTACT_S` are noise. It is assigned to the foot whose mean marker position is nearest to its
     centre of pressure (horizontally, load-weighted). A contact that carries the feet in turn is divided sample by
     sample; while both feet stand on one plate, as in double support on a treadmill with one belt, the
-    whole load counts for the nearer one, since only the sum is known: these samples are `together`.
+    whole load counts for the nearer one, since only the sum is known: these samples are `on_shared_plate`.
 
     Returns:
         the loads by foot, on the plates' time base, and findings: P273 short loads, P275 feet in turn, P277 declared
@@ -115,7 +115,7 @@ def assign_plates(recording: Recording, feet: FootMarkers) -> tuple[FootLoads, t
     force = np.zeros((len(plates.time), 2, 3))
     moment = np.zeros_like(force)
     most, on_plate = np.zeros((len(plates.time), 2)), np.full((len(plates.time), 2), -1)
-    together = np.zeros(len(plates.time), dtype=bool)
+    on_shared_plate = np.zeros(len(plates.time), dtype=bool)
     findings: list[Finding] = []
     for p, name in enumerate(plates.names):
         where = Where(trial=recording.name, plate=name)
@@ -134,7 +134,7 @@ def assign_plates(recording: Recording, feet: FootMarkers) -> tuple[FootLoads, t
                 height_m,
             )
             feet_of.append(nearer)
-            together[piece] |= _changing(plates.time[piece], nearer)
+            on_shared_plate[piece] |= _changing(plates.time[piece], nearer)
             for foot in range(2):
                 force[piece, foot] += np.where((nearer == foot)[:, None], plates.force[piece, p], 0.0)
                 moment[piece, foot] += np.where((nearer == foot)[:, None], plates.moment[piece, p], 0.0)
@@ -144,7 +144,7 @@ def assign_plates(recording: Recording, feet: FootMarkers) -> tuple[FootLoads, t
         findings += _sorted_otherwise(where, plates.time, contacts, feet_of, plates.declared_feet[p])
     noise_n = max(plates.noise_n or (0.0,))
     held = _held(plates.time, on_plate)
-    both = together if together.any() else None
+    both = on_shared_plate if on_shared_plate.any() else None
     return FootLoads(plates.time, force, moment, plates.names, held, noise_n, both, plates.corners), tuple(findings)
 
 
@@ -262,7 +262,7 @@ def _nothing_measured(
         forces = {"forces": Quantity(_spans(time, contact.inside)), "during": during, **left_out}
         return with_evidence("P278", where, forces, causes=("a window in which there are no forces",))
     both = contact.ground.all(axis=1) & (contact.loaded.sum(axis=1) == 1)
-    shared = float(both.mean()) if loads.together is not None else 0.0
+    shared = float(both.mean()) if loads.on_shared_plate is not None else 0.0
     evidence = {"shared": Quantity(shared, "1", limit=_MOSTLY_SHARED)}
     for foot, name in enumerate(FOOT_NAMES):
         evidence[f"{name}_ground"] = Quantity(_spans(time, contact.ground[:, foot]))

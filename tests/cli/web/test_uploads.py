@@ -5,6 +5,7 @@ import http.client
 import io
 import json
 import zipfile
+from concurrent.futures import ThreadPoolExecutor
 from urllib.parse import quote, urlsplit
 
 import pytest
@@ -157,7 +158,9 @@ def received(person, name, size):
         for _ in range(size // 100_000):
             yield bytes(100_000)
 
-    return asyncio.run(receive(person, name, chunks()))
+    # in a thread of its own: tests in a browser leave an event loop running in this one
+    with ThreadPoolExecutor(1) as pool:
+        return pool.submit(asyncio.run, receive(person, name, chunks())).result()
 
 
 @pytest.mark.parametrize(

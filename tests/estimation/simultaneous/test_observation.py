@@ -25,12 +25,12 @@ def trial():
 
 
 def observed(trial, markers, motion_hz=10.0):
-    return alone(trial.skeleton, kinematics_of(trial, markers), motion_hz)
+    return separate(trial.skeleton, kinematics_of(trial, markers), motion_hz)
 
 
-def alone(skeleton, kinematics, motion_hz=10.0):
+def separate(skeleton, kinematics, motion_hz=10.0):
     seen = observe(skeleton, [kinematics], MASS_KG, [Bandwidth(motion_hz)])
-    return seen.alone[0], seen.noise[0]
+    return seen.separate[0], seen.noise[0]
 
 
 @pytest.fixture(scope="module")
@@ -96,7 +96,7 @@ def test_frames_stay_uniform_where_the_pelvis_is_not_seen(trial):
     gap = slice(50, 58)
     positions[gap, pelvis] = np.nan
     kinematics = kinematics_of(trial, replace(trial.markers, positions=positions))
-    seen, noise = alone(trial.skeleton, kinematics)
+    seen, noise = separate(trial.skeleton, kinematics)
     np.testing.assert_allclose(np.diff(seen.time), 0.01)
     np.testing.assert_allclose(seen.time[seen.dynamic], kinematics.time)
     here = slice(*(int(np.searchsorted(seen.time, trial.time[i] - 1e-9)) for i in (gap.start, gap.stop)))
@@ -108,7 +108,7 @@ def test_frames_stay_uniform_where_the_pelvis_is_not_seen(trial):
 
 def test_only_the_window_is_dynamic_and_its_surroundings_are_markers(trial):
     kinematics = replace(kinematics_of(trial, trial.markers), windows_s=((0.4, 0.6),))
-    seen, _ = alone(trial.skeleton, kinematics)
+    seen, _ = separate(trial.skeleton, kinematics)
     assert seen.time[seen.dynamic][[0, -1]] == pytest.approx([0.4, 0.6])
     assert seen.time[[0, -1]] == pytest.approx([0.4 - AROUND_WINDOW_S, 0.6 + AROUND_WINDOW_S])
     assert seen.ground.loads.time[[0, -1]] == pytest.approx([0.4 - AROUND_WINDOW_S, 0.6 + AROUND_WINDOW_S])
@@ -128,9 +128,9 @@ def test_markers_that_err_together_count_as_few(trial):
     apart = camera_noise(trial.markers, 0.004, rng)
     steps = rng.normal(0.0, 0.004, (len(trial.time), len(trial.skeleton.segments), 3))
     shifted = trial.markers.positions + steps[:, trial.skeleton.marker_segments]
-    together = replace(trial.markers, positions=shifted)
+    pooled = replace(trial.markers, positions=shifted)
     ratios = []
-    for markers in (apart, together):
+    for markers in (apart, pooled):
         seen, noise = observed(trial, markers)
         ratios.append(np.square(seen.marker_sd / np.array([noise.sd_m[n] for n in trial.skeleton.labels])))
     assert np.median(ratios[0]) == pytest.approx(1.0, abs=0.1)
@@ -145,7 +145,7 @@ def test_markers_off_their_places_are_not_noise(trial):
     kinematics = kinematics_of(trial, noisy)
     places = trial.skeleton.marker_locals + rng.normal(0.0, 0.01, trial.skeleton.marker_locals.shape)
     moved = trial.skeleton.with_places(places)
-    (rhs, _), (wrong, _) = (alone(skeleton, kinematics) for skeleton in (trial.skeleton, moved))
+    (rhs, _), (wrong, _) = (separate(skeleton, kinematics) for skeleton in (trial.skeleton, moved))
     np.testing.assert_allclose(wrong.marker_sd, rhs.marker_sd, rtol=1e-6)
 
 
@@ -161,11 +161,11 @@ def test_trials_of_one_person(trial):
     positions[:, thigh] += turned @ [0.0, 0.0, 0.015]
     alike = observe(trial.skeleton, [kinematics_of(trial, each) for each in walks], MASS_KG, [Bandwidth(10.0)] * 2)
     assert alike.repeats == pytest.approx(np.ones((2, 2)), abs=0.1)
-    assert np.max(alike.together[0].displacement_sd_m) < 0.001
+    assert np.max(alike.pooled[0].displacement_sd_m) < 0.001
     kinematics = [kinematics_of(trial, each) for each in (walks[0], replace(walks[1], positions=positions))]
     seen = observe(trial.skeleton, kinematics, MASS_KG, [Bandwidth(10.0)] * 2)
-    assert [o.repeats for o in seen.together] == pytest.approx(seen.repeats.sum(axis=1))
-    for one, both in zip(seen.alone, seen.together, strict=True):
+    assert [o.repeats for o in seen.pooled] == pytest.approx(seen.repeats.sum(axis=1))
+    for one, both in zip(seen.separate, seen.pooled, strict=True):
         assert both.marker_sd == pytest.approx(np.sqrt(both.repeats) * one.marker_sd)
         assert both.force_sd == pytest.approx(np.sqrt(both.repeats) * one.force_sd)
         assert both.moment_sd == pytest.approx(np.sqrt(both.repeats) * one.moment_sd)
@@ -173,7 +173,7 @@ def test_trials_of_one_person(trial):
         # of two: 15 mm / sqrt 2 along one of three axes; inverse kinematics spreads some of it
         assert displaced[thigh] == pytest.approx(np.full(thigh.sum(), 0.015 / np.sqrt(6.0)), rel=0.35)
         assert np.median(displaced[~thigh]) < 0.2 * displaced[thigh].min()
-    (single,) = observe(trial.skeleton, kinematics[:1], MASS_KG, [Bandwidth(10.0)]).together
+    (single,) = observe(trial.skeleton, kinematics[:1], MASS_KG, [Bandwidth(10.0)]).pooled
     assert not np.any(single.displacement_sd_m)
     assert single.repeats == 1.0
 

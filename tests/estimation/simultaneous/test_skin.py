@@ -117,5 +117,5 @@ def test_noise_is_what_skin_leaves(trial):
     seen = observe(trial.skeleton, [kinematics_of(trial, moved)], MASS_KG, [Bandwidth(10.0)])
     size = np.sqrt(np.square(moved.positions - trial.markers.positions).mean())
     assert 0.0005 < np.median(list(seen.noise[0].sd_m.values())) < 0.6 * size
-    assert seen.alone[0].skin is not None
-    assert np.isfinite(seen.alone[0].skin.values).all()
+    assert seen.separate[0].skin is not None
+    assert np.isfinite(seen.separate[0].skin.values).all()

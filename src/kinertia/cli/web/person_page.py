@@ -135,7 +135,7 @@ def person_page(
         problem=problem,
         typed=bool(typed),
         trouble=found,
-        told=told(person, found),
+        explained=explained(person, found),
         draft=notes.get("draft", "") if person.files() else "",
         said=said,
         saved=notes.get("saved", False),
@@ -184,16 +184,16 @@ _PLAIN = (
 _MISSING = re.compile(r"\[subject\] lacks '(\w+)'")
 
 
-class Told(NamedTuple):
+class Explanation(NamedTuple):
     """A problem in plain words (empty where the exact text is plain enough), and as the command line reports it."""
 
     plain: str
     exact: str
 
 
-def told(person: Person, trouble: str) -> Told:
+def explained(person: Person, trouble: str) -> Explanation:
     """Explain the problem with a person's subject file, which is stated without its folder."""
     exact = trouble.replace(f"{person.folder}{os.sep}", "")
     if missing := _MISSING.search(exact):
-        return Told(f"{label_of(missing[1])} is missing: fill it in, then save and check.", exact)
-    return Told(next((plain for pattern, plain in _PLAIN if pattern.search(exact)), ""), exact)
+        return Explanation(f"{label_of(missing[1])} is missing: fill it in, then save and check.", exact)
+    return Explanation(next((plain for pattern, plain in _PLAIN if pattern.search(exact)), ""), exact)

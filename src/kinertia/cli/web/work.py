@@ -53,8 +53,8 @@ class Work:
         """Estimate the time left of this stage from how long its share took; None as long as it is unknown."""
         if not 0.0 < self.share < 1.0:
             return None
-        left_when_told = (self._reported - self._since) * (1.0 - self.share) / self.share
-        return max(left_when_told - (time.monotonic() - self._reported), 1.0)
+        left_on_request = (self._reported - self._since) * (1.0 - self.share) / self.share
+        return max(left_on_request - (time.monotonic() - self._reported), 1.0)
 
     def cancel(self) -> None:
         """Cancel the work, whatever its stage; may be called from any thread."""

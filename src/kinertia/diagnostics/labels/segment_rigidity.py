@@ -29,7 +29,7 @@ _ELSEWHERE = 0.35
 """Change of the distances to the markers of the segment with which a marker goes, over that to those of its own."""
 _OWN_WAY = ("torso", "head", "upper_arm", "forearm", "hand")
 """Arms swing with the other leg, and seem to go with it."""
-_TOGETHER_M, _MUCH_BETTER = 0.04, 0.4
+_TOGETHER_M, _CLEARLY_BETTER = 0.04, 0.4
 _PERCENTILES = (0.1, 0.9)
 _SPREAD = 2.563 * np.sqrt(2.0)
 """Spread between these percentiles of the distance of two markers with noise of SD 1."""
@@ -111,7 +111,7 @@ def _better(markers: Markers, marker_set: MarkerSet, odd: str, change_m: float) 
     mates = [mate for mate in markers.labels if mate in owners and owners[mate] != owners.get(odd)]
     changes = _changes_m(markers, [(odd, mate) for mate in mates], np.inf)
     best = int(np.argmin(changes)) if mates else -1
-    if best < 0 or changes[best] > min(_TOGETHER_M, _MUCH_BETTER * change_m):
+    if best < 0 or changes[best] > min(_TOGETHER_M, _CLEARLY_BETTER * change_m):
         return {}
     return {
         "better_segment": Quantity(in_words(owners[mates[best]])),

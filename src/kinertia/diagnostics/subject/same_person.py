@@ -214,11 +214,11 @@ def _called(context: PersonContext, reference: RecordingContext) -> str:
 
 def _joined(found: Sequence[Sequence[Finding]]) -> Iterator[Finding]:
     """Merge the same finding against several references into one, with all their names."""
-    together: dict[tuple[str, Where], Finding] = {}
+    merged: dict[tuple[str, Where], Finding] = {}
     for one in (each for own in found for each in own):
         key = one.code, one.where
-        if key in together:
-            names = Quantity(f"{together[key].evidence['reference'].value} and {one.evidence['reference'].value}")
-            one = replace(together[key], evidence={**together[key].evidence, "reference": names})
-        together[key] = one
-    yield from together.values()
+        if key in merged:
+            names = Quantity(f"{merged[key].evidence['reference'].value} and {one.evidence['reference'].value}")
+            one = replace(merged[key], evidence={**merged[key].evidence, "reference": names})
+        merged[key] = one
+    yield from merged.values()

@@ -147,21 +147,21 @@ def fit_simultaneous(
     used = used_skeleton(skeleton, every, uncertainty)
     bandwidths = bandwidths or Bandwidth.of(trials)
     seen = observed(used, prior, every, [*bandwidths, *Bandwidth.of(functional)], uncertainty)
-    together = seen.together
+    pooled = seen.pooled
     calibration = calibration_prior(used, uncertainty, seen.misplaced_m)
     count = len(trials)
-    others = [reading(*each) for each in zip(together[:count], otherwise, bandwidths, strict=True)] if otherwise else []
-    others += together[count:] if otherwise else ()
-    result = estimate_simultaneous(used, prior, calibration, together, progress, others, terms).of_first(count)
-    together = together[:count]
+    others = [reading(*each) for each in zip(pooled[:count], otherwise, bandwidths, strict=True)] if otherwise else []
+    others += pooled[count:] if otherwise else ()
+    result = estimate_simultaneous(used, prior, calibration, pooled, progress, others, terms).of_first(count)
+    pooled = pooled[:count]
     calibrated = result.skeleton.carrying(None)
     staying = uncertainty.marker_sd_m is None
     if staying:
         calibrated = calibrated.with_markers(used.markers)
-    dynamic = [np.flatnonzero(o.dynamic) for o in together]
+    dynamic = [np.flatnonzero(o.dynamic) for o in pooled]
     motions = tuple(m.cut(frames) for m, frames in zip(result.motions, dynamic, strict=True))
     courses = tuple(m.q[at[0] : at[-1] + 1] for m, at in zip(result.motions, dynamic, strict=True))
-    loads = tuple(every[o.dynamic] for every, o in zip(result.foot_loads, together, strict=True))
+    loads = tuple(every[o.dynamic] for every, o in zip(result.foot_loads, pooled, strict=True))
     covariance, before = (uncertainty.whole_covariance(c) for c in (result.bsp_covariance, prior.covariance))
     posterior = Posterior(
         np.sqrt(np.diag(before)).reshape(-1, 10),
@@ -171,13 +171,13 @@ def fit_simultaneous(
         seen.noise[:count],
         result.iterations,
         base_parameters(
-            result.skeleton, result.bsp, prior.sd, motions, [np.repeat([o.force_sd, o.moment_sd], 3) for o in together]
+            result.skeleton, result.bsp, prior.sd, motions, [np.repeat([o.force_sd, o.moment_sd], 3) for o in pooled]
         ),
         result.instruments,
         uncertainty.whole(prior.mean),
         unlikeness(prior, result.bsp, result.bsp_covariance),
         marker_distances_m=_marker_distances(result, trials),
-        down_weighted=tuple(down_weighted(np.broadcast_to(o.impact, o.dynamic.shape)[o.dynamic]) for o in together),
+        down_weighted=tuple(down_weighted(np.broadcast_to(o.impact, o.dynamic.shape)[o.dynamic]) for o in pooled),
         draws=result.draws.without_places() if staying else result.draws,
     )
     return SimultaneousFit(

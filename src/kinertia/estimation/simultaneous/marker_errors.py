@@ -82,7 +82,7 @@ class ErrorProcess(NamedTuple):
         return self.new / (1.0 - one - two) ** 2
 
     @classmethod
-    def read(cls, frames: float, together: np.ndarray) -> tuple[ErrorProcess, float]:
+    def read(cls, frames: float, products: np.ndarray) -> tuple[ErrorProcess, float]:
         """Fit the slowest process with as much innovation per frame as the errors have; return it with its variance.
 
         The errors have unit variance and are correlated over so many frames. If even a first-order process has too
@@ -91,7 +91,7 @@ class ErrorProcess(NamedTuple):
 
         Args:
             frames: number of frames over which the errors are correlated.
-            together: (k, 3, 3) mean products of the errors of a frame and of the two before it, for several kinds of
+            products: (k, 3, 3) mean products of the errors of a frame and of the two before it, for several kinds of
                 errors; the largest innovation counts.
         """
         double = cls.alike_over(frames)
@@ -100,7 +100,7 @@ class ErrorProcess(NamedTuple):
         for process in (double, *slow, *short):
             variance = frames / process.frames
             beyond = np.array([1.0, *(-each for each in process.of_before)])
-            if np.max(beyond @ together @ beyond) <= variance * process.new:
+            if np.max(beyond @ products @ beyond) <= variance * process.new:
                 break
         return process, max(variance, 1.0)
 

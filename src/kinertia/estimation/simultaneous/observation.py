@@ -48,22 +48,22 @@ class Observations:
     """Observations of the trials of one person.
 
     Attributes:
-        alone: per trial, with the standard deviations of errors that never recur.
+        separate: per trial, with the standard deviations of errors that never recur.
         noise: per trial.
         misplaced_m: (m,) standard deviation of the markers' mean positions in their segments, over the trials, from the
             skeleton's.
         repeats: (t, t) how often the errors of each trial recur in each (`error_repetition.repeats`).
     """
 
-    alone: tuple[Observation, ...]
+    separate: tuple[Observation, ...]
     noise: tuple[MarkerNoise, ...]
     misplaced_m: np.ndarray
     repeats: np.ndarray
 
     @property
-    def together(self) -> tuple[Observation, ...]:
+    def pooled(self) -> tuple[Observation, ...]:
         """Observations of the trials for one estimate from all of them: errors that recur count once."""
-        return tuple(o.repeated(count) for o, count in zip(self.alone, self.repeats.sum(axis=1), strict=True))
+        return tuple(o.repeated(count) for o, count in zip(self.separate, self.repeats.sum(axis=1), strict=True))
 
 
 def observe(
@@ -102,8 +102,8 @@ def observe(
         replace(one, repeats=float(count), displacement_sd_m={label: by_label[label] for label in one.sd_m})
         for (_, one), count in zip(pairs, counts.sum(axis=1), strict=True)
     ]
-    together = tuple(replace(o, displacement_sd_m=displaced) for o, _ in pairs)
-    return Observations(together, tuple(noise), _misplaced(skeleton, rest.displaced), counts)
+    pooled = tuple(replace(o, displacement_sd_m=displaced) for o, _ in pairs)
+    return Observations(pooled, tuple(noise), _misplaced(skeleton, rest.displaced), counts)
 
 
 def _displacement_sd(skeleton: Skeleton, displaced: np.ndarray) -> np.ndarray:
