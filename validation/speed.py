@@ -25,7 +25,7 @@ from threadpoolctl import threadpool_limits
 
 from kinertia.estimation.input_checks import known
 from kinertia.estimation.study_parameters import ParameterVector
-from kinertia.estimation.two_level import TwoLevelProblem, Window, stretches
+from kinertia.estimation.two_level import TwoLevelProblem, Window, intervals
 from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.io.recording import read_recording
 from kinertia.io.sto import read_sto, write_sto
@@ -134,7 +134,7 @@ def ours(one: Walk, runs: int) -> tuple[dict[str, float], int]:
     columns = trial.loads.wrench.reshape(-1, 12)
     loads = smooth(trial.loads.time, columns, 10.0)(ik.time).reshape(-1, 2, 6)
     bsp = literature_bsp(one.mass_kg, known(one.subject.height_m), known(one.subject.sex), model.geometry, "dumas")
-    parts = stretches(Window(ik.time, motion, loads.sum(axis=1)))
+    parts = intervals(Window(ik.time, motion, loads.sum(axis=1)))
     vector = ParameterVector(bsp, symmetric=True)
     problem, theta = TwoLevelProblem(skeleton, vector, parts, True, 0.5), vector.values(bsp)
     seconds["two-level evaluation"], _ = best(runs, lambda: (problem.residuals(theta), problem.jacobian(theta)))

@@ -4,13 +4,13 @@ import pytest
 from generic_static import generic_model, smooth_motion
 from kinertia.estimation.study_parameters import ParameterVector
 from kinertia.estimation.two_level import (
-    MAX_STRETCH_S,
+    LONGEST_INTERVAL_S,
     Integration,
     TwoLevelProblem,
     Window,
     correct_pelvis,
     estimate_two_level,
-    stretches,
+    intervals,
 )
 from kinertia.model.anthropometry import literature_bsp
 from kinertia.model.bsp import BodySegmentParameters
@@ -154,10 +154,10 @@ def test_estimate_with_correction_explains_the_loads_better(model, truth):
 
 
 @pytest.mark.parametrize("seconds", [0.5, 1.1, 1.2, 3.4])
-def test_stretches_cover_the_window_once(model, truth, seconds):
+def test_intervals_cover_the_window_once(model, truth, seconds):
     window = window_of(model.skeleton, truth, n=round(seconds * 60) + 1)
-    parts = stretches(window)
-    assert max(part.time[-1] - part.time[0] for part in parts) <= MAX_STRETCH_S + 1e-9
+    parts = intervals(window)
+    assert max(part.time[-1] - part.time[0] for part in parts) <= LONGEST_INTERVAL_S + 1e-9
     np.testing.assert_array_equal(np.concatenate([part.time for part in parts]), window.time)
     np.testing.assert_array_equal(np.concatenate([part.motion.qdd for part in parts]), window.motion.qdd)
     np.testing.assert_array_equal(np.concatenate([part.wrench for part in parts]), window.wrench)

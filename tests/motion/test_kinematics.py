@@ -120,20 +120,20 @@ def test_a_short_gap_is_bridged(skeleton, trial, motion):
 @pytest.mark.parametrize(
     ("start", "windows"), [(0.6, [(0.05, 0.59), (0.91, 1.95)]), (1.2, [(0.05, 1.19), (1.51, 1.95)])]
 )
-def test_a_long_gap_ends_a_stretch(skeleton, trial, motion, start, windows):
+def test_a_long_gap_ends_an_interval(skeleton, trial, motion, start, windows):
     gapped = hidden(trial, ["shank_r", "foot_r"], start, start + 0.3)
     kinematics = solve_kinematics(skeleton, gapped, 0.0, 10.0)
     np.testing.assert_allclose(kinematics.windows_s, windows, atol=1e-9)
     assert kinematics.window_s == pytest.approx((0.05, 1.95))
-    of_stretches = [kinematics.time[part][[0, -1]] for part in kinematics.stretches]
-    np.testing.assert_allclose(of_stretches, windows, atol=1e-9)
+    of_intervals = [kinematics.time[part][[0, -1]] for part in kinematics.intervals]
+    np.testing.assert_allclose(of_intervals, windows, atol=1e-9)
     assert not kinematics.inside(np.array([start + 0.1])).any()
     assert np.abs(kinematics.motion.q - motion.q[kinematics.frames])[:, 3:].max() < np.radians(2.0)
     (found,) = kinematics.findings
     assert (found.code, found.evidence["count"].value, found.evidence["left_out"].value) == ("P270", 2, 0)
 
 
-def test_a_stretch_that_is_too_short_is_left_out(skeleton, trial):
+def test_an_interval_that_is_too_short_is_left_out(skeleton, trial):
     measured = np.ones(201, dtype=bool)
     measured[80:90] = measured[100:105] = False
     kinematics = solve_kinematics(skeleton, replace(trial, measured=measured), 0.0, 10.0)

@@ -132,7 +132,7 @@ def test_axes_that_do_not_move_are_left_out(skeleton, state):
 
 
 def test_no_frame_knows_of_another(skeleton, bsp):
-    """A stretch of a motion gives what the whole motion gives there."""
+    """An interval of a motion gives what the whole motion gives there."""
     _, motion = smooth_motion(skeleton, n=12, rate_hz=50.0)
     body = (skeleton.tree, 9.81, skeleton.bodies(bsp))
     whole = axis_force_derivatives(*body, *axis_motion(skeleton, motion), every(skeleton))

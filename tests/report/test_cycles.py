@@ -64,7 +64,7 @@ def test_values_are_those_over_time(fit, cycles):
 
 
 def test_power_is_moment_times_velocity(fit, cycles):
-    """Over a measured stretch the work is what the moment does on the way: both are in the table."""
+    """Over a measured interval the work is what the moment does on the way: both are in the table."""
     stride = fit.trials[0].strides[0]
     moment, power = (of(cycles, f"hip_flexion_{kind}", stride.side) for kind in ("moment", "power"))
     angle = np.radians(of(cycles, "hip_flexion_angle", stride.side).value.to_numpy())

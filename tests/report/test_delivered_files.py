@@ -114,9 +114,9 @@ def test_moments_over_the_gait_cycle_are_those_of_opensim(opensim, folder_of, tm
 
 
 @pytest.mark.slow
-def test_opensim_finds_our_moments_up_to_the_ends_of_measured_stretches(opensim, demo_run, tmp_path):
+def test_opensim_finds_our_moments_up_to_the_ends_of_measured_intervals(opensim, demo_run, tmp_path):
     """The demo's walk on one belt, of both feet's forces the sum: double supports are not measured, and between the
-    stretches the motion goes on.
+    intervals the motion goes on.
     """
     laboratory = tmp_path / "lab"
     shutil.copytree(demo_run[0].subject_file.parent, laboratory)
@@ -128,8 +128,8 @@ def test_opensim_finds_our_moments_up_to_the_ends_of_measured_stretches(opensim,
     belt = TimeTable(loads.time, labels, np.hstack([wrench[:, :3], point, torque]), in_degrees=False)
     write_table(laboratory / "walk_grf.mot", belt, "belt")
     fit = fitted(tmp_path / "out", laboratory / "subject.toml")
-    stretches = fit.summary["trials"][0]["windows_s"]
-    assert len(stretches) > 1
+    intervals = fit.summary["trials"][0]["windows_s"]
+    assert len(intervals) > 1
     theirs = inverse_dynamics_tool(
         opensim, fit.folder / "model.osim", fit.folder / "kinematics.mot", fit.folder / LOADS_FILE, tmp_path
     )

@@ -109,7 +109,7 @@ def test_curves_are_thinned_but_not_moved(fit):
     np.testing.assert_allclose(trace.y, trial.residuals["estimate"][::step, 0], rtol=1e-6)
 
 
-def test_curves_break_between_stretches(fit):
+def test_curves_break_between_intervals(fit):
     (trial,) = fit.trials
     first, last = trial.time[[0, -1]]
     windows = ((first, trial.time[40]), (trial.time[61], last))

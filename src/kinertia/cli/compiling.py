@@ -87,7 +87,7 @@ def compile_markers() -> None:
     """Compile the marker terms on a body at rest; they take as long as everything before the estimate."""
     import numpy as np
 
-    from kinertia.estimation.simultaneous.frame_blocks import Stretch
+    from kinertia.estimation.simultaneous.frame_blocks import TimeBlock
     from kinertia.estimation.simultaneous.marker_errors import ErrorProcess
     from kinertia.estimation.simultaneous.marker_terms import add_markers
     from kinertia.estimation.simultaneous.motion_basis import MotionBasis
@@ -100,7 +100,7 @@ def compile_markers() -> None:
     skeleton = walking_subject().skeleton
     coordinates, markers = len(skeleton.coordinates), len(skeleton.markers)
     basis = MotionBasis(0.01 * np.arange(20), 0.05)
-    frames, stretch = len(basis.first), Stretch.whole(basis)
+    frames, time_block = len(basis.first), TimeBlock.whole(basis)
     # the body's parameters stand before the unknowns of the markers
     columns = slice(10, 10 + 3 * markers)
     seen = seen_markers(
@@ -113,4 +113,4 @@ def compile_markers() -> None:
         np.arange(0),
     )
     for kind in (Gradient, NormalEquations):
-        add_markers(kind.zero(stretch.size, coordinates, columns.stop), columns, basis, stretch, seen, 0)
+        add_markers(kind.zero(time_block.size, coordinates, columns.stop), columns, basis, time_block, seen, 0)

@@ -47,10 +47,10 @@ def report_tables(fit: Fit) -> None:
 
 def _report_trial(trial: dict[str, Any], before: str) -> None:
     (first, last), parts = trial["window_s"], len(trial["windows_s"])
-    stretches = f" in {parts} measured stretches" if parts > 1 else ""
+    intervals = f" in {parts} measured intervals" if parts > 1 else ""
     markers = {stage: f"{value * 1e3:.1f} mm" for stage, value in trial["marker_rms_m"].items()}
     out.print(
-        f"\n{trial['name']}: {first:.3f} to {last:.3f} s used{stretches}, {trial['n_dynamic_frames']} of "
+        f"\n{trial['name']}: {first:.3f} to {last:.3f} s used{intervals}, {trial['n_dynamic_frames']} of "
         f"{trial['n_frames']} frames; RMS distance of the markers {markers['ik']} (inverse kinematics), "
         f"{markers['final']} (estimate)"
     )

@@ -172,11 +172,11 @@ class _Source:
     def __init__(self, trial: Estimated, stage: Stage) -> None:
         self.kinematics, self.stage = trial.kinematics, stage
         self.reactions = trial.reactions.whole if stage == "estimate" else measured_reactions(trial.kinematics)
-        own, parts = trial.kinematics.time, trial.kinematics.stretches
+        own, parts = trial.kinematics.time, trial.kinematics.intervals
         self.motion = [interpolate(own[part], trial.motion.q[part]) for part in parts]
-        self.loads = self._by_stretch(partial(make_interp_spline, k=3), trial.joint_loads[stage])
+        self.loads = self._by_interval(partial(make_interp_spline, k=3), trial.joint_loads[stage])
         spread, linear = trial.deviations if stage == "estimate" else None, partial(make_interp_spline, k=1)
-        self.spread = None if spread is None else [self._by_stretch(linear, each) for each in vars(spread).values()]
+        self.spread = None if spread is None else [self._by_interval(linear, each) for each in vars(spread).values()]
 
     def angle(self, time: np.ndarray) -> np.ndarray:
         """Return coordinates (n, c); those of IK + ID wherever inverse kinematics determined them."""
@@ -200,10 +200,10 @@ class _Source:
         """Return the ground reaction force (n, 2, 3) N on right and left foot."""
         return self._measured(time, [lambda at: self.reactions.at(at)[..., :3]] * len(self.kinematics.windows_s))
 
-    def _by_stretch(self, through: _Interpolation, values: np.ndarray) -> list[Callable[[np.ndarray], np.ndarray]]:
+    def _by_interval(self, through: _Interpolation, values: np.ndarray) -> list[Callable[[np.ndarray], np.ndarray]]:
         """Make a curve through the values (w, ...) of each measured window."""
         time = self.kinematics.time
-        return [through(time[part], values[part]) for part in self.kinematics.stretches]
+        return [through(time[part], values[part]) for part in self.kinematics.intervals]
 
     def _coordinates(self, time: np.ndarray, derivative: int) -> np.ndarray:
         if self.stage == "estimate":

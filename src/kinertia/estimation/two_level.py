@@ -34,7 +34,7 @@ from kinertia.motion.dynamics import (
 from kinertia.motion.single_blas_thread import one_blas_thread
 from kinertia.trial.sampled_time import span_s
 
-MAX_STRETCH_S = 1.1
+LONGEST_INTERVAL_S = 1.1
 """Longest integration interval, over which the pelvis is corrected by one double integration."""
 _FREE_EVALUATIONS, _MAX_EVALUATIONS = 200, 400
 _EXACT = 1e-20
@@ -65,13 +65,13 @@ class Window:
         return Integration(self.time)
 
 
-def stretches(window: Window) -> list[Window]:
-    """Divide the window into equal integration intervals of at most MAX_STRETCH_S, about a stride.
+def intervals(window: Window) -> list[Window]:
+    """Divide the window into equal integration intervals of at most LONGEST_INTERVAL_S, about a stride.
 
     With two constants per coordinate the corrected pelvis stays near the measured one only for so long: literature BSPs
     are off by some 10 N m, which rotates the pelvis by 0.3 rad within 2.4 s. The study's trials were one stride.
     """
-    count = int(np.ceil(span_s(window.time) / MAX_STRETCH_S * (1.0 - 1e-9)))
+    count = int(np.ceil(span_s(window.time) / LONGEST_INTERVAL_S * (1.0 - 1e-9)))
     edges = np.linspace(0, len(window.time), max(count, 1) + 1).round().astype(int)
     parts = [slice(start, end) for start, end in pairwise(edges)]
     return [Window(window.time[part], window.motion.cut(part), window.wrench[part]) for part in parts]

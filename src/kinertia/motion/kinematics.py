@@ -95,7 +95,7 @@ class Kinematics:
         return result
 
     @cached_property
-    def stretches(self) -> tuple[slice, ...]:
+    def intervals(self) -> tuple[slice, ...]:
         """Slices of the w frames, one per measured window."""
         starts = np.searchsorted(self.time, [start - TIME_TOLERANCE_S for start, _ in self.windows_s])
         return tuple(slice(a, b) for a, b in pairwise([*starts.tolist(), len(self.time)]))

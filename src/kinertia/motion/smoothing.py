@@ -87,7 +87,7 @@ class SmoothingError(KinertiaError):
         self.n_visible = n_visible
         super().__init__(
             f"column {column} has {n_visible} visible samples, a smoothing spline needs {MIN_SAMPLES}: "
-            "give a longer stretch or leave this column out"
+            "give a longer interval or leave this column out"
         )
 
 

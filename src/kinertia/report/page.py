@@ -158,7 +158,7 @@ def _trial(fit: Fit, trial: TrialFit, k: int, count: int, truth: Truth | None) -
         "id": f"trial{k + 1}",
         "name": trial.name,
         "window_s": trial.kinematics.window_s,
-        "stretches": len(trial.kinematics.windows_s),
+        "intervals": len(trial.kinematics.windows_s),
         "frames": len(trial.time),
         "every": -(-len(trial.time) // frames),
         "all_frames": len(trial.kinematics.trial.markers.time),

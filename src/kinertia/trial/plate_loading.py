@@ -125,8 +125,8 @@ def load_threshold_n(vertical: FloatArray) -> float:
 
 def _joining(loaded: BoolArray, candidates: BoolArray) -> BoolArray:
     """Return the candidates (they include the loaded samples) that are connected to a loaded sample without a break."""
-    stretch = np.cumsum(np.diff(candidates, prepend=False))
-    joins: BoolArray = candidates & np.isin(stretch, stretch[loaded])
+    run_number = np.cumsum(np.diff(candidates, prepend=False))
+    joins: BoolArray = candidates & np.isin(run_number, run_number[loaded])
     return joins
 
 

@@ -19,7 +19,7 @@ from kinertia.estimation.simultaneous.bandwidth import Bandwidth
 from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
 from kinertia.estimation.simultaneous.fit import Posterior, SimultaneousFit, fit_simultaneous
 from kinertia.estimation.simultaneous.model_uncertainty import ModelUncertainty
-from kinertia.estimation.two_level import Window, correct_pelvis, estimate_two_level, stretches
+from kinertia.estimation.two_level import Window, correct_pelvis, estimate_two_level, intervals
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.gait27 import VIRTUAL_TRUNK
 from kinertia.model.imported_model import OsimModel
@@ -122,7 +122,7 @@ class _Outcome:
 
 
 def _two_level(ready: Prepared, settings: Settings, started: float, progress: Progress) -> _Outcome:
-    cut = [_stretches(k) for k in ready.kinematics]
+    cut = [_windows(k) for k in ready.kinematics]
     result = estimate_two_level(
         ready.skeleton,
         ready.literature,
@@ -233,7 +233,7 @@ def _trial_fit(
     seconds: Mapping[str, float],
 ) -> TrialFit:
     wrench = k.foot_loads.sum(axis=1)
-    corrected = joined([correct_pelvis(before, literature, part) for part in _stretches(k)])
+    corrected = joined([correct_pelvis(before, literature, part) for part in _windows(k)])
     stages = {
         "literature": (before, literature, k.motion),
         "corrected": (before, literature, corrected),
@@ -269,7 +269,7 @@ def _trial_fit(
 def _as_opensim(k: Kinematics, estimated: _Estimated) -> Motion:
     """Return the motion that OpenSim's tools read from a file of the estimated coordinates, in the measured frames."""
     if estimated.course is None:
-        return joined([_interpolated(k.time[part], estimated.motion.q[part]) for part in k.stretches])
+        return joined([_interpolated(k.time[part], estimated.motion.q[part]) for part in k.intervals])
     return _interpolated(k.course_time, estimated.course).cut(k.frames - k.frames[0])
 
 
@@ -278,10 +278,10 @@ def _interpolated(time: np.ndarray, q: np.ndarray) -> Motion:
     return Motion(*(spline(time, order) for order in range(3)))
 
 
-def _stretches(k: Kinematics) -> list[Window]:
+def _windows(k: Kinematics) -> list[Window]:
     """Return the measured windows of a trial, in parts over which the pelvis can be corrected."""
     wrench = k.foot_loads.sum(axis=1)
-    return [part for own in k.stretches for part in stretches(Window(k.time[own], k.motion.cut(own), wrench[own]))]
+    return [part for own in k.intervals for part in intervals(Window(k.time[own], k.motion.cut(own), wrench[own]))]
 
 
 def _marker_errors(skeleton: Skeleton, kinematics: Kinematics, motion: Motion) -> np.ndarray:

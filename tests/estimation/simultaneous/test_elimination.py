@@ -1,4 +1,4 @@
-"""A trial cut into stretches says what it says in one."""
+"""A trial cut into time blocks gives what it gives in one."""
 
 from dataclasses import fields, replace
 from types import SimpleNamespace
@@ -9,7 +9,7 @@ import pytest
 import kinertia.estimation.simultaneous.elimination as elimination
 import kinertia.estimation.simultaneous.frame_blocks as limits
 from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations, curve_deviations
-from kinertia.estimation.simultaneous.frame_blocks import Stretch, halves, joined, stretches
+from kinertia.estimation.simultaneous.frame_blocks import TimeBlock, halves, joined, time_blocks
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.posterior_draws import _Steps
 from kinertia.estimation.simultaneous.problem import MapProblem
@@ -53,16 +53,16 @@ def longer_problem() -> MapProblem:
 @pytest.fixture(scope="module")
 def whole():
     problem = longer_problem()
-    problem.stretches = [(Stretch.whole(basis),) for basis in problem.bases]
+    problem.time_blocks = [(TimeBlock.whole(basis),) for basis in problem.bases]
     return problem
 
 
 @pytest.fixture(scope="module", params=[1, 2, 3])
 def cut(request):
-    """The same in stretches of at most so many blocks of splines."""
+    """The same in time blocks of at most so many blocks of splines."""
     problem = longer_problem()
-    problem.stretches = [stretches(basis, 6 * request.param) for basis in problem.bases]
-    assert len(problem.stretches[0]) == {1: 4, 2: 2, 3: 2}[request.param]
+    problem.time_blocks = [time_blocks(basis, 6 * request.param) for basis in problem.bases]
+    assert len(problem.time_blocks[0]) == {1: 4, 2: 2, 3: 2}[request.param]
     return problem
 
 
@@ -78,17 +78,17 @@ def double(monkeypatch):
     monkeypatch.setattr(elimination, "UNSAFE", 0.0)
 
 
-def test_normal_equations_are_the_sum_over_stretches(whole, cut, here):
+def test_normal_equations_are_the_sum_over_time_blocks(whole, cut, here):
     expected, actual = whole.normal(0, *here), cut.gradient(0, *here)
     close(actual.static_rhs, expected.static_rhs)
     close(actual.rhs, expected.rhs)
     assert actual.cost == pytest.approx(expected.cost, rel=1e-12)
     static, band, border = (np.zeros_like(each) for each in (expected.static, expected.band, expected.border))
-    for stretch in cut.stretches[0]:
-        part = cut.normal(0, *here, stretch)
+    for time_block in cut.time_blocks[0]:
+        part = cut.normal(0, *here, time_block)
         static += part.static
-        band[stretch.touched] += part.band
-        border[stretch.touched] += part.border
+        band[time_block.touched] += part.band
+        border[time_block.touched] += part.border
     close(static, expected.static)
     close(band, expected.band)
     close(border, expected.border)
@@ -147,7 +147,7 @@ def test_deviations_of_curves_are_those_of_the_whole(whole, cut, here, double):
 
 @pytest.mark.slow
 def test_the_estimate_is_that_of_the_whole(whole, monkeypatch):
-    """Two trials, whose stretches are as short as can be."""
+    """Two trials, whose time blocks are as short as can be."""
     given = (
         whole.skeleton,
         whole.prior,
@@ -175,7 +175,7 @@ def test_two_threads_give_what_one_gives_bit_for_bit(monkeypatch):
         monkeypatch.setattr(two_threads, "_cores", lambda cores=cores: cores)
         results.append(estimate_simultaneous(*given))
     one, two = results
-    assert len(problem.stretches[0]) > 1
+    assert len(problem.time_blocks[0]) > 1
     assert two.cost == one.cost
     np.testing.assert_array_equal(two.bsp.table(), one.bsp.table())
     np.testing.assert_array_equal(two.bsp_covariance, one.bsp_covariance)
@@ -185,10 +185,10 @@ def test_two_threads_give_what_one_gives_bit_for_bit(monkeypatch):
 
 
 @pytest.mark.parametrize("splines", [6, 7, 11, 12, 13, 18, 19, 40])
-def test_gradients_are_taken_of_the_same_frames_in_longer_stretches(splines, monkeypatch):
+def test_gradients_are_taken_of_the_same_frames_in_longer_time_blocks(splines, monkeypatch):
     monkeypatch.setattr(limits, "_FRAMES_OF_GRADIENT", 30)
     basis = MotionBasis(np.linspace(0.0, 1.0, 4 * splines), 1.0 / (splines - 5))
-    parts = stretches(basis, 6)
+    parts = time_blocks(basis, 6)
     front, back = (joined(half) for half in halves(parts))
     every = [*front, *reversed(back)]
     assert [frame for part in every for frame in range(part.frames.start, part.frames.stop)] == list(
@@ -201,10 +201,10 @@ def test_gradients_are_taken_of_the_same_frames_in_longer_stretches(splines, mon
 
 
 @pytest.mark.parametrize("splines", [6, 7, 11, 12, 13, 18, 19, 40])
-def test_stretches_share_splines_and_frames_out(splines):
+def test_time_blocks_share_splines_and_frames_out(splines):
     basis = MotionBasis(np.linspace(0.0, 1.0, 4 * splines), 1.0 / (splines - 5))
     assert basis.size == splines
-    parts = stretches(basis, 12)
+    parts = time_blocks(basis, 12)
     assert [part.is_last for part in parts] == [False] * (len(parts) - 1) + [True]
     own = [spline for part in parts for spline in range(part.splines.start, part.splines.stop)]
     assert own == list(range(splines))

@@ -79,7 +79,7 @@ def test_loads_and_motion_cover_the_window(trial, plain):
 
 
 @pytest.mark.slow
-def test_stretches_are_used_together_and_forces_between_them_say_nothing(trial, plain):
+def test_intervals_are_used_together_and_forces_between_them_say_nothing(trial, plain):
     """Unmeasured from 0.3 to 0.6 s, where a plate loses a third of the weight: with and without."""
     loads = trial.foot_loads.copy()
     loads[(trial.time > 0.4) & (trial.time < 0.5)] *= 0.7
@@ -102,7 +102,7 @@ def test_stretches_are_used_together_and_forces_between_them_say_nothing(trial, 
     sound, lost = outcomes
     change = np.abs(sound.bsp.table() - lost.bsp.table()) / sound.posterior.sd
     assert change.max() < 0.3
-    # two stretches tell less than all, and more than nothing
+    # two intervals show less than all, and more than nothing
     shown = np.nansum(sound.posterior.information)
     assert 0.2 * np.nansum(plain.posterior.information) < shown < np.nansum(plain.posterior.information)
 

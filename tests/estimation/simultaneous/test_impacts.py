@@ -42,7 +42,7 @@ def test_frames_that_count_a_quarter_or_less():
     assert down_weighted(np.empty(0)) == 0.0
 
 
-def test_stretches_count_by_themselves_and_short_ones_not():
+def test_intervals_count_by_themselves_and_short_ones_not():
     dynamic = EVERY.copy()
     dynamic[70:] = False
     dynamic[[90, 91, 92]] = True

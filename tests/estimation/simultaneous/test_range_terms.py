@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from kinertia.estimation.simultaneous.frame_blocks import Stretch, stretches
+from kinertia.estimation.simultaneous.frame_blocks import TimeBlock, time_blocks
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.normal_equations import NormalEquations
 from kinertia.estimation.simultaneous.range_terms import RangeTerms, add_ranges
@@ -40,23 +40,23 @@ def test_derivatives_are_those_of_the_cost():
     basis = MotionBasis(np.linspace(0.0, 1.0, 61), 0.1)
     coefficients = rng.normal(0.0, 2.0, (basis.size, 3))
 
-    def normal_at(coefficients: np.ndarray, stretch: Stretch) -> NormalEquations:
-        normal = NormalEquations.zero(stretch.size, 3, 1)
-        add_ranges(normal, basis, stretch, BOUNDS, basis.evaluate(coefficients, stretch.frames)[0])
+    def normal_at(coefficients: np.ndarray, time_block: TimeBlock) -> NormalEquations:
+        normal = NormalEquations.zero(time_block.size, 3, 1)
+        add_ranges(normal, basis, time_block, BOUNDS, basis.evaluate(coefficients, time_block.frames)[0])
         return normal
 
-    whole = normal_at(coefficients, Stretch.whole(basis))
+    whole = normal_at(coefficients, TimeBlock.whole(basis))
     assert whole.cost > 1.0
     step = 1e-7
     for i, j in ((0, 0), (4, 1), (7, 0), (basis.size - 1, 1), (3, 2)):
         there, back = coefficients.copy(), coefficients.copy()
         there[i, j] += step
         back[i, j] -= step
-        two = [normal_at(one, Stretch.whole(basis)) for one in (there, back)]
+        two = [normal_at(one, TimeBlock.whole(basis)) for one in (there, back)]
         slope = (two[0].cost - two[1].cost) / (2 * step)
         assert slope == pytest.approx(-whole.rhs[i, j], rel=1e-5, abs=1e-3)
         bends = -(two[0].rhs - two[1].rhs)[i : i + 6] / (2 * step)
         np.testing.assert_allclose(bends[:, j], whole.band[i, : len(bends), j, j], rtol=1e-4, atol=1e-3)
-    parts = stretches(basis, 6)
+    parts = time_blocks(basis, 6)
     assert len(parts) > 1
     assert sum(normal_at(coefficients, part).cost for part in parts) == pytest.approx(whole.cost)

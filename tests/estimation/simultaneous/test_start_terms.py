@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from kinertia.estimation.simultaneous.frame_blocks import Stretch
+from kinertia.estimation.simultaneous.frame_blocks import TimeBlock
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.normal_equations import NormalEquations
 from kinertia.estimation.simultaneous.start_terms import add_start
@@ -9,11 +9,11 @@ from validation.study_bound import dense_band
 
 
 def terms(moved: np.ndarray) -> NormalEquations:
-    """Of a trial of so many splines in one stretch."""
+    """Of a trial of so many splines in one block."""
     size, c = moved.shape
     basis = MotionBasis(np.linspace(0.0, 0.05 * (size - 5), 2 * size), 0.05)
     normal = NormalEquations.zero(size, c, 1)
-    add_start(normal, Stretch.whole(basis), moved)
+    add_start(normal, TimeBlock.whole(basis), moved)
     return normal
 
 

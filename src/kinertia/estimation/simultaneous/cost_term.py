@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from kinertia.estimation.simultaneous.frame_blocks import Stretch
+from kinertia.estimation.simultaneous.frame_blocks import TimeBlock
 from kinertia.estimation.simultaneous.inputs import FreedModel, Given
 from kinertia.estimation.simultaneous.layout import Unknowns
 from kinertia.estimation.simultaneous.mixture_prior import GaussianPrior
@@ -221,7 +221,7 @@ class InTrial:
         k: index of the trial.
         coefficients: of its motion.
         static: (S,) the other unknowns as they are in the trial.
-        stretch: the time block.
+        time_block: the time block.
     """
 
     model: FreedModel
@@ -230,10 +230,10 @@ class InTrial:
     k: int
     coefficients: np.ndarray
     static: np.ndarray
-    stretch: Stretch
+    time_block: TimeBlock
 
     @cached_property
     def near_q(self) -> np.ndarray:
-        """Coordinates (f, c) of the freed skeleton in the block with its neighbours, `Stretch.with_neighbours`."""
-        parts = self.model.given.bases[self.k].evaluate(self.coefficients, self.stretch.with_neighbours)
+        """Coordinates (f, c) of the freed skeleton in the block with its neighbours, `TimeBlock.with_neighbours`."""
+        parts = self.model.given.bases[self.k].evaluate(self.coefficients, self.time_block.with_neighbours)
         return self.model.full(parts, self.static)[0]

@@ -19,7 +19,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from kinertia.estimation.simultaneous.elimination import Branch, Eliminated, Factored
-from kinertia.estimation.simultaneous.frame_blocks import Stretch
+from kinertia.estimation.simultaneous.frame_blocks import TimeBlock
 from kinertia.estimation.simultaneous.moment_derivatives import MomentDerivatives, moment_derivatives
 from kinertia.estimation.simultaneous.motion_noise import motion_noise
 from kinertia.estimation.simultaneous.normal_equations import SPLINES_PER_BLOCK, by_splines
@@ -144,9 +144,9 @@ class _Curves:
 
     def add(self, branch: Branch, root: np.ndarray, end: _EndSpread) -> None:
         """Write the variances in the frames of a branch, given the uncertainty of the block in which it ends."""
-        for part, stretch in zip(branch.outwards(), reversed(branch.stretches), strict=True):
-            spread, end = _MotionSpread.of(part, stretch, root, end)
-            begin, stop = np.searchsorted(self.frames, [stretch.frames.start, stretch.frames.stop])
+        for part, time_block in zip(branch.outwards(), reversed(branch.time_blocks), strict=True):
+            spread, end = _MotionSpread.of(part, time_block, root, end)
+            begin, stop = np.searchsorted(self.frames, [time_block.frames.start, time_block.frames.stop])
             for start in range(begin, stop, _FRAMES_AT_ONCE):
                 self._write(spread, root, slice(start, min(start + _FRAMES_AT_ONCE, stop)))
 
@@ -238,7 +238,7 @@ class _MotionSpread:
 
     @classmethod
     def of(
-        cls, part: Factored, stretch: Stretch, root: np.ndarray, end: _EndSpread
+        cls, part: Factored, time_block: TimeBlock, root: np.ndarray, end: _EndSpread
     ) -> tuple[_MotionSpread, _EndSpread]:
         """Compute the uncertainty of a time block, and of the block of splines with which the next time block ends.
 
@@ -254,7 +254,7 @@ class _MotionSpread:
         if part.backwards:
             every, all_carried, below = every[::-1], all_carried[::-1], below[::-1].transpose(0, 2, 1)
         c = every.shape[1] // SPLINES_PER_BLOCK
-        return cls(stretch.touched.start, every, below, all_carried.reshape(-1, c, size)), other
+        return cls(time_block.touched.start, every, below, all_carried.reshape(-1, c, size)), other
 
     def variances(self, seen: _Seen, root: np.ndarray, into: CurveDeviations, rows: slice) -> None:
         """Write the variances of some frames into rows of `into`.

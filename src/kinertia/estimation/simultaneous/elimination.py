@@ -21,7 +21,7 @@ import numpy as np
 from kinertia.estimation.simultaneous.arrays_on_disk import KeptArrays
 from kinertia.estimation.simultaneous.blas import solve_lower
 from kinertia.estimation.simultaneous.block_tridiagonal import BlockBand
-from kinertia.estimation.simultaneous.frame_blocks import Stretch, halves
+from kinertia.estimation.simultaneous.frame_blocks import TimeBlock, halves
 from kinertia.estimation.simultaneous.normal_equations import SPLINES_PER_BLOCK, Gradient, NormalEquations
 from kinertia.model.compiled import compiled
 from kinertia.motion.two_threads import side_by_side
@@ -91,7 +91,7 @@ class Branch:
         gradient: of its frames, before elimination.
         static_diagonal: (S,) diagonal of the information on the static unknowns with the motion known.
         information: (S, S) on them with the motion unknown except in the middle.
-        stretches: in the order of elimination.
+        time_blocks: in the order of elimination.
         before: stored factors of all time blocks but the last.
         last: factor of the block beside the middle.
         end: contribution to the middle.
@@ -100,7 +100,7 @@ class Branch:
     gradient: Gradient
     static_diagonal: np.ndarray
     information: np.ndarray
-    stretches: tuple[Stretch, ...]
+    time_blocks: tuple[TimeBlock, ...]
     before: KeptArrays
     last: Factored
     end: EndBlock
@@ -108,48 +108,48 @@ class Branch:
     @classmethod
     def of(
         cls,
-        of: Callable[[Stretch], NormalEquations],
+        of: Callable[[TimeBlock], NormalEquations],
         done: Callable[[NormalEquations], None],
         damping: float,
         precision: type[np.floating],
-        stretches: Sequence[Stretch],
+        time_blocks: Sequence[TimeBlock],
     ) -> Branch:
         """Eliminate time blocks in this order, backwards if the first is not the beginning of the trial."""
-        backwards, end, kept = stretches[0].splines.start > 0, None, KeptArrays()
-        for k, stretch in enumerate(stretches):
-            normal = of(stretch)
+        backwards, end, kept = time_blocks[0].splines.start > 0, None, KeptArrays()
+        for k, time_block in enumerate(time_blocks):
+            normal = of(time_block)
             s = normal.border.shape[2]
             if k == 0:
-                size = max(each.touched.stop for each in stretches)
+                size = max(each.touched.stop for each in time_blocks)
                 whole = Gradient.zero(size, normal.rhs.shape[1], len(normal.static_rhs))
                 diagonal, information = np.zeros(s), np.zeros((s, s))
-            whole.add(normal, stretch.touched)
+            whole.add(normal, time_block.touched)
             information += normal.static[:s, :s]
             diagonal += np.diag(normal.static)[:s]
-            part, end = factored(normal, stretch, damping, end, precision, backwards)
+            part, end = factored(normal, time_block, damping, end, precision, backwards)
             done(normal)
             part.take_off(information)
-            if k < len(stretches) - 1:
+            if k < len(time_blocks) - 1:
                 kept.add(part.band.diagonal, part.band.below, part.border)
         assert end is not None
-        return cls(whole, diagonal, information, tuple(stretches), kept, part, end)
+        return cls(whole, diagonal, information, tuple(time_blocks), kept, part, end)
 
     def outwards(self) -> Iterator[Factored]:
         """Yield the factors from the middle to the end of the trial."""
         yield self.last
-        for k in range(len(self.stretches) - 2, -1, -1):
+        for k in range(len(self.time_blocks) - 2, -1, -1):
             yield self._kept(k)
 
     def inwards(self) -> Iterator[Factored]:
         """Yield the factors from the end of the trial to the middle."""
-        for k in range(len(self.stretches) - 1):
+        for k in range(len(self.time_blocks) - 1):
             yield self._kept(k)
         yield self.last
 
     def _kept(self, k: int) -> Factored:
         diagonal, below, border = self.before.get(k)
         backwards = self.last.backwards
-        return Factored(_eliminated(self.stretches[k], backwards), backwards, BlockBand(diagonal, below), border)
+        return Factored(_eliminated(self.time_blocks[k], backwards), backwards, BlockBand(diagonal, below), border)
 
     def forward(self, rhs: np.ndarray) -> tuple[list[np.ndarray], np.ndarray, np.ndarray]:
         """Apply L^-1 to a right-hand side (size, c) of the motion; return it per time block (b, k, 1).
@@ -198,28 +198,28 @@ class Eliminated:
     @classmethod
     def of(
         cls,
-        stretches: Sequence[Stretch],
-        of: Callable[[Stretch], NormalEquations],
+        time_blocks: Sequence[TimeBlock],
+        of: Callable[[TimeBlock], NormalEquations],
         done: Callable[[NormalEquations], None],
         damping: float,
     ) -> Eliminated:
         """Eliminate the motion of a trial.
 
         Args:
-            stretches: time blocks of the trial.
+            time_blocks: time blocks of the trial.
             of: makes the normal equations of one block.
             done: called with them when they are no longer needed.
             damping: share by which the motion's diagonal is raised.
         """
-        result = cls._of(stretches, partial(Branch.of, of, done, damping, np.float32))
+        result = cls._of(time_blocks, partial(Branch.of, of, done, damping, np.float32))
         if (result.static_diagonal > UNSAFE * np.diag(result.information)).any():
-            return cls._of(stretches, partial(Branch.of, of, done, damping, np.float64))
+            return cls._of(time_blocks, partial(Branch.of, of, done, damping, np.float64))
         return result
 
     @classmethod
-    def _of(cls, stretches: Sequence[Stretch], branch_of: Callable[[Sequence[Stretch]], Branch]) -> Eliminated:
-        branches = tuple(side_by_side(branch_of, [half for half in halves(stretches) if half]))
-        size, (_, c) = stretches[-1].splines.stop, branches[0].gradient.rhs.shape
+    def _of(cls, time_blocks: Sequence[TimeBlock], branch_of: Callable[[Sequence[TimeBlock]], Branch]) -> Eliminated:
+        branches = tuple(side_by_side(branch_of, [half for half in halves(time_blocks) if half]))
+        size, (_, c) = time_blocks[-1].splines.stop, branches[0].gradient.rhs.shape
         whole = Gradient.zero(size, c, len(branches[0].gradient.static_rhs))
         for branch in branches:
             whole.add(branch.gradient, slice(0, len(branch.gradient.rhs)))
@@ -280,7 +280,7 @@ def write_step(
 
 def factored(
     normal: NormalEquations,
-    stretch: Stretch,
+    time_block: TimeBlock,
     damping: float,
     carried: EndBlock | None,
     precision: type[np.floating],
@@ -296,7 +296,7 @@ def factored(
     """
     size, c, s = normal.border.shape
     # at the end of the trial one block more than just fits, so that six active splines always lie in two
-    count = size // SPLINES_PER_BLOCK + (1 if stretch.is_last else 0)
+    count = size // SPLINES_PER_BLOCK + (1 if time_block.is_last else 0)
     diagonal, below = _blocks(normal.band, count, damping, backwards)
     border = np.zeros((count * SPLINES_PER_BLOCK, c, s), precision)
     border[:size] = normal.border
@@ -310,15 +310,15 @@ def factored(
     solved = same.forward(border[:-1], in_place=True) if s else border[:-1]
     reach = band.below[-1]
     end = EndBlock(diagonal[-1] - reach @ reach.T, border[-1] - same.below[-1] @ solved[-1])
-    return Factored(_eliminated(stretch, backwards), backwards, band, solved), end
+    return Factored(_eliminated(time_block, backwards), backwards, band, solved), end
 
 
-def _eliminated(stretch: Stretch, backwards: bool) -> slice:
+def _eliminated(time_block: TimeBlock, backwards: bool) -> slice:
     """Return the splines of all blocks that a time block touches but the last, or but the first if `backwards`."""
-    start, stop = stretch.touched.start, stretch.touched.stop
+    start, stop = time_block.touched.start, time_block.touched.stop
     if backwards:
         return slice(start + SPLINES_PER_BLOCK, stop)
-    blocks = stretch.size // SPLINES_PER_BLOCK - (0 if stretch.is_last else 1)
+    blocks = time_block.size // SPLINES_PER_BLOCK - (0 if time_block.is_last else 1)
     return slice(start, start + SPLINES_PER_BLOCK * blocks)
 
 

@@ -29,7 +29,7 @@ _SLICES = ("splines", "touched", "frames")
 
 
 @dataclass(frozen=True)
-class Stretch:
+class TimeBlock:
     """A time block: neighbouring splines of a trial, and the frames whose first active spline is one of them.
 
     Attributes:
@@ -43,7 +43,7 @@ class Stretch:
     frames: slice
 
     @classmethod
-    def whole(cls, basis: MotionBasis) -> Stretch:
+    def whole(cls, basis: MotionBasis) -> TimeBlock:
         """Return the whole trial as one time block."""
         return cls(slice(0, basis.size), slice(0, basis.size), slice(0, len(basis.first)))
 
@@ -64,7 +64,7 @@ class Stretch:
         return slice(max(self.frames.start - LATER, 0), self.frames.stop + LATER)
 
 
-def stretches(basis: MotionBasis, most: int) -> tuple[Stretch, ...]:
+def time_blocks(basis: MotionBasis, most: int) -> tuple[TimeBlock, ...]:
     """Split a trial into time blocks of at most `most` splines, in whole blocks of splines.
 
     There are at least two, except for a very short trial.
@@ -77,25 +77,25 @@ def stretches(basis: MotionBasis, most: int) -> tuple[Stretch, ...]:
     ends = [*starts[1:], size]
     frames = np.searchsorted(basis.first, [*starts, size]).tolist()
     return tuple(
-        Stretch(slice(start, end), slice(start, min(end + whole, size)), slice(frames[i], frames[i + 1]))
+        TimeBlock(slice(start, end), slice(start, min(end + whole, size)), slice(frames[i], frames[i + 1]))
         for i, (start, end) in enumerate(zip(starts, ends, strict=True))
     )
 
 
-def halves(parts: Sequence[Stretch]) -> tuple[tuple[Stretch, ...], tuple[Stretch, ...]]:
+def halves(parts: Sequence[TimeBlock]) -> tuple[tuple[TimeBlock, ...], tuple[TimeBlock, ...]]:
     """Return the time blocks of a trial from its beginning to its middle, and from its end to its middle."""
     middle = (len(parts) + 1) // 2
     return tuple(parts[:middle]), tuple(reversed(parts[middle:]))
 
 
-def joined(half: Sequence[Stretch]) -> list[Stretch]:
+def joined(half: Sequence[TimeBlock]) -> list[TimeBlock]:
     """Merge neighbouring time blocks, in time or backwards, into fewer and longer ones for gradients."""
-    result: list[Stretch] = []
-    for stretch in half:
+    result: list[TimeBlock] = []
+    for time_block in half:
         if result and result[-1].frames.stop - result[-1].frames.start < _FRAMES_OF_GRADIENT:
-            first, last = sorted((result.pop(), stretch), key=lambda each: each.frames.start)
-            stretch = Stretch(*(_both(getattr(first, name), getattr(last, name)) for name in _SLICES))
-        result.append(stretch)
+            first, last = sorted((result.pop(), time_block), key=lambda each: each.frames.start)
+            time_block = TimeBlock(*(_both(getattr(first, name), getattr(last, name)) for name in _SLICES))
+        result.append(time_block)
     return result
 
 
@@ -103,9 +103,9 @@ def _both(first: slice, last: slice) -> slice:
     return slice(first.start, last.stop)
 
 
-def stretches_of_trials(bases: Sequence[MotionBasis], coordinates: int, static: int) -> list[tuple[Stretch, ...]]:
+def time_blocks_of_trials(bases: Sequence[MotionBasis], coordinates: int, static: int) -> list[tuple[TimeBlock, ...]]:
     """Split each trial into time blocks, for so many coordinates and static unknowns."""
     most = TOGETHER_BYTES // NormalEquations.bytes_per_spline(coordinates, static)
     if sum(basis.size for basis in bases) > most:
         most //= _SHARE
-    return [stretches(basis, most) for basis in bases]
+    return [time_blocks(basis, most) for basis in bases]

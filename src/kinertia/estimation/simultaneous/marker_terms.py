@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kinertia.estimation.simultaneous.cost_term import CostTerm, InTrial
-from kinertia.estimation.simultaneous.frame_blocks import Stretch
+from kinertia.estimation.simultaneous.frame_blocks import TimeBlock
 from kinertia.estimation.simultaneous.knot_interval import Interval, longest_run, to_border, to_splines
 from kinertia.estimation.simultaneous.marker_errors import LATER
 from kinertia.estimation.simultaneous.marker_gradient import add_gradient
@@ -40,7 +40,7 @@ class Markers(CostTerm):
 
     def add(self, into: Gradient, here: InTrial) -> None:
         """Add the squares of the markers' errors relative to their expected size."""
-        given, k, near, static = self.given, here.k, here.stretch.with_neighbours, here.static
+        given, k, near, static = self.given, here.k, here.time_block.with_neighbours, here.static
         seen = seen_markers(
             self.model.placed(static),
             given.trials[k].markers[near],
@@ -50,11 +50,11 @@ class Markers(CostTerm):
             given.moving,
             given.still,
         )
-        add_markers(into, self.layout.in_markers, given.bases[k], here.stretch, seen, len(given.still))
+        add_markers(into, self.layout.in_markers, given.bases[k], here.time_block, seen, len(given.still))
 
 
 def add_markers(
-    into: Gradient, columns: slice, basis: MotionBasis, stretch: Stretch, markers: SeenMarkers, still: int
+    into: Gradient, columns: slice, basis: MotionBasis, time_block: TimeBlock, markers: SeenMarkers, still: int
 ) -> None:
     """Add the terms of the markers in one time block of a trial.
 
@@ -62,13 +62,13 @@ def add_markers(
         into: zero, or with other terms.
         columns: slice of the static unknowns that markers depend on.
         basis: of the motion.
-        stretch: of the trial.
+        time_block: of the trial.
         markers: in the block with its neighbours.
         still: number of coordinates that do not move.
     """
-    near = stretch.with_neighbours
-    own = (stretch.frames.start - near.start, stretch.frames.stop - near.start)
-    first, values = basis.first[near] - stretch.splines.start, basis.values[0][near]
+    near = time_block.with_neighbours
+    own = (time_block.frames.start - near.start, time_block.frames.stop - near.start)
+    first, values = basis.first[near] - time_block.splines.start, basis.values[0][near]
     if not isinstance(into, NormalEquations):
         into.cost += 0.5 * add_gradient(markers, first, values, own, still, into.rhs, into.static_rhs[columns])
         return

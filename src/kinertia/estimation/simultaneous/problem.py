@@ -16,7 +16,7 @@ import numpy as np
 from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.simultaneous.cost_term import CostTerm, GroundLoads, InTrial, Solution
 from kinertia.estimation.simultaneous.elimination import Eliminated
-from kinertia.estimation.simultaneous.frame_blocks import Stretch, halves, joined, stretches_of_trials
+from kinertia.estimation.simultaneous.frame_blocks import TimeBlock, halves, joined, time_blocks_of_trials
 from kinertia.estimation.simultaneous.inputs import FreedModel, Given
 from kinertia.estimation.simultaneous.layout import Layout
 from kinertia.estimation.simultaneous.linearised import Linearised, Point, Slope
@@ -56,7 +56,7 @@ class MapProblem:
         self.model = FreedModel(self.given, self.layout)
         self.terms = tuple(term(self.model) for term in terms)
         self.loads = GroundLoads(self.given, self.terms)
-        self.stretches = stretches_of_trials(self.bases, len(self.moving), self.layout.size)
+        self.time_blocks = time_blocks_of_trials(self.bases, len(self.moving), self.layout.size)
         self._adding = [term for term in self.terms if type(term).add is not CostTerm.add]
         self._room = UsedAgain()
 
@@ -165,20 +165,20 @@ class MapProblem:
     ) -> Eliminated:
         """Return trial k with its motion eliminated; not `bordered`: for the motion alone, with all else fixed."""
         of = partial(self.normal, k, coefficients, static, bordered=bordered)
-        return Eliminated.of(self.stretches[k], of, self._room.back, damping)
+        return Eliminated.of(self.time_blocks[k], of, self._room.back, damping)
 
     def normal(
         self,
         k: int,
         coefficients: np.ndarray,
         static: np.ndarray,
-        stretch: Stretch | None = None,
+        time_block: TimeBlock | None = None,
         bordered: bool = True,
     ) -> NormalEquations:
         """Build the normal equations of a time block of trial k, or of the whole trial."""
-        stretch = stretch or Stretch.whole(self.bases[k])
-        result = self._room.zero(stretch.size, len(self.moving), self.layout.size, bordered)
-        here = self._here(k, coefficients, static, stretch)
+        time_block = time_block or TimeBlock.whole(self.bases[k])
+        result = self._room.zero(time_block.size, len(self.moving), self.layout.size, bordered)
+        here = self._here(k, coefficients, static, time_block)
         for term in self._adding:
             term.add(result, here)
         return result
@@ -186,24 +186,24 @@ class MapProblem:
     def gradient(self, k: int, coefficients: np.ndarray, static: np.ndarray) -> Gradient:
         """Return the cost of trial k and minus its gradient."""
 
-        def of_part(part: tuple[Sequence[Stretch], Sequence[CostTerm]]) -> Gradient:
+        def of_part(part: tuple[Sequence[TimeBlock], Sequence[CostTerm]]) -> Gradient:
             result = Gradient.zero(len(coefficients), len(self.moving), self.layout.size)
-            for stretch in part[0]:
-                own = Gradient.zero(stretch.size, len(self.moving), self.layout.size)
-                here = self._here(k, coefficients, static, stretch)
+            for time_block in part[0]:
+                own = Gradient.zero(time_block.size, len(self.moving), self.layout.size)
+                here = self._here(k, coefficients, static, time_block)
                 for term in part[1]:
                     term.add(own, here)
-                result.add(own, stretch.touched)
+                result.add(own, time_block.touched)
             return result
 
-        longer = [joined(half) for half in halves(self.stretches[k]) if half]
-        parts: list[tuple[Sequence[Stretch], Sequence[CostTerm]]] = [(half, self._adding) for half in longer]
+        longer = [joined(half) for half in halves(self.time_blocks[k]) if half]
+        parts: list[tuple[Sequence[TimeBlock], Sequence[CostTerm]]] = [(half, self._adding) for half in longer]
         if sum(map(len, longer)) <= 2:  # too short for halves
-            parts = [(joined(self.stretches[k]), some) for some in (self._adding[:-1], self._adding[-1:])]
+            parts = [(joined(self.time_blocks[k]), some) for some in (self._adding[:-1], self._adding[-1:])]
         result, *others = side_by_side(of_part, parts)
         for other in others:
             result.add(other, slice(None))
         return result
 
-    def _here(self, k: int, coefficients: np.ndarray, static: np.ndarray, stretch: Stretch) -> InTrial:
-        return InTrial(self.model, self.loads, self.terms, k, coefficients, static, stretch)
+    def _here(self, k: int, coefficients: np.ndarray, static: np.ndarray, time_block: TimeBlock) -> InTrial:
+        return InTrial(self.model, self.loads, self.terms, k, coefficients, static, time_block)

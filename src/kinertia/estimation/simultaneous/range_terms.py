@@ -18,7 +18,7 @@ import numpy as np
 from scipy.special import expit
 
 from kinertia.estimation.simultaneous.cost_term import CostTerm, InTrial
-from kinertia.estimation.simultaneous.frame_blocks import Stretch
+from kinertia.estimation.simultaneous.frame_blocks import TimeBlock
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.normal_equations import Gradient, NormalEquations
 from kinertia.model.coordinate_range import Bounds
@@ -71,27 +71,27 @@ class JointRanges(CostTerm):
 
     def add(self, into: Gradient, here: InTrial) -> None:
         """Add the penalty in a time block."""
-        frames = here.stretch.frames
-        first = frames.start - here.stretch.with_neighbours.start
+        frames = here.time_block.frames
+        first = frames.start - here.time_block.with_neighbours.start
         q = here.near_q[first : first + frames.stop - frames.start, self.given.moving]
-        add_ranges(into, self.given.bases[here.k], here.stretch, self.given.skeleton.bounds, q)
+        add_ranges(into, self.given.bases[here.k], here.time_block, self.given.skeleton.bounds, q)
 
 
-def add_ranges(into: Gradient, basis: MotionBasis, stretch: Stretch, bounds: Bounds, q: np.ndarray) -> None:
+def add_ranges(into: Gradient, basis: MotionBasis, time_block: TimeBlock, bounds: Bounds, q: np.ndarray) -> None:
     """Add the penalty of the coordinates q (f, c) in the frames of a time block.
 
     Args:
         into: zero, or with other terms.
         basis: of the motion.
-        stretch: of the trial.
+        time_block: of the trial.
         bounds: of the coordinates that move.
         q: rad and m.
     """
     terms = RangeTerms.of(bounds, q, len(basis.first) / basis.size)
     into.cost += terms.cost
     paying = np.flatnonzero(terms.curvature.any(axis=1))
-    values = basis.values[0, stretch.frames][paying]
-    at = basis.first[stretch.frames][paying] - stretch.splines.start
+    values = basis.values[0, time_block.frames][paying]
+    at = basis.first[time_block.frames][paying] - time_block.splines.start
     columns = np.arange(q.shape[1])
     for i in range(values.shape[1]):
         np.add.at(into.rhs, at + i, values[:, i, None] * terms.pull[paying])

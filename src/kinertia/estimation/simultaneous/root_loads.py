@@ -22,7 +22,7 @@ class RootLoads(CostTerm):
 
     def add(self, into: Gradient, here: InTrial) -> None:
         """Add the squares of the residuals, each over its standard deviation."""
-        basis, frames, start = self.given.bases[here.k], here.stretch.frames, here.stretch.splines.start
+        basis, frames, start = self.given.bases[here.k], here.time_block.frames, here.time_block.splines.start
         dynamic = frames.start + np.flatnonzero(self.given.trials[here.k].dynamic[frames])
         for piece in pieces(len(dynamic)):
             root = self._at(here, dynamic[piece])

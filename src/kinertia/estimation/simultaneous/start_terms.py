@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from kinertia.estimation.simultaneous.cost_term import CostTerm, InTrial
-from kinertia.estimation.simultaneous.frame_blocks import Stretch
+from kinertia.estimation.simultaneous.frame_blocks import TimeBlock
 from kinertia.estimation.simultaneous.normal_equations import Gradient, NormalEquations
 
 CHANGE_SD, AWAY_SD = 1.0, 30.0
@@ -23,19 +23,19 @@ class Start(CostTerm):
 
     def add(self, into: Gradient, here: InTrial) -> None:
         """Add the cost in a time block."""
-        add_start(into, here.stretch, here.coefficients - self.given.start[here.k])
+        add_start(into, here.time_block, here.coefficients - self.given.start[here.k])
 
 
-def add_start(into: Gradient, stretch: Stretch, moved: np.ndarray) -> None:
+def add_start(into: Gradient, time_block: TimeBlock, moved: np.ndarray) -> None:
     """Add the terms of a time block's own splines.
 
     Args:
         into: zero, or with other terms.
-        stretch: of the trial.
+        time_block: of the trial.
         moved: (splines, c) distance of all coefficients of the trial from their start.
     """
-    own, following = moved[stretch.splines], moved[stretch.splines.start + 1 : stretch.splines.stop + 1]
-    count, pairs = len(own), min(len(following), stretch.size - 1)
+    own, following = moved[time_block.splines], moved[time_block.splines.start + 1 : time_block.splines.stop + 1]
+    count, pairs = len(own), min(len(following), time_block.size - 1)
     change = following[:pairs] - own[:pairs]
     into.rhs[:count] -= own / AWAY_SD**2
     into.rhs[:pairs] += change / CHANGE_SD**2
