@@ -1,12 +1,15 @@
 import multiprocessing
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from kinertia.errors import TrialError
 from kinertia.io.c3d_write import write_c3d
 from kinertia.io.marker_set_file import read_marker_set
 from kinertia.io.person_recordings import read_inputs
+from kinertia.io.recording import read_recording
 from kinertia.io.subject_file import read_subject
 from kinertia.synthetic.laboratory import PERFECT, LabNoise, record, write_lab
 from kinertia.synthetic.walk import centre_of_pressure, walk, walking_subject
@@ -123,3 +126,17 @@ def test_c3d_needs_corners_and_a_matching_time_base(tmp_path, measured):
     )
     with pytest.raises(ValueError, match="start with the markers"):
         write_c3d(tmp_path / "a.c3d", Recording("a", walked.markers, late))
+
+
+@pytest.mark.parametrize("degrees", [0.0, 37.0, 50.0, -120.0])
+def test_c3d_holds_plates_that_are_rotated_in_the_laboratory(tmp_path, measured, degrees):
+    walked, plates = measured.walk, measured.walk.plates
+    rotation = Rotation.from_euler("y", degrees, degrees=True).as_matrix()
+    force, moment, corners = (each @ rotation.T for each in (plates.force, plates.moment, plates.corners))
+    rotated = replace(plates, force=force, moment=moment, corners=corners)
+    markers = replace(walked.markers, positions=walked.markers.positions @ rotation.T)
+    write_c3d(tmp_path / "a.c3d", replace(walked, markers=markers, plates=rotated))
+    read = read_recording(tmp_path / "a.c3d").plates
+    loaded = read.force[..., 1] > 20.0
+    assert np.abs(read.force - force)[loaded].max() < 0.001
+    assert np.abs(read.moment - moment)[loaded].max() < 0.001

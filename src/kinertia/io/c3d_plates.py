@@ -111,13 +111,13 @@ def _moment(platform: Any, kind: int, unit: float, moment_unit: float) -> FloatA
         result: FloatArray = np.cross(unit * platform["center_of_pressure"].T, force) + unit * platform["Tz"].T
         return result
     # ezc3d adds to the channels' moments the force times the offset from transducer to surface, in the unit of lengths
-    measured = platform["moment"].T - np.cross(force, _axes(corners) @ platform["origin"])
+    measured = platform["moment"].T - np.cross(force, plate_axes(corners) @ platform["origin"])
     about_middle = unit * platform["moment"].T + (moment_unit - unit) * measured
     result = about_middle + np.cross(unit * corners.mean(axis=0), force)
     return result
 
 
-def _axes(corners: FloatArray) -> FloatArray:
+def plate_axes(corners: FloatArray) -> FloatArray:
     """Return a plate's axes in the laboratory as columns (3, 3), from its corners (4, 3), as ezc3d does."""
     x, along = corners[0] - corners[1], corners[0] - corners[3]
     z = np.cross(x, along)

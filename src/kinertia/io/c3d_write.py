@@ -7,13 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from kinertia.io.c3d_plates import plate_axes
 from kinertia.io.ezc3d_library import new_c3d, save_c3d
 from kinertia.trial.data import FloatArray, PlateLoads, Recording
 
 _TO_LAB = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 """Ground axes (Y up) to lab axes (Z up): x stays, lab y points to the person's left."""
-_TO_PLATE = np.diag([1.0, -1.0, -1.0])
-"""Lab axes to the plates' own: z down, as they are built."""
 _MM = 1000.0
 _CHANNELS = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
 
@@ -69,8 +68,10 @@ def _add_plates(file: Any, plates: PlateLoads, samples_per_frame: int) -> None:
     count, parameters = len(plates.names), file["parameters"]
     middle = plates.corners.mean(axis=1)
     about_middle = plates.moment - np.cross(middle, plates.force)
-    turn = _TO_PLATE @ _TO_LAB
-    channels = np.concatenate([plates.force @ turn.T, _MM * about_middle @ turn.T], axis=-1)
+    corners = [_ordered(_MM * each @ _TO_LAB.T) for each in plates.corners]
+    turns = np.array([plate_axes(each).T @ _TO_LAB for each in corners])
+    force, moment = (np.einsum("pij,kpj->kpi", turns, each) for each in (plates.force, _MM * about_middle))
+    channels = np.concatenate([force, moment], axis=-1)
     file["data"]["analogs"] = channels.reshape(1, len(plates.time), 6 * count).swapaxes(1, 2)
     parameters["ANALOG"]["RATE"]["value"] = [parameters["POINT"]["RATE"]["value"][0] * samples_per_frame]
     parameters["ANALOG"]["LABELS"]["value"] = [f"{name}{p}" for p in range(1, count + 1) for name in _CHANNELS]
@@ -81,15 +82,18 @@ def _add_plates(file: Any, plates: PlateLoads, samples_per_frame: int) -> None:
         ("ZERO", [1, 0]),
         ("ORIGIN", np.zeros((3, count))),
         ("CHANNEL", np.arange(1, 6 * count + 1).reshape(count, 6).T),
-        ("CORNERS", np.moveaxis(np.array([_ordered(c) for c in plates.corners]), 0, 2).swapaxes(0, 1)),
+        ("CORNERS", np.moveaxis(np.array(corners), 0, 2).swapaxes(0, 1)),
     ):
         parameters["FORCE_PLATFORM"][name]["value"] = np.asarray(value)
 
 
 def _ordered(corners: FloatArray) -> FloatArray:
-    """Order corners (4, 3), mm in lab axes, by the quadrants of the plate's axes: (+, +), (-, +), (-, -), (+, -)."""
-    lab = _MM * corners @ _TO_LAB.T
-    x, y, _ = _TO_PLATE @ (lab - lab.mean(axis=0)).T
-    quadrant = np.select([(x > 0) & (y > 0), (x < 0) & (y > 0), (x < 0) & (y < 0)], [0, 1, 2], 3)
-    result: FloatArray = lab[np.argsort(quadrant)]
+    """Order corners (4, 3) in lab axes by the quadrants of the plate's axes: (+, +), (-, +), (-, -), (+, -).
+
+    The plate's z points down, as plates are built, and its x as near to the lab's as a corner allows.
+    """
+    x, y, _ = (corners - corners.mean(axis=0)).T
+    clockwise = np.argsort(np.arctan2(y, x))[::-1]  # from above; counterclockwise about the plate's z
+    first = int(np.argmax((x - y)[clockwise]))
+    result: FloatArray = corners[np.roll(clockwise, -first)]
     return result
