@@ -2,9 +2,11 @@
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from kinertia.diagnostics.result.marker_errors import corrected_joints, moved_markers
+from kinertia.estimation.simultaneous.calibration_entry import AXIS, CalibrationEntry
 from kinertia.estimation.simultaneous.marker_noise import MarkerNoise
 from results import codes, context, walking
 
@@ -44,8 +46,34 @@ def test_a_marker_that_sits_elsewhere_than_in_every_other_trial(label, away_m, e
 
 def test_what_calibration_corrected_is_not_silent():
     nothing = SimpleNamespace(elbow_rotations_rad={}, torso_rotation_rad=None)
-    assert list(corrected_joints(SimpleNamespace(ready=nothing))) == []
+    alone = SimpleNamespace(posterior=None)
+    assert list(corrected_joints(SimpleNamespace(ready=nothing, fit=alone))) == []
     ready = SimpleNamespace(elbow_rotations_rad={"l": -2.1}, torso_rotation_rad=0.6)
-    elbow, torso = corrected_joints(SimpleNamespace(ready=ready))
+    elbow, torso = corrected_joints(SimpleNamespace(ready=ready, fit=alone))
     assert (elbow.code, elbow.where.part, elbow.evidence["rotation_rad"].value) == ("M171", "left elbow", -2.1)
     assert (torso.code, torso.evidence["rotation_rad"].value) == ("M172", 0.6)
+
+
+@pytest.mark.parametrize(
+    ("tilts_deg", "sd_deg", "found"), [((8.0, 7.0), 2.0, []), ((-12.0, 5.0), 2.0, [13.0]), ((-12.0, 5.0), 7.0, [])]
+)
+def test_a_knee_axis_that_the_trials_show_elsewhere(tilts_deg, sd_deg, found):
+    entries = [
+        CalibrationEntry(
+            kind="joint",
+            joint="knee_r",
+            quantity=AXIS,
+            axis=str(k),
+            value=float(np.radians(tilt)),
+            prior_sd=float(np.radians(5.0)),
+            sd=float(np.radians(sd_deg)),
+            unit="rad",
+        )
+        for k, tilt in enumerate(tilts_deg, 1)
+    ]
+    nothing = SimpleNamespace(elbow_rotations_rad={}, torso_rotation_rad=None)
+    fit = SimpleNamespace(posterior=SimpleNamespace(calibration=entries))
+    shown = [*corrected_joints(SimpleNamespace(ready=nothing, fit=fit))]
+    assert [one.code for one in shown] == ["M175"] * len(found)
+    assert [np.degrees(one.evidence["rotation_rad"].value) for one in shown] == pytest.approx(found)
+    assert [one.where.part for one in shown] == ["right knee"] * len(found)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from kinertia.diagnostics.result.context import ResultContext
+from kinertia.estimation.simultaneous.calibration_entry import AXIS, CalibrationEntry
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
@@ -23,7 +24,7 @@ _DRIFTING = 3.0
 """Multiple of the usual SD from which a marker drifts, as in `marker_noise`."""
 _BACKWARDS_RAD = 0.5
 _TORSO_RAD = 0.25
-_SIDES = {"r": "right elbow", "l": "left elbow"}
+_SIDES = {"r": "right", "l": "left"}
 
 
 def moved_markers(context: ResultContext) -> Iterator[Finding]:
@@ -67,9 +68,28 @@ def _at_shoulders(skeleton: Skeleton) -> set[str]:
 
 
 def corrected_joints(context: ResultContext) -> Iterator[Finding]:
-    """Report elbows that the static trial would bend backwards, and a torso that arms would turn under its markers."""
+    """Report elbows that the static trial would bend backwards, a torso that arms would turn, and axes of knees that are
+    elsewhere than in the static trial.
+    """
     for side, rotation_rad in context.ready.elbow_rotations_rad.items():
         rotation = Quantity(rotation_rad, "rad", limit=_BACKWARDS_RAD)
-        yield finding("M171", Where(part=_SIDES[side]), rotation_rad=rotation)
+        yield finding("M171", Where(part=f"{_SIDES[side]} elbow"), rotation_rad=rotation)
     if (torso_rad := context.ready.torso_rotation_rad) is not None:
         yield finding("M172", Where(part="torso"), rotation_rad=Quantity(torso_rad, "rad", limit=_TORSO_RAD))
+    yield from _knee_axes(context)
+
+
+def _knee_axes(context: ResultContext) -> Iterator[Finding]:
+    """M175: knees whose axis the trials show elsewhere than the static trial, by either of its two angles."""
+    for side, name in _SIDES.items():
+        angles = [one for one in _calibrated(context) if one.joint == f"knee_{side}" and one.quantity == AXIS]
+        if any(one.found for one in angles):
+            worst = max(angles, key=lambda one: abs(one.value))
+            rotation_rad = float(np.linalg.norm([one.value for one in angles]))
+            rotation = Quantity(rotation_rad, "rad", limit=2.0 * worst.prior_sd, sd=worst.sd)
+            yield finding("M175", Where(part=f"{name} knee"), rotation_rad=rotation)
+
+
+def _calibrated(context: ResultContext) -> Sequence[CalibrationEntry]:
+    posterior = context.fit.posterior
+    return () if posterior is None else posterior.calibration
