@@ -68,7 +68,7 @@ def _at_shoulders(skeleton: Skeleton) -> set[str]:
 
 
 def corrected_joints(context: ResultContext) -> Iterator[Finding]:
-    """Report elbows that the static trial would bend backwards, a torso that arms would turn, and axes of knees that are
+    """Report elbows that the static trial would bend backwards, a torso that arms would turn, and knees whose axis is
     elsewhere than in the static trial.
     """
     for side, rotation_rad in context.ready.elbow_rotations_rad.items():
