@@ -9,13 +9,9 @@ import numpy as np
 from kinertia.estimation.simultaneous.cost_term import CostTerm, Solution
 from kinertia.estimation.simultaneous.inputs import BSP, FreedModel, Given
 from kinertia.estimation.simultaneous.layout import Unknowns
+from kinertia.estimation.simultaneous.static_information import LEAST_INFORMATION
 from kinertia.model.bsp import block_diagonal
 from kinertia.model.log_cholesky import nearest_consistent, table_jacobian, to_log_cholesky
-
-LEAST_INFORMATION = 0.01
-"""Of every parameter, so that none has a standard deviation above ten. Where the data favour a second moment below
-zero, its logarithm falls until neither data nor prior hold it; what is computed from its variance is then noise, and
-its exponential may have any size."""
 
 
 class BodySegments(CostTerm):

@@ -202,6 +202,7 @@ class Eliminated:
         of: Callable[[TimeBlock], NormalEquations],
         done: Callable[[NormalEquations], None],
         damping: float,
+        precise: bool = False,
     ) -> Eliminated:
         """Eliminate the motion of a trial.
 
@@ -210,10 +211,13 @@ class Eliminated:
             of: makes the normal equations of one block.
             done: called with them when they are no longer needed.
             damping: share by which the motion's diagonal is raised.
+            precise: with the border in double precision.
         """
+        if precise:
+            return cls._of(time_blocks, partial(Branch.of, of, done, damping, np.float64))
         result = cls._of(time_blocks, partial(Branch.of, of, done, damping, np.float32))
         if (result.static_diagonal > UNSAFE * np.diag(result.information)).any():
-            return cls._of(time_blocks, partial(Branch.of, of, done, damping, np.float64))
+            return cls.of(time_blocks, of, done, damping, precise=True)
         return result
 
     @classmethod

@@ -38,6 +38,7 @@ class MapProblem:
         model: of the person, as a function of these.
         terms: of the cost.
         loads: on the feet, corrected by the terms.
+        precise: whether all of it is in double precision (`elimination`).
     """
 
     def __init__(
@@ -48,7 +49,9 @@ class MapProblem:
         trials: Sequence[Observation],
         phase: float = 0.0,
         terms: Sequence[type[CostTerm]] = TERMS,
+        precise: bool = False,
     ) -> None:
+        self.precise = precise
         self.skeleton, self.prior, self.calibration, self.trials = skeleton, prior, calibration, trials
         self.given = Given(skeleton, prior, calibration, trials, phase)
         self.bases, self.start, self.moving = self.given.bases, self.given.start, self.given.moving
@@ -63,7 +66,7 @@ class MapProblem:
     def of(self, trials: Sequence[Observation], phase: float = 0.0) -> MapProblem:
         """Return the same problem with other observations, and with knots this share of an interval earlier."""
         kinds = [type(term) for term in self.terms]
-        return MapProblem(self.skeleton, self.prior, self.calibration, trials, phase, kinds)
+        return MapProblem(self.skeleton, self.prior, self.calibration, trials, phase, kinds, self.precise)
 
     def term(self, kind: type[T]) -> T:
         """Return the term of this kind."""
@@ -83,9 +86,15 @@ class MapProblem:
 
     def shortened(self, point: Point, step: np.ndarray) -> np.ndarray:
         """Shorten a step of all unknowns from a point to what the terms allow."""
-        before, step = sum(part.size for part in point.coefficients), step.copy()
+        before = sum(part.size for part in point.coefficients)
+        static = slice(before, before + self.layout.size)
+        return np.concatenate([step[:before], self.shortened_static(step[static]), step[static.stop :]])
+
+    def shortened_static(self, step: np.ndarray) -> np.ndarray:
+        """Shorten a step (S,) of the static unknowns to what the terms allow."""
+        step = step.copy()
         for term in self.terms:
-            term.shorten(step[before : before + self.layout.size])
+            term.shorten(step)
         return step
 
     def bends(self, rhs: np.ndarray) -> np.ndarray:
@@ -165,7 +174,7 @@ class MapProblem:
     ) -> Eliminated:
         """Return trial k with its motion eliminated; not `bordered`: for the motion alone, with all else fixed."""
         of = partial(self.normal, k, coefficients, static, bordered=bordered)
-        return Eliminated.of(self.time_blocks[k], of, self._room.back, damping)
+        return Eliminated.of(self.time_blocks[k], of, self._room.back, damping, self.precise)
 
     def normal(
         self,

@@ -104,16 +104,19 @@ def estimate_simultaneous(
     with other ground reactions, whose evidence is computed for comparison. `terms` are those of the cost.
     """
     problem = MapProblem(skeleton, prior, calibration, trials, terms=terms)
-    ended = _searched(problem, progress)
-    model = GaussNewton.of(problem, ended.here).under(ended.instruments)
+    ended, model = _optimum(problem, progress)
+    if model.static.is_rounded:
+        problem = MapProblem(skeleton, prior, calibration, trials, terms=terms, precise=True)
+        ended, model = _optimum(problem, progress)
     evidence = Evidence.of(model, ended.instruments, otherwise)
     known = _Judged.known(ended.instruments)
     phases = OfPhases.of(problem, ended.point, partial(_continued, judged=known))
     profile = CostProfile.of(problem, ended.here, ended.instruments, ended.point, partial(_held, problem, ended.point))
     model = GaussNewton.of(problem, profile.here).under(profile.instruments)
     moved, more = _left_out(problem, model, ended.point.static)
-    static = phases.static + profile.static - ended.point.static + moved
-    point = followed(problem, profile.here, ended.point, static)
+    static = ended.point.static
+    corrected = static + problem.shortened_static(phases.static + profile.static - 2.0 * static + moved)
+    point = followed(problem, profile.here, ended.point, corrected)
     ended = ended._replace(here=profile.here, instruments=profile.instruments, point=point)
     roots = _roots_in_trials(problem, ended, model)
     covariance, of_curves = _deviations(problem, ended, model, roots)
@@ -123,6 +126,12 @@ def estimate_simultaneous(
     draws = posterior_draws(model, point, roots, [of_knots(phases), *of_root(model, point, more)])
     support = instrument_support(model, ended.point, ended.instruments, of_curves)
     return result_of(problem, ended, motions, covariance, of_curves, support, evidence, draws)
+
+
+def _optimum(problem: MapProblem, progress: Callable[[float], None]) -> tuple[Ended, GaussNewton]:
+    """Search for the optimum; return it with the quadratic there, under the instruments' Gaussian."""
+    ended = _searched(problem, progress)
+    return ended, GaussNewton.of(problem, ended.here).under(ended.instruments)
 
 
 def _left_out(problem: MapProblem, model: GaussNewton, static: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

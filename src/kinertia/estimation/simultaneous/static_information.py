@@ -8,12 +8,17 @@ zero.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 
-_SINGULAR = 1e-13
-"""Share of the largest eigenvalue of the scaled information below which an eigenvalue is a rounding error."""
+LEAST_INFORMATION = 0.01
+"""On every unknown by its prior, so that none has a standard deviation above ten. Where the data favour a second moment
+below zero, its logarithm falls until neither data nor prior hold it; what is computed from its variance is then noise,
+and its exponential may have any size."""
+_ROUNDED = 0.5
+"""Share of that."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +56,20 @@ class StaticInformation:
         across = solve_triangular(factor, information[n:, :n], lower=True)
         return cls(information[:n, :n] - across.T @ across, factor, across)
 
+    @cached_property
+    def _directions(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Information (n,) along n independent directions, the least that priors allow there, and the directions."""
+        scale = 1.0 / np.sqrt(np.diag(self.first))
+        values, vectors = np.linalg.eigh(scale[:, None] * self.first * scale)
+        directions = scale[:, None] * vectors
+        return values, LEAST_INFORMATION * np.square(directions).sum(axis=0), directions
+
+    @property
+    def is_rounded(self) -> bool:
+        """Rounding took more information than there is in some direction, where precise data show almost nothing."""
+        values, least, _ = self._directions
+        return bool((values < _ROUNDED * least).any())
+
     def first_of(self, rhs: np.ndarray) -> np.ndarray:
         """Reduce the right-hand side (S,) of normal equations to the first n unknowns (n,)."""
         n = len(self.first)
@@ -65,12 +84,11 @@ class StaticInformation:
         return np.concatenate([first, solve_triangular(self.factor, last, lower=True, trans="T")])
 
     def root_of_covariance(self) -> np.ndarray:
-        """Return R (S, S) with covariance R R^T of all unknowns; finite even if information rounds to below zero."""
+        """Return R (S, S) with covariance R R^T of all unknowns; in no direction is it larger than by priors alone."""
         n, k = len(self.first), len(self.factor)
-        scale = 1.0 / np.sqrt(np.diag(self.first))
-        values, vectors = np.linalg.eigh(scale[:, None] * self.first * scale)
+        values, least, directions = self._directions
         result = np.zeros((n + k, n + k))
-        result[:n, :n] = scale[:, None] * vectors / np.sqrt(np.maximum(values, _SINGULAR * values[-1]))
+        result[:n, :n] = directions / np.sqrt(np.maximum(values, least))
         result[n:, n:] = np.eye(k)
         result[n:, :n] = -self.across @ result[:n, :n]
         result[n:] = solve_triangular(self.factor, result[n:], lower=True, trans="T")
