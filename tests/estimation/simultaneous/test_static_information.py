@@ -14,8 +14,22 @@ def singular_first() -> np.ndarray:
 
 @pytest.mark.parametrize("n", [6, 9])
 def test_root_gives_the_inverse(singular_first, n):
-    root = StaticInformation.of(singular_first, n).root_of_covariance()
-    np.testing.assert_allclose(root @ root.T, np.linalg.inv(singular_first), rtol=1e-6, atol=1e-12)
+    """In units in which no standard deviation is above ten, as of all unknowns of the estimate."""
+    units = np.where(np.arange(9) == 3, 1e3, 1.0)
+    information = units[:, None] * singular_first * units
+    root = StaticInformation.of(information, n).root_of_covariance()
+    np.testing.assert_allclose(root @ root.T, np.linalg.inv(information), rtol=1e-6, atol=1e-12)
+
+
+def test_no_direction_is_less_certain_than_by_its_prior():
+    """Information that rounds below that of the prior, 0.01, is a rounding error, and said to be one."""
+    information = np.diag([100.0, 4.0, -1e-3])
+    information[0, 1] = information[1, 0] = 10.0
+    found = StaticInformation.of(information + 1e-9 * np.eye(3), 3)
+    assert found.is_rounded
+    root = found.root_of_covariance()
+    assert np.abs(root @ root.T).max() < 101.0
+    assert not StaticInformation.of(np.diag([100.0, 4.0, 0.02]), 3).is_rounded
 
 
 def test_first_unknowns_alone_are_those_of_all_together(singular_first):

@@ -59,7 +59,7 @@ class StaticInformation:
     @cached_property
     def _directions(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Information (n,) along n independent directions, the least that priors allow there, and the directions."""
-        scale = 1.0 / np.sqrt(np.diag(self.first))
+        scale = 1.0 / np.sqrt(np.maximum(np.diag(self.first), LEAST_INFORMATION))
         values, vectors = np.linalg.eigh(scale[:, None] * self.first * scale)
         directions = scale[:, None] * vectors
         return values, LEAST_INFORMATION * np.square(directions).sum(axis=0), directions
