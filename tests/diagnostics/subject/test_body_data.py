@@ -9,6 +9,7 @@ from kinertia.diagnostics.subject.body_data import absent_markers, population, s
 from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.trial.data import Markers, Recording
 from people import person
+from recordings import WALKS
 
 MARKERS = Markers(np.array([0.0, 0.1]), ("A",), np.zeros((2, 1, 3)))
 STATIC = Recording("static", MARKERS, mass_kg=60.0, height_m=1.7)
@@ -27,6 +28,22 @@ def test_files_that_contradict_each_other():
     other = replace(STATIC, name="second", mass_kg=66.0)
     (found,) = stated_and_filed(person([other], STATIC, mass_kg=60.0, height_m=1.7))
     assert found.where.trial == "second"
+
+
+def test_files_that_agree_are_one_finding():
+    (found,) = stated_and_filed(person([replace(STATIC, name="second")], STATIC, mass_kg=66.0, height_m=1.7))
+    assert (found.where.trial, found.evidence["files"].value) == (None, "static, second")
+
+
+@pytest.mark.parametrize(
+    ("stated_kg", "filed_kg", "severity"), [(72.6, 75.0, "INFO"), (75.0, 72.6, "WARNING"), (90.0, 95.0, "WARNING")]
+)
+def test_plates_that_confirm_the_stated_mass(recording_of, stated_kg, filed_kg, severity):
+    """Whoever corrects a mass as S111 asks is not accused of the old one in the file."""
+    walk = replace(recording_of(*WALKS["synthetic"]), mass_kg=filed_kg)
+    marker_set = choose_marker_set(walk.markers.labels)
+    (found,) = stated_and_filed(person([walk], None, marker_set, mass_kg=stated_kg))
+    assert (found.code, found.severity.name) == ("S103", severity)
 
 
 def test_a_population_that_the_tables_do_not_describe():

@@ -7,8 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from kinertia.diagnostics.context import PersonContext
+from kinertia.diagnostics.subject.mass import weighed_as_stated
 from kinertia.estimation.population import population_of
-from kinertia.findings.finding import Finding, finding
+from kinertia.findings.display import first_few
+from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.settings import Subject
@@ -18,18 +20,25 @@ _QUANTITIES = {"mass_kg": ("mass", "kg"), "height_m": ("stature", "m")}
 
 
 def stated_and_filed(context: PersonContext) -> Iterator[Finding]:
-    """S103: a mass or stature in a file that differs from the one used."""
-    for recording in (*context.standing, *context.trials):
-        for name, (quantity, unit) in _QUANTITIES.items():
-            stated, filed = getattr(context.subject, name), getattr(recording.recording, name)
+    """S103: a mass or stature in files that differs from the one used; no doubt where the plates confirm that one."""
+    for name, (quantity, unit) in _QUANTITIES.items():
+        stated = getattr(context.subject, name)
+        in_files: dict[float, list[str]] = {}
+        for one in (*context.standing, *context.trials):
+            filed = getattr(one.recording, name)
             if stated is not None and filed is not None and abs(filed - stated) > _SAME * stated:
-                yield finding(
-                    "S103",
-                    Where(trial=recording.name, part=quantity),
-                    stated=Quantity(stated, unit),
-                    filed=Quantity(filed, unit, limit=stated * (1.0 + (_SAME if filed > stated else -_SAME))),
-                    quantity=Quantity(quantity),
-                )
+                in_files.setdefault(filed, []).append(one.name)
+        for filed, names in in_files.items():
+            confirmed = name == "mass_kg" and weighed_as_stated(context, filed)
+            yield finding(
+                "S103",
+                Where(trial=names[0] if len(names) == 1 else None, part=quantity),
+                Severity.INFO if confirmed else None,
+                stated=Quantity(stated, unit),
+                filed=Quantity(filed, unit, limit=stated * (1.0 + (_SAME if filed > stated else -_SAME))),
+                quantity=Quantity(quantity),
+                files=Quantity(first_few(names)),
+            )
 
 
 def population(context: PersonContext) -> Iterator[Finding]:

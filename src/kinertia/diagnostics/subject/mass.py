@@ -11,14 +11,14 @@ Of fault-free trials two plates agree on the mass within 2 %. A support of 50 N 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 
 from kinertia.diagnostics.context import PersonContext
-from kinertia.diagnostics.evidence.force_mass import MISSING, ForceMass
+from kinertia.diagnostics.evidence.force_mass import MISSING, ForceMass, UnmeasuredSupport
 from kinertia.diagnostics.subject.odd_recording import odd_ones
 from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.findings.finding import Finding, Severity, finding
@@ -84,15 +84,12 @@ def stated_mass(context: PersonContext) -> Iterator[Finding]:
     if total is None:
         return
     known = {one.name: mass for one in context.trials if (mass := one.force_mass) is not None}
-    apart = {name: found for name, mass in known.items() if (found := mass.unmeasured(total.total_kg)) is not None}
+    apart = _apart(context, total)
     for name, found in apart.items():
         missing, complete = Quantity(found.missing, "1", limit=MISSING), Quantity(found.complete, "1")
         yield finding("P281", Where(trial=name, span_s=found.span_s), missing=missing, complete=complete)
-    standing = [*_standing(context)]
-    by_plates = _by_plates(context)
-    better = {*apart, *(one.trial for one in by_plates)}
-    whole = [*by_plates, *(_occasion(name, mass) for name, mass in known.items() if name not in better)]
-    partly = [_occasion(name, mass) for name, mass in known.items() if name in apart]
+    whole, standing = _whole(context, apart), [*_standing(context)]
+    partly = [_occasion(name, known[name]) for name in apart]
     for one in [*_together([*whole, *standing]), *partly]:
         if one.differs(total, WARNING_SHARE):
             # nothing is computed from the forces of a person who stands
@@ -100,6 +97,20 @@ def stated_mass(context: PersonContext) -> Iterator[Finding]:
             witnesses = standing or [other for other in whole if other.trial != one.trial]
             for each in _contradiction(context, one, total, witnesses):
                 yield each.at(min(each.severity, most))
+
+
+def weighed_as_stated(context: PersonContext, other_kg: float) -> bool:
+    """Return whether every mass by the plates agrees with the stated one, and is nearer to it than to another."""
+    total = context.total_mass
+    if total is None:
+        return False
+    weighed = _together([*_whole(context, _apart(context, total)), *_standing(context)])
+    attached_kg = total.total_kg - total.body_kg
+    return bool(weighed) and all(
+        not one.differs(total, WARNING_SHARE)
+        and abs(one.mass_kg - total.total_kg) < abs(one.mass_kg - other_kg - attached_kg)
+        for one in weighed
+    )
 
 
 def masses_of_trials(context: PersonContext) -> Iterator[Finding]:
@@ -129,6 +140,20 @@ def masses_of_trials(context: PersonContext) -> Iterator[Finding]:
 
 def _occasion(name: str | None, mass: ForceMass, standing: bool = False) -> _Occasion:
     return _Occasion(name, mass.mass_kg, float(np.hypot(mass.sd_kg, _REPEATED * mass.mass_kg)), mass.over, standing)
+
+
+def _apart(context: PersonContext, total: CarriedMass) -> dict[str, UnmeasuredSupport]:
+    """Return the trials by name in which part of the weight is off the plates for a while."""
+    known = {one.name: one.force_mass for one in context.trials if one.force_mass is not None}
+    return {name: found for name, mass in known.items() if (found := mass.unmeasured(total.total_kg)) is not None}
+
+
+def _whole(context: PersonContext, apart: Container[str]) -> list[_Occasion]:
+    """Return the masses of the trials in which all of the weight is on the plates."""
+    by_plates = _by_plates(context)
+    better = {one.trial for one in by_plates}
+    known = ((one.name, one.force_mass) for one in context.trials if one.name not in apart and one.name not in better)
+    return [*by_plates, *(_occasion(name, mass) for name, mass in known if mass is not None)]
 
 
 def _by_plates(context: PersonContext) -> list[_Occasion]:
