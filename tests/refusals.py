@@ -11,6 +11,8 @@ from kinertia.errors import FileError, KinertiaError
 from kinertia.findings.finding import Finding, Severity
 
 ANY = object()
+MOST_WORDS = 25
+"""Of a message."""
 
 
 @contextmanager
@@ -41,8 +43,9 @@ def expect_evidence(found: Finding, /, **evidence: Any) -> None:
 
 
 def expect_filled(found: Finding) -> None:
-    """Every name in its sentences is filled in."""
+    """Every name in its sentences is filled in, and the message is short, whatever it is filled with."""
     assert not re.findall(r"\{\w+(?::[+%#]*)?\}", f"{found.message} {found.effect} {found.remedy}"), found.message
+    assert len(found.message.split()) <= MOST_WORDS, found.message
 
 
 def codes(findings: Sequence[Finding]) -> list[str]:

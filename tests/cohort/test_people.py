@@ -115,5 +115,5 @@ def test_no_study_and_nobody_in_it_are_errors(tmp_path):
     with pytest.raises(FileError, match="none of its folders"):
         people_of(tmp_path, tmp_path / "out")
     (tmp_path / "latin.csv").write_bytes("subject\nZo\xeb.toml\n".encode("latin-1"))
-    with pytest.raises(FileError, match="not UTF-8"):
+    with pytest.raises(FileError, match="not in UTF-8"):
         people_of(tmp_path / "latin.csv", tmp_path / "out")

@@ -53,7 +53,7 @@ def test_without_sex_there_is_no_table():
     [
         (("walk", "walk"), "trial 'walk': trial 'walk' is there already; results have a folder for each"),
         (("walk", "Walk"), "Windows and macOS take both for one folder"),
-        (("walk", "../walk"), "a name that a folder can have on every system"),
+        (("walk", "../walk"), "folders cannot have it on every system"),
         (("walk", "bsp.csv"), "the results have a file bsp.csv"),
     ],
 )

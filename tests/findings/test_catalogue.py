@@ -4,12 +4,12 @@ import re
 
 from kinertia.findings.finding import Severity
 from kinertia.findings.rule import FAMILIES, STAGES, all_rules, family_title, matching, questions, rule
+from refusals import MOST_WORDS
 from template_names import names_in
 
 RULES = all_rules()
 QUESTIONS = {question for family in FAMILIES for question in questions(family)}
 OUTPUTS = {"motion", "moments", "masses", "centres_of_mass", "inertias"}
-MOST_WORDS = 25
 NO_EVIDENCE = {"code", "where", "severity", "causes"}
 """Arguments of `finding`: evidence cannot have these names."""
 

@@ -303,7 +303,7 @@ def plates_left_out(tmp_path, plate, **arguments):
 
 def test_plates_that_cannot_be_used_are_left_out(tmp_path):
     unreadable = plates_left_out(tmp_path, plate_parameters(CORNERS, kind=5))
-    assert "types 5" in unreadable.evidence["reason"].value
+    assert "type (5)" in unreadable.evidence["reason"].value
     assert unreadable.where.plate is None
     for size in (1e8, 0.0):
         lost = plates_left_out(tmp_path, plate_parameters(size * CORNERS))

@@ -63,8 +63,8 @@ CASES = [
         "subject.toml",
         'forces = "walk.mot"',
         'forces = "wakl.mot"',
-        "{file}, line 13: F101 There is no file wakl.mot in {folder}; the nearest names there: walk.mot, walk.tsv, "
-        "walk.trc. Correct the path.",
+        "{file}, line 13: F101 There is no file wakl.mot in {folder}. Correct the path: the nearest names there: "
+        "walk.mot, walk.tsv, walk.trc.",
     ),
 ]
 

@@ -204,7 +204,7 @@ CASES = [
         "belt_speed_m_s = { right = 1.2 }",
         14,
         "F191",
-        {"expected": "{ right = 1.2, left = 0.6 }"},
+        {"expected": "{right=1.2, left=0.6}"},
     ),
     ("window_s = [0.4, 2]", "belt_speed_m_s = { right = 1.2, left = 25 }", 14, "F191", {"expected": "of two belts"}),
     ("window_s = [0.4, 2]", "belt_speed_m_s = 25", 14, "F191", {"key": "belt_speed_m_s", "value": "25"}),

@@ -42,7 +42,7 @@ def read_bsp(path: Path) -> BspTable:
     """
     values: dict[str, dict[str, tuple[float, float]]] = {}
     without_sd: dict[str, dict[str, int]] = {}
-    for row in read_csv(path, _COLUMNS, "the bsp.csv of a simultaneous fit (two-level has no sd)"):
+    for row in read_csv(path, _COLUMNS, "the bsp.csv of a simultaneous fit"):
         line, segment, parameter, written_unit = row.line, *(row.cells[name] for name in _COLUMNS[:3])
         if parameter not in PARAMETERS:
             raise _wrong(path, line, segment, parameter, f"no such parameter; those are {', '.join(PARAMETERS)}")

@@ -131,7 +131,7 @@ def _open(path: Path) -> tuple[C3dContent, list[Finding]]:
     parameters = file["parameters"]
     if file["trouble"] and parameter_values(parameters, "FORCE_PLATFORM", "USED", [0])[0]:
         types = ", ".join(map(str, parameter_values(parameters, "FORCE_PLATFORM", "TYPE", [])))
-        reason = f"they are of types {types} and cannot be read, {file['trouble']}"
+        reason = f"their type ({types}) cannot be read"
         findings.append(plate_left_out(path, None, reason))
     if not file["data"]["points"].shape[1] and _poses(file) is None:
         found = "no points, nor poses of pelvis, thighs, shanks, feet and toes as Theia has them"

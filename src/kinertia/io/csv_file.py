@@ -105,7 +105,7 @@ def read_csv(path: Path, columns: Sequence[str], expected: str) -> Iterator[Row]
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except UnicodeDecodeError:
-        raise mismatch(path, expected, "text that is not UTF-8", "CSV in UTF-8 (Excel: 'CSV UTF-8')") from None
+        raise mismatch(path, expected, "text not in UTF-8", "CSV in UTF-8 (Excel: 'CSV UTF-8')") from None
     first = next((number for number, line in enumerate(lines) if line.strip()), None)
     if first is None:
         raise FileError.found(path, "F104", found=Quantity(f"it is empty, and no {expected}"))

@@ -40,10 +40,7 @@ def trouble_as_folders(trials: Sequence[str]) -> tuple[int, str] | None:
     """Return the first trial whose name cannot be a folder beside the earlier ones, and why."""
     for index, name in enumerate(trials if len(trials) > 1 else ()):
         if not fits_everywhere(name):
-            return index, (
-                'it must be a name that a folder can have on every system: none of < > : " / \\ | ? *, no dot or '
-                "blank at the end, no device of Windows (CON, NUL, COM1, ...)"
-            )
+            return index, 'folders cannot have it on every system (no <>:"/\\|?*, no final dot or blank, no NUL)'
         if taken := next((file for file in RESULT_FILES if same_folder(file, name)), None):
             return index, f"the results have a file {taken}, not a folder"
         for before in trials[:index]:

@@ -73,10 +73,7 @@ def _belt_speed(value: object, info: ValidationInfo) -> float | tuple[float, flo
 def _one_belt_speed(value: object) -> float:
     if isinstance(value, int | float) and not isinstance(value, bool) and 0 < value <= 15:
         return float(value)
-    raise ValueError(
-        "must be the speed of a treadmill's belt in m/s (up to 15), of two belts { right = 1.2, left = 0.6 }, or a "
-        "file with it over time"
-    )
+    raise ValueError("must be a belt's speed in m/s (up to 15), of two belts {right=1.2, left=0.6}, or a file")
 
 
 File = Annotated[Path, BeforeValidator(_file)]

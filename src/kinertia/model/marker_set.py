@@ -229,13 +229,13 @@ def no_marker_set(name: str, count: int, missing: Mapping[str, Sequence[str]]) -
         labels_found=Quantity(float(count - len(missing)), "1", limit=ENOUGH_LABELS * count),
         labels=Quantity(float(count), "1"),
         name=Quantity(name),
-        missing=Quantity(with_nearest(missing)),
+        missing=Quantity(with_nearest(missing, 2)),
     )
 
 
-def with_nearest(missing: Mapping[str, Sequence[str]]) -> str:
+def with_nearest(missing: Mapping[str, Sequence[str]], most: int = 4) -> str:
     """List the first of these labels, each with the most similar ones."""
-    return first_few([f"{label} ({' or '.join(near)}?)" if near else label for label, near in missing.items()])
+    return first_few([f"{label} ({' or '.join(near)}?)" if near else label for label, near in missing.items()], most)
 
 
 def nearest_labels(missing: Sequence[str], labels: Sequence[str]) -> dict[str, list[str]]:
