@@ -9,7 +9,16 @@ from kinertia.findings.finding import finding
 from kinertia.findings.overview import Overview
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
-from kinertia.report.finding_view import FindingView, digest, evidence_text, evidence_texts, lines, linked, place_text
+from kinertia.report.finding_view import (
+    FindingView,
+    digest,
+    evidence_text,
+    evidence_texts,
+    lines,
+    linked,
+    place_text,
+    unbroken,
+)
 
 
 def view(*findings):
@@ -116,6 +125,12 @@ def test_evidence_is_read_with_limit_and_usual_range(quantity, text):
 def test_codes_in_sentences_lead_to_their_explanation_and_nothing_else_does():
     html = linked("<b>; see P213, Z999")
     assert html == '&lt;b&gt;; see <a class="code" href="#explain-P213">P213</a>, Z999'
+
+
+def test_options_of_commands_are_kept_on_one_line():
+    html = unbroken("kinertia markers <F> -o set.toml, so-called --markers.")
+    option = '<span class="option">{}</span>'.format
+    assert html == f"kinertia markers &lt;F&gt; {option('-o')} set.toml, so-called {option('--markers')}."
 
 
 def test_places_are_named_as_far_as_they_are_known():

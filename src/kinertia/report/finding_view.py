@@ -35,6 +35,7 @@ LOOKS = {USE: "info", WITH_CARE: "warning", DO_NOT_USE: "error"}
 MOST_STEPS = 3
 _TITLES = {Severity.ERROR: "Errors", Severity.WARNING: "Warnings"}
 _CODE = re.compile(r"\b([A-Z]\d{3})\b")
+_OPTION = re.compile(r"(?<!\S)(--?[a-z][a-z-]*)")
 
 
 @dataclass(frozen=True)
@@ -192,6 +193,13 @@ def linked(sentence: str) -> Markup:
     return Markup("").join(
         link.format(part) if k % 2 and matching(part) else escape(part) for k, part in enumerate(parts)
     )
+
+
+def unbroken(sentence: str) -> Markup:
+    """Keep each option of a command (`--markers`) on one line."""
+    whole = Markup('<span class="option">{0}</span>')
+    parts = _OPTION.split(sentence)
+    return Markup("").join(whole.format(part) if k % 2 else escape(part) for k, part in enumerate(parts))
 
 
 def lines(findings: Iterable[Finding], least: Severity = Severity.CORRECTED) -> list[str]:

@@ -15,7 +15,7 @@ from markupsafe import Markup
 
 from kinertia.findings.display import outlined
 from kinertia.io.provenance import VERSION
-from kinertia.report.finding_view import LOOKS, linked
+from kinertia.report.finding_view import LOOKS, linked, unbroken
 from kinertia.report.plotly_script import packed_script
 from kinertia.report.wording import fixed
 
@@ -56,7 +56,7 @@ def _environment() -> jinja2.Environment:
     environment = templates_of("kinertia.report")
     environment.globals.update(asset=_asset, packed_script=lambda: Markup(packed_script()))
     environment.globals.update(looks=LOOKS)
-    environment.filters.update(fixed=fixed, outlined=outlined, linked=linked)
+    environment.filters.update(fixed=fixed, outlined=outlined, linked=linked, unbroken=unbroken)
     return environment
 
 
