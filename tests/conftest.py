@@ -27,6 +27,7 @@ from kinertia.settings import Settings, Subject
 from kinertia.trial.data import Recording
 from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow.estimate import estimate_bsp
+from made_codes import MadeCodes
 from once import once
 from quick_two_level import given_back
 from recordings import SYNTHETIC
@@ -63,6 +64,10 @@ markers = "walk.c3d"
 """
 FEW_EVALUATIONS = 30
 LIMITS = ("kinertia.estimation.two_level._MAX_EVALUATIONS", "kinertia.estimation.two_level._FREE_EVALUATIONS")
+
+
+def pytest_configure(config):
+    config.pluginmanager.register(MadeCodes(config))
 
 
 def pytest_sessionstart(session):

@@ -8,8 +8,9 @@ import pytest
 from kinertia.diagnostics.subject.unobserved_segments import unobserved_segments
 from kinertia.io.marker_set_file import read_marker_set
 from kinertia.io.recording import read_recording
-from kinertia.model.gait27 import VIRTUAL_TRUNK
+from kinertia.model.gait27 import ARM_COORDINATES, VIRTUAL_TRUNK
 from kinertia.settings import Subject
+from kinertia.synthetic.walk import walking_subject
 from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow.estimate import estimate
 from kinertia.workflow.prepare import prepare
@@ -30,6 +31,20 @@ def lacking(recording, gone):
     return replace(
         recording, markers=recording.markers.select([one for one in recording.markers.labels if one not in gone])
     )
+
+
+@pytest.mark.parametrize(
+    ("locked", "parts"),
+    [
+        ((), []),
+        (ARM_COORDINATES, ["arms"]),
+        ([name for name in ARM_COORDINATES if name.endswith("_l")], ["left arm"]),
+        (["elbow_flex_r"], ["right forearm"]),
+    ],
+)
+def test_arms_that_no_marker_shows(locked, parts):
+    skeleton = walking_subject().skeleton.lock(dict.fromkeys(locked, 0.0))
+    assert [(one.code, one.where.part) for one in unobserved_segments(skeleton)] == [("R401", part) for part in parts]
 
 
 @pytest.fixture(scope="module")
