@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
+from kinertia.estimation.simultaneous.model_uncertainty import WITHOUT_STATIC
 from kinertia.io.recording import read_recording
 from kinertia.settings import Settings, Subject
 from kinertia.synthetic.walk import HEIGHT_M
 from kinertia.trial.trial_input import TrialInput
-from kinertia.workflow.built_in_model import WITHOUT_STATIC
+from kinertia.workflow.check import check_person
 from kinertia.workflow.person import Person
 from kinertia.workflow.prepare import prepared
 from kinertia.workflow.screening import screen
@@ -16,7 +17,10 @@ from kinertia.workflow.screening import screen
 def ready(lab, static):
     subject = Subject(name="one", mass_kg=72.6, height_m=HEIGHT_M, sex="male")
     person = Person(subject, [TrialInput(read_recording(lab / "walk.c3d"))], static)
-    return prepared(screen(person), Settings())
+    found = [one.to_dict() for one in check_person(person).findings if one.code == "S207"]
+    result = prepared(screen(person), Settings())
+    assert [one.to_dict() for one in result.findings if one.code == "S207"] == found
+    return result
 
 
 def test_a_walk_stands_for_its_static_trial(synthetic_lab):

@@ -47,15 +47,12 @@ from kinertia.workflow.recording import RecordingCheck
 
 @dataclass(frozen=True, eq=False)
 class _Checked:
-    """Everything that was asked for, the files of each recording, what a subject file lacks for a fit, and whether it
-    names neither static trial nor model.
-    """
+    """Everything that was asked for, the files of each recording, and what a subject file lacks for a fit."""
 
     person: PersonCheck | None
     models: Sequence[ModelOverview]
     files: Mapping[str, str]
     lacking: Sequence[str] = ()
-    without_static: bool = False
 
     def facts(self, recording: RecordingCheck) -> list[tuple[str, str]]:
         """Return the files of a recording, and its contents."""
@@ -148,14 +145,13 @@ def check(
             named = files_by_name(measured, loads, forces, static)
             read = {name: _names(one.markers, one.forces) for name, one in zip(trial_names(named), named, strict=True)}
             read |= {} if static is None else {static.stem: static.name}
-            stated = Person(who, (), marker_set=marker_set, model=osim_model, calibrate=calibrate)
+            stated = Person(who, (), marker_set=marker_set, model=osim_model, calibrate=calibrate, files_only=True)
             person = read_files(named, stated, static, lambda share: progress("reading", share)) if named else None
         checked = _Checked(
             None if person is None else check_person(person.with_overrule(overrule)),
             [check_osim(one, who, overrule) for one in osim],
             read,
             person.lacking if subjects and person is not None else (),
-            bool(subjects) and wanted.model.static is None and wanted.model.osim is None,
         )
     recordings = () if checked.person is None else checked.person.recordings
     page = None if output is None else save_check_page(checked.overviews, recordings, checked.models, output)
@@ -197,8 +193,6 @@ def _show(checked: _Checked, page: Path | None, verbose: bool) -> None:
         show_overview(overview, verbose)
     if checked.lacking:
         out.print(f"kinertia fit also needs, under [subject]: {', '.join(checked.lacking)}", soft_wrap=True)
-    if checked.without_static:
-        out.print("There is no static trial: joint centres will come from a walk, less exactly (S207).", soft_wrap=True)
     if page is not None:
         out.print(f"page in {page}", soft_wrap=True)
 

@@ -370,6 +370,7 @@ class PersonContext:
         total_mass: stated masses of the body and of attached items; None where no mass is known.
         found: findings of the recordings themselves, where a question depends on them.
         more_statics: recordings in which the person stands, of which none is the static trial.
+        files_only: whether files are checked by themselves, beside which there may be others.
     """
 
     subject: Subject
@@ -381,6 +382,7 @@ class PersonContext:
     total_mass: CarriedMass | None = None
     found: Sequence[Finding] = field(default=())
     more_statics: Sequence[RecordingContext] = ()
+    files_only: bool = False
 
     @property
     def standing(self) -> Sequence[RecordingContext]:

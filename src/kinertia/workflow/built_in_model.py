@@ -26,8 +26,8 @@ from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.simultaneous.model_uncertainty import (
     GAIT27_UNCERTAINTY,
     JOINT_AXIS_SD_RAD,
-    JOINT_CENTRE_SD_M,
     MARKER_SD_M,
+    WITHOUT_STATIC,
     ModelUncertainty,
 )
 from kinertia.findings.finding import Finding, finding
@@ -59,8 +59,6 @@ from kinertia.workflow.person import Person
 from kinertia.workflow.person_model import LOWER_BODY_SD_M, UPPER_BODY_SD_M, PersonModel, with_stated_ranges
 from kinertia.workflow.screening import Screened
 
-WITHOUT_STATIC = 2.0
-"""Factor on the uncertainty of joint centres and markers of a model that is made from a walk."""
 _STAYS_M = 1e-4
 """SD (m) of markers that have been adapted already."""
 _FAR_M = 0.03
@@ -165,17 +163,12 @@ class _Landmarks:
     Attributes:
         static: the static trial, or a pose of the walk in its place.
         marker_set: which label is which landmark, with the widths of joints that are known.
-        findings: S207 where it is a pose of the walk.
+        of_walk: there is no static trial (S207): joint centres and markers are twice as uncertain.
     """
 
     static: Recording
     marker_set: MarkerSet
-    findings: tuple[Finding, ...] = ()
-
-    @property
-    def of_walk(self) -> bool:
-        """There is no static trial: joint centres and markers are twice as uncertain."""
-        return bool(self.findings)
+    of_walk: bool = False
 
     @property
     def acromia(self) -> list[str]:
@@ -212,7 +205,7 @@ def built_in_model(screened: Screened, trials: Sequence[Turned], settings: Setti
     model = replace(model, skeleton=with_stated_ranges(model.skeleton, subject))
     stated_axes = _free_axes(facing_x, landmarks, settings)
     calibrated = calibrate(model, [one.trial for one in facing_x], landmarks.acromia, stated_axes)
-    found = [*landmarks.findings, *calibrated.findings]
+    found = calibrated.findings
     left = _unblocked(facing_x, screened, [*screened.findings, *found])
     if len(left) < len(facing_x):  # the skeleton is adapted to those that are used
         calibrated = calibrate(model, [one.trial for one in left], landmarks.acromia, stated_axes)
@@ -248,8 +241,7 @@ def _stance_of(person: Person, trials: Sequence[Turned], marker_set: MarkerSet) 
     static, named = with_widths(
         replace(measured, markers=pose, plates=None), person.recordings, marker_set, person.subject
     )
-    found = finding("S207", Where(trial=walk.name), centre_sd_m=Quantity(WITHOUT_STATIC * JOINT_CENTRE_SD_M, "m"))
-    return _Landmarks(static, named, (found,))
+    return _Landmarks(static, named, of_walk=True)
 
 
 def _free_axes(trials: Sequence[Turned], landmarks: _Landmarks, settings: Settings) -> bool | None:

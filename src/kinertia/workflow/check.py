@@ -94,7 +94,7 @@ def check_recording(
     if is_static:
         person = Person(subject, (), recording, marker_set=marker_set)
     else:
-        person = Person(subject, (TrialInput(recording, window_s),), static, marker_set=marker_set)
+        person = Person(subject, (TrialInput(recording, window_s),), static, marker_set=marker_set, files_only=True)
     return check_person(person).recordings[-1]
 
 

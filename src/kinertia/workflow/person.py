@@ -40,6 +40,7 @@ class Person:
         overrule: what the user overrules, for all trials.
         overrule_of: what the user overrules in single trials, by name.
         unread: findings of files that could not be read.
+        files_only: whether files are checked by themselves, beside which there may be others.
 
     Examples:
         >>> person = kinertia.read_person(kinertia.read_subject("lab/subject.toml"))  # the files of `kinertia demo`
@@ -58,6 +59,7 @@ class Person:
     overrule: Overrule = field(default_factory=Overrule)
     overrule_of: Mapping[str, Overrule] = field(default_factory=dict)
     unread: Sequence[Finding] = ()
+    files_only: bool = False
 
     @property
     def recordings(self) -> list[Recording]:

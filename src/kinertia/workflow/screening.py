@@ -202,7 +202,15 @@ def person_context(person: Person) -> PersonContext:
     total = None if stated.mass_kg is None else _total(stated.mass_kg, person)
     more_statics = [standing(one) for one in person.more_statics]
     return PersonContext(
-        stated, trials, static, label_set, person.model, person.calibrate, total, more_statics=more_statics
+        stated,
+        trials,
+        static,
+        label_set,
+        person.model,
+        person.calibrate,
+        total,
+        more_statics=more_statics,
+        files_only=person.files_only,
     )
 
 

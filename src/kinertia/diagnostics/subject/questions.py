@@ -10,7 +10,7 @@ from kinertia.diagnostics.subject.mass import masses_of_trials, stated_mass
 from kinertia.diagnostics.subject.movements import informative_movements
 from kinertia.diagnostics.subject.repeated_trials import repeated_trials
 from kinertia.diagnostics.subject.same_person import static_and_trials, trials_of_one_person
-from kinertia.diagnostics.subject.standing import flat_feet, floor, standing
+from kinertia.diagnostics.subject.standing import flat_feet, floor, no_static, standing
 from kinertia.diagnostics.subject.stature import stature
 
 STATIC_QUESTIONS: tuple[Question[RecordingContext], ...] = (
@@ -21,6 +21,7 @@ STATIC_QUESTIONS: tuple[Question[RecordingContext], ...] = (
 PERSON_QUESTIONS: tuple[Question[PersonContext], ...] = (
     Question("S10", stated_and_filed),
     Question("M10", absent_markers),
+    Question("S20", no_static),
     Question("M14", floor),
     Question("S20", static_and_trials),
     Question("S30", trials_of_one_person),

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from kinertia.diagnostics.context import PersonContext, RecordingContext
+from kinertia.estimation.simultaneous.model_uncertainty import JOINT_CENTRE_SD_M, WITHOUT_STATIC
 from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.quantity import Quantity
 
@@ -30,6 +31,13 @@ def standing(context: RecordingContext) -> Iterator[Finding]:
     if context.travel.kind == "walks":
         distance = Quantity(context.travel.distance_m, "m", limit=_WALK_M, usual=(0.0, 0.03))
         yield finding("S201", context.at(), distance_m=distance)
+
+
+def no_static(context: PersonContext) -> Iterator[Finding]:
+    """S207: neither static trial nor model is named for the trials, so that joint centres come from a walk."""
+    unread = any(one.rule.stage == "file" and one.where.trial is None for one in context.found)
+    if context.trials and not (context.standing or context.model or context.files_only or unread):
+        yield finding("S207", centre_sd_m=Quantity(WITHOUT_STATIC * JOINT_CENTRE_SD_M, "m"))
 
 
 def floor(context: PersonContext) -> Iterator[Finding]:

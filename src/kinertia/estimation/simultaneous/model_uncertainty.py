@@ -15,6 +15,8 @@ JOINT_CENTRE_SD_M = 0.010
 JOINT_AXIS_SD_RAD = float(np.radians(5.0))
 MARKER_SD_M = 0.005
 """The calibrated skeleton has its markers from these trials already; what remains is the error of that calibration."""
+WITHOUT_STATIC = 2.0
+"""Factor on the uncertainty of joint centres and markers of a model that is made from a walk."""
 
 
 @dataclass(frozen=True, eq=False)
