@@ -40,7 +40,7 @@ class MadeCodes:
         self.whole = (
             config.args_source is config.ArgsSource.TESTPATHS
             and option.markexpr == QUICK
-            and not (option.keyword or option.collectonly or option.lf or option.deselect)
+            and not (option.keyword or option.collectonly or getattr(option, "lf", False) or option.deselect)
         )
         complete = Finding.__post_init__
 
