@@ -1,4 +1,4 @@
-"""Make fifty known faults in files: which are named?"""
+"""Make known faults in files: which are named?"""
 
 from __future__ import annotations
 

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads
+from kinertia.trial.sampled_time import runs
 from validation.marker_mistakes import Change
 from validation.measured_person import MeasuredPerson, acting, loads_of
 
@@ -175,3 +176,49 @@ def _middles(plates: PlateLoads, point: FloatArray) -> FloatArray:
         return np.asarray(plates.corners.mean(axis=1)[None])
     weight = np.where(plates.force[..., 1] > LOAD_THRESHOLD_N, plates.force[..., 1], 0.0)[..., None]
     return np.asarray((weight * point).sum(axis=0, keepdims=True) / np.maximum(weight.sum(axis=0, keepdims=True), 1.0))
+
+
+def one_plate(change: Callable[[PlateLoads, FloatArray, FloatArray, FloatArray], tuple[FloatArray, ...]]) -> Change:
+    """Return a fault that changes forces, points and torques (k, 3) of the plate that is stood on first."""
+
+    def changed(plates: PlateLoads) -> PlateLoads:
+        first = _by_time(plates)[0]
+        parts = [part.copy() for part in acting(plates)]
+        own = change(plates, *(part[:, first] for part in parts))
+        for part, new in zip(parts, own, strict=True):
+            part[:, first] = new
+        return loads_of(plates, *parts)
+
+    return loads(changed)
+
+
+def spike(plates: PlateLoads, force: FloatArray, point: FloatArray, torque: FloatArray) -> tuple[FloatArray, ...]:
+    """Add 2 kN to one sample in the middle of the load."""
+    force[_middle(force), 1] += 2000.0
+    return force, point, torque
+
+
+def dropped(plates: PlateLoads, force: FloatArray, point: FloatArray, torque: FloatArray) -> tuple[FloatArray, ...]:
+    """Set 50 ms in the middle of the load to zero."""
+    gone = np.abs(plates.time - plates.time[_middle(force)]) <= 0.025
+    return np.where(gone[:, None], 0.0, force), point, np.where(gone[:, None], 0.0, torque)
+
+
+def vertical_alone(
+    plates: PlateLoads, force: FloatArray, point: FloatArray, torque: FloatArray
+) -> tuple[FloatArray, ...]:
+    """Leave out horizontal forces."""
+    return force * np.array([0.0, 1.0, 0.0]), point, torque
+
+
+def fixed_point(plates: PlateLoads, force: FloatArray, point: FloatArray, torque: FloatArray) -> tuple[FloatArray, ...]:
+    """Write one centre of pressure for each load."""
+    for first, last in runs(force[:, 1] > LOAD_THRESHOLD_N):
+        point[first : last + 1] = np.median(point[first : last + 1], axis=0)
+    return force, point, torque
+
+
+def _middle(force: FloatArray) -> int:
+    """Return the middle one of the loaded samples."""
+    loaded = np.flatnonzero(force[:, 1] > 5 * LOAD_THRESHOLD_N)
+    return int(loaded[len(loaded) // 2])

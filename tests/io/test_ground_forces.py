@@ -149,6 +149,17 @@ def test_load_below_threshold_is_zero(write):
     assert findings == ()
 
 
+def test_a_spike_is_bridged(write):
+    """With the moment that the file makes of it."""
+    group = column_group(FORCE, POINT, TORQUE, STEMS["ground_force_vx"][:3])
+    sound, _ = read_forces(write(group))
+    spiked, _ = read_forces(write(group, ground_force_vy=(50, FORCE[1] - 1500.0)))
+    ((one,),) = spiked.spikes
+    assert (one.axis, one.size_n) == (1, pytest.approx(-1500.0))
+    np.testing.assert_allclose(spiked.force, sound.force)
+    np.testing.assert_allclose(spiked.moment, sound.moment, atol=1e-9)
+
+
 def test_without_torque_the_free_moment_is_zero(write, write_xml):
     group = {name: values for name, values in named("A").items() if not name.startswith("fA_m")}
     for plates, findings in (

@@ -70,8 +70,8 @@ CASES = [
 ]
 
 
-def test_fifty_mistakes():
-    assert len({mistake.name for mistake in MISTAKES}) == len(MISTAKES) == 50
+def test_mistakes_have_names_of_their_own():
+    assert len({mistake.name for mistake in MISTAKES}) == len(MISTAKES)
 
 
 @pytest.mark.parametrize("mistake", CASES)

@@ -22,6 +22,7 @@ from kinertia.io.ezc3d_library import parameter_values
 from kinertia.io.plate_moments import MOMENTS_FIT
 from kinertia.io.trc import METRES_PER_UNIT
 from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads
+from kinertia.trial.force_spikes import without_spikes
 from kinertia.trial.impossible_data import impossible_load
 from kinertia.trial.plate_loading import largest_n, without_idle
 
@@ -132,9 +133,11 @@ def to_ground_plates(
         return None, []
     force, moment = plates.force @ rotation.T, plates.moment @ rotation.T
     corners = None if plates.corners is None else plates.corners @ rotation.T
-    findings, noises, idle = [], [], []
+    findings, read, spikes = [], [], []
     for p, name in enumerate(plates.names):
         where = Where(path.name, plate=name)
+        force[:, p], moment[:, p], bridged = without_spikes(time, force[:, p], moment[:, p])
+        spikes.append(bridged)
         largest = largest_n(time, np.nan_to_num(force[:, p]))
         if largest < -LOAD_THRESHOLD_N:
             force[:, p] *= -1
@@ -146,10 +149,17 @@ def to_ground_plates(
         if lost.any():
             raise FileError.of(path, impossible_load(name, "force or moment", float(time[lost][0])))
         force[:, p], moment[:, p] = plate.force, plate.moment
-        noises.append(plate.noise_n)
-        idle.append(plate.idle)
+        read.append(plate)
     loads = PlateLoads(
-        time, plates.names, force, moment, (None,) * len(plates.names), corners, tuple(noises), tuple(idle)
+        time,
+        plates.names,
+        force,
+        moment,
+        (None,) * len(plates.names),
+        corners,
+        noise_n=tuple(plate.noise_n for plate in read),
+        idle=tuple(plate.idle for plate in read),
+        spikes=tuple(spikes),
     )
     return loads, findings
 

@@ -25,6 +25,7 @@ from kinertia.findings.where import Where
 from kinertia.trial import display
 from kinertia.trial.belt import Belt
 from kinertia.trial.file_outputs import FileOutputs
+from kinertia.trial.force_spikes import ForceSpike
 from kinertia.trial.gait_event import FileEvent
 from kinertia.trial.idle_level import IdleReading
 from kinertia.trial.impossible_data import impossible_markers, impossible_plates
@@ -147,6 +148,7 @@ class PlateLoads:
         corners: (p, 4, 3) m, or None where the file has none.
         noise_n: standard deviation of each plate's vertical force while it is unloaded, N; None where it is unknown.
         idle: reading of each plate while it was unloaded, before that was subtracted; None where it is unknown.
+        spikes: spikes of each plate that its reader has bridged; None where it looked for none.
         torques: content of each plate's torque columns; None where the file has no points and torques.
 
     Examples:
@@ -165,6 +167,7 @@ class PlateLoads:
     corners: FloatArray | None = None
     noise_n: tuple[float, ...] | None = None
     idle: tuple[IdleReading, ...] | None = None
+    spikes: tuple[tuple[ForceSpike, ...], ...] | None = None
     torques: tuple[TorqueColumns, ...] | None = None
 
     def __post_init__(self) -> None:

@@ -5,25 +5,27 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinertia.diagnostics.plates.questions import SIGNAL_QUESTIONS
+from kinertia.diagnostics.plates.questions import SIGNAL_QUESTIONS, STANDING_QUESTIONS
 from kinertia.diagnostics.runner import asked, explained
 from kinertia.findings.finding import Severity
 from kinertia.trial.data import PlateLoads
+from kinertia.trial.force_spikes import without_spikes
 from kinertia.trial.plate_loading import with_idle_levels, without_idle
 from plate_findings import codes, plates_alone
 
 TIME = np.arange(3000) / 1000
 
 
-def plates(offset=(0.0, 0.0, 0.0), drift_n=0.0, factor=1.0, weight_n=700.0, zeroed=False):
+def plates(offset=(0.0, 0.0, 0.0), drift_n=0.0, factor=1.0, weight_n=700.0, zeroed=False, extra=0.0):
     """A plate that is stood on from 1 to 1.6 s, with noise, as the readers leave it, or where it is stated `zeroed`."""
     vertical = np.where((TIME > 1) & (TIME < 1.6), weight_n * np.sin(np.pi * (TIME - 1) / 0.6), 0.0)
     force = np.outer(vertical, [0.0, 1.0, 0.0]) + np.array(offset) + np.outer(TIME / TIME[-1], [0.0, drift_n, 0.0])
-    force = factor * (force + np.random.default_rng(3).normal(0.0, 1.0, (len(TIME), 3)))
-    load = without_idle(TIME, force, np.zeros_like(force))
+    force = factor * (force + extra + np.random.default_rng(3).normal(0.0, 1.0, (len(TIME), 3)))
+    force, moment, spikes = without_spikes(TIME, force, np.zeros_like(force))
+    load = without_idle(TIME, force, moment)
     twist = np.outer(0.01 * load.force[:, 1], [0.0, 1.0, 0.0])
     each = (load.force[:, None], (load.moment + twist)[:, None])
-    read = PlateLoads(TIME, ("plate 1",), *each, declared_feet=(None,), idle=(load.idle,))
+    read = PlateLoads(TIME, ("plate 1",), *each, declared_feet=(None,), idle=(load.idle,), spikes=(spikes,))
     return with_idle_levels(read) if zeroed else read
 
 
@@ -197,6 +199,51 @@ def test_zeros_in_mid_stance():
     force[1200:1300] = force[1400:1420] = 0.0
     lost = [one for one in found(replace(plate, force=force)) if one.code == "P102"]
     assert [one.where.span_s for one in lost] == [pytest.approx((1.2, 1.299)), pytest.approx((1.4, 1.419))]
+
+
+@pytest.mark.parametrize(("samples", "code"), [(50, "P102"), (100, None)])
+def test_one_of_two_plates_reads_zero_in_mid_stance(samples, code):
+    """For longer it may be two steps on one plate."""
+    one = plates()
+    force, moment = (np.repeat(each, 2, axis=1) for each in (one.force, one.moment))
+    force[1200 : 1200 + samples, 0] = moment[1200 : 1200 + samples, 0] = 0.0
+    both = PlateLoads(TIME, ("plate 1", "plate 2"), force, moment, declared_feet=(None, None))
+    lost = [(one.code, one.where.plate) for one in found(both) if one.code == "P102"]
+    assert lost == ([] if code is None else [(code, "plate 1")])
+
+
+def pulse(samples, size_n, axis=1, start=1300):
+    extra = np.zeros((len(TIME), 3))
+    extra[start : start + samples, axis] = size_n
+    return extra
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+@pytest.mark.parametrize("samples", [1, 3])
+@pytest.mark.parametrize("start", [500, 1300])
+def test_a_spike_is_bridged_and_reported(axis, samples, start):
+    spiked, sound = plates(extra=pulse(samples, -600.0, axis, start)), plates()
+    one = only(spiked)
+    there = plates_alone(sound).along(axis)["axis"]
+    assert (one.code, one.severity, one.where.axis) == ("P109", Severity.CORRECTED, there)
+    assert one.evidence["size_n"].value == pytest.approx(-600.0, abs=5.0)
+    assert one.evidence["spikes"].value == 1
+    assert one.where.span_s[0] == pytest.approx(TIME[start + samples // 2], abs=0.0011)
+    np.testing.assert_allclose(spiked.force, sound.force, atol=6.0)
+
+
+def test_a_spike_while_somebody_stands_is_reported():
+    spiked = plates(extra=pulse(1, 900.0))
+    assert codes(asked(STANDING_QUESTIONS, plates_alone(spiked))) == ["P109"]
+
+
+def test_what_is_no_spike_stays():
+    """A load of 10 ms, a step, ringing after a heel has landed, and noise."""
+    ringing = np.zeros((len(TIME), 3))
+    ringing[1100:1130, 1] = 250.0 * np.cos(2 * np.pi * 250.0 * TIME[:30]) * np.exp(-TIME[:30] / 0.02)
+    for extra in (pulse(10, 400.0), np.cumsum(pulse(1, 300.0), axis=0), ringing):
+        assert plates(extra=extra).spikes == ((),)
+        assert [one for one in found(plates(extra=extra)) if one.code == "P109"] == []
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])

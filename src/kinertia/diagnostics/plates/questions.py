@@ -18,7 +18,7 @@ from kinertia.diagnostics.plates.gains import gains
 from kinertia.diagnostics.plates.ground_contact import both_feet, complete_contact, plate_edges
 from kinertia.diagnostics.plates.mains_interference import mains_interference
 from kinertia.diagnostics.plates.quantisation import quantisation
-from kinertia.diagnostics.plates.signals import signals
+from kinertia.diagnostics.plates.signals import signals, spikes
 from kinertia.diagnostics.plates.vertical_moment import vertical_moment
 from kinertia.diagnostics.plates.zeros import idle_levels, zeros
 from kinertia.diagnostics.plates.zeros_under_load import zeros_under_load
@@ -50,7 +50,7 @@ SIGNAL_QUESTIONS: tuple[Question[RecordingContext], ...] = (
     Question("P21", zeros, unless=_OTHER_AXES),
     Question("P26", free_moments, unless=_OTHER_AXES),
 )
-STANDING_QUESTIONS: tuple[Question[RecordingContext], ...] = (Question("P21", idle_levels),)
+STANDING_QUESTIONS: tuple[Question[RecordingContext], ...] = (Question("P10", spikes), Question("P21", idle_levels))
 LOADED_QUESTIONS: tuple[Question[RecordingContext], ...] = (
     Question("M13", over_smoothed, unless=_NO_VELOCITY),
     Question("T20", force_rate, unless=_NO_VELOCITY),

@@ -1,4 +1,4 @@
-"""Are the plates' signals intact? Dead channels, lost and repeated samples, amplifiers at the end of their range."""
+"""Are the plates' signals intact? Dead channels, lost and repeated samples, spikes, amplifiers at their end."""
 
 from __future__ import annotations
 
@@ -13,12 +13,15 @@ from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.trial.centre_of_pressure import FIRM_LOAD_N
 from kinertia.trial.data import BoolArray, FloatArray, PlateLoads
+from kinertia.trial.force_spikes import LIMITS_N
 from kinertia.trial.sampled_time import runs, span_s
 
 _DEAD_N = 0.5
 """Amplifiers have more noise than this."""
 _CARRIED_SHARE = 0.4
 """Share of the median load that a foot at contact or off takes several samples to gain or lose."""
+_DROPPED_S = 0.06
+"""The next foot does not land sooner on one plate, even in running."""
 _SAME, _SATURATED_S, _FEWEST_SATURATED, _STEEP = 1e-6, 0.02, 4, 0.02
 """At the end of a range a force stays exactly the same, and comes and goes steeply."""
 _FULL_RANGE_N, _FULL_RANGE_ACROSS_N = 200.0, 30.0
@@ -31,11 +34,12 @@ _QUANTISED, _STEPS = 4.0, 3.2
 
 
 def signals(context: RecordingContext) -> Iterator[Finding]:
-    """P101 to P104: faulty signals of every plate and axis."""
+    """P101 to P104 and P109: faulty signals of every plate and axis."""
     if context.plates is None:
         return
     for detect in (_dead_channels, _dropped_samples, _repeated_samples, _saturated):
         yield from detect(context, context.plates)
+    yield from spikes(context)
 
 
 def _dead_channels(context: RecordingContext, plates: PlateLoads) -> Iterator[Finding]:
@@ -53,19 +57,31 @@ def _dead_channels(context: RecordingContext, plates: PlateLoads) -> Iterator[Fi
 
 
 def _dropped_samples(context: RecordingContext, plates: PlateLoads) -> Iterator[Finding]:
-    """Find intervals in which all plates read nothing, between samples that support a person."""
-    total = plates.force[..., 1].sum(axis=1)
-    carried = total[total > FIRM_LOAD_N]
+    """Find intervals in which all plates, or one, read nothing between samples that support a person."""
+    vertical, silent = plates.force[..., 1], np.equal(np.abs(plates.force).sum(axis=2), 0.0)
+    whole = list(_dropped(vertical.sum(axis=1), np.asarray(silent.all(axis=1))))
+    everywhere = {(first, last) for first, last, _ in whole}
+    dropped: list[tuple[str | None, tuple[int, int, tuple[float, float, float]]]] = [(None, one) for one in whole]
+    for p, name in enumerate(plates.names):
+        own = [one for one in _dropped(vertical[:, p], silent[:, p]) if one[:2] not in everywhere]
+        dropped += [(name, one) for one in own if span_s(plates.time, *one[:2]) <= _DROPPED_S]
+    for plate, (first, last, (before, after, much)) in dropped:
+        yield finding(
+            "P102",
+            context.at(plate=plate, span_s=(float(plates.time[first]), float(plates.time[last]))),
+            before_n=Quantity(before, "N", limit=much),
+            after_n=Quantity(after, "N", limit=much),
+        )
+
+
+def _dropped(vertical: FloatArray, silent: BoolArray) -> Iterator[tuple[int, int, tuple[float, float, float]]]:
+    """Yield first and last silent sample between much force (k,), with that before, that after, and what is much."""
+    carried = vertical[vertical > FIRM_LOAD_N]
     much = _CARRIED_SHARE * float(np.median(carried)) if carried.size else np.inf
-    for first, last in runs(np.equal(np.abs(plates.force).sum(axis=(1, 2)), 0.0)):
-        before, after = (float(total[k]) for k in (max(first - 1, 0), min(last + 1, len(total) - 1)))
+    for first, last in runs(silent):
+        before, after = (float(vertical[k]) for k in (max(first - 1, 0), min(last + 1, len(vertical) - 1)))
         if min(before, after) > much:
-            yield finding(
-                "P102",
-                context.at(span_s=(float(plates.time[first]), float(plates.time[last]))),
-                before_n=Quantity(before, "N", limit=much),
-                after_n=Quantity(after, "N", limit=much),
-            )
+            yield first, last, (before, after, much)
 
 
 def _repeated_samples(context: RecordingContext, plates: PlateLoads) -> Iterator[Finding]:
@@ -108,6 +124,22 @@ def _saturated(context: RecordingContext, plates: PlateLoads) -> Iterator[Findin
                         level_n=Quantity(sign * top, "N"),
                         span_s=Quantity(span[1] - span[0], "s", limit=_SATURATED_S),
                     )
+
+
+def spikes(context: RecordingContext) -> Iterator[Finding]:
+    """P109: each plate's largest spike, of those that the reader has bridged."""
+    plates = context.plates
+    if plates is None or plates.spikes is None:
+        return
+    for name, bridged in zip(plates.names, plates.spikes, strict=True):
+        if bridged:
+            largest = max(bridged, key=lambda one: abs(one.size_n))
+            yield finding(
+                "P109",
+                context.at(plate=name, span_s=(largest.time_s, largest.time_s), **context.along(largest.axis)),
+                size_n=Quantity(largest.size_n, "N", limit=LIMITS_N[largest.axis]),
+                spikes=Quantity(len(bridged)),
+            )
 
 
 def _at_top(time: FloatArray, values: FloatArray, top: float) -> tuple[float, float] | None:

@@ -1,0 +1,90 @@
+"""Finds and bridges spikes in the signals of a force plate: electrical disturbances of a few samples.
+
+A foot loads a plate more slowly. On 71 plates, recorded at 900 to 2000 Hz, forces differed from their median over 8 ms
+by at most 119 N vertically (ringing as a heel landed on one plate; 50 N on the others) and 24 N horizontally. One
+sample of 2 kN at 1000 Hz, left in the forces, changed joint moments by up to ten standard deviations.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from kinertia.trial.sampled_time import runs
+
+FloatArray = npt.NDArray[np.float64]
+
+LIMITS_N = (100.0, 200.0, 100.0)
+"""Smallest spikes, along X, Y and Z. Smaller ones have no effect on joint moments."""
+_LONGEST_S = 0.004
+_ALONE, _BESIDE_S = 0.25, 0.03
+"""Ringing has other peaks beside it, larger than this share of the first."""
+
+
+class ForceSpike(NamedTuple):
+    """A spike that was bridged.
+
+    Attributes:
+        time_s: time of its largest sample.
+        axis: 0, 1 or 2, the axis along which it is largest.
+        size_n: its distance from the forces around it, N.
+    """
+
+    time_s: float
+    axis: int
+    size_n: float
+
+
+def without_spikes(
+    time: FloatArray, force: FloatArray, moment: FloatArray
+) -> tuple[FloatArray, FloatArray, tuple[ForceSpike, ...]]:
+    """Replace spikes of a plate by straight lines.
+
+    Args:
+        time: (k,) s. Samples farther apart than 2 ms show no spikes.
+        force, moment: (k, 3) N and N m.
+
+    Returns:
+        Force, moment, and the spikes.
+
+    >>> time, force = np.arange(100) / 1000, np.full((100, 3), [0.0, 700.0, 0.0])
+    >>> force[50, 1] = 2700.0
+    >>> mended, _, spikes = without_spikes(time, force, np.zeros((100, 3)))
+    >>> float(mended[50, 1]), spikes
+    (700.0, (ForceSpike(time_s=0.05, axis=1, size_n=2000.0),))
+    """
+    longest = int(_LONGEST_S / float(np.median(np.diff(time))) + 1e-6) if len(time) > 1 else 0
+    if longest < 2 or not np.isfinite(force).all():
+        return force, moment, ()
+    off = _off(force, longest)
+    beyond = np.abs(off) / LIMITS_N
+    spikes = []
+    for first, last in runs(np.asarray((beyond > 1.0).any(axis=1))):
+        at, axis = divmod(int(np.argmax(beyond[first : last + 1])), 3)
+        size, here = abs(off[first + at, axis]), (first - 1, last + 2)
+        wide = round(_BESIDE_S * longest / _LONGEST_S)
+        beside = np.abs(np.concatenate([off[max(here[0] - wide, 0) : here[0], axis], off[here[1] :][:wide, axis]]))
+        if last - first < longest and first > 0 and last + 1 < len(time) and beside.max(initial=0.0) < _ALONE * size:
+            spikes.append((first, last, ForceSpike(float(time[first + at]), axis, float(off[first + at, axis]))))
+    if not spikes:
+        return force, moment, ()
+    sound = np.ones(len(time), dtype=bool)
+    for first, last, _ in spikes:
+        sound[first : last + 1] = False
+    bridged = [
+        np.column_stack([np.interp(time, time[sound], column[sound]) for column in signal.T])
+        for signal in (force, moment)
+    ]
+    return bridged[0], bridged[1], tuple(one for *_, one in spikes)
+
+
+def _off(force: FloatArray, longest: int) -> FloatArray:
+    """Return the distances (k, 3) of forces from their running median, zero where no jump is near."""
+    jump = (np.abs(np.diff(force, axis=0)) > np.array(LIMITS_N) / longest).any(axis=1)
+    near = np.convolve(np.concatenate([[False], jump]), np.ones(2 * longest + 1), "same") > 0.0
+    off, at = np.zeros_like(force), np.flatnonzero(near)
+    around = np.clip(at[:, None] + np.arange(-longest, longest + 1), 0, len(force) - 1)
+    off[at] = force[at] - np.median(force[around], axis=1)
+    return off
