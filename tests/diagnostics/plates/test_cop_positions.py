@@ -272,6 +272,14 @@ def test_a_load_that_does_not_progress(share, code, size_m):
     assert doubted(along(recording, 1, 0.3), SIMPLE_FEET) == []
 
 
+def test_a_mirrored_plate_under_short_feet():
+    adult = along(simple_walk([("r", 0), ("l", 0)]), 1, -1.5)
+    markers = replace(adult.markers, positions=0.6 * adult.markers.positions)
+    child = replace(adult, markers=markers, plates=replace(adult.plates, moment=0.6 * adult.plates.moment))
+    (found,) = [one for one in place_findings(child, SIMPLE_FEET) if one.code == "P252"]
+    assert found.evidence["progression_m"].value == pytest.approx(-0.06, abs=0.02)
+
+
 def test_a_mirrored_plate_does_not_hide_both_feet_on_another():
     """Chain F of the precedence."""
     recording = along(simple_walk([("r", 0), ("l", 0), ("r", 1)]), 2, -1.5)

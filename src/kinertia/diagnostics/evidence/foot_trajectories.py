@@ -64,6 +64,11 @@ class FootTrajectory:
         result: BoolArray = np.any(spans, axis=0)
         return result
 
+    @property
+    def length_m(self) -> float:
+        """Median distance (m) from heel to forefoot."""
+        return float(np.median(np.linalg.norm(self.front - self.back, axis=1)))
+
     def beyond(self, time: FloatArray, place: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return how far (k,) m positions (k, 2) at times (k,) are in front of the back, and in front of the front."""
         back, front = (self._at(end, time) for end in (self.back, self.front))

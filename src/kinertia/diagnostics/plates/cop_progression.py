@@ -1,7 +1,8 @@
 """Does the centre of pressure progress from heel to toe? Plates on which it runs backwards, or never moves.
 
-On 11 fault-free walks and runs it is 43 to 148 mm farther forwards on the foot in the last third of a step than in the
-first, in a drop jump 16 to 20 mm.
+From the first third of a step to the last it moves forwards on the foot by 0.06 to 0.82 of the distance from heel to
+forefoot in the walks and runs of 14 people, most of them children (in a drop jump by 16 to 20 mm), and by -0.37 or less
+on a plate that is mirrored along the walk. Whoever lands on the toes pushes off from them, too.
 """
 
 from __future__ import annotations
@@ -17,8 +18,9 @@ from kinertia.diagnostics.plates.heel_landing import lands_on_heels
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 
-_BACKWARDS_M, _FORWARDS_M, _FIXED_M = -0.08, 0.05, 0.002
-_USUAL_M = (0.043, 0.148)
+_FIXED_M = 0.002
+_BACKWARDS, _FORWARDS, _USUAL = -0.35, 0.25, (0.06, 0.82)
+"""Shares of the distance from heel to forefoot."""
 
 
 def cop_progression(context: RecordingContext) -> Iterator[Finding]:
@@ -36,11 +38,13 @@ def cop_progression(context: RecordingContext) -> Iterator[Finding]:
         if range_m < _FIXED_M:
             yield finding("P251", context.at(plate=plates.names[p]), range_m=Quantity(range_m, "m", limit=_FIXED_M))
         progression[p] = float(np.median([_progression_m(one, feet[one.foot]) for one in own]))
-    if all(each <= _FORWARDS_M for each in progression.values()):
+    length_m = float(np.mean([one.length_m for one in feet]))
+    if all(each <= _FORWARDS * length_m for each in progression.values()):
         return
+    usual = (_USUAL[0] * length_m, _USUAL[1] * length_m)
     for p, each in progression.items():
-        if each < _BACKWARDS_M:
-            measured = Quantity(each, "m", limit=_BACKWARDS_M, usual=_USUAL_M)
+        if each < _BACKWARDS * length_m:
+            measured = Quantity(each, "m", limit=_BACKWARDS * length_m, usual=usual)
             yield finding("P252", context.at(plate=plates.names[p]), progression_m=measured)
 
 

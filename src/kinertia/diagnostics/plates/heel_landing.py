@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from kinertia.diagnostics.context import RecordingContext
 
 _ENDS = (("heel",), ("metatarsal", "toe"))
@@ -42,4 +40,4 @@ def shows_whole_feet(context: RecordingContext) -> bool:
             labels = {label for name in names for label in marker_set.landmarks.get(f"{name}_{side}", ())}
             if labels and not labels & context.seen_labels:
                 return False
-    return min(float(np.median(np.linalg.norm(one.front - one.back, axis=1))) for one in feet) > _LEAST_LENGTH_M
+    return min(one.length_m for one in feet) > _LEAST_LENGTH_M
