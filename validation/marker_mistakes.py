@@ -113,6 +113,26 @@ def placed_anew(sd_m: float) -> Change:
     return change
 
 
+def copied(source: str, target: str) -> Change:
+    """Return a fault that gives a landmark's marker the trajectory of another's in the walk."""
+
+    def change(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPerson | None:
+        names = person.marker_set.landmarks
+        labels = [names.get(name, ("",))[0] for name in (source, target)]
+        if not set(labels) <= set(person.walk.markers.labels):
+            return None
+        one, other = (person.walk.markers.labels.index(label) for label in labels)
+
+        def same(markers: Markers) -> Markers:
+            places = markers.positions.copy()
+            places[:, other] = places[:, one]
+            return replace(markers, positions=places)
+
+        return person.in_walk(same)
+
+    return change
+
+
 def one_marker(landmark: str, change: Callable[[FloatArray, FloatArray, float], FloatArray]) -> Change:
     """Return a fault that changes a marker's trajectory (n, 3) m, given times (n,) s and middle (s) of the loads."""
 

@@ -137,6 +137,11 @@ MISTAKES = (
         _codes("M114"),
     ),
     Mistake("a marker jumps by 60 mm", markers.one_marker("knee_lateral_l", markers.jumping), _codes("M112")),
+    Mistake(
+        "a knee marker has the ankle marker's trajectory",
+        markers.copied("ankle_lateral_r", "knee_lateral_r"),
+        _codes("M115"),
+    ),
     Mistake("two markers exchange their labels for 0.4 s", markers.exchanged_for_a_while, _codes("L211")),
     # loads
     Mistake("sign of the horizontal force along X", forces.with_signs(-1, 1, 1), _codes("P232")),

@@ -165,3 +165,15 @@ def test_every_filled_interval_is_found(line, code, step_m):
     spans = np.array([one.where.span_s for one in intervals])
     assert spans == pytest.approx(np.array([(0.5, 0.9), (1.1, 1.5)]), abs=0.03)
     assert found(trajectories, markers, is_static=True) == []
+
+
+@pytest.mark.parametrize(("frames", "severity"), [(5, None), (15, Severity.WARNING), (150, Severity.ERROR)])
+def test_two_labels_of_one_marker(frames, severity):
+    def merge(places, time):
+        places[20 : 20 + frames, 1] = places[20 : 20 + frames, 0] + [0.0, 0.001, 0.0]
+
+    same = [one for one in found(trajectories, changed(walking(), merge)) if one.code == "M115"]
+    assert [(one.severity, one.where.markers) for one in same] == ([] if severity is None else [(severity, ("A", "B"))])
+    for one in same:
+        assert one.where.span_s == pytest.approx((0.2, 0.19 + frames / 100))
+        assert one.evidence["distance_m"].value == pytest.approx(0.001)
