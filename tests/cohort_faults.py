@@ -8,9 +8,10 @@ from unittest import mock
 
 import numpy as np
 
-from kinertia.cohort.cluster import Job
+from kinertia.cohort.job import Job
 from kinertia.cohort.person import fit_person
 from kinertia.cohort.record import Record
+from kinertia.cohort.worker import main
 from kinertia.synthetic.laboratory import LabNoise, record, write_lab
 from kinertia.synthetic.walk import walk, walking_subject
 
@@ -40,3 +41,7 @@ def fit_person_unless_hanging(job: Job) -> Record:
         return fit_person(job)
     with mock.patch("kinertia.cohort.person.read_subject", hang):
         return fit_person(job)
+
+
+if __name__ == "__main__":
+    main(fit_person_unless_hanging)

@@ -3,8 +3,8 @@
     python tests/cohort_kills.py FOLDER KILLS SEED
     unshare -rm python tests/cohort_kills.py FOLDER KILLS SEED
 
-Everything is loaded once, and the fits, which write nothing, are made once; every run is a fork of this process, with
-Dask's scheduler and worker in it: what `kill -9` ends is all of them. The clock that computing is measured with stands
+Everything is loaded once, and the fits, which write nothing, are made once; every run is a fork of this process, which
+also fits: what `kill -9` ends is all of it. The clock that computing is measured with stands
 still, so that all bytes can be compared. Prints how many kills fell before the end of a run, how many of them after a
 person was finished, and what a run said whose disk was full: that takes the right to mount, which `unshare` gives.
 """
@@ -18,18 +18,16 @@ import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
 from unittest import mock
-
-from distributed import Client, LocalCluster
 
 from cohort_faults import write_study
 from command_line import run
-from kinertia.cohort.resources import LOG
+from kinertia.cohort.job import Job
+from kinertia.cohort.person import fit_person
+from kinertia.cohort.resources import LOG, Finished, measured
 from kinertia.estimation.result import Fit
 from kinertia.io.subject_tables import SubjectFile
 from kinertia.workflow.from_files import fit_subject
@@ -37,11 +35,9 @@ from kinertia.workflow.from_files import fit_subject
 NAMES = ("Anna", "Ben")
 
 
-@contextmanager
-def in_this_process(size: object) -> Iterator[Any]:
-    cluster = LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None)
-    with cluster, Client(cluster) as client:
-        yield client
+def in_this_process(jobs: Sequence[Job], size: object) -> Iterator[Finished]:
+    for job in jobs:
+        yield measured(fit_person, job)
 
 
 def forked(work: Callable[[], int]) -> int:
@@ -134,7 +130,7 @@ def main() -> None:
     out.parent.mkdir()
     with (
         mock.patch("time.perf_counter", float),
-        mock.patch("kinertia.cli.cohort.local_cluster", in_this_process),
+        mock.patch("kinertia.cli.cohort.fit_here", in_this_process),
         mock.patch("kinertia.cohort.person.fit_subject", made_once(study)),
     ):
         counted = study.with_suffix(".txt")

@@ -27,7 +27,8 @@ import numpy as np
 import psutil
 import typer
 
-from kinertia.cohort.cluster import Job, local_size
+from kinertia.cohort.job import Job
+from kinertia.cohort.local import local_size
 from kinertia.cohort.people import people_of
 from kinertia.cohort.person import fit_person
 from kinertia.cohort.record import prepare_folder, standings

@@ -13,9 +13,10 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from cohort_faults import HANGING, fit_person_unless_hanging, write_study
+from cohort_faults import HANGING, write_study
 from command_line import PROGRAM, run
-from kinertia.cohort.cluster import KEPT_MEMORY, ClusterSize, Job, local_cluster, run_jobs
+from kinertia.cohort.job import Job
+from kinertia.cohort.local import LocalSize, fit_here
 from kinertia.cohort.record import Place, inputs_of, prepare_folder
 from kinertia.io.subject_file import read_subject
 
@@ -77,10 +78,7 @@ def test_a_person_whose_files_hang_the_reader_is_given_up_and_the_others_are_fit
         jobs.append(Job(name, subject, cohort, inputs_of(read_subject(subject)), 1, limit_s))
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("PYTHONPATH", with_tests()["PYTHONPATH"])
-        with local_cluster(ClusterSize(1, 2 * 1024**3)) as client:
-            ended = list(run_jobs(client, fit_person_unless_hanging, jobs))
-            environment = {name: client.submit(os.getenv, name).result() for name in KEPT_MEMORY}
-    assert environment == {name: str(size) for name, size in KEPT_MEMORY.items()}
+        ended = list(fit_here(jobs, LocalSize(1, 2 * 1024**3), [sys.executable, "-m", "cohort_faults"]))
     records = {one.record.person: one.record for one in ended}
     assert records["Anna"].fitted
     lost = records[HANGING]

@@ -56,7 +56,7 @@ def quick(fit):
     with (
         mock.patch("kinertia.cohort.person.fit_subject", fitted),
         mock.patch("kinertia.cohort.person.save_fit", saved),
-        mock.patch("kinertia.cli.cohort.local_cluster", in_this_process),
+        mock.patch("kinertia.cli.cohort.fit_here", in_this_process),
         mock.patch("kinertia.cohort.learning.in_parallel", lambda task, cases, *_: [task(one) for one in cases]),
     ):
         yield asked

@@ -11,8 +11,9 @@ import pytest
 import fake_slurm
 from cohort_faults import write_study
 from command_line import PROGRAM, run
-from kinertia.cohort.cluster import KEPT_MEMORY, Job, run_jobs
-from kinertia.cohort.slurm import slurm_cluster
+from kinertia.cohort.cluster import run_jobs
+from kinertia.cohort.job import Job
+from kinertia.cohort.slurm import KEPT_MEMORY, slurm_cluster
 from kinertia.errors import FileError, KinertiaError
 from kinertia.io.slurm_file import SlurmFile, read_slurm
 

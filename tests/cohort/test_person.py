@@ -7,7 +7,7 @@ from unittest import mock
 import pandas as pd
 import pytest
 
-from kinertia.cohort.cluster import Job
+from kinertia.cohort.job import Job
 from kinertia.cohort.person import fit_person
 from kinertia.cohort.record import inputs_of, prepare_folder
 from kinertia.io.subject_file import read_subject

@@ -1,5 +1,7 @@
 """Work in two threads gives what it gives in one, errors included."""
 
+import subprocess
+import sys
 import threading
 
 import numpy as np
@@ -51,3 +53,11 @@ def test_an_error_comes_through_and_leaves_nothing_held(cores, failing):
 def test_numpy_is_as_forgiving_in_the_second_thread(cores):
     with np.errstate(all="raise"), pytest.raises(FloatingPointError):
         side_by_side(lambda value: np.float64(1.0) / value, [np.float64(1.0), np.float64(0.0)])
+
+
+def test_a_process_among_others_stays_in_one_thread():
+    program = (
+        "import threading\nfrom kinertia.motion import two_threads as two\ntwo._cores = lambda: 2\n"
+        "two.in_one_thread()\nprint(len(set(two.side_by_side(lambda _: threading.get_ident(), [0, 1]))))"
+    )
+    assert subprocess.run([sys.executable, "-c", program], capture_output=True, text=True).stdout.strip() == "1"

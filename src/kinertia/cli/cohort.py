@@ -5,9 +5,10 @@ from __future__ import annotations
 import json
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -16,23 +17,16 @@ import typer
 from kinertia.cli.options import Output, Overwrite, Quiet, results_folder
 from kinertia.cli.outcome import Outcome
 from kinertia.cli.terminal import be_quiet, finite, out, plain_table, shown_progress
-from kinertia.cohort.cluster import (
-    Job,
-    doubts_of_workers,
-    expect_extra,
-    guessed_seconds,
-    local_cluster,
-    local_size,
-    run_jobs,
-    running_cluster,
-)
+from kinertia.cohort.cluster import doubts_of_workers, expect_extra, run_jobs, running_cluster
+from kinertia.cohort.job import Job, guessed_seconds
 from kinertia.cohort.learning import FOLDER as LEARNT
 from kinertia.cohort.learning import write_second_study
+from kinertia.cohort.local import fit_here, local_size
 from kinertia.cohort.page import write_cohort_page
 from kinertia.cohort.people import Person, people_of
 from kinertia.cohort.person import fit_person
 from kinertia.cohort.record import Record, Standing, keep, prepare_folder, standings
-from kinertia.cohort.resources import note_resources
+from kinertia.cohort.resources import Finished, note_resources
 from kinertia.cohort.slurm import slurm_cluster
 from kinertia.cohort.tables import write_tables
 from kinertia.errors import SettingsError
@@ -90,7 +84,7 @@ def cohort(
     Results of each person go to out/people/NAME, as kinertia fit writes them;
     tables of everybody beside them. Run it again after adding people or
     correcting files: only those are fitted whose files or settings have
-    changed. It runs on Dask, which the extra "cohort" installs.
+    changed. It needs the extra "cohort".
 
     Exit status 1 if an ERROR of somebody's result is open, or somebody could
     not be fitted: people.csv lists who, and why.
@@ -164,17 +158,17 @@ class _Where:
     scheduler: str | None
     slurm: SlurmFile | None
 
-    @contextmanager
-    def client(self, people: int) -> Iterator[Any]:
-        """Yield a client of the cluster."""
+    def run(self, jobs: Sequence[Job], say_notes: Callable[[Sequence[str]], None]) -> Generator[Finished, None, None]:
+        """Run the jobs and yield how each ended; on a running scheduler, describe first what may be wrong with it."""
         if self.scheduler:
-            cluster = running_cluster(self.scheduler)
+            with running_cluster(self.scheduler) as client:
+                say_notes(doubts_of_workers(client, self.scheduler))
+                yield from run_jobs(client, fit_person, jobs)
         elif self.slurm is not None:
-            cluster = slurm_cluster(self.slurm, people)
+            with slurm_cluster(self.slurm, len(jobs)) as client:
+                yield from run_jobs(client, fit_person, jobs)
         else:
-            cluster = local_cluster(local_size(people))
-        with cluster as client:
-            yield client
+            yield from fit_here(jobs, local_size(len(jobs)))
 
     def sentence(self, people: int) -> str:
         """Describe in words where fits run."""
@@ -259,11 +253,10 @@ def _fitted(everybody: Sequence[Standing], output: Path, where: _Where, lines: J
     records: dict[str, Record] = {}
     if not jobs:
         return records
-    with shown_progress() as shown, where.client(len(jobs)) as client:
-        _say_notes(doubts_of_workers(client, where.scheduler) if where.scheduler else [], lines)
+    with shown_progress() as shown, closing(where.run(jobs, partial(_say_notes, lines=lines))) as ended:
         progress = lines.with_progress(shown)
         progress("people", 0.0)
-        for finished in run_jobs(client, fit_person, jobs):
+        for finished in ended:
             record = finished.record
             keep(output, record)
             note_resources(output, finished)

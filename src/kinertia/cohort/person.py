@@ -6,7 +6,7 @@ import time
 import traceback
 from dataclasses import replace
 
-from kinertia.cohort.cluster import Job
+from kinertia.cohort.job import Job
 from kinertia.cohort.record import AGAINST, BAD_INPUT, FAILED, PASSED, RECORD, Place, Record, inputs_of
 from kinertia.cohort.tables import write_findings, write_person
 from kinertia.cohort.time_limit import no_end, time_limit, was_ended

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import csv
+import json
 import math
 import os
 import platform
 import sys
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from kinertia.cohort.record import Record
 from kinertia.io.csv_file import inert
@@ -35,6 +36,16 @@ class Finished:
     record: Record
     worker: str = ""
     memory_mb: float = math.nan
+
+    @classmethod
+    def of(cls, entries: Mapping[str, Any]) -> Finished:
+        """Read `text`, parsed."""
+        return cls(**{**entries, "record": Record(**entries["record"])})
+
+    @property
+    def text(self) -> str:
+        """All of it in one line, for another process."""
+        return json.dumps(asdict(self))
 
 
 def measured(fit_person: Callable[[Work], Record], job: Work) -> Finished:

@@ -7,13 +7,28 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
 from shutil import which
+from types import MappingProxyType
 from typing import Any
 
-from kinertia.cohort.cluster import HOW, KEPT_MEMORY, NO_DASHBOARD, SCHEDULING
+from kinertia.cohort.cluster import HOW
+from kinertia.cohort.job import RETRIES
 from kinertia.cohort.slurm_jobs import replaced_jobs
 from kinertia.errors import KinertiaError
 from kinertia.io.slurm_file import SlurmFile
 
+KEPT_MEMORY = MappingProxyType({"MALLOC_TRIM_THRESHOLD_": 2**28, "MALLOC_MMAP_THRESHOLD_": 2**25})
+"""Bytes that a worker keeps on Linux, by its environment. Dask's workers give memory back at once, and a fit asks for
+it again, page by page: it took a third longer."""
+_SCHEDULING = MappingProxyType(
+    {
+        "distributed.scheduler.allowed-failures": RETRIES,
+        # a killed process also loses the jobs that wait there: let them wait with the scheduler
+        "distributed.scheduler.worker-saturation": 1.0,
+        "logging": {"distributed": "critical"},
+    }
+)
+_NO_DASHBOARD = MappingProxyType({"dashboard": False, "dashboard_address": "127.0.0.1:0"})
+"""The scheduler listens anyway: at any free port, since another run may use the usual one."""
 _NO_LOGS = ("--output=/dev/null", "--error=/dev/null")
 """Otherwise SLURM leaves a file per job where the command was started."""
 
@@ -38,7 +53,7 @@ def slurm_cluster(wanted: SlurmFile, people: int) -> Iterator[Any]:
     from distributed import Client
 
     with (
-        dask.config.set(SCHEDULING),
+        dask.config.set(_SCHEDULING),
         SLURMCluster(
             cores=1,
             processes=1,
@@ -50,7 +65,7 @@ def slurm_cluster(wanted: SlurmFile, people: int) -> Iterator[Any]:
             job_script_prologue=[*(f"export {name}={size}" for name, size in KEPT_MEMORY.items()), *wanted.before],
             interface=wanted.interface,
             log_directory=wanted.logs,
-            scheduler_options=dict(NO_DASHBOARD),
+            scheduler_options=dict(_NO_DASHBOARD),
             silence_logs=logging.CRITICAL,
             **({} if wanted.python is None else {"python": wanted.python}),
         ) as cluster,

@@ -56,6 +56,11 @@ def side_by_side(function: Callable[[T], R], items: Sequence[T]) -> list[R]:
     return results
 
 
+def in_one_thread() -> None:
+    """Start no second thread in this process from now on: other processes use the other cores."""
+    _second.acquire(blocking=False)
+
+
 @cache
 def _cores() -> int:
     """Return the number of cores that this process may use; one in a child process, which shares the machine."""

@@ -39,7 +39,7 @@ def in_parallel(
     workers = process_count(workers, len(cases))
     progress(0.0)
     # spawned, because a forked copy of a process that has threads (a progress bar, linear algebra) may hang
-    pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_one_thread)
+    pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=one_thread)
     try:
         with interrupted_later():
             futures = [pool.submit(task, case) for case in cases]
@@ -82,7 +82,7 @@ def process_count(wanted: int | None, cases: int) -> int:
     return max(1, min(wanted or os.cpu_count() or 1, cases, most))
 
 
-def _one_thread() -> None:
+def one_thread() -> None:
     """Limit the linear algebra library to one thread, since matrices are small, and ignore Ctrl-C.
 
     Ctrl-C is handled by the waiting process.

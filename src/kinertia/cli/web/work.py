@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-import json
-import subprocess
 import sys
 import threading
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+
+from kinertia.cohort.process import Process
 
 WORKER = (sys.executable, "-m", "kinertia.cli.web.worker")
-_NO_WINDOW: int = getattr(subprocess, "CREATE_NO_WINDOW", 0)
-"""Windows opens a console for every process otherwise."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +41,7 @@ class Work:
         self.share = 0.0
         self.cancelled = False
         self._since = self._reported = time.monotonic()
-        self._process: subprocess.Popen[str] | None = None
+        self._process: Process | None = None
         self._lock = threading.Lock()
 
     def seconds_left(self) -> float | None:
@@ -61,7 +56,7 @@ class Work:
         with self._lock:
             self.cancelled = True
             if self._process is not None:
-                self._process.terminate()
+                self._process.kill()
 
     def done(self, *arguments: str) -> End:
         """Run the work with these arguments of the worker; return how it ended."""
@@ -69,46 +64,17 @@ class Work:
         with self._lock:
             if self.cancelled:
                 return End(1, "", "")
-            process = self._process = _started([*WORKER, *arguments])
-        assert process.stdout is not None
-        assert process.stderr is not None
-        said: list[str] = []
-        listener = threading.Thread(target=lambda: said.append(process.stderr.read()))  # type: ignore[union-attr]
-        listener.start()
+            self._process = Process([*WORKER, *arguments])
         error = ""
-        for line in process.stdout:
-            message = _line(line)
-            error = message.get("error", error)
-            if "stage" in message:
-                self._moved(message["stage"], message["share"])
-        status = process.wait()
-        listener.join()
-        return End(status, error, "".join(said))
+        with self._process as process:
+            for message in process.answers():
+                error = message.get("error", error)
+                if "stage" in message:
+                    self._moved(message["stage"], message["share"])
+            return End(process.status(), error, process.log)
 
     def _moved(self, stage: str, share: float) -> None:
         self._reported = time.monotonic()
         if stage != self.stage:
             self._since = self._reported
         self.stage, self.share = stage, share
-
-
-def _started(command: Sequence[str]) -> subprocess.Popen[str]:
-    return subprocess.Popen(
-        command,
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        encoding="utf-8",
-        errors="replace",
-        cwd=Path.home(),  # results replace their folder, which must be nobody's current one
-        creationflags=_NO_WINDOW,
-    )
-
-
-def _line(text: str) -> dict[str, Any]:
-    """Parse a line of a worker; empty where it is not one of ours."""
-    try:
-        message = json.loads(text)
-    except ValueError:
-        return {}
-    return message if isinstance(message, dict) else {}
