@@ -219,6 +219,6 @@ def fixed_point(plates: PlateLoads, force: FloatArray, point: FloatArray, torque
 
 
 def _middle(force: FloatArray) -> int:
-    """Return the middle one of the loaded samples."""
-    loaded = np.flatnonzero(force[:, 1] > 5 * LOAD_THRESHOLD_N)
-    return int(loaded[len(loaded) // 2])
+    """Return the middle sample of the longest load."""
+    first, last = max(runs(force[:, 1] > 5 * LOAD_THRESHOLD_N), key=lambda run: run[1] - run[0])
+    return (first + last) // 2
