@@ -2,7 +2,7 @@
 
 import pytest
 
-from kinertia.io.file_names import fits_everywhere, path_from, same_folder
+from kinertia.io.file_names import fits_everywhere, missing_file, path_from, same_folder
 
 
 @pytest.mark.parametrize(
@@ -32,3 +32,9 @@ def test_backslashes_are_separators(tmp_path):
     (tmp_path / "day 1" / "walk.trc").touch()
     assert path_from(tmp_path, r"day 1\walk.trc") == tmp_path / "day 1" / "walk.trc"
     assert path_from(tmp_path, "day 1/walk.trc") == tmp_path / "day 1" / "walk.trc"
+
+
+def test_a_name_in_other_letters_is_the_nearest(tmp_path):
+    for name in ("WALK.TRC", "static.trc"):
+        (tmp_path / name).touch()
+    assert missing_file(tmp_path / "walk.trc", "walk.trc")["nearest"].value.startswith("WALK.TRC")

@@ -80,8 +80,8 @@ def missing_file(path: Path, written: str, expected: str = "") -> dict[str, Quan
     """
     folder = path.parent.absolute()
     exists = os.path.isdir(folder)
-    names = sorted(one.name for one in folder.iterdir() if one.name[0] != ".") if exists else []
-    nearest = get_close_matches(path.name, names, n=3, cutoff=0.4)
+    names = {one.name.lower(): one.name for one in folder.iterdir() if one.name[0] != "."} if exists else {}
+    nearest = [names[near] for near in get_close_matches(path.name.lower(), sorted(names), n=3, cutoff=0.4)]
     hint = "nothing there has a name like it" if exists else "that folder does not exist"
     if nearest:
         hint = f"the nearest name{'s' * (len(nearest) > 1)} there: {', '.join(nearest)}"
