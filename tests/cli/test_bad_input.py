@@ -355,3 +355,10 @@ def test_usage_errors(arguments):
     assert outcome.status == 2
     assert "Traceback" not in outcome.err
     assert "Usage: kinertia" in outcome.err
+
+
+def test_a_file_stands_for_its_folder_in_a_draft(c3d_lab, tmp_path):
+    shutil.copyfile(c3d_lab / "walk.c3d", tmp_path / "walk.c3d")
+    outcome = run("init", tmp_path / "walk.c3d")
+    assert outcome.status == 0, outcome.err
+    assert (tmp_path / "subject.toml").is_file()

@@ -18,7 +18,7 @@ from kinertia.report.measures_picture import measures_picture
 
 
 def init(
-    folder: Annotated[Path, typer.Argument(help="Folder with the files of one person.")],
+    folder: Annotated[Path, typer.Argument(help="Folder with the files of one person, or one of them.")],
     measures: Annotated[
         bool, typer.Option("--measures", help="Write the sheet of girths and lengths to fill in, and no subject.toml.")
     ] = False,
@@ -36,6 +36,7 @@ def init(
 
     kinertia init data/subject01
     """
+    folder = folder.parent if folder.is_file() else folder
     if measures:
         return _measures(folder)
     path, own = folder / SUBJECT, folder / MARKER_SET
