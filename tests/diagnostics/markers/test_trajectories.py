@@ -177,3 +177,7 @@ def test_two_labels_of_one_marker(frames, severity):
     for one in same:
         assert one.where.span_s == pytest.approx((0.2, 0.19 + frames / 100))
         assert one.evidence["distance_m"].value == pytest.approx(0.001)
+
+
+def test_a_single_frame_is_no_while():
+    assert found(trajectories, walking(1)) == []

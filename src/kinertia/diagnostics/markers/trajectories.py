@@ -57,6 +57,8 @@ def trajectories(context: RecordingContext) -> Iterator[Finding]:
 def _same_place(context: RecordingContext) -> Iterator[Finding]:
     """M115: pairs of labels, each of a segment, that are at one place for a while."""
     markers = context.markers
+    if len(markers.time) < 2:
+        return
     used = [k for k, label in enumerate(markers.labels) if label in context.segment_of_label]
     every = max(1, int(_SAME_PLACE_S * markers.rate_hz / 2))
     some = markers.positions[::every, used]
