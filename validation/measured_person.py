@@ -133,7 +133,7 @@ def write_person(folder: Path, person: MeasuredPerson) -> Path:
 
 def _marker_set_text(marker_set: MarkerSet) -> str:
     landmarks, segments = (
-        {k: list(v) for k, v in table.items()} for table in (marker_set.landmarks, marker_set.segments)
+        {k: list(v) for k, v in table.items() if v} for table in (marker_set.landmarks, marker_set.segments)
     )
     tables = (("[landmarks]", landmarks), ("[segments]", segments), ("[widths]", marker_set.widths))
     return f"name = {json.dumps(marker_set.name)}\n" + _toml(tables)
