@@ -8,7 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from kinertia.diagnostics.context import PersonContext, RecordingContext
+from kinertia.diagnostics.context import RecordingContext
+from kinertia.diagnostics.person_context import PersonContext
 from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.findings.finding import Finding
 from kinertia.model.bsp import BodySegmentParameters

@@ -1,9 +1,9 @@
-"""Holds what questions are asked of, one recording or one person, with evidence computed once."""
+"""Holds one recording as its questions see it, with evidence computed once."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -26,13 +26,9 @@ from kinertia.diagnostics.evidence.standing_mass import StandingMass, standing_m
 from kinertia.diagnostics.evidence.strides import periods, swing_in_turn
 from kinertia.diagnostics.evidence.trajectory_faults import TrajectoryFaults
 from kinertia.errors import KinertiaError
-from kinertia.estimation.carried_mass import CarriedMass
-from kinertia.findings.finding import Finding, Severity
 from kinertia.findings.where import Where
-from kinertia.model.imported_model import OsimModel
 from kinertia.model.marker_set import MarkerSet
 from kinertia.motion.kinematics import FEWEST_FRAMES as FEWEST_MEASURED
-from kinertia.settings import Subject
 from kinertia.trial.data import FEET, FloatArray, Markers, PlateLoads, Recording, Trial
 from kinertia.trial.ground_contact import FootMarkers
 from kinertia.trial.marker_quality import Travel, travel
@@ -354,49 +350,3 @@ class RecordingContext:
     def along(self, ground_axis: int) -> AxisNames:
         """Return the names of ground axis 0, 1 or 2, as keyword arguments of `at`."""
         return self.axes.named(ground_axis)
-
-
-@dataclass(frozen=True, eq=False)
-class PersonContext:
-    """One person with all recordings.
-
-    Attributes:
-        subject: as stated, with what files add.
-        trials: recordings of motions.
-        static: the static trial; None with an OpenSim model, or without one.
-        marker_set: which label is which landmark, or the markers of the model.
-        model: the OpenSim model, where there is one.
-        calibrated: whether markers and joints of the model are to be calibrated.
-        total_mass: stated masses of the body and of attached items; None where no mass is known.
-        found: findings of the recordings themselves, where a question depends on them.
-        more_statics: recordings in which the person stands, of which none is the static trial.
-        files_only: whether files are checked by themselves, beside which there may be others.
-    """
-
-    subject: Subject
-    trials: Sequence[RecordingContext]
-    static: RecordingContext | None = None
-    marker_set: MarkerSet | None = None
-    model: OsimModel | None = None
-    calibrated: bool = False
-    total_mass: CarriedMass | None = None
-    found: Sequence[Finding] = field(default=())
-    more_statics: Sequence[RecordingContext] = ()
-    files_only: bool = False
-
-    @property
-    def standing(self) -> Sequence[RecordingContext]:
-        """The static trial, or every recording that may be it."""
-        return self.more_statics if self.static is None else (self.static, *self.more_statics)
-
-    @property
-    def has_trials(self) -> bool:
-        """Whether trials were given, blocked ones included, so that the model is not checked on its own."""
-        return bool(self.trials or self.found)
-
-    def has_error(self, trial: str, *codes: str) -> bool:
-        """Return whether an ERROR of one of these codes, questions or families was found in a trial."""
-        return any(
-            one.severity is Severity.ERROR and one.where.trial == trial and one.code.startswith(codes)
-            for one in self.found
-        )

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from kinertia.diagnostics.context import PersonContext
 from kinertia.diagnostics.model import questions as model_questions
 from kinertia.diagnostics.model.model_check import ModelCheck, check_model
+from kinertia.diagnostics.person_context import PersonContext
 from kinertia.diagnostics.runner import asked, explained, overruled, rules_of
 from kinertia.findings.finding import Finding
 from kinertia.findings.overview import Overview

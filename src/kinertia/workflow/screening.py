@@ -10,10 +10,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from kinertia.diagnostics.context import PersonContext, RecordingContext
+from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.labels import questions as labels
 from kinertia.diagnostics.markers import questions as markers
 from kinertia.diagnostics.model import questions as model
+from kinertia.diagnostics.person_context import PersonContext
 from kinertia.diagnostics.plates.ground_contact import complete_contact
 from kinertia.diagnostics.plates.questions import (
     LOADED_QUESTIONS,

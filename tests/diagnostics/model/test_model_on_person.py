@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinertia.diagnostics.context import PersonContext, RecordingContext
+from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.model.model_on_person import model_and_trials, moved_markers
+from kinertia.diagnostics.person_context import PersonContext
 from kinertia.diagnostics.runner import explained
 from kinertia.findings.finding import Severity
 from kinertia.io.osim.reader import read_osim

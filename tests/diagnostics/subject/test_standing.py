@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinertia.diagnostics.context import PersonContext, RecordingContext
+from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.labels.landmarks import landmarks
+from kinertia.diagnostics.person_context import PersonContext
 from kinertia.diagnostics.runner import asked
 from kinertia.diagnostics.subject.questions import STATIC_QUESTIONS
 from kinertia.diagnostics.subject.standing import flat_feet, floor

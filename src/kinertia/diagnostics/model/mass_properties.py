@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from kinertia.diagnostics.context import PersonContext
+from kinertia.diagnostics.person_context import PersonContext
 from kinertia.estimation.estimated_bodies import estimated_bodies
 from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.quantity import Quantity

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from kinertia.diagnostics.context import PersonContext
+from kinertia.diagnostics.person_context import PersonContext
 from kinertia.findings.finding import Finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where

@@ -16,9 +16,9 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from kinertia.diagnostics.context import PersonContext
 from kinertia.diagnostics.evidence.label_exchange import swapped_labels
 from kinertia.diagnostics.evidence.segment_distances import FEWEST_PAIRS, LOWER_BODY, SegmentDistances
+from kinertia.diagnostics.person_context import PersonContext
 from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where

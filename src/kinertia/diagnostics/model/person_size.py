@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from kinertia.diagnostics.context import PersonContext
+from kinertia.diagnostics.person_context import PersonContext
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.model.bsp import BodySegmentParameters

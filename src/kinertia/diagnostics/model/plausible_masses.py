@@ -6,7 +6,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from kinertia.diagnostics.context import PersonContext
 from kinertia.diagnostics.model.mass_properties import advice
 from kinertia.diagnostics.model.model_check import (
     SIDE_COM_M,
@@ -16,6 +15,7 @@ from kinertia.diagnostics.model.model_check import (
     check_model,
     side_differences,
 )
+from kinertia.diagnostics.person_context import PersonContext
 from kinertia.diagnostics.subject.mass import ERROR_SHARE, WARNING_SHARE
 from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.quantity import Quantity

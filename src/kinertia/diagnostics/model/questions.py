@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from kinertia.diagnostics.context import PersonContext
 from kinertia.diagnostics.model.mass_properties import (
     degenerate_inertia,
     impossible_inertia,
@@ -22,6 +21,7 @@ from kinertia.diagnostics.model.plausible_masses import (
     unlike_tables,
 )
 from kinertia.diagnostics.model.subtalar_axis import subtalar_axis
+from kinertia.diagnostics.person_context import PersonContext
 from kinertia.diagnostics.runner import Question
 
 PERSON_QUESTIONS: tuple[Question[PersonContext], ...] = (

@@ -11,8 +11,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from kinertia.diagnostics.context import PersonContext
 from kinertia.diagnostics.model.mirrored_joints import without_side
+from kinertia.diagnostics.person_context import PersonContext
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where

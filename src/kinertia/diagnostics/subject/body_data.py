@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from kinertia.diagnostics.context import PersonContext
+from kinertia.diagnostics.person_context import PersonContext
 from kinertia.diagnostics.subject.mass import weighed_as_stated
 from kinertia.estimation.population import population_of
 from kinertia.findings.display import first_few

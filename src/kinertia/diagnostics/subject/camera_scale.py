@@ -17,8 +17,9 @@ from itertools import combinations
 
 import numpy as np
 
-from kinertia.diagnostics.context import PersonContext, RecordingContext
+from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.segment_distances import FEWEST_PAIRS, SAME_SESSION_M, SegmentDistances
+from kinertia.diagnostics.person_context import PersonContext
 from kinertia.diagnostics.subject.odd_recording import odd_ones
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity

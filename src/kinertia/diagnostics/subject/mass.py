@@ -17,8 +17,8 @@ from itertools import combinations
 
 import numpy as np
 
-from kinertia.diagnostics.context import PersonContext
 from kinertia.diagnostics.evidence.force_mass import MISSING, ForceMass, UnmeasuredSupport
+from kinertia.diagnostics.person_context import PersonContext
 from kinertia.diagnostics.subject.odd_recording import odd_ones
 from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.findings.finding import Finding, Severity, finding

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from kinertia.diagnostics.context import PersonContext, RecordingContext
+from kinertia.diagnostics.context import RecordingContext
+from kinertia.diagnostics.person_context import PersonContext
 from kinertia.diagnostics.runner import Question
 from kinertia.diagnostics.subject.body_data import absent_markers, population, stated_and_filed
 from kinertia.diagnostics.subject.camera_scale import trial_scales

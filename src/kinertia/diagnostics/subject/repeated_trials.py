@@ -7,7 +7,7 @@ from itertools import combinations
 
 import numpy as np
 
-from kinertia.diagnostics.context import PersonContext
+from kinertia.diagnostics.person_context import PersonContext
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where

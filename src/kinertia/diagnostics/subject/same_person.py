@@ -15,9 +15,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kinertia.diagnostics.context import PersonContext, RecordingContext
+from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.label_exchange import swapped_labels
 from kinertia.diagnostics.evidence.segment_distances import FEWEST_PAIRS, SAME_SESSION_M, SegmentDistances
+from kinertia.diagnostics.person_context import PersonContext
 from kinertia.diagnostics.subject.camera_scale import AGAINST_STANDING, camera_scale
 from kinertia.diagnostics.subject.odd_recording import odd_ones
 from kinertia.findings.finding import Finding, finding

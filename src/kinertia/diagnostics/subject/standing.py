@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from kinertia.diagnostics.context import PersonContext, RecordingContext
+from kinertia.diagnostics.context import RecordingContext
+from kinertia.diagnostics.person_context import PersonContext
 from kinertia.estimation.simultaneous.model_uncertainty import JOINT_CENTRE_SD_M, WITHOUT_STATIC
 from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.quantity import Quantity

@@ -13,8 +13,9 @@ from itertools import combinations
 
 import numpy as np
 
-from kinertia.diagnostics.context import PersonContext, RecordingContext
+from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.horizontal_velocity import CausedVelocity, caused_velocities, without_trend
+from kinertia.diagnostics.person_context import PersonContext
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where

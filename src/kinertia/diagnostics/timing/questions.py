@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from kinertia.diagnostics.context import PersonContext, RecordingContext
+from kinertia.diagnostics.context import RecordingContext
+from kinertia.diagnostics.person_context import PersonContext
 from kinertia.diagnostics.runner import Question
 from kinertia.diagnostics.timing.belt_speed import belt_speed
 from kinertia.diagnostics.timing.file_events import file_events

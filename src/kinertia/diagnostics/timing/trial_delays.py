@@ -14,8 +14,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kinertia.diagnostics.context import PersonContext, RecordingContext
+from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.vertical_acceleration import MOST_LEFT, vertical_match_of
+from kinertia.diagnostics.person_context import PersonContext
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
