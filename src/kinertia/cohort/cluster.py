@@ -8,10 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
 from importlib.util import find_spec
 from typing import Any
-from uuid import uuid4
 
 from kinertia.cohort.job import Job
 from kinertia.cohort.record import FAILED, Record, one_line
@@ -78,11 +76,8 @@ def run_jobs(client: Any, fit_person: Callable[[Job], Record], jobs: Sequence[Jo
     """
     from distributed import as_completed
 
-    run = uuid4().hex  # jobs of two runs on one cluster must not be taken for the same
-    of_key = {f"kinertia-{run}-{k}": job for k, job in enumerate(jobs)}
-    futures = [
-        client.submit(measured, fit_person, replace(job, run=run), key=key, pure=False) for key, job in of_key.items()
-    ]
+    of_key = {f"kinertia-{job.run}": job for job in jobs}  # never taken for those of another run on the cluster
+    futures = [client.submit(measured, fit_person, job, key=key, pure=False) for key, job in of_key.items()]
     for future in as_completed(futures):
         job = of_key[future.key]
         if future.status == "finished":

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from uuid import uuid4
 
 from kinertia.cohort.record import FAILED, Record, Standing, one_line
 from kinertia.io.provenance import VERSION
@@ -30,7 +31,7 @@ class Job:
         trials: number of trials.
         limit_s: time after which its process is ended.
         kinertia: version of the command, which has to be the worker's.
-        run: identifier of the run of the command.
+        run: identifier of the job, of which each run of the command has another.
     """
 
     person: str
@@ -40,7 +41,7 @@ class Job:
     trials: int
     limit_s: float
     kinertia: str = VERSION
-    run: str = ""
+    run: str = field(default_factory=lambda: uuid4().hex)
 
     @classmethod
     def of(cls, one: Standing, cohort: Path) -> Job:

@@ -5,10 +5,9 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from queue import Empty, SimpleQueue
 from threading import Event, Thread
-from uuid import uuid4
 
 from kinertia.cohort.job import RETRIES, Job
 from kinertia.cohort.process import Process
@@ -46,10 +45,9 @@ def fit_here(jobs: Sequence[Job], size: LocalSize, command: Sequence[str] = WORK
         size: number of processes, and memory of each: one that takes more is killed.
         command: starts a process that does as `kinertia.cohort.worker`.
     """
-    run = uuid4().hex
     waiting: SimpleQueue[Job] = SimpleQueue()
     for job in jobs:
-        waiting.put(replace(job, run=run))
+        waiting.put(job)
     crew = _Crew(waiting, command)
     threads = [Thread(target=crew.work, daemon=True) for _ in range(min(size.workers, len(jobs)))]
     try:
@@ -57,7 +55,7 @@ def fit_here(jobs: Sequence[Job], size: LocalSize, command: Sequence[str] = WORK
             thread.start()
         left = len(jobs)
         while left:
-            crew.expect_memory(size.memory_bytes)
+            crew.limit_memory(size.memory_bytes)
             try:
                 ended = crew.ended.get(timeout=_LOOK_S)
             except Empty:
@@ -114,7 +112,7 @@ class _Crew:
             process.kill()
         return process
 
-    def expect_memory(self, most_bytes: int) -> None:
+    def limit_memory(self, most_bytes: int) -> None:
         """Kill processes that take more memory."""
         from psutil import NoSuchProcess
         from psutil import Process as Running  # Dask needs it, too

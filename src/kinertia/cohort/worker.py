@@ -17,7 +17,6 @@ from kinertia.cohort.job import Job
 from kinertia.cohort.person import fit_person
 from kinertia.cohort.record import Record
 from kinertia.cohort.resources import measured
-from kinertia.motion.two_threads import in_one_thread
 from kinertia.studies.parallel import one_thread
 
 
@@ -25,7 +24,6 @@ def main(fit: Callable[[Job], Record] = fit_person) -> None:
     """Answer until the input ends."""
     answers, sys.stdout = sys.stdout, sys.stderr  # keeps other output off the answers
     one_thread()
-    in_one_thread()
     lines: SimpleQueue[str] = SimpleQueue()
     Thread(target=_listen, args=(sys.stdin, lines), daemon=True).start()
     while True:

@@ -8,7 +8,7 @@ and the free moment; ezc3d's moment has the opposite sign there, so the moment i
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +24,7 @@ from kinertia.io.trc import METRES_PER_UNIT
 from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads
 from kinertia.trial.force_spikes import without_spikes
 from kinertia.trial.impossible_data import impossible_load
-from kinertia.trial.plate_loading import largest_n, without_idle
+from kinertia.trial.plate_loading import joined, largest_n, without_idle
 
 _CORNER_LIMIT_M = 50.0
 _EDGE_LIMITS_M = (0.1, 10.0)
@@ -133,34 +133,21 @@ def to_ground_plates(
         return None, []
     force, moment = plates.force @ rotation.T, plates.moment @ rotation.T
     corners = None if plates.corners is None else plates.corners @ rotation.T
-    findings, read, spikes = [], [], []
+    findings, read = [], []
     for p, name in enumerate(plates.names):
         where = Where(path.name, plate=name)
-        force[:, p], moment[:, p], bridged = without_spikes(time, force[:, p], moment[:, p])
-        spikes.append(bridged)
-        largest = largest_n(time, np.nan_to_num(force[:, p]))
+        own_force, own_moment, spikes = without_spikes(time, force[:, p], moment[:, p])
+        largest = largest_n(time, np.nan_to_num(own_force))
         if largest < -LOAD_THRESHOLD_N:
-            force[:, p] *= -1
-            moment[:, p] *= -1
+            own_force, own_moment = -own_force, -own_moment
             findings.append(finding("F157", where, force_n=Quantity(largest, "N")))
-        plate = without_idle(time, np.nan_to_num(force[:, p]), np.nan_to_num(moment[:, p]))
+        plate = without_idle(time, np.nan_to_num(own_force), np.nan_to_num(own_moment))
         loaded = plate.force[:, 1] >= LOAD_THRESHOLD_N
-        lost = np.isnan(force[:, p]).any(axis=1) | (loaded & np.isnan(moment[:, p]).any(axis=1))
+        lost = np.isnan(own_force).any(axis=1) | (loaded & np.isnan(own_moment).any(axis=1))
         if lost.any():
             raise FileError.of(path, impossible_load(name, "force or moment", float(time[lost][0])))
-        force[:, p], moment[:, p] = plate.force, plate.moment
-        read.append(plate)
-    loads = PlateLoads(
-        time,
-        plates.names,
-        force,
-        moment,
-        (None,) * len(plates.names),
-        corners,
-        noise_n=tuple(plate.noise_n for plate in read),
-        idle=tuple(plate.idle for plate in read),
-        spikes=tuple(spikes),
-    )
+        read.append(plate._replace(spikes=spikes))
+    loads = replace(joined(time, plates.names, (None,) * len(plates.names), read), corners=corners)
     return loads, findings
 
 

@@ -19,9 +19,9 @@ from kinertia.io.number_table import expect_file, mismatch
 from kinertia.io.sto import TimeTable, read_table
 from kinertia.io.uniform_times import uniform_times
 from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads
-from kinertia.trial.force_spikes import ForceSpike, without_spikes
+from kinertia.trial.force_spikes import without_spikes
 from kinertia.trial.impossible_data import impossible_load
-from kinertia.trial.plate_loading import PlateLoad, largest_n, without_idle
+from kinertia.trial.plate_loading import PlateLoad, joined, largest_n, without_idle
 from kinertia.trial.torque_columns import torque_columns
 
 _FOOT_WORDS = {"r": "r", "right": "r", "l": "l", "left": "l"}
@@ -81,27 +81,14 @@ def read_forces(
     time, time_findings = uniform_times(path, table.time)
     table = replace(table, time=time, values=table.values[: len(time)])
     turn = np.eye(3) if turn is None else turn
-    wrenches, spikes = zip(*(_wrench(path, table, group, turn) for group in groups), strict=True)
-    loads = PlateLoads(
-        table.time,
-        tuple(group.name for group in groups),
-        np.stack([plate.force for plate in wrenches], axis=1),
-        np.stack([plate.moment for plate in wrenches], axis=1),
-        tuple(group.foot for group in groups),
-        noise_n=tuple(plate.noise_n for plate in wrenches),
-        idle=tuple(plate.idle for plate in wrenches),
-        spikes=tuple(spikes),
-        torques=torque_columns(*_stated(table, groups, turn)),
-    )
+    plates = [_plate_load(path, table, group, turn) for group in groups]
+    loads = joined(table.time, [group.name for group in groups], [group.foot for group in groups], plates)
+    loads = replace(loads, torques=torque_columns(*_stated(table, groups, turn)))
     return loads, (*findings, *table.findings, *time_findings)
 
 
-def _wrench(
-    path: Path, table: TimeTable, group: _Columns, turn: FloatArray
-) -> tuple[PlateLoad, tuple[ForceSpike, ...]]:
-    """Return force (k, 3) and moment about the ground origin (k, 3), zero where nobody stands on the plate; and spikes
-    that were bridged.
-    """
+def _plate_load(path: Path, table: TimeTable, group: _Columns, turn: FloatArray) -> PlateLoad:
+    """Return force (k, 3) and moment about the ground origin (k, 3), zero where nobody stands on the plate."""
     force = _triple(table, group.force) @ turn.T
     _expect_numbers(path, table, group, group.force, np.ones(len(force), dtype=bool))
     moment = np.cross(np.nan_to_num(_triple(table, group.point)) @ turn.T, force)
@@ -121,10 +108,10 @@ def _wrench(
     if largest_n(table.time, force) < -LOAD_THRESHOLD_N:
         down = {"force_n": Quantity(float(force[:, 1].min()), "N"), "column": Quantity(f"{group.force}{'xyz'[up]}")}
         raise FileError.found(path, "F157", None, Where(plate=group.name), **down)
-    plate = without_idle(table.time, force, moment)
+    plate = without_idle(table.time, force, moment)._replace(spikes=spikes)
     for identifier in filter(None, (group.point, group.torque)):
         _expect_numbers(path, table, group, identifier, plate.force[:, 1] >= LOAD_THRESHOLD_N)
-    return plate, spikes
+    return plate
 
 
 def _stated(table: TimeTable, groups: Sequence[_Columns], turn: FloatArray) -> list[FloatArray]:

@@ -15,6 +15,8 @@ from typing import TypeVar
 
 from threadpoolctl import threadpool_limits
 
+from kinertia.motion.two_threads import in_one_thread
+
 _MOST_ON_WINDOWS = 61
 """Largest number of handles that Windows can wait for: `ProcessPoolExecutor` raises ValueError above it."""
 
@@ -83,11 +85,12 @@ def process_count(wanted: int | None, cases: int) -> int:
 
 
 def one_thread() -> None:
-    """Limit the linear algebra library to one thread, since matrices are small, and ignore Ctrl-C.
+    """Keep this process to one thread, since matrices are small and others use the other cores, and ignore Ctrl-C.
 
     Ctrl-C is handled by the waiting process.
     """
     import scipy.linalg  # noqa: F401  # the libraries of NumPy and SciPy: only loaded ones can be limited
 
     threadpool_limits(1)
+    in_one_thread()
     signal.signal(signal.SIGINT, signal.SIG_IGN)

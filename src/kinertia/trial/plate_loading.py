@@ -8,6 +8,7 @@ it, and act at the centre of pressure of the nearest sample with a reliable load
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -15,6 +16,7 @@ import numpy as np
 
 from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.data import LOAD_THRESHOLD_N, BoolArray, FloatArray, PlateLoads
+from kinertia.trial.force_spikes import ForceSpike
 from kinertia.trial.idle_level import IdleReading
 from kinertia.trial.idle_reading import idle_blocks, idle_reading
 from kinertia.trial.sampled_time import TIME_TOLERANCE_S, nearest_samples, runs
@@ -38,13 +40,14 @@ _GAUSSIAN = 1.4826
 class PlateLoad(NamedTuple):
     """Load of one plate with its unloaded reading subtracted.
 
-    Force (k, 3) N, moment (k, 3) N m, noise of the vertical force (N), and the reading itself.
+    Force (k, 3) N, moment (k, 3) N m, noise of the vertical force (N), the reading itself, and bridged spikes.
     """
 
     force: FloatArray
     moment: FloatArray
     noise_n: float
     idle: IdleReading
+    spikes: tuple[ForceSpike, ...] = ()
 
 
 def without_idle(time: FloatArray, force: FloatArray, moment: FloatArray) -> PlateLoad:
@@ -71,6 +74,22 @@ def without_idle(time: FloatArray, force: FloatArray, moment: FloatArray) -> Pla
     point = centre_of_pressure(np.concatenate([force, moment], axis=1)[nearest])
     moment = np.where(loaded[:, None], moment, np.where(tail[:, None], np.cross(point, force), 0.0))
     return PlateLoad(np.where((loaded | tail)[:, None], force, 0.0), moment, noise_n, idle)
+
+
+def joined(
+    time: FloatArray, names: Sequence[str], feet: Sequence[str | None], plates: Sequence[PlateLoad]
+) -> PlateLoads:
+    """Return the loads of all plates, with their names and the feet that are declared for them."""
+    return PlateLoads(
+        time,
+        tuple(names),
+        np.stack([plate.force for plate in plates], axis=1),
+        np.stack([plate.moment for plate in plates], axis=1),
+        tuple(feet),
+        noise_n=tuple(plate.noise_n for plate in plates),
+        idle=tuple(plate.idle for plate in plates),
+        spikes=tuple(plate.spikes for plate in plates),
+    )
 
 
 def largest_n(time: FloatArray, force: FloatArray) -> float:

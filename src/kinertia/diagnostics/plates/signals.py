@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from kinertia.diagnostics.evidence.loaded_plates import carrying, wrenches
 from kinertia.diagnostics.plates.quantisation import quantisation_n
 from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
 from kinertia.trial.centre_of_pressure import FIRM_LOAD_N
 from kinertia.trial.data import BoolArray, FloatArray, PlateLoads
 from kinertia.trial.force_spikes import LIMITS_N
@@ -59,29 +61,30 @@ def _dead_channels(context: RecordingContext, plates: PlateLoads) -> Iterator[Fi
 def _dropped_samples(context: RecordingContext, plates: PlateLoads) -> Iterator[Finding]:
     """Find intervals in which all plates, or one, read nothing between samples that support a person."""
     vertical, silent = plates.force[..., 1], np.equal(np.abs(plates.force).sum(axis=2), 0.0)
-    whole = list(_dropped(vertical.sum(axis=1), np.asarray(silent.all(axis=1))))
-    everywhere = {(first, last) for first, last, _ in whole}
-    dropped: list[tuple[str | None, tuple[int, int, tuple[float, float, float]]]] = [(None, one) for one in whole]
+    of_all = list(_dropped(context.at(), plates.time, vertical.sum(axis=1), np.asarray(silent.all(axis=1))))
+    yield from of_all
+    known = {one.where.span_s for one in of_all}
     for p, name in enumerate(plates.names):
-        own = [one for one in _dropped(vertical[:, p], silent[:, p]) if one[:2] not in everywhere]
-        dropped += [(name, one) for one in own if span_s(plates.time, *one[:2]) <= _DROPPED_S]
-    for plate, (first, last, (before, after, much)) in dropped:
-        yield finding(
-            "P102",
-            context.at(plate=plate, span_s=(float(plates.time[first]), float(plates.time[last]))),
-            before_n=Quantity(before, "N", limit=much),
-            after_n=Quantity(after, "N", limit=much),
-        )
+        for one in _dropped(context.at(plate=name), plates.time, vertical[:, p], silent[:, p], _DROPPED_S):
+            if one.where.span_s not in known:
+                yield one
 
 
-def _dropped(vertical: FloatArray, silent: BoolArray) -> Iterator[tuple[int, int, tuple[float, float, float]]]:
-    """Yield first and last silent sample between much force (k,), with that before, that after, and what is much."""
+def _dropped(
+    where: Where, time: FloatArray, vertical: FloatArray, silent: BoolArray, longest_s: float = np.inf
+) -> Iterator[Finding]:
+    """Find intervals in which a plate, or all, are silent (k,) between samples of much of their usual force (k,)."""
     carried = vertical[vertical > FIRM_LOAD_N]
     much = _CARRIED_SHARE * float(np.median(carried)) if carried.size else np.inf
     for first, last in runs(silent):
         before, after = (float(vertical[k]) for k in (max(first - 1, 0), min(last + 1, len(vertical) - 1)))
-        if min(before, after) > much:
-            yield first, last, (before, after, much)
+        if min(before, after) > much and span_s(time, first, last) <= longest_s:
+            yield finding(
+                "P102",
+                replace(where, span_s=(float(time[first]), float(time[last]))),
+                before_n=Quantity(before, "N", limit=much),
+                after_n=Quantity(after, "N", limit=much),
+            )
 
 
 def _repeated_samples(context: RecordingContext, plates: PlateLoads) -> Iterator[Finding]:
