@@ -159,7 +159,7 @@ def seconds_per_frame() -> float:
         [cell.strip() for cell in next(line for line in lines if line.startswith(start)).strip("|").split("|")]
         for start in ("| walk |", "| 10 min |")
     )
-    return 1e-3 * float(row[headings.index("ms a frame")])
+    return 1e-3 * float(row[headings.index("processor (ms per frame)")])
 
 
 def document(singles: Singles, runs: list[Run], workers: int) -> str:
@@ -203,7 +203,7 @@ files; {workers} processes on {os.cpu_count()} cores.
 ## {DATA_SET_FRAMES // 1_000_000} million frames
 
 The largest public data set has {DATA_SET_PEOPLE} people and {DATA_SET_FRAMES // 1_000_000} million frames,
-{DATA_SET_FRAMES // DATA_SET_PEOPLE} of each. At {1e3 * frame_s:.2f} ms a frame ([long trials]({PAGE}), ten
+{DATA_SET_FRAMES // DATA_SET_PEOPLE} of each. At {1e3 * frame_s:.2f} ms per frame ([long trials]({PAGE}), ten
 minutes) the frames take {frames_h:.1f} h of one core, what each person costs besides {people_h:.1f} h, and both
 {ratio:.2f} times as long in a cohort: {listed}. This is arithmetic; nobody has run it.
 """

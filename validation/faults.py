@@ -1,4 +1,4 @@
-"""Make known faults in files: which are named?"""
+"""Inject known faults into files: which are identified?"""
 
 from __future__ import annotations
 

@@ -155,13 +155,13 @@ def document(walks: list[Long]) -> str:
         for w in walks
     ]
     headings = ["walk", "frames", "plates (Hz)", "data (MB)", "kinematics (MB)", "estimate (MB)"]
-    headings += ["kinematics (s)", "estimate (s)", "steps", "ms a frame", "on the clock"]
+    headings += ["kinematics (s)", "estimate (s)", "steps", "processor (ms per frame)", "elapsed (ms per frame)"]
     return f"""# Long trials
 
-A synthetic walk on a treadmill, its markers (41) at 100 Hz, 27 coordinates; seconds of processor time. Milliseconds a
-frame are those of kinematics and estimate, of the processor and on the clock of a machine with two cores. Memory is the
-most that the process has held until the data are there (the programs themselves included), until inverse kinematics and
-smoothing are done, and until the end.
+A synthetic walk on a treadmill, its markers (41) at 100 Hz, 27 coordinates; seconds of processor time. The last two
+columns cover kinematics and estimate: processor time, and elapsed time on a machine with two cores. Memory is the
+largest of the process, the program included, until the data are read, until inverse kinematics and smoothing are done,
+and until the end.
 
 {table(headings, rows)}
 

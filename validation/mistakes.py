@@ -138,7 +138,7 @@ MISTAKES = (
     ),
     Mistake("a marker jumps by 60 mm", markers.one_marker("knee_lateral_l", markers.jumping), _codes("M112")),
     Mistake(
-        "a knee marker has the ankle marker's trajectory",
+        "a knee marker with the trajectory of the ankle marker",
         markers.copied("ankle_lateral_r", "knee_lateral_r"),
         _codes("M115"),
     ),
@@ -162,10 +162,10 @@ MISTAKES = (
     Mistake("50 N on the vertical axis", forces.with_offset(y_n=50.0), _codes("P212", "P213", "P216")),
     Mistake("zero of the vertical force drifts by 60 N", forces.with_drift(60.0), _codes("P211")),
     Mistake("one plate reads 10 % too much", forces.scaled(force=1.1, plates=slice(1, 2)), _codes("P221", "P223")),
-    Mistake("one sample of 2 kN on one plate", forces.one_plate(forces.spike), _codes("P109")),
-    Mistake("one plate reads zero for 50 ms", forces.one_plate(forces.dropped), _codes("P102")),
-    Mistake("one plate without horizontal forces", forces.one_plate(forces.vertical_alone), _codes("P101")),
-    Mistake("one plate's centre of pressure does not move", forces.one_plate(forces.fixed_point), _codes("P251")),
+    Mistake("a spike of 2 kN in the force of one plate", forces.one_plate(forces.spike), _codes("P109")),
+    Mistake("force samples of one plate missing for 50 ms", forces.one_plate(forces.dropped), _codes("P102")),
+    Mistake("horizontal forces of one plate not exported", forces.one_plate(forces.vertical_alone), _codes("P101")),
+    Mistake("a constant centre of pressure on one plate", forces.one_plate(forces.fixed_point), _codes("P251")),
     Mistake("plates turned by 3 degrees about the vertical", forces.turned_about_vertical(3.0), _codes("P234")),
     # who
     Mistake("height 20 cm too much", _more(height_m=0.2), _codes("S104")),

@@ -19,15 +19,15 @@ from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.trial.sampled_time import windows
 
-_SAME_PLACE_M, _SAME_PLACE_S, _MOSTLY = 0.003, 0.1, 0.5
-"""The middles of two markers are at least a diameter apart, 4 mm of the smallest."""
+_COINCIDING_M, _COINCIDING_S, _MOSTLY = 0.003, 0.1, 0.5
+"""The centres of two markers are at least a diameter apart: 4 mm for the smallest."""
 
 
 def trajectories(context: RecordingContext) -> Iterator[Finding]:
     """M111 to M115: faults of single trajectories, one finding per marker with spikes, per jump and per filled gap; and
     labels of one and the same marker.
     """
-    yield from _same_place(context)
+    yield from _coinciding(context)
     faults, rate_hz = context.trajectory_faults, context.markers.rate_hz
     for spikes in faults.spikes:
         yield finding(
@@ -54,24 +54,24 @@ def trajectories(context: RecordingContext) -> Iterator[Finding]:
         )
 
 
-def _same_place(context: RecordingContext) -> Iterator[Finding]:
-    """M115: pairs of labels, each of a segment, that are at one place for a while."""
+def _coinciding(context: RecordingContext) -> Iterator[Finding]:
+    """M115: pairs of labels of the marker set that coincide for a while."""
     markers = context.markers
     if len(markers.time) < 2:
         return
     used = [k for k, label in enumerate(markers.labels) if label in context.segment_of_label]
-    every = max(1, int(_SAME_PLACE_S * markers.rate_hz / 2))
+    every = max(1, int(_COINCIDING_S * markers.rate_hz / 2))
     some = markers.positions[::every, used]
     for k, one in enumerate(used):
-        near = (np.linalg.norm(some[:, k + 1 :] - some[:, k, None], axis=2) < _SAME_PLACE_M).any(axis=0)
+        near = (np.linalg.norm(some[:, k + 1 :] - some[:, k, None], axis=2) < _COINCIDING_M).any(axis=0)
         for other in np.array(used)[k + 1 :][near].tolist():
             apart = np.linalg.norm(markers.positions[:, one] - markers.positions[:, other], axis=1)
-            same = np.asarray(apart < _SAME_PLACE_M)
+            same = np.asarray(apart < _COINCIDING_M)
             span_s = windows(markers.time, same)[0]
-            if span_s[1] - span_s[0] >= _SAME_PLACE_S:
+            if span_s[1] - span_s[0] >= _COINCIDING_S:
                 yield finding(
                     "M115",
                     context.at(markers=(markers.labels[one], markers.labels[other]), span_s=span_s),
                     Severity.ERROR if same.sum() > _MOSTLY * np.isfinite(apart).sum() else None,
-                    distance_m=Quantity(float(np.median(apart[same])), "m", limit=_SAME_PLACE_M),
+                    distance_m=Quantity(float(np.median(apart[same])), "m", limit=_COINCIDING_M),
                 )
