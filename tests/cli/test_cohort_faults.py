@@ -88,6 +88,13 @@ def test_a_person_whose_files_hang_the_reader_is_given_up_and_the_others_are_fit
     assert not Place(cohort, HANGING).results.exists()
 
 
+def waiting_jobs(address):
+    from distributed import Client
+
+    with Client(address) as client:
+        return client.run_on_scheduler(lambda dask_scheduler: len(dask_scheduler.tasks))
+
+
 @posix
 @pytest.mark.slow
 def test_a_scheduler_that_is_killed_ends_the_command_and_the_next_run_finishes(tmp_path):
@@ -103,9 +110,8 @@ def test_a_scheduler_that_is_killed_ends_the_command_and_the_next_run_finishes(t
         # nobody works there, so that the moment is before the end
         command = [*COMMAND, str(study), "-o", str(out), "--scheduler", address]
         with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-            while process.stderr.readline().strip() != "people":
+            while not waiting_jobs(address):
                 assert process.poll() is None
-            time.sleep(0.5)
             scheduler.kill()
             _, errors = process.communicate(timeout=120)
     assert process.returncode == 2, errors

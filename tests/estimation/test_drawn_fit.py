@@ -110,7 +110,8 @@ def test_places_rates_and_accelerations_are_narrowed_by_their_own_shares(shares)
     random = np.random.default_rng(2)
     white = random.standard_normal((100, 120, 2))
     alone = white[:, 1:] + 0.6 * white[:, :-1]
-    narrowed = posterior_draws._narrowed(alone, np.array(shares))
+    narrowed = alone.copy()
+    posterior_draws._narrow(narrowed, np.array(shares))
     kernels = [np.array([1, 26, 66, 26, 1]) / 120, np.array([1, 10, 0, -10, -1]) / 24, np.array([1, 2, -6, 2, 1]) / 6]
     for kernel, share in zip(kernels, shares, strict=True):
         before, after = (

@@ -19,6 +19,7 @@ import numpy as np
 
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
+from kinertia.motion.frame_chunks import pieces
 from kinertia.motion.regressor import regressor
 from kinertia.motion.rigid_body import axis_forces, root_balance, root_load
 
@@ -149,10 +150,13 @@ def inverse_dynamics(
         foot_loads: (n, f, 6) per foot: force (N), moment about the ground origin (N m), ground axes.
         feet: the segments they act on; the skeleton's feet if None.
     """
-    state = axis_motion(skeleton, motion)
-    tau, _ = axis_forces(skeleton.tree, skeleton.gravity_m_s2, skeleton.bodies(bsp), *state)
-    pose = skeleton.pose(motion.q)
-    for i, foot in enumerate(skeleton.feet if feet is None else feet):
-        moves = skeleton.support[skeleton.segments.index(foot)]
-        tau[:, moves] -= (pose.axes[:, moves] @ foot_loads[:, i, :, None])[..., 0]
-    return skeleton.map.to_coordinates(tau, pose.slopes)
+    result, bodies = np.empty_like(motion.q), skeleton.bodies(bsp)
+    for some in pieces(len(result)):
+        state = axis_motion(skeleton, motion.cut(some))
+        tau, _ = axis_forces(skeleton.tree, skeleton.gravity_m_s2, bodies, *state)
+        pose = skeleton.pose(motion.q[some])
+        for i, foot in enumerate(skeleton.feet if feet is None else feet):
+            moves = skeleton.support[skeleton.segments.index(foot)]
+            tau[:, moves] -= (pose.axes[:, moves] @ foot_loads[some, i, :, None])[..., 0]
+        result[some] = skeleton.map.to_coordinates(tau, pose.slopes)
+    return result

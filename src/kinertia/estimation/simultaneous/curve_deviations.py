@@ -54,7 +54,12 @@ class CurveDeviations:
 
     def and_of(self, other: CurveDeviations) -> CurveDeviations:
         """Combine with other, independent standard deviations."""
-        return CurveDeviations(*(np.hypot(getattr(self, f.name), getattr(other, f.name)) for f in fields(self)))
+        return CurveDeviations(*(np.hypot(*pair) for pair in zip(self.curves, other.curves, strict=True)))
+
+    @property
+    def curves(self) -> tuple[np.ndarray, ...]:
+        """The standard deviations of all curves, in the order of the attributes."""
+        return tuple(getattr(self, field.name) for field in fields(self))
 
     @classmethod
     def filled(cls, d: int, c: int, value: float) -> CurveDeviations:

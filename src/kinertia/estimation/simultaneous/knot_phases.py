@@ -19,6 +19,8 @@ from kinertia.estimation.simultaneous.gauss_newton import GaussNewton
 from kinertia.estimation.simultaneous.linearised import Linearised, Point
 from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.motion.dynamics import Motion, inverse_dynamics
+from kinertia.motion.frame_chunks import pieces
+from kinertia.motion.ground_reactions import GroundReactions
 from kinertia.motion.moving_windows import even_mean
 
 PHASES = (0.5,)
@@ -89,20 +91,31 @@ _KNOTS = 2.0
 
 def curves_apart(problems: Sequence[MapProblem], points: Sequence[Point], k: int) -> CurveDeviations:
     """Return the standard deviations between estimates of the curves of trial k."""
-    every = [_curves(problem, k, point) for problem, point in zip(problems, points, strict=True)]
-    basis = problems[0].bases[k]
+    frames, basis = np.flatnonzero(problems[0].trials[k].dynamic), problems[0].bases[k]
+    statics = [problem.in_trial(k, point) for problem, point in zip(problems, points, strict=True)]
+    reactions = [problem.loads.reactions(k, static) for problem, static in zip(problems, statics, strict=True)]
+    estimates = [(each.coefficients[k], static) for each, static in zip(points, statics, strict=True)]
+    variances = CurveDeviations.filled(len(frames), len(problems[0].moving), 0.0).curves
+    for some in pieces(len(frames)):
+        rows = zip(problems, estimates, reactions, strict=True)
+        every = [_curves(problem, k, *estimate, loads, frames[some]) for problem, estimate, loads in rows]
+        for variance, *each in zip(variances, *every, strict=True):
+            variance[some] = np.var(each, axis=0, ddof=1)
     around = 1 + 2 * round(_KNOTS * len(basis.first) / (basis.size - 5))
-    parts = [np.stack(each) for each in zip(*every, strict=True)]
-    variances = [even_mean(each.var(axis=0, ddof=1), around) for each in parts]
-    return CurveDeviations(*(np.sqrt(np.maximum(each, 0.0)) for each in variances))
+    return CurveDeviations(*(np.sqrt(np.maximum(even_mean(each, around), 0.0)) for each in variances))
 
 
-def _curves(problem: MapProblem, k: int, point: Point) -> tuple[np.ndarray, ...]:
-    """Return coordinates, moments, powers and ground reactions at the dynamic frames."""
-    frames = np.flatnonzero(problem.trials[k].dynamic)
-    static = problem.in_trial(k, point)
-    motion = Motion(*problem.model.full(problem.bases[k].evaluate(point.coefficients[k], frames), static))
-    loads = problem.loads.reactions(k, static).at(problem.trials[k].time[frames])
+def _curves(
+    problem: MapProblem,
+    k: int,
+    coefficients: np.ndarray,
+    static: np.ndarray,
+    reactions: GroundReactions,
+    frames: np.ndarray,
+) -> tuple[np.ndarray, ...]:
+    """Return coordinates, moments, powers and ground reactions at these frames of trial k."""
+    motion = Motion(*problem.model.full(problem.bases[k].evaluate(coefficients, frames), static))
+    loads = reactions.at(problem.trials[k].time[frames])
     moments = inverse_dynamics(problem.model.placed(static), problem.model.bsp(static), motion, loads)[
         :, problem.moving
     ]

@@ -191,8 +191,9 @@ def _motions(
             block = steps.write(part, block)
     follow, alone = np.split(steps.into, 2)
     noise = motion_noise(problem, k, point.coefficients[k], problem.in_trial(k, point))
-    result: np.ndarray = follow + _narrowed(alone, noise / problem.trials[k].repeats)
-    return result
+    _narrow(alone, noise / problem.trials[k].repeats)
+    follow += alone
+    return follow
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,7 +226,7 @@ class _Steps:
         return first
 
 
-def _narrowed(alone: np.ndarray, shares: np.ndarray) -> np.ndarray:
+def _narrow(alone: np.ndarray, shares: np.ndarray) -> None:
     """Filter series (n, k, c) of spline coefficients so that their power is multiplied by shares (3,).
 
     The shares apply to the power of the sums of splines, of their rates and of their accelerations. The logarithm of
@@ -233,11 +234,12 @@ def _narrowed(alone: np.ndarray, shares: np.ndarray) -> np.ndarray:
     them are kept.
     """
     if np.ptp(shares) < _ALIKE * shares.max():
-        same: np.ndarray = np.sqrt(shares.mean()) * alone
-        return same
+        alone *= np.sqrt(shares.mean())
+        return
     size = alone.shape[1]
     ends = min(_LOOSE_ENDS, (size - _LOOSE_ENDS) // 2)
-    power = np.square(np.abs(_spectrum(alone[:, ends : size - ends]))).mean(axis=0)
+    # one draw at a time: of long trials the spectra of all would be most of the memory
+    power = sum(np.square(np.abs(_spectrum(one[ends : size - ends]))) for one in alone)
     squares = _squares(len(power))
     # a quintic spline's own spectrum
     power = (power / power.sum(axis=0)).mean(axis=1) * np.sinc(0.5 * np.sqrt(squares)) ** 12
@@ -250,15 +252,14 @@ def _narrowed(alone: np.ndarray, shares: np.ndarray) -> np.ndarray:
         return gap
 
     found = least_squares(missing, [np.log(shares.mean()), 0.0, 0.0], bounds=([-20.0] * 3, [20.0] * 3))
-    spectrum = _spectrum(alone)
-    gain = np.exp(0.5 * found.x @ _squares(spectrum.shape[1]) ** np.arange(3)[:, None])
-    filtered: np.ndarray = np.fft.irfft(spectrum * gain[:, None], 2 * size, axis=1)[:, :size]
-    return filtered
+    gain = np.exp(0.5 * found.x @ _squares(size + 1) ** np.arange(3)[:, None])
+    for one in alone:
+        one[:] = np.fft.irfft(_spectrum(one) * gain[:, None], 2 * size, axis=0)[:size]
 
 
 def _spectrum(series: np.ndarray) -> np.ndarray:
-    """Return the spectrum (n, f, c) of series (n, k, c) followed by their mirror image, which avoids jumps."""
-    return np.fft.rfft(np.concatenate([series, series[:, ::-1]], axis=1), axis=1)
+    """Return the spectrum (f, c) of a series (k, c) followed by its mirror image, which avoids jumps."""
+    return np.fft.rfft(np.concatenate([series, series[::-1]]), axis=0)
 
 
 def _squares(count: int) -> np.ndarray:

@@ -13,6 +13,7 @@ import numpy as np
 
 from kinertia.model.anatomy import segment_of
 from kinertia.model.skeleton import Joint, Skeleton
+from kinertia.motion.frame_chunks import pieces
 
 CLAVICLE_M = 0.15
 CLAVICLE_PER_ARM = 0.16
@@ -56,9 +57,11 @@ def _spread_rad(skeleton: Skeleton, shoulder: Joint, q: np.ndarray) -> float:
     """Return the RMS angle (rad) between the arm's direction in the trunk and its mean."""
     elbow = next((joint for joint in skeleton.joints if joint.parent == shoulder.child), None)
     far = np.array([0.0, -1.0, 0.0]) if elbow is None else elbow.translation - shoulder.child_translation
-    pose = skeleton.pose(q)
-    arm, trunk = (pose.rotation[:, skeleton.segments.index(name)] for name in (shoulder.child, shoulder.parent))
-    direction = np.einsum("nji,njk,k->ni", trunk, arm, far / np.linalg.norm(far))
+    direction = np.empty((len(q), 3))
+    for some in pieces(len(q)):
+        turned = skeleton.pose(q[some]).rotation
+        arm, trunk = (turned[:, skeleton.segments.index(name)] for name in (shoulder.child, shoulder.parent))
+        direction[some] = np.einsum("nji,njk,k->ni", trunk, arm, far / np.linalg.norm(far))
     return float(np.sqrt(np.square(direction - direction.mean(axis=0)).sum(axis=1).mean()))
 
 

@@ -21,7 +21,7 @@ LASTS_S = 0.14
 
 
 def block_growth(problem: MapProblem, k: int, static: np.ndarray, time: np.ndarray) -> np.ndarray:
-    """(n, c) by how much more the markers' errors make of each moment at these times of trial k.
+    """Return factors (n, c) on what the markers' errors make of each moment at these times of trial k.
 
     Args:
         problem: of the estimate.
@@ -35,7 +35,7 @@ def block_growth(problem: MapProblem, k: int, static: np.ndarray, time: np.ndarr
     landed[1:] = loaded[1:] & ~loaded[:-1]
     result = np.ones((len(time), len(names)))
     for side, at in zip("rl", landed.T, strict=True):
-        since = time[:, None] - trial.time[at]
-        after = ((since >= 0.0) & (since < LASTS_S)).any(axis=1)
+        landings = np.append(-np.inf, trial.time[at])
+        after = time - landings[np.searchsorted(landings, time, side="right") - 1] < LASTS_S
         result[np.ix_(after, [name == f"hip_flexion_{side}" for name in names])] = GROWTH
     return result
