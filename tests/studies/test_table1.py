@@ -84,7 +84,7 @@ def test_parameters_stay_wrong_with_noise(trial):
 @in_one_process()
 @mock.patch("kinertia.studies.table1.CONDITIONS", CLEAN)
 def test_without_noise_every_parameter_is_found_from_every_start(trial):
-    for draw in run_table1(trial, repeats=4, seed=2).draws:
+    for draw in run_table1(trial, repeats=2, seed=2).draws:
         for condition in CLEAN:
             assert_exact(draw.errors[condition], PUBLISHED[condition])
 

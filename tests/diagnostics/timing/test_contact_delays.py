@@ -29,7 +29,7 @@ def walk(request, recording_of):
     return recording_of(*WALKS[request.param])
 
 
-@pytest.mark.parametrize("rate", [0.95, 0.98, 0.99, 1.01, 1.02, 1.05])
+@pytest.mark.parametrize("rate", [0.95, 0.99, 1.01, 1.05])
 def test_a_wrong_rate_of_a_run(run, rate):
     found = found_in(run, rate)
     assert found.code == "T201"
