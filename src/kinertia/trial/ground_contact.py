@@ -132,9 +132,10 @@ def _learned(moves: Sequence[FootMotion], loaded: BoolArray) -> tuple[float, flo
             if last < len(speed) - 1:
                 leaving.append(_halfway(speed[last + 1], speed[last]))
     speeds = np.concatenate(loaded_speed)
+    speeds = speeds[np.isfinite(speeds)]  # a hidden foot has none
     usual = _largest(speeds)
     land = max(_LEAST_SPEED_M_S, _usual(landing) or usual)
-    if len(landing) < _FEWEST_TO_JUDGE:
+    if len(landing) < _FEWEST_TO_JUDGE and speeds.size:
         land = max(land, min(_SLOW_LANDING * land, float(np.quantile(speeds, _STANCE))))
     return clearance, land, max(land, _usual(leaving) or usual)
 
