@@ -21,6 +21,15 @@ def problem_of(found: Finding) -> str:
     return f"{found.code} {found.message} {found.remedy}"
 
 
+def how_to_install(extra: str) -> str:
+    """Return how to install what an extra of the package needs: as in README, since no package index has Kinertia.
+
+    >>> how_to_install("app")
+    'pip install ".[app]" in the folder of Kinertia'
+    """
+    return f'pip install ".[{extra}]" in the folder of Kinertia'
+
+
 class KinertiaError(Exception):
     """Base of all errors raised on purpose; `str(error)` is one complete sentence for the user.
 

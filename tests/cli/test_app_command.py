@@ -23,7 +23,7 @@ def test_without_the_extra_it_says_how_to_install_it(without, monkeypatch, tmp_p
     without(package)
     outcome = run("app", "--folder", tmp_path / "library", "--no-browser")
     assert outcome.status == 2
-    assert 'pip install "kinertia[app]"' in outcome.err
+    assert 'pip install ".[app]"' in outcome.err
     assert not (tmp_path / "library").exists()
 
 
@@ -75,7 +75,7 @@ def test_the_browser_is_opened_at_the_address(monkeypatch, tmp_path):
 
 @pytest.mark.parametrize(
     ("command", "words"),
-    [("app", 'pip install "kinertia[app]"'), ("instruments", "under [instruments]"), ("population", "under [prior]")],
+    [("app", 'pip install ".[app]"'), ("instruments", "under [instruments]"), ("population", "under [prior]")],
 )
 def test_help_shows_what_stands_in_brackets(command, words):
     assert words in " ".join(run(command, "--help").out.split())

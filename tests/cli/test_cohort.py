@@ -18,6 +18,7 @@ from cohort_faults import write_study
 from command_line import PROGRAM, run
 from kinertia.cli.cohort import _LOCK
 from kinertia.cohort.cluster import doubts_of_workers
+from kinertia.errors import how_to_install
 from kinertia.io.file_lock import sole_use
 from kinertia.report.files import save_fit
 from kinertia.workflow.from_files import fit_subject
@@ -103,7 +104,7 @@ def test_bad_input_is_one_line(tmp_path, monkeypatch):
     monkeypatch.setattr("kinertia.cohort.cluster.find_spec", lambda name: None if name == "pyarrow" else name)
     outcome = run("cohort", tmp_path, "-o", tmp_path / "out")
     assert outcome.status == 2
-    assert "cohorts need pyarrow, which is not installed; install: pip install 'kinertia[cohort]'" in outcome.err
+    assert "cohorts need pyarrow, which is not installed: " + how_to_install("cohort") in outcome.err
 
 
 @pytest.fixture

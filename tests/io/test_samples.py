@@ -246,7 +246,7 @@ def test_without_pooch_the_files_may_be_there(site, cache, monkeypatch):
 
 def test_without_pooch_it_says_how_to_install_it_and_which_files_to_put_where(site, cache, monkeypatch):
     without_pooch(monkeypatch)
-    installing = 'pooch, which downloads it, is not installed; install it (pip install "kinertia[samples]"), '
+    installing = 'pooch, which downloads it, is not installed; pip install ".[samples]" in the folder of Kinertia, '
     assert refusal() == installing + by_hand(cache)
     put(cache, [FIRST, LAST])
     (cache / LAST).write_bytes(b"saved with other line ends")

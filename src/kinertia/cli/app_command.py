@@ -13,10 +13,9 @@ import typer
 from kinertia.cli.measured_demo import write_measured_lab
 from kinertia.cli.synthetic_demo import write_synthetic_lab
 from kinertia.cli.terminal import out, print_json
-from kinertia.errors import KinertiaError
+from kinertia.errors import KinertiaError, how_to_install
 
 _EXAMPLES: dict[str, Callable[[Path], object]] = {"measured": write_measured_lab, "synthetic": write_synthetic_lab}
-_HOW = 'pip install "kinertia[app]"'
 
 
 def app(
@@ -34,7 +33,7 @@ def app(
     The page is served on this computer to this computer only, at an address
     with a secret part; nothing is sent anywhere. What it keeps is in a folder
     of yours, in the form that the other commands take. It ends with Ctrl-C or
-    the button on the page. Needs pip install "kinertia\\[app]".
+    the button on the page. Needs pip install ".\\[app]".
 
     [bold]Examples[/]
 
@@ -48,7 +47,7 @@ def app(
     except ImportError as error:
         if (error.name or str(error)).partition(".")[0] not in ("starlette", "uvicorn", "anyio"):
             raise
-        problem = f"kinertia app needs starlette and uvicorn, which are not installed; install them: {_HOW}"
+        problem = f"kinertia app needs starlette and uvicorn, which are not installed: {how_to_install('app')}"
         raise KinertiaError(problem) from None
     library = Library(Path.home() / "Kinertia" if folder is None else folder)
     with library.opened():

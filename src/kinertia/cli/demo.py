@@ -32,7 +32,7 @@ def demo(
     estimate with the truth.
 
     With --measured it is a real person in a real laboratory: OpenSim's gait2354
-    example, downloaded once (0.9 MB; needs pip install "kinertia\\[samples]").
+    example, downloaded once (0.9 MB; needs pip install ".\\[samples]").
     Results, report and exit status are those of kinertia fit.
 
     [bold]Examples[/]

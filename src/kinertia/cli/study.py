@@ -132,7 +132,7 @@ def _say_where(output: Path, files: Sequence[str], picture: str) -> None:
     drawn = has_matplotlib()
     out.print(f"results in {output}: {', '.join([*files, picture] if drawn else files)}", soft_wrap=True)
     if not drawn:
-        out.print(f"no {picture}: matplotlib is not installed; install it: {HOW}", soft_wrap=True)
+        out.print(f"no {picture}: matplotlib is not installed: {HOW}", soft_wrap=True)
 
 
 for command in (table1, sensitivity):

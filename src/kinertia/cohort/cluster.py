@@ -14,9 +14,9 @@ from typing import Any
 from kinertia.cohort.job import Job
 from kinertia.cohort.record import FAILED, Record, one_line
 from kinertia.cohort.resources import Finished, measured
-from kinertia.errors import KinertiaError, SettingsError
+from kinertia.errors import KinertiaError, SettingsError, how_to_install
 
-HOW = "pip install 'kinertia[cohort]'"
+HOW = how_to_install("cohort")
 _NEEDED = ("dask", "distributed", "pyarrow")
 
 
@@ -25,7 +25,7 @@ def expect_extra() -> None:
     missing = [name for name in _NEEDED if find_spec(name) is None]
     if missing:
         verb = "are" if missing[1:] else "is"
-        raise KinertiaError(f"cohorts need {' and '.join(missing)}, which {verb} not installed; install: {HOW}")
+        raise KinertiaError(f"cohorts need {' and '.join(missing)}, which {verb} not installed: {HOW}")
 
 
 @contextmanager

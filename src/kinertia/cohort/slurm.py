@@ -45,7 +45,7 @@ def slurm_cluster(wanted: SlurmFile, people: int) -> Iterator[Any]:
         KinertiaError: dask-jobqueue or SLURM is not installed, SLURM accepts no job, or none of them reports.
     """
     if find_spec("dask_jobqueue") is None:
-        raise KinertiaError(f"--slurm needs dask-jobqueue, which is not installed; install: {HOW}")
+        raise KinertiaError(f"--slurm needs dask-jobqueue, which is not installed: {HOW}")
     if which("sbatch") is None:
         raise KinertiaError("--slurm: there is no sbatch here; run the command on a login node of the cluster")
     import dask

@@ -18,7 +18,7 @@ from urllib.parse import urlsplit
 
 import platformdirs
 
-from kinertia.errors import KinertiaError
+from kinertia.errors import KinertiaError, how_to_install
 
 URL = (
     "https://raw.githubusercontent.com/opensim-org/opensim-models/"
@@ -38,7 +38,6 @@ NAME, SIZE_MB = "gait2354", 0.9
 VARIABLE = "KINERTIA_DATA"
 """Environment variable: a folder that holds the folder `NAME`, in place of the user's cache."""
 _TIMEOUT_S = 20
-_HOW = 'pip install "kinertia[samples]"'
 
 
 def samples_folder() -> Path:
@@ -60,7 +59,7 @@ def sample_walk(progress: Callable[[str, float], None] = lambda stage, share: No
     missing = [name for name, expected in SHA256.items() if _sha256(folder / name) != expected]
     if missing and find_spec("pooch") is None:
         raise _unavailable(
-            folder, missing, _Failure("pooch, which downloads it, is not installed", f"install it ({_HOW})")
+            folder, missing, _Failure("pooch, which downloads it, is not installed", how_to_install("samples"))
         )
     for k, name in enumerate(missing):
         share = _Share(partial(_of_all, progress, k, len(missing)))

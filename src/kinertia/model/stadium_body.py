@@ -28,7 +28,7 @@ from typing import Any
 
 import numpy as np
 
-from kinertia.errors import PriorError, problem_of
+from kinertia.errors import PriorError, how_to_install, problem_of
 from kinertia.findings.finding import Severity, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
@@ -63,8 +63,7 @@ def expect_yeadon() -> None:
     """Raise a PriorError with installation instructions if the package yeadon is missing."""
     if find_spec("yeadon") is None:
         raise PriorError(
-            "girths and lengths need the package yeadon, which is not installed; install it: "
-            "pip install 'kinertia[measures]'"
+            f"girths and lengths need the package yeadon, which is not installed: {how_to_install('measures')}"
         )
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kinertia.errors import KinertiaError
+from kinertia.errors import KinertiaError, how_to_install
 from kinertia.estimation.cycles import UNITS, cycle_curves
 from kinertia.estimation.drawn_fit import chosen_draws, drawn_fit
 from kinertia.estimation.result import Fit, TrialFit
@@ -137,5 +137,6 @@ def _xarray() -> Any:
     try:
         import xarray
     except ImportError as error:
-        raise KinertiaError("Datasets need xarray, which is not installed: pip install 'kinertia[xarray]'") from error
+        message = f"Datasets need xarray, which is not installed: {how_to_install('xarray')}"
+        raise KinertiaError(message) from error
     return xarray

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from importlib.util import find_spec
 
-from kinertia.errors import KinertiaError
+from kinertia.errors import KinertiaError, how_to_install
 
-HOW = "pip install 'kinertia[plots]'"
+HOW = how_to_install("plots")
 
 
 def has_matplotlib() -> bool:
@@ -17,4 +17,4 @@ def has_matplotlib() -> bool:
 def expect_matplotlib() -> None:
     """Raise a KinertiaError that says how to install matplotlib, unless it is there."""
     if not has_matplotlib():
-        raise KinertiaError(f"figures in files need matplotlib, which is not installed; install it: {HOW}")
+        raise KinertiaError(f"figures in files need matplotlib, which is not installed: {HOW}")
