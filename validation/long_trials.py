@@ -169,7 +169,7 @@ Time is linear. Up to about a minute, counted over all trials of a fit, the norm
 Longer walks are processed in blocks of a few seconds; intermediate results go to a temporary file, about 1.5 GB
 for ten minutes. The results are the same to rounding. Memory grows by what there is of every frame:
 markers, coordinates, loads. Of the loads, at the plates' rate, the estimate holds several copies (as measured, without
-impacts, put right, smooth): with fast plates they are most of it.
+impacts, corrected, smooth): with fast plates they are most of it.
 """
 
 
