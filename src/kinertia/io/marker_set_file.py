@@ -44,12 +44,17 @@ def read_marker_set(name: str | Path) -> MarkerSet:
         FileError: no such preset or file, or the file is not a marker set.
     """
     if str(name) in preset_names():
-        text = (resources.files("kinertia.io") / "marker_sets" / f"{name}.toml").read_text(encoding="utf-8")
-        path = Path(f"{name}.toml")
-        return _marker_set(parse_toml(text, path), path)
+        return _preset(str(name))
     path = Path(name)
     expect_file(path, f"a TOML file, or one of the presets {', '.join(preset_names())}")
     return _marker_set(read_toml(path, "a marker set"), path)
+
+
+@cache
+def _preset(name: str) -> MarkerSet:
+    path = Path(f"{name}.toml")
+    text = (resources.files("kinertia.io") / "marker_sets" / path).read_text(encoding="utf-8")
+    return _marker_set(parse_toml(text, path), path)
 
 
 def choose_marker_set(labels: Sequence[str]) -> MarkerSet:

@@ -114,8 +114,9 @@ def spelled_as(marker_set: MarkerSet, labels: Sequence[str]) -> MarkerSet:
         marker_set: its labels may have been retyped by hand or changed by a program.
         labels: of a recording.
     """
-    wanted = [label for label in marker_set.labels if label not in labels]
-    others = [label for label in labels if label not in marker_set.labels]
+    own = marker_set.labels
+    wanted = [label for label in own if label not in labels]
+    others = [label for label in labels if label not in own]
     spelled = _matched({label: {folded(label)} for label in wanted}, others)
     named = {
         label: set(map(folded, names))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -33,22 +34,22 @@ class PlateContact:
         plate: index of the plate.
         start_s, end_s: when the load is above `CONTACT_FORCE_N`; NaN for an end that the trial does not show.
         foot: the foot under which the load mostly is, 0 right, 1 left.
+        trajectory: of that foot.
         weight: (k,) N, vertical force where it is reliable and the foot is visible.
         time: (k,) s.
         place: (k, 2) m, centre of pressure.
         offset_m: (2, k, 2) m, horizontally from each foot to the centre of pressure.
-        ends_m: how far the first twentieth of the load is in front of the heel, and the last one in front of the toes.
     """
 
     plate: int
     start_s: float
     end_s: float
     foot: int
+    trajectory: FootTrajectory
     weight: FloatArray
     time: FloatArray
     place: FloatArray
     offset_m: FloatArray
-    ends_m: tuple[float, float]
 
     @property
     def is_step(self) -> bool:
@@ -73,7 +74,7 @@ class PlateContact:
     @property
     def distance_m(self) -> float:
         """Median distance (m) of the load from the nearer foot."""
-        return _quantile(np.linalg.norm(self.offset_m, axis=2).min(axis=0), self.weight, 0.5)
+        return _quantile(np.minimum(*_length(self.offset_m)), self.weight, 0.5)
 
     @property
     def own_offset_m(self) -> FloatArray:
@@ -81,11 +82,22 @@ class PlateContact:
         result: FloatArray = self.weight @ self.offset_m[self.foot] / self.weight.sum()
         return result
 
+    @cached_property
+    def ends_m(self) -> tuple[float, float]:
+        """How far the first twentieth of the load is in front of the heel, and the last one in front of the toes."""
+        of_heel, of_toes = self.trajectory.beyond(self.time, self.place)
+        return _quantile(of_heel, self.weight, _END), _quantile(of_toes, self.weight, 1 - _END)
 
-def contacts_of(plates: PlateLoads, feet: tuple[FootTrajectory, FootTrajectory]) -> list[PlateContact]:
-    """Find loads of at least `SHORTEST_S` while markers are visible, except those whose foot is mostly hidden."""
+
+def contacts_of(
+    plates: PlateLoads, feet: tuple[FootTrajectory, FootTrajectory], point: FloatArray | None = None
+) -> list[PlateContact]:
+    """Find loads of at least `SHORTEST_S` while markers are visible, except those whose foot is mostly hidden.
+
+    `point` is their `cop_horizontal`, where it is known.
+    """
     first_s, last_s = feet[0].time[0] - TIME_TOLERANCE_S, feet[0].time[-1] + TIME_TOLERANCE_S
-    point = cop_horizontal(plates)
+    point = cop_horizontal(plates) if point is None else point
     contacts = []
     for p in range(len(plates.names)):
         vertical = plates.force[:, p, 1]
@@ -97,18 +109,16 @@ def contacts_of(plates: PlateLoads, feet: tuple[FootTrajectory, FootTrajectory])
             if len(rows) < 3:
                 continue
             off = np.stack([one.offset_m(plates.time[rows], point[rows, p]) for one in feet])
-            near = [float(vertical[rows] @ np.linalg.norm(one, axis=1)) for one in off]
+            near = [float(vertical[rows] @ _length(one)) for one in off]
             foot = int(np.argmin(near))
             seen = feet[foot].seen(plates.time[rows])
             if vertical[rows][seen].sum() < vertical[rows].sum() / 2:
                 continue
             rows, off = rows[seen], off[:, seen]
             weight, time, place = vertical[rows], plates.time[rows], point[rows, p]
-            ahead = feet[foot].beyond(time, place)
-            ends_m = (_quantile(ahead[0], weight, _END), _quantile(ahead[1], weight, 1 - _END))
             begins, ends = first > 0 and start > first_s, last < len(plates.time) - 1 and end < last_s
             begin_s, end_s = start if begins else np.nan, end if ends else np.nan
-            contacts.append(PlateContact(p, begin_s, end_s, foot, weight, time, place, off, ends_m))
+            contacts.append(PlateContact(p, begin_s, end_s, foot, feet[foot], weight, time, place, off))
     return contacts
 
 
@@ -131,6 +141,11 @@ def displaced(plates: PlateLoads, by_m: FloatArray) -> PlateLoads:
     by = np.broadcast_to(by_m, (*plates.force.shape[:2], 2))
     lever = np.stack([by[..., 0], np.zeros(by.shape[:2]), by[..., 1]], axis=-1)
     return replace(plates, moment=plates.moment + np.cross(lever, plates.force))
+
+
+def _length(offset: FloatArray) -> FloatArray:
+    """Return the lengths (...) of vectors (..., 2), in less time than `np.linalg.norm`."""
+    return np.sqrt(offset[..., 0] ** 2 + offset[..., 1] ** 2)
 
 
 def _quantile(values: FloatArray, weight: FloatArray, share: float) -> float:

@@ -13,7 +13,7 @@ import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.contact_fit import FITS_M, ContactFit, Feet, Hypothesis
-from kinertia.diagnostics.evidence.plate_contacts import FAR_M, contacts_of
+from kinertia.diagnostics.evidence.plate_contacts import FAR_M, contacts_of, cop_horizontal
 from kinertia.diagnostics.timing.contact_delays import USUAL_S
 from kinertia.findings.finding import finding
 from kinertia.findings.quantity import Quantity
@@ -83,8 +83,9 @@ def _best(
     plates: PlateLoads, feet: Feet, values: FloatArray, corrected: Callable[[FloatArray, float], FloatArray]
 ) -> _Best:
     """Return the value with the smallest delays, among those that put the loads under the feet if any do."""
+    point = cop_horizontal(plates)
     tried = []
     for value in values:
         moved = replace(plates, time=corrected(plates.time, float(value)))
-        tried.append(_Best(float(value), ContactFit.of(contacts_of(moved, feet), feet)))
+        tried.append(_Best(float(value), ContactFit.of(contacts_of(moved, feet, point), feet)))
     return min(tried, key=lambda one: (one.fit.far_m >= FITS_M, one.fit.delay_rms_s))
