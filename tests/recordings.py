@@ -6,7 +6,9 @@ Files are named as in `measured_data`; those under `synthetic/` are written by `
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TypeVar
+from typing import Any, TypeVar
+
+import pytest
 
 from validation.measured_data import find
 
@@ -32,6 +34,11 @@ def named_here(recordings: dict[K, V]) -> dict[K, V]:
     return {key: names for key, names in recordings.items() if is_here(names)}
 
 
+def slow_beside(quick: Iterable[K], names: Iterable[K]) -> list[Any]:
+    """Parameters of a test that takes long: of these names, all but the quick ones are slow."""
+    return [name if name in quick else pytest.param(name, marks=pytest.mark.slow) for name in names]
+
+
 WALKS = named_here(
     {
         "synthetic": ("synthetic/walk.trc", "synthetic/walk_grf.mot"),
@@ -43,6 +50,8 @@ WALKS = named_here(
     }
 )
 """Markers and forces of sound walks, as the fixture `recording_of` takes them."""
+QUICK_WALKS = ("synthetic c3d", "rajagopal", "plug-in gait b")
+"""Each kind once: plates with and without corners, one or two steps on each, a foot that reaches beyond its plate."""
 FITTED = named_here(
     {
         "synthetic": "synthetic/walk.trc",

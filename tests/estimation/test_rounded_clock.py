@@ -15,7 +15,7 @@ from kinertia.trial.sampled_time import nearest_samples, span_s
 from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow.check import check_recording
 from kinertia.workflow.estimate import estimate_bsp
-from recordings import WALKS, named_here
+from recordings import QUICK_WALKS, WALKS, named_here, slow_beside
 
 SUBJECT4 = ("subject4/walking1.trc", "subject4/walking1_grf.mot")
 SEVERAL = WALKS | named_here({"subject4": SUBJECT4})
@@ -68,7 +68,7 @@ def test_as_many_knots(spacing_s):
         np.testing.assert_array_equal(shifted.first, MotionBasis(time, spacing_s).first)
 
 
-@pytest.mark.parametrize("name", SEVERAL)
+@pytest.mark.parametrize("name", slow_beside((*QUICK_WALKS, "subject4"), SEVERAL))
 def test_the_same_frames_and_findings(recording_of, name):
     recording = recording_of(*SEVERAL[name])
     if name == "subject4":
@@ -86,7 +86,7 @@ def test_the_same_frames_and_findings(recording_of, name):
         assert found(later(recording, by_s)) == as_read
 
 
-@pytest.mark.parametrize("name", OF_MODELS)
+@pytest.mark.parametrize("name", slow_beside(list(OF_MODELS)[-1:], OF_MODELS))
 def test_the_same_estimate(file_of, recording_of, name):
     """In subject4's walk one knot more than 39 made the forces 4.8 ms late and lumbar moments 4.5 N m larger."""
     model_file, *files = OF_MODELS[name]

@@ -10,12 +10,9 @@ from kinertia.model.skeleton import GRAVITY_M_S2
 from kinertia.settings import Settings, Subject
 from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow.estimate import estimate_bsp
-from recordings import FITTED
+from recordings import FITTED, slow_beside
 
-QUICK = ("synthetic", "gait2354")
-walks = pytest.mark.parametrize(
-    "name", [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in FITTED]
-)
+walks = pytest.mark.parametrize("name", slow_beside(("synthetic", "gait2354"), FITTED))
 LONGEST_WINDOW_S = {
     "synthetic": (1.09, 2.17),
     "gait2354": (0.0, 2.5),

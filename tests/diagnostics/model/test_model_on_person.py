@@ -34,7 +34,7 @@ KNOWN = [
 SOUND = here(KNOWN)
 
 
-@pytest.fixture(params=SOUND, ids=[walk for _, walk in SOUND])
+@pytest.fixture(scope="module", params=SOUND, ids=[walk for _, walk in SOUND])
 def someone(request, file_of, recording_of):
     """A model, markers of a trial, and which are on which segment."""
     file, trial = request.param

@@ -14,7 +14,7 @@ from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.data import Markers, PlateLoads
 from kinertia.trial.sampled_time import runs
 from loads_and_feet import doubted, error_of, place_findings
-from recordings import RUNS, SQUATS, WALKS
+from recordings import QUICK_WALKS, RUNS, SQUATS, WALKS, slow_beside
 from walk_on_plates import ALL_STEPS
 from walk_on_plates import FEET as SIMPLE_FEET
 from walk_on_plates import walk as simple_walk
@@ -29,7 +29,7 @@ BESIDE_M = {"synthetic": -0.008, "synthetic c3d": -0.010}
 """Along Z, from the line between heel and toe to the centres of pressure of the package's walk."""
 
 
-@pytest.fixture(params=WALKS)
+@pytest.fixture(params=slow_beside(QUICK_WALKS, WALKS))
 def name(request):
     return request.param
 
@@ -204,7 +204,7 @@ def test_plates_that_are_interchanged():
 
 
 @pytest.mark.parametrize("apart_m", [0.5, -0.4])
-@pytest.mark.parametrize("name", ON_BELTS)
+@pytest.mark.parametrize("name", slow_beside(("run, synthetic", "walk, gait2354"), ON_BELTS))
 def test_belts_that_are_interchanged(recording_of, name, apart_m):
     """Each load lies on the other belt, and goes there as it would on its own."""
     run = recording_of(*ON_BELTS[name])

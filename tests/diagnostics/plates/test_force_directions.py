@@ -13,10 +13,10 @@ from kinertia.diagnostics.plates.force_directions import force_directions
 from kinertia.io.marker_set_file import choose_marker_set, read_marker_set
 from kinertia.trial.data import PlateLoads
 from plate_findings import codes, context_of, found_in, with_force
-from recordings import RUNS, SQUATS, WALKS
+from recordings import QUICK_WALKS, RUNS, SQUATS, WALKS, slow_beside
 
 
-@pytest.fixture(params=WALKS)
+@pytest.fixture(params=slow_beside(QUICK_WALKS, WALKS))
 def walk(request, recording_of):
     return recording_of(*WALKS[request.param])
 

@@ -8,7 +8,7 @@ import pytest
 from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.trial.centre_of_pressure import centre_of_pressure
 from loads_and_feet import error_of
-from recordings import SYNTHETIC, here
+from recordings import SYNTHETIC, here, slow_beside
 
 WALKS = here(["synthetic/walk.c3d", "pig_c3d/subject_a_walk.c3d", "pig_c3d/subject_b_walk.c3d"])
 QUARTER = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
@@ -23,7 +23,7 @@ MISTAKES = {
 }
 
 
-@pytest.fixture(params=WALKS)
+@pytest.fixture(params=slow_beside(["synthetic/walk.c3d", "pig_c3d/subject_b_walk.c3d"], WALKS))
 def walk(request, recording_of):
     recording = recording_of(request.param)
     if not request.param.startswith(SYNTHETIC):

@@ -10,7 +10,7 @@ from kinertia.findings.quantity import Quantity
 from kinertia.io.ground_forces import read_forces
 from kinertia.io.sto import read_table, write_table
 from plate_findings import plates_alone
-from recordings import WALKS, here
+from recordings import WALKS, here, slow_beside
 
 MADE = (
     ("1_ground_force_v", "1_ground_force_p", "1_ground_torque_"),
@@ -33,7 +33,7 @@ COLUMNS = {
         ("ground_force_2_v", "ground_force_2_p", "ground_force_2_m"),
     ),
 }
-GROUPS = here(COLUMNS)
+GROUPS = slow_beside(("synthetic/walk_grf.mot", "gait2354/subject01_walk1_grf.mot"), here(COLUMNS))
 SOUND = here(
     [
         *COLUMNS,

@@ -11,7 +11,7 @@ from kinertia.diagnostics.timing.questions import PERSON_QUESTIONS
 from trials_of_people import PEOPLE, Trials
 
 
-@pytest.fixture(params=PEOPLE)
+@pytest.fixture(scope="module", params=PEOPLE)
 def person(request, file_of, recording_of):
     return Trials(PEOPLE[request.param], file_of, recording_of)
 

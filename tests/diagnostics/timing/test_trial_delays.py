@@ -9,7 +9,7 @@ from kinertia.diagnostics.timing.trial_delays import TrialDelay, trial_delay, tr
 from trials_of_people import PEOPLE, Trials
 
 
-@pytest.fixture(params=PEOPLE)
+@pytest.fixture(scope="module", params=PEOPLE)
 def person(request, file_of, recording_of):
     return Trials(PEOPLE[request.param], file_of, recording_of)
 

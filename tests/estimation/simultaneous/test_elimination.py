@@ -8,6 +8,7 @@ import pytest
 
 import kinertia.estimation.simultaneous.elimination as elimination
 import kinertia.estimation.simultaneous.frame_blocks as limits
+import kinertia.estimation.simultaneous.solver as solver
 from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations, curve_deviations
 from kinertia.estimation.simultaneous.frame_blocks import TimeBlock, halves, joined, time_blocks
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
@@ -168,6 +169,7 @@ def test_the_estimate_is_that_of_the_whole(whole, monkeypatch):
 
 
 def test_two_threads_give_what_one_gives_bit_for_bit(monkeypatch):
+    monkeypatch.setattr(solver, "_MAX_ITERATIONS", 4)
     problem = longer_problem()
     given = problem.skeleton, problem.prior, problem.calibration, problem.trials
     results = []

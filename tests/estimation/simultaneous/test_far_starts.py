@@ -8,11 +8,12 @@ import pytest
 
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous
 from kinertia.synthetic.noise import camera_noise
+from recordings import slow_beside
 from validation.bsp_errors import errors
 from validation.study_noise import CAMERA_SD_M, drawn_start, held, observation_of, start_prior, study_noise, study_walk
 
 
-@pytest.mark.parametrize("number", [1, 6])
+@pytest.mark.parametrize("number", slow_beside([1], [1, 6]))
 def test_second_moments_that_the_data_would_have_below_zero_stay_small(number):
     trial = study_walk()
     start, rng = drawn_start(trial, number)
