@@ -81,7 +81,7 @@ def test_the_measured_demo_is_a_fit(measured_demo, tmp_path, monkeypatch):
     assert {key: content[key] for key in summary} == summary
 
 
-def test_fit_has_the_rows_of_its_table(demo_run, tmp_path):
+def test_fit_has_the_rows_of_its_table(demo_run, tmp_path, few_evaluations):
     content = told("fit", demo_run[1] / "lab", "--method", "two-level", "-o", tmp_path / "out", status=None)
     table = pd.read_csv(tmp_path / "out" / "bsp.csv")
     rows = pd.DataFrame(content["bsp"])

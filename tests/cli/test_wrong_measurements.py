@@ -11,22 +11,9 @@ from kinertia.io.sto import read_sto, write_sto
 from spoilt_lab import blocking_codes, changed_markers, complaint, expect_found, refused
 
 
-@pytest.mark.parametrize(("one", "other"), [("R.ASIS", "L.ASIS"), ("R.Heel", "L.Heel")])
-def test_markers_swapped_for_the_whole_trial(lab, one, other):
-    changed_markers(lab / "walk.trc", exchange(one, other))
-    expect_found(refused(lab), "L202", {"trial": "walk", "markers": [one, other]})
-
-
-def test_markers_of_shanks_swapped_for_the_whole_trial(lab):
-    """Of a cluster it is known on which segment each would fit."""
-    changed_markers(lab / "walk.trc", exchange("R.Shank.Front", "L.Shank.Front"))
-    refusal = refused(lab)
-    expect_found(refusal, "L213", {"trial": "walk"})
-    assert {one["evidence"]["better_segment"]["value"] for one in refusal.blocking} == {"right shank", "left shank"}
-    markers = {label for found in refusal.blocking for label in found["where"]["markers"]}
-    assert {"R.Shank.Front", "L.Shank.Front"} <= markers
-    assert all(found["evidence"]["change_m"]["value"] > 0.2 for found in refusal.blocking)
-    assert all(found["evidence"]["better_change_m"]["value"] < 0.002 for found in refusal.blocking)
+def test_markers_swapped_for_the_whole_trial(lab):
+    changed_markers(lab / "walk.trc", exchange("R.Heel", "L.Heel"))
+    expect_found(refused(lab), "L202", {"trial": "walk", "markers": ["R.Heel", "L.Heel"]})
 
 
 def exchange(one, other):
@@ -36,13 +23,10 @@ def exchange(one, other):
     return swap
 
 
-@pytest.mark.parametrize(
-    ("one", "other", "joint"),
-    [("R.Knee.Lat", "R.Knee.Med", "right knee"), ("L.Ankle.Lat", "L.Ankle.Med", "left ankle")],
-)
-def test_outer_and_inner_labels_swapped_in_the_static_trial(lab, one, other, joint):
+def test_outer_and_inner_labels_swapped_in_the_static_trial(lab):
+    one, other = "L.Ankle.Lat", "L.Ankle.Med"
     changed_markers(lab / "static.trc", exchange(one, other))
-    expect_found(refused(lab), "L208", {"trial": "static", "markers": [one, other]}, joint=joint)
+    expect_found(refused(lab), "L208", {"trial": "static", "markers": [one, other]}, joint="left ankle")
     assert_checked(lab, "L208")
 
 
@@ -61,52 +45,13 @@ def test_static_trial_of_another_person(lab):
     assert_checked(lab, "S203")
 
 
-def test_spikes(lab):
-    """Those around plate contact: 9 of 14."""
-
-    def spike(positions, index):
-        positions[5::20, index("R.Heel"), 1] += 0.3
-
-    changed_markers(lab / "walk.trc", spike)
-    expect_found(refused(lab), "M111", {"trial": "walk", "markers": ["R.Heel"]}, distance_m=0.3, frames=9)
-    assert_checked(lab, "M111")
-
-
-def changed_forces(path, change):
-    table = read_sto(path)
-    change(table)
-    write_sto(path, table, False, "changed")
-
-
-@pytest.mark.parametrize(
-    ("columns", "factor", "code", "where", "evidence"),
-    [
-        ("_vx", -1.0, "P232", {"axis": "fore-aft", "file_axis": "X"}, {"correlation": -0.94}),
-        ("_vz", -1.0, "P232", {"axis": "mediolateral", "file_axis": "Z"}, {"correlation": -0.99}),
-        ("_v[xz]", -1.0, "P231", {"axis": None}, {"angle_rad": np.pi}),
-    ],
-)
-def test_forces_that_do_not_belong_to_the_motion(lab, columns, factor, code, where, evidence):
-    scale_forces(lab / "walk.mot", columns, factor)
-    expect_found(refused(lab), code, {"trial": "walk", **where}, **evidence)
-    assert_checked(lab, code)
-
-
-def test_torques_in_newton_millimetres(lab):
-    scale_forces(lab / "walk.mot", "torque", 1000.0)
-    refusal = refused(lab)
-    expect_found(refusal, "P203", {"trial": "walk"})
-    arms = {found["where"]["plate"]: found["evidence"]["lever_arm_m"]["value"] for found in refusal.blocking}
-    assert set(arms) == {"right", "left"}
-    assert min(arms.values()) > 3.0
-    assert_checked(lab, "P203")
-
-
-def scale_forces(path, columns, factor):
-    def change(table):
-        table.loc[:, [name for name in table.columns if re.search(columns, name)]] *= factor
-
-    changed_forces(path, change)
+def test_forces_that_do_not_belong_to_the_motion(lab):
+    table = read_sto(lab / "walk.mot")
+    table.loc[:, [name for name in table.columns if name.endswith("_vx")]] *= -1.0
+    write_sto(lab / "walk.mot", table, False, "changed")
+    where = {"trial": "walk", "axis": "fore-aft", "file_axis": "X"}
+    expect_found(refused(lab), "P232", where, correlation=-0.94)
+    assert_checked(lab, "P232")
 
 
 def assert_checked(lab, code):

@@ -9,7 +9,7 @@ from generic_static import generic_static, recording, standing_positions
 from kinertia.io.marker_set_draft import draft_marker_set, known_places, preset_of
 from kinertia.io.marker_set_file import choose_marker_set, preset_names, read_marker_set
 from kinertia.model.gait27 import build_gait27
-from recordings import here
+from recordings import here, slow_beside
 
 STANDING = {
     "lasem": ("field/lasem/static.c3d", {"knee_medial_r": ("RMEPI",), "metatarsal_l": ("LP1MT", "LP5MT")}),
@@ -181,7 +181,9 @@ def test_what_one_side_lacks_is_placed_as_on_the_other_by_its_label(tmp_path):
     assert "as on the other side, by its label" in text
 
 
-@pytest.mark.parametrize("name", [name for name, (file, _) in STANDING.items() if here([file])])
+@pytest.mark.parametrize(
+    "name", slow_beside(("lasem", "unipd", "child"), [name for name, (file, _) in STANDING.items() if here([file])])
+)
 def test_legs_of_measured_laboratories_are_complete(tmp_path, name, recording_of):
     file, expected = STANDING[name]
     static = recording_of(file)

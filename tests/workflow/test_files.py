@@ -8,7 +8,7 @@ from kinertia.settings import Subject
 from kinertia.workflow.check import check_person
 from kinertia.workflow.files import RecordingFiles, files_by_name, read_files
 from kinertia.workflow.person import Person, read_person
-from recordings import named_here
+from recordings import named_here, slow_beside
 from refusals import refused
 
 WALKS = named_here(
@@ -22,7 +22,7 @@ FAR_M = {"synthetic": 3.0, "a": 4.5, "b": 3.6}
 """How far they walk."""
 
 
-@pytest.fixture(params=WALKS)
+@pytest.fixture(params=slow_beside(("synthetic", "b"), WALKS))
 def given(request, file_of):
     """Name, and what is found of its files, where one of them may be given as the static trial."""
 
@@ -53,7 +53,7 @@ def test_a_walk_given_as_the_static_trial(given):
     assert found.recordings[0].context.name == walks.where.trial
 
 
-@pytest.mark.parametrize("name", WALKS)
+@pytest.mark.parametrize("name", slow_beside(("synthetic", "b"), WALKS))
 def test_files_and_options_of_a_fit_are_judged_alike(file_of, name):
     walk, static = map(file_of, WALKS[name])
     stated = {"mass_kg": 60.0, "height_m": 1.6, "sex": "male"}

@@ -14,7 +14,7 @@ from kinertia.settings import Overrule
 from kinertia.workflow.check import check_person
 from kinertia.workflow.from_files import prepare_subject
 from kinertia.workflow.person import read_person
-from recordings import FITTED, is_here
+from recordings import FITTED, is_here, slow_beside
 from refusals import expect_filled
 from synthetic_lab import WITH_MODEL, synthetic_arguments
 from validation import osim_models
@@ -56,7 +56,7 @@ def written(arguments):
     return "\n".join(lines)
 
 
-@pytest.fixture(params=PEOPLE)
+@pytest.fixture(params=slow_beside(("synthetic", "pig_b", "synthetic with model"), PEOPLE))
 def subject(request, tmp_path, synthetic_lab):
     """One person's subject file, read."""
     name = request.param

@@ -7,6 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from kinertia.diagnostics.markers.axes_and_floor import floor_slope, unit_and_vertical
+from kinertia.findings.finding import Severity
 from kinertia.io.marker_set_file import choose_marker_set, read_marker_set
 from kinertia.trial.data import Markers, Recording
 from marker_contexts import codes, context_of
@@ -99,6 +100,7 @@ def test_axes_and_unit(turn, vertical, expected, up):
     """Axes are called as the file calls them."""
     found = list(unit_and_vertical(context_of(Recording("walk", walking(turn), None, vertical=vertical))))
     assert codes(found) == expected
+    assert {one.severity for one in found} <= {Severity.ERROR}
     assert [one.evidence["up"].value for one in found if one.code == "M142"] == ([up] if up else [])
 
 

@@ -148,6 +148,7 @@ def test_a_stated_mass_that_the_forces_contradict(lab, stated_kg, found):
     for one in findings:
         assert one.evidence["mass_by_force_kg"].value == pytest.approx(72.6, abs=1.5)
         assert one.evidence["stated_kg"].value == stated_kg
+        assert any("handrail" in cause for cause in one.causes) == (stated_kg > 72.6)
 
 
 def test_a_declared_rucksack_is_not_accused(lab):
