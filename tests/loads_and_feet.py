@@ -6,8 +6,16 @@ from kinertia.diagnostics.runner import asked, explained
 from kinertia.findings.finding import Severity
 from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.model.marker_set import MarkerSet
+from recordings import marker_set_for
 
 COMPETING = ("P204", "P241", "P242", "P243", "P244", "T201", "T211", "T212")
+
+
+def feet_of(recording):
+    """Labels on the right ("r") and left ("l") foot of a recording, those that it has."""
+    labels = recording.markers.labels
+    feet = marker_set_for(labels).foot_labels()
+    return {side: [label for label in own if label in labels] for side, own in feet.items()}
 
 
 def context_of(recording, feet=None, **more):

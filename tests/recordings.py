@@ -5,11 +5,14 @@ Files are named as in `measured_data`; those under `synthetic/` are written by `
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from pathlib import Path
 from typing import Any, TypeVar
 
 import pytest
 
+from kinertia.io.marker_set_file import choose_marker_set, read_marker_set
+from kinertia.model.marker_set import MarkerSet
 from validation.measured_data import find
 
 K = TypeVar("K")
@@ -32,6 +35,12 @@ def here(recordings: Iterable[V]) -> list[V]:
 def named_here(recordings: dict[K, V]) -> dict[K, V]:
     """The same of files by a name."""
     return {key: names for key, names in recordings.items() if is_here(names)}
+
+
+def marker_set_for(labels: Sequence[str]) -> MarkerSet:
+    """The preset that fits these labels, or the set of subject4's laboratory."""
+    own = Path(__file__).parent / "subject4.toml"
+    return read_marker_set(own) if "r_calc" in labels else choose_marker_set(labels)
 
 
 def slow_beside(quick: Iterable[K], names: Iterable[K]) -> list[Any]:

@@ -1,13 +1,11 @@
 """When a trial began changes nothing: what a clock adds to its times by rounding must not decide anything."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
-from kinertia.io.marker_set_file import choose_marker_set, read_marker_set
 from kinertia.io.osim.reader import read_osim
 from kinertia.settings import Subject
 from kinertia.trial.ground_contact import bridged
@@ -15,7 +13,7 @@ from kinertia.trial.sampled_time import nearest_samples, span_s
 from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow.check import check_recording
 from kinertia.workflow.estimate import estimate_bsp
-from recordings import QUICK_WALKS, WALKS, named_here, slow_beside
+from recordings import QUICK_WALKS, WALKS, marker_set_for, named_here, slow_beside
 
 SUBJECT4 = ("subject4/walking1.trc", "subject4/walking1_grf.mot")
 SEVERAL = WALKS | named_here({"subject4": SUBJECT4})
@@ -71,10 +69,7 @@ def test_as_many_knots(spacing_s):
 @pytest.mark.parametrize("name", slow_beside((*QUICK_WALKS, "subject4"), SEVERAL))
 def test_the_same_frames_and_findings(recording_of, name):
     recording = recording_of(*SEVERAL[name])
-    if name == "subject4":
-        marker_set = read_marker_set(Path(__file__).parents[1] / "subject4.toml")
-    else:
-        marker_set = choose_marker_set(recording.markers.labels)
+    marker_set = marker_set_for(recording.markers.labels)
 
     def found(one):
         check = check_recording(one, marker_set)

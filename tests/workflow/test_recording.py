@@ -1,14 +1,13 @@
 """Findings of recordings: a synthetic laboratory's, spoilt in one way at a time, and the measured ones."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import ezc3d
 import numpy as np
 import pytest
 
 from kinertia.findings.finding import Severity
-from kinertia.io.marker_set_file import choose_marker_set, read_marker_set
+from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.io.recording import read_recording
 from kinertia.settings import Subject
 from kinertia.synthetic.laboratory import LabNoise, record
@@ -17,7 +16,7 @@ from kinertia.trial.data import Markers, PlateLoads
 from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow.check import check_person, check_recording
 from kinertia.workflow.person import Person
-from recordings import here, is_here
+from recordings import here, is_here, marker_set_for
 
 
 @pytest.fixture(scope="module")
@@ -242,8 +241,7 @@ WALKS = {
 def test_sound_trials(recording_of, name):
     forces, mass_kg, window = WALKS[name]
     recording = recording_of(name, forces)
-    own = Path(__file__).parents[1] / "subject4.toml"
-    marker_set = read_marker_set(own) if "subject4" in name else choose_marker_set(recording.markers.labels)
+    marker_set = marker_set_for(recording.markers.labels)
     check = check_recording(recording, marker_set, mass_kg)
     assert not errors(check)
     assert check.windows[0] == pytest.approx(window, abs=0.03)

@@ -1,18 +1,15 @@
 """Markers that do not move with their segment are found, and with what they go; in fault-free trials none are."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from kinertia.diagnostics.labels.segment_rigidity import rigidity
 from kinertia.findings.finding import Severity
-from kinertia.io.marker_set_file import choose_marker_set, read_marker_set
 from marker_contexts import changed, codes, context_of, relabelled
-from recordings import here
+from recordings import here, marker_set_for
 
-OPENCAP = Path(__file__).parents[2] / "subject4.toml"
 LOW_WANDS = "synthetic/walk.c3d with low wands"
 """On the thighs, 9 cm above the knee as those of subject B; in the file they are twice as far up."""
 FAULT_FREE = here(
@@ -68,7 +65,7 @@ def read(recording_of, name):
     markers = recording_of(name.removesuffix(" with low wands")).markers
     if name == LOW_WANDS:
         markers = with_low_wands(markers)
-    marker_set = read_marker_set(OPENCAP) if "subject4" in name else choose_marker_set(markers.labels)
+    marker_set = marker_set_for(markers.labels)
     return markers.select([label for label in marker_set.labels if label in markers.labels]), marker_set
 
 

@@ -1,5 +1,4 @@
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -7,13 +6,11 @@ import pytest
 from generic_static import generic_model, smooth_motion
 from kinertia.diagnostics.labels.swapped_markers import labels_by_model
 from kinertia.findings.finding import Severity
-from kinertia.io.marker_set_file import choose_marker_set, read_marker_set
 from kinertia.model.gait27 import build_gait27
 from kinertia.trial.data import Markers, Recording
 from marker_contexts import codes, relabelled
-from recordings import is_here
+from recordings import is_here, marker_set_for
 
-SUBJECT4 = Path(__file__).parents[2] / "subject4.toml"
 TRIALS = {
     "synthetic": ("synthetic/static.trc", "synthetic/walk.trc", 1.803),
     "synthetic_c3d": ("synthetic/static.c3d", "synthetic/walk.c3d", 1.803),
@@ -66,8 +63,7 @@ def walk(recording_of):
         if name not in known:
             static_path, walk_path, height = WALKS[name]
             static = recording_of(static_path)
-            labels = static.markers.labels
-            marker_set = read_marker_set(SUBJECT4) if name.startswith("subject4") else choose_marker_set(labels)
+            marker_set = marker_set_for(static.markers.labels)
             skeleton = build_gait27(static, marker_set, height, "male").skeleton
             known[name] = skeleton, recording_of(walk_path).markers
         return known[name]

@@ -1,19 +1,15 @@
 """Another unit, another axis up and a vertical that is tilted along the walk are found; in level laboratories never."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from kinertia.diagnostics.markers.axes_and_floor import floor_slope, unit_and_vertical
 from kinertia.findings.finding import Severity
-from kinertia.io.marker_set_file import choose_marker_set, read_marker_set
 from kinertia.trial.data import Markers, Recording
 from marker_contexts import codes, context_of
-from recordings import here
+from recordings import here, marker_set_for
 
-OPENCAP = Path(__file__).parents[2] / "subject4.toml"
 LEVEL = here(
     [
         "synthetic/walk.trc",
@@ -43,8 +39,7 @@ OTHERS = here(
 
 def read(recording_of, name, turn=None):
     markers = recording_of(name).markers
-    marker_set = read_marker_set(OPENCAP) if "r_calc" in markers.labels else choose_marker_set(markers.labels)
-    return context_of(markers if turn is None else markers.rotated(turn), marker_set)
+    return context_of(markers if turn is None else markers.rotated(turn), marker_set_for(markers.labels))
 
 
 @pytest.mark.parametrize("name", [*WALKS, *OTHERS])

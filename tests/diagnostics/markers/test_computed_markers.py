@@ -1,28 +1,22 @@
 """Joint centres that programs computed from other markers are found; markers on skin never are."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from kinertia.diagnostics.markers.computed_markers import computed_markers
-from kinertia.io.marker_set_file import choose_marker_set, read_marker_set
+from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.trial.data import Markers
 from marker_contexts import codes, context_of
-from recordings import WALKS, here
+from recordings import WALKS, here, marker_set_for
 
-SUBJECT4 = Path(__file__).parents[2] / "subject4.toml"
 ELBOWS = {
     "synthetic/clusters_walk.trc": ("R.Elbow", "R.MElbow"),
     "subject4/walking1.trc": ("R_elbow_lat", "R_elbow_med"),
 }
 """Walks with markers on both sides of the elbow, and these."""
-
-
-def set_of(name, markers):
-    return read_marker_set(SUBJECT4) if "subject4" in name else choose_marker_set(markers.labels)
 
 
 def computed(markers, marker_set):
@@ -49,7 +43,7 @@ def test_measured_markers_are_not_computed(walk):
 @pytest.mark.parametrize("name", here(ELBOWS))
 def test_a_point_between_two_markers_of_a_joint(recording_of, name):
     markers, elbow = recording_of(name).markers, ELBOWS[name]
-    marker_set = set_of(name, markers)
+    marker_set = marker_set_for(markers.labels)
     middle = markers.select(elbow).positions.mean(axis=1)
     (one,) = computed(*with_point(markers, marker_set, "upper_arm_r", middle))
     assert (one.code, one.where.markers, one.evidence["sources"].value) == ("M151", ("centre",), ", ".join(elbow))
@@ -99,7 +93,7 @@ def test_hip_centres_by_a_rigid_fit_of_the_pelvis(noise_m, recording_of):
 def test_hip_centres_that_another_laboratory_computed(trial, recording_of):
     """By a rigid fit of all pelvis markers; regressions of the same study go with knees and hips, and are not seen."""
     markers = recording_of(f"subject4/{trial}.trc").markers
-    marker_set = read_marker_set(SUBJECT4)
+    marker_set = marker_set_for(markers.labels)
     assert computed(markers, marker_set) == []
     thigh = (*marker_set.segments["thigh_r"], "R_HJC", "L_HJC")
     found = computed(markers, replace(marker_set, segments={**marker_set.segments, "thigh_r": thigh}))

@@ -1,7 +1,6 @@
 """Loads that are not under the feet, or not when they stand, are named by their cause; fault-free ones never are."""
 
 from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,11 +8,10 @@ import pytest
 
 from kinertia.diagnostics.plates.heel_landing import shows_feet_alike
 from kinertia.findings.finding import Severity
-from kinertia.io.marker_set_file import choose_marker_set, read_marker_set
 from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.data import Markers, PlateLoads
 from kinertia.trial.sampled_time import runs
-from loads_and_feet import doubted, error_of, place_findings
+from loads_and_feet import doubted, error_of, feet_of, place_findings
 from recordings import QUICK_WALKS, RUNS, SQUATS, WALKS, slow_beside
 from walk_on_plates import ALL_STEPS
 from walk_on_plates import FEET as SIMPLE_FEET
@@ -38,10 +36,7 @@ def name(request):
 def walk(name, recording_of):
     """A walk and the labels of its feet."""
     recording = recording_of(*WALKS[name])
-    feet = choose_marker_set(recording.markers.labels).foot_labels()
-    return recording, {
-        side: [one for one in labels if one in recording.markers.labels] for side, labels in feet.items()
-    }
+    return recording, feet_of(recording)
 
 
 def moved(recording, offset_m, factor=1.0):
@@ -165,8 +160,7 @@ def test_a_walk_on_one_long_plate(walk):
 def test_squats_on_one_plate(recording_of, name):
     """The load is between the feet all the time: not of another trial, but both feet on one plate."""
     squats = recording_of(*SQUATS[name])
-    own = read_marker_set(Path(__file__).parents[2] / "subject4.toml") if name == "subject4" else None
-    feet = (own or choose_marker_set(squats.markers.labels)).foot_labels()
+    feet = feet_of(squats)
     plates = squats.plates
     force, moment = (part.sum(axis=1, keepdims=True) for part in (plates.force, plates.moment))
     one = replace(squats, plates=PlateLoads(plates.time, ("plate",), force, moment, (None,)))
@@ -208,7 +202,7 @@ def test_plates_that_are_interchanged():
 def test_belts_that_are_interchanged(recording_of, name, apart_m):
     """Each load lies on the other belt, and goes there as it would on its own."""
     run = recording_of(*ON_BELTS[name])
-    feet = choose_marker_set(run.markers.labels).foot_labels()
+    feet = feet_of(run)
     offset_m = np.array([[0.0, 0.0, apart_m], [0.0, 0.0, -apart_m]])
     found = error_of(moved(run, offset_m), feet)
     assert found.code == "P241"
@@ -247,7 +241,7 @@ def test_both_feet_explain_feet_in_turn():
 def test_a_foot_that_swings_is_on_no_plate(recording_of, name):
     """A runner's centre of pressure that is off the foot is not the other foot's, which is in the air."""
     run = recording_of(*RUNS[name])
-    feet = choose_marker_set(run.markers.labels).foot_labels()
+    feet = feet_of(run)
     codes = doubted(moved(run, (0.0, 0.0, 0.13)), feet)
     assert codes
     assert "P276" not in codes

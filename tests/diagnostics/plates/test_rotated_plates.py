@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.trial.centre_of_pressure import centre_of_pressure
-from loads_and_feet import error_of
+from loads_and_feet import error_of, feet_of
 from recordings import SYNTHETIC, here, slow_beside
 
 WALKS = here(["synthetic/walk.c3d", "pig_c3d/subject_a_walk.c3d", "pig_c3d/subject_b_walk.c3d"])
@@ -44,9 +43,7 @@ def found_in(recording, which=(), matrix=None, offset_m=(0.0, 0.0, 0.0)):
             force[:, p] = force[:, p] @ matrix.T
     moment = np.cross(point + np.array(offset_m), force) + free
     wrong = replace(plates, force=force, moment=moment)
-    feet = choose_marker_set(recording.markers.labels).foot_labels()
-    feet = {side: [label for label in own if label in recording.markers.labels] for side, own in feet.items()}
-    return error_of(replace(recording, plates=wrong), feet)
+    return error_of(replace(recording, plates=wrong), feet_of(recording))
 
 
 @pytest.mark.parametrize("which", [(0,), (0, 1)])

@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinertia.io.marker_set_file import choose_marker_set
-from loads_and_feet import error_of
+from loads_and_feet import error_of, feet_of
 from recordings import LONG_WALKS, QUICK_WALKS, RUNS, WALKS, slow_beside
 
 
@@ -14,9 +13,7 @@ def found_in(recording, rate=1.0, delay_s=0.0):
     """What is found in forces whose time goes at this rate, and which are later."""
     plates = recording.plates
     time = plates.time[0] + rate * (plates.time - plates.time[0]) + delay_s
-    feet = choose_marker_set(recording.markers.labels).foot_labels()
-    feet = {side: [label for label in own if label in recording.markers.labels] for side, own in feet.items()}
-    return error_of(replace(recording, plates=replace(plates, time=time)), feet)
+    return error_of(replace(recording, plates=replace(plates, time=time)), feet_of(recording))
 
 
 @pytest.fixture(params=slow_beside(("synthetic", "hamner"), RUNS))
@@ -64,11 +61,7 @@ def test_markers_that_flicker_do_not_change_how_long_feet_stand(walk, share):
 def test_a_foot_that_is_hidden_while_it_stands(walk, side):
     """For a third of a second in the middle of its longest load, with all its markers."""
     markers, plates = walk.markers, walk.plates
-    own = [
-        markers.labels.index(label)
-        for label in choose_marker_set(markers.labels).foot_labels()[side]
-        if label in markers.labels
-    ]
+    own = [markers.labels.index(label) for label in feet_of(walk)[side]]
     for vertical in plates.force[..., 1].T:
         middle = float(np.average(plates.time, weights=vertical > 200.0))
         positions = markers.positions.copy()
