@@ -22,6 +22,7 @@ from kinertia.cli.renamed_options import as_named_now
 from kinertia.diagnostics.result.residuals import FORCE, MOMENT, PEAK_FORCE_SHARE
 from kinertia.findings.finding import Severity, finding
 from kinertia.findings.quantity import Quantity
+from kinertia.io.provenance import command_line
 from kinertia.report.files import summary
 from synthetic_lab import synthetic_arguments
 
@@ -300,6 +301,16 @@ def test_init_leaves_an_existing_file_alone(person):
     assert outcome.status == 2
     assert "exists already" in outcome.err
     assert (person / "subject.toml").read_text() == "mine"
+
+
+def test_commands_of_a_folder_with_a_space_can_be_typed_as_shown(tmp_path, c3d_lab):
+    folder = tmp_path / "Anna Müller"
+    folder.mkdir()
+    shutil.copyfile(c3d_lab / "static.c3d", folder / "static.c3d")
+    shutil.copyfile(c3d_lab / "walk.c3d", folder / "walk.c3d")
+    drafted = run("init", folder)
+    assert command_line(["kinertia", "check", str(folder / "subject.toml")]) in drafted.out
+    assert command_line(["kinertia", "init", str(folder)]) in run("init", folder, "--measures").out
 
 
 def test_init_without_recordings(tmp_path):

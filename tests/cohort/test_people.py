@@ -4,6 +4,7 @@ import pytest
 
 from kinertia.cohort.people import Person, people_of
 from kinertia.errors import FileError
+from kinertia.io.provenance import command_line
 
 
 def person(folder, *files):
@@ -24,14 +25,16 @@ def test_every_folder_with_a_subject_file_is_a_person(tmp_path):
 
 
 def test_who_lacks_a_subject_file_is_named_with_what_to_do(tmp_path):
-    clara = person(tmp_path / "Clara", "static.c3d", "walk.C3D")
+    clara = person(tmp_path / "Clara Z", "static.c3d", "walk.C3D")
     person(tmp_path / "Dora", "one.toml", "two.toml")
     emil = person(tmp_path / "Emil")
     (emil / "walk.csv").write_text("Trajectories\n100\nFrame,Sub Frame,X,Y,Z\n", encoding="utf-8")
     person(tmp_path / "lists", "people.csv")
     one, two, three = people_of(tmp_path, tmp_path / "out")
     assert three == Person("Emil", None, f"no subject file; kinertia init {emil} drafts one")
-    assert one == Person("Clara", None, f"no subject file; kinertia init {clara} drafts one")
+    assert one == Person(
+        "Clara Z", None, f"no subject file; {command_line(['kinertia', 'init', str(clara)])} drafts one"
+    )
     assert two.subject is None
     assert "one.toml" in two.problem
 

@@ -52,3 +52,12 @@ def test_equal_findings_are_one_line():
     assert len(group.findings) == 3
     assert "LKNE, RANK" in group.line
     assert group.line.startswith("walk  M113 ")
+
+
+def test_equal_findings_of_one_plate_differ_by_their_axes():
+    offsets = [
+        finding("P215", Where(trial="walk", plate="plate 1", axis=axis), zero_offset_n=Quantity(5.3, "N"))
+        for axis in ("fore-aft", "mediolateral")
+    ]
+    (group,) = grouped(offsets)
+    assert "(also mediolateral on plate 1)" in group.line

@@ -14,6 +14,7 @@ from kinertia.cli.options import Output, Overwrite, Quiet, results_folder
 from kinertia.cli.outcome import Outcome
 from kinertia.cli.synthetic_demo import Demo, run_demo
 from kinertia.cli.terminal import out, plain_table, shown_progress
+from kinertia.io.provenance import command_line
 from kinertia.report.files import summary
 from kinertia.trial.rms import rms_length
 
@@ -59,9 +60,9 @@ def _measured_demo(folder: Path) -> Outcome:
     )
     show_overview(fit.overview, verbose=False)
     lab = folder / "lab"
+    check = command_line(["kinertia", "check", str(lab / "subject.toml")])
     out.print(
-        f"results in {folder}, the laboratory's files in {lab}\n"
-        f"to see what the files are like: kinertia check {lab / 'subject.toml'}",
+        f"results in {folder}, the laboratory's files in {lab}\nto see what the files are like: {check}",
         soft_wrap=True,
     )
     return Outcome({"folder": str(folder), **summary(fit)}, int(fit.overview.failed))

@@ -13,6 +13,7 @@ from kinertia.errors import FileError
 from kinertia.io.file_names import missing_file
 from kinertia.io.measures_file import measures_sheet
 from kinertia.io.output_folder import write_then_rename
+from kinertia.io.provenance import command_line
 from kinertia.io.subject_draft import FILL_IN, MARKER_SET, NO_FORCES, SUBJECT, init_files
 from kinertia.report.measures_picture import measures_picture
 
@@ -53,7 +54,8 @@ def init(
         out.print(
             f"no marker-set preset fits: wrote {own}, drafted from where the markers are; check it", soft_wrap=True
         )
-    out.print(f"wrote {path}: fill in what it asks for, then run: kinertia check {path}", soft_wrap=True)
+    check = command_line(["kinertia", "check", str(path)])
+    out.print(f"wrote {path}: fill in what it asks for, then run: {check}", soft_wrap=True)
     asked = [line.removeprefix("# ").partition(" =")[0] for line in lines if FILL_IN in line]
     marker_set = str(own) if MARKER_SET in files else None
     return Outcome({"subject_file": str(path), "marker_set": marker_set, "fill_in": asked, "notes": notes})
@@ -67,8 +69,9 @@ def _measures(folder: Path) -> Outcome:
         raise FileError(sheet, "exists already and is left alone; remove it to write a new one")
     write_then_rename(picture, measures_picture())
     write_then_rename(sheet, measures_sheet())
+    init_again = command_line(["kinertia", "init", str(folder)])
     out.print(
-        f"wrote {sheet}: fill in the column cm for what you measure, where {picture} shows; kinertia init {folder} "
+        f"wrote {sheet}: fill in the column cm for what you measure, where {picture} shows; {init_again} "
         'takes it up, and in a subject file that is there already name it under [prior]: measures = "measures.csv"',
         soft_wrap=True,
     )

@@ -9,6 +9,7 @@ from pathlib import Path
 from kinertia.errors import FileError
 from kinertia.io.csv_file import read_csv
 from kinertia.io.file_names import RESULT_FILES, fits_everywhere, path_from, same_name_key
+from kinertia.io.provenance import command_line
 from kinertia.io.subject_draft import is_capture
 from kinertia.io.subject_file import subject_file_in
 
@@ -67,7 +68,8 @@ def _of_folders(study: Path, output: Path) -> Iterator[Person]:
         if _holds_subject(folder):
             yield _with_subject_in(folder, folder.name)
         elif _holds_recordings(folder):
-            yield Person(folder.name, None, f"no subject file; kinertia init {folder} drafts one")
+            init = command_line(["kinertia", "init", str(folder)])
+            yield Person(folder.name, None, f"no subject file; {init} drafts one")
         elif deeper := [each.name for each in _shown(folder) if each.is_dir() and _is_session(each, output)]:
             problem = (
                 f"no subject file, but there are files in its folder{'s' if deeper[1:] else ''} {', '.join(deeper)}; "

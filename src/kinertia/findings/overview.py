@@ -164,4 +164,6 @@ def grouped(findings: Iterable[Finding]) -> list[Group]:
 
 def _place(one: Finding) -> str:
     where = one.where
+    if where.plate and where.axis:
+        return f"{where.axis} on {where.plate}"
     return where.plate or (where.markers[0] if where.markers else None) or where.part or ""

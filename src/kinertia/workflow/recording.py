@@ -98,7 +98,7 @@ class RecordingCheck:
         if plates is None:
             return [*facts, ("forces", "none")]
         rate_hz = (len(plates.time) - 1) / (plates.time[-1] - plates.time[0])
-        spans = [f"{start:.3f} to {end:.3f} s" for start, end in self.windows]
+        spans = [f"{start:.3f} to {end:.3f} s" for start, end in sorted(self.windows)]
         return [
             *facts,
             ("forces", f"{len(plates.names)} plates at {rate_hz:.6g} Hz"),
