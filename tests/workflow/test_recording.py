@@ -80,6 +80,11 @@ def test_facts_say_what_is_in_it(lab, marker_set):
     assert dict(check_recording(lab.static, marker_set, is_static=True).facts())["forces"] == "none"
 
 
+def test_windows_are_shown_in_order_of_time(lab, marker_set):
+    check = replace(check_recording(lab.walk, marker_set, 72.6), windows=((2.8, 3.4), (2.4, 2.7)))
+    assert dict(check.facts())["complete contact"] == "2.400 to 2.700 s, 2.800 to 3.400 s"
+
+
 def test_labels_of_nobody(lab):
     markers = lab.walk.markers
     strange = replace(lab.walk, markers=replace(markers, labels=tuple(f"P{k}" for k in range(len(markers.labels)))))
