@@ -62,6 +62,7 @@ from kinertia.findings.finding import Finding, finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.io.file_names import trouble_as_folders
+from kinertia.io.provenance import command_line
 from kinertia.io.subject_tables import TABLES, StudyFile, SubjectFile
 from kinertia.io.subject_values import CodedError, shown
 from kinertia.io.toml_lines import Location, TomlFile, read_toml
@@ -92,8 +93,8 @@ def subject_file_in(folder: Path) -> Path:
     if len(named) == 1:
         return named[0]
     if not named:
-        problem, action = Quantity("holds no subject file"), Quantity(f"Draft one: kinertia init {folder}")
-        raise FileError.found(folder, "F108", problem=problem, action=action)
+        problem, draft = Quantity("holds no subject file"), command_line(["kinertia", "init", str(folder)])
+        raise FileError.found(folder, "F108", problem=problem, action=Quantity(f"Draft one: {draft}"))
     listed = ", ".join(path.name for path in named)
     problem = Quantity(f"holds several .toml files ({listed}), none of them subject.toml")
     raise FileError.found(folder, "F108", problem=problem, action=Quantity("Name the subject file itself"))
