@@ -22,8 +22,9 @@ from validation.accuracy_tables import accuracy_markdown, moments_markdown
 from validation.joint_accuracy import JointErrors
 
 ELSEWHERE = ("session", "faulty_walks", "study", "artefact")
-"""Laboratories that the page on accuracy has, too, but whose single faults others have as well, or that take as long as
-all others together; but for the session, which begins first."""
+"""Laboratories that are not tested in PROOF's order: the session comes first, since it takes longest. The others are
+only on the page on accuracy: `faulty_walks` takes as long as all the rest, and the noise of `study` and `artefact` is
+tested with calibration errors."""
 SHORT_S = 1.3
 """About a stride."""
 

@@ -32,9 +32,9 @@ def demo(
     A synthetic person walks through a synthetic laboratory; Kinertia then estimates from its files and compares the
     estimate with the truth.
 
-    With --measured it is a real person in a real laboratory: OpenSim's gait2354
-    example, downloaded once (0.9 MB; needs pip install ".\\[samples]").
-    Results, report and exit status are those of kinertia fit.
+    With --measured, Kinertia fits a recorded walk: OpenSim's gait2354 example,
+    downloaded once (0.9 MB; first run pip install ".\\[samples]"). Results,
+    report and exit status are those of kinertia fit.
 
     [bold]Examples[/]
 
