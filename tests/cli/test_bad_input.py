@@ -1,6 +1,7 @@
 """Every kind of bad input through the command line: its code, place and evidence; status 2."""
 
 import json
+import os
 import shutil
 
 import numpy as np
@@ -345,3 +346,10 @@ def test_a_file_stands_for_its_folder_in_a_draft(c3d_lab, tmp_path):
     outcome = run("init", tmp_path / "walk.c3d")
     assert outcome.status == 0, outcome.err
     assert (tmp_path / "subject.toml").is_file()
+
+
+def test_a_folder_that_cannot_be_written_to_gets_no_draft(tmp_path, monkeypatch):
+    monkeypatch.setattr("os.access", lambda path, mode: mode != os.W_OK)
+    outcome = run("init", tmp_path)
+    assert outcome.status == 2
+    assert "copy the files into a folder of your own" in " ".join(outcome.err.split())

@@ -55,6 +55,9 @@ def test_norms_and_scores(fit, demo_run, controls, tmp_path):
     cycles = pd.read_csv(results / "cycles.csv")
     pd.testing.assert_frame_equal(fit.cycles(norms=file), cycles, rtol=1e-4, check_dtype=False)
     pd.testing.assert_frame_equal(fit.gps(file).table, pd.read_csv(results / "gps.csv"), rtol=1e-4, check_dtype=False)
+    assert run("report", results).status == 0
+    assert not (results / "gps.csv").exists(), "scores of norms that the report no longer has"
+    pd.testing.assert_frame_equal(fit.cycles(), pd.read_csv(results / "cycles.csv"), rtol=1e-4, check_dtype=False)
 
 
 def test_one_folder_per_person(controls, tmp_path):

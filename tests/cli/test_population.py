@@ -113,3 +113,10 @@ def test_information_is_what_the_prior_does_not_explain(fit):
     estimate, covariance = person.with_prior(person.literature)
     np.testing.assert_allclose(covariance, fit.posterior.covariance, atol=2.5e-3 * sd.max() ** 2)
     np.testing.assert_allclose((estimate.table() - fit.estimate.table()) / sd, 0.0, atol=0.05)
+
+
+def test_who_was_fitted_at_the_mass_of_the_plates_can_be_learnt_from(fit):
+    """Their prior is the tables' at another mass."""
+    prior = literature_prior(fit.literature).at_mass(0.95 * fit.literature.total_mass_kg, 0.4)
+    weighed = replace(fit, posterior=replace(fit.posterior, prior_mean=prior.mean, prior_sd=prior.sd))
+    assert information_of(weighed).literature.mass_kg == pytest.approx(prior.mass_kg)

@@ -25,7 +25,7 @@ def test_what_is_taken_out_of_an_estimate_does_not_depend_on_its_prior():
     """Nor on the body at which the fit linearised: the same recordings by two priors far apart."""
     person = seen(0)
     far = POPULATIONS["obese"].of(PRIOR)
-    for prior in (PRIOR, replace(PRIOR, covariance=2.0 * PRIOR.covariance)):
+    for prior in (PRIOR, replace(PRIOR, covariance=2.0 * PRIOR.covariance), PRIOR.at_mass(0.9 * PRIOR.mass_kg, 0.5)):
         estimate, covariance = person.with_prior(prior)
         out = person_information("", PRIOR, prior, estimate, covariance)
         np.testing.assert_allclose(out.information, person.information, atol=1e-4 * np.abs(person.information).max())

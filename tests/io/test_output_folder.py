@@ -12,7 +12,7 @@ import pytest
 
 from kinertia.errors import FileError
 from kinertia.io.folder_exchange import put_in_place
-from kinertia.io.output_folder import GENERATOR, check_folder, complete_folder, expect_own_folder
+from kinertia.io.output_folder import GENERATOR, check_folder, complete_folder, expect_own_folder, updated_files
 
 
 @pytest.mark.parametrize("name", ["missing", "empty", ".DS_Store", "desktop.ini", ".gitkeep", ".kinertia-cohort.lock"])
@@ -159,6 +159,32 @@ def test_results_of_other_kinds_stay(results):
     assert _texts(results) == {**NEW, "check.html": "page"}
     _write(results, "again", "check.html", kind="check")
     assert _texts(results) == {**NEW, "check.html": "again"}
+
+
+def test_files_that_results_get_later_go_with_them(results):
+    """Scores by norms, which a report adds, are not left beside the next fit."""
+    with updated_files(results, "fit", ["gps.csv"]) as work:
+        (work / "gps.csv").write_text("scores", encoding="utf-8")
+    (results / "mine.csv").write_text("mine", encoding="utf-8")
+    assert _texts(results)["gps.csv"] == "scores"
+    _write_again(results)
+    assert _texts(results) == {**NEW, "mine.csv": "mine"}
+
+
+def test_an_optional_file_is_removed_only_where_an_update_wrote_it(results):
+    (results / "gps.csv").write_text("mine", encoding="utf-8")
+    after = []
+    for name in ("report.html", "gps.csv", "report.html"):
+        with updated_files(results, "fit", ["gps.csv"]) as work:
+            (work / name).write_text("new", encoding="utf-8")
+        after.append(_texts(results).get("gps.csv"))
+    assert after == ["mine", "new", None]
+
+
+def test_a_folder_without_permission_is_refused_without_advice_that_cannot_work(results, monkeypatch):
+    monkeypatch.setattr("os.access", lambda path, mode: Path(path) != results)
+    with pytest.raises(FileError, match=r"cannot be written to; give another folder for the results$"):
+        check_folder(results)
 
 
 def test_results_within_results(tmp_path):

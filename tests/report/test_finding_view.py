@@ -87,6 +87,14 @@ def test_an_assumption_about_several_trials_is_said_once():
     assert trials == "walk, run"
 
 
+def test_an_assumption_that_differs_between_trials_is_told_for_each():
+    at = [
+        finding("P270", Where(trial=name), **{each: Quantity(count, "1") for each in ("frames", "count", "left_out")})
+        for name, count in (("walk", 1), ("run", 2), ("jump", 1))
+    ]
+    assert [trials for _, trials in view(*at).notes] == ["walk, jump", "run"]
+
+
 def test_words_that_the_message_has_are_no_evidence_again():
     overhang = finding("P282", Where(plate="plate 1"), overhang_m=Quantity(0.045, "m"), foot=Quantity("right"))
     assert evidence_texts(overhang) == ["overhang 45 mm"]

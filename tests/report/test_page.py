@@ -133,6 +133,13 @@ def test_start_is_called_what_it_is(fit, of_model):
     assert "literature" not in Elements(render(replace(of_model, findings=(), notes=()))).text.lower()
 
 
+def test_changes_are_counted_from_the_prior_and_called_so(fit):
+    told = replace(fit, posterior=replace(fit.posterior, prior_mean=fit.estimate))
+    captions = [render(one).count("Zero is the prior.") for one in (fit, told)]
+    assert captions[0] == 0
+    assert captions[1] >= 2
+
+
 def test_numbers_in_the_table_have_the_digits_of_their_unit(fit):
     for row in bsp_rows(fit):
         texts = [row[name]["text"] for name in ("before", "estimate", "prior_sd", "sd")]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Annotated
 
@@ -43,6 +44,8 @@ def init(
     path, own = folder / SUBJECT, folder / MARKER_SET
     if path.exists():
         raise FileError(path, "exists already and is left alone; remove it to draft a new one")
+    if folder.is_dir() and not os.access(folder, os.W_OK):
+        raise FileError(folder, "cannot be written to; copy the files into a folder of your own, and draft it there")
     files = init_files(folder)
     for name, text in sorted(files.items()):
         write_then_rename(folder / name, text)

@@ -17,7 +17,7 @@ from kinertia.estimation.gait_profile import check_convention, gait_profile
 from kinertia.estimation.gait_scores import with_norms
 from kinertia.estimation.result import Fit
 from kinertia.io.norms_file import Norm, read_norms
-from kinertia.io.output_folder import write_then_rename
+from kinertia.io.output_folder import updated_files
 from kinertia.motion.clinical_angles import CLINICAL_ANGLES
 from kinertia.report.cycle_figures import MOST_STRIDES, quantities_of
 from kinertia.report.files import write_columns
@@ -48,14 +48,17 @@ def report(
     bands, without_curve = ({}, []) if norms is None else _norms_for(saved.fit, norms)
     profile = gait_profile(saved.fit, bands) if set(CLINICAL_ANGLES) <= set(bands) else None
     page = render(saved.fit, saved.provenance, saved.versions, bands, saved.truth)
-    write_then_rename(results / "report.html", page)
+    with updated_files(results, "fit", ["gps.csv"]) as work:
+        (work / "report.html").write_text(page, encoding="utf-8", newline="\n")
+        if any(trial.strides for trial in saved.fit.trials):
+            columns = cycle_columns(saved.fit.trials, saved.fit.mass_kg, "estimate", MOST_STRIDES)
+            columns = with_norms(columns, bands, saved.fit.skeleton) if bands else columns
+            write_columns(work / "cycles.csv", columns, "%.6g")
+        if profile:
+            write_columns(work / "gps.csv", profile.columns(), "%.6g")
     out.print(f"report in {results / 'report.html'}", soft_wrap=True)
-    if bands and any(trial.strides for trial in saved.fit.trials):
-        columns = cycle_columns(saved.fit.trials, saved.fit.mass_kg, "estimate", MOST_STRIDES)
-        write_columns(results / "cycles.csv", with_norms(columns, bands, saved.fit.skeleton), "%.6g")
     summary: dict[str, Any] = {"report": str(results / "report.html"), "norms": list(bands)}
     if profile:
-        write_columns(results / "gps.csv", profile.columns(), "%.6g")
         overall = profile.overall_deg
         out.print(f"Gait Profile Score {score_text(overall)}; {results / 'gps.csv'}", soft_wrap=True)
         for remark in profile.remarks:

@@ -112,6 +112,9 @@ def information_of(fit: Fit) -> PersonInformation:
         raise unusable(name, "estimated by the two-level method, which has no error bars")
     literature = literature_prior(fit.literature)
     own = population_prior(literature, fit.subject).prior
+    # a person whom the plates weigh otherwise is fitted at their mass
+    factor = fit.expected.total_mass_kg / own.mean.total_mass_kg
+    literature, own = (each.at_mass(factor * each.mass_kg, each.mass_sd_kg) for each in (literature, own))
     if fit.file is not None or not np.allclose(fit.posterior.prior_sd, own.sd, rtol=_OWN_PRIOR):
         raise unusable(name, "estimated with another prior than the tables' for the built-in model")
     return person_information(name, literature, own, fit.estimate, fit.posterior.covariance)
@@ -120,7 +123,7 @@ def information_of(fit: Fit) -> PersonInformation:
 def person_information(
     name: str, literature: BspPrior, own: BspPrior, estimate: BodySegmentParameters, covariance: np.ndarray
 ) -> PersonInformation:
-    """Extract the information in recordings from an estimate whose prior had the literature's mean.
+    """Extract the information in recordings from an estimate.
 
     Args:
         name: of the person.
@@ -130,7 +133,7 @@ def person_information(
     """
     sd = literature.sd.ravel()
     before, posterior = (each / np.outer(sd, sd) for each in (own.covariance, covariance))
-    moved = (estimate.table() - literature.mean.table()).ravel() / sd
+    moved = (estimate.table() - own.mean.table()).ravel() / sd
     # in coordinates in which the estimate's prior is the unit matrix; combinations with next to no information are left
     # out
     root = np.linalg.cholesky(before)
@@ -140,7 +143,7 @@ def person_information(
     shown = left < 1.0 - _LEAST_SHARE
     back = (inverse.T @ vectors)[:, shown]
     information = (back * (1.0 / left[shown] - 1.0)) @ back.T
-    score = back @ (along[shown] / left[shown]) - information @ moved
+    score = back @ along[shown]
     # so far on the relative parameters at the estimate; now on the dynamic ones
     derivative, dynamic = _relative(literature, estimate)
     to_dynamic = np.linalg.inv(derivative)

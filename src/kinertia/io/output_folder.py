@@ -65,6 +65,8 @@ def _expect_place(folder: Path) -> None:
     sweep(parent)
     with working_folder(parent):  # Windows does not tell otherwise whether that is allowed
         pass
+    if folder.is_dir() and not os.access(folder, os.W_OK):
+        raise FileError(folder, "cannot be written to; give another folder for the results")
     if folder.is_dir() and (trouble := _irreplaceable(folder)):
         problem = f"{trouble}, and results replace their folder as a whole; give a folder inside it ({folder / 'out'})"
         raise FileError(folder, problem)
@@ -84,7 +86,7 @@ def _irreplaceable(folder: Path) -> str:
         return "is your home folder"
     if os.path.ismount(folder):
         return "is a drive or mounted folder"
-    return "" if os.access(folder, os.W_OK) else "cannot be written to"
+    return ""
 
 
 def _open_elsewhere(folder: Path) -> list[Path]:
@@ -174,6 +176,34 @@ def complete_folder(folder: str | Path, kind: str) -> Iterator[Path]:
         said = error.strerror or str(error)
         problem = f"cannot be written ({said}); nothing in it has changed: make room, or give another folder"
         raise FileError(folder, problem) from error
+
+
+@contextmanager
+def updated_files(folder: Path, kind: str, optional: Collection[str]) -> Iterator[Path]:
+    """Yield a hidden folder whose files replace those in `folder` when the block ends without an error.
+
+    Args:
+        folder: folder of complete results, which stay but for these files.
+        kind: what they are results of; the files belong to them from then on, and go when they are replaced.
+        optional: names of files that are removed where an earlier update wrote them and this one does not.
+
+    Raises:
+        FileError: the folder cannot be written to.
+    """
+    with working_folder(folder) as work:
+        new = work / "new"
+        new.mkdir()
+        yield new
+        names, listed = _files(new), _written(folder)
+        own = set(listed.get(kind, ()))
+        gone = own & set(optional) - names
+        text = json.dumps({**listed, kind: sorted((own | names) - gone)}, indent=1) + "\n"
+        (new / _WRITTEN).write_text(text, encoding="utf-8")
+        with _uninterrupted():
+            for name in (*sorted(names), _WRITTEN):
+                os.replace(new / name, folder / name)
+            for name in gone:
+                (folder / name).unlink(missing_ok=True)
 
 
 def _replace(new: Path, folder: Path, kind: str, aside: Path) -> None:

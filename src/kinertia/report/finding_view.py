@@ -110,12 +110,12 @@ class FindingView:
 
     @cached_property
     def notes(self) -> list[tuple[Group, str]]:
-        """Assumptions and advice, once for each code, with their trials or files."""
-        by_code: dict[str, list[Group]] = {}
+        """Assumptions and advice, once for each code and message, with their trials or files."""
+        alike: dict[tuple[str, str], list[Group]] = {}
         for group in grouped(self._top(Severity.INFO)):
-            by_code.setdefault(group.first.code, []).append(group)
-        places = (list(filter(None, (each.first.place for each in groups))) for groups in by_code.values())
-        return [(groups[0], first_few(names)) for groups, names in zip(by_code.values(), places, strict=True)]
+            alike.setdefault((group.first.code, group.message), []).append(group)
+        places = (list(filter(None, (each.first.place for each in groups))) for groups in alike.values())
+        return [(groups[0], first_few(names)) for groups, names in zip(alike.values(), places, strict=True)]
 
     def _top(self, severity: Severity) -> list[Finding]:
         return [one for one in self.findings if one.severity is severity and one.is_open]

@@ -20,7 +20,7 @@ from kinertia.findings.overview import DO_NOT_USE, USES, WITH_CARE
 from kinertia.report.bsp_figures import DEPARTURE_SD, NAMES, departures, estimated_rows, segment_name
 from kinertia.report.coordinate_titles import title_of
 from kinertia.report.time_figures import motion_change
-from kinertia.report.wording import decimals, expected_of, fixed, read_in, start_of
+from kinertia.report.wording import decimals, expected_of, fixed, read_in
 from kinertia.trial.rms import rms
 
 _LISTED_FAR = 12
@@ -119,10 +119,11 @@ def _knowledge(fit: Fit) -> tuple[str, ...]:
     posterior = fit.posterior
     grades = [evidence(value) for value in posterior.information[posterior.prior_sd > 0]]
     counts = {word: grades.count(word) for word in _EVIDENCE}
+    whose = expected_of(fit).whose
     sentences = [
         f"of {len(grades)} parameters {counts['measured']} are well informed by the data (information above "
         f"{100 * MEASURED:g} %), {counts['informed']} partly and {counts['assumed']} not (below {100 * INFORMED:g} %; "
-        f'"assumed" in the table): the latter remain about as uncertain as {start_of(fit).whose}, even where they moved'
+        f'"assumed" in the table): the latter remain about as uncertain as {whose}, even where they moved'
     ]
     masses = {fit.estimate.segments[i]: evidence(posterior.information[i, 0]) for i in estimated_rows(fit)}
     for word, meaning in _EVIDENCE.items():
