@@ -25,7 +25,7 @@ _COMPLETE = "complete"
 """File that marks a complete folder."""
 SOURCES = (
     "model/compiled.py",
-    "model/kept_code.py",
+    "model/machine_code_cache.py",
     "model/spatial.py",
     "model/kinematic_tree.py",
     "motion/rigid_body.py",
@@ -52,11 +52,11 @@ def compiled(function: F) -> F:
 
     Division by zero gives inf or nan, as in NumPy.
     """
-    from kinertia.model.kept_code import KeptCode  # brings numba
+    from kinertia.model.machine_code_cache import MachineCodeCache  # brings numba
 
     result: Any = _compiled(function)
     with _kept_in(cache_folder()):
-        result._cache = KeptCode(function)
+        result._cache = MachineCodeCache(function)
     return cast(F, result)
 
 

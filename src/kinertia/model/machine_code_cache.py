@@ -23,7 +23,7 @@ class _MachineCode(CompileResultCacheImpl):  # type: ignore[misc]
         return ((name, kind, (code, called.as_bitcode())), *others)
 
 
-class KeptCode(FunctionCache):  # type: ignore[misc]
+class MachineCodeCache(FunctionCache):  # type: ignore[misc]
     """Cache files of one function that Python calls."""
 
     _impl_class = _MachineCode
