@@ -156,6 +156,7 @@ def test_the_estimate_is_that_of_the_whole(whole, monkeypatch):
         [whole.trials[0], replace(small_problem().trials[0], spacing_s=0.05)],
     )
     monkeypatch.setattr(elimination, "UNSAFE", 0.0)
+    monkeypatch.setattr(solver, "_MAX_ITERATIONS", 6)
     expected = estimate_simultaneous(*given)
     monkeypatch.setattr(limits, "TOGETHER_BYTES", 1)
     actual = estimate_simultaneous(*given)
