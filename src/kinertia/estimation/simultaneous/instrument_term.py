@@ -70,7 +70,7 @@ class InstrumentErrors(LoadTerm):
         return float(own @ (pull - 2.0 * shown.rhs))
 
     def left_out(self, static: np.ndarray) -> np.ndarray:
-        """Zeros along either axis that a tilt of all plates makes (`plumb_line`)."""
+        """Return the zero offsets that a tilt about each horizontal axis imitates (`plumb_line`)."""
         result = np.zeros((len(static), len(ZERO_UNKNOWNS)))
         for k, trial in enumerate(self.given.trials):
             for axis, places in enumerate(self.zeros_of(k).T):
