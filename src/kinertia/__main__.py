@@ -1,4 +1,4 @@
-"""`python -m kinertia`: the command where the folder of Python's programs is not on the path, and in new processes."""
+"""Runs the command as `python -m kinertia`: in new processes, and where Python's scripts folder is not on the path."""
 
 from kinertia.cli.start import program
 

@@ -1,1 +1,1 @@
-"""The command line: one module per command, and what the commands share; in `web` the page in the browser."""
+"""Defines the command line: one module per command, and what they share; `web` is the page in the browser."""

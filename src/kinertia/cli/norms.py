@@ -69,7 +69,7 @@ def norms(
 
 
 def _name(fit: Fit, folder: Path) -> str:
-    """The person's; of the folder where the fit took that of a trial, which all people's may have."""
+    """Return the person's name, or the folder's where the fit is named after its trial, as others' may be."""
     return folder.resolve().name if fit.subject.name in {trial.name for trial in fit.trials} else fit.subject.name
 
 

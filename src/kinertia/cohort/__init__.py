@@ -1,1 +1,1 @@
-"""Everything of many people: who they are, what is known of each, who fits them where, tables, page, learning."""
+"""Fits many people: reads who they are, distributes the fits, writes tables and page, learns from the group."""

@@ -1,4 +1,4 @@
-"""Gait scores of a cohort on its page: of each person where people are few, those farthest from the norms otherwise."""
+"""Shows a cohort's gait scores on its page: everyone's where people are few, else those farthest from the norms."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _HEADINGS = ("person", "overall", "right", "left", "farthest variable", "remarks
 
 
 def score_parts(folder: Path) -> Iterator[Part]:
-    """A table of Gait Profile Scores (degrees), the largest first; nothing where there were no norms."""
+    """Return a table of Gait Profile Scores (degrees), the largest first; nothing without norms."""
     from pyarrow import parquet
 
     scores: pd.DataFrame = parquet.read_table(folder / "scores.parquet").to_pandas()
@@ -36,7 +36,7 @@ def score_parts(folder: Path) -> Iterator[Part]:
 
 
 def _row(person: str, own: pd.DataFrame) -> tuple[float, tuple[str, ...]]:
-    """The overall score, -1 where there is none, and the cells."""
+    """Return the overall score, -1 where there is none, and the cells."""
     gps = own[own["score"] == "GPS"].set_index("side")["degrees"]
     variables = own[own["score"] == "GVS"].dropna(subset=["degrees"])
     farthest = ""

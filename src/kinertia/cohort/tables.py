@@ -161,7 +161,7 @@ def fitted_people(cohort: Path) -> set[str] | None:
 
 
 def read_cohort(folder: str | Path) -> dict[str, Any]:
-    """The tables of a cohort, as lazy frames: nothing is in memory before it is asked for.
+    """Return the tables of a cohort as lazy frames, which are read when they are computed.
 
     They are Dask's data frames: what pandas users write works on them, `compute()` makes a pandas table of the result,
     and a filter reads of the files what it needs. DuckDB and pyarrow read the same Parquet files as well; Dask is what
@@ -255,7 +255,7 @@ def _instruments(fit: Fit, day: date | None, with_session: bool) -> dict[str, An
 
 
 def _scores(person: str, folder: Path, norms: Mapping[str, Norm]) -> dict[str, Any]:
-    """Gait scores of a person's result; one row that says why, if there are none."""
+    """Return a person's gait scores; one row with the reason, if there are none."""
     try:
         profile = gait_profile(load_fit(folder), norms)
     except KinertiaError as error:

@@ -1,1 +1,1 @@
-"""What is wrong with recordings, persons, models and results: one module per question, answered with findings."""
+"""Finds what is wrong with recordings, persons, models and results: one module per question."""

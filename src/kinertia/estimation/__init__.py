@@ -1,1 +1,1 @@
-"""From recordings to body segment parameters: preparation, the two estimators, and the result."""
+"""Estimates body segment parameters from recordings: preparation, the two estimators, and the result."""

@@ -18,7 +18,7 @@ _WITHIN = 0.02, 0.98
 
 
 def show_knee_axes(poses: Sequence[InverseKinematics]) -> bool:
-    """Tell whether the trials show the axes of both knees: two trials with a stride of both legs, or one with a squat.
+    """Decide whether the trials show the axes of both knees: two with a stride of both legs, or one with a squat.
 
     Args:
         poses: inverse kinematics of the trials with the 27-DOF model.

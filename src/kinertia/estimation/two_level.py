@@ -130,7 +130,7 @@ class TwoLevelResult:
 
 
 def correct_pelvis(skeleton: Skeleton, bsp: BodySegmentParameters, window: Window) -> Motion:
-    """Inner level: return the motion with the pelvis acceleration of equation (2), nearest to the measured pelvis."""
+    """Return, as the inner level, the motion with the pelvis acceleration of equation (2) nearest to the measured."""
     acceleration, _ = consistent_root_acceleration(skeleton, bsp, window.motion, window.wrench)
     position, velocity = window.integration.track(acceleration, window.motion.q[:, :6])
     return window.motion.with_root(position, velocity, acceleration)
@@ -146,7 +146,7 @@ def estimate_two_level(
     correct: bool = True,
     progress: Callable[[float], None] = lambda share: None,
 ) -> TwoLevelResult:
-    """Outer level: find the BSPs that minimise the residual P over all frames of all windows.
+    """Find, as the outer level, the BSPs that minimise the residual P over all frames of all windows.
 
     Args:
         skeleton: the model.

@@ -113,7 +113,7 @@ def with_outputs(
     events: Sequence[EventToWrite] = (),
     measures: Sequence[Measure] = (),
 ) -> bytes:
-    """The file with these points behind its own, which it lists by type, and the group KINERTIA.
+    """Return the file with these points appended and listed by type, and with the group KINERTIA.
 
     Args:
         frames: of the file; what Kinertia wrote into it before is replaced.

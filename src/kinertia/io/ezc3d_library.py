@@ -146,7 +146,7 @@ def parameter_values(parameters: Any, group: str, name: str, default: Sequence[A
 
 
 def text_list(parameters: Any, group: str, name: str) -> list[str]:
-    """A list of strings, with all entries that go on under other names."""
+    """Return a list of strings, with the entries that continue under other names."""
 
     def entries(one: str) -> list[str]:
         return [str(entry).strip() for entry in parameter_values(parameters, group, one)]

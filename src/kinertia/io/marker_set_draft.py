@@ -89,7 +89,7 @@ def _widths(landmarks: Mapping[str, Sequence[str]], recording: Recording) -> dic
 
 
 def places_of(recording: Recording) -> Placement:
-    """Where the markers are: by geometry, or of nobody who stands, by those of the labels that are known."""
+    """Locate the markers on the body by geometry or, if nobody stands, by the labels that are known."""
     placed = place_markers(recording)
     if placed.landmarks:
         return placed

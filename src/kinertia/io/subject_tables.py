@@ -1,4 +1,4 @@
-"""The tables of a subject file (`subject_file`), with what each entry may be and says."""
+"""Defines the tables of a subject file (`subject_file`), with the values and the meaning of each entry."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""The body: segments, joints, markers and their place on a person, and its mass properties."""
+"""Describes the body: segments, joints, markers and their places on a person, and mass properties."""

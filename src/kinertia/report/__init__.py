@@ -1,1 +1,1 @@
-"""`report.html` and the notebook pictures: what a `Fit` looks like. Estimation knows nothing of this package."""
+"""Presents a `Fit`: `report.html`, figures, notebook pictures. Estimation does not depend on this package."""

@@ -62,7 +62,7 @@ def estimated_rows(fit: Fit) -> np.ndarray:
 
 
 def change_figure(fit: Fit, columns: Sequence[int] = MAIN, truth: BodySegmentParameters | None = None) -> Figure:
-    """Change of these parameters by the estimate, in kg, mm and kg m2: a panel per parameter, a row per segment.
+    """Draw the change of these parameters in kg, mm and kg m2: a panel per parameter, a row per segment.
 
     With 95 % intervals of prior and estimate, where there are any (not after two-level). Fixed segments are
     left out. `truth_comparison`: of a synthetic person, as diamonds.

@@ -74,7 +74,7 @@ def usual_convention(fit: Fit) -> Convention:
 
 
 def outputs_of(fit: Fit, trial: TrialFit, convention: Convention) -> list[ModelOutput]:
-    """Model outputs of the estimate over the trial's measured frames; posterior draws tell how errors go together."""
+    """Return model outputs over the trial's measured frames, with SDs from the posterior draws."""
     loads, body, drawn = trial.reactions.at(trial.time), fit.estimate, _departures(fit, trial)
     return model_outputs(trial.skeleton, body, trial.motion, loads, fit.mass_kg, convention, trial.deviations, drawn)
 
@@ -233,7 +233,7 @@ def _own(
 
 
 def _departures(fit: Fit, trial: TrialFit) -> Departures | None:
-    """Of a trial of a fit, at its measured frames; None of a fit that keeps no draws."""
+    """Return the departures of the draws in a trial, at its measured frames; None if the fit has no draws."""
     if fit.posterior is None or fit.posterior.draws is None:
         return None
     k, kept = [one.name for one in fit.trials].index(trial.name), fit.posterior.draws
@@ -245,6 +245,6 @@ def _departures(fit: Fit, trial: TrialFit) -> Departures | None:
 
 
 def _curves(trial: TrialFit) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Coordinates, moments and powers (w, c)."""
+    """Return coordinates, moments and powers (w, c)."""
     moments = trial.joint_loads["estimate"]
     return trial.motion.q, moments, moments * trial.motion.qd

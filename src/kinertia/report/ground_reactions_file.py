@@ -1,5 +1,4 @@
-"""Ground reactions as OpenSim reads them: `ground_reactions.mot`, and `external_loads.xml` that says what they act
-on."""
+"""Writes ground reactions for OpenSim: `ground_reactions.mot`, and `external_loads.xml` with what they act on."""
 
 from __future__ import annotations
 

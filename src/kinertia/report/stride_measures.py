@@ -1,4 +1,4 @@
-"""Mean measures of a trial's strides, side by side, by the names and units that Vicon's programs give them."""
+"""Computes mean stride measures of a trial, left and right, with Vicon's names and units."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _CONTEXTS = {"r": "Right", "l": "Left"}
 
 
 def stride_measures(trial: TrialFit) -> list[Measure]:
-    """All that are known; none without strides."""
+    """Return all that are known; none without strides."""
     if not trial.strides:
         return []
     feet = feet_under_pelvis(trial.skeleton, trial.kinematics)
@@ -35,7 +35,7 @@ def stride_measures(trial: TrialFit) -> list[Measure]:
 
 
 def _measures(stride: Stride, one: Spatiotemporal) -> dict[tuple[str, str], float]:
-    """By name and unit."""
+    """Return the measures by name and unit."""
     return {
         ("Cadence", "steps/min"): one.cadence_steps_min,
         ("Walking Speed", "m/s"): one.speed_m_s,

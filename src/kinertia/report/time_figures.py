@@ -125,7 +125,7 @@ def moment_figure(
     start: Start = LITERATURE,
     truth: np.ndarray | None = None,
 ) -> Figure:
-    """Joint moments (N m/kg) with the values before on the measured motion, and as estimated, with its 95 % band.
+    """Draw joint moments (N m/kg) as before, on the measured motion, and as estimated, with the 95 % band.
 
     `truth_comparison` (w, c) N m: of a synthetic person, dashed.
     """

@@ -1,1 +1,1 @@
-"""People whose body segment parameters are known, and laboratories that measure them with known errors."""
+"""Makes people of known body segment parameters, and laboratories that measure them with known errors."""

@@ -1,1 +1,1 @@
-"""What was measured: markers and loads, which foot is on which plate, and when."""
+"""Holds what was measured: markers and loads, and which foot is on which plate when."""

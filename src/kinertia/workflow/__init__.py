@@ -1,1 +1,1 @@
-"""The one road from files to a result: read, screen, prepare, screen, estimate, judge."""
+"""Leads from files to a result, for every interface: read, screen, prepare, screen, estimate, judge."""

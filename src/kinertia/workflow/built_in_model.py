@@ -1,4 +1,4 @@
-"""The built-in model of a person: by landmarks of the static trial, adapted to the trials, around the literature."""
+"""Builds the built-in model of a person from landmarks of the static trial, adapted to the trials."""
 
 from __future__ import annotations
 
@@ -177,7 +177,7 @@ class _Landmarks:
 
 
 def built_in_model(screened: Screened, trials: Sequence[Turned], settings: Settings) -> PersonModel:
-    """The 27-DOF model of a person by landmarks, adapted to the trials, around the literature's parameters.
+    """Build the 27-DOF model of a person from landmarks, adapted to the trials, with the literature's prior.
 
     Args:
         screened: the person.
@@ -225,7 +225,7 @@ def built_in_model(screened: Screened, trials: Sequence[Turned], settings: Setti
 
 
 def _stance_of(person: Person, trials: Sequence[Turned], marker_set: MarkerSet) -> _Landmarks:
-    """A pose of the first trial with forces in place of a static trial, with the widths that are known.
+    """Return a pose of the first trial with forces in place of a static trial, with the widths that are known.
 
     Raises:
         SettingsError: no frame of it shows a pelvis over each flat foot.
@@ -245,7 +245,7 @@ def _stance_of(person: Person, trials: Sequence[Turned], marker_set: MarkerSet) 
 
 
 def _free_axes(trials: Sequence[Turned], landmarks: _Landmarks, settings: Settings) -> bool | None:
-    """Tell whether axes of joints are uncertain; None: if the trials show them."""
+    """Decide whether axes of joints are uncertain; None: if the trials show them."""
     if settings.joint_axes is not None:
         return settings.joint_axes
     if landmarks.of_walk or any(not one.trial.loads.plates for one in trials):
@@ -283,7 +283,7 @@ def _adapted(calibrated: Calibrated) -> Iterator[Finding]:
 
 
 def _unblocked(trials: Sequence[Turned], screened: Screened, found: Sequence[Finding]) -> list[Turned]:
-    """Those that can go on after all that was found.
+    """Return the trials that can go on after all that was found.
 
     Raises:
         BlockedError: none can.
@@ -297,7 +297,7 @@ def _unblocked(trials: Sequence[Turned], screened: Screened, found: Sequence[Fin
 
 
 def _turned(one: Turned, marker_set: MarkerSet) -> Turned:
-    """The trial facing +X."""
+    """Return the trial rotated to face +X."""
     try:
         rotation, angle = facing(one.trial.markers, marker_set)
     except MarkerSetError as error:

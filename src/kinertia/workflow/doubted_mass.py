@@ -17,7 +17,7 @@ _FEWEST = 2
 
 
 def with_doubted_mass(prior: BspPrior, findings: Sequence[Finding]) -> BspPrior:
-    """The prior at the mass of the plates, where several occasions or plates agree that the stated one is wrong.
+    """Return the prior at the plates' mass, where several occasions or plates agree that the stated mass is wrong.
 
     They are not scaled to it. Whoever ignores the finding keeps the stated mass.
     """
@@ -33,8 +33,9 @@ def with_doubted_mass(prior: BspPrior, findings: Sequence[Finding]) -> BspPrior:
 
 
 def at_mass_of_plates(ready: Prepared, fitted: SimultaneousFit) -> Prepared | None:
-    """The person at the mass that all plates agree on in an estimate; None where they contradict the stated one in
-    nothing alike, where something was attached, or the user ignores it.
+    """Return the person at the mass that all plates agree on in an estimate.
+
+    None if the plates do not contradict the stated mass alike, if something was attached, or if the user ignores it.
     """
     gain = common_gain(fitted.posterior.instrument_errors)
     ignored = any(_DOUBTED.startswith(code) for code in ready.overrule.ignore)

@@ -51,7 +51,7 @@ def estimate_bsp(
     overrule: Overrule | None = None,
     calibrate: bool = False,
 ) -> Fit:
-    """Body segment parameters of a person from one or more trials, with the built-in model or the person's own.
+    """Estimate a person's body segment parameters from one or more trials, with the built-in or an own model.
 
     Args:
         subject: mass and height may be None where a recording carries them; height and sex with an OpenSim model.
@@ -77,7 +77,7 @@ def estimate_bsp(
 
 @one_blas_thread
 def estimate(ready: Prepared, progress: Progress = lambda stage, share: None) -> Fit:
-    """Body segment parameters of a prepared person: the last step of `estimate_bsp`, with the settings of the others.
+    """Estimate the parameters of a prepared person: the last step of `estimate_bsp`, with the settings of the others.
 
     Args:
         ready: as `prepare` makes it.

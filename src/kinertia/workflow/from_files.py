@@ -1,4 +1,4 @@
-"""From a subject file to the recordings that it names, to what an estimator needs, and to a `Fit`.
+"""Leads from a subject file to its recordings, to what an estimator needs, and to a `Fit`.
 
 What only some subject files name is imported where it is read: all of it together takes as long as reading a trial.
 """

@@ -1,4 +1,4 @@
-"""A user's own OpenSim model on a person and the trials.
+"""Adapts a user's own OpenSim model to a person and the trials.
 
 The model's scaling, markers and joints stay as they are unless calibration is asked for, and so does the laboratory's
 frame: the trial is not turned. The prior is around the model's own body segment parameters, at the mass on the scale.
@@ -34,7 +34,7 @@ _MASS_TOLERANCE = 0.002
 
 
 def opensim_model(screened: Screened, trials: Sequence[Turned], model: OsimModel) -> PersonModel:
-    """A user's model on a person and the trials.
+    """Adapt a user's model to a person and the trials.
 
     Args:
         screened: the person.

@@ -1,4 +1,4 @@
-"""What both sources of a model, the built-in one and a user's file, make of a person and the trials."""
+"""Defines what both sources of a model, the built-in one and a user's file, make of a person and the trials."""
 
 from __future__ import annotations
 

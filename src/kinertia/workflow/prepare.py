@@ -1,4 +1,4 @@
-"""From screened recordings to what an estimator needs, with the built-in model or the user's own.
+"""Prepares screened recordings for an estimator, with the built-in model or the user's own.
 
 The road is one: the trials that can be used, a model adapted to them, their kinematics. The two sources of a model
 (`built_in_model`, `opensim_model`) take the same and return the same, a `PersonModel`.
@@ -38,7 +38,7 @@ def prepare(
     overrule: Overrule | None = None,
     calibrate: bool = False,
 ) -> Prepared:
-    """Calibrated skeleton, prior and smoothed kinematics of all trials; the arguments are `estimate_bsp`'s.
+    """Return calibrated skeleton, prior and smoothed kinematics of all trials; arguments are as in `estimate_bsp`.
 
     Raises:
         BlockedError: findings leave no trial, with all of them.
@@ -60,7 +60,7 @@ def prepare(
 
 @one_blas_thread
 def prepared(screened: Screened, settings: Settings, progress: Progress = lambda stage, share: None) -> Prepared:
-    """A screened person with a model on all trials that can be used.
+    """Prepare a screened person: a model on all trials that can be used.
 
     Raises:
         BlockedError: findings leave no trial, with all of them.
@@ -105,7 +105,7 @@ def prepared(screened: Screened, settings: Settings, progress: Progress = lambda
 
 
 def _model(screened: Screened, trials: Sequence[Turned], settings: Settings) -> PersonModel:
-    """The person's model by its source; the only place that tells the two apart."""
+    """Return the person's model by its source; the only place that distinguishes the two."""
     if screened.person.model is None:
         from kinertia.workflow.built_in_model import built_in_model
 

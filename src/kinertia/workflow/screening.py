@@ -102,7 +102,7 @@ class Screened:
         )
 
     def stopped_by(self, findings: Sequence[Finding]) -> set[str | None]:
-        """Names of the trials of which nothing is used, by these findings."""
+        """Return the names of the trials that these findings exclude."""
         names = {one.name for one in self.markers_only}
         return {one.where.trial for one in blocking(findings) if one.where.trial not in names or not _of_forces(one)}
 
@@ -146,9 +146,7 @@ def screen(person: Person) -> Screened:
 
 
 def _markers_only(screened: Screened) -> tuple[RecordingContext, ...]:
-    """Trials that are left out for nothing but their forces, beside others with forces; none of them if their markers
-    raise an ERROR of their own.
-    """
+    """Return the trials excluded for their forces alone, as trials without forces; none if no other trial has any."""
     context, left_out = screened.context, screened.left_out
     if screened.stops or not any(not one.without_forces for one in context.trials if one.name not in left_out):
         return ()
@@ -170,7 +168,7 @@ def _markers_only(screened: Screened) -> tuple[RecordingContext, ...]:
 
 
 def _of_forces(one: Finding) -> bool:
-    """Whether it says something of forces alone."""
+    """Return whether a finding is about forces alone."""
     return one.code.startswith(_OF_FORCES)
 
 

@@ -1,1 +1,1 @@
-"""The page on the user's own machine: drop files on it, check them, fit, read the report."""
+"""Serves the page on the user's own machine: drop files on it, check them, fit, read the report."""

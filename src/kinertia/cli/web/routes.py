@@ -334,7 +334,7 @@ def _recognised(person: Person) -> None:
 
 
 def _copied(person: Person, folder: Path) -> None:
-    """Copy the results to another folder, complete or not at all."""
+    """Copy the results to another folder, completely or not at all."""
     expect_own_folder(folder)
     with complete_folder(folder, "fit") as work:
         shutil.copytree(person.results, work, ignore=shutil.ignore_patterns(".*"), dirs_exist_ok=True)

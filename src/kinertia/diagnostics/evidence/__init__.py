@@ -1,1 +1,1 @@
-"""What several questions stand on: velocities by forces and by markers, plate contacts, distances in segments."""
+"""Computes evidence for several questions: velocities from forces and markers, plate contacts, segment distances."""

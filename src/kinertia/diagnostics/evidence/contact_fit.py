@@ -1,4 +1,4 @@
-"""How well loads fit the feet: whether they are under them, and begin and end when these land and leave.
+"""Measures how well loads fit the feet: whether they act under them, and begin and end when the feet do.
 
 Every explanation of loads that do not (another rate, a delay, plates interchanged, rotated or displaced) is judged by
 how well they fit once it is undone.

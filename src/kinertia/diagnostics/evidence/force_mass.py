@@ -90,7 +90,7 @@ class ForceMass:
         return UnmeasuredSupport(-float(share[first : last + 1].mean()), span, complete)
 
     def foreign(self, total_kg: float) -> ForeignLoad | None:
-        """The longest time in which plates bear much more than the person, though at other times they do not."""
+        """Find the longest time in which plates bear much more than the person, though at other times they do not."""
         share = self.supported_kg / total_kg - 1.0
         spans = [(a, b) for a, b in runs(share > FOREIGN_SHARE) if span_s(self.time, a, b) >= _FOREIGN_S]
         if float((np.abs(share) < _COMPLETE).mean()) < _MOSTLY or not spans:

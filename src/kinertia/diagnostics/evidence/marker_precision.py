@@ -1,4 +1,4 @@
-"""How finely were marker coordinates recorded? Rounding and noise from frame to frame.
+"""Measures how finely marker coordinates were recorded: rounding, and noise from frame to frame.
 
 On 17 measured recordings of motions and ten synthetic ones coordinates have steps of 0.08 mm at most, and noise is
 0.25 mm at most (0.8 mm in synthetic laboratories with cameras of 1 mm).

@@ -249,7 +249,7 @@ def _contradiction(
 
 
 def _agreeing(one: _Occasion, stated_kg: float, by_plate: Mapping[str, float], witnesses: Sequence[_Occasion]) -> int:
-    """How many occasions agree, or how many plates on a single one that no other occasion speaks against."""
+    """Count occasions that agree, or plates that agree on a single occasion that no other contradicts."""
     if one.count > 1 or not by_plate:
         return one.count
     alike = max(by_plate.values()) <= (1.0 + _SAME) * min(by_plate.values())

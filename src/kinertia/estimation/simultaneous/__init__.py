@@ -1,1 +1,1 @@
-"""Motion, body segment parameters and calibration in one maximum-a-posteriori estimate."""
+"""Estimates motion, body segment parameters and calibration together, maximum a posteriori."""

@@ -1,4 +1,4 @@
-"""Where the skin of a thigh moves as a block: after its foot has landed.
+"""Models skin of a thigh that moves as a block after its foot has landed.
 
 Measured over the bone of a walking person (Cereatti et al. 2017, J Biomech, doi 10.1016/j.jbiomech.2017.02.004), the
 thigh's skin moves fore and aft by some 6 mm in the first 12 % of the stride, with twice the acceleration that it has

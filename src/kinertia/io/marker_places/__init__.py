@@ -1,1 +1,1 @@
-"""Where on the body the markers of a standing person are, by geometry; what they are called gives hints only."""
+"""Finds where on a standing person's body the markers are, by geometry; labels give hints only."""

@@ -1,1 +1,1 @@
-"""OpenSim model files: read, edited in place, and written."""
+"""Reads, edits in place, and writes OpenSim model files."""
