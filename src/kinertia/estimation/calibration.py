@@ -11,11 +11,13 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from kinertia.errors import TrialError
 from kinertia.estimation.simultaneous.range_terms import RangeTerms
+from kinertia.model.coordinate_range import Bounds
 from kinertia.model.skeleton import Marker, Pose, Skeleton
 from kinertia.motion.inverse_kinematics import InverseKinematics, solve_ik
 from kinertia.trial.data import Markers, Trial
@@ -26,7 +28,7 @@ MARKER_NOISE_M = 0.01
 """
 FRAME_SPACING_S = 0.1
 _MAX_FRAMES = 60
-_STEPS = 15
+_STEPS, _SMALLEST_SHARE = 15, 1e-3
 _TOLERANCE_M = 1e-5
 _ENOUGH_M2 = 1e-6
 """Square of a millimetre."""
@@ -98,28 +100,92 @@ def adapt(skeleton: Skeleton, given: AdaptationInputs) -> Adaptation:
     still = list(coordinate_sd)
     freed = base.free(still)
     columns = {name: i for i, name in enumerate(freed.coordinates)}
-    still_at = np.array([columns[name] for name in still], dtype=int)
-    moving_at = np.array([columns[name] for name in base.coordinates])
-    prior = np.concatenate([[base.locked[name] for name in still], base.marker_locals.ravel()])
-    deviation = np.concatenate(
-        [list(coordinate_sd.values()), np.repeat([given.marker_sd_m[marker.segment] for marker in kept], 3)]
+    sd = [*coordinate_sd.values(), *np.repeat([given.marker_sd_m[marker.segment] for marker in kept], 3)]
+    problem = _Problem(
+        freed,
+        measured,
+        base.bounds,
+        np.array([columns[name] for name in base.coordinates]),
+        np.array([columns[name] for name in still], dtype=int),
+        np.concatenate([[base.locked[name] for name in still], base.marker_locals.ravel()]),
+        np.diag(np.square(sd) ** -1.0),
     )
-    information = np.diag(1.0 / deviation**2)
-    static = prior.copy()
-    for _ in range(_STEPS):
-        q = np.empty((len(moving), len(freed.coordinates)))
-        q[:, moving_at], q[:, still_at] = moving, static[: len(still)]
-        residual, jacobian = _in_segments(freed, measured, q, static[len(still) :].reshape(-1, 3))
-        by_moving, by_still = jacobian[..., moving_at], jacobian[..., still_at]
-        ranges = RangeTerms.of(base.bounds, moving, frames_per_interval=1.0)
-        step, moving_step = _step(residual, by_moving, by_still, information @ (prior - static), information, ranges)
-        static, moving = static + step, moving + moving_step
-        if np.abs(step).max() < _TOLERANCE_M:
-            break
+    static = problem.solved(moving)
     markers = _relocated(kept, static[len(still) :])
     moved = {m.label: float(np.linalg.norm(m.position - k.position)) for m, k in zip(markers, kept, strict=True)}
     values = {name: float(value) for name, value in zip(still, static[: len(still)], strict=True)}
     return Adaptation(skeleton.with_markers([*markers, *rest]).lock(values), moved, values)
+
+
+@dataclass(frozen=True, eq=False)
+class _Problem:
+    """Cost of static and moving unknowns of some frames, and its minimum.
+
+    Static unknowns (k,) are locked coordinates, then marker positions.
+
+    Attributes:
+        skeleton: with all coordinates free.
+        measured: (n, m, 3) markers, m.
+        bounds: of the moving coordinates.
+        moving_at, still_at: columns of moving and of static coordinates.
+        prior: (k,) mean of the static unknowns.
+        information: (k, k) of the prior.
+    """
+
+    skeleton: Skeleton
+    measured: np.ndarray
+    bounds: Bounds
+    moving_at: np.ndarray
+    still_at: np.ndarray
+    prior: np.ndarray
+    information: np.ndarray
+
+    def solved(self, moving: np.ndarray) -> np.ndarray:
+        """Return the static unknowns (k,) by Gauss-Newton, from the prior and moving coordinates (n, c).
+
+        Steps that would raise the cost are halved: arms that swing and rotate make it far from quadratic.
+        """
+        here = self._at(self.prior, moving)
+        for _ in range(_STEPS):
+            pull = self.information @ (self.prior - here.static)
+            step, moving_step = _step(
+                here.residual,
+                here.jacobian[..., self.moving_at],
+                here.jacobian[..., self.still_at],
+                pull,
+                self.information,
+                here.ranges,
+            )
+            share, there = 1.0, self._at(here.static + step, here.moving + moving_step)
+            while there.cost > here.cost and share > _SMALLEST_SHARE:
+                share *= 0.5
+                there = self._at(here.static + share * step, here.moving + share * moving_step)
+            if there.cost > here.cost:
+                break
+            here = there
+            if share * np.abs(step).max() < _TOLERANCE_M:
+                break
+        return here.static
+
+    def _at(self, static: np.ndarray, moving: np.ndarray) -> _Point:
+        """Evaluate the cost at static unknowns (k,) and moving coordinates (n, c)."""
+        q, count = np.empty((len(moving), len(self.skeleton.coordinates))), len(self.still_at)
+        q[:, self.moving_at], q[:, self.still_at] = moving, static[:count]
+        residual, jacobian = _in_segments(self.skeleton, self.measured, q, static[count:].reshape(-1, 3))
+        ranges, away = RangeTerms.of(self.bounds, moving, frames_per_interval=1.0), static - self.prior
+        cost = 0.5 * float(np.nansum(np.square(residual)) + away @ self.information @ away) + ranges.cost
+        return _Point(static, moving, residual, jacobian, ranges, cost)
+
+
+class _Point(NamedTuple):
+    """Static unknowns (k,) and moving coordinates (n, c), with marker errors and range penalty there."""
+
+    static: np.ndarray
+    moving: np.ndarray
+    residual: np.ndarray
+    jacobian: np.ndarray
+    ranges: RangeTerms
+    cost: float
 
 
 def hold_uninformed(
