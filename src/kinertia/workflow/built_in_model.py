@@ -9,10 +9,12 @@ from kinertia.diagnostics.labels.swapped_markers import labels_by_model
 from kinertia.diagnostics.runner import blocking
 from kinertia.diagnostics.subject.unobserved_segments import unobserved_segments
 from kinertia.errors import BlockedError, MarkerSetError, SettingsError, TrialError
+from kinertia.estimation.arm_rotation import with_rotating_arms
 from kinertia.estimation.calibration import (
     Adaptation,
     AdaptationInputs,
     adapt,
+    first_poses,
     hold_uninformed,
     turn_about,
     without_partly_shown,
@@ -101,9 +103,9 @@ def calibrate(
     the shoulder centres by 40 mm, free axes of knees and ankles by 5 degrees; where `free_axes` is None, they are free
     if the trials show those of the knees. Axes are adapted to all trials, markers to those with forces: a squat draws
     skin, and with it ankles, 5 mm away from where a walk's joint moments need them.
-    Where arms have turned the torso under its markers, since the model's shoulders lack an axis, the rest of the body
-    is adapted without them. Markers on the head are left out where three others show the trunk, which the acromia
-    (labels), that move with the arms, do not.
+    Where arms have turned the torso under its markers, since the model's shoulders lack an axis, upper arms may rotate
+    about their own axes, and the rest of the body is adapted without them. Markers on the head are left out where three
+    others show the trunk, which the acromia (labels), that move with the arms, do not.
     """
     skeleton, poses = with_elbows_that_bend_forwards(model.skeleton, trials)
     complete = without_partly_shown(skeleton, poses, ARM_COORDINATES)
@@ -126,6 +128,9 @@ def calibrate(
     adapted = adapt(skeleton, given)
     torso_rad: float | None = turn_about("torso", skeleton.markers, adapted.skeleton.markers)
     if torso_rad is not None and torso_rad > _TURNED_RAD:
+        skeleton = with_rotating_arms(skeleton, trials)
+        locked = {name: sd for name, sd in coordinate_sd.items() if name in skeleton.locked}
+        given = replace(given, poses=first_poses(skeleton, given.trials), coordinate_sd=locked)
         adapted = _arms_last(skeleton, given)
     else:
         torso_rad = None

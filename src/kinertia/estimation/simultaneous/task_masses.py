@@ -17,7 +17,7 @@ from kinertia.estimation.simultaneous.inputs import BSP
 from kinertia.model.anatomy import segment_of
 from kinertia.model.skeleton import Skeleton
 
-LEAST_TASK_SD, TASK_SD_PER_RAD = 0.1, 0.1
+LEAST_TASK_SD, TASK_SD_PER_RAD = 0.1, 0.095
 """Standard deviation of the mass that moves with a thigh, as a share of it: least value, and increase with hip flexion.
 Walks, jumps and squats of that person differ by 0.2 (SD). Hips are flexed by 0.4 rad in its walks, 1.7 in jumps and 1.9
 in squats; with a standard deviation proportional to that, the tasks agree."""
@@ -31,7 +31,7 @@ def task_sd(bent_rad: float) -> float:
     """Return the SD of the mass that moves with a thigh, as a share of it, in a task that flexes the hips this far.
 
     >>> round(task_sd(0.4), 3), round(task_sd(1.9), 3)
-    (0.1, 0.19)
+    (0.1, 0.18)
     """
     return max(LEAST_TASK_SD, TASK_SD_PER_RAD * bent_rad)
 
