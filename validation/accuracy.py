@@ -19,19 +19,16 @@ from validation.study_bound import bound_rows
 from validation.study_noise import UNIFORM_SD, study_draw, study_section
 from validation.walks import WALKS
 
-
-def document(sections: dict[str, str]) -> str:
-    """Return the text of docs/validation/accuracy.md."""
-    return f"""# Accuracy of the simultaneous estimate
+_PAGE = """# Accuracy of the simultaneous estimate
 
 ## Joint moments
 
-RMS errors of joint moments (N m), estimate / usual pipeline, {sections["people"]} people in each laboratory, a walk of
+RMS errors of joint moments (N m), estimate / usual pipeline, {people} people in each laboratory, a walk of
 2.5 s. *Usual pipeline*: inverse kinematics, literature BSPs, forces as measured,
 coordinates low-passed at the best of 6, 10 and 12 Hz for each joint. Both know the same skeleton and see the same
 markers and forces.
 
-{sections["moments"]}
+{moments}
 
 At hips and back the estimate is better in every laboratory, and with wrong instruments everywhere below them, too.
 Where instruments *and* skeleton are exact, as no laboratory's are, the usual pipeline knows knee and ankle better: it
@@ -40,14 +37,14 @@ the usual pipeline and its model kept as it is: [peers](peers.md).
 
 ## The study's noise, from starts 50 % off
 
-RMS errors of the 49 parameters of [the study](study.md), mean over {sections["draws"]} draws: the walk of the package
+RMS errors of the 49 parameters of [the study](study.md), mean over {draws} draws: the walk of the package
 (1.14 m/s, one stride and margins, 41 markers, 100 Hz), the study's sinusoidal noise on every marker coordinate,
 every parameter of the start off by uniform +/-50 %. Both estimators see the same starts and markers and know the
-skeleton. The simultaneous estimate also knows that the start is within some 50 % ({UNIFORM_SD:.2f} of its value as
+skeleton. The simultaneous estimate also knows that the start is within some 50 % ({uniform_sd:.2f} of its value as
 standard deviation), that left mirrors right, and the total mass within 0.5 %. It reads the noise from the markers, as
 `kinertia fit` does.
 
-{sections["study"]}
+{study}
 
 **How good an estimate could be on this walk.** *At best* is the Cramér-Rao bound of an
 estimate that knows all that none can know: forces count as exact, and the covariance of the noise over time is that of
@@ -64,13 +61,13 @@ literature), five people each. Per quantity: RMS error / mean posterior deviatio
 deviations). Priors: plates and clock as in every fit, sound or faulty; hips 10 mm. BSPs: RMS errors of mass (kg), CoM
 (mm), inertia (kg m2) with calibration free, held at its wrong values, and of the literature.
 
-{sections["calibration"]}
+{calibration}
 
 ## Measured walks
 
 `kinertia fit`, default settings. Residuals are RMS over the measured window.
 
-{sections["measured"]}
+{measured}
 
 The total mass agrees with the scale within 1 % also where
 the plates do not: those of the Plug-in Gait walks correspond to 3.4 and 4.7 % less than the stated mass, and the
@@ -80,7 +77,7 @@ estimate finds their gains wrong by that much and says so. A parameter beyond 3 
 
 The gait2354 walk, cut in two: differences of the BSPs from the estimate of the whole walk, in its posterior deviations.
 
-{sections["pooling"]}
+{pooling}
 
 The halves together give the estimate of the whole, well within its error bars; what is left is what the cut takes away
 (the dynamics of the frames beside it). Most errors of one half come back in the other and count once, so that both
@@ -93,15 +90,15 @@ another initial rate of turning and by CoMs moved to the side.
 ## Error bars
 
 People drawn from the prior (masses, CoMs and inertias with all their correlations, physically possible, given the
-scale), a walk of 2.5 s at 100 Hz, {sections["people"]} people in each laboratory.
+scale), a walk of 2.5 s at 100 Hz, {people} people in each laboratory.
 *Coverage*: parameters whose truth lies in the 95 % interval, and the standard error over people. *Error / sd*: RMS.
 *Bound*: the Cramér-Rao bound, prior included, at the true motion and parameters, with the estimator's own noise model.
 *Better*: people for whom the RMS error is below the literature's, and in brackets the share for whom that of an
 estimate at the bound would be. *Measured*, *informed* and *assumed*: parameters of all kinds, in prior SDs. Skin,
-skeleton and instruments are the same in all trials of a person. {JOINT_CAPTION} What an error bar means is explained in
+skeleton and instruments are the same in all trials of a person. {joint_caption} What an error bar means is explained in
 [error bars](../error-bars.md).
 
-{sections["error_bars"]}
+{error_bars}
 
 In the laboratories that error bars are made for (the first ten) they hold: masses, CoMs and inertias are covered in
 94 to 98 %, with errors of 0.90 to 1.00 deviations, near the bound. Where skin goes with the joints, which the
@@ -128,6 +125,11 @@ What breaks the bars breaks those of joint moments first: hip centres 15 mm off 
 for ankles. Bars of masses, CoMs and inertias hold whatever is done: most are wide. Wobbling thighs do little in the
 smooth synthetic walk, which has no impacts.
 """
+
+
+def document(sections: dict[str, str]) -> str:
+    """Return the text of docs/validation/accuracy.md."""
+    return _PAGE.format(uniform_sd=UNIFORM_SD, joint_caption=JOINT_CAPTION, **sections)
 
 
 def _calibrated(case: tuple[str, int]) -> Calibrated:

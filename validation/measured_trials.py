@@ -57,6 +57,47 @@ def table(headings: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
 
+_PAGE = """# Measured trials
+
+What `kinertia fit` gives on four measured walks, one trial each, with its default settings.
+
+## What was used
+
+Markers: RMS distance between measured and model markers over the frames used, after inverse kinematics and in the
+motion that goes with the estimate.
+
+{used}
+
+## Residual at the pelvis
+
+RMS (maximum) over the frames used. *Literature*: literature BSPs on the smoothed motion. *Corrected*: literature BSPs
+with pelvis correction. *Estimate*: BSPs, motion and calibration of the simultaneous estimate.
+
+{residuals}
+
+## Total mass
+
+{masses}
+
+## What the estimated body segment parameters are worth
+
+How many of the 120 parameters the walk measures (information above 0.75), informs on (0.25 to 0.75) or leaves assumed;
+see [accuracy](accuracy.md) for what the deviations are worth.
+
+{worth}
+
+## Warnings given
+
+{warnings}
+
+## Seconds
+
+On the machine that wrote this page; see [speed](speed.md) for times next to OpenSim's on one machine.
+
+{seconds}
+"""
+
+
 def document(runs: dict[str, dict[str, Any]]) -> str:
     """Return the text of docs/validation/measured-trials.md."""
     trials = {name: run["trials"][0] for name, run in runs.items()}
@@ -97,45 +138,14 @@ def document(runs: dict[str, dict[str, Any]]) -> str:
         ([WALKS[name], *(f"{t['seconds'][stage]:.2f}" for stage in times)] for name, t in trials.items()),
     )
     warnings = "\n".join(f"- {WALKS[name]}: {each}" for name, run in runs.items() for each in messages_of(run))
-    return f"""# Measured trials
-
-What `kinertia fit` gives on four measured walks, one trial each, with its default settings.
-
-## What was used
-
-Markers: RMS distance between measured and model markers over the frames used, after inverse kinematics and in the
-motion that goes with the estimate.
-
-{used}
-
-## Residual at the pelvis
-
-RMS (maximum) over the frames used. *Literature*: literature BSPs on the smoothed motion. *Corrected*: literature BSPs
-with pelvis correction. *Estimate*: BSPs, motion and calibration of the simultaneous estimate.
-
-{residuals}
-
-## Total mass
-
-{masses}
-
-## What the estimated body segment parameters are worth
-
-How many of the 120 parameters the walk measures (information above 0.75), informs on (0.25 to 0.75) or leaves assumed;
-see [accuracy](accuracy.md) for what the deviations are worth.
-
-{_worth(runs)}
-
-## Warnings given
-
-{warnings or "None."}
-
-## Seconds
-
-On the machine that wrote this page; see [speed](speed.md) for times next to OpenSim's on one machine.
-
-{seconds}
-"""
+    return _PAGE.format(
+        used=used,
+        residuals=residuals,
+        masses=masses,
+        worth=_worth(runs),
+        warnings=warnings or "None.",
+        seconds=seconds,
+    )
 
 
 def _worth(runs: dict[str, dict[str, Any]]) -> str:
