@@ -1,8 +1,11 @@
 """A fit without a static trial: S207, wider priors, and legs as the static trial has them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from kinertia.errors import BlockedError
 from kinertia.estimation.simultaneous.model_uncertainty import WITHOUT_STATIC
 from kinertia.io.recording import read_recording
 from kinertia.settings import Settings, Subject
@@ -21,6 +24,20 @@ def ready(lab, static):
     result = prepared(screen(person), Settings())
     assert [one.to_dict() for one in result.findings if one.code == "S207"] == found
     return result
+
+
+def test_a_trial_without_markers_on_knees_and_ankles_cannot_stand_for_it(synthetic_lab):
+    """As runs whose anatomical markers are in the static trial only."""
+    walk = read_recording(synthetic_lab / "walk.c3d")
+    worn = [label for label in walk.markers.labels if label not in ("RKNE", "RANK")]
+    subject = Subject(name="one", mass_kg=72.6, height_m=HEIGHT_M, sex="male")
+    run = replace(walk, markers=walk.markers.select(worn))
+    person = Person(subject, [TrialInput(run)], None)
+    (found,) = [one for one in check_person(person).findings if one.code == "S208"]
+    assert found.evidence["landmarks"].value == "ankle_lateral_r, knee_lateral_r"
+    with pytest.raises(BlockedError) as caught:
+        prepared(screen(person), Settings())
+    assert "S208" in [one.code for one in caught.value.blocking]
 
 
 def test_a_walk_stands_for_its_static_trial(synthetic_lab):

@@ -53,6 +53,7 @@ def stance_pose(markers: Markers, marker_set: MarkerSet) -> Markers | None:
     return Markers(markers.time[[base]], markers.labels, pose)
 
 
+_OF_FOOT = ("heel", "metatarsal", "ankle_lateral", "knee_lateral")
 _LEFT_LEG = ("thigh_l", "shank_l", "foot_l")
 
 
@@ -65,9 +66,16 @@ def _landmark(markers: Markers, labels: tuple[str, ...]) -> FloatArray:
     return middle
 
 
+def hidden_landmarks(markers: Markers, marker_set: MarkerSet) -> list[str]:
+    """List the landmarks that a `stance_pose` needs and no frame shows."""
+    names = ["asis_r", "asis_l", *(f"{name}_{side}" for side in "rl" for name in _OF_FOOT)]
+    every = {name: _landmark(markers, marker_set.landmarks.get(name, ())) for name in names}
+    return [name for name, place in every.items() if not np.isfinite(place[:, 0]).any()]
+
+
 def _flat_frame(place: Mapping[str, FloatArray], pelvis: np.ndarray, side: str) -> int | None:
     """Return the frame in which this foot is flat and the shank over it most upright."""
-    names = [f"{name}_{side}" for name in ("heel", "metatarsal", "ankle_lateral", "knee_lateral")]
+    names = [f"{name}_{side}" for name in _OF_FOOT]
     if not set(names) <= place.keys():
         return None
     heel, forefoot, ankle, knee = (place[name] for name in names)

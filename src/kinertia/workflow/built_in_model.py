@@ -51,7 +51,7 @@ from kinertia.model.skeleton import Skeleton
 from kinertia.model.upper_body import ARM_SEGMENTS
 from kinertia.motion.kinematics import facing
 from kinertia.motion.single_blas_thread import one_blas_thread
-from kinertia.motion.stance_pose import stance_pose
+from kinertia.motion.stance_pose import hidden_landmarks, stance_pose
 from kinertia.motion.upright_trunk import shows_trunk, with_upright_trunk
 from kinertia.settings import Settings
 from kinertia.trial.data import Recording, Trial
@@ -233,15 +233,13 @@ def _stance_of(person: Person, trials: Sequence[Turned], marker_set: MarkerSet) 
     """Return a pose of the first trial with forces in place of a static trial, with the widths that are known.
 
     Raises:
-        SettingsError: no frame of it shows a pelvis over each flat foot.
+        TrialError: S208, it lacks landmarks of a leg that stands.
     """
     walk = next(one.trial for one in trials if one.trial.loads.plates)
     pose = stance_pose(walk.markers, marker_set)
     if pose is None:
-        raise SettingsError(
-            "the built-in model needs a static trial (--static, or static = ... under [model]): no frames of "
-            f"{walk.name} show pelvis, knee, ankle and foot of each leg while that foot is flat"
-        )
+        hidden = ", ".join(hidden_landmarks(walk.markers, marker_set)) or "all of a leg in one frame"
+        raise TrialError.found(walk.name, "S208", landmarks=Quantity(hidden))
     measured = next(one for one in person.recordings if one.name == walk.name)
     static, named = with_widths(
         replace(measured, markers=pose, plates=None), person.recordings, marker_set, person.subject

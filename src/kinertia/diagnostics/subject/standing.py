@@ -12,6 +12,7 @@ from kinertia.diagnostics.person_context import PersonContext
 from kinertia.estimation.simultaneous.model_uncertainty import JOINT_CENTRE_SD_M, WITHOUT_STATIC
 from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.quantity import Quantity
+from kinertia.motion.stance_pose import hidden_landmarks
 
 _LOWEST_M = (0.008, 0.050)
 """A marker's own radius is 5 mm and more; soles are under both feet, and markers on the side of a foot are low.
@@ -35,10 +36,14 @@ def standing(context: RecordingContext) -> Iterator[Finding]:
 
 
 def no_static(context: PersonContext) -> Iterator[Finding]:
-    """S207: neither static trial nor model is named for the trials, so that joint centres come from a walk."""
+    """S207 and S208: neither static trial nor model is named for the trials; S208 where no walk can replace it."""
     unread = any(one.rule.stage == "file" and one.where.trial is None for one in context.found)
-    if context.trials and not (context.standing or context.model or context.files_only or unread):
-        yield finding("S207", centre_sd_m=Quantity(WITHOUT_STATIC * JOINT_CENTRE_SD_M, "m"))
+    if not context.trials or context.standing or context.model or context.files_only or unread:
+        return
+    yield finding("S207", centre_sd_m=Quantity(WITHOUT_STATIC * JOINT_CENTRE_SD_M, "m"))
+    measured = [one.recording for one in context.trials if one.recording.plates is not None]
+    if measured and context.marker_set and (hidden := hidden_landmarks(measured[0].markers, context.marker_set)):
+        yield finding("S208", landmarks=Quantity(", ".join(hidden)))
 
 
 def floor(context: PersonContext) -> Iterator[Finding]:
