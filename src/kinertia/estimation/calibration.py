@@ -17,6 +17,7 @@ import numpy as np
 
 from kinertia.errors import TrialError
 from kinertia.estimation.simultaneous.range_terms import RangeTerms
+from kinertia.findings.where import Where
 from kinertia.model.coordinate_range import Bounds
 from kinertia.model.skeleton import Marker, Pose, Skeleton
 from kinertia.motion.inverse_kinematics import InverseKinematics, solve_ik
@@ -200,7 +201,7 @@ def hold_uninformed(
         may_hold: the coordinates that may be undetermined, and the values at which they are locked.
 
     Raises:
-        TrialError: a trial never determines another coordinate, or one that another trial determines.
+        TrialError: R103, a trial never determines another coordinate, or one that another trial determines.
     """
     never = []
     for ik in poses:
@@ -210,7 +211,9 @@ def hold_uninformed(
     for trial, names in zip(trials, never, strict=True):
         lost = [name for name in names if name not in held]
         if lost:
-            raise TrialError(trial.name, _not_shown(skeleton, trial.markers, lost))
+            moved = [joint.child for joint in skeleton.joints if {axis.coordinate for axis in joint.axes} & set(lost)]
+            worn = tuple(marker.label for marker in skeleton.markers if marker.segment in moved)
+            raise TrialError.found(trial.name, "R103", Where(part=", ".join(lost), markers=worn))
     return skeleton.lock({name: may_hold[name] for name in held}), tuple(held)
 
 
@@ -231,17 +234,6 @@ def without_partly_shown(skeleton: Skeleton, poses: Sequence[InverseKinematics],
         if joint.parent in beyond or partly & {axis.coordinate for axis in joint.axes}:
             beyond.add(joint.child)
     return skeleton.with_markers([marker for marker in skeleton.markers if marker.segment not in beyond])
-
-
-def _not_shown(skeleton: Skeleton, markers: Markers, coordinates: Sequence[str]) -> str:
-    children = [joint.child for joint in skeleton.joints if {axis.coordinate for axis in joint.axes} & set(coordinates)]
-    worn = [m.label for m in skeleton.markers if m.segment in children]
-    gone = [label for label in worn if label not in markers.labels]
-    missing = f"; not in the file: {', '.join(gone)}" if gone else ""
-    return (
-        f"in no frame do enough markers show {', '.join(coordinates)} (markers of {', '.join(children)}: "
-        f"{', '.join(worn) or 'none'}{missing}); use a trial that has them"
-    )
 
 
 def sampled(markers: Markers) -> Markers:
