@@ -103,13 +103,13 @@ def adapt(skeleton: Skeleton, given: AdaptationInputs) -> Adaptation:
     columns = {name: i for i, name in enumerate(freed.coordinates)}
     sd = [*coordinate_sd.values(), *np.repeat([given.marker_sd_m[marker.segment] for marker in kept], 3)]
     problem = _Problem(
-        freed,
-        measured,
-        base.bounds,
-        np.array([columns[name] for name in base.coordinates]),
-        np.array([columns[name] for name in still], dtype=int),
-        np.concatenate([[base.locked[name] for name in still], base.marker_locals.ravel()]),
-        np.diag(np.square(sd) ** -1.0),
+        skeleton=freed,
+        measured=measured,
+        bounds=base.bounds,
+        moving_at=np.array([columns[name] for name in base.coordinates]),
+        still_at=np.array([columns[name] for name in still], dtype=int),
+        prior=np.concatenate([[base.locked[name] for name in still], base.marker_locals.ravel()]),
+        information=np.diag(np.square(sd) ** -1.0),
     )
     static = problem.solved(moving)
     markers = _relocated(kept, static[len(still) :])
