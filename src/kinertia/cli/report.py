@@ -50,7 +50,8 @@ def report(
     page = render(saved.fit, saved.provenance, saved.versions, bands, saved.truth)
     with updated_files(results, "fit", ["gps.csv"]) as work:
         (work / "report.html").write_text(page, encoding="utf-8", newline="\n")
-        if any(trial.strides for trial in saved.fit.trials):
+        cycles = bands or (results / "cycles.csv").is_file()
+        if cycles and any(trial.strides for trial in saved.fit.trials):
             columns = cycle_columns(saved.fit.trials, saved.fit.mass_kg, "estimate", MOST_STRIDES)
             columns = with_norms(columns, bands, saved.fit.skeleton) if bands else columns
             write_columns(work / "cycles.csv", columns, "%.6g")

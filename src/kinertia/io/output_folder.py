@@ -197,10 +197,11 @@ def updated_files(folder: Path, kind: str, optional: Collection[str]) -> Iterato
         names, listed = _files(new), _written(folder)
         own = set(listed.get(kind, ()))
         gone = own & set(optional) - names
-        text = json.dumps({**listed, kind: sorted((own | names) - gone)}, indent=1) + "\n"
-        (new / _WRITTEN).write_text(text, encoding="utf-8")
+        if listed or names & set(optional):
+            text = json.dumps({**listed, kind: sorted((own | names) - gone)}, indent=1) + "\n"
+            (new / _WRITTEN).write_text(text, encoding="utf-8")
         with _uninterrupted():
-            for name in (*sorted(names), _WRITTEN):
+            for name in sorted(_files(new)):
                 os.replace(new / name, folder / name)
             for name in gone:
                 (folder / name).unlink(missing_ok=True)
