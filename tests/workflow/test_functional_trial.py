@@ -9,9 +9,11 @@ import pytest
 
 from kinertia import Settings, Subject, TrialInput, estimate, prepare, prepare_subject
 from kinertia.errors import BlockedError, SettingsError
+from kinertia.estimation.drawn_fit import kept_draws
 from kinertia.estimation.simultaneous.calibration_entry import AXIS
 from kinertia.io.trc import write_trc
 from kinertia.model.gait27 import LEG_AXIS_TILTS
+from kinertia.report.draw_files import write_draws
 from kinertia.synthetic.laboratory import LabNoise, record, write_lab
 from kinertia.synthetic.motions import squat
 from kinertia.synthetic.noise import SkinMotion, camera_noise
@@ -69,6 +71,12 @@ def test_its_markers_alone_count(fit):
     assert not fit.left_out
     assert fit.converged
     assert fit.overview.line.endswith("1 of 1 trials, and the markers of 1 more")
+
+
+def test_draws_are_of_the_trials_in_the_result(fit, tmp_path):
+    assert len(kept_draws(fit).trials) == len(fit.trials)
+    write_draws(fit, tmp_path, 2)
+    assert (tmp_path / "draw_002" / "kinematics.mot").is_file()
 
 
 def test_axes_of_knees_are_found(fit):

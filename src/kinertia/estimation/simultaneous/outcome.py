@@ -69,7 +69,8 @@ class SimultaneousResult:
     def of_first(self, count: int) -> SimultaneousResult:
         """Return the result with the first `count` trials only."""
         names = ("foot_loads", "reactions", "motions", "marker_offsets_m", "curve_deviations")
-        return replace(self, **{name: getattr(self, name)[:count] for name in names})
+        first = {name: getattr(self, name)[:count] for name in names}
+        return replace(self, **first, draws=self.draws.of_first(count))
 
 
 class Ended(NamedTuple):

@@ -99,6 +99,10 @@ class PosteriorDraws:
         """Return the draws with marker positions as estimated."""
         return replace(self, places=np.zeros_like(self.places))
 
+    def of_first(self, count: int) -> PosteriorDraws:
+        """Return the draws with the motions of the first `count` trials only."""
+        return replace(self, trials=self.trials[:count])
+
 
 @dataclass(frozen=True, eq=False)
 class Mode:
