@@ -287,6 +287,14 @@ def test_errors_of_the_whole(folder, text, line, code, evidence):
         read(folder, text)
 
 
+def test_forces_of_one_trial_at_least_are_used(folder):
+    markers_only = re.sub(r"(\[\[trial\]\])", r'\1\nuse = "kinematics"', GOOD)
+    first = markers_only[: markers_only.index("use =")].count("\n") + 1
+    with refused("F191", first, key="use", expected="forces"):
+        read(folder, markers_only)
+    assert len(read(folder, markers_only.replace('use = "kinematics"\n', "", 1)).trials) == 2
+
+
 @pytest.mark.parametrize("name", ["x" * 300, "a/" * 3000, "x" * 300 + "/walk.trc"])
 def test_names_longer_than_the_system_allows_are_no_files(folder, name):
     with refused("F101", 7, key="static"):

@@ -76,6 +76,7 @@ from kinertia.settings import (
 
 T = TypeVar("T", bound=Table)
 STUDY_FILE = "kinertia.toml"
+_FORCES_NEEDED = "one trial at least needs its forces, and no trial here uses them"
 
 
 def subject_file_in(folder: Path) -> Path:
@@ -182,6 +183,9 @@ def _incomplete(wanted: SubjectFile, needs_sex: bool = True) -> tuple[Location, 
         return ("subject", "sex"), _no_sex(wanted)
     if lack := _two_models(model.static, model.markers, model.osim, model.calibrate):
         return lack
+    if all(trial.use == "kinematics" for trial in wanted.trials):
+        known = {"key": Quantity("use"), "value": Quantity(shown("kinematics"))}
+        return ("trial", 0, "use"), _wrong_entry(f"use = {shown('kinematics')}", _FORCES_NEEDED, known)
     if model.osim is not None and wanted.settings.method == "two-level":
         two_level = 'method = "two-level" (which works on the built-in model only)'
         return ("settings", "method"), _conflict(two_level, "osim in [model]")

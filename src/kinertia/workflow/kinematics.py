@@ -84,7 +84,7 @@ def expect_forces(trials: Sequence[Trial]) -> None:
     """Raise a SettingsError unless one of these trials has forces."""
     if not any(trial.loads.plates for trial in trials):
         raise SettingsError(
-            'of no trial that can be used the forces are used; leave out use = "kinematics" of one over force plates'
+            'no usable trial has forces to use; add a trial over force plates, without use = "kinematics"'
         )
 
 
