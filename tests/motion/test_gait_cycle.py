@@ -270,6 +270,19 @@ def test_a_file_tells_the_events_that_plates_do_not_see(walked, trial):
     assert by_motion == []
 
 
+def test_events_that_a_cropped_file_kept_from_outside_its_frames_begin_no_stride(walked, trial):
+    own = stated(walked)
+    strikes = {side: [one for one in own if (one.side, one.kind) == (side, "heel strike")] for side in FEET}
+    first, second, *_ = max(strikes.values(), key=lambda of_side: of_side[0].time_s)
+    before = replace(first, time_s=2.0 * first.time_s - second.time_s)
+    after = replace(first, time_s=walked.time[-1] + 0.5)
+    assert before.time_s < walked.time[0]
+    expected = strides_of(walked.skeleton, kinematics_of(walked, replace(trial, events=own)))
+    found = strides_of(walked.skeleton, kinematics_of(walked, replace(trial, events=(before, *own, after))))
+    assert found == expected
+    assert min(stride.start_s for stride in found) >= walked.time[0]
+
+
 @pytest.mark.parametrize("fault", [{"delay_s": 0.05}, {"exchanged": True}])
 def test_events_that_forces_contradict_are_not_used(walked, trial, fault):
     half = with_half_of_the_loads(trial)

@@ -129,8 +129,13 @@ def _heel_and_toe(skeleton: Skeleton, segment: str) -> tuple[np.ndarray, np.ndar
 
 
 def found_events(skeleton: Skeleton, kinematics: Kinematics) -> list[FoundEvent]:
-    """Detect all heel strikes and toe offs of a trial, in order of time."""
-    edges, stated = load_edges(kinematics.trial.loads), usable_events(kinematics.trial)
+    """Detect all heel strikes and toe offs of a trial, in order of time.
+
+    Events of the file before or after the frames with a motion are left out, as a file keeps when it is cropped.
+    """
+    (first, last), edges = kinematics.spline.time[[0, -1]], load_edges(kinematics.trial.loads)
+    slack = 0.5 / kinematics.trial.markers.rate_hz
+    stated = [one for one in usable_events(kinematics.trial) if first - slack <= one.time_s <= last + slack]
     known = [*edges, *stated]
     events = [
         event
