@@ -60,6 +60,27 @@ def test_events_of_another_person_are_left_out():
     assert one.subject == "Ann"
 
 
+@pytest.mark.parametrize(
+    ("names", "expected"),
+    [
+        (["Ann"], ["Ann", ""]),
+        (["Eve"], ["Ann", "", "Ben"]),
+        (["Ann", "Ben"], ["Ann", "", "Ben"]),
+        ([], ["Ann", "", "Ben"]),
+    ],
+)
+def test_events_of_another_person_are_known_by_the_subject_of_the_file(names, expected):
+    """Where the file names somebody else than all of its events do, the person was renamed."""
+    event = {
+        "TIMES": {"value": np.array([[0.0, 0.0, 0.0], [1.0, 2.0, 3.0]])},
+        "CONTEXTS": {"value": ["Left", "General", "Left"]},
+        "LABELS": {"value": ["Foot Strike", "Event", "Foot Strike"]},
+        "SUBJECTS": {"value": ["Ann", "", "Ben"]},
+    }
+    found = file_events({"EVENT": event, "SUBJECTS": {"NAMES": {"value": names}}}, ["LHEE"])
+    assert [one.subject for one in found] == expected
+
+
 @pytest.mark.parametrize("times", [np.zeros(3), np.array(["a", "b"]), np.array([[0.0], [np.nan]])])
 def test_times_that_are_none_are_no_events(times):
     assert file_events({"EVENT": {"TIMES": {"value": times}}}) == ()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -28,7 +28,9 @@ def file_events(parameters: Any, labels: Sequence[str] = ()) -> tuple[FileEvent,
 
     Args:
         parameters: parameters of the file, as ezc3d has them.
-        labels: labels of the markers; people with a prefix there are not the trial's person, their events are left out.
+        labels: labels of the markers; people with a prefix there are not the trial's person.
+
+    Events of other people are left out (`subjects_of_person`).
     """
     times = np.asarray(parameter_values(parameters, "EVENT", "TIMES"))
     if not np.issubdtype(times.dtype, np.number) or len(times) % 2:
@@ -36,13 +38,30 @@ def file_events(parameters: Any, labels: Sequence[str] = ()) -> tuple[FileEvent,
     times = times.astype(float).reshape(-1, 2)
     lists = [_texts(parameters, name, len(times)) for name in ("CONTEXTS", "LABELS", "SUBJECTS", "DESCRIPTIONS")]
     others = {label.split(":", 1)[0] for label in labels if ":" in label}
+    person = person_among(text_list(parameters, "SUBJECTS", "NAMES"), others)
+    own = subjects_of_person(lists[2], person, others)
     events = []
     for (minutes, seconds), context, name, subject, description in zip(times, *lists, strict=True):
         label = name or context  # Motion Analysis writes "RHS" as the context
         side, kind = side_and_kind(context, label)
-        if subject not in others and not description.startswith(OWN_METHOD):
+        if subject in own and not description.startswith(OWN_METHOD):
             events.append(FileEvent(float(_SECONDS_PER_MINUTE * minutes + seconds), side, label, subject, kind))
     return tuple(sorted((one for one in events if np.isfinite(one.time_s)), key=lambda one: one.time_s))
+
+
+def person_among(names: Sequence[str], others: Collection[str]) -> str:
+    """Return the trial's person among the SUBJECTS of a file, where other people are known; empty where it is open."""
+    left = [name for name in dict.fromkeys(names) if name and name not in others]
+    return left[0] if len(left) == 1 else ""
+
+
+def subjects_of_person(subjects: Iterable[str], person: str, others: Collection[str]) -> set[str]:
+    """Return the subjects of events that are the person's: those of this name and of none, if any has this name.
+
+    Else the name was changed, or is not known, and all but those of other people are.
+    """
+    found = set(subjects) - set(others)
+    return found & {person, ""} if person in found and person else found
 
 
 def _texts(parameters: Any, name: str, count: int) -> list[str]:
