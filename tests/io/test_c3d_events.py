@@ -5,7 +5,7 @@ import pytest
 
 from c3d_writer import write_c3d
 from kinertia.io.c3d import read_c3d
-from kinertia.io.c3d_event_writer import EventToWrite, add_events
+from kinertia.io.c3d_event_writer import EventToWrite, add_events, subject_of
 from kinertia.io.c3d_events import file_events
 from kinertia.io.c3d_parameters import ParameterSection
 from kinertia.trial.gait_event import GaitEvent
@@ -119,3 +119,41 @@ def test_events_of_the_file_stay_as_they_are():
         ("Right", "Foot Strike", "by hand", 1.49),
         ("Right", "Foot Off", "Kinertia: motion", 2.1),
     ]
+
+
+def section_of(parameters: dict[str, dict[str, object]]) -> ParameterSection:
+    section = ParameterSection(bytes([1, 80, 1, 84]).ljust(512, b"\0"), "<")
+    for group, entries in parameters.items():
+        for name, value in entries.items():
+            section.put(group, name, value, (2, len(value) // 2) if name == "TIMES" else None)
+    return section
+
+
+EVENTS = {
+    "CONTEXTS": ["Right", "Right"],
+    "LABELS": ["Foot Strike", "Foot Off"],
+    "TIMES": np.array([0.0, 1.5, 0.0, 2.1]),
+}
+
+
+@pytest.mark.parametrize(
+    ("parameters", "prefix", "expected"),
+    [
+        ({"SUBJECTS": {"NAMES": ["Ann"]}}, "", "Ann"),
+        ({"SUBJECTS": {"NAMES": ["Ann", "Ben"]}}, "", ""),
+        ({"SUBJECTS": {"NAMES": ["Ann", "Ben"]}}, "Ben", "Ben"),
+        ({"SUBJECTS": {"NAMES": ["Ann"]}, "EVENT": {**EVENTS, "SUBJECTS": ["Old", "Old"]}}, "", "Old"),
+        ({"SUBJECTS": {"NAMES": ["Ann"]}, "EVENT": {**EVENTS, "SUBJECTS": ["", ""]}}, "", ""),
+        ({"SUBJECTS": {"NAMES": ["Ann"]}, "EVENT": {**EVENTS, "SUBJECTS": ["Ann", "Ben"]}}, "", "Ann"),
+        ({}, "", ""),
+    ],
+)
+def test_events_have_the_subject_that_the_file_knows(parameters, prefix, expected):
+    assert subject_of(section_of(parameters), prefix) == expected
+
+
+@pytest.mark.parametrize(("subjects", "others", "added"), [("Ann", (), 0), ("Ben", (), 0), ("Ben", {"Ben"}, 2)])
+def test_events_of_other_people_state_nothing_of_this_one(subjects, others, added):
+    section = section_of({"EVENT": {**EVENTS, "SUBJECTS": [subjects] * 2}})
+    strike, off = GaitEvent(1.5, "r", "heel strike"), GaitEvent(2.1, "r", "toe off")
+    assert add_events(section, [EventToWrite(one, "motion") for one in (strike, off)], "Ann", others) == added

@@ -9,10 +9,12 @@ from c3d_writer import plate_parameters, write_c3d
 from kinertia.errors import FileError
 from kinertia.io.c3d import read_c3d
 from kinertia.io.c3d_analysis import Measure
+from kinertia.io.c3d_event_writer import EventToWrite
 from kinertia.io.c3d_outputs import OutputPoint, frames_of, with_outputs
 from kinertia.io.c3d_parameters import ParameterSection
 from kinertia.io.c3d_structure import doubts_about
 from kinertia.io.provenance import VERSION
+from kinertia.trial.gait_event import GaitEvent
 from recordings import here
 
 MAKERS = (
@@ -153,6 +155,17 @@ def test_measures_of_strides_are_added_where_a_file_states_none(tmp_path):
     assert (kept["ANALYSIS"]["NAMES"]["value"], kept["ANALYSIS"]["VALUES"]["value"]) == (["Cadence"], [120.0])
     assert kept["MANUFACTURER"]["EDITED"]["value"] == ["Mokka", f"Kinertia {VERSION}"]
     assert once["KINERTIA"]["__METADATA__"]["DESCRIPTION"].startswith("Results of Kinertia")
+
+
+def test_events_and_measures_have_the_subject_of_the_file(tmp_path):
+    """Vicon's programs show only those of a subject."""
+    ezc3d = pytest.importorskip("ezc3d")
+    path = person(tmp_path / "vicon.c3d", parameters={"SUBJECTS": {"NAMES": ["HC002D"]}})
+    event = EventToWrite(GaitEvent(0.1, "r", "heel strike"), "motion")
+    measure = Measure("Left", "Cadence", "steps/min", 120.0)
+    (tmp_path / "new.c3d").write_bytes(with_outputs(frames_of(path), outputs(20), "", UNITS, {}, [event], [measure]))
+    parameters = ezc3d.c3d(str(tmp_path / "new.c3d"))["parameters"]
+    assert parameters["EVENT"]["SUBJECTS"]["value"] == parameters["ANALYSIS"]["SUBJECTS"]["value"] == ["HC002D"]
 
 
 def test_more_points_than_a_list_has_room_for(tmp_path):

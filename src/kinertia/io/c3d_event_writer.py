@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from kinertia.io.c3d_events import OWN_METHOD, side_and_kind
+from kinertia.io.c3d_events import OWN_METHOD, person_among, side_and_kind, subjects_of_person
 from kinertia.io.c3d_parameters import ParameterSection, Value
 from kinertia.trial.gait_event import SAME_EVENT_S, GaitEvent, nearest_event
 
@@ -44,19 +44,40 @@ class _Row(NamedTuple):
         return None if kind is None or not side else GaitEvent(60.0 * self.minutes + self.seconds, side, kind)
 
 
-def add_events(section: ParameterSection, events: Sequence[EventToWrite], subject: str) -> int:
+def subject_of(section: ParameterSection, prefix: str) -> str:
+    """Return the name that a file's events have for the trial's person; empty where it names nobody.
+
+    Args:
+        section: parameters of the file.
+        prefix: name before the labels of the person's markers; empty for none.
+    """
+    if prefix:
+        return prefix
+    subjects = {row.subject for row in _rows(section) if not row.description.startswith(OWN_METHOD)}
+    if len(subjects) == 1:
+        return subjects.pop()
+    names = section.get("SUBJECTS", "NAMES")
+    return person_among([] if names is None else [str(name).strip() for name in names], ())
+
+
+def add_events(
+    section: ParameterSection, events: Sequence[EventToWrite], subject: str, others: Collection[str] = ()
+) -> int:
     """Add the events that a file does not state, with their method as description; return how many were added.
 
-    The file's own events keep their values and order. Nothing changes where there is none to add.
+    The file's own events keep their values and order. Nothing changes where there is none to add. Events that another
+    person has (`subjects_of_person`) state nothing of this one.
 
     Args:
         section: parameters of the file.
         events: all known events.
-        subject: name of their person; empty where the file names nobody.
+        subject: name of their person (`subject_of`).
+        others: names of other people whose markers are in the file.
     """
     rows = _rows(section)
     own = [row for row in rows if not row.description.startswith(OWN_METHOD)]
-    stated = [event for row in own if (event := row.of_gait) is not None]
+    persons = subjects_of_person([row.subject for row in own], subject, others)
+    stated = [event for row in own if row.subject in persons and (event := row.of_gait) is not None]
     new = [
         _Row(
             _CONTEXTS[one.event.side],

@@ -18,7 +18,7 @@ import numpy as np
 from kinertia.errors import FileError
 from kinertia.findings.quantity import Quantity
 from kinertia.io.c3d_analysis import Measure, add_analysis
-from kinertia.io.c3d_event_writer import EventToWrite, add_events
+from kinertia.io.c3d_event_writer import EventToWrite, add_events, subject_of
 from kinertia.io.c3d_parameters import ParameterSection, Value, continued
 from kinertia.io.c3d_structure import doubts_about, with_plain_samples
 from kinertia.io.provenance import VERSION
@@ -148,8 +148,10 @@ def with_outputs(
     _put_list(section, "LABELS", labels, OWN_GROUP)
     for key, (value, shape) in own.items():
         section.put(OWN_GROUP, key, value, shape)
-    add_events(section, events, prefix.removesuffix(":"))
-    add_analysis(section, measures, prefix.removesuffix(":"))
+    subject = subject_of(section, prefix.removesuffix(":"))
+    others = {label.split(":", 1)[0] for label in frames.labels if ":" in label} - {subject}
+    add_events(section, events, subject, others)
+    add_analysis(section, measures, subject)
     edited = [text for text in _texts(section, "EDITED", "MANUFACTURER") if not text.startswith(_EDITOR)]
     section.put("MANUFACTURER", "EDITED", [*edited, f"{_EDITOR}{VERSION}"])
     return _together(parts, np.concatenate([_four(one.values) for one in outputs], axis=1))
