@@ -128,6 +128,32 @@ def test_what_others_wrote_stays(results):
     assert [path.name for path in results.parent.iterdir()] == ["out"]
 
 
+@pytest.mark.parametrize("name", ["walk.c3d", "walk/model.osim"])
+@pytest.mark.parametrize("among", ["results", "recordings"])
+def test_a_file_of_the_users_is_never_replaced_by_a_result_of_its_name(results, among, name):
+    """A recording in the folder that its export would go to, a model of one's own: nothing could bring them back."""
+    if among == "recordings":
+        (results / ".kinertia.json").unlink()
+    (results / name).write_text("mine", encoding="utf-8")
+    before = _texts(results)
+    with pytest.raises(FileError, match=rf"{Path(name).name}: is a file of yours .*give another folder"):
+        _write(results, "new", "new.txt", name, kind="export")
+    assert _texts(results) == before
+    (results / name).unlink()
+    if among == "results":
+        _write(results, "new", name, kind="export")
+        _write(results, "newer", name, kind="export")
+        assert _texts(results)[name] == "newer"
+
+
+def test_results_without_their_hidden_list_are_replaced(results):
+    """Copied by a program that passes over hidden files."""
+    (results / ".kinertia.json").unlink()
+    (results / "fit.json").write_text('{"kinertia": "0.1.0"}', encoding="utf-8")
+    _write_again(results)
+    assert _texts(results)["a.txt"] == "new"
+
+
 def test_a_file_system_without_links_and_exchange(results, monkeypatch):
     """Windows' FAT: copies, and two steps."""
 

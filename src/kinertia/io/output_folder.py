@@ -117,10 +117,15 @@ def expect_own_folder(folder: str | Path, otherwise: str = "") -> None:
         return
     found = [path.name for path in folder.iterdir() if not path.name.startswith(_OWN) and path.name not in _ANYWHERE]
     names = sorted(found, key=lambda name: (name.startswith("."), name))
-    if names and not any(_says_kinertia(folder / name) for name in names if name.endswith(_TELLING)):
+    if names and not _has_results(folder):
         listed = ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
         problem = f"holds files that are not results of Kinertia ({listed}); give another folder{otherwise}"
         raise FileError(folder, problem)
+
+
+def _has_results(folder: Path) -> bool:
+    """Return whether a file in a folder states that Kinertia made it."""
+    return any(_says_kinertia(path) for path in folder.iterdir() if path.suffix in _TELLING)
 
 
 def _says_kinertia(path: Path) -> bool:
@@ -213,6 +218,9 @@ def _replace(new: Path, folder: Path, kind: str, aside: Path) -> None:
     others = {name for names in written.values() for name in names}
     written[kind] = sorted(_files(new) - others - {_WRITTEN})
     listed = _written(folder)
+    if foreign := _foreign(folder, _files(new), listed):
+        problem = "is a file of yours that a result of this name would replace; nothing was written"
+        raise FileError(folder / foreign[0], f"{problem}: give another folder, or rename the file")
     old = {name for one in written for name in listed.get(one, ())} | {_WRITTEN}
     everything = {**{one: names for one, names in listed.items() if one not in written}, **written}
     (new / _WRITTEN).write_text(json.dumps(everything, indent=1) + "\n", encoding="utf-8")
@@ -234,6 +242,17 @@ def _replace(new: Path, folder: Path, kind: str, aside: Path) -> None:
     for name in _files(before) - staying - old - _files(folder):  # came in the meantime
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         os.replace(before / name, folder / name)
+
+
+def _foreign(folder: Path, names: Collection[str], listed: dict[str, list[str]]) -> list[str]:
+    """Return which of these files the folder has already from elsewhere, like a recording or the user's own model.
+
+    Results that were copied without their hidden list count as Kinertia's.
+    """
+    if not folder.is_dir() or (not listed and _has_results(folder)):
+        return []
+    ours = {_WRITTEN, *(name for of_kind in listed.values() for name in of_kind)}
+    return sorted((_files(folder) & set(names)) - ours)
 
 
 def _written(folder: Path) -> dict[str, list[str]]:
