@@ -416,3 +416,10 @@ def test_killed_at_random_moments_the_folder_is_one_generation(tmp_path, kills):
     done = _process(GENERATIONS, tmp_path / "out", kills)
     assert done.returncode == 0, done.stderr
     assert int(done.stdout) > kills / 4, "most kills must fall after a folder was replaced"
+
+
+def test_a_file_that_a_result_would_replace_is_refused_before_any_work(results):
+    (results / "model.osim").write_text("mine", encoding="utf-8")
+    check_folder(results, files=["fit.json"])
+    with pytest.raises(FileError, match=r"model\.osim: is a file of yours"):
+        check_folder(results, files=["fit.json", "model.osim"])

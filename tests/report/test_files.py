@@ -11,7 +11,7 @@ from kinertia.diagnostics.result.suitability import suitability
 from kinertia.errors import FileError
 from kinertia.io.output_folder import check_folder
 from kinertia.io.sto import read_sto
-from kinertia.report.files import save_fit, summary
+from kinertia.report.files import FIT_FILES, TRIAL_FILES, save_fit, summary
 from kinertia.settings import Settings
 
 STAGES = {"literature", "corrected", "estimate"}
@@ -190,7 +190,7 @@ def test_several_trials_have_a_folder_each(short_fit, tmp_path):
 
 def test_results_replace_older_ones_and_leave_other_files_alone(saved, tmp_path):
     fit, _ = saved
-    (tmp_path / "fit.json").write_text("old")
+    (tmp_path / "fit.json").write_text('{"kinertia": "old"}')
     (tmp_path / "mine.txt").write_text("kept")
     save_fit(fit, tmp_path, force=True)
     assert json.loads((tmp_path / "fit.json").read_text())["kinertia"] == version("kinertia")
@@ -198,14 +198,18 @@ def test_results_replace_older_ones_and_leave_other_files_alone(saved, tmp_path)
     assert {path.name for path in tmp_path.glob("[!.]*")} == RESULTS | {"mine.txt"}
 
 
-def test_files_of_others_are_kept_unless_asked(short_fit, tmp_path):
+def test_files_of_others_are_kept_whatever_is_asked(short_fit, tmp_path):
     (tmp_path / "model.osim").write_text("mine")
     with pytest.raises(FileError, match=r"holds files that are not results of Kinertia \(model.osim\).*force=True"):
         short_fit.save(tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["model.osim"]
     assert (tmp_path / "model.osim").read_text() == "mine"
+    with pytest.raises(FileError, match=r"model\.osim: is a file of yours"):
+        short_fit.save(tmp_path, force=True)
+    (tmp_path / "model.osim").rename(tmp_path / "mine.osim")
     short_fit.save(tmp_path, force=True)
     assert "<OpenSimDocument" in (tmp_path / "model.osim").read_text()
+    assert (tmp_path / "mine.osim").read_text() == "mine"
 
 
 def test_a_failure_while_writing_leaves_nothing(saved, tmp_path, monkeypatch):
@@ -228,3 +232,8 @@ def test_folder_that_is_a_file(tmp_path):
             check_folder(folder)
     check_folder(tmp_path / "new" / "folder")
     assert [path.name for path in tmp_path.iterdir()] == ["taken"]
+
+
+def test_names_of_results_are_known_before(demo_run):
+    names = {path.name for path in demo_run[1].iterdir()}
+    assert set(FIT_FILES) | set(TRIAL_FILES) <= names

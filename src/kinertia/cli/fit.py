@@ -39,7 +39,7 @@ from kinertia.io.file_names import same_folder
 from kinertia.io.provenance import command_line, provenance_of
 from kinertia.io.subject_file import read_subject, subject_file_in, subject_from_options, with_settings
 from kinertia.io.subject_tables import SubjectFile
-from kinertia.report.files import save_fit, summary
+from kinertia.report.files import FIT_FILES, TRIAL_FILES, save_fit, summary
 from kinertia.settings import Overrule, Settings
 from kinertia.workflow.from_files import fit_subject
 
@@ -114,7 +114,9 @@ def fit(
     runs = _runs(trials, output, options, method, overrule_of(waive))
     for one in runs:
         names = [trial.name for trial in one.wanted.trials]
-        results_folder(one.folder, overwrite, names if len(names) > 1 else ())
+        several = len(names) > 1
+        files = FIT_FILES if several else (*FIT_FILES, *TRIAL_FILES)
+        results_folder(one.folder, overwrite, names if several else (), files)
     summaries, status = [], 0
     for one in runs:
         try:

@@ -16,15 +16,19 @@ from kinertia.io.output_folder import check_folder, expect_own_folder
 from kinertia.settings import Overrule, number_of, sex_of
 
 
-def results_folder(folder: Path, overwrite: bool, sub_folders: Collection[str] = ()) -> None:
+def results_folder(
+    folder: Path, overwrite: bool, sub_folders: Collection[str] = (), files: Collection[str] = ()
+) -> None:
     """Raise an error, before any work, if results cannot or may not go to a folder, or its `sub_folders`.
+
+    Not all names of results are known so early; `files` lists those that are.
 
     Raises:
         FileError: it cannot be written to, or holds other files and `overwrite` is False.
     """
     if not overwrite:
         expect_own_folder(folder, ", or --overwrite to write among them")
-    check_folder(folder, sub_folders)
+    check_folder(folder, sub_folders, files)
 
 
 def number(text: str) -> float:

@@ -278,7 +278,7 @@ class Fit:
 
         Args:
             folder: created if necessary.
-            force: write even among files that are not results of Kinertia; files of the same names are replaced.
+            force: write even among files that are not results of Kinertia; one with the name of a result is refused.
 
         Raises:
             FileError: the folder holds such files, or cannot be written to.

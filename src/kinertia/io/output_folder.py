@@ -8,7 +8,7 @@ import shutil
 import signal
 import sys
 import threading
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -34,7 +34,7 @@ _RESULTS = {".html", ".json", ".csv", ".osim", ".sto", ".mot", ".trc", ".c3d", "
 """Types of files that results have."""
 
 
-def check_folder(folder: str | Path, sub_folders: Collection[str] = ()) -> None:
+def check_folder(folder: str | Path, sub_folders: Collection[str] = (), files: Collection[str] = ()) -> None:
     """Raise FileError unless results can be written to `folder`, which need not exist yet.
 
     Call it before a long computation. It also removes what killed runs left beside the folder.
@@ -42,11 +42,13 @@ def check_folder(folder: str | Path, sub_folders: Collection[str] = ()) -> None:
     Args:
         folder: folder that is replaced as a whole when results are complete, with everything else in it.
         sub_folders: names in it that results need as folders.
+        files: names of results, as far as they are known already.
     """
     folder = _real(folder)
     _expect_place(folder)
     if not folder.is_dir():
         return
+    _expect_nothing_of_others(folder, files, _written(folder))
     for path in folder.rglob("*"):
         if path.is_dir() and path.suffix.lower() in _RESULTS and path.name not in sub_folders:
             raise FileError(path, "is a folder where a file of the results may go; rename it, or give another folder")
@@ -218,9 +220,7 @@ def _replace(new: Path, folder: Path, kind: str, aside: Path) -> None:
     others = {name for names in written.values() for name in names}
     written[kind] = sorted(_files(new) - others - {_WRITTEN})
     listed = _written(folder)
-    if foreign := _foreign(folder, _files(new), listed):
-        problem = "is a file of yours that a result of this name would replace; nothing was written"
-        raise FileError(folder / foreign[0], f"{problem}: give another folder, or rename the file")
+    _expect_nothing_of_others(folder, _files(new), listed)
     old = {name for one in written for name in listed.get(one, ())} | {_WRITTEN}
     everything = {**{one: names for one, names in listed.items() if one not in written}, **written}
     (new / _WRITTEN).write_text(json.dumps(everything, indent=1) + "\n", encoding="utf-8")
@@ -244,15 +244,17 @@ def _replace(new: Path, folder: Path, kind: str, aside: Path) -> None:
         os.replace(before / name, folder / name)
 
 
-def _foreign(folder: Path, names: Collection[str], listed: dict[str, list[str]]) -> list[str]:
-    """Return which of these files the folder has already from elsewhere, like a recording or the user's own model.
+def _expect_nothing_of_others(folder: Path, names: Collection[str], listed: Mapping[str, Sequence[str]]) -> None:
+    """Raise FileError if one of these files is there already from elsewhere, like a recording or the user's own model.
 
     Results that were copied without their hidden list count as Kinertia's.
     """
     if not folder.is_dir() or (not listed and _has_results(folder)):
-        return []
+        return
     ours = {_WRITTEN, *(name for of_kind in listed.values() for name in of_kind)}
-    return sorted((_files(folder) & set(names)) - ours)
+    if foreign := sorted((_files(folder) & set(names)) - ours):
+        problem = "is a file of yours that a result of this name would replace; nothing was written"
+        raise FileError(folder / foreign[0], f"{problem}: give another folder, or rename the file")
 
 
 def _written(folder: Path) -> dict[str, list[str]]:

@@ -35,6 +35,10 @@ from kinertia.report.truth_comparison import Truth
 from kinertia.report.wording import asymmetry_sentences
 from kinertia.trial.rms import rms, rms_length
 
+FIT_FILES = ("fit.json", FIT_FILE, "report.html", "bsp.csv", "model.osim")
+"""Names of results that every fit has."""
+TRIAL_FILES = ("kinematics.mot", "ground_reactions.mot", "external_loads.xml", "inverse_dynamics.sto", "residuals.sto")
+"""Names of results that every trial has."""
 _PARTS = (slice(0, 3), slice(3, 6))
 """Force and moment of a residual."""
 _ALL_DIGITS, _SIX_DIGITS = "%r", "%.6g"
@@ -52,7 +56,7 @@ def save_fit(
 
     With one trial its files are in the folder itself, with several in a sub-folder per trial. The report states
     command and files given by `provenance`, and shows the truth of a synthetic person. With `force` also among
-    files that are not results of Kinertia; those of the same names are replaced.
+    files that are not results of Kinertia; a file with the name of a result is refused.
 
     Raises:
         FileError: the folder holds such files, or cannot be written to.
