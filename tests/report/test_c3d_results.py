@@ -98,6 +98,15 @@ def test_the_prefix_is_the_persons(prefix):
     assert prefix_of(SimpleNamespace(labels=labels), trial) == prefix
 
 
+def test_the_prefix_is_not_that_of_a_second_person():
+    """The reader leaves the others' prefixes in place, so that as many labels are found without Anna's."""
+    own, other = ("LASI", "RASI", "LKNE"), ("Ben:LASI", "Ben:RASI", "Ben:LKNE")
+    markers = SimpleNamespace(labels=(*own, *other))
+    trial = SimpleNamespace(kinematics=SimpleNamespace(trial=SimpleNamespace(markers=markers)))
+    labels = (*(f"Anna:{label}" for label in own), *other)
+    assert prefix_of(SimpleNamespace(labels=labels), trial) == "Anna:"
+
+
 WALKS = {
     "A": ("pig_c3d/subject_a_walk.c3d", "pig_c3d/subject_a_static.c3d", "--mass 41.5 --height 1.61 --sex male"),
     "B": ("pig_c3d/subject_b_walk.c3d", "pig_c3d/subject_b_static.c3d", "--sex female"),

@@ -130,8 +130,13 @@ def _suffixed(label: str) -> str:
 
 
 def prefix_of(frames: C3dFrames, trial: TrialFit) -> str:
-    """Return the subject prefix that most of the trial's markers have in the file."""
-    labels, own = set(frames.labels), trial.kinematics.trial.markers.labels
+    """Return the subject prefix that most of the trial's markers have in the file.
+
+    Labels of other people in it keep their prefixes, and do not count.
+    """
+    labels = set(frames.labels)
+    every = trial.kinematics.trial.markers.labels
+    own = [label for label in every if ":" not in label] or every
     prefixes = dict.fromkeys(["", *(label.split(":", 1)[0] + ":" for label in frames.labels if ":" in label)])
     return max(prefixes, key=lambda prefix: sum(prefix + label in labels for label in own))
 
