@@ -34,14 +34,17 @@ def test_events_with_their_forces(trial):
     assert found(trial, []) == found(trial, of_loads(trial)) == found(trial, of_loads(trial, 0.025)) == []
 
 
-@pytest.mark.parametrize("delay_s", [-0.06, 0.04])
-def test_one_event_that_is_off(trial, delay_s):
+@pytest.mark.parametrize(
+    ("delay_s", "words"), [(-0.06, "is 60 ms before its force"), (0.04, "is 40 ms after its force")]
+)
+def test_one_event_that_is_off(trial, delay_s, words):
     events = of_loads(trial)
     events[3] = FileEvent(events[3].time_s + delay_s, events[3].side, "Foot Off", "", events[3].kind)
     (one,) = found(trial, events)
     assert one.code == "T311"
     assert one.evidence["difference_s"].value == pytest.approx(delay_s)
     assert one.evidence["events"].value == 1
+    assert words in one.message
 
 
 def test_events_of_the_other_foot(trial):

@@ -24,12 +24,15 @@ def file_events(context: RecordingContext) -> Iterator[Finding]:
     apart = contradicted_events(trial)
     if apart:
         stated, shown = max(apart, key=lambda pair: abs(pair[0].time_s - pair[1].time_s))
+        difference = stated.time_s - shown.time_s
         yield finding(
             "T311",
             context.at(),
             event=Quantity(stated.label),
             foot=Quantity(FOOT_NAMES[FEET.index(stated.side)]),
             time_s=Quantity(stated.time_s, "s"),
-            difference_s=Quantity(stated.time_s - shown.time_s, "s", limit=EVENT_LIMIT_S),
+            difference_s=Quantity(difference, "s", limit=EVENT_LIMIT_S),
+            apart_s=Quantity(abs(difference), "s"),
+            direction=Quantity("after" if difference > 0.0 else "before"),
             events=Quantity(len(apart), "1"),
         )
