@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import kinertia
+from command_line import run
 from kinertia.errors import FileError
 from kinertia.io.b3d import about_origin, read_b3d
 
@@ -99,6 +100,10 @@ def test_broken_and_missing_files_are_refused(nimble, tmp_path):
 def test_commands_point_to_it(tmp_path):
     with pytest.raises(FileError, match=r"kinertia\.read_b3d"):
         kinertia.read_recording(a_file(tmp_path))
+    for command in ("fit", "check", "markers"):
+        refused = run(command, a_file(tmp_path))
+        assert refused.status == 2
+        assert "kinertia.read_b3d" in refused.err, command
 
 
 def test_a_subject_that_nimblephysics_wrote():

@@ -37,6 +37,7 @@ from kinertia.errors import FileError, KinertiaError
 from kinertia.estimation.result import Fit
 from kinertia.io.file_names import same_folder
 from kinertia.io.provenance import command_line, provenance_of
+from kinertia.io.recording import expect_recording
 from kinertia.io.subject_file import read_subject, subject_file_in, subject_from_options, with_settings
 from kinertia.io.subject_tables import SubjectFile
 from kinertia.report.files import FIT_FILES, TRIAL_FILES, save_fit, summary
@@ -233,6 +234,7 @@ def _from_options(trial: Path, options: dict[str, Any]) -> SubjectFile:
     given = {
         key: str(value) if isinstance(value, Path) else value for key, value in options.items() if value is not None
     }
+    expect_recording(trial)
     if "--sex" not in given and "--model" not in given:
         raise FileError(
             trial, "a trial on its own needs --sex (or --model); or write a subject file (kinertia init FOLDER)"

@@ -54,8 +54,7 @@ def read_recording(
         TrialError: forces and markers do not overlap in time.
     """
     markers_path = Path(markers_path)
-    if markers_path.suffix.lower() == _SUBJECT:
-        raise FileError(markers_path, "holds a subject's trials: kinertia.read_b3d reads them all, in Python")
+    expect_recording(markers_path)
     _expect_kind(markers_path, MARKER_FILES, "markers")
     tsv = forces_path is not None and Path(forces_path).suffix.lower() == ".tsv"
     recording = _read_markers(markers_path, Path(str(forces_path)) if tsv else None, length_unit, standing)
@@ -129,6 +128,12 @@ def _turned(recording: Recording, path: Path, turn: FloatArray) -> Recording:
         vertical="+Z",
         findings=(*recording.findings, rotated),
     )
+
+
+def expect_recording(path: Path) -> None:
+    """Raise a FileError for a file of a subject with many recordings (AddBiomechanics' .b3d)."""
+    if path.suffix.lower() == _SUBJECT:
+        raise FileError(path, "holds a subject's trials: kinertia.read_b3d reads them all, in Python")
 
 
 def _expect_kind(path: Path, suffixes: tuple[str, ...], what: str) -> None:

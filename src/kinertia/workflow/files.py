@@ -11,7 +11,7 @@ from pathlib import Path
 from kinertia.errors import FileError
 from kinertia.findings.quantity import Quantity
 from kinertia.io.qualisys import is_plate_file
-from kinertia.io.recording import FORCE_FILES, MARKER_FILES, read_recording
+from kinertia.io.recording import FORCE_FILES, MARKER_FILES, expect_recording, read_recording
 from kinertia.io.subject_draft import STATIC_NAME, matched_by_name
 from kinertia.trial.data import Recording
 from kinertia.trial.marker_quality import travel
@@ -48,6 +48,7 @@ def files_by_name(
         if path.is_dir():
             raise _unpaired(path, "is a folder", "Give the files in it, or a subject file (kinertia init drafts one)")
         if path.suffix.lower() not in (*MARKER_FILES, *FORCE_FILES):
+            expect_recording(path)
             raise unknown_kind(path)
     marked = [path for path in files if path.suffix.lower() in MARKER_FILES and not is_plate_file(path)]
     beside = [path for path in files if path not in marked]
