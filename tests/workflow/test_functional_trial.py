@@ -149,6 +149,18 @@ def test_its_markers_must_be_sound(lab):
     assert not [one for one in screened.findings if one.code == "P283"]
 
 
+@pytest.mark.parametrize("window_s", [(200.0, 260.0), (1.0, 1.04)])
+def test_a_window_with_hardly_any_of_its_frames_leaves_it_out(lab, window_s):
+    measured, squats = lab
+    inputs = [TrialInput(measured.walk), TrialInput(squats, window_s, use="kinematics")]
+    checked = check_person(Person(SUBJECT, inputs, measured.static))
+    (found,) = [one for one in checked.findings if one.where.trial == "squat" and one.severity.name == "ERROR"]
+    assert (found.code, found.evidence["key"].value) == ("F191", "window_s")
+    assert checked.overview.line.endswith("1 of 2 trials")
+    ready = prepare(SUBJECT, measured.static, inputs)
+    assert (ready.functional, ready.left_out) == ((), ("squat",))
+
+
 def test_of_no_trial_with_forces_none_joins(lab):
     measured, _ = lab
     inputs = [TrialInput(with_empty_plates(measured.walk, name)) for name in ("one", "two")]

@@ -13,12 +13,12 @@ from kinertia.diagnostics.evidence.plate_contacts import BETWEEN_M, ONE_STEP_S, 
 from kinertia.diagnostics.evidence.plate_edges import OVERHANG_M
 from kinertia.diagnostics.plates.heel_landing import goes_forwards
 from kinertia.errors import KinertiaError
-from kinertia.findings.finding import Finding, finding
+from kinertia.findings.finding import Finding, finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.motion.kinematics import FEWEST_FRAMES
 from kinertia.trial.data import FEET, BoolArray
 from kinertia.trial.plate_assignment import FOOT_NAMES, no_forces
-from kinertia.trial.sampled_time import span_s
+from kinertia.trial.sampled_time import span_s, within
 
 _OUTSIDE_M, _OUTSIDE_SHARE = 0.14, 0.01
 _MOSTLY = 0.5
@@ -30,12 +30,12 @@ marker it is up to 0.19 of the way to the other foot, which stands on the floor.
 def complete_contact(context: RecordingContext) -> Iterator[Finding]:
     """T104, P271, P278: no trial can be made of the recording; P279: it has too few frames with complete contact; P273,
     P274, P275, P277: how its loads were sorted by foot; P280, P283: its markers alone are used, as asked for or since
-    its forces cannot be.
+    its forces cannot be; F191: hardly any frames are in the window stated for these.
     """
     if context.is_static:
         return
     if context.without_forces:
-        yield finding("P283" if context.forces_refused else "P280", context.at())
+        yield _too_few_in_window(context) or finding("P283" if context.forces_refused else "P280", context.at())
         return
     if context.plates is None:
         yield no_forces(context.recording).in_trial(context.name)
@@ -52,6 +52,22 @@ def complete_contact(context: RecordingContext) -> Iterator[Finding]:
     if frames < FEWEST_FRAMES:
         measured = Quantity(frames, "1", limit=FEWEST_FRAMES)
         yield finding("P279", context.at(span_s=(start, end)), frames=measured)
+
+
+def _too_few_in_window(context: RecordingContext) -> Finding | None:
+    """Return F191 if a window stated for a trial without forces has too few of its frames."""
+    time, window_s = context.recording.markers.time, context.window_s
+    if window_s is None or (frames := int(within(time, *window_s).sum())) >= FEWEST_FRAMES:
+        return None
+    stated = f"[{window_s[0]:g}, {window_s[1]:g}]"
+    lasts = f"the trial lasts from {time[0]:.2f} to {time[-1]:.2f} s"
+    evidence = {
+        "entry": Quantity(f"window_s = {stated}"),
+        "expected": Quantity(f"has {frames} frames of the trial, and {FEWEST_FRAMES} are needed; {lasts}"),
+        "key": Quantity("window_s"),
+        "value": Quantity(stated),
+    }
+    return with_evidence("F191", context.at(), evidence)
 
 
 def both_feet(context: RecordingContext) -> Iterator[Finding]:
