@@ -121,6 +121,17 @@ def test_events_of_the_file_stay_as_they_are():
     ]
 
 
+@pytest.mark.parametrize(("flags", "size"), [(None, 1), ([0, 1], 1), ([0, 1], 2), ([0, 300], 2)])
+def test_flags_are_stored_as_in_the_file(flags, size):
+    """One byte each in Vicon's files; elsewhere two."""
+    section = section_of({"EVENT": EVENTS})
+    if flags is not None:
+        section.put("EVENT", "GENERIC_FLAGS", np.array(flags, np.int8 if size == 1 else np.int16))
+    add_events(section, [EventToWrite(GaitEvent(3.0, "r", "heel strike"), "motion")], "")
+    stored = section.get("EVENT", "GENERIC_FLAGS")
+    assert (stored.dtype.itemsize, stored.tolist()) == (size, [*(flags or [0, 0]), 0])
+
+
 def section_of(parameters: dict[str, dict[str, object]]) -> ParameterSection:
     section = ParameterSection(bytes([1, 80, 1, 84]).ljust(512, b"\0"), "<")
     for group, entries in parameters.items():

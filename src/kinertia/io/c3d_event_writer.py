@@ -116,13 +116,15 @@ def _rows(section: ParameterSection) -> list[_Row]:
 
 
 def _put(section: ParameterSection, rows: Sequence[_Row]) -> None:
+    """Write all events; flags are bytes as in Vicon's files, or what they are in this one."""
+    flags = np.int8 if section.get(_GROUP, "GENERIC_FLAGS") is None else np.int16
     lists: dict[str, Value] = {
         "CONTEXTS": [row.context for row in rows],
         "LABELS": [row.label for row in rows],
         "DESCRIPTIONS": [row.description for row in rows],
         "SUBJECTS": [row.subject for row in rows],
         "ICON_IDS": np.array([row.icon for row in rows], dtype=np.int16),
-        "GENERIC_FLAGS": np.array([row.flag for row in rows], dtype=np.int16),
+        "GENERIC_FLAGS": np.array([row.flag for row in rows], dtype=flags),
         "USED": np.array([len(rows)], dtype=np.int16),
     }
     for name, value in lists.items():

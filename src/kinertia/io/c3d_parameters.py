@@ -108,14 +108,16 @@ class ParameterSection:
 
         Args:
             group, name: which entry.
-            value: its value; texts are stored as wide as the longest, or as before where that is wider.
+            value: its value; texts are stored as wide as the longest, or as before where that is wider; whole numbers
+                in two bytes, in one if they are of type int8, or were and fit.
             shape: shape as in the file, fastest dimension first; one list if None.
         """
         k = self._find(group, name)
         old = None if k is None else self.records[k]
         width = old.body[2] if old is not None and old.body[:1] == b"\xff" and old.body[1] > 1 else 1
         described = old.body[self._described(old.body) :] if old is not None else b"\0"
-        body = self._plain(value, shape, width) + described
+        bytewise = old is not None and old.body[:1] == b"\x01"
+        body = self._plain(value, shape, width, bytewise) + described
         if old is not None and k is not None:
             self.records[k] = Record(old.group, old.name, old.head, body)
             return
@@ -148,12 +150,14 @@ class ParameterSection:
         kind, dimensions = struct.unpack_from("bB", body)
         return int(2 + dimensions + abs(kind) * math.prod(body[2 : 2 + dimensions]))
 
-    def _plain(self, value: Value, shape: tuple[int, ...] | None, width: int) -> bytes:
+    def _plain(self, value: Value, shape: tuple[int, ...] | None, width: int, bytewise: bool) -> bytes:
         if isinstance(value, np.ndarray):
-            whole = np.issubdtype(value.dtype, np.integer)
+            kind = 2 if np.issubdtype(value.dtype, np.integer) else 4
+            if value.dtype == np.int8 or (kind == 2 and bytewise and np.array_equal(value, value.astype(np.int8))):
+                kind = 1
             sizes = shape or (value.size,)
-            numbers = np.ravel(value).astype(f"{self.order}{'i2' if whole else 'f4'}").tobytes()
-            return struct.pack("bB", 2 if whole else 4, len(sizes)) + bytes(sizes) + numbers
+            numbers = np.ravel(value).astype(f"{self.order}{_NUMBERS[kind]}").tobytes()
+            return struct.pack("bB", kind, len(sizes)) + bytes(sizes) + numbers
         texts = [text.encode(*_TEXT)[:_MOST] for text in value]
         width = max([width, *map(len, texts)])
         sizes = (width, *(shape or (len(texts),)))
