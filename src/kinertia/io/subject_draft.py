@@ -68,29 +68,42 @@ def init_files(folder: str | Path, nearby: bool = True, marker_set: bool = True)
     by_model = len(models) == 1 and not any(STATIC_NAME.search(file.stem) for file in captures)
     static, trials = (None, captures) if by_model else _static_and_trials(captures)
     others = [file.name for file in c3d + trc if file not in (static, *trials)]
-    alone = [trial for trial in trials if not _brings_forces(trial)]
-    forces, loads = (
-        _here_or_near(folder, files, holds) if nearby else [file for file in files if holds(file)]
-        for holds in (holds_forces, holds_loads)
-    )
-    chosen = matched_by_name(alone, forces)
     text = [f"# Drafted from the files in {folder.name}: complete the lines marked FILL IN, check the rest."]
     if others:
         text += [f"# Left out (another subject's, another static trial, or also there as C3D): {', '.join(others)}."]
     text += ["", "[subject]", *_subject_lines([file for file in (static, *trials) if file in c3d])]
     wanted = marker_set and not by_model and not (folder / MARKER_SET).exists()
     own = _drafted_set(static, trials) if wanted else ""
+    has_set = (folder / MARKER_SET).is_file() or bool(own)
+    text += ["", "[model]"]
+    text += [_entry(Model, "osim", models[0].name)] if by_model else _static_lines(static, has_set)
+    text += _trial_lines(folder, files, trials, nearby)
+    sheets = [] if by_model else [file.name for file in files if is_measures_sheet(file)]
+    if sheets:
+        text += ["", "[prior]", _entry(PriorFiles, "measures", sheets[0] if len(sheets) == 1 else None, sheets[0])]
+    stated = Settings().model_dump(exclude_none=True)
+    text += ["", "[settings]", *(_entry(Settings, *item) for item in stated.items())]
+    text += ["# " + _entry(Settings, "joint_axes", True), ""]
+    return {SUBJECT: "\n".join(text)} | ({MARKER_SET: own} if own else {})
+
+
+def _static_lines(static: Path | None, has_set: bool) -> list[str]:
+    """Return the entries of a model made from a static trial; `has_set` is whether a marker set lies in the folder."""
     guessed = static is not None and not STATIC_NAME.search(static.stem)
     note = " (the shortest in which nobody moves)" if guessed else "" if static else _NO_STATIC
-    text += ["", "[model]"]
-    if by_model:
-        text += [_entry(Model, "osim", models[0].name)]
-    else:
-        text += [_entry(Model, "static", static and static.name, "static.trc", note)]
-        if (folder / MARKER_SET).is_file() or own:
-            text += [_entry(Model, "markers", MARKER_SET)]
-        else:
-            text += ["# " + _entry(Model, "markers", "plug-in-gait")]
+    markers = _entry(Model, "markers", MARKER_SET) if has_set else "# " + _entry(Model, "markers", "plug-in-gait")
+    return [_entry(Model, "static", static and static.name, "static.trc", note), markers]
+
+
+def _trial_lines(folder: Path, files: Sequence[Path], trials: Sequence[Path], nearby: bool) -> list[str]:
+    """Return a table per trial with the forces and loads that are most like it by name."""
+    alone = [trial for trial in trials if not _brings_forces(trial)]
+    forces, loads = (
+        _here_or_near(folder, files, holds) if nearby else [file for file in files if holds(file)]
+        for holds in (holds_forces, holds_loads)
+    )
+    chosen = matched_by_name(alone, forces)
+    text = []
     for trial in trials:
         text += ["", "[[trial]]", _entry(TrialFiles, "markers", trial.name)]
         if trial in chosen:
@@ -100,15 +113,7 @@ def init_files(folder: str | Path, nearby: bool = True, marker_set: bool = True)
         elif trial in alone:
             text += [f"{NO_FORCES} {trial.name}, here or in the folders in and beside this one.{_unread(files)}"]
             text += [_entry(TrialFiles, "forces", None, "walk_grf.mot")]
-    if not trials:
-        text += ["", "[[trial]]", _entry(TrialFiles, "markers", None, "walk.trc")]
-    sheets = [] if by_model else [file.name for file in files if is_measures_sheet(file)]
-    if sheets:
-        text += ["", "[prior]", _entry(PriorFiles, "measures", sheets[0] if len(sheets) == 1 else None, sheets[0])]
-    stated = Settings().model_dump(exclude_none=True)
-    text += ["", "[settings]", *(_entry(Settings, *item) for item in stated.items())]
-    text += ["# " + _entry(Settings, "joint_axes", True), ""]
-    return {SUBJECT: "\n".join(text)} | ({MARKER_SET: own} if own else {})
+    return text or ["", "[[trial]]", _entry(TrialFiles, "markers", None, "walk.trc")]
 
 
 def _drafted_set(static: Path | None, trials: Sequence[Path]) -> str:
