@@ -85,12 +85,7 @@ def read_c3d(path: str | Path, length_unit: str | None = None, standing: bool = 
     unit_name, unit_findings = _length_unit(path, parameters, positions, length_unit)
     unit = METRES_PER_UNIT[unit_name]
     if poses is not None:
-        poses = poses.scaled(unit)
-        places = virtual_places(poses)
-        labels, positions = tuple(places), virtual_markers(poses.standing() if standing else poses, places) / unit
-        made = Quantity("the person standing upright" if standing else "segment poses")
-        sizes = {"count": Quantity(len(labels), "1"), "sd_m": Quantity(POSE_SD_M, "m")}
-        label_findings = [with_evidence("F165", Where(path.name), {**sizes, "source": made})]
+        labels, positions, label_findings = _pose_markers(path, poses, unit, standing)
     time = _times(file, "points" if poses is None else "rotations")[: len(positions)]
     plates, more_findings = lab_plates(path, file, unit_name)
     stated = str(parameter_values(parameters, "POINT", "Y_SCREEN", [""])[0]).strip().upper()
@@ -160,6 +155,18 @@ def _poses(file: C3dContent) -> Poses | None:
     heels = {side: parameter_values(file["parameters"], "THEIA3D", f"{side}_heel") for side in "rl"}
     known = {side: np.ravel(heel).astype(float) for side, heel in heels.items() if np.size(heel) == 3}
     return Poses.of(labels, file["data"]["rotations"], known)
+
+
+def _pose_markers(
+    path: Path, poses: Poses, unit: float, standing: bool
+) -> tuple[tuple[str, ...], FloatArray, list[Finding]]:
+    """Make virtual markers of poses: labels, positions (n, m, 3) in lab axes and file units, and the finding F165."""
+    poses = poses.scaled(unit)
+    places = virtual_places(poses)
+    positions = virtual_markers(poses.standing() if standing else poses, places) / unit
+    made = Quantity("the person standing upright" if standing else "segment poses")
+    sizes = {"count": Quantity(len(places), "1"), "sd_m": Quantity(POSE_SD_M, "m")}
+    return tuple(places), positions, [with_evidence("F165", Where(path.name), {**sizes, "source": made})]
 
 
 def _length_unit(path: Path, parameters: Any, positions: FloatArray, stated: str | None) -> tuple[str, list[Finding]]:
