@@ -16,7 +16,7 @@ from kinertia.estimation.identifiability import evidence
 from kinertia.estimation.result import Fit, TrialFit
 from kinertia.estimation.simultaneous.calibration_entry import SHOWN_UNIT, item_text, quantity_text
 from kinertia.io.provenance import Provenance, versions
-from kinertia.model.bsp import PARAMETERS
+from kinertia.model.bsp import PARAMETERS, BodySegmentParameters
 from kinertia.motion.clinical_angles import CLINICAL_ANGLES
 from kinertia.report.body_figure import body_figure
 from kinertia.report.bsp_figures import (
@@ -99,16 +99,7 @@ def render(
             "information": _written(body_figure(fit, "information")),
             "changes": written(change_figure(fit, MASS_AND_COM, true_bsp)),
         },
-        bsp={
-            **{
-                name: {
-                    "change": written(change_figure(fit, some, true_bsp)),
-                    "departure": _written(departure_figure(fit, some)),
-                }
-                for name, some in (("main", MAIN), ("products", PRODUCTS))
-            },
-            "rows": bsp_rows(fit),
-        },
+        bsp=_parameters(fit, true_bsp),
         information=_written(information_figure(fit)),
         residuals=residual_rows(fit.trials),
         truth=None if truth is None else truth_rows(fit, truth),
@@ -124,6 +115,18 @@ def render(
         most_events=MOST_EVENTS,
         seconds={trial.name: dict(trial.seconds) for trial in fit.trials},
     )
+
+
+def _parameters(fit: Fit, true_bsp: BodySegmentParameters | None) -> dict[str, Any]:
+    """Collect everything that the template shows of the body segment parameters."""
+    figures = {
+        name: {
+            "change": written(change_figure(fit, some, true_bsp)),
+            "departure": _written(departure_figure(fit, some)),
+        }
+        for name, some in (("main", MAIN), ("products", PRODUCTS))
+    }
+    return {**figures, "rows": bsp_rows(fit)}
 
 
 def _written(figure: Figure | None) -> dict[str, Any] | None:
