@@ -116,7 +116,6 @@ def person_page(
     rows = file_table(person.files(), dict(content))
     notes = person.notes()
     found = trouble(person) if person.subject.is_file() else notes.get("draft", "")
-    checked, results = (_known(person.outcome(kind)) for kind in ("check", "results"))
     return page(
         request,
         "person.html.j2",
@@ -141,16 +140,24 @@ def person_page(
         saved=notes.get("saved", False),
         jobs=progress(person, jobs),
         ended={kind: _how(notes, kind) for kind in KINDS},
-        check=checked,
-        check_page=(person.check / "check.html").is_file(),
-        check_old=bool(checked) and checked.get("inputs") != person.inputs,
+        **_outcomes(person),
         looks=LOOKS,
-        results=results if person.fitted else {},
-        fitted=person.fitted,
-        results_old=bool(results) and results.get("inputs") != person.inputs,
-        result_files=_result_files(person),
         limits=LIMITS,
     )
+
+
+def _outcomes(person: Person) -> dict[str, Any]:
+    """Collect everything that the template shows of the last check and the last fit; old: of other files."""
+    checked, results = (_known(person.outcome(kind)) for kind in ("check", "results"))
+    return {
+        "check": checked,
+        "check_page": (person.check / "check.html").is_file(),
+        "check_old": bool(checked) and checked.get("inputs") != person.inputs,
+        "results": results if person.fitted else {},
+        "fitted": person.fitted,
+        "results_old": bool(results) and results.get("inputs") != person.inputs,
+        "result_files": _result_files(person),
+    }
 
 
 def _how(notes: Mapping[str, Any], kind: str) -> dict[str, str]:
