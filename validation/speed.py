@@ -204,8 +204,8 @@ def gcv_splines(frames: int, columns: int, runs: int) -> tuple[float, float]:
     return best(runs, lambda: smooth(clock, values, "gcv"))[0], best(runs, theirs)[0]
 
 
-def document(runs: int = 5, lengths: Sequence[int] = (1, 2, 4), names: Sequence[str] = tuple(SETUPS)) -> str:
-    """Return the text of docs/validation/speed.md, measured now."""
+def beside_opensim(runs: int, lengths: Sequence[int], names: Sequence[str]) -> tuple[list[list[str]], list[list[str]]]:
+    """Measure both programs: rows of tasks next to OpenSim, and of Kinertia's stages by the length of the trial."""
     opensim.Logger.removeFileSink()
     opensim.Logger.setLevelString("error")
     peers, scaling = [], []
@@ -224,6 +224,12 @@ def document(runs: int = 5, lengths: Sequence[int] = (1, 2, 4), names: Sequence[
             mine, theirs = (spent / frames for spent in gcv_splines(frames, 27, runs))
             title = f"quintic GCV splines, 27 columns of {frames} samples"
             peers.append([title, _ms(mine), _ms(theirs), f"{theirs / mine:.1f}"])
+    return peers, scaling
+
+
+def document(runs: int = 5, lengths: Sequence[int] = (1, 2, 4), names: Sequence[str] = tuple(SETUPS)) -> str:
+    """Return the text of docs/validation/speed.md, measured now."""
+    peers, scaling = beside_opensim(runs, lengths, names)
     return f"""# Speed
 
 Milliseconds per frame, both programs in the same run on the same machine: only the ratios travel to another. All but
