@@ -40,8 +40,8 @@ from kinertia.model.anthropometry import check_subject
 from kinertia.report.check_page import save_check_page
 from kinertia.settings import Subject
 from kinertia.workflow.check import ModelOverview, PersonCheck, check_osim, check_person
-from kinertia.workflow.files import files_by_name, read_files, trial_names
-from kinertia.workflow.person import Person, read_person
+from kinertia.workflow.files import RecordingFiles, files_by_name, read_files, trial_names
+from kinertia.workflow.person import Person, Progress, read_person
 from kinertia.workflow.recording import RecordingCheck
 
 
@@ -133,20 +133,14 @@ def check(
     person: Person | None
     with shown_progress() as progress:
         if subjects:
-            wanted = read_subject(subjects[0], to_fit=False)
-            person = read_person(wanted, progress)
-            read = {one.name: _names(one.markers, one.forces) for one in wanted.trials}
-            if wanted.model.static is not None:
-                read[wanted.model.static.stem] = wanted.model.static.name
+            person, read = _of_subject_file(subjects[0], progress)
         else:
             expect_one_model(static=static, markers=markers, osim=model, calibrate=calibrate)
             marker_set = None if markers is None else read_marker_set(markers)
             osim_model = None if model is None else read_osim(model)
-            named = files_by_name(measured, loads, forces, static)
-            read = {name: _names(one.markers, one.forces) for name, one in zip(trial_names(named), named, strict=True)}
-            read |= {} if static is None else {static.stem: static.name}
             stated = Person(who, (), marker_set=marker_set, model=osim_model, calibrate=calibrate, files_only=True)
-            person = read_files(named, stated, static, lambda share: progress("reading", share)) if named else None
+            named = files_by_name(measured, loads, forces, static)
+            person, read = _of_files(named, stated, static, progress)
         checked = _Checked(
             None if person is None else check_person(person.with_overrule(overrule)),
             [check_osim(one, who, overrule) for one in osim],
@@ -158,6 +152,24 @@ def check(
     with suppress(SystemExit):  # rich's, where nobody reads on (| head)
         _show(checked, page, verbose)
     return Outcome(_for_scripts(checked), checked.status)
+
+
+def _of_subject_file(path: Path, progress: Progress) -> tuple[Person, dict[str, str]]:
+    """Read the person of a subject file, and list the files of each recording."""
+    wanted = read_subject(path, to_fit=False)
+    read = {one.name: _names(one.markers, one.forces) for one in wanted.trials}
+    if wanted.model.static is not None:
+        read[wanted.model.static.stem] = wanted.model.static.name
+    return read_person(wanted, progress), read
+
+
+def _of_files(
+    named: Sequence[RecordingFiles], stated: Person, static: Path | None, progress: Progress
+) -> tuple[Person | None, dict[str, str]]:
+    """Read the person of files alone, None where there are none, and list the files of each recording."""
+    read = {name: _names(one.markers, one.forces) for name, one in zip(trial_names(named), named, strict=True)}
+    read |= {} if static is None else {static.stem: static.name}
+    return read_files(named, stated, static, lambda share: progress("reading", share)) if named else None, read
 
 
 def _holds_subject_file(path: Path) -> bool:
