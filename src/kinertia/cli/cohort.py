@@ -118,12 +118,7 @@ def cohort(
         expect_all_nine(wanted.norms)
     people = people_of(study, output)
     if dry_run:
-        everybody = _standing(people, output, lines)
-        _report_plan(everybody, where)
-        plan = [_planned(one) for one in everybody]
-        for each in plan:
-            lines.say("plan", **each)
-        return Outcome({"people": plan}, int(any(one.problem for one in everybody)))
+        return _plan(people, output, where, lines)
     results_folder(output, overwrite)
     output.mkdir(parents=True, exist_ok=True)
     with sole_use(output / _LOCK, "the folder of this cohort"):
@@ -132,6 +127,16 @@ def cohort(
             outcomes += _run_again(people, outcomes, output, where, wanted, lines)
     fitted = [{**_ended(record), "fitted": record.fitted} for record in outcomes]
     return Outcome({"folder": str(output), "people": fitted}, int(any(record.status for record in outcomes)))
+
+
+def _plan(people: Sequence[Person], output: Path, where: _Where, lines: JsonLines) -> Outcome:
+    """Show who would be fitted, and fit nobody; status 1 where somebody lacks what a fit needs."""
+    everybody = _standing(people, output, lines)
+    _report_plan(everybody, where)
+    plan = [_planned(one) for one in everybody]
+    for each in plan:
+        lines.say("plan", **each)
+    return Outcome({"people": plan}, int(any(one.problem for one in everybody)))
 
 
 def _planned(one: Standing) -> dict[str, Any]:
