@@ -15,3 +15,13 @@ def lab(tmp_path, synthetic_lab):
     for kind in ("mot", "xml"):
         shutil.copyfile(synthetic_lab / f"walk_grf.{kind}", folder / f"walk.{kind}")
     return folder
+
+
+@pytest.fixture
+def person(tmp_path, c3d_lab):
+    """A folder with the two C3D files of one person."""
+    folder = tmp_path / "anna [b]"
+    folder.mkdir()
+    for kind in ("walk", "static"):
+        shutil.copyfile(c3d_lab / f"{kind}.c3d", folder / f"{kind}.c3d")
+    return folder

@@ -9,11 +9,8 @@ import urllib.error
 import urllib.request
 
 import pytest
-import typer
-from rich.text import Text
 
 from command_line import PROGRAM, run
-from kinertia.cli.app import application
 
 
 @pytest.mark.parametrize("package", ["starlette", "uvicorn"])
@@ -71,24 +68,3 @@ def test_the_browser_is_opened_at_the_address(monkeypatch, tmp_path):
     assert outcome.status == 0
     assert len(opened) == 1
     assert opened[0] in outcome.out
-
-
-@pytest.mark.parametrize(
-    ("command", "words"),
-    [("app", 'pip install ".[app]"'), ("instruments", "under [instruments]"), ("population", "under [prior]")],
-)
-def test_help_shows_what_stands_in_brackets(command, words):
-    assert words in " ".join(run(command, "--help").out.split())
-
-
-def test_help_has_no_other_markup_than_bold():
-    """What else stands in brackets would not be shown."""
-
-    def helps(command):
-        yield command.help or ""
-        yield from (getattr(one, "help", None) or "" for one in command.params)
-        for child in getattr(command, "commands", {}).values():
-            yield from helps(child)
-
-    texts = list(helps(typer.main.get_command(application())))
-    assert {str(span.style) for text in texts for span in Text.from_markup(text).spans} == {"bold"}

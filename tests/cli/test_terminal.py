@@ -92,4 +92,4 @@ def test_a_process_ends_in_order():
     )
     ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
     assert (ended.returncode, ended.stdout.split("\n")) == (2, ["before", "at its end", ""])
-    assert "none.toml" in ended.stderr
+    assert re.fullmatch(r"error: .*none\.toml: F101 .*\n", ended.stderr)

@@ -1,0 +1,53 @@
+"""Failures of Kinertia itself and trouble of the system: one line, a status, a log."""
+
+from importlib.metadata import version
+
+import pytest
+
+from command_line import run
+
+
+def test_a_failure_of_kinertia_is_one_line_a_status_and_a_log(tmp_path, monkeypatch):
+    def fail(_):
+        raise ZeroDivisionError("division by\nzero")
+
+    monkeypatch.setattr("kinertia.cli.check.check_subject", lambda *_: fail(0))
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    outcome = run("check", "wälk.trc")
+    assert outcome.status == 70
+    assert outcome.out == ""
+    (line,) = outcome.err.splitlines()
+    (log,) = tmp_path.iterdir()
+    assert line.startswith("error: Kinertia failed, which it should not on any input (ZeroDivisionError: division by")
+    assert str(log) in line
+    text = log.read_text(encoding="utf-8")
+    for part in ("wälk.trc", f"kinertia {version('kinertia')}", "Traceback", "in fail", "numpy"):
+        assert part in text
+
+
+@pytest.mark.parametrize(
+    ("error", "line"),
+    [
+        (OSError(28, "No space left on device"), "error: No space left on device; check the path"),
+        (OSError("gone"), "error: gone; check the path"),
+    ],
+)
+def test_trouble_of_the_system_without_a_file(monkeypatch, error, line):
+    def full(*_):
+        raise error
+
+    monkeypatch.setattr("kinertia.cli.check.check_subject", full)
+    outcome = run("check", "walk.trc")
+    assert outcome.status == 2
+    assert outcome.err.startswith(line)
+
+
+def test_trouble_with_the_disk_is_one_line(person, monkeypatch):
+    def denied(*_, **__):
+        raise PermissionError(13, "Permission denied", "/somewhere")
+
+    monkeypatch.setattr("kinertia.io.person_recordings.read_recording", denied)
+    outcome = run("fit", person / "walk.c3d", "--static", person / "static.c3d", "--sex", "male", "-o", person / "out")
+    assert outcome.status == 2
+    assert outcome.err.splitlines()[-1].startswith("error: /somewhere: Permission denied; check")
+    assert not (person / "out").exists()
