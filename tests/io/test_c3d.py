@@ -1,42 +1,16 @@
+"""C3D files of many makers, and what is read from any: axes, labels, measures, times."""
+
 import numpy as np
 import pytest
 
 from c3d_writer import plate_parameters, write_c3d
 from kinertia.findings.finding import Severity
 from kinertia.io.c3d import read_c3d
-from kinertia.io.c3d_plates import lab_plates
-from kinertia.io.ezc3d_library import read_content
+from person_on_plate import CORNERS, SCREEN, expect_centre_of_pressure, standing, stepping
 from recordings import here, is_here
 from refusals import codes, only, refused
 
 GRAVITY = 9.80665
-CORNERS = np.array([[[0, 500, 0], [500, 500, 0], [500, 0, 0], [0, 0, 0]]], float)  # mm, type 2: z down
-SCREEN = {"POINT": {"Y_SCREEN": ["+Z"]}}
-
-
-def standing(n=20, labels=("RHEE", "RTOE", "RASI", "RFHD")):
-    """Points (n, m, 3) mm of somebody upright over the plate, Z up."""
-    height = np.linspace(30, 1700, len(labels))
-    points = np.column_stack(
-        (np.full(len(labels), 250.0) + 20 * np.arange(len(labels)), np.full(len(labels), 240.0), height)
-    )
-    return np.tile(points, (n, 1, 1)), list(labels)
-
-
-def stepping(n=20, per_frame=10, vertical=-600.0):
-    """Analogs (n * s, 6) N, N mm of a constant load at (300, 200) mm, in plate axes (-X, Y, down)."""
-    force = np.array([-30.0, 20.0, vertical])
-    point = np.array([-(300 - 250), 200 - 250, 20.0]) * [1, 1, -1]  # from the transducer 20 mm below the surface
-    return np.tile(np.concatenate((force, np.cross(point, force))), (n * per_frame, 1))
-
-
-def expect_centre_of_pressure(plates, x, z, force):
-    np.testing.assert_allclose(plates.force[:, 0], np.tile(force, (len(plates.time), 1)), atol=1e-4)
-    np.testing.assert_allclose(
-        plates.moment[:, 0], np.tile(np.cross((x, 0, z), force), (len(plates.time), 1)), atol=1e-3
-    )
-
-
 VARIETY = {
     "synthetic/walk.c3d": (270, 35, 2),
     "c3d_variety/bts.c3d": (675, 22, 6),
@@ -48,8 +22,6 @@ VARIETY = {
     "c3d_variety/rotations_only.c3d": (340, 36, 0),
     "c3d_variety/subject_prefixed_labels.c3d": (333, 86, 2),
 }
-
-
 LARGE = ("c3d_variety/bts.c3d", "c3d_variety/plates_kistler_type3.c3d")
 
 
@@ -152,177 +124,6 @@ def test_plug_in_gait_outputs_go_and_virtual_markers_stay(file_of):
     assert recording.plates.time[-1] == pytest.approx(5.159)
 
 
-def test_load_about_the_ground_origin(tmp_path):
-    points, labels = standing()
-    path = write_c3d(
-        tmp_path / "x.c3d", points, labels, stepping(), {**SCREEN, "FORCE_PLATFORM": plate_parameters(CORNERS)}
-    )
-    recording = read_c3d(path)
-    assert codes(recording.findings) == ["F133"]
-    only(recording.findings, "F133", axis="+Z")
-    np.testing.assert_allclose(recording.markers.positions[0, 0], [0.25, 0.03, -0.24], atol=1e-6)
-    expect_centre_of_pressure(recording.plates, 0.3, -0.2, [30, 600, -20])
-    np.testing.assert_allclose(recording.plates.time[:3], [0, 0.001, 0.002])
-    np.testing.assert_allclose(recording.plates.corners[0, 0], [0, 0, -0.5], atol=1e-6)
-
-
-@pytest.mark.parametrize("unit", ["m", "cm", "mm"])
-def test_units(tmp_path, unit):
-    size = {"m": 1000, "cm": 10, "mm": 1}[unit]
-    points, labels = standing()
-    analogs = stepping() / [1, 1, 1, size, size, size]
-    plate = plate_parameters(CORNERS / size, origin_z=-20 / size)
-    path = write_c3d(tmp_path / "x.c3d", points / size, labels, analogs, {**SCREEN, "FORCE_PLATFORM": plate}, unit=unit)
-    recording = read_c3d(path)
-    np.testing.assert_allclose(recording.markers.positions[0, 0], [0.25, 0.03, -0.24], atol=1e-6)
-    expect_centre_of_pressure(recording.plates, 0.3, -0.2, [30, 600, -20])
-
-
-@pytest.mark.parametrize("unit", ["m", "cm", "mm"])
-def test_plates_of_a_file_whose_length_unit_is_inferred(tmp_path, unit):
-    size = {"m": 1000, "cm": 10, "mm": 1}[unit]
-    points, labels = standing()
-    analogs = stepping() / [1, 1, 1, size, size, size]
-    plate = plate_parameters(CORNERS / size, origin_z=-20 / size)
-    parameters = {**SCREEN, "FORCE_PLATFORM": plate}
-    for said in ("", f"N{unit}"):
-        path = write_c3d(tmp_path / "x.c3d", points / size, labels, analogs, parameters, unit="", moment_unit=said)
-        recording = read_c3d(path)
-        assert recording.length_unit == unit
-        expect_centre_of_pressure(recording.plates, 0.3, -0.2, [30, 600, -20])
-
-
-def test_plates_of_a_file_whose_length_unit_has_no_entry(tmp_path):
-    points, labels = standing()
-    parameters = {"POINT": {"Y_SCREEN": ["+Z"], "UNITS": []}, "FORCE_PLATFORM": plate_parameters(CORNERS)}
-    recording = read_c3d(write_c3d(tmp_path / "x.c3d", points, labels, stepping(), parameters))
-    assert recording.length_unit == "mm"
-    expect_centre_of_pressure(recording.plates, 0.3, -0.2, [30, 600, -20])
-
-
-def test_calibrated_plate_of_type_4(tmp_path):
-    points, labels = standing()
-    plate = plate_parameters(CORNERS, kind=4)
-    plate["CAL_MATRIX"] = 2 * plate["CAL_MATRIX"]
-    path = write_c3d(tmp_path / "x.c3d", points, labels, stepping() / 2, {**SCREEN, "FORCE_PLATFORM": plate})
-    expect_centre_of_pressure(read_c3d(path).plates, 0.3, -0.2, [30, 600, -20])
-
-
-SHAPES = [("USED", (1, 1)), ("TYPE", (2, 1)), ("TYPE", (1, 2)), ("CHANNEL", (6, 2, 1)), ("CORNERS", (24,))]
-
-
-@pytest.mark.parametrize(("name", "shape"), SHAPES)
-def test_parameters_of_plates_in_other_shapes(tmp_path, name, shape):
-    points, labels = standing()
-    plates = plate_parameters(np.concatenate((CORNERS, CORNERS + np.array([600, 0, 0]))))
-    plates[name] = np.reshape(plates[name], shape, order="F")
-    analogs = np.hstack((stepping(), stepping()))
-    path = write_c3d(tmp_path / "x.c3d", points, labels, analogs, {**SCREEN, "FORCE_PLATFORM": plates})
-    assert read_c3d(path).plates.names == ("plate 1", "plate 2")
-
-
-@pytest.mark.parametrize(("name", "shape"), [("TYPE", ()), ("CHANNEL", (6,)), ("CORNERS", (3, 4)), ("ORIGIN", (3,))])
-def test_parameters_of_one_plate_in_other_shapes(tmp_path, name, shape):
-    points, labels = standing()
-    plate = plate_parameters(CORNERS)
-    plate[name] = np.reshape(plate[name], shape, order="F")
-    path = write_c3d(tmp_path / "x.c3d", points, labels, stepping(), {**SCREEN, "FORCE_PLATFORM": plate})
-    expect_centre_of_pressure(read_c3d(path).plates, 0.3, -0.2, [30, 600, -20])
-    if name != "TYPE":  # ezc3d itself reads beyond too few dimensions, and now and then finds no plate
-        assert np.shape(read_content(path)["parameters"]["FORCE_PLATFORM"][name]["value"])[-1] == 1
-
-
-@pytest.mark.parametrize("units", [[], ["N"]])
-def test_channels_without_units_are_in_those_of_the_points(tmp_path, units):
-    points, labels = standing()
-    parameters = {**SCREEN, "FORCE_PLATFORM": plate_parameters(CORNERS), "ANALOG": {"UNITS": units}}
-    path = write_c3d(tmp_path / "x.c3d", points, labels, stepping(), parameters)
-    expect_centre_of_pressure(read_c3d(path).plates, 0.3, -0.2, [30, 600, -20])
-    content = read_content(path)
-    del content["parameters"]["ANALOG"]
-    assert lab_plates(path, content, "mm")[0].names == ("plate 1",)
-
-
-def test_plate_of_type_1_tells_the_centre_of_pressure(tmp_path):
-    points, labels = standing()
-    analogs = np.tile([-30.0, 20, -600, -(300 - 250), 200 - 250, 4000], (200, 1))  # plate axes; free moment 4 N m down
-    plate = plate_parameters(CORNERS, kind=1)
-    path = write_c3d(tmp_path / "x.c3d", points, labels, analogs, {**SCREEN, "FORCE_PLATFORM": plate})
-    plates = read_c3d(path).plates
-    np.testing.assert_allclose(plates.force[0, 0], [30, 600, -20], atol=1e-4)
-    np.testing.assert_allclose(plates.moment[0, 0], np.cross((0.3, 0, -0.2), (30, 600, -20)) - (0, 4, 0), atol=1e-3)
-
-
-def test_load_on_the_plate_is_reversed(tmp_path):
-    points, labels = standing()
-    path = write_c3d(
-        tmp_path / "x.c3d", points, labels, -stepping(), {**SCREEN, "FORCE_PLATFORM": plate_parameters(CORNERS)}
-    )
-    recording = read_c3d(path)
-    expect_centre_of_pressure(recording.plates, 0.3, -0.2, [30, 600, -20])
-    reversed_ = only(recording.findings, "F157", force_n=-600.0)
-    assert (reversed_.where.plate, reversed_.severity) == ("plate 1", Severity.CORRECTED)
-
-
-def test_unloaded_plate_is_zero(tmp_path):
-    points, labels = standing()
-    path = write_c3d(
-        tmp_path / "x.c3d",
-        points,
-        labels,
-        stepping(vertical=-18.0),
-        {**SCREEN, "FORCE_PLATFORM": plate_parameters(CORNERS)},
-    )
-    recording = read_c3d(path)
-    assert not recording.plates.force.any()
-    assert not recording.plates.moment.any()
-    assert codes(recording.findings) == ["F133"], "such an offset is examined with the recording"
-
-
-def test_what_an_idle_plate_reads_is_taken_off_its_loads(tmp_path):
-    points, labels = standing(n=80)
-    level = np.array([2.7, -1.8, -7.0, 1500.0, 0.0, 0.0])
-    steps = np.concatenate((0.0 * stepping(60), stepping(20)))
-    plate = {**SCREEN, "FORCE_PLATFORM": plate_parameters(CORNERS)}
-    sound, wrong = (
-        read_c3d(write_c3d(tmp_path / name, points, labels, steps + more, plate)).plates
-        for name, more in (("sound.c3d", 0.0 * level), ("wrong.c3d", level))
-    )
-    assert (sound.idle[0].subtracted, wrong.idle[0].subtracted) == (False, True)
-    np.testing.assert_allclose(wrong.force, sound.force, atol=1e-3)
-    np.testing.assert_allclose(wrong.moment, sound.moment, atol=1e-2)
-
-
-def plates_left_out(tmp_path, plate, **arguments):
-    points, labels = standing()
-    path = write_c3d(tmp_path / "x.c3d", points, labels, stepping(), {**SCREEN, "FORCE_PLATFORM": plate}, **arguments)
-    recording = read_c3d(path)
-    assert recording.plates is None
-    return only(recording.findings, "F151")
-
-
-def test_plates_that_cannot_be_used_are_left_out(tmp_path):
-    unreadable = plates_left_out(tmp_path, plate_parameters(CORNERS, kind=5))
-    assert "type (5)" in unreadable.evidence["reason"].value
-    assert unreadable.where.plate is None
-    for size in (1e8, 0.0):
-        lost = plates_left_out(tmp_path, plate_parameters(size * CORNERS))
-        assert (lost.where.plate, lost.severity) == ("plate 1", Severity.WARNING)
-        assert lost.evidence["edges_m"].value == pytest.approx([0.5 * size] * 4)
-
-
-def test_analog_without_a_number(tmp_path):
-    points, labels = standing()
-    analogs = stepping()
-    analogs[25, 2] = np.nan
-    path = write_c3d(
-        tmp_path / "x.c3d", points, labels, analogs, {**SCREEN, "FORCE_PLATFORM": plate_parameters(CORNERS)}
-    )
-    with refused("F172", None, time_s=0.025) as caught:
-        read_c3d(path)
-    assert caught.value.finding.where.plate == "plate 1"
-
-
 @pytest.mark.parametrize("vertical", ["+Z", "-Y", "+X", "-X", "+Y", "-Z"])
 def test_vertical_axis(tmp_path, vertical):
     points, labels = standing()
@@ -347,7 +148,7 @@ def test_contradicted_vertical_axis_is_noted(tmp_path):
     recording = read_c3d(write_c3d(tmp_path / "x.c3d", points, labels, stepping(), parameters))
     wrong = only(recording.findings, "F132", stated="+Y", axis="+Z", source="forces")
     assert wrong.severity is Severity.CORRECTED
-    expect_centre_of_pressure(recording.plates, 0.3, -0.2, [30, 600, -20])
+    expect_centre_of_pressure(recording.plates)
     recording = read_c3d(write_c3d(tmp_path / "x.c3d", points, labels, parameters={"POINT": {"Y_SCREEN": ["+Y"]}}))
     only(recording.findings, "F132", stated="+Y", axis="+Z", source="markers")
 

@@ -5,9 +5,9 @@ import pytest
 
 from c3d_writer import plate_parameters, write_c3d
 from kinertia.io.c3d import read_c3d
+from person_on_plate import CORNERS
 from refusals import refused
 
-CORNERS = np.array([[[0, 500, 0], [500, 500, 0], [500, 0, 0], [0, 0, 0]]], float)
 SCALE = np.array([0.05, 0.05, 0.05, 5.0, 5.0, 5.0])
 """N and N mm of one step of the converter."""
 RNG = np.random.default_rng(0)

@@ -6,9 +6,9 @@ import pytest
 from c3d_writer import plate_parameters, write_c3d
 from kinertia.io.c3d import read_c3d
 from kinertia.io.subject_prefix import without_prefixes
+from person_on_plate import CORNERS
 from refusals import only, refused
 
-CORNERS = np.array([[[0, 500, 0], [500, 500, 0], [500, 0, 0], [0, 0, 0]]], float)
 PERSON = np.random.default_rng(0).uniform((100, 100, 0), (400, 400, 1800), (20, 9, 3))
 ASIDE = np.array([0.0, 1200.0, 0.0])
 
