@@ -30,3 +30,8 @@ def test_what_is_known_of_instruments_goes_to_other_processes(known):
     """With it all that is prepared of a person."""
     for again in (pickle.loads(pickle.dumps(known)), copy.deepcopy(known)):
         assert (again.plate, again.floor, again.delay_s) == (known.plate, known.floor, known.delay_s)
+
+
+@pytest.mark.parametrize(("written", "meant"), [("f", "female"), ("F", "female"), ("Female", "female"), ("m", "male")])
+def test_sex_may_be_abbreviated(written, meant):
+    assert Subject(name="A", sex=written).sex == meant
