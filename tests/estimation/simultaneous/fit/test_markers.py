@@ -1,0 +1,62 @@
+"""What `fit_simultaneous` finds of markers."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kinertia.estimation.prior import literature_prior
+from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINTY
+from kinertia.synthetic.noise import camera_noise
+from kinertia.synthetic.walk import walking_subject
+from results import codes, of_estimate
+from short_walk_fit import estimated, fitted
+from validation.synthetic_walks import kinematics_of
+
+
+@pytest.mark.slow
+def test_a_drifting_marker_is_named(trial):
+    def wander(positions, loads):
+        at = trial.markers.labels.index("R.Bicep")
+        positions[:, at] += np.random.default_rng(1).normal(0.0, 0.05, positions[:, at].shape)
+
+    drifting = [one for one in of_estimate(fitted(trial, disturb=wander)) if one.code == "M163"]
+    (found,) = [one for one in drifting if one.where.markers == ("R.Bicep",)]
+    assert found.where.trial == "walk"
+    assert found.evidence["sd_m"].value > 3.0 * found.evidence["usual_sd_m"].value
+
+
+@pytest.mark.slow
+def test_a_marker_attached_anew_between_trials_is_named(trial):
+    at = trial.markers.labels.index("R.Thigh.Front")
+    turned = trial.skeleton.pose(trial.motion.q).rotation[:, trial.skeleton.marker_segments[at]]
+    positions = [camera_noise(trial.markers, 0.002, np.random.default_rng(seed)).positions for seed in (0, 1)]
+    positions[1][:, at] += turned @ [0.0, -0.05, 0.0]
+    kinematics = [kinematics_of(trial, replace(trial.markers, positions=each), trial.foot_loads) for each in positions]
+    outcome = estimated(trial, kinematics)
+    found = of_estimate(outcome, "one", "two")
+    assert codes(found) == ["M162", "M162"]  # of two trials, either may be the odd one
+    assert [one.where.trial for one in found] == ["one", "two"]
+    assert {one.where.markers for one in found} == {("R.Thigh.Front",)}
+    assert found[0].evidence["difference_m"].value == pytest.approx(0.05, abs=0.01)
+    places = [skeleton.markers[skeleton.labels.index("R.Thigh.Front")].position[1] for skeleton in outcome.skeletons]
+    assert places[1] - places[0] == pytest.approx(-0.05, abs=0.01)
+
+
+@pytest.mark.slow
+def test_markers_that_stay_do_so_in_every_trial(trial):
+    """Else a second trial would make a model with wrong marker places look right."""
+    rng = np.random.default_rng(0)
+    places = trial.skeleton.marker_locals + rng.normal(0.0, 0.012, trial.skeleton.marker_locals.shape)
+    wrong = replace(trial, skeleton=trial.skeleton.with_places(places))
+    markers = [camera_noise(trial.markers, sd_m, rng) for sd_m in (0.001, 0.002)]
+    kinematics = [kinematics_of(wrong, each, trial.foot_loads) for each in markers]
+    outcome = estimated(wrong, kinematics, uncertainty=replace(GAIT27_UNCERTAINTY, marker_sd_m=None))
+    for skeleton in (outcome.skeleton, *outcome.skeletons):
+        np.testing.assert_array_equal(skeleton.marker_locals, wrong.skeleton.marker_locals)
+    # and the body need not make up for them
+    assert outcome.result.converged
+    assert "R203" not in codes(of_estimate(outcome, "one", "two"))
+    literature = walking_subject().literature
+    away = (outcome.bsp.table() - literature.table()) / literature_prior(literature).sd
+    assert np.abs(away).max() < 2.0
