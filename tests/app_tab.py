@@ -114,10 +114,25 @@ class Tab:
         self.page.close()
 
 
-def with_everything(person, lab):
-    """Files of a laboratory's folder, findings and results, without computing any."""
+def folder_of(path, lab):
+    """A new folder with a laboratory's static trial and walk."""
+    path.mkdir()
+    for name in ("static.c3d", "walk.c3d"):
+        shutil.copyfile(lab / name, path / name)
+    return path
+
+
+def ready(library, name, lab):
+    """Somebody who can be fitted, with files of a laboratory's folder."""
+    person = library.add(name)
     for path in (*lab.glob("*.c3d"), lab / "subject.toml"):
         shutil.copyfile(path, person.folder / path.name)
+    return person
+
+
+def with_everything(library, name, lab):
+    """Somebody ready who has findings and results, too, without computing any."""
+    person = ready(library, name, lab)
     person.check.mkdir()
     overview = Overview(FAULTY, 61, 2, ("walk 2",))
     outcome = {"inputs": "", **digest(overview)}
@@ -129,3 +144,4 @@ def with_everything(person, lab):
     outcome = {**outcome, "ended": 1.7e9}
     outcome["summary"] = sha256(person.results / "fit.json")
     (person.results / "outcome.json").write_text(json.dumps(outcome))
+    return person

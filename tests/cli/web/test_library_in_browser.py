@@ -10,7 +10,7 @@ import pytest
 pytest.importorskip("starlette", reason="needs the extra app (pip install -e '.[test]')")
 pytest.importorskip("uvicorn", reason="needs the extra app (pip install -e '.[test]')")
 from app_server import running
-from app_tab import Tab, with_everything
+from app_tab import Tab, ready, with_everything
 from chromium import playwright
 from kinertia.cli.web import work
 
@@ -18,14 +18,6 @@ WAITING = "import json, sys, time\nprint(json.dumps({'stage': 'estimate', 'share
 """A fit that is not done before it is cancelled."""
 
 pytestmark = pytest.mark.slow
-
-
-def ready(library, name, c3d_lab):
-    """Somebody who can be fitted."""
-    person = library.add(name)
-    for path in (*c3d_lab.glob("*.c3d"), c3d_lab / "subject.toml"):
-        shutil.copyfile(path, person.folder / path.name)
-    return person
 
 
 @pytest.fixture
@@ -129,8 +121,7 @@ def test_results_are_listed_opened_again_compared_and_deleted(browser, demo_run,
 
 
 def test_a_person_is_renamed_and_results_stay_those_of_the_files(tab, app, c3d_lab):
-    person = ready(app.library, "Person to rename", c3d_lab)
-    with_everything(person, c3d_lab)
+    person = with_everything(app.library, "Person to rename", c3d_lab)
     outcome = json.loads((person.results / "outcome.json").read_text())
     (person.results / "outcome.json").write_text(json.dumps({**outcome, "inputs": person.inputs}))
     tab.page.goto(f"{app.address}people/{quote(person.name)}")
@@ -146,8 +137,7 @@ def test_a_person_is_renamed_and_results_stay_those_of_the_files(tab, app, c3d_l
 
 def test_a_report_reaches_nothing(browser, app, c3d_lab):
     """Whatever a file made a report say, it has no way to the page, the library or the network."""
-    person = app.library.add("Curious report")
-    with_everything(person, c3d_lab)
+    person = with_everything(app.library, "Curious report", c3d_lab)
     tries = {
         "asked": "fetch(location.href.replace('results/report.html', 'subject.toml')).then(() => 'yes', () => 'no')",
         "out": "fetch('http://127.0.0.1:9/').then(() => 'yes', () => 'no')",
