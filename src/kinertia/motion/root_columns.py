@@ -95,15 +95,21 @@ def root_columns(
         _centre_moves(left[i], slides, by[0, i])
         _by_ground(about[i], columns.first, columns.last, static[i])
         _by_bodies(tree, frame, rotation, translation, about[i], chain, columns.segments, static[i])
-        for r in range(6):
-            weight = 1.0 / sd[i, r]
-            left[i, r] *= weight
-            for k in range(static.shape[2]):
-                static[i, r, k] *= weight
-            for order in range(3):
-                for k in range(columns.wide):
-                    by[order, i, r, k] *= weight
+        _over_deviations(sd, i, left, static, by)
     return left, by
+
+
+@part
+def _over_deviations(sd: np.ndarray, i: int, left: np.ndarray, static: np.ndarray, by: np.ndarray) -> None:
+    """Divide residuals and derivatives of frame i by their standard deviations."""
+    for r in range(6):
+        weight = 1.0 / sd[i, r]
+        left[i, r] *= weight
+        for k in range(static.shape[2]):
+            static[i, r, k] *= weight
+        for order in range(3):
+            for k in range(by.shape[3]):
+                by[order, i, r, k] *= weight
 
 
 @part

@@ -57,13 +57,8 @@ def add_root_gradient(
     (x, v, a), (about, slides), (first, values) = motion, root, basis
     n, count = x.shape
     cost, by_bodies, by_ground = 0.0, np.zeros((len(columns.segments), 10)), np.empty((n, 6))
-    frame, left, load, pull, by = (
-        empty_frame(count, gravity_m_s2),
-        np.empty(6),
-        np.zeros((1, 6)),
-        np.empty(6),
-        np.empty(3),
-    )
+    frame, left, load = empty_frame(count, gravity_m_s2), np.empty(6), np.zeros((1, 6))
+    pull, by = np.empty(6), np.empty(3)
     rotation, translation = np.empty((len(tree.carrier), 3, 3)), np.empty((len(tree.carrier), 3))
     for k in range(n):
         fill(tree, bodies, x[k], v[k], a[k], frame)
@@ -84,10 +79,7 @@ def add_root_gradient(
         for j in range(count):
             _by_axis(frame, by_ground, k, j, by)
             if len(bends):
-                place, rate, acceleration, bend = by[0], by[1], by[2], bends[k, j]
-                by[0] = place * bend[0] + rate * bend[1] + acceleration * bend[2]
-                by[1] = rate * bend[0] + acceleration * 2.0 * bend[1]
-                by[2] = acceleration * bend[0]
+                _bend(by, bends[k, j])
             if columns.still[j] >= 0:
                 static_rhs[columns.still[j]] -= by[0]
             if columns.moving[j] >= 0:
@@ -136,6 +128,15 @@ def _by_axis(frame: Frame, pulls: np.ndarray, k: int, j: int, by: np.ndarray) ->
     by[0] = inner(force, j, pulls, k) + inner(biased, j, swept, j) + inner(borne, j, turned, j)
     by[1] = inner(biased, j, axes, j) + 2.0 * inner(borne, j, swept, j)
     by[2] = inner(borne, j, axes, j)
+
+
+@part
+def _bend(by: np.ndarray, bend: np.ndarray) -> None:
+    """Convert the gradient (3,) by an axis' value, rate and acceleration to that by its coordinate's."""
+    place, rate, acceleration = by[0], by[1], by[2]
+    by[0] = place * bend[0] + rate * bend[1] + acceleration * bend[2]
+    by[1] = rate * bend[0] + acceleration * 2.0 * bend[1]
+    by[2] = acceleration * bend[0]
 
 
 @part
