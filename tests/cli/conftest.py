@@ -1,8 +1,16 @@
-"""Laboratories that tests of the command line spoil."""
+"""Laboratories that tests of the command line spoil, and a terminal that every test finds as a user does."""
 
 import shutil
 
 import pytest
+
+from kinertia.cli import terminal
+
+
+@pytest.fixture(autouse=True)
+def not_quiet(monkeypatch):
+    """No test is quiet because the command of an earlier one was: in use, each command is a process of its own."""
+    monkeypatch.setattr(terminal.out, "quiet", False)
 
 
 @pytest.fixture
