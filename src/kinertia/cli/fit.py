@@ -114,10 +114,7 @@ def fit(
     }
     runs = _runs(trials, output, options, method, overrule_of(waive))
     for one in runs:
-        names = [trial.name for trial in one.wanted.trials]
-        several = len(names) > 1
-        files = FIT_FILES if several else (*FIT_FILES, *TRIAL_FILES)
-        results_folder(one.folder, overwrite, names if several else (), files)
+        _expect_folder(one, overwrite)
     summaries, status = [], 0
     for one in runs:
         try:
@@ -129,14 +126,10 @@ def fit(
             summaries.append({"folder": None, "file": str(one.given), **of_error(error)})
             status = 2
             continue
-        overview = result.overview
-        status = max(status, int(overview.failed))
+        status = max(status, int(result.overview.failed))
         summaries.append({"folder": str(one.folder), **summary(result), "bsp": _bsp_rows(result)})
         if not quiet:
-            if verbose or shown_table:
-                report_tables(result)
-            show_overview(overview, verbose)
-            out.print(f"results in {one.folder}", soft_wrap=True)
+            _show(result, one.folder, verbose, shown_table)
     return Outcome(summaries if len(runs) > 1 else summaries[0], status)
 
 
@@ -181,6 +174,22 @@ def _runs(
         )
         for path, folder in zip(trials, folders, strict=True)
     ]
+
+
+def _expect_folder(one: _Run, overwrite: bool) -> None:
+    """Raise an error, before any work, if the results of a run cannot or may not go to its folder."""
+    names = [trial.name for trial in one.wanted.trials]
+    several = len(names) > 1
+    files = FIT_FILES if several else (*FIT_FILES, *TRIAL_FILES)
+    results_folder(one.folder, overwrite, names if several else (), files)
+
+
+def _show(fit: Fit, folder: Path, verbose: bool, tables: bool) -> None:
+    """Show verdict and findings of a fit and the folder of its results, with tables where they are wanted."""
+    if verbose or tables:
+        report_tables(fit)
+    show_overview(fit.overview, verbose)
+    out.print(f"results in {folder}", soft_wrap=True)
 
 
 def _name(path: Path) -> str:
