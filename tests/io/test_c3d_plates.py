@@ -12,13 +12,19 @@ from person_on_plate import CORNERS, SCREEN, expect_centre_of_pressure, plate_fi
 from refusals import codes, only, refused
 
 
-@pytest.mark.parametrize("unit", ["m", "cm", "mm"])
-def test_load_about_the_ground_origin(tmp_path, unit):
+def in_unit(unit):
+    """Points, labels, analogs and parameters of somebody standing on a plate, lengths in this unit."""
     size = {"m": 1000, "cm": 10, "mm": 1}[unit]
     points, labels = standing()
-    analogs = stepping() / [1, 1, 1, size, size, size]
     plate = plate_parameters(CORNERS / size, origin_z=-20 / size)
-    path = write_c3d(tmp_path / "x.c3d", points / size, labels, analogs, {**SCREEN, "FORCE_PLATFORM": plate}, unit=unit)
+    analogs = stepping() / [1, 1, 1, size, size, size]
+    return points / size, labels, analogs, {**SCREEN, "FORCE_PLATFORM": plate}
+
+
+@pytest.mark.parametrize("unit", ["m", "cm", "mm"])
+def test_load_about_the_ground_origin(tmp_path, unit):
+    content = in_unit(unit)
+    path = write_c3d(tmp_path / "x.c3d", *content, unit=unit)
     recording = read_c3d(path)
     assert codes(recording.findings) == ["F133"]
     only(recording.findings, "F133", axis="+Z")
@@ -30,13 +36,9 @@ def test_load_about_the_ground_origin(tmp_path, unit):
 
 @pytest.mark.parametrize("unit", ["m", "cm", "mm"])
 def test_plates_of_a_file_whose_length_unit_is_inferred(tmp_path, unit):
-    size = {"m": 1000, "cm": 10, "mm": 1}[unit]
-    points, labels = standing()
-    analogs = stepping() / [1, 1, 1, size, size, size]
-    plate = plate_parameters(CORNERS / size, origin_z=-20 / size)
-    parameters = {**SCREEN, "FORCE_PLATFORM": plate}
+    content = in_unit(unit)
     for said in ("", f"N{unit}"):
-        path = write_c3d(tmp_path / "x.c3d", points / size, labels, analogs, parameters, unit="", moment_unit=said)
+        path = write_c3d(tmp_path / "x.c3d", *content, unit="", moment_unit=said)
         recording = read_c3d(path)
         assert recording.length_unit == unit
         expect_centre_of_pressure(recording.plates)

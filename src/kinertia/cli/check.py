@@ -169,7 +169,8 @@ def _of_files(
     """Read the person of files alone, None where there are none, and list the files of each recording."""
     read = {name: _names(one.markers, one.forces) for name, one in zip(trial_names(named), named, strict=True)}
     read |= {} if static is None else {static.stem: static.name}
-    return read_files(named, stated, static, lambda share: progress("reading", share)) if named else None, read
+    person = read_files(named, stated, static, lambda share: progress("reading", share)) if named else None
+    return person, read
 
 
 def _holds_subject_file(path: Path) -> bool:

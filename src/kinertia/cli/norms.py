@@ -69,7 +69,7 @@ def norms(
 
 
 def _name(fit: Fit, folder: Path) -> str:
-    """Return the person's name, or the folder's where the fit is named after its trial, as others' may be."""
+    """Return the person's name, or the folder's name if the fit is only named after its trial."""
     return folder.resolve().name if fit.subject.name in {trial.name for trial in fit.trials} else fit.subject.name
 
 

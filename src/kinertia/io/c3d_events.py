@@ -56,9 +56,9 @@ def person_among(names: Sequence[str], others: Collection[str]) -> str:
 
 
 def subjects_of_person(subjects: Iterable[str], person: str, others: Collection[str]) -> set[str]:
-    """Return the subjects of events that are the person's: those of this name and of none, if any has this name.
+    """Return which subjects of events are the person: this name and the empty one, if an event has this name.
 
-    Else the name was changed, or is not known, and all but those of other people are.
+    Otherwise the person was renamed or is unknown, and every subject counts that is not one of the others.
     """
     found = set(subjects) - set(others)
     return found & {person, ""} if person in found and person else found

@@ -34,7 +34,7 @@ Value = Sequence[str] | np.ndarray
 
 
 def continued(entries: Callable[[str], Sequence[str]], name: str) -> list[str]:
-    """Return a list of texts that continues in NAME2, NAME3 after 255 entries; `entries` returns those of one name."""
+    """Return a list of texts that continues in NAME2, NAME3 after 255; `entries` returns the texts of one name."""
     found: list[str] = []
     for suffix in ["", *map(str, range(2, 100))]:
         more = entries(name + suffix)

@@ -36,7 +36,7 @@ def standing(context: RecordingContext) -> Iterator[Finding]:
 
 
 def no_static(context: PersonContext) -> Iterator[Finding]:
-    """S207 and S208: neither static trial nor model is named for the trials; S208 where no walk can replace it."""
+    """S207: there is neither a static trial nor a model, and a walk replaces it; S208: no walk can."""
     unread = any(one.rule.stage == "file" and one.where.trial is None for one in context.found)
     if not context.trials or context.standing or context.model or context.files_only or unread:
         return

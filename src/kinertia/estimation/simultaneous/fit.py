@@ -19,7 +19,7 @@ from kinertia.estimation.simultaneous.marker_noise import MarkerNoise
 from kinertia.estimation.simultaneous.model_evidence import FreeMomentSign
 from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINTY, ModelUncertainty
 from kinertia.estimation.simultaneous.observation import Observations, observe, reading
-from kinertia.estimation.simultaneous.observed_trial import CalibrationPrior, Observation
+from kinertia.estimation.simultaneous.observed_trial import CalibrationPrior
 from kinertia.estimation.simultaneous.outcome import SimultaneousResult
 from kinertia.estimation.simultaneous.posterior_draws import PosteriorDraws
 from kinertia.estimation.simultaneous.prior_plausibility import Unlikeness, unlikeness
@@ -153,50 +153,49 @@ def fit_simultaneous(
     others = [reading(*each) for each in zip(pooled[:count], otherwise, bandwidths, strict=True)] if otherwise else []
     others += pooled[count:] if otherwise else ()
     result = estimate_simultaneous(used, prior, calibration, pooled, progress, others, terms).of_first(count)
-    pooled = pooled[:count]
     staying = uncertainty.marker_sd_m is None
     calibrated = result.skeleton.carrying(None)
     calibrated = calibrated.with_markers(used.markers) if staying else calibrated
     offsets_m = [0.0 if staying else moved for moved in result.marker_offsets_m]
-    dynamic = [np.flatnonzero(o.dynamic) for o in pooled]
+    dynamic = [np.flatnonzero(o.dynamic) for o in pooled[:count]]
     motions = tuple(m.cut(frames) for m, frames in zip(result.motions, dynamic, strict=True))
-    posterior = _posterior(result, prior, pooled, motions, uncertainty)
     return SimultaneousFit(
         result=result,
         bsp=uncertainty.whole(result.bsp),
         skeleton=calibrated,
         skeletons=tuple(calibrated.with_places(calibrated.marker_locals + moved) for moved in offsets_m),
-        posterior=replace(
-            posterior, marker_noise=seen.noise[:count], marker_distances_m=_marker_distances(result, trials)
-        ),
+        posterior=_posterior(result, prior, seen, trials, motions, uncertainty),
         motions=motions,
         courses=tuple(m.q[at[0] : at[-1] + 1] for m, at in zip(result.motions, dynamic, strict=True)),
-        foot_loads=tuple(loads[o.dynamic] for loads, o in zip(result.foot_loads, pooled, strict=True)),
+        foot_loads=tuple(loads[frames] for loads, frames in zip(result.foot_loads, dynamic, strict=True)),
     )
 
 
 def _posterior(
     result: SimultaneousResult,
     prior: BspPrior,
-    trials: Sequence[Observation],
+    seen: Observations,
+    trials: Sequence[Kinematics],
     motions: Sequence[Motion],
     uncertainty: ModelUncertainty,
 ) -> Posterior:
-    """Return the uncertainty of a result, by the observations of its trials, but for their markers'."""
+    """Return the uncertainty of a result from the first observations, those of these trials."""
+    observations = seen.pooled[: len(trials)]
     covariance, before = (uncertainty.whole_covariance(c) for c in (result.bsp_covariance, prior.covariance))
-    load_sd = [np.repeat([trial.force_sd, trial.moment_sd], 3) for trial in trials]
-    reduced = (np.broadcast_to(trial.impact, trial.dynamic.shape)[trial.dynamic] for trial in trials)
+    load_sd = [np.repeat([one.force_sd, one.moment_sd], 3) for one in observations]
+    reduced = (np.broadcast_to(one.impact, one.dynamic.shape)[one.dynamic] for one in observations)
     return Posterior(
         prior_sd=np.sqrt(np.diag(before)).reshape(-1, 10),
         sd=np.sqrt(np.diag(covariance)).reshape(-1, 10),
         covariance=covariance,
         calibration=result.calibration,
-        marker_noise=(),
+        marker_noise=seen.noise[: len(trials)],
         iterations=result.iterations,
         base=base_parameters(result.skeleton, result.bsp, prior.sd, motions, load_sd),
         instruments=result.instruments,
         prior_mean=uncertainty.whole(prior.mean),
         unlikeness=unlikeness(prior, result.bsp, result.bsp_covariance),
+        marker_distances_m=_marker_distances(result, trials),
         down_weighted=tuple(map(down_weighted, reduced)),
         draws=result.draws.without_places() if uncertainty.marker_sd_m is None else result.draws,
     )

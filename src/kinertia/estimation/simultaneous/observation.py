@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -60,7 +61,7 @@ class Observations:
     misplaced_m: np.ndarray
     repeats: np.ndarray
 
-    @property
+    @cached_property
     def pooled(self) -> tuple[Observation, ...]:
         """Observations of the trials for one estimate from all of them: errors that recur count once."""
         return tuple(o.repeated(count) for o, count in zip(self.separate, self.repeats.sum(axis=1), strict=True))
