@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from kinertia.model.joint_centres import find_landmarks, hip_in_pelvis, pelvis_frame
 from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, Markers
@@ -70,6 +71,11 @@ def wands_exchanged(person: MeasuredPerson, rng: np.random.Generator) -> Measure
 def turned(rotation: FloatArray, where: str = "both") -> Change:
     """Return a fault that rotates the markers to other axes."""
     return lambda person, rng: _in(person, where, lambda markers: markers.rotated(rotation), set())
+
+
+def tilted(axis: str, degrees: float) -> Change:
+    """Return a fault that tilts the cameras about a horizontal axis; the walks go along X."""
+    return turned(Rotation.from_euler(axis, degrees, degrees=True).as_matrix())
 
 
 def z_up(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPerson:

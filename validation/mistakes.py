@@ -118,6 +118,8 @@ MISTAKES = (
     Mistake("an axis of the laboratory mirrored", markers.mirrored, _codes("L201")),
     Mistake("lengths in cm called mm", markers.scaled(0.1, "both"), _codes("M141")),
     Mistake("floor of the cameras 30 mm too low", markers.moved((0.0, 0.03, 0.0), "both"), _codes("M143")),
+    Mistake("cameras tilted by 3 degrees along the walk", markers.tilted("z", 3.0), _codes("M144")),
+    Mistake("cameras tilted by 3 degrees to one side", markers.tilted("x", -3.0), _codes("M145")),
     Mistake(
         "cameras calibrated anew: all markers 100 mm further on than the plates",
         markers.moved((0.1, 0.0, 0.0), "walk"),

@@ -13,6 +13,7 @@ from kinertia.diagnostics.result.masses import attached_items, forces_of_the_mot
 from kinertia.diagnostics.result.plate_positions import plate_positions
 from kinertia.diagnostics.result.residuals import residuals
 from kinertia.diagnostics.result.rotation import plate_rotation
+from kinertia.diagnostics.result.sideways_lean import sideways_lean
 from kinertia.diagnostics.result.soundness import soundness
 from kinertia.diagnostics.runner import Question, asked
 from kinertia.findings.finding import Finding
@@ -24,6 +25,7 @@ ESTIMATE_QUESTIONS: tuple[Question[ResultContext], ...] = (
     Question("P22", gains),
     Question("P23", plate_rotation),
     Question("P24", plate_positions),
+    Question("M14", sideways_lean),
     Question("P26", free_moments),
     Question("T21", delays),
     Question("M16", moved_markers),
