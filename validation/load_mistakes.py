@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
 from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads
@@ -151,11 +152,29 @@ def late(delay_s: float) -> Change:
     """Return a fault that delays the forces."""
 
     def change(plates: PlateLoads) -> PlateLoads:
-        step = float(plates.time[1] - plates.time[0])
-        rows = np.clip(np.arange(len(plates.time)) - round(delay_s / step), 0, len(plates.time) - 1)
+        rows = _earlier(plates, delay_s)
         return replace(plates, force=plates.force[rows], moment=plates.moment[rows])
 
     return loads(change)
+
+
+def late_plate(delay_s: float) -> Change:
+    """Return a fault that delays the forces of the plate that is stood on first."""
+
+    def change(plates: PlateLoads) -> PlateLoads:
+        rows, first = _earlier(plates, delay_s), _by_time(plates)[0]
+        force, moment = plates.force.copy(), plates.moment.copy()
+        force[:, first], moment[:, first] = plates.force[rows, first], plates.moment[rows, first]
+        return replace(plates, force=force, moment=moment)
+
+    return loads(change)
+
+
+def _earlier(plates: PlateLoads, delay_s: float) -> npt.NDArray[np.int_]:
+    """Return the row of the sample that was taken this much earlier than each."""
+    step = float(plates.time[1] - plates.time[0])
+    rows: npt.NDArray[np.int_] = np.arange(len(plates.time)) - round(delay_s / step)
+    return np.clip(rows, 0, len(plates.time) - 1)
 
 
 def of_another_trial(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPerson | None:

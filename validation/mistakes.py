@@ -129,6 +129,7 @@ MISTAKES = (
     Mistake("80 ms of marker frames cut out and closed up", markers.closed_up, _codes("M121")),
     Mistake("markers at half their rate", markers.half_speed, _codes("T201", "T202")),
     Mistake("forces 100 ms late", forces.late(0.1), _codes("T211", "T214")),
+    Mistake("forces of one plate 25 ms late", forces.late_plate(0.025), _codes("T216")),
     Mistake("forces of another trial", forces.of_another_trial, _codes("T212")),
     # single markers
     Mistake("spikes of 300 mm every 20 frames", markers.one_marker("knee_lateral_r", markers.spikes), _codes("M111")),

@@ -24,6 +24,7 @@ from kinertia.diagnostics.plates.zeros import idle_levels, zeros
 from kinertia.diagnostics.plates.zeros_under_load import zeros_under_load
 from kinertia.diagnostics.runner import Question
 from kinertia.diagnostics.timing.force_rate import force_rate
+from kinertia.diagnostics.timing.plate_delay import plate_delay
 
 _NOT_UNDER_FEET = ("P201", "P202", "P203", "P204", "P24", "T20", "T21")
 """ERRORs after which it is not known where on a foot a load acts."""
@@ -54,6 +55,7 @@ STANDING_QUESTIONS: tuple[Question[RecordingContext], ...] = (Question("P10", sp
 LOADED_QUESTIONS: tuple[Question[RecordingContext], ...] = (
     Question("M13", over_smoothed, unless=_NO_VELOCITY),
     Question("T20", force_rate, unless=_NO_VELOCITY),
+    Question("T21", plate_delay, unless=_NO_VELOCITY),
     Question("P23", force_directions, unless=_NO_VELOCITY),
     Question("P22", gains, unless=_NO_VELOCITY),
     Question("P21", zeros_under_load, unless=_NO_VELOCITY),

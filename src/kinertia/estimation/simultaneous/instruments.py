@@ -136,8 +136,8 @@ class InstrumentPrior:
         plate: prior of each of PLATE_UNKNOWNS, for every plate on its own.
         floor: prior of each of FLOOR_UNKNOWNS, for all plates together.
         delay_s: prior of the delay between forces and markers.
-        delay_s: prior of the additional delay of the forces of one of several trials.
-        zero_n: prior of the zero offsets of each plate's horizontal forces in each trial.
+        trial_delay_s: prior of the additional delay of the forces of one of several trials.
+        zero_offset_n: prior of the zero offsets of each plate's horizontal forces in each trial.
         trial_gain: prior of each plate's additional gain error in each trial.
         session: information from other people measured with the same instruments.
 
