@@ -166,6 +166,12 @@ def test_no_usable_frame_names_trial_and_counts(skeleton, trial):
     assert found.where.span_s == pytest.approx((1.0, 1.09))
 
 
+def test_a_trial_without_forces_lacks_no_contact(skeleton, trial):
+    alone = replace(trial, loads=replace(trial.loads, plates=()))
+    found = refused(skeleton, hidden(alone, ["foot_l", "shank_l"], 0.14, 1.9))
+    assert (found.code, found.where.part, found.evidence["frames"].value) == ("R102", "the whole body", 14)
+
+
 def refused(skeleton, trial):
     """The finding of the error that this trial has no kinematics."""
     with pytest.raises(TrialError) as caught:

@@ -161,6 +161,19 @@ def test_a_window_with_hardly_any_of_its_frames_leaves_it_out(lab, window_s):
     assert (ready.functional, ready.left_out) == ((), ("squat",))
 
 
+@pytest.mark.parametrize("frames", [12, 19, 40])
+def test_check_and_fit_say_alike_that_it_is_too_short(lab, frames):
+    measured, squats = lab
+    short = replace(squats, markers=squats.markers.cut(1.0, 1.0 + (frames - 0.5) / squats.markers.rate_hz))
+    inputs = [TrialInput(measured.walk), TrialInput(short, use="kinematics")]
+    checked = check_person(Person(SUBJECT, inputs, measured.static))
+    ready = prepare(SUBJECT, measured.static, inputs)
+    for findings in (checked.findings, ready.findings):
+        (found,) = [one for one in findings if one.where.trial == "squat" and one.severity.name == "ERROR"]
+        assert (found.code, found.evidence["frames"].value) == ("T104", frames)
+    assert ready.left_out == ("squat",)
+
+
 def test_of_no_trial_with_forces_none_joins(lab):
     measured, _ = lab
     inputs = [TrialInput(with_empty_plates(measured.walk, name)) for name in ("one", "two")]

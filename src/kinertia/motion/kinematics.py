@@ -36,7 +36,7 @@ FEWEST_FRAMES = 11
 """Fewest frames of a window."""
 AROUND_WINDOW_S = AROUND_LOAD_S
 """Samples this near the measured window help to determine the motion at its ends."""
-_END_PERIODS = 0.5
+END_PERIODS = 0.5
 """The window is this share of the cutoff's period away from the ends of the record, where accelerations are poor.
 
 On the gait2354 walk the residual is 57 N in these frames and 35 N in all others.
@@ -164,7 +164,7 @@ def solve_kinematics(
 
     Raises:
         TrialError: R102, R103, a coordinate is known in too few frames to be smoothed, or in none; R104, P279, no
-            frame, or too few, with complete ground contact and all coordinates.
+            frame, or too few, with complete ground contact and all coordinates; R102, if the trial has no forces.
     """
     ik = solve_ik(skeleton, trial.markers, trial.name)
     solved = np.flatnonzero(np.isfinite(ik.q).any(axis=1))
@@ -179,7 +179,7 @@ def solve_kinematics(
     known = np.all(_bridged(np.isfinite(ik.q), ik.time), axis=1)
     known &= (
         np.abs(ik.time - ik.time[shown].mean())
-        <= np.ptp(ik.time[shown]) / 2 - _END_PERIODS / cutoff.hz + TIME_TOLERANCE_S
+        <= np.ptp(ik.time[shown]) / 2 - END_PERIODS / cutoff.hz + TIME_TOLERANCE_S
     )
     windows, findings = _long_enough(trial, known & trial.measured, known)
     stuck = int((~ik.converged[solved]).sum())
@@ -209,10 +209,13 @@ def _long_enough(
     """
     time, where = trial.markers.time, Where(trial=trial.name)
     windows = runs(usable)
+    used = [(first, last) for first, last in windows if last - first + 1 >= FEWEST_FRAMES]
+    if not used and not trial.loads.plates:
+        whole = Where(part="the whole body")
+        raise TrialError.found(trial.name, "R102", whole, frames=Quantity(int(known.sum()), "1"))
     if not windows:
         measured, shown = (Quantity(int(mask.sum()), "1") for mask in (trial.measured, known))
         raise TrialError.found(trial.name, "R104", frames_with_contact=measured, frames_with_markers=shown)
-    used = [(first, last) for first, last in windows if last - first + 1 >= FEWEST_FRAMES]
     if not used:
         first, last = max(windows, key=lambda run: run[1] - run[0])
         longest = Where(span_s=(float(time[first]), float(time[last])))

@@ -15,7 +15,8 @@ from kinertia.diagnostics.plates.heel_landing import goes_forwards
 from kinertia.errors import KinertiaError
 from kinertia.findings.finding import Finding, finding, with_evidence
 from kinertia.findings.quantity import Quantity
-from kinertia.motion.kinematics import FEWEST_FRAMES
+from kinertia.motion.common_cutoff import LOWEST_HZ
+from kinertia.motion.kinematics import END_PERIODS, FEWEST_FRAMES
 from kinertia.trial.data import FEET, BoolArray
 from kinertia.trial.plate_assignment import FOOT_NAMES, no_forces
 from kinertia.trial.sampled_time import span_s, within
@@ -30,12 +31,13 @@ marker it is up to 0.19 of the way to the other foot, which stands on the floor.
 def complete_contact(context: RecordingContext) -> Iterator[Finding]:
     """T104, P271, P278: no trial can be made of the recording; P279: it has too few frames with complete contact; P273,
     P274, P275, P277: how its loads were sorted by foot; P280, P283: its markers alone are used, as asked for or since
-    its forces cannot be; F191: hardly any frames are in the window stated for these.
+    its forces cannot be; F191, T104: hardly any frames are in the window stated for these, or in the trial.
     """
     if context.is_static:
         return
     if context.without_forces:
-        yield _too_few_in_window(context) or finding("P283" if context.forces_refused else "P280", context.at())
+        use = finding("P283" if context.forces_refused else "P280", context.at())
+        yield _too_few_in_window(context) or _too_few_frames(context) or use
         return
     if context.plates is None:
         yield no_forces(context.recording).in_trial(context.name)
@@ -68,6 +70,13 @@ def _too_few_in_window(context: RecordingContext) -> Finding | None:
         "value": Quantity(stated),
     }
     return with_evidence("F191", context.at(), evidence)
+
+
+def _too_few_frames(context: RecordingContext) -> Finding | None:
+    """Return T104 if a trial without forces is too short for its motion to be used, at the lowest cutoff."""
+    markers = context.recording.markers
+    frames, fewest = len(markers.time), FEWEST_FRAMES + 2.0 * END_PERIODS * markers.rate_hz / LOWEST_HZ
+    return None if frames >= fewest else finding("T104", context.at(), frames=Quantity(frames, "1", limit=fewest))
 
 
 def both_feet(context: RecordingContext) -> Iterator[Finding]:
