@@ -1,3 +1,5 @@
+import tomllib
+
 import pytest
 
 from kinertia.io.session_file import PersonInstruments, read_session, session_text
@@ -16,12 +18,17 @@ FOUND = {
 @pytest.fixture
 def written(tmp_path):
     path = tmp_path / "instruments.toml"
-    path.write_text(session_text("0.1", FOUND, [PERSON, PERSON]), encoding="utf-8")
+    path.write_text(session_text("day \"β\".toml", "0.1", FOUND, [PERSON, PERSON]), encoding="utf-8")
     return path
 
 
 def test_what_is_written_is_read(written):
     assert read_session(written) == (PERSON, PERSON)
+
+
+def test_the_file_names_itself(written):
+    commented = [line.removeprefix("#") for line in written.read_text(encoding="utf-8").splitlines() if line[0:1] == "#"]
+    assert tomllib.loads("\n".join(commented[1:3])) == {"instruments": {"session": 'day "β".toml'}}
 
 
 def test_people_read_millimetres_and_milliseconds(written):

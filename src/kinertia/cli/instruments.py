@@ -51,7 +51,7 @@ def instruments(
             fit = fit_subject(each, progress)
         people.append(person_instruments(fit, recordings(each)))
     session = session_instruments(people, wanted[0].instruments)
-    write_then_rename(output, session_text(VERSION, session.found, session.people))
+    write_then_rename(output, session_text(output.name, VERSION, session.found, session.people))
     _report(session)
     out.print(f"written to {output}; name it in the subject files: session = ... under [instruments]", soft_wrap=True)
     names = [person.name for person in session.people]

@@ -214,7 +214,7 @@ def _teach_instruments(folder: Path, people: Sequence[_Known], notes: list[str])
         session = session_instruments(said, of_day[0].wanted.instruments)
         notes += [f"{day}: {one.line()} {one.remedy}" for one in session.contradictions]
         path = folder / f"{day}-{k + 1}.toml"
-        write_then_rename(path, session_text(VERSION, session.found, session.people))
+        write_then_rename(path, session_text(path.name, VERSION, session.found, session.people))
         for one in sharing:
             one.entries["instruments"] = {"session": str(path.resolve())}
 

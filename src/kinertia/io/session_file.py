@@ -86,11 +86,15 @@ def read_session(path: Path) -> tuple[PersonInstruments, ...]:
 
 
 def session_text(
-    version: str, values: Mapping[str, Mapping[str, tuple[float, float, str]]], people: Sequence[PersonInstruments]
+    name: str,
+    version: str,
+    values: Mapping[str, Mapping[str, tuple[float, float, str]]],
+    people: Sequence[PersonInstruments],
 ) -> str:
     """Return the text of the file.
 
     Args:
+        name: name of the file.
         version: version of Kinertia.
         values: error, SD and unit (m, 1, N m/N, rad or s) by instrument and quantity.
         people: information from each person.
@@ -98,7 +102,7 @@ def session_text(
     lines = [
         "# Plates and clock of a session, found by kinertia instruments. For use in its fits, in the subject files:",
         "#     [instruments]",
-        '#     session = "instruments.toml"',
+        f"#     session = {json.dumps(name, ensure_ascii=False)}",
         "# A fit leaves out what its own trials have said here. Values are errors, recorded minus true.",
         f"kinertia = {json.dumps(version)}",
     ]
