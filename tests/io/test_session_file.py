@@ -18,7 +18,7 @@ FOUND = {
 @pytest.fixture
 def written(tmp_path):
     path = tmp_path / "instruments.toml"
-    path.write_text(session_text("day \"β\".toml", "0.1", FOUND, [PERSON, PERSON]), encoding="utf-8")
+    path.write_text(session_text('day "β".toml', "0.1", FOUND, [PERSON, PERSON]), encoding="utf-8")
     return path
 
 
@@ -27,7 +27,9 @@ def test_what_is_written_is_read(written):
 
 
 def test_the_file_names_itself(written):
-    commented = [line.removeprefix("#") for line in written.read_text(encoding="utf-8").splitlines() if line[0:1] == "#"]
+    commented = [
+        line.removeprefix("#") for line in written.read_text(encoding="utf-8").splitlines() if line[0:1] == "#"
+    ]
     assert tomllib.loads("\n".join(commented[1:3])) == {"instruments": {"session": 'day "β".toml'}}
 
 

@@ -291,3 +291,13 @@ def test_events_that_forces_contradict_are_not_used(walked, trial, fault):
     assert sides_exchanged(contradicted) == ("exchanged" in fault)
     expected = strides_of(walked.skeleton, kinematics_of(walked, half))
     assert strides_of(walked.skeleton, kinematics_of(walked, contradicted)) == expected
+
+
+def test_one_event_of_the_wrong_side_costs_no_stride(walked, trial):
+    half = with_half_of_the_loads(trial)
+    events = stated(walked)
+    expected = strides_of(walked.skeleton, kinematics_of(walked, half))
+    for k, event in enumerate(events[1:-1], start=1):
+        wrong = replace(event, side="l" if event.side == "r" else "r")
+        one_off = replace(half, events=(*events[:k], wrong, *events[k + 1 :]))
+        assert strides_of(walked.skeleton, kinematics_of(walked, one_off)) == expected

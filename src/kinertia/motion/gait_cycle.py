@@ -134,12 +134,14 @@ def found_events(skeleton: Skeleton, kinematics: Kinematics) -> list[FoundEvent]
     Events of the file before or after the frames with a motion are left out, as a file keeps when it is cropped.
     """
     (first, last), edges = kinematics.spline.time[[0, -1]], load_edges(kinematics.trial.loads)
+    by_motion = _from_motion(feet_under_pelvis(skeleton, kinematics))
     slack = 0.5 / kinematics.trial.markers.rate_hz
-    stated = [one for one in usable_events(kinematics.trial) if first - slack <= one.time_s <= last + slack]
+    usable = usable_events(kinematics.trial, by_motion)
+    stated = [one for one in usable if first - slack <= one.time_s <= last + slack]
     known = [*edges, *stated]
     events = [
         event
-        for event in _from_motion(feet_under_pelvis(skeleton, kinematics))
+        for event in by_motion
         if _foot_is_shown(skeleton, kinematics, event) or nearest_event(known, event, _SAME_EVENT_S) is not None
     ]
     return _timed(events, gait_events(kinematics.trial), edges, stated)

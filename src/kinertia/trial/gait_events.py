@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -43,6 +43,9 @@ EVENT_LIMIT_S = 0.03
 _PLAINLY = 2
 """Ratio of counts required: where a foot leaves the plates but not the ground, a load may end with a step of the other
 foot."""
+_SAME_STEP_EVENT_S = 0.1
+"""Largest difference between an event and the motion or the load of the foot that makes it."""
+_OTHER = dict(zip(FEET, reversed(FEET), strict=True))
 
 
 def contradicted_events(trial: Trial) -> list[tuple[FileEvent, GaitEvent]]:
@@ -55,14 +58,27 @@ def contradicted_events(trial: Trial) -> list[tuple[FileEvent, GaitEvent]]:
 def sides_exchanged(trial: Trial) -> bool:
     """Decide whether the events coincide with the loads of the other foot and hardly with those of their own."""
     edges, stated = load_edges(trial.loads), _stated(trial)
-    other = dict(zip(FEET, reversed(FEET), strict=True))
-    exchanged = [one._replace(side=other[one.side]) for one in stated]
+    exchanged = [one._replace(side=_OTHER[one.side]) for one in stated]
     return _agreeing(exchanged, edges) > _PLAINLY * _agreeing(stated, edges)
 
 
-def usable_events(trial: Trial) -> list[GaitEvent]:
-    """Return all gait events that the file states, or none if forces contradict one of them."""
+def events_of_other_foot(events: Iterable[FileEvent], shown: Sequence[GaitEvent]) -> list[FileEvent]:
+    """Return the stated events at whose times the other foot does what they state, and their own foot does not."""
+    wrong = []
+    for one in events:
+        if (stated := one.of_gait) is None:
+            continue
+        other = nearest_event(shown, stated._replace(side=_OTHER[stated.side]), _SAME_STEP_EVENT_S)
+        if other is not None and nearest_event(shown, stated, SAME_EVENT_S) is None:
+            wrong.append(one)
+    return wrong
+
+
+def usable_events(trial: Trial, by_motion: Sequence[GaitEvent]) -> list[GaitEvent]:
+    """Return all gait events that the file states, or none if forces or the motion of the feet contradict one."""
     if contradicted_events(trial) or sides_exchanged(trial):
+        return []
+    if events_of_other_foot(trial.events, [*gait_events(trial), *by_motion]):
         return []
     return _stated(trial)
 

@@ -1,16 +1,22 @@
 """Events of a file next to the forces: late ones, those of the other foot, and sound ones."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from kinertia.diagnostics.evidence.foot_trajectories import foot_trajectories
 from kinertia.diagnostics.timing.file_events import file_events
 from kinertia.findings.where import Where
 from kinertia.synthetic.walk import walk, walking_subject
 from kinertia.trial.data import FEET, FootLoads, Trial
 from kinertia.trial.gait_event import FileEvent
 from kinertia.trial.gait_events import load_edges
+
+FOOT_MARKERS = {
+    side: [one.label for one in walking_subject().skeleton.markers if one.segment == f"foot_{side}"] for side in FEET
+}
 
 
 @pytest.fixture(scope="module")
@@ -20,9 +26,9 @@ def trial() -> Trial:
     return Trial("walk", walked.markers, loads, np.ones(len(walked.time), dtype=bool))
 
 
-def found(trial, events):
+def found(trial, events, feet=None):
     stated = Trial(trial.name, trial.markers, trial.loads, trial.measured, events=tuple(events))
-    return [*file_events(SimpleNamespace(loaded=stated, at=lambda: Where(trial=trial.name)))]
+    return [*file_events(SimpleNamespace(loaded=stated, at=lambda: Where(trial=trial.name), foot_trajectories=feet))]
 
 
 def of_loads(trial, delay_s=0.0, sides=FEET):
@@ -50,6 +56,24 @@ def test_one_event_that_is_off(trial, delay_s, words):
 def test_events_of_the_other_foot(trial):
     (one,) = found(trial, of_loads(trial, sides=("l", "r")))
     assert one.code == "T312"
+
+
+def unloaded(trial):
+    """The same walk where no plate is."""
+    return replace(trial, loads=replace(trial.loads, force=0.0 * trial.loads.force))
+
+
+@pytest.mark.parametrize("on_plates", [True, False])
+def test_one_event_of_the_other_foot(trial, on_plates):
+    feet = foot_trajectories(trial.markers, {side: FOOT_MARKERS[side] for side in FEET})
+    events = of_loads(trial)
+    measured = trial if on_plates else unloaded(trial)
+    assert found(measured, events, feet) == []
+    events[3] = replace(events[3], side="l" if events[3].side == "r" else "r")
+    (one,) = found(measured, events, feet)
+    assert one.code == "T313"
+    assert one.evidence["time_s"].value == events[3].time_s
+    assert one.evidence["other_foot"].value != one.evidence["foot"].value
 
 
 def test_general_events_are_nobody_s_step(trial):

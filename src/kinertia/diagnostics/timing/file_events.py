@@ -8,12 +8,21 @@ from kinertia.diagnostics.context import RecordingContext
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.trial.data import FEET, Trial
-from kinertia.trial.gait_events import EVENT_LIMIT_S, contradicted_events, sides_exchanged
+from kinertia.trial.gait_event import GaitEvent
+from kinertia.trial.gait_events import (
+    EVENT_LIMIT_S,
+    contradicted_events,
+    events_of_other_foot,
+    gait_events,
+    sides_exchanged,
+)
 from kinertia.trial.plate_assignment import FOOT_NAMES
 
 
 def file_events(context: RecordingContext) -> Iterator[Finding]:
-    """T311 and T312: the event of a file farthest from its forces (T311), or events with sides exchanged (T312)."""
+    """T311 to T313: the event of a file farthest from its forces (T311), or events with sides exchanged, all of them
+    (T312) or a few (T313).
+    """
     trial = context.loaded
     if not isinstance(trial, Trial):
         return
@@ -21,6 +30,17 @@ def file_events(context: RecordingContext) -> Iterator[Finding]:
         count = sum(one.of_gait is not None for one in trial.events)
         yield finding("T312", context.at(), events=Quantity(count, "1"))
         return
+    other_foot = events_of_other_foot(trial.events, [*gait_events(trial), *_by_motion(context)])
+    for one in other_foot[:1]:
+        yield finding(
+            "T313",
+            context.at(),
+            event=Quantity(one.label),
+            foot=Quantity(FOOT_NAMES[FEET.index(one.side)]),
+            other_foot=Quantity(FOOT_NAMES[1 - FEET.index(one.side)]),
+            time_s=Quantity(one.time_s, "s"),
+            events=Quantity(len(other_foot), "1"),
+        )
     apart = contradicted_events(trial)
     if apart:
         stated, shown = max(apart, key=lambda pair: abs(pair[0].time_s - pair[1].time_s))
@@ -36,3 +56,13 @@ def file_events(context: RecordingContext) -> Iterator[Finding]:
             direction=Quantity("after" if difference > 0.0 else "before"),
             events=Quantity(len(apart), "1"),
         )
+
+
+def _by_motion(context: RecordingContext) -> Iterator[GaitEvent]:
+    """Detect foot strikes and foot offs as the begin and end of stance phases that the trial shows."""
+    for side, foot in zip(FEET, context.foot_trajectories or (), strict=False):
+        for start, end, _ in foot.stance_spans:
+            if start > foot.time[0]:
+                yield GaitEvent(start, side, "heel strike")
+            if end < foot.time[-1]:
+                yield GaitEvent(end, side, "toe off")
