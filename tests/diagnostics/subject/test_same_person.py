@@ -92,6 +92,43 @@ def test_markers_put_on_anew(someone, seed):
     assert "S204" in codes(static_and_trials(context))
 
 
+def reapplied(markers, by_m, seed=1):
+    """The same markers, each elsewhere on the skin by so much along each axis."""
+    offsets = np.random.default_rng(seed).normal(0.0, by_m, (len(markers.labels), 3))
+    return Markers(markers.time, markers.labels, markers.positions + offsets)
+
+
+@pytest.mark.parametrize(
+    ("by_m", "mass_kg", "height_m", "code"),
+    [
+        (0.0, 48.0, 1.5, None),
+        (0.012, None, None, "S204"),
+        (0.012, 61.0, 1.71, "S204"),
+        (0.012, 54.0, None, "S203"),
+        (0.012, None, 1.62, "S203"),
+        (0.04, None, None, "S203"),
+    ],
+)
+def test_the_static_trial_of_a_person_of_the_same_size(recording_of, by_m, mass_kg, height_m, code):
+    """Distances alone do not tell another person from markers that were re-applied; what files state of the body does."""
+    static, walk = (recording_of(name).markers for name in CLINIC[0])
+    marker_set = choose_marker_set(static.labels)
+    moving = replace(only_markers("walk", walk), mass_kg=60.0, height_m=1.70)
+    still = replace(only_markers("static", reapplied(static, by_m)), mass_kg=mass_kg, height_m=height_m)
+    context = person([moving], still, marker_set)
+    assert codes(one for one in explained(static_and_trials(context)) if one.is_open) == (
+        [] if code is None else [code]
+    )
+
+
+@pytest.mark.parametrize("pair", here([("pig_c3d/subject_a_static.c3d", "pig_c3d/subject_b_walk.c3d")]))
+def test_the_static_trial_of_somebody_else_of_one_laboratory(recording_of, pair):
+    static, walk = map(recording_of, pair)
+    context = person([walk], static, choose_marker_set(static.markers.labels))
+    (one,) = [each for each in explained(static_and_trials(context)) if each.is_open]
+    assert (one.code, one.severity, one.where.trial) == ("S203", Severity.ERROR, walk.name)
+
+
 def test_one_marker_that_was_moved(someone):
     static, walk, marker_set = someone
     moved, label = with_heel_moved(walk, marker_set)

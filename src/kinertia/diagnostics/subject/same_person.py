@@ -29,6 +29,10 @@ from kinertia.trial.rms import rms
 
 _OTHER_PERSON = 0.05
 """Median share by which the distances may differ."""
+_BEYOND_REAPPLIED_M, _TYPICAL_BEYOND_M = 0.020, 0.012
+"""RMS and median difference beyond those of markers that are re-applied: 7 to 14 mm RMS, of nine distances 19 at most."""
+_OTHER_MASS, _OTHER_STATURE = 0.05, 0.03
+"""Shares by which mass and stature of two recordings differ for them not to be of one person in one session."""
 _MOVED_M, _MOVED_BETWEEN_M, _MOVED_SHARE = 0.03, 0.04, 0.15
 """Difference of a distance where a marker was moved: from a static trial; between trials, where soft thighs
 change shape, a length and a share."""
@@ -102,22 +106,14 @@ def _against(
         return
     swapped = list(swapped_labels(distances, at, called))
     yield from swapped
-    off, ratio, count = distances.differences(), distances.ratio(), len(distances.pairs)
-    worst = int(np.argmax(np.abs(off)))
-    if count >= FEWEST_PAIRS and abs(ratio - 1.0) > _OTHER_PERSON:
-        yield finding(
-            "S203",
-            Where(trial=at),
-            ratio=Quantity(ratio, "1", limit=1.0 + _OTHER_PERSON * float(np.sign(ratio - 1.0)), usual=(0.988, 1.012)),
-            pairs=Quantity(count, "1"),
-            worst_m=Quantity(float(off[worst]), "m"),
-            reference=Quantity(called),
-        )
+    exchanged = {label for one in swapped for label in one.where.markers}
+    moved = _moved_markers(distances, _MOVED_M, 0.0, exchanged)
+    count, rms_m = len(distances.pairs), rms(distances.differences())
+    if count >= FEWEST_PAIRS:
+        yield from _other_person(distances, reference, trial, at, called, whole=not swapped and not moved)
     if (scale := camera_scale(distances, usual)) is not None:
         yield scale.finding(at, called)
-    exchanged = {label for one in swapped for label in one.where.markers}
-    yield from _moved_findings(_moved_markers(distances, _MOVED_M, 0.0, exchanged), at, called)
-    rms_m = rms(off)
+    yield from _moved_findings(moved, at, called)
     if count >= FEWEST_PAIRS and rms_m > SAME_SESSION_M:
         yield finding(
             "S204",
@@ -126,6 +122,57 @@ def _against(
             worst_pair=Quantity(distances.worst_pair()),
             reference=Quantity(called),
         )
+
+
+def _other_person(
+    distances: SegmentDistances,
+    reference: RecordingContext,
+    trial: RecordingContext,
+    at: str,
+    called: str,
+    *,
+    whole: bool,
+) -> Iterator[Finding]:
+    """S203: distances at another scale, or farther off than markers that are re-applied, or as far where body data
+    differ, too; the latter unless a few labels explain the differences (not `whole`).
+    """
+    off, ratio = distances.differences(), distances.ratio()
+    rms_m, typical_m = rms(off), float(np.median(np.abs(off)))
+    scaled = abs(ratio - 1.0) > _OTHER_PERSON
+    far = whole and rms_m > _BEYOND_REAPPLIED_M and typical_m > _TYPICAL_BEYOND_M
+    data = _other_body_data(reference, trial) if whole and rms_m > SAME_SESSION_M else ""
+    if not (scaled or far or data):
+        return
+    difference = f"a factor of {ratio:.3g}" if scaled else f"{1e3 * rms_m:.0f} mm RMS"
+    yield finding(
+        "S203",
+        Where(trial=at),
+        ratio=Quantity(ratio, "1", limit=1.0 + _OTHER_PERSON * float(np.sign(ratio - 1.0)), usual=(0.988, 1.012)),
+        rms_m=Quantity(rms_m, "m", limit=SAME_SESSION_M if data else _BEYOND_REAPPLIED_M, usual=(0.0, 0.0046)),
+        pairs=Quantity(len(distances.pairs), "1"),
+        worst_m=Quantity(float(off[np.argmax(np.abs(off))]), "m"),
+        reference=Quantity(called),
+        difference=Quantity(difference + data),
+        unit=Quantity(", or in another unit" if scaled else ""),
+    )
+
+
+def _other_body_data(reference: RecordingContext, trial: RecordingContext) -> str:
+    """Describe how mass or stature of two recordings differ: stated in their files, else as their plates weigh them."""
+    one, other = reference.recording, trial.recording
+    for first, second, limit, unit in (
+        (one.mass_kg, other.mass_kg, _OTHER_MASS, "kg"),
+        (one.height_m, other.height_m, _OTHER_STATURE, "m"),
+    ):
+        if first and second and abs(np.log(second / first)) > limit:
+            return f"; its file states {first:.4g} {unit}, that of {trial.name} {second:.4g} {unit}"
+    standing, moving = reference.standing_mass, trial.force_mass
+    if standing is None or moving is None:
+        return ""
+    allowed_kg = _OTHER_MASS * moving.mass_kg + 2.0 * float(np.hypot(standing.sd_kg, moving.sd_kg))
+    if abs(standing.mass_kg - moving.mass_kg) <= allowed_kg:
+        return ""
+    return f"; its plates weigh {standing.mass_kg:.3g} kg, those of {trial.name} {moving.mass_kg:.3g} kg"
 
 
 @dataclass(frozen=True)
