@@ -110,7 +110,7 @@ def reapplied(markers, by_m, seed=1):
     ],
 )
 def test_the_static_trial_of_a_person_of_the_same_size(recording_of, by_m, mass_kg, height_m, code):
-    """Distances alone do not tell another person from markers that were re-applied; what files state of the body does."""
+    """Distances alone do not tell another person from re-applied markers; what files state of the body does."""
     static, walk = (recording_of(name).markers for name in CLINIC[0])
     marker_set = choose_marker_set(static.labels)
     moving = replace(only_markers("walk", walk), mass_kg=60.0, height_m=1.70)
