@@ -117,6 +117,10 @@ class FileError(KinertiaError):
         return cls(path, problem_of(placed), line).with_finding(placed)
 
 
+def _wrong_entry(entry: str, problem: str) -> Finding:
+    return finding("F191", entry=Quantity(entry), expected=Quantity(problem))
+
+
 class MarkerSetError(KinertiaError):
     """A marker set does not fit the labels of a trial.
 
@@ -193,7 +197,7 @@ class SubjectError(KinertiaError):
 
 
 class PriorError(KinertiaError):
-    """A prior of body segment parameters is impossible: an SD that is not positive, or an invalid covariance.
+    """A prior of body segment parameters is impossible: an SD that is not positive, or an invalid covariance (F191).
 
     Attributes:
         parameter: "segment.parameter" that is wrong, or None.
@@ -201,7 +205,8 @@ class PriorError(KinertiaError):
 
     def __init__(self, problem: str, parameter: str | None = None) -> None:
         self.parameter = parameter
-        super().__init__(f"prior of body segment parameters: {problem}")
+        self.finding = _wrong_entry("prior of body segment parameters", problem)
+        super().__init__(f"{self.finding.code} {self.finding.message}")
 
 
 class SettingsError(KinertiaError):
@@ -211,6 +216,16 @@ class SettingsError(KinertiaError):
         >>> isinstance(kinertia.SettingsError("cutoff_hz must be positive"), kinertia.KinertiaError)
         True
     """
+
+    @classmethod
+    def of_entry(cls, entry: str, problem: str) -> Self:
+        """Create the error of an entry that another one contradicts or lacks: F191.
+
+        >>> kinertia.SettingsError.of_entry("[model]", "expected a marker set").finding.code
+        'F191'
+        """
+        found = _wrong_entry(entry, problem)
+        return cls(f"{found.code} {found.message}").with_finding(found)
 
 
 class SessionError(KinertiaError):

@@ -41,8 +41,9 @@ def test_one_trial_keeps_its_names(subject):
 
 
 def test_a_static_trial_is_missing_where_one_is_needed(subject):
-    with pytest.raises(SettingsError, match="needs a static trial"):
+    with pytest.raises(SettingsError) as caught:
         read_inputs(subject)
+    assert (caught.value.finding.code, caught.value.finding.evidence["entry"].value) == ("F191", "[model]")
 
 
 def test_a_prosthesis_is_no_mirror_image(c3d_lab):

@@ -17,6 +17,7 @@ import numpy as np
 
 from kinertia.errors import TrialError
 from kinertia.estimation.simultaneous.range_terms import RangeTerms
+from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.model.coordinate_range import Bounds
 from kinertia.model.skeleton import Marker, Pose, Skeleton
@@ -80,7 +81,7 @@ def adapt(skeleton: Skeleton, given: AdaptationInputs) -> Adaptation:
     Frames whose visible markers do not determine every coordinate are left out.
 
     Raises:
-        TrialError: no frame of any trial remains.
+        TrialError: R102, no frame of any trial remains.
     """
     trials, coordinate_sd = given.trials, given.coordinate_sd
     present = {label for trial in trials for label in trial.markers.labels}
@@ -91,11 +92,8 @@ def adapt(skeleton: Skeleton, given: AdaptationInputs) -> Adaptation:
     start = np.concatenate([ik.q[:, [ik.coordinates.index(name) for name in base.coordinates]] for ik in given.poses])
     seen = np.isfinite(start).all(axis=1)
     if not seen.any():
-        raise TrialError(
-            ", ".join(trial.name for trial in trials),
-            f"in none of the {len(seen)} frames looked at are enough markers visible for all coordinates; fill the "
-            f"gaps of the markers or use another trial",
-        )
+        names, whole = ", ".join(trial.name for trial in trials), Where(part="the whole body")
+        raise TrialError.found(names, "R102", whole, frames=Quantity(0, "1"))
     measured, moving = measured[seen], start[seen]
 
     still = list(coordinate_sd)

@@ -44,7 +44,7 @@ def read_static(wanted: SubjectFile) -> Recording:
         KinertiaError: there is none, or its file is missing or broken.
     """
     if wanted.model.static is None:
-        raise SettingsError("[model] names an OpenSim model; this needs a static trial (static = ...)")
+        raise SettingsError.of_entry("[model]", "expected a static trial (static = ...), and no OpenSim model")
     return _as_zeroed(wanted, read_recording(wanted.model.static, length_unit=wanted.model.length_unit, standing=True))
 
 

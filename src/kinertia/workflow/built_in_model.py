@@ -195,7 +195,7 @@ def built_in_model(screened: Screened, trials: Sequence[Turned], settings: Setti
     """
     person, context = screened.person, screened.context
     if context.marker_set is None:
-        raise SettingsError("the built-in model needs a marker set (markers = ... under [model])")
+        raise SettingsError.of_entry("[model]", "expected the marker set of the built-in model (markers = ...)")
     statics = [] if context.static is None else [context.static.recording]
     subject = complete_subject(person.subject, [*statics, *person.recordings])
     height_m, sex = known(subject.height_m), known(subject.sex)

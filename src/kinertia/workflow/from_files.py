@@ -64,9 +64,9 @@ def prepare_subject(
 def _expect_no_mirrored_prosthesis(wanted: SubjectFile) -> None:
     names = [name for name, segment in wanted.segments.items() if segment.prosthesis]
     if names and wanted.settings.method == "two-level" and wanted.settings.symmetry:
-        raise SettingsError(
-            f"{', '.join(names)}: a prosthesis is no mirror image of the other side, as two-level with symmetry = true "
-            "has it; use the default method, or symmetry = false under [settings]"
+        raise SettingsError.of_entry(
+            ", ".join(names),
+            "a prosthesis is no mirror image of the other side; use the default method, or symmetry = false",
         )
 
 

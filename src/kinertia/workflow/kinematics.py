@@ -83,9 +83,7 @@ class Solved:
 def expect_forces(trials: Sequence[Trial]) -> None:
     """Raise a SettingsError unless one of these trials has forces."""
     if not any(trial.loads.plates for trial in trials):
-        raise SettingsError(
-            'no usable trial has forces to use; add a trial over force plates, without use = "kinematics"'
-        )
+        raise SettingsError.of_entry("[[trial]]", 'expected a usable trial with forces, without use = "kinematics"')
 
 
 def solved_trials(

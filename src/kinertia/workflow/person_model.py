@@ -60,7 +60,9 @@ def with_stated_ranges(skeleton: Skeleton, subject: Subject) -> Skeleton:
     for name, degrees in (subject.ranges_deg or {}).items():
         if name not in skeleton.coordinates:
             near = difflib.get_close_matches(name, skeleton.coordinates, n=1) or skeleton.coordinates[6:7]
-            raise SettingsError(f"ranges_deg under [subject]: no coordinate {name} moves; there is {near[0]}")
+            raise SettingsError.of_entry(
+                "ranges_deg under [subject]", f"no coordinate {name} moves; there is {near[0]}"
+            )
         low, high = np.radians(degrees).tolist()
         ranges[name] = Range(low, high, ranges.get(name, UNKNOWN).clamped, stated=True)
     return replace(skeleton, ranges=ranges)

@@ -68,7 +68,7 @@ def prepared(screened: Screened, settings: Settings, progress: Progress = lambda
     """
     person = screened.person
     if person.attached and settings.method == "two-level":
-        raise SettingsError("two-level knows the body only; where something is attached, use the default method")
+        raise SettingsError.of_entry("method", "two-level knows the body only; with [[attached]] use the default")
     check_trials(person.recordings)
     usable = screened.usable
     progress("calibration", 0.0)
