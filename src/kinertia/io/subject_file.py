@@ -115,6 +115,9 @@ def read_subject(path: str | Path, to_fit: bool = True) -> SubjectFile:
     """
     path = Path(path).resolve()
     document = read_toml(path, "a subject file (subject.toml)")
+    if "landmarks" in document:
+        expected = "expected the subject file that names it (markers = ... under [model])"
+        raise FileError.of(path, _wrong_entry("a marker set", expected, {}))
     result = _validated(SubjectFile, document, path)
     if lack := _incomplete(result, needs_sex=to_fit):
         place, found = lack

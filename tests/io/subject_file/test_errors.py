@@ -115,6 +115,14 @@ def test_errors_of_the_whole(folder, text, line, code, evidence):
         read(folder, text)
 
 
+def test_a_marker_set_is_no_subject_file(folder):
+    path = folder / "markers.toml"
+    path.write_text('name = "ours"\n[landmarks]\nasis_r = ["RASI"]\n', encoding="utf-8")
+    with pytest.raises(FileError) as caught:
+        read_subject(path)
+    assert (caught.value.finding.code, caught.value.finding.evidence["entry"].value) == ("F191", "a marker set")
+
+
 def test_forces_of_one_trial_at_least_are_used(folder):
     markers_only = re.sub(r"(\[\[trial\]\])", r'\1\nuse = "kinematics"', GOOD)
     first = markers_only[: markers_only.index("use =")].count("\n") + 1
