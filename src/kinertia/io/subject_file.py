@@ -115,7 +115,7 @@ def read_subject(path: str | Path, to_fit: bool = True) -> SubjectFile:
     """
     path = Path(path).resolve()
     document = read_toml(path, "a subject file (subject.toml)")
-    if "landmarks" in document:
+    if "landmarks" in document.content:
         expected = "expected the subject file that names it (markers = ... under [model])"
         raise FileError.of(path, _wrong_entry("a marker set", expected, {}))
     result = _validated(SubjectFile, document, path)
