@@ -61,6 +61,20 @@ def test_a_foot_on_two_plates_is_measured():
     assert list(plate_edges(context_of(together, FEET))) == []
 
 
+@pytest.mark.parametrize(("inside_m", "found"), [(0.005, ["P282"]), (0.012, ["P282"]), (0.018, []), (0.035, [])])
+def test_a_centre_of_pressure_nearer_to_an_edge_than_a_whole_foot(inside_m, found):
+    """The markers are inside, the foot around them is not."""
+    recording = on_plates()
+    corners = recording.plates.corners.copy()
+    corners[0, :, 2] += np.ptp(corners[0, :, 2]) / 2 - inside_m
+    context = context_of(replace(recording, plates=replace(recording.plates, corners=corners)), FEET)
+    assert [one.code for one in plate_edges(context)] == found
+    if found:
+        (one,) = context.overhangs
+        assert one.overhang_m == pytest.approx(0.035 - inside_m, abs=0.002)
+        assert one.unmeasured_s == one.span_s == (pytest.approx(0.2, abs=0.05), pytest.approx(0.8, abs=0.05))
+
+
 def lifting_heels(recording, rise_s=0.15):
     """The same walk; heels rise to 60 mm in the last part of each stance of the right foot."""
     positions = recording.markers.positions.copy()
