@@ -6,7 +6,7 @@ attributes. The command line prints the message as one line and exits with statu
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Self
@@ -117,8 +117,9 @@ class FileError(KinertiaError):
         return cls(path, problem_of(placed), line).with_finding(placed)
 
 
-def _wrong_entry(entry: str, problem: str) -> Finding:
-    return finding("F191", entry=Quantity(entry), expected=Quantity(problem))
+def wrong_entry(entry: str, expected: str, known: Mapping[str, Quantity] | None = None) -> Finding:
+    """Return F191 about an entry of the subject file: what was expected, and what else is known of it."""
+    return with_evidence("F191", Where(), {**(known or {}), "entry": Quantity(entry), "expected": Quantity(expected)})
 
 
 class MarkerSetError(KinertiaError):
@@ -201,12 +202,22 @@ class PriorError(KinertiaError):
 
     Attributes:
         parameter: "segment.parameter" that is wrong, or None.
+
+    Examples:
+        >>> kinertia.PriorError("the covariance is not symmetric").finding.code
+        'F191'
     """
 
-    def __init__(self, problem: str, parameter: str | None = None) -> None:
+    def __init__(self, problem: str, parameter: str | None = None, found: Finding | None = None) -> None:
+        entry = "prior of body segment parameters"
         self.parameter = parameter
-        self.finding = _wrong_entry("prior of body segment parameters", problem)
-        super().__init__(f"{self.finding.code} {self.finding.message}")
+        self.finding = found or wrong_entry(entry, problem)
+        super().__init__(f"{entry}: {problem}" if found else problem_of(self.finding))
+
+    @classmethod
+    def of(cls, found: Finding) -> Self:
+        """Create the error of a finding that has a code of its own."""
+        return cls(problem_of(found), found=found)
 
 
 class SettingsError(KinertiaError):
@@ -224,8 +235,12 @@ class SettingsError(KinertiaError):
         >>> kinertia.SettingsError.of_entry("[model]", "expected a marker set").finding.code
         'F191'
         """
-        found = _wrong_entry(entry, problem)
-        return cls(f"{found.code} {found.message}").with_finding(found)
+        return cls.of(wrong_entry(entry, problem))
+
+    @classmethod
+    def of(cls, found: Finding) -> Self:
+        """Create the error of a finding."""
+        return cls(problem_of(found)).with_finding(found)
 
 
 class SessionError(KinertiaError):

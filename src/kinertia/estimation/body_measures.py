@@ -26,7 +26,7 @@ from itertools import product, zip_longest
 
 import numpy as np
 
-from kinertia.errors import PriorError, problem_of
+from kinertia.errors import PriorError
 from kinertia.estimation.prior import BspPrior, updated
 from kinertia.findings.finding import Finding, Severity, with_evidence
 from kinertia.findings.quantity import Quantity
@@ -142,7 +142,7 @@ def measured_body(
         if implausible:  # the likelier cause, in the words of the form
             blocking = [one.at(Severity.ERROR) for one in implausible]
             reasons = "; ".join(one.message for one in blocking[:_FEW])
-            raise PriorError(f"no body has these girths and lengths: {reasons}").with_finding(blocking[0]) from error
+            raise PriorError(f"no body has these girths and lengths: {reasons}", found=blocking[0]) from error
         raise
 
 
@@ -278,7 +278,7 @@ def with_measures(
     if missing := [kind for kind in KINDS if kind not in names]:
         inputs = {"one": Quantity("[prior] measures"), "other": Quantity(f"a model without {missing[0]}")}
         found = with_evidence("S405", Where(), inputs)
-        raise PriorError(problem_of(found)).with_finding(found)
+        raise PriorError.of(found)
     lengths_m, hip, lumbar = _joint_lengths(skeleton)
     body = measured_body(stated, lengths_m, float(lumbar[1] - hip[1]), mass_kg, height_m, mass_sd_kg)
     seen = np.zeros((body.values.size, 10 * len(names)))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from kinertia.errors import PriorError, problem_of
+from kinertia.errors import PriorError
 from kinertia.findings.finding import with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
@@ -57,7 +57,7 @@ class CarriedMass:
             problem = f"weighed with the person (on_scale = true), it leaves {body:.4g} kg of {stated_mass_kg:.4g} kg"
             left = {"left_kg": Quantity(body, "kg"), "name": Quantity(names), "problem": Quantity(problem)}
             found = with_evidence("S406", Where(part=names), left)
-            raise PriorError(problem_of(found)).with_finding(found)
+            raise PriorError.of(found)
         beside = [mass for mass, weighed in masses if not weighed]
         return cls(body, stated_mass_kg + sum(mass for mass, _ in beside), sum(sd * sd for _, sd in beside) ** 0.5)
 

@@ -35,8 +35,7 @@ def check_trials(recordings: Sequence[Recording]) -> None:
         TrialError: a name is not usable as a folder beside those of the other trials.
     """
     if not recordings:
-        none = finding("S301")
-        raise SettingsError(problem_of(none)).with_finding(none)
+        raise SettingsError.of(finding("S301"))
     names = [recording.name for recording in recordings]
     if trouble := trouble_as_folders(names):
         index, problem = trouble

@@ -26,7 +26,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kinertia.errors import PriorError, problem_of
+from kinertia.errors import PriorError
 from kinertia.estimation.person_information import PersonInformation, unusable
 from kinertia.estimation.prior import BspPrior
 from kinertia.findings.finding import with_evidence
@@ -106,7 +106,7 @@ class LearntPrior:
             of = f"a group prior of {len(self.segments)} segments ({', '.join(self.segments)})"
             inputs = {"one": Quantity(of), "other": Quantity(f"a model of {', '.join(literature.mean.segments)}")}
             found = with_evidence("S405", Where(), inputs)
-            raise PriorError(problem_of(found)).with_finding(found)
+            raise PriorError.of(found)
         sd = literature.sd.ravel()
         table = literature.mean.table().ravel() + sd * self.mean
         mean = BodySegmentParameters.from_table(self.segments, table)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinertia.errors import PriorError, problem_of
+from kinertia.errors import PriorError
 from kinertia.estimation.population import population_prior
 from kinertia.estimation.prior import BspPrior, literature_prior
 from kinertia.estimation.result import Fit
@@ -98,7 +98,7 @@ def unusable(person: str, reason: str, **evidence: Quantity) -> PriorError:
     found = with_evidence(
         "S409", Where(part=person), {**evidence, "person": Quantity(person), "reason": Quantity(reason)}
     )
-    return PriorError(problem_of(found)).with_finding(found)
+    return PriorError.of(found)
 
 
 def information_of(fit: Fit) -> PersonInformation:

@@ -57,10 +57,9 @@ from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
-from kinertia.errors import FileError, SettingsError, SubjectError, problem_of
-from kinertia.findings.finding import Finding, finding, with_evidence
+from kinertia.errors import FileError, SettingsError, SubjectError, wrong_entry
+from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
-from kinertia.findings.where import Where
 from kinertia.io.file_names import trouble_as_folders
 from kinertia.io.provenance import command_line
 from kinertia.io.subject_tables import TABLES, StudyFile, SubjectFile
@@ -117,7 +116,7 @@ def read_subject(path: str | Path, to_fit: bool = True) -> SubjectFile:
     document = read_toml(path, "a subject file (subject.toml)")
     if "landmarks" in document.content:
         expected = "expected the subject file that names it (markers = ... under [model])"
-        raise FileError.of(path, _wrong_entry("a marker set", expected, {}))
+        raise FileError.of(path, wrong_entry("a marker set", expected))
     result = _validated(SubjectFile, document, path)
     if lack := _incomplete(result, needs_sex=to_fit):
         place, found = lack
@@ -130,7 +129,7 @@ def read_subject(path: str | Path, to_fit: bool = True) -> SubjectFile:
     except SubjectError as error:
         entry, _, expected = str(error).partition(": ")
         known = {"key": Quantity(error.field), "value": Quantity(str(error.value))}
-        wrong = error.finding or _wrong_entry(entry, expected.rstrip("."), known)
+        wrong = error.finding or wrong_entry(entry, expected.rstrip("."), known)
         raise FileError.of(path, wrong, document.line(("subject", error.field))) from error
     if trouble := trouble_as_folders([trial.name for trial in result.trials]):
         index, problem = trouble
@@ -169,14 +168,10 @@ def subject_from_options(content: Mapping[str, Any]) -> SubjectFile:
     try:
         result = SubjectFile.model_validate(content, context={"folder": Path.cwd()})
     except ValidationError as error:
-        raise _settings_error(_finding(error.errors()[0])) from None
+        raise SettingsError.of(_finding(error.errors()[0])) from None
     if lack := _incomplete(result):
-        raise _settings_error(lack[1])
+        raise SettingsError.of(lack[1])
     return result
-
-
-def _settings_error(found: Finding) -> SettingsError:
-    return SettingsError(problem_of(found)).with_finding(found)
 
 
 def _incomplete(wanted: SubjectFile, needs_sex: bool = True) -> tuple[Location, Finding] | None:
@@ -188,7 +183,7 @@ def _incomplete(wanted: SubjectFile, needs_sex: bool = True) -> tuple[Location, 
         return lack
     if all(trial.use == "kinematics" for trial in wanted.trials):
         known = {"key": Quantity("use"), "value": Quantity(shown("kinematics"))}
-        return ("trial", 0, "use"), _wrong_entry(f"use = {shown('kinematics')}", _FORCES_NEEDED, known)
+        return ("trial", 0, "use"), wrong_entry(f"use = {shown('kinematics')}", _FORCES_NEEDED, known)
     if model.osim is not None and wanted.settings.method == "two-level":
         two_level = 'method = "two-level" (which works on the built-in model only)'
         return ("settings", "method"), _conflict(two_level, "osim in [model]")
@@ -215,7 +210,7 @@ def expect_one_model(static: Path | None, markers: str | Path | None, osim: Path
         SettingsError: they belong to the built-in and to an OpenSim model (F193).
     """
     if lack := _two_models(static, markers, osim, calibrate):
-        raise _settings_error(lack[1])
+        raise SettingsError.of(lack[1])
 
 
 def _two_models(
@@ -246,10 +241,10 @@ def with_settings(wanted: SubjectFile, **values: Any) -> SubjectFile:
         settings = Settings.model_validate({**wanted.settings.model_dump(), **values})
     except ValidationError as error:
         detail = error.errors()[0]
-        raise _settings_error(_finding({**detail, "loc": ("settings", *detail["loc"])})) from None
+        raise SettingsError.of(_finding({**detail, "loc": ("settings", *detail["loc"])})) from None
     changed = wanted.model_copy(update={"settings": settings})
     if lack := _incomplete(changed):
-        raise _settings_error(lack[1])
+        raise SettingsError.of(lack[1])
     return changed
 
 
@@ -262,11 +257,7 @@ def _finding(detail: Any) -> Finding:
     known = {"key": Quantity(str(key))}
     if "input" in detail:
         known["value"] = Quantity(shown(detail["input"]))
-    return _wrong_entry(*_entry_and_expectation(detail, [str(part) for part in holder], str(key)), known)
-
-
-def _wrong_entry(entry: str, expected: str, known: Mapping[str, Quantity]) -> Finding:
-    return with_evidence("F191", Where(), {**known, "entry": Quantity(entry), "expected": Quantity(expected)})
+    return wrong_entry(*_entry_and_expectation(detail, [str(part) for part in holder], str(key)), known)
 
 
 def _entry_and_expectation(detail: Any, holder: list[str], key: str) -> tuple[str, str]:

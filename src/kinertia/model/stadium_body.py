@@ -28,7 +28,7 @@ from typing import Any
 
 import numpy as np
 
-from kinertia.errors import PriorError, how_to_install, problem_of
+from kinertia.errors import PriorError, how_to_install
 from kinertia.findings.finding import Severity, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
@@ -156,7 +156,7 @@ def _impossible(measure: str, value: Quantity, expected: str) -> PriorError:
     """Make the error S403 for measurements that no body has."""
     stated = {"measure": Quantity(measure), "value_m": value, "expected_m": Quantity(expected)}
     found = with_evidence("S403", Where(part=measure), stated, Severity.ERROR)
-    return PriorError(problem_of(found)).with_finding(found)
+    return PriorError.of(found)
 
 
 def _upwards(stack: Sequence[tuple[Any, float]]) -> tuple[float, np.ndarray, np.ndarray]:
