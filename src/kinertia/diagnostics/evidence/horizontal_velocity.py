@@ -51,7 +51,7 @@ class VelocityChanges:
     def of(cls, parts: Sequence[CausedVelocity]) -> VelocityChanges:
         """Join the velocities of these windows."""
         pelvis, centre, caused = (
-            np.concatenate([without_trend(part.time, getattr(part, name)) for part in parts])
+            joined_without_trend(parts, [getattr(part, name) for part in parts])
             for name in ("pelvis", "centre", "caused")
         )
         return cls(pelvis, centre, caused)
@@ -72,6 +72,11 @@ def without_trend(time: FloatArray, values: FloatArray) -> FloatArray:
     slope, level = np.polyfit(after, values, 1)
     result: FloatArray = values - np.multiply.outer(after, slope) - level
     return result
+
+
+def joined_without_trend(parts: Sequence[CausedVelocity], values: Sequence[FloatArray]) -> FloatArray:
+    """Join values (n,) or (n, k) of all windows, each without its linear trend."""
+    return np.concatenate([without_trend(part.time, each) for part, each in zip(parts, values, strict=True)])
 
 
 def caused_velocities(trial: Trial, owners: Mapping[str, str]) -> list[CausedVelocity]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinertia.diagnostics.evidence.horizontal_velocity import CausedVelocity, without_trend
+from kinertia.diagnostics.evidence.horizontal_velocity import CausedVelocity, joined_without_trend
 from kinertia.findings.quantity import Quantity
 from kinertia.trial.data import FloatArray
 
@@ -67,9 +67,7 @@ class VelocityResidual:
             scaled.append(_scaled(p, off, own))
             reversed_.append(np.std(off - 2.0 * own))
             zeroed.append(np.std(off - zero_offset_n[-1] * one_newton))
-        trends = np.concatenate(
-            [without_trend(part.time, part.caused[:, axis] - part.centre[:, axis]) for part in parts]
-        )
+        trends = joined_without_trend(parts, [part.caused[:, axis] - part.centre[:, axis] for part in parts])
         return cls(
             float(np.std(off)),
             float(np.std(caused + body)),

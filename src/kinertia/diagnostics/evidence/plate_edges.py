@@ -21,11 +21,11 @@ _LIFTED_M = 0.01
 """A heel that is higher than where it is lowest by more is lifted. Under a big toe 36 mm beyond a plate a tenth of the
 weight is missing 0.1 s later."""
 _PRESSED_M = 0.05
-"""Around a centre of pressure the foot presses so far at most."""
+"""A foot presses on the ground up to this far from its centre of pressure."""
 _NO_FOOT_M, _FOOT_M, _GAP_M, _FIRM = 0.015, 0.035, 0.01, 0.25
-"""A centre of pressure under a whole foot is farther than the first from the foot's edge, and within the second of it
-hardly a load is: on 27 plates of eleven people who stand on these with the whole foot, it stays 34 mm and more from the
-plate's edge while it bears a quarter of its largest load; with toes beyond the edge it comes to 27 mm and less."""
+"""With the whole foot on a plate, the centre of pressure stays farther from the plate's edge than the first, and as a
+rule farther than the second: on 27 plates, 34 mm and more while the load is above a quarter of its largest. With toes
+beyond the edge it comes to 27 mm and nearer. Plates side by side are less than the third apart."""
 _LOW_M = 0.03
 """A marker so near to where it is lowest during a contact is on the ground, not landing or lifted."""
 
@@ -35,8 +35,9 @@ class Overhang(NamedTuple):
 
     Attributes:
         plate, foot: index of the plate; 0 right, 1 left.
-        overhang_m: distance beyond the edge of the marker that is farthest out.
-        span_s: first and last time at which a marker is out while it is on the ground.
+        overhang_m: distance beyond the edge of the marker that is farthest out; where no marker is, an estimate by the
+            centre of pressure.
+        span_s: first and last time at which a marker is out while it is on the ground, or the load is near the edge.
         unmeasured_s: first and last time at which the part outside bears load; None if never. Toes do once the heel
             is lifted.
     """
@@ -114,20 +115,22 @@ def overhangs(
 
 
 def _by_pressure(contact: PlateContact, corners: FloatArray) -> list[Overhang]:
-    """Find the overhang that markers do not show: a centre of pressure nearer to an edge than that of a whole foot."""
+    """Find an overhang that no marker shows, by a centre of pressure nearer to the edge than a whole foot allows."""
+    firm = contact.weight > _FIRM * contact.weight.max()
+    beyond = beyond_edges(corners[contact.plate], contact.place)[firm]
+    if np.median(beyond) >= 0.0 or beyond.max() < -_NO_FOOT_M:
+        return []
     angles = np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False)
     ring = np.stack([np.cos(angles), np.sin(angles)], axis=1)
 
     def near(distance_m: float) -> BoolArray:
-        """Whether a place is outside all plates that is no farther than this, beyond any gap between plates."""
+        """Return (k,) whether some place within this distance is outside all plates, not just in a gap between them."""
         around = contact.place[:, None] + (distance_m + _GAP_M) * ring
-        beyond = np.min([beyond_edges(one, around) for one in corners], axis=0)
-        result: BoolArray = (beyond > _GAP_M).any(axis=1)
+        outside = np.min([beyond_edges(one, around) for one in corners], axis=0)
+        result: BoolArray = (outside > _GAP_M).any(axis=1)
         return result
 
-    firm = contact.weight > _FIRM * contact.weight.max()
-    on_plate = np.median(beyond_edges(corners[contact.plate], contact.place)[firm]) < 0.0
-    if not on_plate or not (near(_NO_FOOT_M) & firm).any():
+    if not (near(_NO_FOOT_M) & firm).any():
         return []
     unmeasured = near(_PRESSED_M)
     start, end = float(contact.time[unmeasured][0]), float(contact.time[unmeasured][-1])

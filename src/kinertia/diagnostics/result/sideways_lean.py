@@ -1,9 +1,9 @@
-"""M14, do loads still act along the feet once plates are corrected? A body that leans, in place of displaced plates.
+"""M14, do loads still act along the feet once plates are corrected? If not, the body leans, and no plate is displaced.
 
-Cameras that are tilted sideways put the body beside its feet, where displaced plates put the loads: for the motion of
-the whole body both are the same. The feet tell them apart. On 25 fault-free recordings the loads of right and left
-together are within 7 mm of the lines from heel to toe. With plates 20 mm off on nine walks they are 14 to 26 mm beside
-them, and the correction brings them back; with cameras tilted by 1.5 degrees it takes them away.
+Cameras that are tilted sideways displace the body against its loads, and so do displaced plates. The dynamics of the
+whole body cannot distinguish the two; the feet can. On 31 recordings the loads of both feet, averaged, are within 7 mm
+of the lines from heel to toe. With plates 20 mm off, on nine walks, they are 14 to 26 mm beside these lines, and the
+correction moves them back; with cameras tilted by 1.5 degrees it moves them away.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from kinertia.diagnostics.evidence.body_centre import owners_of
 from kinertia.diagnostics.evidence.foot_trajectories import FootTrajectory, foot_trajectories
 from kinertia.diagnostics.result.context import ResultContext
 from kinertia.diagnostics.result.corrections import equal
@@ -19,7 +20,6 @@ from kinertia.estimation.result import TrialFit
 from kinertia.estimation.simultaneous.calibration_entry import POSITION
 from kinertia.findings.finding import Finding, with_evidence
 from kinertia.findings.quantity import Quantity
-from kinertia.model.anatomy import segment_of
 from kinertia.trial.centre_of_pressure import FIRM_LOAD_N, centre_of_pressure
 from kinertia.trial.data import FEET
 from kinertia.trial.sampled_time import within
@@ -55,11 +55,11 @@ def sideways_lean(context: ResultContext) -> Iterator[Finding]:
 
 
 def _beside_feet_m(context: ResultContext, trial: TrialFit) -> tuple[float, float] | None:
-    """Return how far (m) the loads of both feet together act to the right of these, as recorded and as corrected; None
+    """Return how far (m) the loads act to the right of the feet, both feet averaged, as recorded and as corrected; None
     where a foot or its loads are hardly visible.
     """
     recorded, markers = trial.kinematics.trial, trial.kinematics.trial.markers
-    owners = {marker.label: segment_of(marker.segment) for marker in context.fit.skeleton.markers}
+    owners = owners_of(context.fit.skeleton)
     labels = {side: [one for one in markers.labels if owners.get(one) == f"foot_{side}"] for side in FEET}
     feet = foot_trajectories(markers, labels, recorded.belt) if all(labels.values()) else None
     if feet is None:

@@ -30,7 +30,8 @@ from kinertia.trial.rms import rms
 _OTHER_PERSON = 0.05
 """Median share by which the distances may differ."""
 _BEYOND_REAPPLIED_M, _TYPICAL_BEYOND_M = 0.020, 0.012
-"""RMS and median difference beyond those of re-applied markers: 7 to 14 mm RMS, of nine distances 19 at most."""
+"""RMS and median difference that re-applied markers do not reach: these give 7 to 14 mm RMS, and with only nine
+distances 19 mm at most."""
 _OTHER_MASS, _OTHER_STATURE = 0.05, 0.03
 """Shares by which mass and stature of two recordings differ for them not to be of one person in one session."""
 _MOVED_M, _MOVED_BETWEEN_M, _MOVED_SHARE = 0.03, 0.04, 0.15
