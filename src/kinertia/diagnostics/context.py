@@ -310,6 +310,15 @@ class RecordingContext:
         return VelocityChanges.of(self.velocities) if self.velocities else None
 
     @cached_property
+    def velocity_changes_on_plates(self) -> VelocityChanges | None:
+        """`velocity_changes` of the frames of `trial_on_plates` alone."""
+        trial = self.trial_on_plates
+        if not (self.overhangs or self.foreign_contacts):
+            return self.velocity_changes
+        parts = () if trial is None else caused_velocities(trial, self.segment_of_label)
+        return VelocityChanges.of(parts) if parts else None
+
+    @cached_property
     def force_mass(self) -> ForceMass | None:
         """Body mass from the vertical force; None where forces or markers do not show it."""
         if self.trial_on_plates is None:

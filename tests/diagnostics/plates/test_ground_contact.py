@@ -50,7 +50,24 @@ def test_a_heel_behind_its_plate():
     (one,) = context.overhangs
     assert one.span_s == one.unmeasured_s == found.where.span_s
     span = one.span_s
-    assert 0.2 <= span[0] < span[1] <= 0.82
+    assert 0.15 <= span[0] < span[1] <= 0.85, "the markers of that foot are slow so long"
+
+
+@pytest.mark.parametrize(("lost_s", "lands_or_leaves_s"), [((0.0, 0.3), 0.2), ((0.7, 1.0), 0.8)])
+def test_a_foot_that_lands_or_leaves_beside_its_plate(lost_s, lands_or_leaves_s):
+    """The plate bears nothing before, or after; the foot stands all the same."""
+    recording = on_plates(0.06 if lands_or_leaves_s == 0.2 else -0.2 - 0.24)
+    lost = (recording.plates.time >= lost_s[0]) & (recording.plates.time < lost_s[1])
+    plates = replace(
+        recording.plates,
+        force=np.where(lost[:, None, None], 0.0, recording.plates.force),
+        moment=np.where(lost[:, None, None], 0.0, recording.plates.moment),
+    )
+    context = replace(context_of(replace(recording, plates=plates), FEET), marker_set=marker_set())
+    (one,) = context.overhangs
+    assert one.unmeasured_s[0] <= lands_or_leaves_s <= one.unmeasured_s[1]
+    measured = context.trial_on_plates.measured
+    assert not measured[np.abs(context.recording.markers.time - lands_or_leaves_s) < 0.01].any()
 
 
 def test_a_foot_on_two_plates_is_measured():
@@ -91,7 +108,7 @@ def test_a_toe_bears_load_once_the_heel_is_lifted(toes):
     (one,) = context.overhangs
     assert found.evidence["overhang_m"].value == pytest.approx(0.04, abs=0.002)
     begins = 0.2 + 0.6 - 0.15 * 5 / 6 if toes else one.span_s[0]
-    assert one.unmeasured_s == (pytest.approx(begins, abs=0.02), pytest.approx(0.8, abs=0.02))
+    assert one.unmeasured_s == (pytest.approx(begins, abs=0.02), pytest.approx(0.8, abs=0.05))
     time, measured = context.recording.markers.time, context.trial.measured
     lost = measured & ~context.trial_on_plates.measured
     assert time[lost].min() == pytest.approx(max(begins, time[measured].min()), abs=0.02)

@@ -107,7 +107,7 @@ def overhangs(
         # where the load is not under the foot, the corners are not at the plate's true position
         if plates.corners is None or contact.distance_m > FAR_M / 2 or contact.in_turn or contact.between:
             continue
-        inside = within(time, contact.time[0], contact.time[-1])
+        inside = within(time, *_stance(contact))
         foot = feet[contact.foot].at(inside)
         by_markers = _overhang(contact, plates.corners, time[inside], foot) if np.isfinite(foot.place).any() else []
         found += by_markers or _by_pressure(contact, plates.corners)
@@ -143,6 +143,15 @@ def _by_pressure(contact: PlateContact, corners: FloatArray) -> list[Overhang]:
     return [Overhang(contact.plate, contact.foot, _FOOT_M - float(nearest), (start, end), (start, end))]
 
 
+def _stance(contact: PlateContact) -> tuple[float, float]:
+    """Return first and last time (s) of a load, or of the foot's stance where that lasts longer: a part that is beside
+    the plate lands before it is loaded, or leaves after.
+    """
+    first, last = float(contact.time[0]), float(contact.time[-1])
+    spans = [(start, end) for start, end, _ in contact.trajectory.stance_spans if start < last and end > first]
+    return min([first, *(start for start, _ in spans)]), max([last, *(end for _, end in spans)])
+
+
 def _overhang(contact: PlateContact, corners: FloatArray, time: FloatArray, foot: FootPoints) -> list[Overhang]:
     """Find the overhang of one foot (n frames) during one load on one of the plates (p, 4, 3)."""
     seen = np.isfinite(foot.place).all(axis=2)
@@ -157,12 +166,14 @@ def _overhang(contact: PlateContact, corners: FloatArray, time: FloatArray, foot
         return []
     more = far & (~foot.toe | (usual > _TOE_M))
     out = low & (beyond > foot.limit_m) & (more if more.any() else far)
-    lifted = _heel_lifted(foot, height, far) if foot.toe[far].all() else np.ones(len(time), dtype=bool)
+    bears = np.ones(len(time), dtype=bool)
+    if foot.toe[far].all():
+        bears = _heel_lifted(foot, height, far) & (time >= contact.time[0])
     span_s = _span(time, out.any(axis=1))
     assert span_s is not None
     measured = far & (foot.limit_m == OVERHANG_M)
     overhang_m = float(usual[measured if measured.any() else far].max())
-    return [Overhang(contact.plate, contact.foot, overhang_m, span_s, _span(time, out.any(axis=1) & lifted))]
+    return [Overhang(contact.plate, contact.foot, overhang_m, span_s, _span(time, out.any(axis=1) & bears))]
 
 
 def _heel_lifted(foot: FootPoints, height: FloatArray, toes: BoolArray) -> BoolArray:

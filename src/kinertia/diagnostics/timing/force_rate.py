@@ -29,7 +29,17 @@ def force_rate(context: RecordingContext) -> Iterator[Finding]:
 
     Without strides the trunk bends, so that the pelvis moves differently: the marker-based centre must agree.
     """
-    changes = context.velocity_changes
+    if context.velocity_changes is None:
+        return
+    yield from _wrong_rate(context)
+    grows = next(_growing_delays(context), None)
+    if grows is not None:
+        yield grows
+
+
+def _wrong_rate(context: RecordingContext) -> Iterator[Finding]:
+    """T202, where all of the load is known: a foot beyond its plate seems to move the body at another rate."""
+    changes = context.velocity_changes_on_plates
     if changes is None:
         return
     ratio = changes.vertical_ratio(changes.pelvis)
@@ -42,9 +52,6 @@ def force_rate(context: RecordingContext) -> Iterator[Finding]:
             rate_factor=Quantity(float(np.sqrt(_TYPICAL_RATIO / ratio)), "1"),
             velocity_ratio=Quantity(ratio, "1", limit=_MOST_RATIO if ratio > 1 else _LEAST_RATIO, usual=_USUAL_RATIO),
         )
-    grows = next(_growing_delays(context), None)
-    if grows is not None:
-        yield grows
 
 
 def _wrong(ratio: float) -> bool:
