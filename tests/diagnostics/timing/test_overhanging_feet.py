@@ -2,11 +2,15 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from kinertia.diagnostics.evidence.plate_edges import Overhang
+from kinertia.diagnostics.timing.force_rate import force_rate
 from kinertia.diagnostics.timing.rate_and_delay import fitted_rate_or_delay
+from kinertia.trial.sampled_time import within
 from loads_and_feet import context_of
+from recordings import here
 from walk_on_plates import FEET, walk
 
 
@@ -36,3 +40,19 @@ def test_else_every_load_counts(early):
     context = context_of(early, FEET)
     assert len(context.whole_contacts) == 2
     assert context.whole_loads is early.plates
+
+
+@pytest.mark.parametrize("files", here(["pig_c3d/subject_a_walk.c3d"]))
+def test_it_is_no_other_rate_of_both(recording_of, files):
+    """T202 of forces that move the body four times as fast as the markers while a foot is partly beside its plate."""
+    recording = recording_of(files)
+    plates, span_s = recording.plates, (3.1, 3.45)
+    total, weight = plates.force[:, :, 1].sum(axis=1), 400.0
+    partly = within(plates.time, *span_s) & (total > 50.0)
+    factor = np.where(partly, np.maximum(weight + 4.0 * (total - weight), 20.0) / np.maximum(total, 50.0), 1.0)
+    factor = factor[:, None, None]
+    spoilt = replace(recording, plates=replace(plates, force=factor * plates.force, moment=factor * plates.moment))
+    assert [one.code for one in force_rate(context_of(spoilt))] == ["T202"]
+    context = context_of(spoilt)
+    context.__dict__["overhangs"] = [Overhang(1, 0, 0.06, span_s, span_s)]
+    assert list(force_rate(context)) == []
