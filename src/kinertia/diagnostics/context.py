@@ -23,6 +23,7 @@ from kinertia.diagnostics.evidence.plate_contacts import PlateContact, contacts_
 from kinertia.diagnostics.evidence.plate_edges import LITTLE_BEYOND_M, FootPoints, Overhang, overhangs
 from kinertia.diagnostics.evidence.plate_masses import plate_masses
 from kinertia.diagnostics.evidence.standing_mass import StandingMass, standing_mass
+from kinertia.diagnostics.evidence.stray_loads import stray_contacts, without_loads
 from kinertia.diagnostics.evidence.strides import periods, swing_in_turn
 from kinertia.diagnostics.evidence.trajectory_faults import TrajectoryFaults
 from kinertia.errors import KinertiaError
@@ -76,9 +77,15 @@ class RecordingContext:
         return self.recording.markers
 
     @property
-    def plates(self) -> PlateLoads | None:
-        """Force plates, if there are any and they are used."""
+    def recorded_plates(self) -> PlateLoads | None:
+        """Force plates as recorded, if there are any and they are used."""
         return None if self.without_forces else self.recording.plates
+
+    @cached_property
+    def plates(self) -> PlateLoads | None:
+        """Force plates without loads that are under no foot."""
+        plates, strays = self.recorded_plates, self.stray_contacts
+        return plates if plates is None or not strays else without_loads(plates, strays, self.contacts)
 
     @cached_property
     def markers(self) -> Markers:
@@ -177,11 +184,22 @@ class RecordingContext:
         return None if self.feet is None else foot_trajectories(self.recording.markers, self.feet, self.recording.belt)
 
     @cached_property
-    def contacts(self) -> Sequence[PlateContact]:
-        """Every load on a plate, with its position relative to the feet; none without plates or feet."""
-        if self.plates is None or self.foot_trajectories is None:
+    def _all_contacts(self) -> Sequence[PlateContact]:
+        plates, feet = self.recorded_plates, self.foot_trajectories
+        return () if plates is None or feet is None else contacts_of(plates, feet)
+
+    @cached_property
+    def stray_contacts(self) -> Sequence[PlateContact]:
+        """Loads under no foot, of another person or a thing; none where the person stands."""
+        if self.is_static or self.recorded_plates is None or self.foot_trajectories is None:
             return ()
-        return contacts_of(self.plates, self.foot_trajectories)
+        return stray_contacts(self._all_contacts, self.foot_trajectories)
+
+    @cached_property
+    def contacts(self) -> Sequence[PlateContact]:
+        """Every other load on a plate, with its position relative to the feet; none without plates or feet."""
+        strays = set(map(id, self.stray_contacts))
+        return [one for one in self._all_contacts if id(one) not in strays]
 
     @cached_property
     def overhangs(self) -> Sequence[Overhang]:
@@ -226,7 +244,7 @@ class RecordingContext:
         if self.plates is None or self.feet is None:
             return None
         try:
-            return build_trial(self.recording, self.feet, self.window_s)
+            return build_trial(replace(self.recording, plates=self.plates), self.feet, self.window_s)
         except KinertiaError as error:
             return error
 

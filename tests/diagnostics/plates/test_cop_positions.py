@@ -287,14 +287,6 @@ def test_a_mirrored_plate_does_not_hide_both_feet_on_another():
     assert sorted(doubted(wrong, SIMPLE_FEET)) == ["P252", "P276"]
 
 
-def test_a_load_of_somebody_else():
-    recording = simple_walk([("r", 0), ("l", 0), ("r", 1)])
-    shift = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-    found = [one for one in place_findings(moved(recording, shift), SIMPLE_FEET) if one.code == "P244"]
-    assert [(one.where.plate, one.severity) for one in found] == [("plate 3", Severity.WARNING)]
-    assert found[0].evidence["distance_m"].value == pytest.approx(0.9, abs=0.11)
-
-
 def test_a_static_trial_is_asked_nothing_and_somebody_who_stands_is(walk):
     """D10."""
     recording, feet = walk

@@ -34,7 +34,7 @@ from kinertia.findings.finding import Finding, Severity, finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.rule import rule
 
-_OTHER_UNIT_M, _STRAY_M = 5.0, 0.3
+_OTHER_UNIT_M = 5.0
 _OFFSET_M = 0.03
 _BEGIN_M, _END_M = -0.015, 0.06
 """There is no foot behind the marker at the back of the heel: on fault-free trials, from squats to forefoot runs, the
@@ -73,7 +73,6 @@ def loads_and_feet(context: RecordingContext) -> Iterator[Finding]:
         ranked = sorted(hypotheses, key=lambda one: one.misfit(feet))
         yield _with_runners_up([one.finding for one in ranked])
         return
-    yield from _stray(context)
     if goes_forwards(context) and shows_feet_alike(context):
         yield from _offset(context)
 
@@ -124,17 +123,6 @@ def _displaced(context: RecordingContext) -> Iterator[Hypothesis]:
         distance_m=Quantity(worst.distance_m, "m", limit=FAR_M, usual=(0.0, 0.04)),
     )
     yield Hypothesis(found, None)
-
-
-def _stray(context: RecordingContext) -> Iterator[Finding]:
-    """P244 as a WARNING: a single load far from both feet, caused by another person or an object."""
-    plates = context.plates
-    assert plates is not None
-    for one in context.contacts:
-        if one.distance_m > _STRAY_M and not one.between:
-            where = context.at(plate=plates.names[one.plate], span_s=(float(one.time[0]), float(one.time[-1])))
-            distance = Quantity(one.distance_m, "m", limit=_STRAY_M, usual=(0.0, 0.04))
-            yield finding("P244", where, Severity.WARNING, causes=("another person", "a thing"), distance_m=distance)
 
 
 def _offset(context: RecordingContext) -> Iterator[Finding]:

@@ -1,4 +1,4 @@
-"""Asks whether the plates bear somebody else for a while."""
+"""Asks whether the plates bear somebody else for a while, beside the person or elsewhere."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.force_mass import FOREIGN_SHARE
+from kinertia.diagnostics.evidence.stray_loads import STRAY_M
 from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.quantity import Quantity
 
@@ -21,3 +22,11 @@ def foreign_load(context: RecordingContext) -> Iterator[Finding]:
     where = context.at(plate=plates.pop() if plates else None, span_s=found.span_s)
     surplus = Quantity(found.surplus, "1", limit=FOREIGN_SHARE)
     yield finding("P284", where, None if left else Severity.ERROR, surplus=surplus)
+
+
+def stray_loads(context: RecordingContext) -> Iterator[Finding]:
+    """P285: loads under no foot, which are left out."""
+    names = () if context.plates is None else context.plates.names
+    for one in context.stray_contacts:
+        where = context.at(plate=names[one.plate], span_s=(float(one.time[0]), float(one.time[-1])))
+        yield finding("P285", where, distance_m=Quantity(one.distance_m, "m", limit=STRAY_M, usual=(0.0, 0.04)))

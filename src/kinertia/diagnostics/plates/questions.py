@@ -12,7 +12,7 @@ from kinertia.diagnostics.plates.cop_on_plate import cop_on_plate
 from kinertia.diagnostics.plates.cop_positions import loads_and_feet
 from kinertia.diagnostics.plates.cop_progression import cop_progression
 from kinertia.diagnostics.plates.force_directions import force_directions
-from kinertia.diagnostics.plates.foreign_load import foreign_load
+from kinertia.diagnostics.plates.foreign_load import foreign_load, stray_loads
 from kinertia.diagnostics.plates.free_moments import free_moments
 from kinertia.diagnostics.plates.gains import gains
 from kinertia.diagnostics.plates.ground_contact import both_feet, complete_contact, plate_edges
@@ -34,6 +34,7 @@ PLACE_QUESTIONS: tuple[Question[RecordingContext], ...] = (
     Question("P24", cop_on_plate, unless=("P204",)),
     Question("P25", cop_progression, unless=_NOT_UNDER_FEET),
     Question("P28", plate_edges, unless=_NOT_UNDER_FEET),
+    Question("P28", stray_loads),
     Question("P28", foreign_load, unless=("P201", "P202", "P203", "P204")),
     Question("P27", both_feet, unless=_NOT_UNDER_FEET),
     Question("P27", complete_contact),
