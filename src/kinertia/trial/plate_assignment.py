@@ -4,7 +4,7 @@ Dynamics hold only where every foot on the ground stands on a plate that works. 
 the data: a load belongs to the foot that is nearest to its centre of pressure, and whether a foot without load is on
 the ground follows from the heights and speeds of its markers (`kinertia.trial.ground_contact`).
 
-A hand on a rail, a chair or a second person is not detected here.
+A hand on a rail, a chair or a second person is not detected here; loads far from both feet are left out before.
 """
 
 from __future__ import annotations
