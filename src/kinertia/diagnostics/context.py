@@ -220,7 +220,9 @@ class RecordingContext:
             one
             for one in self.contacts
             if not any(
-                other.plate == one.plate and one.time[0] <= other.span_s[0] and other.span_s[1] <= one.time[-1]
+                (other.plate, other.foot) == (one.plate, one.foot)
+                and one.time[0] <= other.span_s[1]
+                and other.span_s[0] <= one.time[-1]
                 for other in far
             )
         ]

@@ -68,6 +68,7 @@ def test_a_foot_that_lands_or_leaves_beside_its_plate(lost_s, lands_or_leaves_s)
     assert one.unmeasured_s[0] <= lands_or_leaves_s <= one.unmeasured_s[1]
     measured = context.trial_on_plates.measured
     assert not measured[np.abs(context.recording.markers.time - lands_or_leaves_s) < 0.01].any()
+    assert one.plate not in {whole.plate for whole in context.whole_contacts}
 
 
 def test_a_foot_on_two_plates_is_measured():
