@@ -10,6 +10,7 @@ from kinertia.diagnostics.plates.ground_contact import plate_edges
 from kinertia.findings.finding import Severity
 from kinertia.model.marker_set import MarkerSet
 from kinertia.trial.centre_of_pressure import centre_of_pressure
+from kinertia.trial.sampled_time import within
 from loads_and_feet import context_of, doubted, place_findings
 from recordings import here
 from walk_on_plates import FEET, walk
@@ -69,6 +70,26 @@ def test_a_foot_that_lands_or_leaves_beside_its_plate(lost_s, lands_or_leaves_s)
     measured = context.trial_on_plates.measured
     assert not measured[np.abs(context.recording.markers.time - lands_or_leaves_s) < 0.01].any()
     assert one.plate not in {whole.plate for whole in context.whole_contacts}
+
+
+def test_a_heel_is_on_the_ground_where_it_is_low_under_load():
+    """Its marker is lower while the foot lands; under load it stays on the ground all the same."""
+    recording = on_plates(0.06)
+    plates, time = recording.plates, recording.markers.time
+    lost = (plates.time < 0.3)[:, None, None]
+    plates = replace(plates, force=np.where(lost, 0.0, plates.force), moment=np.where(lost, 0.0, plates.moment))
+    positions = recording.markers.positions.copy()
+    positions[(time > 0.2) & (time < 0.28), 0, 1] -= 0.04
+    landing = replace(recording, plates=plates, markers=replace(recording.markers, positions=positions))
+    (one,) = context_of(landing, FEET).overhangs
+    assert one.unmeasured_s[1] == pytest.approx(0.8, abs=0.05)
+
+
+def test_a_foot_that_is_never_seen_under_load_is_over_no_edge():
+    recording = on_plates(0.06)
+    positions = recording.markers.positions.copy()
+    positions[within(recording.markers.time, 0.19, 0.81), :2] = np.nan
+    assert not context_of(replace(recording, markers=replace(recording.markers, positions=positions)), FEET).overhangs
 
 
 def test_a_foot_on_two_plates_is_measured():

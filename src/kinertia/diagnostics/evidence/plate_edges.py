@@ -108,8 +108,7 @@ def overhangs(
         if plates.corners is None or contact.distance_m > FAR_M / 2 or contact.in_turn or contact.between:
             continue
         inside = within(time, *_stance(contact))
-        foot = feet[contact.foot].at(inside)
-        by_markers = _overhang(contact, plates.corners, time[inside], foot) if np.isfinite(foot.place).any() else []
+        by_markers = _overhang(contact, plates.corners, time[inside], feet[contact.foot].at(inside))
         found += by_markers or _by_pressure(contact, plates.corners)
     return found
 
@@ -153,27 +152,25 @@ def _stance(contact: PlateContact) -> tuple[float, float]:
 
 
 def _overhang(contact: PlateContact, corners: FloatArray, time: FloatArray, foot: FootPoints) -> list[Overhang]:
-    """Find the overhang of one foot (n frames) during one load on one of the plates (p, 4, 3)."""
-    seen = np.isfinite(foot.place).all(axis=2)
+    """Find the overhang of one foot (n frames of its stance) during one load on one of the plates (p, 4, 3)."""
+    seen, loaded = np.isfinite(foot.place).all(axis=2), within(time, contact.time[0], contact.time[-1])
     height = np.where(seen, foot.place[..., 1], np.inf)
-    low = height < height.min(axis=0) + _LOW_M
+    low = height < height[loaded].min(axis=0, initial=np.inf) + _LOW_M
     each = np.stack([beyond_edges(one, foot.place[..., [0, 2]]) for one in corners])
     beyond = np.where(seen, each.min(axis=0), -np.inf)
-    usual = np.array([np.median(beyond[on, k]) if on.any() else -np.inf for k, on in enumerate(low.T)])
+    bearing = low & loaded[:, None]
+    usual = np.array([np.median(beyond[on, k]) if on.any() else -np.inf for k, on in enumerate(bearing.T)])
     far = usual > foot.limit_m
-    on_plate = (each[contact.plate] < 0.0) & low
-    if not far.any() or not on_plate.any():
+    if not far.any() or not ((each[contact.plate] < 0.0) & bearing).any():
         return []
     more = far & (~foot.toe | (usual > _TOE_M))
-    out = low & (beyond > foot.limit_m) & (more if more.any() else far)
-    bears = np.ones(len(time), dtype=bool)
-    if foot.toe[far].all():
-        bears = _heel_lifted(foot, height, far) & (time >= contact.time[0])
-    span_s = _span(time, out.any(axis=1))
+    out = (low & (beyond > foot.limit_m) & (more if more.any() else far)).any(axis=1)
+    bears = out & _heel_lifted(foot, height, far) & (time >= contact.time[0]) if foot.toe[far].all() else out
+    span_s = _span(time, out)
     assert span_s is not None
     measured = far & (foot.limit_m == OVERHANG_M)
     overhang_m = float(usual[measured if measured.any() else far].max())
-    return [Overhang(contact.plate, contact.foot, overhang_m, span_s, _span(time, out.any(axis=1) & bears))]
+    return [Overhang(contact.plate, contact.foot, overhang_m, span_s, _span(time, bears))]
 
 
 def _heel_lifted(foot: FootPoints, height: FloatArray, toes: BoolArray) -> BoolArray:
