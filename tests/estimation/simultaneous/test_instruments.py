@@ -79,7 +79,7 @@ def test_a_trial_that_began_with_the_others_has_hardly_a_delay_of_its_own(clock_
     (clock,), delays = priors[CLOCK], priors[TRIAL_DELAYS]
     assert len(delays) == 3
     assert clock.nominal_sd == (0.0003 if clock_sd_ms is None else pytest.approx(clock_sd_ms / 1e3))
-    assert all((one.nominal_sd, one.faulty_sd, one.fault_probability) == (0.00003, 0.010, 0.03) for one in delays)
+    assert all((one.nominal_sd, one.faulty_sd, one.fault_probability) == (0.00003, 0.010, 0.04) for one in delays)
 
 
 def test_what_is_left_without_the_trials_own_says_nothing_negative():

@@ -8,6 +8,7 @@ from scipy.integrate import quad
 from kinertia.estimation.simultaneous.mixture_prior import ErrorPriors, FaultMixture, GaussianPrior, log_chance
 
 PLATE = FaultMixture(0.001, 0.015, 0.1)
+DELAY_S = FaultMixture(0.0003, 0.005, 0.2, faulty_mean=0.006)
 
 
 def normal(x: float, mean: float, sd: float) -> float:
@@ -15,21 +16,24 @@ def normal(x: float, mean: float, sd: float) -> float:
     return exp(-0.5 * ((x - mean) / sd) ** 2) / sd
 
 
-def density(x: float) -> float:
-    return 0.9 * normal(x, 0.0, PLATE.nominal_sd) + 0.1 * normal(x, 0.0, PLATE.faulty_sd)
+def density(prior: FaultMixture, x: float) -> float:
+    share = prior.fault_probability
+    faulty = normal(x, prior.faulty_mean, prior.faulty_sd)
+    return (1.0 - share) * normal(x, 0.0, prior.nominal_sd) + share * faulty
 
 
+@pytest.mark.parametrize("prior", [PLATE, DELAY_S])
 @pytest.mark.parametrize(("mean", "sd"), [(0.0, 0.002), (0.004, 0.002), (-0.012, 0.006), (0.02, 0.003)])
-def test_one_quantity_has_the_mean_and_deviation_of_the_product(mean, sd):
+def test_one_quantity_has_the_mean_and_deviation_of_the_product(prior, mean, sd):
     """Also where both components are likely, so that the posterior is wider than with any Gaussian prior."""
 
     def part(power):
         def value(x):
-            return x**power * density(x) * normal(x, mean, sd)
+            return x**power * density(prior, x) * normal(x, mean, sd)
 
-        return quad(value, -0.1, 0.1, points=[0.0, mean], limit=200, epsabs=0, epsrel=1e-6)[0]
+        return quad(value, -0.1, 0.1, points=[0.0, prior.faulty_mean, mean], limit=200, epsabs=0, epsrel=1e-6)[0]
 
-    posterior_mean, covariance = posterior([PLATE], np.eye(1) / sd**2, np.array([mean / sd**2]))
+    posterior_mean, covariance = posterior([prior], np.eye(1) / sd**2, np.array([mean / sd**2]))
     expected = part(1) / part(0)
     assert posterior_mean[0] == pytest.approx(expected, rel=1e-4, abs=1e-9)
     assert covariance[0, 0] == pytest.approx(part(2) / part(0) - expected**2, rel=1e-3)
@@ -110,7 +114,7 @@ def test_the_plates_that_are_off_take_the_whole_error_in_every_trial():
 @pytest.mark.parametrize("count", [1, 4, 7])
 def test_the_posterior_is_that_of_all_ways_to_be_sound_or_faulty(count):
     rng = np.random.default_rng(count)
-    priors = [FaultMixture(0.001, 0.015, share) for share in rng.uniform(0.02, 0.3, count)]
+    priors = [FaultMixture(0.001, 0.015, *of) for of in rng.uniform([0.02, -0.01], [0.3, 0.01], (count, 2))]
     jacobian = rng.normal(size=(2 * count, count)) / 0.006
     data, rhs = jacobian.T @ jacobian, jacobian.T @ rng.normal(0.0, 2.0, 2 * count)
     weights, means, covariances = [], [], []
@@ -120,10 +124,12 @@ def test_the_posterior_is_that_of_all_ways_to_be_sound_or_faulty(count):
             prior.fault_probability if off else 1 - prior.fault_probability
             for off, prior in zip(way, priors, strict=True)
         ]
+        centre = np.array([prior.faulty_mean if off else 0.0 for off, prior in zip(way, priors, strict=True)])
         covariances.append(np.linalg.inv(data + np.diag(sd**-2.0)))
-        means.append(covariances[-1] @ rhs)
-        size = np.linalg.slogdet(covariances[-1])[1] - 2.0 * np.log(sd).sum()
-        weights.append(np.log(share).sum() + 0.5 * (rhs @ means[-1] + size))
+        pull = rhs + centre / sd**2
+        means.append(covariances[-1] @ pull)
+        size = np.linalg.slogdet(covariances[-1])[1] - 2.0 * np.log(sd).sum() - np.square(centre / sd).sum()
+        weights.append(np.log(share).sum() + 0.5 * (pull @ means[-1] + size))
     weight = np.exp(np.array(weights) - max(weights))
     mean = np.average(means, axis=0, weights=weight)
     covariance = np.average(covariances, axis=0, weights=weight) + np.cov(np.transpose(means), aweights=weight, ddof=0)
@@ -149,23 +155,27 @@ def test_of_plates_that_are_mostly_one_any_may_be_off_alone():
     np.testing.assert_allclose(mean, truth, atol=0.002)
 
 
-def test_drawn_instruments_have_the_prior_s_deviation():
+@pytest.mark.parametrize("prior", [PLATE, DELAY_S])
+def test_drawn_instruments_have_the_prior_s_deviation(prior):
     rng = np.random.default_rng(1)
-    drawn = np.array([PLATE.draw(rng) for _ in range(20000)])
-    assert np.sqrt(np.mean(np.square(drawn))) == pytest.approx(PLATE.sd, rel=0.05)
-    assert np.mean(np.abs(drawn) < 0.003) == pytest.approx(0.9 + 0.1 * 0.16, abs=0.01)
+    drawn = np.array([prior.draw(rng) for _ in range(20000)])
+    assert np.sqrt(np.mean(np.square(drawn))) == pytest.approx(prior.sd, rel=0.05)
+    faulty = np.abs(drawn) > 5.0 * prior.nominal_sd
+    assert faulty.mean() == pytest.approx(prior.fault_probability, rel=0.4)
+    assert np.mean(drawn) == pytest.approx(prior.fault_probability * prior.faulty_mean, abs=0.02 * prior.faulty_sd)
 
 
 def test_chance_of_data_is_their_mean_under_the_priors():
     """Of two errors that are added to a common one, against sums over a fine grid."""
-    own, both = FaultMixture(0.3, 2.0, 0.2), FaultMixture(0.5, 1.5, 0.1)
+    own, both = FaultMixture(0.3, 2.0, 0.2), FaultMixture(0.5, 1.5, 0.1, faulty_mean=1.0)
     priors = ErrorPriors((own, own), ((both, (0, 1)),))
     data = np.array([[2.0, 0.5], [0.5, 1.0]])
     grid = np.linspace(-9.0, 9.0, 181)
 
     def density(prior):
-        parts = ((1.0 - prior.fault_probability, prior.nominal_sd), (prior.fault_probability, prior.faulty_sd))
-        return sum(share / sd * np.exp(-0.5 * (grid / sd) ** 2) for share, sd in parts)
+        share = prior.fault_probability
+        parts = ((1.0 - share, 0.0, prior.nominal_sd), (share, prior.faulty_mean, prior.faulty_sd))
+        return sum(part / sd * np.exp(-0.5 * ((grid - mean) / sd) ** 2) for part, mean, sd in parts)
 
     a, b, c = np.meshgrid(grid, grid, grid, indexing="ij", sparse=True)
     x, y = a + c, b + c

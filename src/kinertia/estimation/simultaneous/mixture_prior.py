@@ -32,11 +32,12 @@ _UNLIKELY = -15.0
 
 @dataclass(frozen=True)
 class FaultMixture:
-    """Prior of a quantity with zero mean: a narrow Gaussian and, with the fault probability, a wide one.
+    """Prior of a quantity that is near zero: a narrow Gaussian and, with the fault probability, a wide one.
 
     Attributes:
         nominal_sd, faulty_sd: standard deviations of the components.
         fault_probability: fault probability, 0 to 1.
+        faulty_mean: mean of the wide one; the narrow one's is zero.
 
     >>> FaultMixture(0.001, 0.015, 0.2).sd
     0.00676...
@@ -45,6 +46,7 @@ class FaultMixture:
     nominal_sd: float
     faulty_sd: float
     fault_probability: float
+    faulty_mean: float = 0.0
 
     @classmethod
     def certain(cls, sd: float) -> FaultMixture:
@@ -53,14 +55,15 @@ class FaultMixture:
 
     @property
     def sd(self) -> float:
-        """Standard deviation of both components together."""
+        """Root mean square of both components together: their standard deviation from zero."""
         share = self.fault_probability
-        return float(np.sqrt((1.0 - share) * self.nominal_sd**2 + share * self.faulty_sd**2))
+        faulty = self.faulty_sd**2 + self.faulty_mean**2
+        return float(np.sqrt((1.0 - share) * self.nominal_sd**2 + share * faulty))
 
     def smallest_detectable(self, sd: float) -> float:
         """Return the smallest error that data with this standard deviation attribute to a fault with odds above one.
 
-        It is infinite if there is only one component.
+        It is infinite if there is only one component. Faults have zero mean here.
 
         >>> prior = FaultMixture(0.1, 2.0, 0.05)
         >>> round(prior.smallest_detectable(0.3), 2), round(prior.smallest_detectable(1.6), 2)
@@ -75,7 +78,7 @@ class FaultMixture:
     def draw(self, rng: np.random.Generator) -> float:
         """Draw one instrument's error."""
         faulty = rng.random() < self.fault_probability
-        return float(rng.normal(0.0, self.faulty_sd if faulty else self.nominal_sd))
+        return float(rng.normal(self.faulty_mean, self.faulty_sd) if faulty else rng.normal(0.0, self.nominal_sd))
 
 
 @dataclass(frozen=True)
@@ -171,7 +174,7 @@ def _posterior(priors: Sequence[FaultMixture], data: np.ndarray, rhs: np.ndarray
     right-hand side (k,). The likeliest combinations with one fault more are searched among those that add one to the
     likeliest so far.
     """
-    change, log_odds = _faults(priors)
+    faults = _Faults.of(priors)
     ways = _Ways.sound(priors, data, rhs)
     likeliest = float(ways.log_weight[0])
     weight, first, second = 0.0, np.zeros(len(rhs)), np.zeros_like(data)
@@ -181,7 +184,7 @@ def _posterior(priors: Sequence[FaultMixture], data: np.ndarray, rhs: np.ndarray
         weight = before * weight + own.sum()
         first = before * first + own @ ways.centres
         second = before * second + np.tensordot(own, ways.spread, 1) + (own * ways.centres.T) @ ways.centres
-        likeliest, ways = now, ways.one_fault_more(change, log_odds)
+        likeliest, ways = now, ways.one_fault_more(faults)
     middle = first / weight
     return middle, second / weight - np.outer(middle, middle)
 
@@ -194,25 +197,38 @@ def log_chance(priors: ErrorPriors, data: np.ndarray, rhs: np.ndarray) -> float:
     """
     parts = priors.of_parts
     data, rhs = parts.T @ data @ parts, parts.T @ rhs
-    change, log_odds = _faults(priors.parts)
+    faults = _Faults.of(priors.parts)
     ways = _Ways.sound(priors.parts, data, rhs)
     weights = [ways.log_weight]
     while len(ways.log_weight) and ways.log_weight.max() > max(map(np.max, weights)) + _UNLIKELY:
-        ways = ways.one_fault_more(change, log_odds)
+        ways = ways.one_fault_more(faults)
         weights += [ways.log_weight] if len(ways.log_weight) else []
     return float(np.logaddexp.reduce(np.concatenate(weights)))
 
 
-def _faults(priors: Sequence[FaultMixture]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the change by a fault of each quantity (k,) of its precision and of a combination's log prior.
+@dataclass(frozen=True, eq=False)
+class _Faults:
+    """Changes of a combination by a fault of each of k quantities.
 
-    The latter includes the ratio of the components' standard deviations; it is -inf if there is only one component.
+    Attributes:
+        precision, pull: (k,) changes of the prior's precision, and of precision times mean.
+        log_odds: (k,) change of the log prior, with the ratio of the components' standard deviations; -inf if there is
+            only one component.
     """
-    change = np.array([prior.faulty_sd**-2.0 - prior.nominal_sd**-2.0 for prior in priors])
-    share = np.array([prior.fault_probability for prior in priors])
-    shorter = np.log([prior.nominal_sd / prior.faulty_sd for prior in priors])
-    with np.errstate(divide="ignore"):
-        return change, np.log(share / (1.0 - share)) + shorter
+
+    precision: np.ndarray
+    pull: np.ndarray
+    log_odds: np.ndarray
+
+    @classmethod
+    def of(cls, priors: Sequence[FaultMixture]) -> _Faults:
+        """Return the faults of quantities with these priors."""
+        share, nominal, faulty, mean = np.array(
+            [(one.fault_probability, one.nominal_sd, one.faulty_sd, one.faulty_mean) for one in priors]
+        ).T
+        with np.errstate(divide="ignore"):
+            log_odds = np.log(share / (1.0 - share)) + np.log(nominal / faulty) - 0.5 * np.square(mean / faulty)
+        return cls(faulty**-2.0 - nominal**-2.0, mean * faulty**-2.0, log_odds)
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,22 +254,25 @@ class _Ways:
         log_weight = 0.5 * (centre @ rhs + np.linalg.slogdet(spread)[1])
         return cls(np.zeros((1, len(rhs)), dtype=bool), np.array([log_weight]), centre[None], spread[None])
 
-    def one_fault_more(self, change: np.ndarray, log_odds: np.ndarray) -> _Ways:
-        """Return the likeliest that add a fault (`_faults`) to one of these, by rank-one updates (Sherman-Morrison)."""
-        k = len(change)
-        left = np.where(self.off, 1.0, 1.0 + change * np.diagonal(self.spread, axis1=1, axis2=2))
-        log_weight = self.log_weight[:, None] + log_odds
-        log_weight -= 0.5 * (np.log(left) + change / left * np.square(self.centres))
+    def one_fault_more(self, faults: _Faults) -> _Ways:
+        """Return the likeliest that add a fault to one of these, by rank-one updates (Sherman-Morrison)."""
+        k, change, pull = len(faults.pull), faults.precision, faults.pull
+        variance = np.diagonal(self.spread, axis1=1, axis2=2)
+        left = np.where(self.off, 1.0, 1.0 + change * variance)
+        moved = change * self.centres - pull
+        log_weight = self.log_weight[:, None] + faults.log_odds
+        log_weight -= 0.5 * (np.log(left) + (moved * self.centres - pull * (self.centres + pull * variance)) / left)
         log_weight[self.off] = -np.inf
         before, fault = self._likeliest(log_weight, min(_MOST_WAYS, max(_FEWEST_WAYS, _MOST_NUMBERS // k**2)))
         column, share = self.spread[before, :, fault], (change / left)[before, fault][:, None]
+        step = (moved / left)[before, fault][:, None]
         spread, scaled, each = self.spread[before], share * column, 1 + _AT_ONCE // k**2
         for some in (slice(first, first + each) for first in range(0, len(before), each)):
             spread[some] -= scaled[some, :, None] * column[some, None, :]
         return _Ways(
             self.off[before] | np.eye(k, dtype=bool)[fault],
             log_weight[before, fault],
-            self.centres[before] - share * self.centres[before, fault][:, None] * column,
+            self.centres[before] - step * column,
             spread,
         )
 
