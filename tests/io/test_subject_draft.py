@@ -250,7 +250,9 @@ def test_the_only_model_takes_the_place_of_a_static_trial_that_no_name_tells(tmp
     assert content["model"] == {"osim": "scaled.osim"}
     assert [trial["markers"] for trial in content["trial"]] == ["first.c3d", "second.c3d"]
     (tmp_path / "generic.osim").touch()
-    assert "osim" not in tomllib.loads(init_subject(tmp_path))["model"], "which of two is not for us to say"
+    two = init_subject(tmp_path)
+    assert "osim" not in tomllib.loads(two)["model"], "which of two is not for us to say"
+    assert [f'# osim = "{name}.osim"' in two for name in ("generic", "scaled", "other")] == [True, True, False]
     (tmp_path / "generic.osim").unlink()
     (tmp_path / "first.c3d").rename(tmp_path / "static.c3d")
     assert tomllib.loads(init_subject(tmp_path))["model"] == {"static": "static.c3d"}

@@ -46,11 +46,11 @@ def init_files(folder: str | Path, nearby: bool = True, marker_set: bool = True)
     """Draft a subject file for the recordings in a folder (not its subfolders), and a marker set where none fits the
     static trial; writes nothing.
 
-    The static trial is the one with such a name ("static", "cal"), else the shortest without movement; forces
-    and loads go with the trial whose name is most like theirs, and are looked for in the folders in it and beside it
-    where the folder itself has none and `nearby` is True; mass and height come from a C3D file that holds them. The
-    only OpenSim model of a folder replaces a static trial that no name identifies. A sheet of girths and lengths
-    is used, but not with a model, whose segments are cut elsewhere; of several, one is to be chosen. What stays
+    The static trial is the one with such a name ("static", "cal"), else the shortest without movement; forces and loads
+    go with the trial whose name is most like theirs, and are looked for in the folders in it and beside it where the
+    folder itself has none and `nearby` is True; mass and height come from a C3D file that holds them. The only OpenSim
+    model of a folder replaces a static trial that no name identifies; others are commented lines. A sheet of girths and
+    lengths is used, but not with a model, whose segments are cut elsewhere; of several, one is to be chosen. What stays
     unknown is a commented line marked FILL IN, and so is a trial for which no forces were found. Recordings whose names
     begin like another static trial's are left out and named in a comment.
 
@@ -77,6 +77,8 @@ def init_files(folder: str | Path, nearby: bool = True, marker_set: bool = True)
     has_set = (folder / MARKER_SET).is_file() or bool(own)
     text += ["", "[model]"]
     text += [_entry(Model, "osim", models[0].name)] if by_model else _static_lines(static, has_set)
+    if not by_model:
+        text += [f"# {_entry(Model, 'osim', model.name)}" for model in models]
     text += _trial_lines(folder, files, trials, nearby)
     sheets = [] if by_model else [file.name for file in files if is_measures_sheet(file)]
     if sheets:
