@@ -84,8 +84,8 @@ class RecordingContext:
     @cached_property
     def plates(self) -> PlateLoads | None:
         """Force plates without loads that are under no foot."""
-        plates, strays = self.recorded_plates, self.stray_contacts
-        return plates if plates is None or not strays else without_loads(plates, strays, self.contacts)
+        plates = self.recorded_plates
+        return None if plates is None else without_loads(plates, self.stray_contacts, self.contacts)
 
     @cached_property
     def markers(self) -> Markers:
@@ -230,15 +230,9 @@ class RecordingContext:
     @property
     def whole_loads(self) -> PlateLoads | None:
         """The plates without the loads that are not among `whole_contacts`."""
-        plates, partly = self.plates, set(map(id, self.contacts)) - set(map(id, self.whole_contacts))
-        if plates is None or not partly:
-            return plates
-        force, moment = plates.force.copy(), plates.moment.copy()
-        for one in self.contacts:
-            if id(one) in partly:
-                during = within(plates.time, one.time[0], one.time[-1])
-                force[during, one.plate], moment[during, one.plate] = 0.0, 0.0
-        return replace(plates, force=force, moment=moment)
+        plates, whole = self.plates, set(map(id, self.whole_contacts))
+        partly = [one for one in self.contacts if id(one) not in whole]
+        return None if plates is None else without_loads(plates, partly, self.whole_contacts)
 
     @cached_property
     def loaded(self) -> Trial | KinertiaError | None:

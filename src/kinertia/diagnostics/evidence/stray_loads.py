@@ -31,6 +31,8 @@ def stray_contacts(
 
 def without_loads(plates: PlateLoads, contacts: Sequence[PlateContact], others: Sequence[PlateContact]) -> PlateLoads:
     """Return the plates without these loads, as long as they last; what belongs to other loads stays."""
+    if not contacts:
+        return plates
     force, moment = plates.force.copy(), plates.moment.copy()
     for one in contacts:
         during = within(plates.time, one.time[0], one.time[-1])
