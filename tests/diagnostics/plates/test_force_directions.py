@@ -62,17 +62,30 @@ def test_the_sign_of_one_plate_in_a_run(run, plate, axis):
     assert (found.code, found.where) == ("P233", wrong.at(plate=run.plates.names[plate], **wrong.along(axis)))
 
 
-@pytest.mark.parametrize("plate", [0, 1])
-@pytest.mark.parametrize("kind", ["exchanged", "rotated"])
-def test_the_axes_of_one_plate(walk, plate, kind):
-    def misread(force):
+def misread(recording, plate, kind):
+    """The recording with the axes of one plate exchanged, or rotated."""
+
+    def change(force):
         wrong = force.copy()
         wrong[:, plate, 0], wrong[:, plate, 2] = force[:, plate, 2], force[:, plate, 0]
         if kind == "rotated":
             wrong[:, plate, 2] *= -1.0
         return wrong
 
-    context = context_of(with_force(walk, misread))
+    return with_force(recording, change)
+
+
+@pytest.mark.parametrize("plate", [0, 1])
+@pytest.mark.parametrize("kind", ["exchanged", "rotated"])
+def test_the_axes_of_one_plate_in_a_run(run, plate, kind):
+    found = [*force_directions(context_of(misread(run, plate, kind)))]
+    assert [(one.code, one.evidence["plate"].value) for one in found] == [("P236", run.plates.names[plate])]
+
+
+@pytest.mark.parametrize("plate", [0, 1])
+@pytest.mark.parametrize("kind", ["exchanged", "rotated"])
+def test_the_axes_of_one_plate(walk, plate, kind):
+    context = context_of(misread(walk, plate, kind))
     found = [*force_directions(context)]
     if not found:  # a plate that hardly counts in the frames that do, such as one of subject A
         apart = context.velocity_changes.caused - context.velocity_changes.centre

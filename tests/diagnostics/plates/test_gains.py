@@ -99,3 +99,19 @@ def test_one_axis_of_one_plate_that_reads_twice(recording_of, plate):
     assert found.where.axis == context.along(0)["axis"]
     assert found.where.plate == walk.plates.names[plate]
     assert found.evidence["factor"].value == pytest.approx(2.0, abs=0.3)
+
+
+@pytest.mark.parametrize("name", [name for name in WALKS if name == "gait2354"])
+@pytest.mark.parametrize("plate", [0, 1, None])
+def test_an_axis_that_reads_half(recording_of, plate, name):
+    """A zero offset of the forces hides nothing of it."""
+    recording = recording_of(*WALKS[name])
+    factors = np.ones((len(recording.plates.names), 3))
+    factors[slice(None) if plate is None else plate, 0] = 0.5
+    context = context_of(
+        with_force(recording, lambda force: force * factors + [3.0, 0.0, 0.0] * (force[..., 1:2] > 20.0))
+    )
+    (found,) = gains(context)
+    assert (found.code, found.where.axis) == ("P222", context.along(0)["axis"])
+    assert found.where.plate == (None if plate is None else recording.plates.names[plate])
+    assert found.evidence["factor"].value == pytest.approx(0.5, abs=0.15)

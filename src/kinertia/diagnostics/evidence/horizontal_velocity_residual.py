@@ -83,6 +83,21 @@ class VelocityResidual:
         return Quantity((self.as_read, residual), "m/s", limit=limit)
 
 
+def steady_scaled(
+    time: FloatArray, force: FloatArray, parts: Sequence[CausedVelocity], axis: int
+) -> tuple[float, tuple[Scaled, ...]]:
+    """Compute what is left without a linear trend, which zero offsets cause: the residual (m/s) of forces as recorded,
+    and if all plates, or one, have a gain error. Arguments as of `VelocityResidual.of`.
+    """
+    caused = [part.caused[:, axis] for part in parts]
+    moved = [(part.pelvis[:, axis] + part.centre[:, axis]) / 2 for part in parts]
+    off = joined_without_trend(parts, caused) - joined_without_trend(parts, moved)
+    by_plate = [[part.by(time, own) for part in parts] for own in force[..., axis].T]
+    plates = [None, *range(len(by_plate))]
+    each = zip(plates, [caused, *by_plate], strict=True)
+    return float(np.std(off)), tuple(_scaled(plate, off, joined_without_trend(parts, own)) for plate, own in each)
+
+
 def rotated_residual(parts: Sequence[CausedVelocity], angle: float) -> float:
     """Compute the residual (m/s) of both horizontal axes, forces rotated back by `angle` (rad) about the vertical."""
     # from Z to X is a positive rotation about Y

@@ -168,7 +168,8 @@ def _misread_plate(
     as_read = float(np.linalg.norm([one.as_read for one in residuals.values()]))
     if len(plates.names) < 2 or not context.has_strides or as_read < _LEAST_REVERSED_M_S:
         return None
-    left = misread_plate_residuals(plates.time, plates.force, context.velocities)
+    shown = (context.velocities, _by_centre(context.velocities))
+    left = min((misread_plate_residuals(plates.time, plates.force, parts) for parts in shown), key=np.min)
     best = int(np.argmin(left.min(axis=1)))
     signs = [min(one.all_reversed, one.without_trend, *one.plate_reversed, one.as_read) for one in residuals.values()]
     zeros = [min(sign, *one.plate_zeroed) for sign, one in zip(signs, residuals.values(), strict=True)]
@@ -193,9 +194,14 @@ def _best_explained(plates: PlateLoads, parts: Sequence[CausedVelocity], axis: i
     """
     shown = [parts]
     if max(span_s(part.time) for part in parts) >= _LONG_WINDOW_S:
-        shown.append([replace(part, pelvis=part.centre) for part in parts])
+        shown.append(_by_centre(parts))
     found = [VelocityResidual.of(plates.time, plates.force, each, axis) for each in shown]
     return min(found, key=lambda one: min(one.as_read, float(one.plate_reversed.min())))
+
+
+def _by_centre(parts: Sequence[CausedVelocity]) -> Sequence[CausedVelocity]:
+    """Return the windows with the marker-based centre in place of the pelvis, too."""
+    return [replace(part, pelvis=part.centre) for part in parts]
 
 
 def _one_zero_off(trial: Trial, parts: Sequence[CausedVelocity], axis: int) -> bool:

@@ -18,6 +18,7 @@ from kinertia.diagnostics.evidence.horizontal_velocity_residual import (
     HORIZONTAL,
     Scaled,
     VelocityResidual,
+    steady_scaled,
 )
 from kinertia.diagnostics.evidence.vertical_acceleration import vertical_match_of
 from kinertia.findings.finding import Finding, with_evidence
@@ -113,16 +114,17 @@ def _scaled_axis(
     context: RecordingContext, plates: PlateLoads, long: Sequence[CausedVelocity], axis: int
 ) -> Finding | None:
     """P222: the axis of one plate, or of all, that reads a multiple of the true force."""
-    residual = VelocityResidual.of(plates.time, plates.force, long, axis)
-    best = min(residual.scaled, key=lambda one: one.residual)
-    limit = min(_SCALED * residual.as_read, CLEARLY_BEST * float(residual.plate_zeroed.min()))
-    if residual.as_read < _LEAST_RESIDUAL_M_S or best.residual > limit or not _is_gain(best):
+    as_read, scaled = steady_scaled(plates.time, plates.force, long, axis)
+    best = min(scaled, key=lambda one: one.residual)
+    zeroed = VelocityResidual.of(plates.time, plates.force, long, axis).plate_zeroed
+    limit = min(_SCALED * as_read, CLEARLY_BEST * float(zeroed.min()))
+    if as_read < _LEAST_RESIDUAL_M_S or best.residual > limit or not _is_gain(best):
         return None
-    alike = [one for one in residual.scaled if CLEARLY_BEST * one.residual < best.residual and _is_gain(one)]
+    alike = [one for one in scaled if CLEARLY_BEST * one.residual < best.residual and _is_gain(one)]
     names = ["all plates" if one.plate is None else plates.names[one.plate] for one in alike]
     evidence = {
         "factor": Quantity(best.factor, "1"),
-        "velocity_residual_m_s": residual.once(best.residual, limit),
+        "velocity_residual_m_s": Quantity((as_read, best.residual), "m/s", limit=limit),
     }
     single = len(alike) == 1 and best.plate is not None
     if not single:
