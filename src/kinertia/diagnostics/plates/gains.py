@@ -113,19 +113,28 @@ def _disagreeing(
 def _scaled_axis(
     context: RecordingContext, plates: PlateLoads, long: Sequence[CausedVelocity], axis: int
 ) -> Finding | None:
-    """P222: the axis of one plate, or of all, that reads a multiple of the true force."""
-    as_read, scaled = steady_scaled(plates.time, plates.force, long, axis)
-    best = min(scaled, key=lambda one: one.residual)
-    zeroed = VelocityResidual.of(plates.time, plates.force, long, axis).plate_zeroed
-    limit = min(_SCALED * as_read, CLEARLY_BEST * float(zeroed.min()))
-    if as_read < _LEAST_RESIDUAL_M_S or best.residual > limit or not _is_gain(best):
-        return None
+    """P222: the axis of one plate, or of all, that reads a multiple of the true force, beside a zero offset or not."""
+    residual = VelocityResidual.of(plates.time, plates.force, long, axis)
+    steady = steady_scaled(plates.time, plates.force, long, axis)
+    for as_read, scaled in ((residual.as_read, residual.scaled), steady):
+        best = min(scaled, key=lambda one: one.residual)
+        limit = min(_SCALED * as_read, CLEARLY_BEST * float(residual.plate_zeroed.min()))
+        if as_read >= _LEAST_RESIDUAL_M_S and best.residual <= limit and _is_gain(best):
+            return _multiple(context, plates, axis, best, scaled, Quantity((as_read, best.residual), "m/s", limit))
+    return None
+
+
+def _multiple(
+    context: RecordingContext,
+    plates: PlateLoads,
+    axis: int,
+    best: Scaled,
+    scaled: Sequence[Scaled],
+    residuals: Quantity,
+) -> Finding:
     alike = [one for one in scaled if CLEARLY_BEST * one.residual < best.residual and _is_gain(one)]
     names = ["all plates" if one.plate is None else plates.names[one.plate] for one in alike]
-    evidence = {
-        "factor": Quantity(best.factor, "1"),
-        "velocity_residual_m_s": Quantity((as_read, best.residual), "m/s", limit=limit),
-    }
+    evidence = {"factor": Quantity(best.factor, "1"), "velocity_residual_m_s": residuals}
     single = len(alike) == 1 and best.plate is not None
     if not single:
         evidence["plate"] = Quantity(" or ".join(names))
