@@ -6,9 +6,14 @@ import numpy as np
 import pytest
 
 from kinertia.io.marker_set_file import read_marker_set
-from kinertia.settings import Subject
+from kinertia.io.recording import read_recording
+from kinertia.settings import Settings, Subject
 from kinertia.trial.data import Markers, Recording
+from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow.joint_widths import with_widths
+from kinertia.workflow.person import Person
+from kinertia.workflow.prepare import prepared
+from kinertia.workflow.screening import screen
 
 SET = read_marker_set("plug-in-gait")
 
@@ -41,3 +46,18 @@ def test_a_set_that_names_no_widths_takes_those_of_the_subject_file():
     assert {joint: static.measurements[name] for joint, name in marker_set.widths.items()} == pytest.approx(
         {"ankle_r": 0.07, "ankle_l": 0.07}
     )
+
+
+def test_the_model_has_the_widths_of_the_subject_file(measured_folder):
+    """The static trial has widths of its own, of 105 mm at the knees."""
+    folder = measured_folder / "pig_c3d"
+    static, walk = (read_recording(folder / f"subject_b_{name}.c3d") for name in ("static", "walk"))
+
+    def shank_m(**given):
+        subject = Subject(name="B", mass_kg=47.5, height_m=1.505, sex="female", **given)
+        skeleton = prepared(screen(Person(subject, [TrialInput(walk)], static)), Settings(joint_axes=False)).skeleton
+        return {joint.child: np.array(joint.translation) for joint in skeleton.joints}["shank_r"]
+
+    usual, same, wide = shank_m(), shank_m(knee_width_mm=105.0), shank_m(knee_width_mm=140.0)
+    assert same == pytest.approx(usual, abs=1e-9)
+    assert np.linalg.norm(wide - usual) > 0.002

@@ -196,13 +196,12 @@ def built_in_model(screened: Screened, trials: Sequence[Turned], settings: Setti
     person, context = screened.person, screened.context
     if context.marker_set is None:
         raise SettingsError.of_entry("[model]", "expected the marker set of the built-in model (markers = ...)")
-    statics = [] if context.static is None else [context.static.recording]
+    static = None if context.static is None else _Landmarks(context.static.recording, known(context.static.marker_set))
+    statics = [] if static is None else [static.static]
     subject = complete_subject(person.subject, [*statics, *person.recordings])
     height_m, sex = known(subject.height_m), known(subject.sex)
     facing_x = [_turned(one, context.marker_set) for one in trials]
-    landmarks = (
-        _Landmarks(statics[0], context.marker_set) if statics else _stance_of(person, facing_x, context.marker_set)
-    )
+    landmarks = static or _stance_of(person, facing_x, context.marker_set)
     model = build_gait27(
         landmarks.static, landmarks.marker_set, height_m, sex, settings.hip_centre, by_stature=landmarks.of_walk
     )
