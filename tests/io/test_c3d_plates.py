@@ -70,6 +70,14 @@ def test_parameters_of_plates_in_other_shapes(tmp_path, name, shape):
     assert read_c3d(path).plates.names == ("plate 1", "plate 2")
 
 
+@pytest.mark.parametrize("kind", [2, 4])
+def test_integers_of_plates_stored_as_floats(tmp_path, kind):
+    """As ezc3d writes them when Python adds them as lists."""
+    plate = plate_parameters(CORNERS, kind)
+    floats = {name: plate[name].astype(float) for name in ("USED", "TYPE", "ZERO", "CHANNEL")}
+    expect_centre_of_pressure(read_c3d(plate_file(tmp_path / "x.c3d", stepping(), {**plate, **floats})).plates)
+
+
 @pytest.mark.parametrize(("name", "shape"), [("TYPE", ()), ("CHANNEL", (6,)), ("CORNERS", (3, 4)), ("ORIGIN", (3,))])
 def test_parameters_of_one_plate_in_other_shapes(tmp_path, name, shape):
     plate = plate_parameters(CORNERS)

@@ -78,6 +78,19 @@ def test_moments_in_another_unit_than_lengths_are_converted(tmp_path, unit, per_
         assert (one.where.plate, one.evidence["unit"].value, one.severity) == ("plate 1", unit, Severity.CORRECTED)
 
 
+@pytest.mark.parametrize(("unit", "per_unit"), [("Nm", 1e3), ("Nmm", 1.0), ("", 1.0)])
+def test_free_moments_of_type_1_in_another_unit_than_lengths_are_converted(tmp_path, unit, per_unit):
+    person = np.random.default_rng(0).uniform((0.0, 0.0, 0.0), (600.0, 500.0, 1800.0), (20, 9, 3))
+    load = np.array([-30.0, 20.0, -600.0, 0.0, 0.0, 4000.0 / per_unit])
+    corners = np.array([[300.0, 200, 0], [-300, 200, 0], [-300, -200, 0], [300, -200, 0]]) @ PLATE_AXES.T
+    parameters = {"POINT": {"Y_SCREEN": ["+Z"]}, "FORCE_PLATFORM": plate_parameters(corners[None], kind=1)}
+    labels = [f"M{k}" for k in range(9)]
+    path = write_c3d(tmp_path / "x.c3d", person, labels, np.tile(load, (200, 1)), parameters, moment_unit=unit)
+    recording = read_c3d(path)
+    np.testing.assert_allclose(recording.plates.moment[:, 0], np.tile([0.0, -4.0, 0.0], (200, 1)), atol=1e-3)
+    assert codes(recording.findings) == [*["F152"] * (per_unit != 1.0), "F133"]
+
+
 def test_a_plate_whose_moments_nobody_can_convert_is_left_out(tmp_path):
     recording = read_recording(on_turned_plate(tmp_path / "x.c3d", "Nm", 1e3, kind=4))
     assert recording.plates is None

@@ -23,7 +23,7 @@ from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.io.c3d_events import file_events
 from kinertia.io.c3d_outputs import OWN_GROUP
-from kinertia.io.c3d_plates import lab_plates, person_on_plates, plate_left_out, to_ground_plates
+from kinertia.io.c3d_plates import PLATE_TYPES, lab_plates, person_on_plates, plate_left_out, to_ground_plates
 from kinertia.io.c3d_structure import doubts_about, with_plain_samples
 from kinertia.io.c3d_subject import subject_data
 from kinertia.io.ezc3d_library import (
@@ -125,8 +125,9 @@ def _open(path: Path) -> tuple[C3dContent, list[Finding]]:
         raise FileError.found(path, "F106", what=Quantity(problem)) from None
     parameters = file["parameters"]
     if file["trouble"] and parameter_values(parameters, "FORCE_PLATFORM", "USED", [0])[0]:
-        types = ", ".join(map(str, parameter_values(parameters, "FORCE_PLATFORM", "TYPE", [])))
-        reason = f"their type ({types}) cannot be read"
+        types = parameter_values(parameters, "FORCE_PLATFORM", "TYPE", [])
+        unknown = ", ".join(str(kind) for kind in types if kind not in PLATE_TYPES)
+        reason = f"their type ({unknown}) cannot be read" if unknown else f"ezc3d cannot read them ({file['trouble']})"
         findings.append(plate_left_out(path, None, reason))
     if not file["data"]["points"].shape[1] and _poses(file) is None:
         found = "no points, nor poses of pelvis, thighs, shanks, feet and toes as Theia has them"

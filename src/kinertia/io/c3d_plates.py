@@ -26,6 +26,8 @@ from kinertia.trial.force_spikes import without_spikes
 from kinertia.trial.impossible_data import impossible_load
 from kinertia.trial.plate_loading import joined, largest_n, without_idle
 
+PLATE_TYPES = (1, 2, 3, 4)
+"""Those that ezc3d reads."""
 _CORNER_LIMIT_M = 50.0
 _EDGE_LIMITS_M = (0.1, 10.0)
 _MUCH_NEARER = 0.5
@@ -109,7 +111,7 @@ def _moment(platform: Any, kind: int, unit: float, moment_unit: float) -> FloatA
     """Return moments (k, 3) N m about the lab origin; the file has lengths in `unit` (m), moments N `moment_unit`."""
     force, corners = platform["force"].T, platform["corners"].T
     if kind == 1:
-        result: FloatArray = np.cross(unit * platform["center_of_pressure"].T, force) + unit * platform["Tz"].T
+        result: FloatArray = np.cross(unit * platform["center_of_pressure"].T, force) + moment_unit * platform["Tz"].T
         return result
     # ezc3d adds to the channels' moments the force times the offset from transducer to surface, in the unit of lengths
     measured = platform["moment"].T - np.cross(force, plate_axes(corners) @ platform["origin"])
@@ -194,11 +196,11 @@ def _corner_trouble(corners: FloatArray) -> tuple[str, dict[str, Quantity]]:
 
 def _moment_unit(parameters: Any, kind: int, plate: int, plates: int, length: str) -> tuple[str, float]:
     """Return the moment unit stated by a plate's analog channels, and how many N m it is; N `length` by default."""
-    if kind not in (2, 4):
+    if kind == 3:
         return "", METRES_PER_UNIT[length]
     channels = np.reshape(parameter_values(parameters, "FORCE_PLATFORM", "CHANNEL"), (plates, -1))[plate]
     units = parameter_values(parameters, "ANALOG", "UNITS")
-    channel = int(channels[3]) - 1
+    channel = int(channels[5]) - 1
     unit = str(units[channel]) if channel < len(units) else ""
     said = "".join(letter for letter in unit.lower() if letter.isalpha())
     return unit, METRES_PER_UNIT[said[1:] if said in ("nm", "nmm", "ncm") else length]

@@ -35,6 +35,8 @@ except ImportError:
 
 ONLY_ASCII_PATHS = sys.platform == "win32"
 _COPY = "copy.c3d"
+_INTEGER = 2
+"""Type of a parameter as ezc3d has it."""
 _SECONDS, _SECONDS_PER_BYTE = 6.0, 1e-5
 _WAITING = 20.0
 _BYTES, _BYTES_PER_BYTE = 800_000_000, 20
@@ -65,8 +67,9 @@ def read_content(path: Path) -> C3dContent:
         C3dTrouble: ezc3d cannot read it.
     """
     file, trouble = _with_plates(path)
+    whole = _make_whole(file["parameters"])
     shapes = _plate_shapes(file["parameters"])
-    if shapes:
+    if whole or shapes:
         file, trouble = _with_plate_shapes(file, shapes)
     data, header = file["data"], file["header"]
     return {
@@ -80,6 +83,21 @@ def read_content(path: Path) -> C3dContent:
         },
         "trouble": trouble,
     }
+
+
+def _make_whole(parameters: Any) -> bool:
+    """Turn numbers and types of plates and channels that are stored as floats into the integers that ezc3d expects.
+
+    Return whether there were any: ezc3d itself writes them when Python adds them as lists.
+    """
+    changed = False
+    for name in ("USED", "TYPE", "ZERO", "CHANNEL"):
+        values = np.array(parameter_values(parameters, "FORCE_PLATFORM", name))
+        if np.issubdtype(values.dtype, np.floating) and len(values) and (values == np.round(values)).all():
+            entry = parameters["FORCE_PLATFORM"][name]
+            entry["type"], entry["value"] = _INTEGER, np.asarray(entry["value"]).astype(np.int32)
+            changed = True
+    return changed
 
 
 def _plate_shapes(parameters: Any) -> dict[str, tuple[int, ...]]:
