@@ -34,9 +34,26 @@ def test_vicon(tmp_path):
     assert off == ("r", "toe off", "Foot Off", "Ann", 1.15)
 
 
-@pytest.mark.parametrize(("label", "side", "kind"), [("RHS", "r", "heel strike"), ("LTO", "l", "toe off")])
+@pytest.mark.parametrize(
+    ("label", "side", "kind"),
+    [
+        ("RHS", "r", "heel strike"),
+        ("LTO", "l", "toe off"),
+        ("R_TO", "r", "toe off"),
+        ("RON", "r", "heel strike"),
+        ("LOFF", "l", "toe off"),
+        ("Right Foot Strike", "r", "heel strike"),
+        ("left_toe-off", "l", "toe off"),
+        ("Left Initial Contact", "l", "heel strike"),
+    ],
+)
 def test_one_label_for_side_and_kind(tmp_path, label, side, kind):
     assert events_of(tmp_path, [label], [""], [1.05])[0][:2] == (side, kind)
+
+
+@pytest.mark.parametrize(("context", "side", "kind"), [("Right", "r", "heel strike"), ("Left", "l", None)])
+def test_a_label_with_a_side_counts_only_on_the_side_of_its_context(tmp_path, context, side, kind):
+    assert events_of(tmp_path, [context], ["Right Foot Strike"], [1.05])[0][:2] == (side, kind)
 
 
 def test_minutes_and_a_single_event(tmp_path):

@@ -12,8 +12,8 @@ from kinertia.io.ezc3d_library import parameter_values, text_list
 from kinertia.trial.gait_event import EventKind, FileEvent
 
 _SIDES = {"right": "r", "left": "l", "r": "r", "l": "l"}
-_SHORT = re.compile(r"([rl])[ _]?(hs|ic|fs|to|fo)")
-_STRIKE, _OFF = "foot strike|heel strike|initial contact|hs|ic|fs", "foot off|toe off|to|fo"
+_ONE_LABEL = re.compile(r"(?:(right|left) (?=\w)|([rl]) ?(?=(?:hs|ic|fs|on|to|fo|off)$))(.*)")
+_STRIKE, _OFF = "(foot|heel) (strike|contact|on)|initial contact|hs|ic|fs|on", "(foot|toe) off|to|fo|off"
 OWN_METHOD = "Kinertia: "
 """Prefix of the descriptions of events that Kinertia wrote: they are results, which another export replaces."""
 _SECONDS_PER_MINUTE = 60.0
@@ -72,10 +72,10 @@ def _texts(parameters: Any, name: str, count: int) -> list[str]:
 
 def side_and_kind(context: str, label: str) -> tuple[str, EventKind | None]:
     """Identify side and kind from context and label; empty and None where neither states them."""
-    side, word = _SIDES.get(context.lower(), ""), label.lower().replace("-", " ")
-    short = _SHORT.fullmatch(word)
-    if short and not side:
-        side, word = short.groups()
+    side, word = _SIDES.get(context.lower(), ""), re.sub("[-_ ]+", " ", label.lower())
+    whole = _ONE_LABEL.fullmatch(word)
+    if whole and re.fullmatch(f"{_STRIKE}|{_OFF}", whole[3]) and side in ("", _SIDES[whole[1] or whole[2]]):
+        side, word = _SIDES[whole[1] or whole[2]], whole[3]
     if re.fullmatch(_STRIKE, word):
         return side, "heel strike"
     return side, "toe off" if re.fullmatch(_OFF, word) else None
