@@ -104,6 +104,17 @@ def test_a_preset_is_recognised_in_other_capitals_and_punctuation(name):
     assert chosen.respelled == {label: spelled for label, spelled in written.items() if label != spelled}
 
 
+@pytest.mark.parametrize("name", preset_names())
+def test_a_preset_is_recognised_behind_a_name_that_all_labels_begin_with(name):
+    preset = read_marker_set(name)
+    labels = [f"Anna_{label}" for label in preset.labels]
+    chosen = choose_marker_set([*labels, "wand"])
+    assert chosen.name == preset.name
+    assert chosen.respelled == dict(zip(preset.labels, labels, strict=True))
+    with pytest.raises(MarkerSetError):
+        choose_marker_set([*labels, *(f"Ben_{label}" for label in preset.labels)])
+
+
 def test_a_spelling_that_could_be_two_labels_is_nobodys():
     preset = read_marker_set("rajagopal")
     labels = [label for label in preset.labels if label != "R.Toe"]

@@ -51,6 +51,8 @@ ENOUGH_LABELS = 2.0 / 3.0
 """Least share of a set's labels, or of those of its pelvis, legs and feet, that a recording must have for the set,
 whether the user named it or it is a preset. Measured recordings that lack part of their own set have 0.76 and more; two
 of other laboratories' sets have up to 0.62 of the labels of Plug-in Gait, which mean something else there."""
+_PREFIX_SHARE = 0.9
+"""Share of the labels that begin with a person's name: unnamed trajectories and objects have others."""
 _COMPUTED_M = 1e-4
 _SIDES = {"r": "right", "l": "left"}
 _FOOT = ("heel", "metatarsal")
@@ -108,7 +110,8 @@ class MarkerSet:
 def spelled_as(marker_set: MarkerSet, labels: Sequence[str]) -> MarkerSet:
     """Return the set with missing labels spelled as in the recording, if only one of its labels comes into question.
 
-    Spellings may differ in capitals and punctuation, or be another known name of the marker.
+    Spellings may differ in capitals and punctuation, be another known name of the marker, or begin with a person's name
+    that all labels share, as in `Anna_LASI`.
 
     Args:
         marker_set: its labels may have been retyped by hand or changed by a program.
@@ -117,13 +120,14 @@ def spelled_as(marker_set: MarkerSet, labels: Sequence[str]) -> MarkerSet:
     own = marker_set.labels
     wanted = [label for label in own if label not in labels]
     others = [label for label in labels if label not in own]
-    spelled = _matched({label: {folded(label)} for label in wanted}, others)
+    prefix = shared_prefix(labels)
+    spelled = _matched({label: {folded(label)} for label in wanted}, others, prefix)
     named = {
         label: set(map(folded, names))
         for label, names in marker_set.spellings.items()
         if label in wanted and label not in spelled
     }
-    spelled |= _matched(named, [label for label in others if label not in spelled.values()])
+    spelled |= _matched(named, [label for label in others if label not in spelled.values()], prefix)
     if not spelled:
         return marker_set
 
@@ -138,10 +142,18 @@ def spelled_as(marker_set: MarkerSet, labels: Sequence[str]) -> MarkerSet:
     )
 
 
-def _matched(names: Mapping[str, set[str]], labels: Sequence[str]) -> dict[str, str]:
-    """Map each label of a set to the one of these labels that is among its names (folded) and not claimed twice."""
-    known = [(one, folded(one)) for one in labels]
-    fitting = {label: [one for one, name in known if name in own] for label, own in names.items()}
+def shared_prefix(labels: Sequence[str]) -> str:
+    """Return what nearly all labels have before their first underscore, with it; empty if they differ."""
+    parts = Counter(label[: label.find("_") + 1] for label in labels).most_common(1)
+    return parts[0][0] if parts and parts[0][1] >= _PREFIX_SHARE * len(labels) else ""
+
+
+def _matched(names: Mapping[str, set[str]], labels: Sequence[str], prefix: str) -> dict[str, str]:
+    """Map each label of a set to the one of these labels that is among its names (folded, with or without the prefix)
+    and not claimed twice.
+    """
+    known = [(one, {folded(one), folded(one.removeprefix(prefix))}) for one in labels]
+    fitting = {label: [one for one, forms in known if forms & own] for label, own in names.items()}
     claims = Counter(one for found in fitting.values() for one in found)
     return {label: found[0] for label, found in fitting.items() if len(found) == 1 and claims[found[0]] == 1}
 

@@ -20,6 +20,7 @@ from kinertia.io.provenance import VERSION
 from kinertia.io.recording import read_recording
 from kinertia.io.trial_files import trial_file
 from kinertia.model.bsp import PARAMETERS
+from kinertia.model.marker_set import shared_prefix
 from kinertia.motion.gait_cycle import found_events
 from kinertia.motion.joint_wrench import leg_joints
 from kinertia.motion.model_outputs import CONVENTIONS, UNITS, Convention, Departures, ModelOutput, model_outputs
@@ -69,7 +70,8 @@ def write_c3d_results(
 
 def usual_convention(fit: Fit) -> Convention:
     """Return Plug-in Gait's convention where its markers are present, else ISB's."""
-    labels = set(fit.skeleton.labels)
+    prefix = shared_prefix(fit.skeleton.labels)
+    labels = {label.removeprefix(prefix) for label in fit.skeleton.labels}
     return "plug-in-gait" if any(own <= labels for own in _PLUG_IN_GAIT) else "isb"
 
 
