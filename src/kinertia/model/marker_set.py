@@ -111,7 +111,7 @@ def spelled_as(marker_set: MarkerSet, labels: Sequence[str]) -> MarkerSet:
     """Return the set with missing labels spelled as in the recording, if only one of its labels comes into question.
 
     Spellings may differ in capitals and punctuation, be another known name of the marker, or begin with a person's name
-    that all labels share, as in `Anna_LASI`.
+    that all labels share, as in "Anna_LASI".
 
     Args:
         marker_set: its labels may have been retyped by hand or changed by a program.
