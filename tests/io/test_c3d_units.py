@@ -67,7 +67,20 @@ def on_turned_plate(path, moment_unit, per_unit, kind=2):
     return write_c3d(path, person, labels, np.tile(load, (200, 1)), parameters, moment_unit=moment_unit)
 
 
-@pytest.mark.parametrize(("unit", "per_unit"), [("Nm", 1e3), ("N-m", 1e3), ("Ncm", 10.0), ("Nmm", 1.0), ("", 1.0)])
+MOMENT_UNITS = [
+    ("Nm", 1e3),
+    ("N-m", 1e3),
+    ("Newton-meters", 1e3),
+    ("newton metre", 1e3),
+    ("Ncm", 10.0),
+    ("Newton-Centimeter", 10.0),
+    ("Nmm", 1.0),
+    ("Newton-millimeters", 1.0),
+    ("", 1.0),
+]
+
+
+@pytest.mark.parametrize(("unit", "per_unit"), MOMENT_UNITS)
 def test_moments_in_another_unit_than_lengths_are_converted(tmp_path, unit, per_unit):
     recording = read_c3d(on_turned_plate(tmp_path / "x.c3d", unit, per_unit))
     x, y, _ = PLATE_AXES @ [0.05, -0.04, 0.0]

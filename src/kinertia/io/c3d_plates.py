@@ -7,6 +7,7 @@ and the free moment; ezc3d's moment has the opposite sign there, so the moment i
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -28,6 +29,8 @@ from kinertia.trial.plate_loading import joined, largest_n, without_idle
 
 PLATE_TYPES = (1, 2, 3, 4)
 """Those that ezc3d reads."""
+_MOMENT_UNIT = re.compile("n(?:ewtons?)?(milli|centi|m(?=m)|c)?m(?:et(?:er|re)s?)?")
+"""Letters of N m, N mm and N cm, as symbols or words."""
 _CORNER_LIMIT_M = 50.0
 _EDGE_LIMITS_M = (0.1, 10.0)
 _MUCH_NEARER = 0.5
@@ -203,4 +206,5 @@ def _moment_unit(parameters: Any, kind: int, plate: int, plates: int, length: st
     channel = int(channels[5]) - 1
     unit = str(units[channel]) if channel < len(units) else ""
     said = "".join(letter for letter in unit.lower() if letter.isalpha())
-    return unit, METRES_PER_UNIT[said[1:] if said in ("nm", "nmm", "ncm") else length]
+    known = _MOMENT_UNIT.fullmatch(said)
+    return unit, METRES_PER_UNIT[f"{(known[1] or '')[:1]}m" if known else length]
