@@ -165,6 +165,7 @@ def test_labels(tmp_path):
     points[:, 1] = np.nan
     points[3, 2] = 0.0
     points[4:6, 2] = -9999.0
+    points[4:, 9] = np.nan
     labels = ["Ann:RHEE", "Ann:RTOE", "Ann:RTOE", "Ann:RASI", "Bob:RASI", "*3", "", "Ann:RKneeAngles", "Listed",
               "Ann:RTOE", "LHipForce", "CentreOfMass"]  # fmt: skip
     parameters = {"POINT": {"Y_SCREEN": ["+Z"], "SCALARS": ["Listed"]}}
@@ -185,6 +186,14 @@ def test_labels(tmp_path):
     missing = {one.evidence["written"].value: one for one in recording.findings if one.code == "F115"}
     assert {what: one.evidence["count"].value for what, one in missing.items()} == {"0 0 0": 1, "-9999 -9999 -9999": 2}
     assert {one.where.markers for one in missing.values()} == {("RTOE",)}
+
+
+def test_of_repeated_labels_the_one_in_most_frames_is_kept(tmp_path):
+    points, _ = standing(labels=range(3))
+    points[5:, 0] = np.nan
+    recording = read_c3d(write_c3d(tmp_path / "x.c3d", points, ["RTOE", "RTOE", "RASI"], parameters=SCREEN))
+    toe = recording.markers.select(["RTOE"]).positions[:, 0]
+    np.testing.assert_allclose(toe[0] * 1000, points[0, 1][[0, 2, 1]] * [1, 1, -1], atol=1e-3)
 
 
 def test_more_than_255_labels(tmp_path):

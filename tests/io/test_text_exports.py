@@ -58,7 +58,7 @@ def test_broken_exports_are_refused(tmp_path, kind, old, new, code, evidence):
         read_recording(path)
 
 
-def test_of_repeated_labels_of_qualisys_the_first_with_data_is_kept(tmp_path):
+def test_of_repeated_labels_of_qualisys_the_first_of_equals_is_kept(tmp_path):
     path = tmp_path / "walk.tsv"
     lab_files.write_qtm(path, lab_files.lab_walk())
     names = next(line for line in path.read_text(encoding="utf-8").split("\n") if line.startswith("MARKER_NAMES"))

@@ -195,7 +195,7 @@ def test_the_subjects_name_before_the_labels_is_taken_off(write):
     assert both.markers.labels == ("Anna:A", "A")
 
 
-def test_of_repeated_labels_the_first_with_data_is_kept(write):
+def test_of_repeated_labels_the_one_seen_in_most_frames_is_kept(write):
     header = HEADER.replace("\t3\t2\t", "\t3\t3\t").replace("L Heel", "R.Heel\t\t\tR.Heel")
     first = read_trc_recording(write(header + THIRD))
     assert first.markers.labels == ("R.Heel",)
@@ -203,6 +203,9 @@ def test_of_repeated_labels_the_first_with_data_is_kept(write):
     assert only(first.findings, "F113", label="R.Heel", count=3).severity is Severity.INFO
     second = read_trc_recording(write(header + THIRD.replace("\t1\t2\t3\t", "\t\t\t\t")))
     np.testing.assert_allclose(second.markers.positions[0, 0], (0.004, 0.005, 0.006))
+    row = THIRD.split("\n")[0]
+    gap = read_trc_recording(write(header + THIRD.replace(row, row.replace("\t1\t2\t3\t", "\t\t\t\t"), 1)))
+    np.testing.assert_allclose(gap.markers.positions[0, 0], (0.004, 0.005, 0.006))
 
 
 def test_lost_frame_in_the_middle(write):

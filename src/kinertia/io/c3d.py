@@ -37,7 +37,7 @@ from kinertia.io.ezc3d_library import (
 )
 from kinertia.io.lab_axes import to_ground
 from kinertia.io.number_table import expect_file
-from kinertia.io.repeated_labels import first_with_data
+from kinertia.io.repeated_labels import most_seen
 from kinertia.io.subject_prefix import left_out, people_among, without_prefixes
 from kinertia.io.theia import POSE_SD_M, Poses, virtual_markers, virtual_places
 from kinertia.io.trc import METRES_PER_UNIT, read_as_missing, stand_ins, unknown_unit
@@ -55,7 +55,7 @@ def read_c3d(path: str | Path, length_unit: str | None = None, standing: bool = 
 
     Markers: model outputs (angles, forces, moments, powers) and unnamed points (`*...`) are left out, virtual
     points (joint centres, segment origins) are kept unless Kinertia wrote them; `subject:` prefixes are stripped; of
-    repeated labels the first one with data is kept. Time counts from the first frame of the capture, so a cropped file
+    repeated labels the one in most frames is kept. Time counts from the first frame of the capture, so a cropped file
     does not begin at zero.
 
     Plates: types 1 to 4 (ezc3d reads no others); moment about the ground origin; samples with less than
@@ -213,7 +213,8 @@ def _markers(path: Path, file: Any) -> tuple[tuple[str, ...], FloatArray, list[F
     missing = stand_ins(positions)
     for where in missing.values():
         positions[where] = np.nan
-    seen = np.asarray(np.isfinite(positions).all(axis=2).any(axis=0))
+    shown = np.asarray(np.isfinite(positions).all(axis=2))
+    seen = np.asarray(shown.any(axis=0))
     labels = text_list(file["parameters"], "POINT", "LABELS")[: positions.shape[1]]
     labels += ["*"] * (positions.shape[1] - len(labels))
     ours = set(text_list(file["parameters"], OWN_GROUP, "LABELS"))
@@ -227,7 +228,7 @@ def _markers(path: Path, file: Any) -> tuple[tuple[str, ...], FloatArray, list[F
     if on_plates:
         who = {"person": Quantity(on_plates), "people": Quantity(", ".join(people))}
         findings.append(with_evidence("F162", Where(path.name), who))
-    first, repeated = first_with_data(path, names, seen[kept])
+    first, repeated = most_seen(path, names, shown[:, kept])
     chosen = {name: kept[k] for name, k in first.items()}
     if not chosen or not seen[list(chosen.values())].any():
         raise FileError.found(path, "F164", found=Quantity(f"none of its {len(labels)} points has a label and data"))

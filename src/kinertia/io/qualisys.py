@@ -23,7 +23,7 @@ from kinertia.io.c3d_plates import LabPlates, contradicting_moments, to_ground_p
 from kinertia.io.lab_axes import to_ground
 from kinertia.io.number_table import mismatch, read_lines, read_rows
 from kinertia.io.plate_moments import PlateMoments
-from kinertia.io.repeated_labels import first_with_data
+from kinertia.io.repeated_labels import most_seen
 from kinertia.io.sto import header_entry, other_count
 from kinertia.io.trc import seen_positions
 from kinertia.trial.data import FloatArray, Markers, Recording
@@ -138,7 +138,7 @@ def _markers(path: Path) -> tuple[Markers, list[Finding]]:
     if stated != len(values):
         findings.append(other_count(path, None, stated, len(values), "frames"))
     start = values[0, 1] if counted else 0.0
-    chosen, repeated = first_with_data(path, labels, np.asarray(np.isfinite(positions).all(axis=2).any(axis=0)))
+    chosen, repeated = most_seen(path, labels, np.asarray(np.isfinite(positions).all(axis=2)))
     time = start + np.arange(len(values)) / rate
     return Markers(time, tuple(chosen), _MM * positions[:, list(chosen.values())]), [*findings, *repeated]
 

@@ -12,20 +12,21 @@ from kinertia.findings.where import Where
 from kinertia.trial.data import BoolArray
 
 
-def first_with_data(path: Path, labels: Sequence[str], seen: BoolArray) -> tuple[dict[str, int], list[Finding]]:
-    """Choose one trajectory for each label, the first that has data; F113 lists repeated labels.
+def most_seen(path: Path, labels: Sequence[str], seen: BoolArray) -> tuple[dict[str, int], list[Finding]]:
+    """Choose one trajectory for each label, the one in most frames, of equals the first; F113 lists repeated labels.
 
     Args:
         path: the file, for findings.
         labels: labels of the m trajectories.
-        seen: (m) whether any frame shows them.
+        seen: (n, m) whether a frame shows them.
 
     Returns:
         label -> column of its trajectory, in the order of the file, and what was found.
     """
     chosen: dict[str, int] = {}
+    frames = seen.sum(axis=0)
     for column, label in enumerate(labels):
-        if label not in chosen or (not seen[chosen[label]] and seen[column]):
+        if label not in chosen or frames[column] > frames[chosen[label]]:
             chosen[label] = column
     findings = []
     for label, times in Counter(labels).items():

@@ -15,7 +15,7 @@ from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.io.number_table import malformed, mismatch, read_lines, read_rows
 from kinertia.io.output_folder import write_then_rename
-from kinertia.io.repeated_labels import first_with_data
+from kinertia.io.repeated_labels import most_seen
 from kinertia.io.sto import header_entry, other_count
 from kinertia.io.subject_prefix import without_prefixes
 from kinertia.io.uniform_times import rounding_s, times_rounded, uneven
@@ -34,7 +34,7 @@ def read_trc(path: str | Path) -> Markers:
     """Read marker trajectories (m, ground axes as in the file) from a TRC file.
 
     Empty cells, NaN and the triples 0 0 0 and -9999 -9999 -9999 are missing markers; `subject:` before the labels is
-    taken off; of repeated labels the first one with data is kept. Frame times that were rounded when written are put
+    taken off; of repeated labels the one in most frames is kept. Frame times that were rounded when written are put
     back on the uniform grid they came from.
     `read_trc_recording` reports what was assumed.
 
@@ -64,7 +64,7 @@ def read_trc_recording(path: str | Path) -> Recording:
     names, prefix_findings = without_prefixes(path, labels)
     if len(set(names)) == len(set(labels)):
         labels, findings = tuple(names), [*findings, *prefix_findings]
-    chosen, repeated = first_with_data(path, labels, np.asarray(np.isfinite(positions).all(axis=2).any(axis=0)))
+    chosen, repeated = most_seen(path, labels, np.asarray(np.isfinite(positions).all(axis=2)))
     markers = Markers(time, tuple(chosen), positions[:, list(chosen.values())] * METRES_PER_UNIT[unit])
     found = (*findings, *repeated, *time_findings, *position_findings)
     return Recording(path.stem, markers, findings=found, length_unit=unit)
