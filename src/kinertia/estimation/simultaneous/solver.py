@@ -220,12 +220,16 @@ class _Place(NamedTuple):
 
 
 def _continued(problem: MapProblem, point: Point, judged: _Judged) -> Point:
-    """Return the optimum, starting from a point near it."""
+    """Return the optimum, starting from a point near it, and from the Gaussian of the instruments there.
+
+    That is updated with these knots' own data: where an instrument may be on time or late, another's is negative, and
+    would let it run away.
+    """
     at = _Place(problem.slope(point), judged)
     for _ in range(_MOST_CONTINUED):
         here = problem.at(at.slope.point, _LEAST_DAMPING)
         model = GaussNewton.of(problem, here, problem.bends(here.point.like(here.slope.rhs).static))
-        at = _descended(problem, model, at._replace(slope=here.slope), False, _CONTINUED)
+        at = _descended(problem, model, at._replace(slope=here.slope), True, _CONTINUED)
         if at.converged:
             break
     return at.slope.point
