@@ -29,31 +29,44 @@ def side_by_side(function: Callable[[T], R], items: Sequence[T]) -> list[R]:
     >>> side_by_side(abs, [-3, 2, -1])
     [3, 2, 1]
     """
-    here = (len(items) + 1) // 2
-    if len(items) < 2 or _cores() < 2 or not _second.acquire(blocking=False):
+    if len(items) < 2:
         return [function(item) for item in items]
-    there: list[R | BaseException] = []
+    middle = (len(items) + 1) // 2
+    here, there = both(
+        lambda: [function(item) for item in items[:middle]], lambda: [function(item) for item in items[middle:]]
+    )
+    return here + there
 
-    def second() -> None:
+
+def both(first: Callable[[], T], second: Callable[[], R]) -> tuple[T, R]:
+    """Call two functions: the first here, the other in a second thread if there is a core for it.
+
+    >>> both(lambda: 1, lambda: "a")
+    (1, 'a')
+    """
+    if _cores() < 2 or not _second.acquire(blocking=False):
+        return first(), second()
+    there: list[R] = []
+    failed: list[BaseException] = []
+
+    def in_thread() -> None:
         try:
-            there.extend([function(item) for item in items[here:]])
+            there.append(second())
         except BaseException as error:
-            there.append(error)
+            failed.append(error)
 
     # a daemon: an interruption ends the process, whatever this is doing
-    thread = Thread(target=copy_context().run, args=(second,), name=THREAD, daemon=True)
+    thread = Thread(target=copy_context().run, args=(in_thread,), name=THREAD, daemon=True)
     try:
         thread.start()
-        results = [function(item) for item in items[:here]]
+        here = first()
     finally:
         if thread.is_alive():
             thread.join()
         _second.release()
-    for result in there:
-        if isinstance(result, BaseException):
-            raise result
-        results.append(result)
-    return results
+    if failed:
+        raise failed[0]
+    return here, there[0]
 
 
 def in_one_thread() -> None:

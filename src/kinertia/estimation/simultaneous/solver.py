@@ -44,6 +44,7 @@ from kinertia.estimation.simultaneous.static_information import StaticInformatio
 from kinertia.estimation.simultaneous.terms import TERMS
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.single_blas_thread import one_blas_thread
+from kinertia.motion.two_threads import both
 
 CONVERGED = 1e-3
 """Predicted decrease of half the sum of squares below which a step is the last of the search: after one more step, from
@@ -110,8 +111,11 @@ def estimate_simultaneous(
         ended, model = _optimum(problem, progress)
     evidence = Evidence.of(model, ended.instruments, otherwise)
     known = _Judged.known(ended.instruments)
-    phases = OfPhases.of(problem, ended.point, partial(_continued, judged=known))
-    profile = CostProfile.of(problem, ended.here, ended.instruments, ended.point, partial(_held, problem, ended.point))
+    held = partial(_held, problem, ended.point)
+    phases, profile = both(
+        lambda: OfPhases.of(problem, ended.point, partial(_continued, judged=known)),
+        lambda: CostProfile.of(problem, ended.here, ended.instruments, ended.point, held),
+    )
     model = GaussNewton.of(problem, profile.here).under(profile.instruments)
     moved, more = _left_out(problem, model, ended.point.static)
     static = ended.point.static
@@ -119,11 +123,13 @@ def estimate_simultaneous(
     point = followed(problem, profile.here, ended.point, corrected)
     ended = ended._replace(here=profile.here, instruments=profile.instruments, point=point)
     roots = _roots_in_trials(problem, ended, model)
-    covariance, of_curves = _deviations(problem, ended, model, roots)
+    modes = [of_knots(phases), *of_root(model, point, more)]
+    motions, ((covariance, of_curves), draws) = both(
+        lambda: _through_impacts(problem, point),
+        lambda: (_deviations(problem, ended, model, roots), posterior_draws(model, point, roots, modes)),
+    )
     covariance += phases.covariance + more @ more.T
     of_curves = tuple(each.and_of(phases.curves_apart(k)) for k, each in enumerate(of_curves))
-    motions = _through_impacts(problem, ended.point)
-    draws = posterior_draws(model, point, roots, [of_knots(phases), *of_root(model, point, more)])
     support = instrument_support(model, ended.point, ended.instruments, of_curves)
     return result_of(problem, ended, motions, covariance, of_curves, support, evidence, draws)
 
