@@ -32,8 +32,7 @@ def common_strides(values: np.ndarray) -> np.ndarray:
 
 def mean_of(values: np.ndarray) -> np.ndarray:
     """Return the mean (101,) of curves (n, 101): NaN where one was not measured, and throughout without curves."""
-    result: np.ndarray = values.mean(axis=0) if len(values) else np.full(values.shape[1], np.nan)
-    return result
+    return values.mean(axis=0) if len(values) else np.full(values.shape[1], np.nan)
 
 
 def mean_of_common(values: np.ndarray) -> np.ndarray:

@@ -76,5 +76,4 @@ def _mean_angle(poses: Sequence[InverseKinematics], name: str) -> float:
 def _angles(poses: Sequence[InverseKinematics], name: str) -> np.ndarray:
     """Return the coordinate (rad) in all frames; NaN where it is not determined."""
     columns = [ik.q[:, ik.coordinates.index(name)] for ik in poses if name in ik.coordinates]
-    result: np.ndarray = np.concatenate([np.empty(0), *columns])
-    return result
+    return np.concatenate([np.empty(0), *columns])

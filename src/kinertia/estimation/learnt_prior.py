@@ -75,8 +75,7 @@ class LearntPrior:
     @property
     def learnt(self) -> np.ndarray:
         """Variance reduction (10 s,), 1 - variance / variance of a group without data: 0 means nothing learnt."""
-        result: np.ndarray = np.maximum(0.0, 1.0 - np.diag(self.covariance) / (BETWEEN + WITHIN))
-        return result
+        return np.maximum(0.0, 1.0 - np.diag(self.covariance) / (BETWEEN + WITHIN))
 
     @classmethod
     def from_file(cls, file: PopulationFile) -> LearntPrior:
@@ -190,8 +189,7 @@ class _Means:
         for rows, scale in zip(self.blocks, scales, strict=True):
             each[rows] = np.sqrt(scale)
         whole = np.linalg.solve(self.root, each[:, None] * np.linalg.cholesky(self.correlation))
-        result: np.ndarray = whole @ whole.T
-        return result
+        return whole @ whole.T
 
     def scales(self, mean: np.ndarray, of_mean: np.ndarray, scales: np.ndarray) -> np.ndarray:
         """Update the squared scales from mean and covariance of the mean, in the coordinates of `root`."""

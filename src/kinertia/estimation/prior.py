@@ -202,8 +202,7 @@ def inertia_covariance(bsp: BodySegmentParameters) -> np.ndarray:
         inertia = inertia_of(root @ change @ root.transpose(0, 2, 1))
         columns.append(inertia[:, [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]])
     factor = np.stack(columns, axis=-1)
-    result: np.ndarray = factor @ factor.transpose(0, 2, 1)
-    return result
+    return factor @ factor.transpose(0, 2, 1)
 
 
 def with_symmetry(covariance: np.ndarray, segments: tuple[str, ...], correlation: float) -> np.ndarray:

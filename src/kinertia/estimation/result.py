@@ -319,8 +319,7 @@ class Fit:
             >>> knee.value.attrs["units"]
             'N m/kg'
         """
-        result: Dataset = display.dataset(self, kind, over)
-        return result
+        return display.dataset(self, kind, over)
 
     def gps(self, norms: str | Path) -> GaitProfile:
         """Compute Gait Profile Score and Movement Analysis Profile (Baker 2009) against norms, in degrees.
@@ -347,8 +346,7 @@ class Fit:
         Raises:
             KinertiaError: xarray is missing, or fewer draws are stored.
         """
-        result: Dataset = display.draws(self, count, seed)
-        return result
+        return display.draws(self, count, seed)
 
     @property
     def covariance(self) -> pd.DataFrame | None:

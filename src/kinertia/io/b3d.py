@@ -95,5 +95,4 @@ def about_origin(force: np.ndarray, torque: np.ndarray, point: np.ndarray) -> np
     arm = np.cross(point, force)
     horizontal = [0, 2]
     of_point, of_origin = (np.square(each[..., horizontal]).sum(axis=(0, 2)) for each in (torque, torque - arm))
-    result: np.ndarray = torque + np.where((of_point <= of_origin)[:, None], arm, 0.0)
-    return result
+    return torque + np.where((of_point <= of_origin)[:, None], arm, 0.0)

@@ -95,5 +95,4 @@ def _ordered(corners: FloatArray) -> FloatArray:
     x, y, _ = (corners - corners.mean(axis=0)).T
     clockwise = np.argsort(np.arctan2(y, x))[::-1]  # from above; counterclockwise about the plate's z
     first = int(np.argmax((x - y)[clockwise]))
-    result: FloatArray = corners[np.roll(clockwise, -first)]
-    return result
+    return corners[np.roll(clockwise, -first)]

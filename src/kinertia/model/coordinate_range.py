@@ -114,8 +114,7 @@ class Bounds:
 
     def held(self, q: np.ndarray, pull: np.ndarray) -> np.ndarray:
         """Return the mask (n, c) of coordinates at a limit of a clamped range whose pull (n, c) is outwards."""
-        result: np.ndarray = ((q <= self.least) & (pull < 0)) | ((q >= self.most) & (pull > 0))
-        return result
+        return ((q <= self.least) & (pull < 0)) | ((q >= self.most) & (pull > 0))
 
 
 def _ends(own: Range, known: RangeOfMotion | None) -> tuple[float, float, float, float, float, float]:

@@ -133,8 +133,7 @@ class EqualAngles:
 
 def within_half_a_turn(angles: np.ndarray) -> np.ndarray:
     """Return the same angles between -pi and pi."""
-    result: np.ndarray = (angles + np.pi) % (2 * np.pi) - np.pi
-    return result
+    return (angles + np.pi) % (2 * np.pi) - np.pi
 
 
 def _three_angles(model: Skeleton, joint: Joint) -> ThreeAngles | None:

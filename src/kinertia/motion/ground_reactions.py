@@ -90,8 +90,7 @@ class GroundReactions:
     @property
     def torque(self) -> np.ndarray:
         """Moment (k, 2, 3) N m about `point`: the free moment, and next to nothing about the horizontal axes."""
-        result: np.ndarray = self.wrench[..., 3:] - np.cross(self.point, self.wrench[..., :3])
-        return result
+        return self.wrench[..., 3:] - np.cross(self.point, self.wrench[..., :3])
 
     def at(self, time: np.ndarray) -> np.ndarray:
         """Interpolate the loads (n, 2, 6) at these times by natural cubic splines of force, point and torque.
@@ -192,5 +191,4 @@ def _points(wrench: np.ndarray, least_n: float = LOAD_THRESHOLD_N) -> np.ndarray
 
 def _around(values: np.ndarray, step_s: float, motion_hz: float) -> np.ndarray:
     """Return the mean over about half a period of the motion's cutoff."""
-    result: np.ndarray = gaussian_mean(values, 0.25 / motion_hz / step_s)
-    return result
+    return gaussian_mean(values, 0.25 / motion_hz / step_s)

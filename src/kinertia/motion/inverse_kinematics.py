@@ -166,8 +166,7 @@ def _doubtful(model: Skeleton, measured: np.ndarray, poses: PoseFit) -> np.ndarr
 
 
 def _as_good(cost: np.ndarray, other: np.ndarray) -> np.ndarray:
-    result: np.ndarray = cost <= _AS_GOOD * other + _AS_GOOD_M2
-    return result
+    return cost <= _AS_GOOD * other + _AS_GOOD_M2
 
 
 def _carry_on(

@@ -91,8 +91,7 @@ class Kinematics:
     @property
     def course_time(self) -> np.ndarray:
         """Times (f,) s of all frames from the first to the last one inside the measured windows."""
-        result: np.ndarray = self.trial.markers.time[self.frames[0] : self.frames[-1] + 1]
-        return result
+        return self.trial.markers.time[self.frames[0] : self.frames[-1] + 1]
 
     @cached_property
     def intervals(self) -> tuple[slice, ...]:

@@ -40,8 +40,7 @@ def even_mean(values: FloatArray, size: int) -> FloatArray:
     """
     around = _with_ends(values, size // 2)
     steps = np.concatenate([np.cumsum(around[:size], axis=0)[-1:], around[size:] - around[:-size]])
-    result: FloatArray = np.cumsum(steps, axis=0) / size
-    return result
+    return np.cumsum(steps, axis=0) / size
 
 
 def greatest(values: FloatArray, size: int) -> FloatArray:

@@ -111,8 +111,7 @@ def fit_poses(model: Skeleton, measured: np.ndarray, q: np.ndarray, stop: Stop) 
 def _price(bounds: Bounds, q: np.ndarray, choosing: bool) -> np.ndarray:
     """Return the penalty (n, c) in m per rad or m beyond a range; zero within."""
     counts = (bounds.beyond(q) != 0) & (bounds.anatomical | choosing)
-    result: np.ndarray = np.where(counts, MARKER_M / bounds.sd(q), 0.0)
-    return result
+    return np.where(counts, MARKER_M / bounds.sd(q), 0.0)
 
 
 def _steps(

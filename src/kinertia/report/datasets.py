@@ -61,8 +61,7 @@ def draw_dataset(fit: Fit, count: int, seed: int) -> Dataset:
         "segment": list(fit.estimate.segments),
         "parameter": list(PARAMETERS),
     }
-    result: Dataset = xarray.Dataset(variables, coordinates, _attributes(fit))
-    return result
+    return xarray.Dataset(variables, coordinates, _attributes(fit))
 
 
 def _over_percent(fit: Fit, kind: str) -> tuple[dict[str, Any], np.ndarray, np.ndarray]:
@@ -104,8 +103,7 @@ def _dataset(
     spread = {"units": unit, "long_name": "posterior standard deviation"}
     dims = tuple(coordinates)
     variables = {"value": (dims, value, named), "sd": (dims, sd, spread)}
-    result: Dataset = _xarray().Dataset(variables, coordinates, _attributes(fit))
-    return result
+    return _xarray().Dataset(variables, coordinates, _attributes(fit))
 
 
 def _attributes(fit: Fit) -> dict[str, str | float]:

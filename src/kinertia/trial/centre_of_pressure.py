@@ -25,8 +25,7 @@ def centre_of_pressure(wrench: np.ndarray, height_m: float = 0.0) -> np.ndarray:
 
 def free_moment(wrench: np.ndarray) -> np.ndarray:
     """Return the moment (...) N m about the vertical through the centre of pressure of a wrench (..., 6)."""
-    result: np.ndarray = (wrench[..., 3:] - np.cross(centre_of_pressure(wrench), wrench[..., :3]))[..., 1]
-    return result
+    return (wrench[..., 3:] - np.cross(centre_of_pressure(wrench), wrench[..., :3]))[..., 1]
 
 
 def with_turned_free_moments(loads: FootLoads) -> FootLoads:

@@ -109,8 +109,7 @@ def _above_lowest(height: FloatArray, loaded: BoolArray) -> FloatArray:
     stance = height[loaded]
     if not np.isfinite(stance).any() or not np.isfinite(stance).any(axis=0).all():
         stance = height
-    result: FloatArray = height - np.nanpercentile(stance, 2, axis=0)
-    return result
+    return height - np.nanpercentile(stance, 2, axis=0)
 
 
 def _steps(heights: Sequence[FloatArray], loaded: BoolArray) -> list[float]:

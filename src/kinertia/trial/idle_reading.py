@@ -93,8 +93,7 @@ def idle_blocks(time: FloatArray, vertical: FloatArray) -> npt.NDArray[np.int_]:
 
 def _deviation(levels: FloatArray) -> FloatArray:
     """Return the distances (3,) from their median within which most of the levels (b, 3) lie."""
-    result: FloatArray = np.quantile(np.abs(levels - np.median(levels, axis=0)), _MOST_BLOCKS, axis=0)
-    return result
+    return np.quantile(np.abs(levels - np.median(levels, axis=0)), _MOST_BLOCKS, axis=0)
 
 
 def _mean_point(force: FloatArray, moment: FloatArray) -> FloatArray:

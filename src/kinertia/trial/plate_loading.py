@@ -112,8 +112,7 @@ def with_idle_levels(plates: PlateLoads) -> PlateLoads:
 def _loaded(time: FloatArray, vertical: FloatArray, idle: IdleReading) -> BoolArray:
     """Return the mask (k,) of samples whose vertical force (k,) exceeds the reading of the unloaded plate."""
     if np.isnan(idle.noise_n):
-        loaded: BoolArray = vertical >= load_threshold_n(vertical)
-        return loaded
+        return vertical >= load_threshold_n(vertical)
     course = vertical - idle.left_n[1]
     if idle.noise_n > _NOISY_N:
         period = min(max(1, round(_MAINS_S / float(np.median(np.diff(time))))), len(course))
@@ -145,8 +144,7 @@ def load_threshold_n(vertical: FloatArray) -> float:
 def _joining(loaded: BoolArray, candidates: BoolArray) -> BoolArray:
     """Return the candidates (they include the loaded samples) that are connected to a loaded sample without a break."""
     run_number = np.cumsum(np.diff(candidates, prepend=False))
-    joins: BoolArray = candidates & np.isin(run_number, run_number[loaded])
-    return joins
+    return candidates & np.isin(run_number, run_number[loaded])
 
 
 def _idle(vertical: FloatArray) -> tuple[float, float]:

@@ -20,8 +20,7 @@ def nearest_samples(time: npt.NDArray[np.float64], at: npt.NDArray[np.float64]) 
 
 def within(time: npt.NDArray[np.float64], start_s: float, end_s: float) -> npt.NDArray[np.bool_]:
     """Return the mask of times from start_s to end_s, both included, whatever their rounding errors."""
-    result: npt.NDArray[np.bool_] = (time >= start_s - TIME_TOLERANCE_S) & (time <= end_s + TIME_TOLERANCE_S)
-    return result
+    return (time >= start_s - TIME_TOLERANCE_S) & (time <= end_s + TIME_TOLERANCE_S)
 
 
 def span_s(time: npt.NDArray[np.float64], first: int = 0, last: int = -1) -> float:

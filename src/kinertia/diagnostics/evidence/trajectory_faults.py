@@ -134,8 +134,7 @@ def slowness(rate_hz: float) -> float:
 def steps(position: FloatArray) -> FloatArray:
     """Compute (n - 3, m, 3) m, how much each displacement i + 1 to i + 2 differs from those before and after."""
     way = np.diff(position, axis=0)
-    result: FloatArray = way[1:-1] - (way[:-2] + way[2:]) / 2
-    return result
+    return way[1:-1] - (way[:-2] + way[2:]) / 2
 
 
 def _spikes(markers: Markers, off: FloatArray, far: BoolArray, single: BoolArray) -> tuple[Spikes, ...]:

@@ -75,8 +75,7 @@ def away_from_expected(fit: Fit) -> np.ndarray:
     """Return distances (s, 10) of parameters from their expected values, in prior SDs; zero where they were fixed."""
     assert fit.posterior is not None
     scale = np.where(fit.posterior.prior_sd > 0, fit.posterior.prior_sd, np.inf)
-    result: np.ndarray = (fit.estimate.table() - fit.expected.table()) / scale
-    return result
+    return (fit.estimate.table() - fit.expected.table()) / scale
 
 
 def _far_parameters(fit: Fit) -> Iterator[Finding]:

@@ -85,5 +85,4 @@ def _routine(name: str, arguments: int) -> Callable[..., None]:
 
     module = "scipy.linalg.cython_lapack" if name.endswith("potrf") else "scipy.linalg.cython_blas"
     prototype = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * arguments)
-    result: Callable[..., None] = prototype(get_cython_function_address(module, name))
-    return result
+    return prototype(get_cython_function_address(module, name))

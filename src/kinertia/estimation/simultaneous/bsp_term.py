@@ -32,8 +32,7 @@ class BodySegments(CostTerm):
     def _logs(self) -> np.ndarray:
         """Indices of unknowns that are logarithms: per segment its mass, and three square roots of second moments."""
         every = np.arange(self._at.start, self._at.stop).reshape(-1, 10)
-        result: np.ndarray = every[:, [0, 4, 5, 6]].ravel()
-        return result
+        return every[:, [0, 4, 5, 6]].ravel()
 
     def add_information(self, into: np.ndarray, static: np.ndarray) -> None:
         """Add the information of the table's prior and of the total mass by the scale."""

@@ -50,8 +50,7 @@ class Solution:
     @cached_property
     def sd(self) -> np.ndarray:
         """Standard deviations (S,)."""
-        result: np.ndarray = np.sqrt(np.diag(self.covariance))
-        return result
+        return np.sqrt(np.diag(self.covariance))
 
     def pairs(self, at: slice) -> list[tuple[float, float]]:
         """Return values and standard deviations of the unknowns at these indices."""

@@ -122,8 +122,7 @@ class Layout:
     @cached_property
     def start(self) -> np.ndarray:
         """Values (S,) from which the search starts."""
-        result: np.ndarray = np.concatenate([one.start for one in self.unknowns])
-        return result
+        return np.concatenate([one.start for one in self.unknowns])
 
     @cached_property
     def weight(self) -> np.ndarray:

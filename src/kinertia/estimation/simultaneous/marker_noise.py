@@ -142,8 +142,7 @@ def root_mean_square(errors: np.ndarray) -> np.ndarray:
         seen = np.isfinite(errors[some])
         squares += np.square(np.where(seen, errors[some], 0.0)).sum(axis=(0, 2))
         counts += seen.sum(axis=(0, 2))
-    result: np.ndarray = np.sqrt(squares / np.maximum(counts, 1))
-    return result
+    return np.sqrt(squares / np.maximum(counts, 1))
 
 
 def frames_alike(errors: np.ndarray, sd_m: np.ndarray | float) -> float:

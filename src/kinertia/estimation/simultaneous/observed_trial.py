@@ -66,8 +66,7 @@ class Observation:
     def root_sd(self, frames: np.ndarray) -> np.ndarray:
         """Return standard deviations (d, 6) of the root residual in these frames: N, N m."""
         larger = np.broadcast_to(self.impact, len(self.time))[frames]
-        result: np.ndarray = np.outer(larger, np.repeat([self.force_sd, self.moment_sd], 3))
-        return result
+        return np.outer(larger, np.repeat([self.force_sd, self.moment_sd], 3))
 
     def repeated(self, times: float) -> Observation:
         """Return the observation with standard deviations for errors that recur so many times in the estimate's data.

@@ -40,5 +40,4 @@ def swing_factors(
     accelerating = np.where(dynamic[:, None], force - [0.0, weight_n, 0.0], 0.0)
     frames = 1 + 2 * round(0.5 * _SWING_S * (len(time) - 1) / (time[-1] - time[0]))
     square = np.maximum(even_mean(np.square(accelerating).sum(axis=1), frames), 0.0)
-    result: np.ndarray = np.sqrt(1.0 + square * (SWING / usual_n) ** 2)
-    return result
+    return np.sqrt(1.0 + square * (SWING / usual_n) ** 2)

@@ -34,8 +34,7 @@ class BodyAxes:
 
     def places(self, points: FloatArray) -> FloatArray:
         """Transform points (m, 3) from ground to body axes."""
-        result: FloatArray = (points - self.origin) @ self.rotation.T
-        return result
+        return (points - self.origin) @ self.rotation.T
 
     def turned(self) -> BodyAxes:
         """Return the axes of the person facing the other way."""

@@ -93,5 +93,4 @@ def by_label(meant: frozenset[str], landmark: str) -> float:
 
 def by_distance(distance_m: FloatArray, usual: tuple[float, float], stature_m: float) -> FloatArray:
     """Return the score of markers by their distance (m) alone."""
-    result: FloatArray = FOUND - 0.5 * np.square((distance_m / stature_m - usual[0]) / usual[1])
-    return result
+    return FOUND - 0.5 * np.square((distance_m / stature_m - usual[0]) / usual[1])
