@@ -15,7 +15,7 @@ from kinertia.motion.dynamics import (
     root_regressor,
 )
 from kinertia.synthetic.walk import balancing_wrench
-from opensim_model import Oracle
+from opensim_model import oracle_of
 from pinocchio_model import pin, pinocchio_model
 
 
@@ -57,12 +57,12 @@ def test_ground_reactions_are_taken_about_the_pelvis_origin(skeleton, bsp, motio
 
 def test_residual_is_opensims(skeleton, bsp, motion):
     """OpenSim's root forces are generalised; their virtual power must be that of our force and moment."""
-    oracle = Oracle(skeleton, bsp)
+    oracle = oracle_of(skeleton, bsp)
     load = residual(skeleton, bsp, motion, np.zeros((8, 6)))
     jacobian = skeleton.pose(motion.q).axes[:, :6]
     for k in range(8):
         oracle.pose(motion.q[k], motion.qd[k])
-        tau = oracle.inverse_dynamics(motion.qdd[k])[:6]
+        tau = oracle.inverse_dynamics(motion.q[k], motion.qd[k], motion.qdd[k])[:6]
         about_ground = np.concatenate([load[k, :3], load[k, 3:] + np.cross(motion.q[k, :3], load[k, :3])])
         np.testing.assert_allclose(jacobian[k] @ about_ground, tau, atol=1e-6 * np.abs(tau).max())
 
