@@ -106,12 +106,6 @@ def spoil(path, change):
     path.write_text("\n".join(lines) + "\n")
 
 
-def replace_in(path, old, new):
-    text = path.read_text()
-    assert text.count(old) >= 1, old
-    path.write_text(text.replace(old, new, 1))
-
-
 def edit_cell(line, column, value):
     def change(lines):
         cells = lines[line - 1].split("\t")

@@ -119,19 +119,6 @@ def test_numbers_and_sex_as_people_write_them(subjects, tmp_path):
     assert "a decimal point, not a comma: 72.6" in outcome.err
 
 
-def test_check_tells_scripts_what_it_tells_people(subjects):
-    files = (subjects / "walk.trc", subjects / "walk_grf.mot", "--mass", 72.6)
-    told = json.loads(run("check", *files, "--json").out)
-    shown = " ".join(run("check", *files, "--verbose").out.split())
-    assert len(told["findings"]) >= 2
-    for one in told["findings"]:
-        assert f"{one['code']} {one['message']}" in shown
-    for fact, words in told["recordings"][0]["facts"].items():
-        assert " ".join(f"{fact} {words}".split()) in shown
-    wrong = run("check", subjects / "walk_grf.mot", subjects / "anna.trc", "--json")
-    assert wrong.status == 2
-
-
 @pytest.mark.slow
 def test_shells_complete_commands_and_options():
     for typed, expected in (("kinertia com", "compare"), ("kinertia report --no", "--norms")):
