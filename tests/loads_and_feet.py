@@ -1,11 +1,14 @@
 """What is found of where loads and feet are, and when."""
 
+from dataclasses import replace
+
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.plates.questions import PLACE_QUESTIONS
 from kinertia.diagnostics.runner import asked, explained
 from kinertia.findings.finding import Severity
 from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.model.marker_set import MarkerSet
+from kinertia.trial.data import PlateLoads
 from recordings import marker_set_for
 
 COMPETING = ("P204", "P241", "P242", "P243", "P244", "T201", "T211", "T212")
@@ -24,6 +27,13 @@ def context_of(recording, feet=None, **more):
         return RecordingContext(recording, choose_marker_set(recording.markers.labels), **more)
     segments = {f"foot_{side}": tuple(labels) for side, labels in feet.items()}
     return RecordingContext(recording, MarkerSet("feet", {}, segments, {}), **more)
+
+
+def on_one_plate(recording):
+    """The recording with all its loads on one plate."""
+    plates = recording.plates
+    force, moment = (part.sum(axis=1, keepdims=True) for part in (plates.force, plates.moment))
+    return replace(recording, plates=PlateLoads(plates.time, ("belt",), force, moment, (None,)))
 
 
 def place_findings(recording, feet=None, context=None, **more):

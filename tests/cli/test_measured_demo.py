@@ -1,13 +1,7 @@
-"""`kinertia demo --measured`, and every stage that it goes through.
-
-The stages run on a synthetic laboratory's C3D files; the demo on the sample walk, measured where it is on this machine,
-with a synthetic walk in its place elsewhere. The two-level estimate is in `tests/estimation/test_estimate.py`, by the
-fixture `short_fit`.
-"""
+"""`kinertia demo --measured`, on the sample walk where it is on this machine, elsewhere on a synthetic one."""
 
 import hashlib
 import json
-import re
 
 import numpy as np
 import pandas as pd
@@ -17,9 +11,7 @@ from command_line import fitted, run
 from kinertia.estimation.simultaneous.skin import OTHER_EXPECTED_SD_M
 from kinertia.findings.finding import Severity
 from kinertia.io import samples
-from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.io.sto import read_sto
-from kinertia.trial.plate_assignment import build_trial
 from kinertia.workflow.from_files import prepare_subject
 from report_page import Elements, figures_of
 
@@ -37,60 +29,13 @@ RESULTS = {
 LAB = {*samples.SHA256, "subject.toml"}
 
 
-@pytest.fixture(scope="module")
-def static(recording_of):
-    return recording_of("synthetic/static.c3d")
-
-
-@pytest.fixture(scope="module")
-def walk(recording_of):
-    return recording_of("synthetic/walk.c3d")
-
-
-@pytest.fixture(scope="module")
-def prepared(c3d_lab):
-    return prepare_subject(c3d_lab / "subject.toml")
-
-
 def words(text):
     return " ".join(text.split())
 
 
-def test_reading_static_trial(static):
-    assert (static.mass_kg, static.height_m) == (pytest.approx(MASS_KG), pytest.approx(HEIGHT_M))
-    assert static.measurements["LKneeWidth"] == pytest.approx(static.measurements["RKneeWidth"], abs=1e-6)
-    assert 0.08 < static.measurements["LKneeWidth"] < 0.13
-    assert static.markers.positions.shape == (20, 35, 3)
-    assert np.isfinite(static.markers.positions).all()
-    assert choose_marker_set(static.markers.labels).name == "Plug-in Gait"
-
-
-def test_reading_walk_with_plates(walk):
-    assert (walk.length_unit, walk.vertical) == ("mm", "+Z")
-    assert walk.markers.rate_hz == pytest.approx(100.0)
-    assert (walk.markers.time[0], walk.markers.time[-1]) == pytest.approx((0.0, 2.69))
-    assert walk.plates.names == ("plate 1", "plate 2")
-    assert len(walk.plates.time) == 10 * len(walk.markers.time)
-    top = walk.plates.force[:, :, 1].max(axis=0)
-    assert ((top > 1.0 * MASS_KG * GRAVITY) & (top < 1.5 * MASS_KG * GRAVITY)).all()
-
-
-def test_plates_by_foot_and_the_measured_window(walk):
-    """One foot steps on each plate; together they carry the person."""
-    trial = build_trial(walk, {side: [f"{side.upper()}{end}" for end in ("HEE", "TOE", "ANK")] for side in "rl"})
-    assert len(trial.windows()) == 1
-    assert trial.windows()[0] == pytest.approx(WINDOW_S, abs=0.025)
-    loads = trial.loads
-    first = np.argmax(loads.force[:, :, 1] > 100, axis=0)
-    for foot, plate in enumerate((0, 1) if first[0] < first[1] else (1, 0)):
-        loaded = walk.plates.force[:, plate, 1] > 100
-        heavy = loads.force[:, foot, 1] > 100
-        assert (loads.carrier[heavy, foot] == plate).all()
-        assert heavy.sum() == pytest.approx(loaded.sum(), rel=0.02)
-
-
-def test_calibration_and_inverse_kinematics(prepared):
+def test_calibration_and_inverse_kinematics(c3d_lab):
     """Markers are met within some millimetres by joints that bend as joints do, and nothing sits upside down."""
+    prepared = prepare_subject(c3d_lab / "subject.toml")
     (kinematics,) = prepared.kinematics
     assert kinematics.window_s == pytest.approx(WINDOW_S, abs=0.025)
     assert kinematics.ik.marker_rms_m < 0.006
@@ -179,18 +124,6 @@ def test_terminal_says_what_it_is_and_judges_as_fit_does(measured_demo):
     assert outcome.status == int(overview.severity is Severity.ERROR)
     for stage in ("reading", "calibration", "inverse kinematics", "estimate"):
         assert stage in outcome.err
-
-
-def test_check_of_the_walk(c3d_lab):
-    outcome = run("check", c3d_lab / "subject.toml", "--verbose")
-    assert outcome.status == 0, outcome.err
-    printed = words(outcome.out)
-    for needed in ("2 plates at 1000 Hz", "33 of its 33 labels"):
-        assert needed in printed
-    measured = re.search(r"complete contact ([\d.]+) to ([\d.]+) s", printed)
-    assert [float(time) for time in measured.groups()] == pytest.approx(WINDOW_S, abs=0.025)
-    feet = [re.search(rf"plate {k} +(left|right)", outcome.out)[1] for k in (1, 2)]
-    assert sorted(feet) == ["left", "right"]
 
 
 def test_measured_demo_refuses_a_folder_with_other_files(tmp_path):

@@ -94,21 +94,6 @@ def test_a_folder_without_results_is_told(tmp_path, monkeypatch, command):
     assert not list((tmp_path / "here").iterdir())
 
 
-def test_fit_takes_a_folder_with_a_subject_file(tmp_path):
-    outcome = run("fit", tmp_path, "-o", tmp_path / "out")
-    assert outcome.status == 2
-    assert "holds no subject file. Draft one: kinertia init" in " ".join(outcome.err.split())
-    (tmp_path / "subject.toml").write_text("[subject]\nmas_kg = 60.0\n")
-    outcome = run("fit", tmp_path, "-o", tmp_path / "out")
-    assert "subject.toml, line 2" in outcome.err
-    (tmp_path / "subject.toml").rename(tmp_path / "a.toml")
-    outcome = run("fit", tmp_path, "-o", tmp_path / "out")
-    assert "a.toml, line 2" in outcome.err
-    (tmp_path / "b.toml").write_text("")
-    outcome = run("fit", tmp_path, "-o", tmp_path / "out")
-    assert "several .toml files (a.toml, b.toml)" in " ".join(outcome.err.split())
-
-
 def test_compare_prints_json_for_scripts(demo_run, tmp_path):
     outcome = run("compare", demo_run[1], demo_run[1] / "two-level", "-o", tmp_path / "out", "--json")
     assert outcome.status == 0, outcome.err

@@ -4,7 +4,6 @@ import re
 
 import numpy as np
 import pytest
-from threadpoolctl import threadpool_limits
 
 from validation import accuracy
 from validation.bsp_errors import errors
@@ -12,12 +11,6 @@ from validation.calibration_errors import LARGEST, calibrated, calibration_secti
 from validation.pooling import pooling_section
 from validation.study_noise import study_draw, study_section
 from validation.synthetic_walks import study_walk
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _one_thread():
-    with threadpool_limits(1, user_api="blas"):
-        yield
 
 
 def test_errors_of_the_truth_are_zero():

@@ -12,10 +12,11 @@ from kinertia.io.recording import read_recording
 from kinertia.settings import Subject
 from kinertia.synthetic.laboratory import LabNoise, record
 from kinertia.synthetic.walk import walk, walking_subject
-from kinertia.trial.data import Markers, PlateLoads
+from kinertia.trial.data import Markers
 from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow.check import check_person, check_recording
 from kinertia.workflow.person import Person
+from loads_and_feet import on_one_plate
 from recordings import here, is_here, marker_set_for
 
 
@@ -221,9 +222,7 @@ def test_window_of_the_user(lab, marker_set):
 def test_mass_on_one_belt_is_that_of_two_plates(recording_of, name, over):
     """While both feet stand on it, the sum of their loads is known, which is all that weighs."""
     two = recording_of(f"{name}.trc", f"{name}_grf.mot")
-    plates = two.plates
-    force, moment = (part.sum(axis=1, keepdims=True) for part in (plates.force, plates.moment))
-    one = replace(two, plates=PlateLoads(plates.time, ("belt",), force, moment, (None,)))
+    one = on_one_plate(two)
     by_two, by_one = (check_recording(recording).context.force_mass for recording in (two, one))
     assert by_one.over == by_two.over == over
     assert by_one.mass_kg == pytest.approx(by_two.mass_kg, rel=0.005)

@@ -100,11 +100,6 @@ def _shape_and_spread() -> tuple[np.ndarray, np.ndarray]:
     return usual.log_shape, correlation * np.outer(usual.log_sd, usual.log_sd)
 
 
-def _total_kg(mass_kg: np.ndarray) -> float:
-    """Return the total mass (kg) of a body with segments `KINDS`, counting two of those that have sides."""
-    return float(mass_kg @ _HOW_MANY)
-
-
 _HOW_MANY = np.array([2.0 if kind.endswith("_r") else 1.0 for kind in KINDS])
 
 
@@ -194,7 +189,7 @@ def _with_errors(logs: np.ndarray, covariance: np.ndarray, lumbar_m: float, foun
     errors += other @ other.T
     mass = slice(0, None, len(_TELLS))
     total_sd = float(np.sqrt(_HOW_MANY @ errors[mass, mass] @ _HOW_MANY))
-    return MeasuredBody(values, errors, _total_kg(values[:, 0]), total_sd, found)
+    return MeasuredBody(values, errors, float(values[:, 0] @ _HOW_MANY), total_sd, found)
 
 
 def _slopes(measures_m: np.ndarray, lumbar_m: float, values: np.ndarray) -> np.ndarray:

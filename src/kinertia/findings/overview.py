@@ -61,14 +61,9 @@ class Overview:
     @property
     def severity(self) -> Severity:
         """Worst severity of the open findings; a waived ERROR, and one of a trial left out, count as a WARNING."""
-        used = (
-            self.open if len(self.left_out) >= self.trials else [one for one in self.open if not self._is_left_out(one)]
-        )
+        used = [one for one in self.open if one.where.trial not in self.left_out or len(self.left_out) >= self.trials]
         worst = max((one.severity for one in used), default=Severity.INFO)
         return max(worst, Severity.WARNING) if self.waived or self.left_out else worst
-
-    def _is_left_out(self, one: Finding) -> bool:
-        return one.where.trial in self.left_out
 
     @property
     def verdict(self) -> Use:

@@ -9,9 +9,9 @@ import pytest
 from kinertia.diagnostics.plates.heel_landing import shows_feet_alike
 from kinertia.findings.finding import Severity
 from kinertia.trial.centre_of_pressure import centre_of_pressure
-from kinertia.trial.data import Markers, PlateLoads
+from kinertia.trial.data import Markers
 from kinertia.trial.sampled_time import runs
-from loads_and_feet import doubted, error_of, feet_of, place_findings
+from loads_and_feet import doubted, error_of, feet_of, on_one_plate, place_findings
 from recordings import QUICK_WALKS, RUNS, SQUATS, WALKS, slow_beside
 from walk_on_plates import ALL_STEPS
 from walk_on_plates import FEET as SIMPLE_FEET
@@ -150,9 +150,7 @@ def test_rates(name, walk, factor):
 def test_a_walk_on_one_long_plate(walk):
     """A load that goes from foot to foot is no long stance."""
     recording, feet = walk
-    plates = recording.plates
-    force, moment = (part.sum(axis=1, keepdims=True) for part in (plates.force, plates.moment))
-    one = replace(recording, plates=PlateLoads(plates.time, ("plate",), force, moment, (None,)))
+    one = on_one_plate(recording)
     assert error_of(one, feet) is None
 
 
@@ -161,9 +159,7 @@ def test_squats_on_one_plate(recording_of, name):
     """The load is between the feet all the time: not of another trial, but both feet on one plate."""
     squats = recording_of(*SQUATS[name])
     feet = feet_of(squats)
-    plates = squats.plates
-    force, moment = (part.sum(axis=1, keepdims=True) for part in (plates.force, plates.moment))
-    one = replace(squats, plates=PlateLoads(plates.time, ("plate",), force, moment, (None,)))
+    one = on_one_plate(squats)
     assert error_of(one, feet) is None
     assert "P276" in doubted(one, feet)
 
@@ -230,9 +226,7 @@ def test_both_feet_on_a_plate():
 def test_both_feet_explain_feet_in_turn():
     """D20: one load is told once."""
     recording = simple_walk([("r", 0), ("l", 0)])
-    plates = recording.plates
-    force, moment = (part.sum(axis=1, keepdims=True) for part in (plates.force, plates.moment))
-    one = replace(recording, plates=PlateLoads(plates.time, ("belt",), force, moment, (None,)))
+    one = on_one_plate(recording)
     found = {each.code: each.muted_by for each in place_findings(one, SIMPLE_FEET)}
     assert found == {"P275": "P276", "P276": None}
 

@@ -10,7 +10,7 @@ from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.horizontal_velocity import caused_velocities
 from kinertia.diagnostics.plates.force_directions import force_directions
 from kinertia.io.marker_set_file import choose_marker_set
-from kinertia.trial.data import PlateLoads
+from loads_and_feet import on_one_plate
 from plate_findings import codes, context_of, found_in, with_force
 from recordings import QUICK_WALKS, RUNS, SQUATS, WALKS, marker_set_for, slow_beside
 
@@ -139,24 +139,17 @@ def test_signs_over_two_windows(walk):
     assert [*force_directions(context)] == []
 
 
-def on_one_belt(walk):
-    """The walk as a treadmill with one belt would have measured it."""
-    plates = walk.plates
-    force, moment = (part.sum(axis=1, keepdims=True) for part in (plates.force, plates.moment))
-    return replace(walk, plates=PlateLoads(plates.time, ("belt",), force, moment, (None,)))
-
-
 def test_fault_free_walks_on_one_belt(walk):
     """Of both feet only the sum is known, which is all that moves the body."""
-    belt = context_of(on_one_belt(walk)).trial
+    belt = context_of(on_one_plate(walk)).trial
     assert max(b - a for a, b in belt.windows()) < 0.7
     assert belt.carried_windows()[0] == pytest.approx(context_of(walk).trial.windows()[0], abs=0.25)
-    assert loaded(on_one_belt(walk)) == []
+    assert loaded(on_one_plate(walk)) == []
 
 
 @pytest.mark.parametrize("axis", [0, 2])
 def test_signs_on_one_belt(walk, axis):
-    wrong = context_of(with_force(on_one_belt(walk), lambda force: force * (1.0 - 2.0 * np.eye(3)[axis])))
+    wrong = context_of(with_force(on_one_plate(walk), lambda force: force * (1.0 - 2.0 * np.eye(3)[axis])))
     (found,) = [*force_directions(wrong)]
     assert (found.code, found.where) == ("P232", wrong.at(**wrong.along(axis)))
     assert found.evidence["correlation"].value < -0.4

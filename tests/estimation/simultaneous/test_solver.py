@@ -2,7 +2,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from threadpoolctl import threadpool_limits
 
 import kinertia.estimation.simultaneous.solver as simultaneous
 from kinertia.estimation.prior import literature_prior, with_symmetry
@@ -21,13 +20,6 @@ from validation.calibration_errors import DISTURBANCES, calibrated
 SPACING_S = 0.05
 PLATES = {"x": 0.005, "z": 0.005, "gain": 0.02, "free moment": 0.001}
 EXACT = FaultMixture.certain(1e-9)
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _one_thread():
-    """As `estimate_bsp` has it: the matrices are small."""
-    with threadpool_limits(1, user_api="blas"):
-        yield
 
 
 @pytest.fixture(scope="module")

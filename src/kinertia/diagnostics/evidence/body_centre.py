@@ -35,7 +35,7 @@ def body_centre(owners: Mapping[str, str], markers: Markers) -> FloatArray | Non
             places.setdefault(owners[label], []).append(bridged_way(markers.time, markers.positions[:, column]))
     if not places.keys() & {"pelvis", "torso"}:
         return None
-    shares = _shares(places)
+    shares = {name: _SHARES[name.removesuffix("_r").removesuffix("_l")] for name in places}
     middles = (shares[name] * np.mean(own, axis=0) for name, own in places.items())
     total: FloatArray = sum(middles, np.zeros((len(seen), 3)))
     return total / sum(shares.values())
@@ -47,7 +47,3 @@ def bridged_way(time: FloatArray, way: FloatArray) -> FloatArray:
     if known.all():
         return way
     return np.stack([np.interp(time, time[known], along[known]) for along in way.T], axis=1)
-
-
-def _shares(segments: Mapping[str, object]) -> dict[str, float]:
-    return {name: _SHARES[name.removesuffix("_r").removesuffix("_l")] for name in segments}

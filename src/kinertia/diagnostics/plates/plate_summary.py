@@ -29,7 +29,6 @@ class PlateCheck:
 
     Attributes:
         name: as the recording has it.
-        declared: foot stated in the file, or None.
         peak_n: largest vertical force.
         contacts: in the order of time.
         outside_share: share of reliably loaded samples whose centre of pressure is off the plate; None where the file
@@ -37,7 +36,6 @@ class PlateCheck:
     """
 
     name: str
-    declared: str | None
     peak_n: float
     contacts: tuple[Contact, ...]
     outside_share: float | None
@@ -86,7 +84,7 @@ def _check_plate(recording: Recording, p: int, feet: FootMarkers | None) -> Plat
         ]
     share, _ = off_plate(plates, p) or (None, 0.0)
     ordered = tuple(sorted(contacts, key=lambda contact: contact.start_s))
-    return PlateCheck(plates.names[p], plates.declared_feet[p], float(vertical.max()), ordered, share)
+    return PlateCheck(plates.names[p], float(vertical.max()), ordered, share)
 
 
 def _contacts(time: FloatArray, loaded: BoolArray, foot: str | None) -> list[Contact]:

@@ -94,13 +94,9 @@ def joined(half: Sequence[TimeBlock]) -> list[TimeBlock]:
     for time_block in half:
         if result and result[-1].frames.stop - result[-1].frames.start < _FRAMES_OF_GRADIENT:
             first, last = sorted((result.pop(), time_block), key=lambda each: each.frames.start)
-            time_block = TimeBlock(*(_both(getattr(first, name), getattr(last, name)) for name in _SLICES))
+            time_block = TimeBlock(*(slice(getattr(first, name).start, getattr(last, name).stop) for name in _SLICES))
         result.append(time_block)
     return result
-
-
-def _both(first: slice, last: slice) -> slice:
-    return slice(first.start, last.stop)
 
 
 def time_blocks_of_trials(bases: Sequence[MotionBasis], coordinates: int, static: int) -> list[tuple[TimeBlock, ...]]:
