@@ -104,13 +104,6 @@ def test_files_of_somebody_whom_the_tables_do_not_describe_say_so(demo_run, tmp_
     assert [one.evidence["population"].value for one in found] == populations
 
 
-def test_of_somebody_of_unknown_height_nothing_is_said():
-    """A user's OpenSim model needs no height."""
-    result = population_prior(PRIOR, subject(height_m=None))
-    assert result.findings == ()
-    np.testing.assert_array_equal(result.prior.covariance, PRIOR.covariance)
-
-
 def test_masses_of_the_elderly_are_those_of_their_table():
     prior = population_prior(PRIOR, subject(population="elderly")).prior
     share = dict(zip(SEGMENTS, prior.mean.mass_kg / prior.mean.total_mass_kg, strict=True))
