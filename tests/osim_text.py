@@ -34,7 +34,6 @@ def joint(
     child: str,
     coordinates: Sequence[str],
     inside: str = "",
-    extra: str = "",
     places: tuple[tuple[str, str], tuple[str, str]] = (
         ("0.1 -0.05 0.02", "0.1 -0.2 0.3"),
         ("0.02 0.3 -0.04", "0.2 0.1 -0.4"),
@@ -44,7 +43,7 @@ def joint(
     return (
         f'<{kind} name="{name}"><socket_parent_frame>near</socket_parent_frame>'
         f"<socket_child_frame>far</socket_child_frame>\n"
-        f"<coordinates>{''.join(coordinate(c, extra) for c in coordinates)}</coordinates>\n"
+        f"<coordinates>{''.join(coordinate(c) for c in coordinates)}</coordinates>\n"
         f"<frames>{frame('near', parent, here, turned)}{frame('far', f'/bodyset/{child}', there, back)}</frames>\n"
         f"{inside}</{kind}>\n"
     )

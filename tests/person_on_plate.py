@@ -30,9 +30,8 @@ def plate_file(path, analogs, plate=None, **arguments):
     return write_c3d(path, *standing(), analogs, {**SCREEN, "FORCE_PLATFORM": plate}, **arguments)
 
 
-def expect_centre_of_pressure(plates, x=0.3, z=-0.2, force=(30, 600, -20)):
-    """The only plate's loads act there, by default where those of `stepping` do."""
-    np.testing.assert_allclose(plates.force[:, 0], np.tile(force, (len(plates.time), 1)), atol=1e-4)
-    np.testing.assert_allclose(
-        plates.moment[:, 0], np.tile(np.cross((x, 0, z), force), (len(plates.time), 1)), atol=1e-3
-    )
+def expect_centre_of_pressure(plates):
+    """The only plate's loads act where those of `stepping` do."""
+    force = np.tile((30, 600, -20), (len(plates.time), 1))
+    np.testing.assert_allclose(plates.force[:, 0], force, atol=1e-4)
+    np.testing.assert_allclose(plates.moment[:, 0], np.cross((0.3, 0, -0.2), force), atol=1e-3)

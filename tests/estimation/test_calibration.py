@@ -34,8 +34,8 @@ def dropped(markers: Markers, labels) -> Markers:
     return markers.select([label for label in markers.labels if label not in labels])
 
 
-def deviations(skeleton, lower=0.01, upper=0.04) -> dict[str, float]:
-    return {segment: upper if segment in UPPER else lower for segment in skeleton.segments}
+def deviations(skeleton) -> dict[str, float]:
+    return {segment: 0.04 if segment in UPPER else 0.01 for segment in skeleton.segments}
 
 
 def adapt(skeleton, recordings, *deviations):

@@ -23,11 +23,11 @@ PRIOR = replace(
 R = PRIOR.covariance / np.outer(PRIOR.sd, PRIOR.sd)
 
 
-def group(rng, count, mean=None, within=WITHIN):
+def group(rng, count):
     """People of a group, each seen in some directions only: truth (p, k) and what their recordings say."""
     root = np.linalg.cholesky(R)
-    mean = np.sqrt(BETWEEN) * root @ rng.standard_normal(SIZE) if mean is None else mean
-    truth = mean + np.sqrt(within) * (root @ rng.standard_normal((SIZE, count))).T
+    mean = np.sqrt(BETWEEN) * root @ rng.standard_normal(SIZE)
+    truth = mean + np.sqrt(WITHIN) * (root @ rng.standard_normal((SIZE, count))).T
     people = []
     for k, person in enumerate(truth):
         seen = rng.standard_normal((12, SIZE)) / np.sqrt(SIZE) / 0.3

@@ -6,14 +6,8 @@ import pytest
 from gait_loads import RATE_HZ
 from kinertia.diagnostics.plates.cop_on_plate import off_plate
 from kinertia.diagnostics.plates.plate_summary import check_plates
-from kinertia.trial.data import Markers, PlateLoads, Recording, Trial
+from kinertia.trial.data import Markers, PlateLoads, Recording
 from walk_on_plates import ALL_STEPS, FEET, STRIDE_S, walk
-
-
-def trial_of(loads, start_s, end_s):
-    time = np.arange(0, loads.time[-1], 0.01)
-    markers = Markers(time, ("A",), np.zeros((len(time), 1, 3)))
-    return Trial("walk", markers, loads, (time >= start_s - 1e-9) & (time <= end_s + 1e-9))
 
 
 def test_contacts_and_feet():
