@@ -70,6 +70,13 @@ def test_parameters_of_plates_in_other_shapes(tmp_path, name, shape):
     assert read_c3d(path).plates.names == ("plate 1", "plate 2")
 
 
+@pytest.mark.parametrize("name", ["CORNERS", "ORIGIN", "CAL_MATRIX"])
+def test_lengths_and_matrices_of_plates_stored_as_integers(tmp_path, name):
+    plate = plate_parameters(CORNERS, kind=4)
+    plate[name] = plate[name].astype(np.int16)
+    expect_centre_of_pressure(read_c3d(plate_file(tmp_path / "x.c3d", stepping(), plate)).plates)
+
+
 @pytest.mark.parametrize("kind", [2, 4])
 def test_integers_of_plates_stored_as_floats(tmp_path, kind):
     """As ezc3d writes them when Python adds them as lists."""

@@ -35,7 +35,11 @@ except ImportError:
 
 ONLY_ASCII_PATHS = sys.platform == "win32"
 _COPY = "copy.c3d"
-_INTEGER = 2
+_INTEGER, _FLOAT = 2, 4
+_PLATE_TYPES = {
+    **dict.fromkeys(("USED", "TYPE", "ZERO", "CHANNEL"), _INTEGER),
+    **dict.fromkeys(("CORNERS", "ORIGIN", "CAL_MATRIX"), _FLOAT),
+}
 """Type of a parameter as ezc3d has it."""
 _SECONDS, _SECONDS_PER_BYTE = 6.0, 1e-5
 _WAITING = 20.0
@@ -67,9 +71,9 @@ def read_content(path: Path) -> C3dContent:
         C3dTrouble: ezc3d cannot read it.
     """
     file, trouble = _with_plates(path)
-    whole = _make_whole(file["parameters"])
+    retyped = _retype(file["parameters"])
     shapes = _plate_shapes(file["parameters"])
-    if whole or shapes:
+    if retyped or shapes:
         file, trouble = _with_plate_shapes(file, shapes)
     data, header = file["data"], file["header"]
     return {
@@ -85,17 +89,20 @@ def read_content(path: Path) -> C3dContent:
     }
 
 
-def _make_whole(parameters: Any) -> bool:
-    """Turn numbers and types of plates and channels that are stored as floats into the integers that ezc3d expects.
+def _retype(parameters: Any) -> bool:
+    """Give numbers of force plates the types that ezc3d expects, and return whether any had another.
 
-    Return whether there were any: ezc3d itself writes them when Python adds them as lists.
+    Numbers and types of plates and channels are integers, which ezc3d itself writes as floats when Python adds them as
+    lists; corners, origins and matrices are floats.
     """
     changed = False
-    for name in ("USED", "TYPE", "ZERO", "CHANNEL"):
+    for name, kind in _PLATE_TYPES.items():
         values = np.array(parameter_values(parameters, "FORCE_PLATFORM", name))
-        if np.issubdtype(values.dtype, np.floating) and len(values) and (values == np.round(values)).all():
+        other = np.floating if kind == _INTEGER else np.integer
+        if len(values) and np.issubdtype(values.dtype, other) and (values == np.round(values)).all():
             entry = parameters["FORCE_PLATFORM"][name]
-            entry["type"], entry["value"] = _INTEGER, np.asarray(entry["value"]).astype(np.int32)
+            entry["type"] = kind
+            entry["value"] = np.asarray(entry["value"]).astype(np.int32 if kind == _INTEGER else float)
             changed = True
     return changed
 
