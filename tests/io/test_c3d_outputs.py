@@ -188,3 +188,12 @@ def test_a_file_that_contradicts_itself_is_refused(tmp_path):
     path = person(tmp_path / "broken.c3d", parameters={"ANALOG": {"RATE": np.array([1.0])}})
     with pytest.raises(FileError, match=r"cannot take model outputs: ANALOG:RATE contradicts its header"):
         frames_of(path)
+
+
+def test_numbers_of_frames_that_a_crop_left_behind_refuse_nothing(tmp_path):
+    """As ezc3d leaves TRIAL where Python cuts frames off."""
+    fields = {"ACTUAL_START_FIELD": np.array([148, 0]), "ACTUAL_END_FIELD": np.array([462, 0])}
+    path = person(tmp_path / "cropped.c3d", parameters={"TRIAL": fields})
+    new = written(path, tmp_path / "new.c3d")
+    np.testing.assert_array_equal(read_c3d(new).markers.time, read_c3d(path).markers.time)
+    assert sections(new.read_bytes())[0].get("TRIAL", "ACTUAL_START_FIELD").tolist() == [148, 0]

@@ -89,7 +89,7 @@ def frames_of(path: Path) -> C3dFrames:
     Raises:
         FileError: it is damaged, or stored in a form not written here (DEC numbers, poses of segments).
     """
-    doubt = doubts_about(path)
+    doubt = doubts_about(path, numbers_of_frames=False)
     if doubt:
         raise FileError(path, f"cannot take model outputs: {doubt}")
     content = with_plain_samples(path) or path.read_bytes()

@@ -74,8 +74,12 @@ class _Parameter:
 _Parameters = dict[tuple[str, str], _Parameter]
 
 
-def doubts_about(path: Path) -> str:
+def doubts_about(path: Path, numbers_of_frames: bool = True) -> str:
     """Describe contradictions within a C3D file that may crash ezc3d; empty where there are none.
+
+    Args:
+        path: the file.
+        numbers_of_frames: whether those of TRIAL count, which programs that cut frames off leave as they were.
 
     Raises:
         FileError: it is empty, no C3D file, shorter than announced, or its parameters cannot be parsed.
@@ -97,7 +101,8 @@ def doubts_about(path: Path) -> str:
     if section[3] == 85:
         return "its numbers are DEC's"
     parameters, doubt = _parameters(path, section, order)
-    return doubt or _header_doubt(header, start + _BLOCK * section[2]) or _doubt(header, parameters)
+    doubt = doubt or _header_doubt(header, start + _BLOCK * section[2]) or _doubt(header, parameters)
+    return doubt or (_trial_doubt(header, parameters) if numbers_of_frames else "")
 
 
 def _too_short(path: Path, size: int, needed: int) -> FileError:
@@ -294,9 +299,7 @@ def _doubt(header: _Header, parameters: _Parameters) -> str:
         return "ANALOG:RATE contradicts its header"
     if value("POINT", "SCALE", header.scale) * header.scale < 0:
         return "POINT:SCALE contradicts its header"
-    return (
-        _trial_doubt(header, parameters) or _list_doubt(parameters, int(channels)) or _plate_doubt(parameters, channels)
-    )
+    return _list_doubt(parameters, int(channels)) or _plate_doubt(parameters, channels)
 
 
 def _trial_doubt(header: _Header, parameters: _Parameters) -> str:
