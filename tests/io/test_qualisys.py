@@ -38,6 +38,14 @@ def test_a_plate_named_brings_the_others(tmp_path, walk):
     np.testing.assert_allclose(recording.plates.force, walk.plates.force, atol=1e-6)
 
 
+def test_a_missing_file_among_the_plates_is_a_finding(tmp_path, walk):
+    path = write_qtm(tmp_path / "walk.tsv", walk)
+    (tmp_path / "walk_f_1.tsv").unlink()
+    found = only(read_recording(path).findings, "F151")
+    assert (found.where.file, found.where.plate, found.severity) == ("walk.tsv", "plate 1", Severity.WARNING)
+    assert "walk_f_1.tsv" in found.evidence["reason"].value
+
+
 def test_forces_on_the_plate_are_reversed(tmp_path, walk):
     down = replace(walk, plates=replace(walk.plates, force=-walk.plates.force, moment=-walk.plates.moment))
     recording = read_recording(write_qtm(tmp_path / "walk.tsv", down, local=True))

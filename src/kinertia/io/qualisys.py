@@ -19,7 +19,7 @@ from kinertia.errors import FileError
 from kinertia.findings.finding import Finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
-from kinertia.io.c3d_plates import LabPlates, contradicting_moments, to_ground_plates
+from kinertia.io.c3d_plates import LabPlates, contradicting_moments, plate_left_out, to_ground_plates
 from kinertia.io.lab_axes import to_ground
 from kinertia.io.number_table import mismatch, read_lines, read_rows
 from kinertia.io.plate_moments import PlateMoments
@@ -66,7 +66,7 @@ def read_qualisys(path: str | Path, forces: Sequence[Path] | None = None) -> Rec
         path.stem,
         markers.rotated(rotation),
         ground,
-        findings=(*findings, *more, *axis_findings, *load_findings),
+        findings=(*findings, *_missing_plates(path, beside), *more, *axis_findings, *load_findings),
         length_unit="mm",
         vertical=up,
     )
@@ -82,6 +82,16 @@ def plates_beside(path: Path) -> list[Path]:
     stem = _PLATE.sub("", path.stem)
     files = [file for file in path.parent.iterdir() if is_plate_file(file) and _PLATE.sub("", file.stem) == stem]
     return sorted(files, key=lambda file: (len(file.stem), file.stem))
+
+
+def _missing_plates(path: Path, files: Sequence[Path]) -> list[Finding]:
+    """Return F151 for each number below the highest that no file of a plate has."""
+    numbers = {int(match[1][1:]) for file in files if (match := _PLATE.search(file.stem)) and match[1]}
+    return [
+        plate_left_out(path, f"plate {k}", f"the file {path.stem}_f_{k}.tsv is missing")
+        for k in range(1, max(numbers, default=0))
+        if k not in numbers
+    ]
 
 
 def _header(path: Path, lines: Sequence[str]) -> tuple[dict[str, list[str]], int]:
