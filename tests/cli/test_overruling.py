@@ -78,6 +78,7 @@ def test_a_waived_error_is_fitted_and_shown_as_waived_everywhere(waived):
     assert waived.content["verdict"] != "use"
     first = waived.outcome.out.splitlines()[0]
     assert re.search(r", 1 waived; \d+ rules, 1 of 1 trials", first)
+    assert "--waive" not in waived.outcome.out
     page = (waived.folder / "report.html").read_text(encoding="utf-8")
     assert "S111" in Elements(page).text
     assert re.search(r"waived", Elements(page).text)
@@ -144,10 +145,36 @@ def test_codes_that_do_not_exist_or_are_hard_are_refused_as_options(lab, command
     assert f"{code} {words}" in " ".join(outcome.err.replace("│", " ").split())
 
 
+@pytest.mark.parametrize(
+    ("code", "mass", "words"),
+    [("P244", 72.6, "it was not found"), ("S111", 75.5, "S111 is no ERROR here"), ("R305", 72.6, None)],
+)
+def test_check_reports_what_was_waived_in_vain(lab, code, mass, words):
+    notes = [
+        line
+        for line in run("check", subject_file(lab, WALK, mass=mass), "--waive", code).out.splitlines()
+        if line.startswith("note: ")
+    ]
+    assert notes == ([] if words is None else [f"note: --waive {code} has no effect: {words}"])
+
+
+def test_a_hard_error_waived_by_its_question_is_reported(lab):
+    alone = '[[trial]]\nmarkers = "walk.trc"\n'
+    outcome = run("check", subject_file(lab, alone), "--waive", "P27")
+    assert "\nnote: --waive P27 has no effect: P271 is an ERROR that cannot be waived\n" in outcome.out
+
+
 def test_a_hard_error_stays_open_where_its_question_is_waived(lab):
     alone = '[[trial]]\nmarkers = "walk.trc"\n'
     content = told("check", subject_file(lab, overruling(["P27"]), alone), status=1)
     assert blocking_codes(content["findings"]) == ["P271"]
+
+
+@pytest.mark.usefixtures("few_evaluations")
+def test_a_fit_reports_what_was_waived_in_vain(lab):
+    outcome = run("fit", subject_file(lab, WALK), "-o", lab / "out", "--waive", "P244", "--waive", "R3")
+    notes = [line for line in outcome.out.splitlines() if line.startswith("note: --waive P244")]
+    assert notes == ["note: --waive P244 has no effect: it was not found"]
 
 
 @pytest.mark.usefixtures("few_evaluations")

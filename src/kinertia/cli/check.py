@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from kinertia.cli.findings_view import show_overview
+from kinertia.cli.findings_view import show_overview, show_waived_in_vain
 from kinertia.cli.options import (
     Calibrate,
     Forces,
@@ -150,7 +150,7 @@ def check(
     recordings = () if checked.person is None else checked.person.recordings
     page = None if output is None else save_check_page(checked.overviews, recordings, checked.models, output)
     with suppress(SystemExit):  # rich's, where nobody reads on (| head)
-        _show(checked, page, verbose)
+        _show(checked, page, verbose, overrule.waive)
     return Outcome(_for_scripts(checked), checked.status)
 
 
@@ -195,7 +195,7 @@ def _for_scripts(checked: _Checked) -> dict[str, Any]:
     }
 
 
-def _show(checked: _Checked, page: Path | None, verbose: bool) -> None:
+def _show(checked: _Checked, page: Path | None, verbose: bool, waive: Sequence[str]) -> None:
     """Show the verdict, at most three findings, and with `verbose` all contents of the files."""
     if verbose and checked.person is not None:
         for recording in checked.person.recordings:
@@ -204,6 +204,8 @@ def _show(checked: _Checked, page: Path | None, verbose: bool) -> None:
         _show_model(model)
     for overview in checked.overviews:
         show_overview(overview, verbose)
+    found = [one for overview in checked.overviews for one in overview.findings]
+    show_waived_in_vain(waive, found, ("file", "recording", "person"))
     if checked.lacking:
         out.print(f"kinertia fit also needs, under [subject]: {', '.join(checked.lacking)}", soft_wrap=True)
     if page is not None:

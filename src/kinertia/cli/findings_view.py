@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from kinertia.cli.terminal import out
 from kinertia.findings.finding import Finding, Severity
 from kinertia.findings.overview import Group, Overview, consequences, grouped, in_order, reported
+from kinertia.findings.rule import STAGES, matching, rule
 
 _SHOWN = 3
 _STYLES = {
@@ -15,6 +16,7 @@ _STYLES = {
     Severity.CORRECTED: "cyan",
     Severity.INFO: "dim",
 }
+_WHY_NOT = {True: "an ERROR that cannot be waived", False: "no ERROR here"}
 
 
 def show_overview(overview: Overview, verbose: bool) -> None:
@@ -44,6 +46,16 @@ def show_all(findings: Sequence[Finding]) -> None:
         out.print("\n".join(f"    {line}" for line in lines if line), soft_wrap=True)
         for muted in grouped(consequences(findings, group.findings)):
             out.print(f"    explains {muted.line}", soft_wrap=True)
+
+
+def show_waived_in_vain(codes: Sequence[str], findings: Sequence[Finding], stages: Sequence[str] = STAGES) -> None:
+    """Show which codes of `--waive` waived nothing, and why; what rules of other stages would find is not known."""
+    for code in codes:
+        alike = [one for one in findings if one.code.startswith(code)]
+        asked = all(rule(one).stage in stages for one in matching(code))
+        if (alike or asked) and not any(one.status == "waived" for one in alike):
+            why = dict.fromkeys(f"{one.code} is {_WHY_NOT[one.severity is Severity.ERROR]}" for one in alike)
+            out.print(f"note: --waive {code} has no effect: {', '.join(why) or 'it was not found'}", soft_wrap=True)
 
 
 def _causes(one: Finding) -> str:

@@ -10,7 +10,7 @@ from typing import Annotated, Any, get_args
 import numpy as np
 import typer
 
-from kinertia.cli.findings_view import show_overview
+from kinertia.cli.findings_view import show_overview, show_waived_in_vain
 from kinertia.cli.fit_report import report_tables
 from kinertia.cli.next_commands import next_commands
 from kinertia.cli.options import (
@@ -129,7 +129,7 @@ def fit(
         status = max(status, int(result.overview.failed))
         summaries.append({"folder": str(one.folder), **summary(result), "bsp": _bsp_rows(result)})
         if not quiet:
-            _show(result, one.folder, verbose, shown_table)
+            _show(result, one, verbose, shown_table)
     return Outcome(summaries if len(runs) > 1 else summaries[0], status)
 
 
@@ -184,12 +184,13 @@ def _expect_folder(one: _Run, overwrite: bool) -> None:
     results_folder(one.folder, overwrite, names if several else (), files)
 
 
-def _show(fit: Fit, folder: Path, verbose: bool, tables: bool) -> None:
+def _show(fit: Fit, run: _Run, verbose: bool, tables: bool) -> None:
     """Show verdict and findings of a fit and the folder of its results, with tables where they are wanted."""
     if verbose or tables:
         report_tables(fit)
     show_overview(fit.overview, verbose)
-    out.print(f"results in {folder}", soft_wrap=True)
+    show_waived_in_vain(run.overrule.waive, fit.overview.findings)
+    out.print(f"results in {run.folder}", soft_wrap=True)
 
 
 def _name(path: Path) -> str:
