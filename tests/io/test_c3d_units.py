@@ -104,8 +104,18 @@ def test_free_moments_of_type_1_in_another_unit_than_lengths_are_converted(tmp_p
     assert codes(recording.findings) == [*["F152"] * (per_unit != 1.0), "F133"]
 
 
+@pytest.mark.parametrize("per_unit", [1.0, 1e3])
+def test_moments_of_type_4_have_the_unit_that_puts_the_load_on_the_plate(tmp_path, per_unit):
+    """Its matrix may give the unit of its channels, or that of lengths."""
+    recording = read_recording(on_turned_plate(tmp_path / "x.c3d", "Nm", per_unit, kind=4))
+    x, y, _ = PLATE_AXES @ [0.05, -0.04, 0.0]
+    force = recording.plates.force[:, 0]
+    np.testing.assert_allclose(recording.plates.moment[:, 0], np.cross((x, 0.0, -y), force), atol=1e-3)
+    assert codes(recording.findings) == [*["F152"] * (per_unit != 1.0), "F133"]
+
+
 def test_a_plate_whose_moments_nobody_can_convert_is_left_out(tmp_path):
-    recording = read_recording(on_turned_plate(tmp_path / "x.c3d", "Nm", 1e3, kind=4))
+    recording = read_recording(on_turned_plate(tmp_path / "x.c3d", "Nm", 0.01, kind=4))
     assert recording.plates is None
     found = only(recording.findings, "F151", reason="in Nm while points are in mm")
     assert (found.where.plate, found.severity) == ("plate 1", Severity.WARNING)

@@ -82,8 +82,10 @@ def lab_plates(path: Path, file: Any, length_unit: str) -> tuple[LabPlates | Non
         reason, edges = _corner_trouble(places)
         if not platform["force"].size:
             reason = reason or "it has no samples"
-        if moment_unit != unit and kind == 4:  # it is unknown what its matrix makes of them
-            reason = reason or f"its moments are in {stated} while points are in {length_unit}"
+        if not reason and moment_unit != unit and kind == 4:
+            of_matrix = _unit_of_matrix(platform, unit, moment_unit)
+            reason = "" if of_matrix else f"its moments are in {stated} while points are in {length_unit}"
+            moment_unit = of_matrix or moment_unit
         if reason:
             findings.append(plate_left_out(path, name, reason, **edges))
             continue
@@ -121,6 +123,23 @@ def _moment(platform: Any, kind: int, unit: float, moment_unit: float) -> FloatA
     about_middle = unit * platform["moment"].T + (moment_unit - unit) * measured
     result = about_middle + np.cross(unit * corners.mean(axis=0), force)
     return result
+
+
+def _unit_of_matrix(platform: Any, unit: float, stated: float) -> float | None:
+    """Return the unit of the moments that the matrix of a type 4 plate gives: that of its channels or N `unit`.
+
+    The larger one that puts the mean loaded centre of pressure on the plate counts, since with a smaller one it is
+    always near the middle; None if neither does.
+    """
+    corners, force = unit * platform["corners"].T, platform["force"].T
+    loaded = np.linalg.norm(force, axis=1) > 5 * LOAD_THRESHOLD_N
+    axes, half = plate_axes(corners), np.linalg.norm(corners[[0, 0]] - corners[[1, 3]], axis=1) / 2
+    for one in sorted((unit, stated), reverse=True):
+        about_middle = _moment(platform, 4, unit, one) - np.cross(corners.mean(axis=0), force)
+        load, moment = force[loaded].sum(axis=0) @ axes, about_middle[loaded].sum(axis=0) @ axes
+        if (np.abs([moment[1], moment[0]]) <= half * np.abs(load[2])).all():
+            return one
+    return None
 
 
 def plate_axes(corners: FloatArray) -> FloatArray:
