@@ -8,10 +8,11 @@ import pytest
 
 import kinertia
 from command_line import fitted, run
+from kinertia.errors import FileError
 from kinertia.io.c3d_outputs import frames_of
 from kinertia.motion.joint_wrench import joint_wrenches
 from kinertia.motion.smoothing import smooth
-from kinertia.report.c3d_results import outputs_of, prefix_of, to_file, usual_convention
+from kinertia.report.c3d_results import c3d_with_results, outputs_of, prefix_of, to_file, usual_convention
 from kinertia.report.saved_fit import load_fit
 from validation.measured_data import find
 
@@ -88,6 +89,38 @@ def test_export_refuses_what_is_not_the_trials_file(demo_run, tmp_path):
     assert refused.status == 2
     assert "has changed since" in " ".join(refused.err.split())
     assert run("export", demo_run[1], "--c3d", "--convention", "iso", "-o", tmp_path / "out").status == 2
+
+
+def with_units(demo_run, folder, **units):
+    """The C3D file of the demo's walk, as other software leaves it: with these units of outputs."""
+    assert run("export", demo_run[1], "--c3d", "-o", folder / "plain").status == 0
+    (path,) = (folder / "plain").glob("*.c3d")
+    file = ezc3d.c3d(str(path))
+    for name, unit in units.items():
+        file["parameters"]["POINT"][name]["value"] = [unit]
+    file.write(str(folder / path.name))
+    return folder / path.name
+
+
+def test_results_have_the_units_that_the_file_states(fit, demo_run, tmp_path):
+    stated = {"ANGLE_UNITS": "rad", "MOMENT_UNITS": "N-mm", "FORCE_UNITS": "", "POWER_UNITS": "mW"}
+    path = with_units(demo_run, tmp_path, **stated)
+    (trial,) = fit.trials
+    path.write_bytes(c3d_with_results(fit, trial, path, "isb", {}))
+    points, file = points_of(path)
+    at = np.flatnonzero(np.isfinite(points["LKneeMoment"][0]))
+    factors = {"ANGLES": np.pi / 180.0, "MOMENTS": 1e3, "FORCES": 1.0, "POWERS": 1e3}
+    for one in outputs_of(fit, trial, "isb"):
+        np.testing.assert_allclose(points[one.name][:, at].T, factors[one.kind] * one.values, rtol=1e-5, atol=1e-5)
+    own = file["parameters"]["KINERTIA"]["UNITS"]["value"]
+    assert own == ["ANGLES rad", "FORCES N/kg", "MOMENTS N-mm/kg", "POWERS mW/kg"]
+    assert file["parameters"]["POINT"]["FORCE_UNITS"]["value"] == ["N"]
+
+
+def test_a_file_whose_unit_is_unknown_is_refused(fit, demo_run, tmp_path):
+    path = with_units(demo_run, tmp_path, MOMENT_UNITS="lbf ft")
+    with pytest.raises(FileError, match="MOMENTS are in 'lbf ft'"):
+        c3d_with_results(fit, fit.trials[0], path, "isb", {})
 
 
 @pytest.mark.parametrize("prefix", ["", "Anna:"])

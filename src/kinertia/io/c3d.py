@@ -22,7 +22,7 @@ from kinertia.findings.finding import Finding, finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.io.c3d_events import file_events
-from kinertia.io.c3d_outputs import OWN_GROUP
+from kinertia.io.c3d_outputs import OWN_GROUP, unit_factor
 from kinertia.io.c3d_plates import PLATE_TYPES, lab_plates, person_on_plates, plate_left_out, to_ground_plates
 from kinertia.io.c3d_structure import doubts_about, with_plain_samples
 from kinertia.io.c3d_subject import subject_data
@@ -257,11 +257,12 @@ def _outputs(parameters: Any, labels: list[str]) -> set[str]:
 
 
 _NAME = re.compile(r"(?:.*:)?([LR])(Vicon)?((?:Hip|Knee|Ankle)(?:Angles|Moment|Power))")
-_UNITS = {
-    "Angles": ("ANGLE_UNITS", {"deg": 1.0, "degrees": 1.0, "rad": 180.0 / np.pi}),
-    "Moment": ("MOMENT_UNITS", {"nmm": 1e-3, "n.mm": 1e-3, "nm": 1.0, "n.m": 1.0}),
-    "Power": ("POWER_UNITS", {"w": 1.0, "mw": 1e-3}),
+_KINDS = {
+    "Angles": ("ANGLES", "ANGLE_UNITS", "deg"),
+    "Moment": ("MOMENTS", "MOMENT_UNITS", "Nmm"),
+    "Power": ("POWERS", "POWER_UNITS", "W"),
 }
+"""By the end of their names: type of outputs, parameter with their unit, and the unit where it is empty."""
 
 
 def file_outputs(
@@ -293,6 +294,5 @@ def file_outputs(
 
 
 def _factor(parameters: Any, name: str) -> float | None:
-    parameter, known = next(units for kind, units in _UNITS.items() if name.endswith(kind))
-    unit = str(parameter_values(parameters, "POINT", parameter, [""])[0]).strip().lower().removesuffix("/kg")
-    return known.get(unit) if unit else next(iter(known.values()))
+    kind, parameter, usual = next(units for end, units in _KINDS.items() if name.endswith(end))
+    return unit_factor(kind, str(parameter_values(parameters, "POINT", parameter, [""])[0]).strip() or usual)

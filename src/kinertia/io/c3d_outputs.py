@@ -31,6 +31,18 @@ _BLOCK = 512
 _ORDERS = {84: "<", 86: ">"}
 _MOST_IN_LIST = 255
 _TYPES = {"ANGLES": "ANGLE", "FORCES": "FORCE", "MOMENTS": "MOMENT", "POWERS": "POWER"}
+_UNITS = {
+    "ANGLES": {"deg": 1.0, "degree": 1.0, "degrees": 1.0, "rad": 180.0 / np.pi, "radians": 180.0 / np.pi},
+    "FORCES": {"n": 1.0, "kn": 1e3},
+    "MOMENTS": {"nmm": 1e-3, "ncm": 1e-2, "nm": 1.0},
+    "POWERS": {"w": 1.0, "mw": 1e-3, "kw": 1e3},
+}
+"""By type: letters of units, per kg or not, and their factors to SI and degrees."""
+
+
+def unit_factor(kind: str, unit: str) -> float | None:
+    """Return the factor of a unit of "ANGLES", "FORCES", "MOMENTS" or "POWERS" to SI and degrees; None if unknown."""
+    return _UNITS[kind].get("".join(filter(str.isalpha, unit.lower().removesuffix("/kg"))))
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +99,8 @@ def frames_of(path: Path) -> C3dFrames:
     """Read labels and positions of the points of a C3D file that outputs are to be written into.
 
     Raises:
-        FileError: it is damaged, or stored in a form not written here (DEC numbers, poses of segments).
+        FileError: it is damaged, has outputs in unknown units, or is stored in a form not written here (DEC numbers,
+            poses of segments).
     """
     doubt = doubts_about(path, numbers_of_frames=False)
     if doubt:
@@ -100,7 +113,10 @@ def frames_of(path: Path) -> C3dFrames:
     each = parts.words[:, : 4 * parts.points].reshape(len(parts.words), parts.points, 4).astype(float)
     seen = (each[..., 3] >= 0) & np.isfinite(each[..., :3]).all(axis=-1)
     stated = {kind: parts.section.get("POINT", f"{name}_UNITS") for kind, name in _TYPES.items()}
-    units = {kind: str(texts[0]) for kind, texts in stated.items() if texts is not None and len(texts)}
+    units = {kind: str(texts[0]) for kind, texts in stated.items() if texts is not None and len(texts) and texts[0]}
+    for kind, unit in units.items():
+        if unit_factor(kind, unit) is None:
+            raise FileError(path, f"cannot take model outputs: its {kind} are in '{unit}'")
     return C3dFrames(content, tuple(labels), first, rate_hz, np.where(seen[..., None], each[..., :3], np.nan), units)
 
 
@@ -119,7 +135,7 @@ def with_outputs(
         frames: of the file; what Kinertia wrote into it before is replaced.
         outputs: with labels that no other point has.
         prefix: of labels, "Anna:"; empty for none.
-        units: of the types, for a file that states none.
+        units: of the types, for a file that states none and has no others of that type.
         own: entries of the group KINERTIA by name: value, and shape as `ParameterSection.put` has it.
         events: of which those are added that the file does not state.
         measures: of strides, for a file that states none.
@@ -138,10 +154,11 @@ def with_outputs(
         ours = [label for label, one in zip(labels, outputs, strict=True) if one.kind == kind]
         if not ours:
             continue
-        _put_list(section, kind, [*_listed(section, kind), *ours])
+        already = _listed(section, kind)
+        _put_list(section, kind, [*already, *ours])
         if kind not in groups[::2]:
             groups += [kind, name]
-        if section.get("POINT", f"{name}_UNITS") is None:
+        if not already and not any(_texts(section, f"{name}_UNITS")):
             section.put("POINT", f"{name}_UNITS", [units[kind]])
     if groups:
         section.put("POINT", "TYPE_GROUPS", groups, (2, len(groups) // 2))

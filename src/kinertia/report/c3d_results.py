@@ -13,7 +13,7 @@ from kinertia.errors import FileError
 from kinertia.estimation.drawn_fit import drawn_fit
 from kinertia.estimation.result import Fit, TrialFit
 from kinertia.io.c3d_event_writer import EventToWrite
-from kinertia.io.c3d_outputs import C3dFrames, OutputPoint, frames_of, too_many, with_outputs
+from kinertia.io.c3d_outputs import C3dFrames, OutputPoint, frames_of, too_many, unit_factor, with_outputs
 from kinertia.io.c3d_parameters import TooManyParameters, Value
 from kinertia.io.c3d_write import write_c3d
 from kinertia.io.provenance import VERSION
@@ -36,8 +36,6 @@ _MOST_DRAWS = 100
 NO_DEVIATION = -1.0
 """Value on axes without an SD, where a point has others: readers take a point with any NaN for missing."""
 _PLUG_IN_GAIT = ({"LASI", "RASI", "LTHI", "RTHI", "LTIB", "RTIB"}, {"LASI", "RASI", "LTHI", "RTHI", "SACR"})
-_FACTORS = {"nmm": 1e-3, "n.mm": 1e-3, "nm": 1.0, "n.m": 1.0, "n": 1.0, "kn": 1e3, "w": 1.0, "mw": 1e-3, "deg": 1.0}
-"""Factors of the units in files for moments, forces, powers and angles, to SI and degrees; per kg or not."""
 _SAME_PLACE = 1e-3
 """Largest error of markers against the fit's, as a share of their distances: a file stores single precision."""
 _SAME_TIME_FRAMES = 0.02
@@ -162,9 +160,11 @@ def _points(
     """Return outputs and their SDs at all frames of the file, in the file's units where it states others."""
     points, count = [], len(frames.points)
     for one in outputs:
-        stated = frames.units.get(one.kind, units[one.kind])
-        own = _FACTORS[units[one.kind].lower()]
-        factor = own / _FACTORS.get(stated.lower().removesuffix("/kg"), own)
+        own = unit_factor(one.kind, units[one.kind])
+        stated = unit_factor(one.kind, frames.units.get(one.kind, units[one.kind]))
+        assert own is not None
+        assert stated is not None  # `frames_of` refuses others
+        factor = own / stated
         points.append(OutputPoint(one.name, one.kind, _spread(factor * one.values, at, count)))
         if np.isfinite(one.sd).any():
             sd = np.where(np.isfinite(one.sd), factor * one.sd, NO_DEVIATION)
