@@ -36,8 +36,8 @@ def test_a_trial_comes_back_whatever_axes_its_forces_are_in(tmp_path, walk, turn
     np.testing.assert_allclose(recording.plates.force, walk.plates.force, atol=1e-5)
     np.testing.assert_allclose(recording.plates.moment, walk.plates.moment, atol=1e-3)
     rotated = [] if np.array_equal(turn, np.eye(3)) else ["F154", "F154"]
-    assert codes(recording.findings) == [*rotated, "F133"]
-    assert [one.where.plate for one in recording.findings[:-1]] == list(recording.plates.names)[: len(rotated)]
+    assert codes(recording.findings) == ["F163", *rotated, "F133"]
+    assert [one.where.plate for one in recording.findings[1:-1]] == list(recording.plates.names)[: len(rotated)]
 
 
 def test_an_empty_cell_is_a_missing_marker(tmp_path, walk):
@@ -49,7 +49,23 @@ def test_an_empty_cell_is_a_missing_marker(tmp_path, walk):
     assert np.isfinite(np.delete(recording.markers.positions, 3, axis=0)).all()
 
 
+def twice(text, other):
+    """The text with all trajectories once more, those of another person 2 m away."""
+    before, trajectories = text.split("Trajectories\n")
+    rate, owners, names, units, *rows = trajectories.rstrip().split("\n")
+    labels = owners.replace("Anna:", other).removeprefix(",,")
+    away = [",".join(str(float(cell) + 2000.0) for cell in row.split(",")[2:]) for row in rows]
+    lines = [rate, f"{owners},{labels}", names + names.removeprefix("Frame,Sub Frame"), units + units[1:]]
+    return "\n".join([f"{before}Trajectories", *lines, *(f"{a},{b}" for a, b in zip(rows, away, strict=True))]) + "\n"
+
+
 BAD = {
+    "two people": (
+        lambda text: twice(text, "Ben:"),
+        None,
+        "F161",
+        {"count": 2},
+    ),
     "no trajectories": (lambda text: text.replace("Trajectories", "Joints"), None, "F164", {}),
     "no labels": (lambda text: re.sub(r"\n,,[^\n]*Head[^\n]*", "\n", text, count=1), None, "F164", {}),
     "another table": (lambda text: "a,b\n1,2\n3,4\n5,6\n7,8\n9,10\n", None, "F103", {}),

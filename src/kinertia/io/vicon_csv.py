@@ -26,6 +26,7 @@ from kinertia.io.lab_axes import to_ground
 from kinertia.io.number_table import malformed, mismatch, read_lines, wrong_cells
 from kinertia.io.plate_moments import PlateMoments
 from kinertia.io.sto import header_entry
+from kinertia.io.subject_prefix import without_prefixes
 from kinertia.io.trc import METRES_PER_UNIT, seen_positions, unknown_unit
 from kinertia.io.uniform_times import uneven
 from kinertia.trial.data import FloatArray, Markers, Recording
@@ -151,7 +152,7 @@ def _markers(path: Path, section: _Section) -> tuple[Markers, list[Finding]]:
     owners = [owner for owner in dict.fromkeys(section.owners) if len(section.columns(owner, "XYZ")) == 3]
     places = {owner: section.columns(owner, "XYZ") for owner in owners}
     places = {o: at for o, at in places.items() if section.units[at[0]] in METRES_PER_UNIT}
-    labels = [owner.rsplit(":", 1)[-1] for owner in places]
+    labels, prefix_findings = without_prefixes(path, list(places))
     kept = {label: at for label, at in zip(labels, places.values(), strict=True) if label and not label.startswith("*")}
     if not kept or not len(section.rows):
         raise FileError.found(path, "F164", found=Quantity("no labelled ones in its section Trajectories"))
@@ -164,7 +165,7 @@ def _markers(path: Path, section: _Section) -> tuple[Markers, list[Finding]]:
     if odd.size:
         before, after = (frames[odd[0] : odd[0] + 2] - 1.0) / section.rate_hz
         raise uneven(path, lines[odd[0] + 1], before, after, 1.0 / section.rate_hz)
-    return Markers((frames - 1.0) / section.rate_hz, tuple(kept), unit * positions), findings
+    return Markers((frames - 1.0) / section.rate_hz, tuple(kept), unit * positions), [*prefix_findings, *findings]
 
 
 def _plates(
