@@ -91,20 +91,22 @@ def test_export_refuses_what_is_not_the_trials_file(demo_run, tmp_path):
     assert run("export", demo_run[1], "--c3d", "--convention", "iso", "-o", tmp_path / "out").status == 2
 
 
-def with_units(demo_run, folder, **units):
-    """The C3D file of the demo's walk, as other software leaves it: with these units of outputs."""
+def left_by_others(demo_run, folder, spelling=str, **units):
+    """The C3D file of the demo's walk, as other software leaves it: with these labels and units of outputs."""
     assert run("export", demo_run[1], "--c3d", "-o", folder / "plain").status == 0
     (path,) = (folder / "plain").glob("*.c3d")
     file = ezc3d.c3d(str(path))
     for name, unit in units.items():
         file["parameters"]["POINT"][name]["value"] = [unit]
+    labels, ours = (file["parameters"][group]["LABELS"] for group in ("POINT", "KINERTIA"))
+    labels["value"] = [label if label in ours["value"] else spelling(label) for label in labels["value"]]
     file.write(str(folder / path.name))
     return folder / path.name
 
 
 def test_results_have_the_units_that_the_file_states(fit, demo_run, tmp_path):
     stated = {"ANGLE_UNITS": "rad", "MOMENT_UNITS": "N-mm", "FORCE_UNITS": "", "POWER_UNITS": "mW"}
-    path = with_units(demo_run, tmp_path, **stated)
+    path = left_by_others(demo_run, tmp_path, **stated)
     (trial,) = fit.trials
     path.write_bytes(c3d_with_results(fit, trial, path, "isb", {}))
     points, file = points_of(path)
@@ -117,8 +119,14 @@ def test_results_have_the_units_that_the_file_states(fit, demo_run, tmp_path):
     assert file["parameters"]["POINT"]["FORCE_UNITS"]["value"] == ["N"]
 
 
+def test_markers_that_the_file_spells_otherwise_are_found_in_it(fit, demo_run, tmp_path):
+    path = left_by_others(demo_run, tmp_path, "Walk_{}".format)
+    path.write_bytes(c3d_with_results(fit, fit.trials[0], path, "isb", {}))
+    expect_outputs(path, fit)
+
+
 def test_a_file_whose_unit_is_unknown_is_refused(fit, demo_run, tmp_path):
-    path = with_units(demo_run, tmp_path, MOMENT_UNITS="lbf ft")
+    path = left_by_others(demo_run, tmp_path, MOMENT_UNITS="lbf ft")
     with pytest.raises(FileError, match="MOMENTS are in 'lbf ft'"):
         c3d_with_results(fit, fit.trials[0], path, "isb", {})
 

@@ -117,17 +117,14 @@ def spelled_as(marker_set: MarkerSet, labels: Sequence[str]) -> MarkerSet:
         marker_set: its labels may have been retyped by hand or changed by a program.
         labels: of a recording.
     """
-    own = marker_set.labels
-    wanted = [label for label in own if label not in labels]
-    others = [label for label in labels if label not in own]
-    prefix = shared_prefix(labels)
-    spelled = _matched({label: {folded(label)} for label in wanted}, others, prefix)
+    spelled = spellings(marker_set.labels, labels)
     named = {
         label: set(map(folded, names))
         for label, names in marker_set.spellings.items()
-        if label in wanted and label not in spelled
+        if label in marker_set.labels and label not in labels and label not in spelled
     }
-    spelled |= _matched(named, [label for label in others if label not in spelled.values()], prefix)
+    others = [label for label in labels if label not in {*marker_set.labels, *spelled.values()}]
+    spelled |= _matched(named, others, shared_prefix(labels))
     if not spelled:
         return marker_set
 
@@ -140,6 +137,15 @@ def spelled_as(marker_set: MarkerSet, labels: Sequence[str]) -> MarkerSet:
         segments=respelled(marker_set.segments),
         respelled=spelled,
     )
+
+
+def spellings(wanted: Sequence[str], labels: Sequence[str]) -> dict[str, str]:
+    """Map each wanted label that is not among these to the one that differs in capitals or punctuation only, or by a
+    person's name before all labels of either.
+    """
+    own = shared_prefix(wanted)
+    names = {one: {folded(one), folded(one.removeprefix(own))} for one in wanted if one not in labels}
+    return _matched(names, [label for label in labels if label not in wanted], shared_prefix(labels))
 
 
 def shared_prefix(labels: Sequence[str]) -> str:

@@ -20,7 +20,7 @@ from kinertia.io.provenance import VERSION
 from kinertia.io.recording import read_recording
 from kinertia.io.trial_files import trial_file
 from kinertia.model.bsp import PARAMETERS
-from kinertia.model.marker_set import shared_prefix
+from kinertia.model.marker_set import shared_prefix, spellings
 from kinertia.motion.gait_cycle import found_events
 from kinertia.motion.joint_wrench import leg_joints
 from kinertia.motion.model_outputs import CONVENTIONS, UNITS, Convention, Departures, ModelOutput, model_outputs
@@ -196,7 +196,10 @@ def _centres(source: Path, frames: C3dFrames, trial: TrialFit, prefix: str, at: 
 def to_file(source: Path, frames: C3dFrames, trial: TrialFit, prefix: str) -> tuple[np.ndarray, np.ndarray]:
     """Return rotation (3, 3) and translation (3,) from the axes of the fit (m, facing +X) to the file's, by markers."""
     markers, columns = trial.kinematics.trial.markers, {label: k for k, label in enumerate(frames.labels)}
-    shared = [(k, columns[prefix + label]) for k, label in enumerate(markers.labels) if prefix + label in columns]
+    wanted = [prefix + label for label in markers.labels]
+    read_as = spellings(wanted, frames.labels)
+    written = [read_as.get(label, label) for label in wanted]
+    shared = [(k, columns[label]) for k, label in enumerate(written) if label in columns]
     index = (markers.time * frames.rate_hz - (frames.first - 1)).round().astype(int)
     inside = (index >= 0) & (index < len(frames.points))
     ours = markers.positions[inside][:, [k for k, _ in shared]].reshape(-1, 3)

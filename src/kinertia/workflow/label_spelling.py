@@ -1,0 +1,39 @@
+"""Gives markers of trials the labels of the static trial, where these differ in spelling only."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from kinertia.errors import MarkerSetError
+from kinertia.findings.finding import finding
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
+from kinertia.model.marker_set import MarkerSet, is_worn, spellings
+from kinertia.trial.data import Recording
+from kinertia.workflow.person import Person
+
+
+def spelled_alike(person: Person) -> Person:
+    """Return the person, with trials labelled as the static trial where only then the marker set fits them (L103)."""
+    marker_set, static = person.labels, person.static
+    if static is None or person.model is not None or isinstance(marker_set, MarkerSetError):
+        return person
+    known = static.markers.labels
+    trials = [replace(one, recording=_spelled(one.recording, marker_set, known)) for one in person.trials]
+    return replace(person, trials=trials)
+
+
+def _spelled(recording: Recording, marker_set: MarkerSet, known: Sequence[str]) -> Recording:
+    labels = recording.markers.labels
+    read_as = {written: label for label, written in spellings(known, labels).items()}
+    alike = tuple(read_as.get(label, label) for label in labels)
+    if is_worn(marker_set, labels) or not is_worn(marker_set, alike):
+        return recording
+    found = [
+        finding("L103", Where(markers=(written,)), written=Quantity(written), label=Quantity(label))
+        for written, label in read_as.items()
+        if label in marker_set.labels
+    ]
+    markers = replace(recording.markers, labels=alike)
+    return replace(recording, markers=markers, findings=(*recording.findings, *found))

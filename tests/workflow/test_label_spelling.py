@@ -1,0 +1,53 @@
+"""A trial whose labels differ from the static trial's in spelling only is labelled as that one is."""
+
+from dataclasses import replace
+
+import pytest
+
+from kinertia.findings.finding import Severity
+from kinertia.settings import Subject
+from kinertia.trial.trial_input import TrialInput
+from kinertia.workflow.person import Person
+from kinertia.workflow.screening import screen
+
+
+def spelled(recording, spelling):
+    labels = tuple(spelling(label) for label in recording.markers.labels)
+    return replace(recording, markers=replace(recording.markers, labels=labels))
+
+
+def screened(static, walk):
+    return screen(Person(Subject(name="anna", mass_kg=72.6, height_m=1.8, sex="male"), (TrialInput(walk),), static))
+
+
+@pytest.fixture
+def person(recording_of):
+    return recording_of("synthetic/static.trc"), recording_of("synthetic/walk.trc", "synthetic/walk_grf.mot")
+
+
+SPELLINGS = [
+    (str, str.lower),
+    (str, "Walk_{}".format),
+    ("Static_{}".format, str),
+    ("Static_{}".format, "Walk_{}".format),
+]
+
+
+@pytest.mark.parametrize(("of_static", "of_walk"), SPELLINGS)
+def test_another_spelling_is_read_as_the_static_trials(person, of_static, of_walk):
+    static, walk = spelled(person[0], of_static), spelled(person[1], of_walk)
+    result = screened(static, walk)
+    (trial,) = result.context.trials
+    assert trial.recording.markers.labels == tuple(of_static(label) for label in person[1].markers.labels)
+    found = [one for one in result.findings if one.code == "L103" and one.where.trial == walk.name]
+    assert {(one.evidence["written"].value, one.evidence["label"].value) for one in found} >= {
+        (of_walk(label), of_static(label)) for label in ("R.ASIS", "L.Heel")
+    }
+    assert max(one.severity for one in result.findings) < Severity.ERROR
+
+
+def test_labels_of_another_set_stay_as_they_are(person):
+    static, walk = person[0], spelled(person[1], lambda label: f"{len(label)}{label[::-1]}")
+    result = screened(static, walk)
+    assert result.context.trials[0].recording.markers.labels == walk.markers.labels
+    assert "L101" in [one.code for one in result.findings]
