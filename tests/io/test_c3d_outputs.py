@@ -190,6 +190,15 @@ def test_a_file_that_contradicts_itself_is_refused(tmp_path):
         frames_of(path)
 
 
+@pytest.mark.parametrize(("unit", "stated"), [("Nmm", ["Nmm"]), ("Nm", None)])
+def test_units_that_a_file_leaves_open_are_stated_if_they_are_those_of_its_outputs(tmp_path, unit, stated):
+    path = person(tmp_path / "open.c3d", parameters={"POINT": {"Y_SCREEN": ["+Z"], "MOMENTS": ["M0"]}})
+    frames, units = frames_of(path), {**UNITS, "MOMENTS": unit}
+    path.write_bytes(with_outputs(frames, outputs(len(frames.points), "Kin"), "", units, {}))
+    section, *_ = sections(path.read_bytes())
+    assert (section.get("POINT", "MOMENT_UNITS"), section.get("POINT", "ANGLE_UNITS")) == (stated, ["deg"])
+
+
 def test_numbers_of_frames_that_a_crop_left_behind_refuse_nothing(tmp_path):
     """As ezc3d leaves TRIAL where Python cuts frames off."""
     fields = {"ACTUAL_START_FIELD": np.array([148, 0]), "ACTUAL_END_FIELD": np.array([462, 0])}

@@ -22,7 +22,7 @@ from kinertia.findings.finding import Finding, finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.io.c3d_events import file_events
-from kinertia.io.c3d_outputs import OWN_GROUP, unit_factor
+from kinertia.io.c3d_outputs import OWN_GROUP, USUAL_UNITS, unit_factor
 from kinertia.io.c3d_plates import PLATE_TYPES, lab_plates, person_on_plates, plate_left_out, to_ground_plates
 from kinertia.io.c3d_structure import doubts_about, with_plain_samples
 from kinertia.io.c3d_subject import subject_data
@@ -258,11 +258,11 @@ def _outputs(parameters: Any, labels: list[str]) -> set[str]:
 
 _NAME = re.compile(r"(?:.*:)?([LR])(Vicon)?((?:Hip|Knee|Ankle)(?:Angles|Moment|Power))")
 _KINDS = {
-    "Angles": ("ANGLES", "ANGLE_UNITS", "deg"),
-    "Moment": ("MOMENTS", "MOMENT_UNITS", "Nmm"),
-    "Power": ("POWERS", "POWER_UNITS", "W"),
+    "Angles": ("ANGLES", "ANGLE_UNITS"),
+    "Moment": ("MOMENTS", "MOMENT_UNITS"),
+    "Power": ("POWERS", "POWER_UNITS"),
 }
-"""By the end of their names: type of outputs, parameter with their unit, and the unit where it is empty."""
+"""By the end of their names: type of outputs, and the parameter with their unit."""
 
 
 def file_outputs(
@@ -294,5 +294,6 @@ def file_outputs(
 
 
 def _factor(parameters: Any, name: str) -> float | None:
-    kind, parameter, usual = next(units for end, units in _KINDS.items() if name.endswith(end))
-    return unit_factor(kind, str(parameter_values(parameters, "POINT", parameter, [""])[0]).strip() or usual)
+    kind, parameter = next(one for end, one in _KINDS.items() if name.endswith(end))
+    stated = str(parameter_values(parameters, "POINT", parameter, [""])[0]).strip()
+    return unit_factor(kind, stated or USUAL_UNITS[kind])

@@ -38,6 +38,8 @@ _UNITS = {
     "POWERS": {"w": 1.0, "mw": 1e-3, "kw": 1e3},
 }
 """By type: letters of units, per kg or not, and their factors to SI and degrees."""
+USUAL_UNITS = {"ANGLES": "deg", "FORCES": "N", "MOMENTS": "Nmm", "POWERS": "W"}
+"""Units of outputs in a file that states none: Vicon's."""
 
 
 def unit_factor(kind: str, unit: str) -> float | None:
@@ -135,7 +137,7 @@ def with_outputs(
         frames: of the file; what Kinertia wrote into it before is replaced.
         outputs: with labels that no other point has.
         prefix: of labels, "Anna:"; empty for none.
-        units: of the types, for a file that states none and has no others of that type.
+        units: of the types, for a file that states none; left open beside others whose unit is another (`USUAL_UNITS`).
         own: entries of the group KINERTIA by name: value, and shape as `ParameterSection.put` has it.
         events: of which those are added that the file does not state.
         measures: of strides, for a file that states none.
@@ -158,7 +160,7 @@ def with_outputs(
         _put_list(section, kind, [*already, *ours])
         if kind not in groups[::2]:
             groups += [kind, name]
-        if not already and not any(_texts(section, f"{name}_UNITS")):
+        if (not already or units[kind] == USUAL_UNITS[kind]) and not any(_texts(section, f"{name}_UNITS")):
             section.put("POINT", f"{name}_UNITS", [units[kind]])
     if groups:
         section.put("POINT", "TYPE_GROUPS", groups, (2, len(groups) // 2))
