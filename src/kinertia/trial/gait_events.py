@@ -58,8 +58,17 @@ def contradicted_events(trial: Trial) -> list[tuple[FileEvent, GaitEvent]]:
 def sides_exchanged(trial: Trial) -> bool:
     """Decide whether the events coincide with the loads of the other foot and hardly with those of their own."""
     edges, stated = load_edges(trial.loads), _stated(trial)
-    exchanged = [one._replace(side=_OTHER[one.side]) for one in stated]
-    return _agreeing(exchanged, edges) > _PLAINLY * _agreeing(stated, edges)
+    return _agreeing(_exchanged(stated), edges) > _PLAINLY * _agreeing(stated, edges)
+
+
+def counted_from_first_frame(trial: Trial) -> bool:
+    """Decide whether more events coincide with loads if their times count from the first frame: two at least, and more
+    than with the other foot's.
+    """
+    edges, stated = load_edges(trial.loads), _stated(trial)
+    first_s = float(trial.markers.time[0])
+    later = _agreeing([one._replace(time_s=one.time_s + first_s) for one in stated], edges)
+    return later > max(1, _agreeing(stated, edges), _agreeing(_exchanged(stated), edges))
 
 
 def events_of_other_foot(events: Iterable[FileEvent], shown: Sequence[GaitEvent]) -> list[FileEvent]:
@@ -76,7 +85,7 @@ def events_of_other_foot(events: Iterable[FileEvent], shown: Sequence[GaitEvent]
 
 def usable_events(trial: Trial, by_motion: Sequence[GaitEvent]) -> list[GaitEvent]:
     """Return all gait events that the file states, or none if forces or the motion of the feet contradict one."""
-    if contradicted_events(trial) or sides_exchanged(trial):
+    if contradicted_events(trial) or sides_exchanged(trial) or counted_from_first_frame(trial):
         return []
     if events_of_other_foot(trial.events, [*gait_events(trial), *by_motion]):
         return []
@@ -85,6 +94,10 @@ def usable_events(trial: Trial, by_motion: Sequence[GaitEvent]) -> list[GaitEven
 
 def _stated(trial: Trial) -> list[GaitEvent]:
     return [one.of_gait for one in trial.events if one.of_gait is not None]
+
+
+def _exchanged(events: Sequence[GaitEvent]) -> list[GaitEvent]:
+    return [one._replace(side=_OTHER[one.side]) for one in events]
 
 
 def _agreeing(events: Sequence[GaitEvent], edges: Sequence[GaitEvent]) -> int:

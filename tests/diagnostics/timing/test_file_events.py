@@ -58,6 +58,19 @@ def test_events_of_the_other_foot(trial):
     assert one.code == "T312"
 
 
+@pytest.mark.parametrize("sides", [FEET, ("l", "r")])
+def test_times_that_count_from_the_first_frame_of_a_cropped_file(trial, sides):
+    """Half a cycle off, they come at the times of the other foot."""
+    starts = [e.time_s for e in load_edges(trial.loads) if e.kind == "heel strike"]
+    cut = trial.markers.time >= starts[1] - starts[0]
+    first_s = float(trial.markers.time[cut][0])
+    markers = replace(trial.markers, time=trial.markers.time[cut], positions=trial.markers.positions[cut])
+    cropped = replace(trial, markers=markers, measured=trial.measured[cut])
+    codes = [one.code for one in found(cropped, of_loads(trial, -first_s, sides))]
+    assert codes == (["T314"] if sides == FEET else [])
+    assert [one.code for one in found(cropped, of_loads(trial))] == []
+
+
 def unloaded(trial):
     """The same walk where no plate is."""
     return replace(trial, loads=replace(trial.loads, force=0.0 * trial.loads.force))

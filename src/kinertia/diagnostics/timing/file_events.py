@@ -12,6 +12,7 @@ from kinertia.trial.gait_event import GaitEvent
 from kinertia.trial.gait_events import (
     EVENT_LIMIT_S,
     contradicted_events,
+    counted_from_first_frame,
     events_of_other_foot,
     gait_events,
     sides_exchanged,
@@ -20,14 +21,18 @@ from kinertia.trial.plate_assignment import FOOT_NAMES
 
 
 def file_events(context: RecordingContext) -> Iterator[Finding]:
-    """T311 to T313: the event of a file farthest from its forces (T311), or events with sides exchanged, all of them
-    (T312) or a few (T313).
+    """T311 to T314: the event of a file farthest from its forces (T311), events with sides exchanged, all of them
+    (T312) or a few (T313), or times that count from the first frame (T314).
     """
     trial = context.loaded
     if not isinstance(trial, Trial):
         return
+    count = sum(one.of_gait is not None for one in trial.events)
+    if counted_from_first_frame(trial):
+        first = Quantity(float(trial.markers.time[0]), "s")
+        yield finding("T314", context.at(), events=Quantity(count, "1"), first_s=first)
+        return
     if sides_exchanged(trial):
-        count = sum(one.of_gait is not None for one in trial.events)
         yield finding("T312", context.at(), events=Quantity(count, "1"))
         return
     other_foot = events_of_other_foot(trial.events, [*gait_events(trial), *_by_motion(context)])
