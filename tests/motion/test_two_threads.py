@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from kinertia.motion import two_threads
-from kinertia.motion.two_threads import side_by_side
+from kinertia.motion.two_threads import both, side_by_side
 
 
 @pytest.fixture(params=[1, 2])
@@ -31,7 +31,9 @@ def test_there_are_two_threads_and_no_third(monkeypatch):
 
     def outer(_: int) -> list[int]:
         meeting.wait()
-        return [threading.get_ident(), *side_by_side(within, [0, 1])]
+        threads = [threading.get_ident(), *side_by_side(within, [0, 1])]
+        meeting.wait()
+        return threads
 
     first, second = side_by_side(outer, [0, 1])
     assert len(set(first)) == len(set(second)) == 1
@@ -48,6 +50,26 @@ def test_an_error_comes_through_and_leaves_nothing_held(cores, failing):
     with pytest.raises(np.linalg.LinAlgError):
         side_by_side(function, [0, 1])
     assert side_by_side(abs, [-1, 2]) == [1, 2]
+
+
+def test_an_interruption_does_not_wait_for_the_second_thread(monkeypatch):
+    monkeypatch.setattr(two_threads, "_cores", lambda: 2)
+    begun, go_on, ended = threading.Event(), threading.Event(), threading.Event()
+
+    def interrupted() -> None:
+        begun.wait(timeout=20)
+        raise KeyboardInterrupt
+
+    def long() -> None:
+        begun.set()
+        go_on.wait(timeout=20)
+        ended.set()
+
+    with pytest.raises(KeyboardInterrupt):
+        both(interrupted, long)
+    assert not ended.is_set()
+    go_on.set()
+    assert ended.wait(timeout=20)
 
 
 def test_numpy_is_as_forgiving_in_the_second_thread(cores):

@@ -54,16 +54,22 @@ def both(first: Callable[[], T], second: Callable[[], R]) -> tuple[T, R]:
             there.append(second())
         except BaseException as error:
             failed.append(error)
+        finally:
+            _second.release()
 
-    # a daemon: an interruption ends the process, whatever this is doing
     thread = Thread(target=copy_context().run, args=(in_thread,), name=THREAD, daemon=True)
     try:
         thread.start()
-        here = first()
-    finally:
-        if thread.is_alive():
-            thread.join()
+    except RuntimeError:  # no thread can be started
         _second.release()
+        return first(), second()
+    try:
+        here = first()
+    except Exception:
+        thread.join()
+        raise
+    # an interruption waits for nothing
+    thread.join()
     if failed:
         raise failed[0]
     return here, there[0]
