@@ -43,6 +43,25 @@ def test_without_a_moment_of_the_idle_plate_the_level_acts_in_the_middle_of_the_
     np.testing.assert_allclose(load.moment[firm], np.cross(MIDDLE, load.force[firm]), atol=0.8)
 
 
+@pytest.mark.parametrize("torque_nm", [0.0, 1.5])
+def test_a_horizontal_level_that_acts_in_the_middle_of_the_loads_is_taken_off_once(torque_nm):
+    """It has a vertical moment only, as a torque without a point of application has."""
+    level_n, torque = np.array([0.0, 0.0, -8.0]), np.array([0.0, torque_nm, 0.0])
+    force, moment = steps(noise_n=0.0)
+    load = without_idle(TIME, force + level_n, moment + np.cross(MIDDLE, level_n) + torque)
+    assert load.idle.twist_nm == pytest.approx(torque_nm, abs=0.01)
+    np.testing.assert_allclose(load.moment[STEP], moment[STEP], atol=0.01)
+
+
+def test_a_torque_without_a_point_of_application_acts_in_the_middle_of_the_loads():
+    level_n, torque = np.array([0.0, 0.0, -8.0]), np.array([0.0, 1.5, 0.0])
+    force, moment = steps(noise_n=0.0)
+    there = np.cross(MIDDLE, level_n) + torque
+    load = without_idle(TIME, force + level_n, moment + np.where(STEP[:, None], there, torque))
+    assert load.idle.twist_nm == pytest.approx(1.5)
+    np.testing.assert_allclose(load.moment[STEP], moment[STEP], atol=0.01)
+
+
 def test_a_moment_alone_is_a_level_too():
     force, moment = steps()
     load = without_idle(TIME, force, moment + np.array([0.0, 2.0, 0.0]))

@@ -67,8 +67,11 @@ def _moment(
     steady = bool((_deviation(moments) < _CONSTANT_NM).all())
     level_nm = np.median(moments, axis=0) if steady else np.zeros(3)
     there = np.cross(_mean_point(force - level_n, moment - level_nm), level_n)
-    # a file without a centre of pressure for the unloaded plate has zero there, and at most a torque
-    about = level_nm - (there if level_nm[[0, 2]].any() else 0.0)
+    about = level_nm - there
+    if not level_nm[[0, 2]].any():
+        # either the file has no centre of pressure for the unloaded plate, and at most a torque, or the level is
+        # horizontal: the smaller torque is the likelier
+        about = min(about, level_nm, key=np.linalg.norm)
     x, y, z = (float(value) for value in about + there)
     return (x, y, z), float(about[np.argmax(np.abs(about))])
 
