@@ -5,9 +5,11 @@ from itertools import combinations
 
 import pytest
 
+from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.runner import asked, explained
 from kinertia.diagnostics.timing.interchanged_forces import interchanged_forces
 from kinertia.diagnostics.timing.questions import PERSON_QUESTIONS
+from kinertia.trial.sampled_time import within
 from trials_of_people import PEOPLE, Trials
 
 
@@ -30,6 +32,25 @@ def test_one_late_and_the_other_early(person):
     for delay_s in (0.01, 0.015, -0.01, -0.015):
         trials = [person.context(first, delay_s=-delay_s), person.context(second, delay_s=delay_s)]
         assert list(interchanged_forces(person.together(trials))) == []
+
+
+@pytest.mark.parametrize("share", [0.5, 0.6, 0.75])
+def test_overlapping_parts_of_one_recording_whose_one_plate_has_a_wrong_gain(person, share):
+    """Where they overlap, the other's forces are its own: a shorter window leaves less unexplained."""
+    whole = person.context(person.names[0])
+    plates = whole.recording.plates
+    force, moment = plates.force.copy(), plates.moment.copy()
+    force[:, 0] *= 1.08
+    moment[:, 0] *= 1.08
+    time = whole.recording.markers.time
+    start, end, part = time[0], time[-1], share * (time[-1] - time[0])
+    parts = []
+    for name, (first, last) in {"first": (start, start + part), "second": (end - part, end)}.items():
+        inside = within(plates.time, first, last)
+        own = replace(plates, time=plates.time[inside], force=force[inside], moment=moment[inside])
+        recording = replace(whole.recording, name=name, markers=whole.recording.markers.cut(first, last), plates=own)
+        parts.append(RecordingContext(recording, person.marker_set))
+    assert list(interchanged_forces(person.together(parts))) == []
 
 
 def test_interchanged_force_files(person):

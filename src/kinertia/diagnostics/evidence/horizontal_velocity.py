@@ -15,7 +15,7 @@ from kinertia.trial.foot_motion import AROUND_LOAD_S
 from kinertia.trial.sampled_time import span_s, within
 
 _PELVIS_HZ = 6.0
-_LEAST_WINDOW_S, _LEAST_SPECIFIC = 0.4, 0.2
+LEAST_WINDOW_S, _LEAST_SPECIFIC = 0.4, 0.2
 LEAST_CHANGE_M_S, _FOLLOWS = 0.02, 0.7
 """Velocities whose changes have a smaller standard deviation carry no information on forces."""
 
@@ -31,6 +31,12 @@ class CausedVelocity:
     centre: FloatArray
     caused: FloatArray
     mass_kg: float
+
+    def cut(self, start_s: float, end_s: float) -> CausedVelocity:
+        """Return the part with start_s <= time <= end_s."""
+        inside = within(self.time, start_s, end_s)
+        pelvis, centre, caused = (each[inside] for each in (self.pelvis, self.centre, self.caused))
+        return CausedVelocity(self.time[inside], pelvis, centre, caused, self.mass_kg)
 
     def by(self, time: FloatArray, force: FloatArray) -> FloatArray:
         """Return the velocity (n,) m/s that a force (k,) N over time (k,) s gives this mass."""
@@ -104,7 +110,7 @@ def caused_velocities(trial: Trial, owners: Mapping[str, str]) -> list[CausedVel
     for start, end in windows:
         inside = within(trial.loads.time, max(start, first), min(end, last))
         time, force = trial.loads.time[inside], trial.loads.force[inside].sum(axis=1)
-        if len(time) < 10 or span_s(time) < _LEAST_WINDOW_S or not force[:, 1].mean() > 0:
+        if len(time) < 10 or span_s(time) < LEAST_WINDOW_S or not force[:, 1].mean() > 0:
             continue
         centre = centre_m(time, 1)
         # a person who lands, or jumps off, is faster upwards at the end
