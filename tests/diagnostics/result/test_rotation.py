@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinertia.diagnostics.result.rotation import plate_rotation, smallest_detectable_rad
+from kinertia.diagnostics.result.rotation import plate_rotation
+from kinertia.diagnostics.result.smallest_detectable import smallest_detectable
 from kinertia.estimation.simultaneous.instruments import FLOOR_PRIOR, InstrumentInformation, InstrumentPrior
 from results import codes, context, error
 
@@ -25,7 +26,7 @@ def shown(turn_sd_deg, shared_with_x=0.0):
 def test_from_there_on_rotated_plates_are_likelier(sd_deg):
     """Bayes' factor of the data's own value, by simulation of neither: two normal densities."""
     prior = FLOOR_PRIOR["turn"]
-    least = np.degrees(smallest_detectable_rad(shown(sd_deg), InstrumentPrior()))
+    least = np.degrees(smallest_detectable(shown(sd_deg), InstrumentPrior(), "turn"))
 
     def odds(value):
         wide, narrow = (np.hypot(sd_deg, np.degrees(own)) for own in (prior.faulty_sd, prior.nominal_sd))
@@ -36,7 +37,7 @@ def test_from_there_on_rotated_plates_are_likelier(sd_deg):
 
 
 def test_what_is_shared_with_the_position_of_a_plate_is_not_known_of_the_rotation():
-    alone, shared = (smallest_detectable_rad(shown(0.5, share), InstrumentPrior()) for share in (0.0, 0.99))
+    alone, shared = (smallest_detectable(shown(0.5, share), InstrumentPrior(), "turn") for share in (0.0, 0.99))
     assert shared > 1.05 * alone
 
 

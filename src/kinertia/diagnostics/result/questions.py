@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from kinertia.diagnostics.result.basis import basis, filters
+from kinertia.diagnostics.result.common_offset import common_offset
 from kinertia.diagnostics.result.context import ResultContext
 from kinertia.diagnostics.result.corrections import delays, zero_offsets
 from kinertia.diagnostics.result.free_moments import free_moments
@@ -25,6 +26,7 @@ ESTIMATE_QUESTIONS: tuple[Question[ResultContext], ...] = (
     Question("P22", gains),
     Question("P23", plate_rotation),
     Question("P24", plate_positions),
+    Question("P24", common_offset),
     Question("M14", sideways_lean),
     Question("P26", free_moments),
     Question("T21", delays),

@@ -1,0 +1,24 @@
+"""Computes how large an error of all plates must be for trials to show it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kinertia.estimation.simultaneous.instruments import InstrumentInformation, InstrumentPrior
+from kinertia.estimation.simultaneous.plates import FLOOR_UNKNOWNS
+
+
+def smallest_detectable(shown: InstrumentInformation, prior: InstrumentPrior, unknown: str) -> float:
+    """Return the smallest error of all plates at which the trials make it likelier than fault-free plates.
+
+    Args:
+        shown: information of the trials on plates and synchronisation, without any prior.
+        prior: what was known of them before, from other people of the session, too.
+        unknown: one of FLOOR_UNKNOWNS.
+    """
+    place = len(shown.rhs) - 1 - len(FLOOR_UNKNOWNS) + list(FLOOR_UNKNOWNS).index(unknown)
+    unknowns = prior.of_unknowns(shown.plates).own
+    precision = np.array([0.0 if k == place else 1.0 / one.sd**2 for k, one in enumerate(unknowns)])
+    information = shown.information + prior.of_session(shown.plates).information + np.diag(precision)
+    deviation = float(np.sqrt(np.linalg.inv(information)[place, place]))
+    return unknowns[place].smallest_detectable(deviation)
