@@ -176,7 +176,7 @@ def test_identifiers_say_which_column_is_what(write, write_xml):
     plates = plates_of(path, write_xml("B", body="/bodyset/calcn_l"))
     assert plates.names == ("B",)
     assert plates.declared_feet == ("l",)
-    assert plates_of(path, write_xml("A", body="pelvis")).declared_feet == (None,)
+    assert plates_of(path, write_xml("A", body="LeftFoot")).declared_feet == (None,)
 
 
 def test_datafile_is_used_only_without_a_force_file(write, write_xml, tmp_path):
@@ -237,6 +237,18 @@ def test_loads_file_trouble(write, write_xml, case):
     replace, code, evidence = XML_TROUBLE[case]
     with refused(code, **evidence):
         plates_of(write(named("A")), write_xml("A", replace=replace))
+
+
+@pytest.mark.parametrize("body", ["hand_r", "/bodyset/torso", "pelvis", "tibia_l", "calcn_r", "toes_l", "LeftFoot", ""])
+def test_loads_that_do_not_act_on_a_foot_are_refused(write, write_xml, body):
+    force_file, xml = write(named("A")), write_xml("A", body=body)
+    name = body.rsplit("/", 1)[-1]
+    if name in ("hand_r", "torso", "pelvis", "tibia_l"):
+        with refused("F149", None, load="A") as caught:
+            plates_of(force_file, xml)
+        assert caught.value.finding.where.part == name
+    else:
+        assert plates_of(force_file, xml).names == ("A",)
 
 
 CROSSED = {

@@ -18,6 +18,7 @@ from kinertia.io.file_names import path_from
 from kinertia.io.number_table import expect_file, mismatch
 from kinertia.io.sto import TimeTable, read_table
 from kinertia.io.uniform_times import uniform_times
+from kinertia.model.anatomy import segment_of
 from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads
 from kinertia.trial.force_spikes import without_spikes
 from kinertia.trial.impossible_data import impossible_load
@@ -61,7 +62,8 @@ def read_forces(
 
     Raises:
         FileError: a file is missing or broken, a column that is needed is not there, a load is not expressed
-            in ground, time does not grow, a loaded sample is NaN, or the forces point down.
+            in ground or acts on another segment than a foot, time does not grow, a loaded sample is NaN, or the forces
+            point down.
     """
     findings: tuple[Finding, ...] = ()
     if loads_path is None:
@@ -216,7 +218,10 @@ def _groups_by_identifier(root: ElementTree.Element, path: Path) -> tuple[list[_
             if not identifier:
                 needed = Quantity(f"a {tag}, the beginning of its three column names")
                 raise FileError.found(path, "F143", load=Quantity(name), identifier=needed, found=Quantity("none"))
-        side = re.search(r"_([rl])$", _text(element, "applied_to_body"))
+        body = _text(element, "applied_to_body").rsplit("/", 1)[-1]
+        if not (segment_of(body) or "foot").startswith("foot"):
+            raise FileError.found(path, "F149", None, Where(part=body), load=Quantity(name))
+        side = re.search(r"_([rl])$", body)
         groups.append(
             _Columns(name, force, point, _text(element, "torque_identifier") or None, side[1] if side else None)
         )
