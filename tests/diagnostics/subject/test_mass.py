@@ -48,6 +48,14 @@ def test_it_is_the_mass_of_the_body(made):
     np.testing.assert_allclose(mass.supported_kg, mass.mass_kg, rtol=0.15)
 
 
+def test_markers_on_bodies_of_no_segment_are_left_out(made):
+    """Backpacks and sockets of prostheses have markers, too."""
+    owners, one = owners_of(made.skeleton), trial(made)
+    carried = next(label for label, owner in owners.items() if owner == "torso")
+    mass = force_mass({**owners, carried: "backpack"}, one)
+    assert mass.mass_kg == pytest.approx(force_mass({**owners, carried: ""}, one).mass_kg, rel=1e-9)
+
+
 def test_no_motion_of_ours_is_asked(made):
     """Markers of which no pose makes sense say the same as long as their centre moves as it does."""
     turned = replace(made.markers, positions=made.markers.positions[:, :, [2, 1, 0]])

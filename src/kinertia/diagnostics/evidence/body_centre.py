@@ -25,20 +25,25 @@ def body_centre(owners: Mapping[str, str], markers: Markers) -> FloatArray | Non
     pelvis.
 
     Args:
-        owners: the segment that each marker is on.
+        owners: the segment that each marker is on; markers on anything else (a backpack) do not count.
         markers: Y up.
     """
     seen = markers.seen
     places: dict[str, list[FloatArray]] = {}
     for column, label in enumerate(markers.labels):
-        if owners.get(label) and seen[:, column].mean() >= _SEEN:
-            places.setdefault(owners[label], []).append(bridged_way(markers.time, markers.positions[:, column]))
+        owner = owners.get(label, "")
+        if _share(owner) and seen[:, column].mean() >= _SEEN:
+            places.setdefault(owner, []).append(bridged_way(markers.time, markers.positions[:, column]))
     if not places.keys() & {"pelvis", "torso"}:
         return None
-    shares = {name: _SHARES[name.removesuffix("_r").removesuffix("_l")] for name in places}
+    shares = {name: _share(name) for name in places}
     middles = (shares[name] * np.mean(own, axis=0) for name, own in places.items())
     total: FloatArray = sum(middles, np.zeros((len(seen), 3)))
     return total / sum(shares.values())
+
+
+def _share(segment: str) -> float:
+    return _SHARES.get(segment.removesuffix("_r").removesuffix("_l"), 0.0)
 
 
 def bridged_way(time: FloatArray, way: FloatArray) -> FloatArray:
