@@ -10,7 +10,7 @@ from kinertia.diagnostics.model.questions import PERSON_QUESTIONS
 from kinertia.diagnostics.runner import asked, explained
 from kinertia.findings.finding import Severity
 from kinertia.io.osim.reader import read_osim
-from kinertia.model.bsp import BodySegmentParameters
+from kinertia.model.bsp import PARAMETERS, BodySegmentParameters
 from people import UNMOVED, with_model
 from recordings import here
 from upright_model import changed, with_moments
@@ -69,6 +69,19 @@ def test_total_mass(mass_kg, alone, fitted):
     stated = {**PERSON, "mass_kg": mass_kg}
     assert [one.severity for one in answers("O213", **stated)] == alone
     assert [one.severity for one in answers("O213", trials=[UNMOVED], **stated)] == fitted
+
+
+def test_legs_without_a_trunk_are_not_scaled_to_the_whole_mass():
+    """Thighs and shanks would be twice as heavy as they are."""
+    zero = dict.fromkeys(PARAMETERS, 0.0)
+    (one,) = answers("O213", changed("torso", **zero), trials=[UNMOVED], **PERSON)
+    assert one.severity is Severity.ERROR
+    own = upright.bsp()
+    table = own.table()
+    pelvis, torso = (own.segments.index(name) for name in ("pelvis", "torso"))
+    table[pelvis, 0], table[torso] = table[pelvis, 0] + table[torso, 0], 0.0
+    in_pelvis = BodySegmentParameters.from_table(own.segments, table)
+    assert answers("O213", in_pelvis, trials=[UNMOVED], **PERSON) == []
 
 
 def test_left_and_right():

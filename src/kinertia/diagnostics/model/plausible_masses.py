@@ -20,6 +20,7 @@ from kinertia.diagnostics.subject.mass import ERROR_SHARE, WARNING_SHARE
 from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
+from kinertia.model.anatomy import segment_of
 from kinertia.model.bsp import PARAMETERS, BodySegmentParameters
 
 _ARMS_IN_TORSO = 0.42
@@ -78,7 +79,7 @@ def unlike_tables(context: PersonContext) -> Iterator[Finding]:
 
 def model_mass(context: PersonContext) -> Iterator[Finding]:
     """O213: a model mass that differs from the person's. A fit scales the masses, so that only a difference larger than
-    between people is reported there.
+    between people is reported there; legs alone cannot be scaled to the whole body's mass.
     """
     stated_kg = None if context.total_mass is None else context.total_mass.body_kg
     stated_kg = context.subject.mass_kg if stated_kg is None else stated_kg
@@ -88,7 +89,10 @@ def model_mass(context: PersonContext) -> Iterator[Finding]:
     off = abs(model_kg / stated_kg - 1.0)
     if off <= (ERROR_SHARE if context.has_trials else WARNING_SHARE):
         return
-    severity = Severity.ERROR if off > ERROR_SHARE and not context.has_trials else Severity.WARNING
+    bsp = context.model.bsp
+    trunk_kg = sum(kg for name, kg in zip(bsp.segments, bsp.mass_kg, strict=True) if segment_of(name) == "torso")
+    scaled = context.has_trials and (trunk_kg > 0 or model_kg > stated_kg)
+    severity = Severity.ERROR if off > ERROR_SHARE and not scaled else Severity.WARNING
     limit = stated_kg * (1.0 + (WARNING_SHARE if model_kg > stated_kg else -WARNING_SHARE))
     yield finding(
         "O213", None, severity, model_kg=Quantity(model_kg, "kg", limit=limit), stated_kg=Quantity(stated_kg, "kg")
