@@ -91,6 +91,13 @@ def test_rates_whose_times_are_rounded(write, rate, decimals):
     np.testing.assert_allclose(markers.time, np.arange(500) / rate, atol=1e-9)
 
 
+def test_times_with_many_digits_precede_a_rounded_rate(write):
+    """59.94 Hz in the times and 60 in the header: 2.5 ms after as many seconds."""
+    rows = "".join(f"{k}\t{k / 59.94:.6f}\t1\t2\t3\t4\t5\t6\n" for k in range(151))
+    header = HEADER.replace("\t3\t2\t", "\t151\t2\t").replace("\n100\t", "\n60\t")
+    np.testing.assert_allclose(read_trc(write(header + rows)).time, np.arange(151) / 59.94, atol=1e-6)
+
+
 @pytest.mark.parametrize(
     "text",
     [

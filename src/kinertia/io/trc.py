@@ -25,7 +25,7 @@ METRES_PER_UNIT = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 
 _HEADER_KEYS = ("DataRate", "NumFrames", "NumMarkers", "Units")
 _FIRST_ROW_LINE = 6
-_TIME_TOLERANCE_FRAMES = 0.25
+_TIME_TOLERANCE_FRAMES, _TIME_TOLERANCE_S = 0.25, 1e-6
 _SHOWN = 40
 _STAND_INS = {"0 0 0": (0.0,), "-9999 -9999 -9999": (-9999.0, -9.999)}
 
@@ -201,7 +201,7 @@ def _first_row(lines: list[str]) -> int:
 def _uniform_time(
     path: Path, time: FloatArray, line_numbers: list[int], rate_hz: float
 ) -> tuple[FloatArray, tuple[Finding, ...]]:
-    """Return times on an exactly uniform grid; DataRate gives the step, or the time column where that fits better."""
+    """Return times on an exactly uniform grid; DataRate gives the step where the times are those of the grid, rounded."""
     _expect_even_steps(path, time, line_numbers)
     if len(time) == 1:
         return time, ()
@@ -213,7 +213,7 @@ def _uniform_time(
         raise FileError.found(path, "T103", 3, **rates)
     frames = np.arange(len(time))
     uniform = time[0] + frames / rate_hz
-    if np.abs(time - uniform).max() > _TIME_TOLERANCE_FRAMES * step:
+    if np.abs(time - uniform).max() > max(1.01 * rounding_s(time), _TIME_TOLERANCE_S):
         uniform = time[0] + frames * step
     error = np.abs(time - uniform)
     if error.max() > _TIME_TOLERANCE_FRAMES * step:
