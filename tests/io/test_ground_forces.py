@@ -171,6 +171,13 @@ def test_without_torque_the_free_moment_is_zero(write, write_xml):
         assert findings == (), "P264 is seen in the loads themselves"
 
 
+@pytest.mark.parametrize("stem", ["Ground_Force_", "GROUND_FORCE_R_", "1_Ground_Force_"])
+def test_torques_are_recognised_in_capitals(write, stem):
+    torque = stem.replace("Force", "Torque").replace("FORCE", "TORQUE")
+    plates = plates_of(write(column_group(FORCE, POINT, TORQUE, (f"{stem}vx", f"{stem}px", f"{torque}x"))))
+    np.testing.assert_allclose(plates.moment[-1, 0], MOMENT, atol=1e-9)
+
+
 def test_identifiers_say_which_column_is_what(write, write_xml):
     path = write(named("A"), named("B"))
     plates = plates_of(path, write_xml("B", body="/bodyset/calcn_l"))

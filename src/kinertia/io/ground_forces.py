@@ -141,6 +141,7 @@ def _expect_numbers(path: Path, table: TimeTable, group: _Columns, identifier: s
 def _groups_by_name(path: Path, table: TimeTable) -> list[_Columns]:
     columns = list(table.labels)
     forces = [c[:-1] for c in columns if c.endswith("vx") and {c[:-1] + "y", c[:-1] + "z"} <= set(columns)]
+    written = {label[:-1].lower(): label[:-1] for label in columns}
     groups = []
     for force in forces:
         stem = force[:-1]
@@ -148,8 +149,10 @@ def _groups_by_name(path: Path, table: TimeTable) -> list[_Columns]:
             expected = Quantity(f"{stem}px, {stem}py and {stem}pz, or an ExternalLoads file")
             raise FileError.found(path, "F142", force=Quantity(f"{force}x"), expected=expected)
         candidates = [stem + "m", stem + "t"]
-        candidates += [stem.replace("force", word) + end for word in ("torque", "moment") for end in ("", "m", "t")]
-        torque = next((c for c in candidates if c != stem and _has(table, c)), None)
+        turned = (re.sub("force", word, stem, flags=re.IGNORECASE) for word in ("torque", "moment"))
+        candidates += [other + end for other in turned for end in ("", "m", "t")]
+        wanted = (written.get(c.lower()) for c in candidates if c != stem)
+        torque = next((c for c in wanted if c is not None and _has(table, c)), None)
         words = re.split(r"[_\W]+", stem.lower())
         feet = {_FOOT_WORDS[word] for word in words if word in _FOOT_WORDS}
         groups.append(_Columns(stem.strip("_ "), force, stem + "p", torque, feet.pop() if len(feet) == 1 else None))
