@@ -258,6 +258,22 @@ def test_the_only_model_takes_the_place_of_a_static_trial_that_no_name_tells(tmp
     assert tomllib.loads(init_subject(tmp_path))["model"] == {"static": "static.c3d"}
 
 
+@pytest.mark.parametrize("place", ["Models", "OpenSimData/Model"])
+def test_models_nearby_are_commented_lines(tmp_path, c3d_lab, place):
+    """As AddBiomechanics and OpenCap place them."""
+    folder = tmp_path / "MarkerData"
+    for one in (folder, tmp_path / place, tmp_path / "Ben" / "Model"):
+        one.mkdir(parents=True)
+    shutil.copyfile(c3d_lab / "static.c3d", folder / "walk.c3d")
+    (tmp_path / place / "final.osim").touch()
+    (tmp_path / "Ben" / "Model" / "bens.osim").touch()
+    text = init_subject(folder)
+    assert f'# osim = "../{place}/final.osim"' in text
+    assert "bens" not in text
+    assert "osim" not in tomllib.loads(text)["model"], "which model is not for us to say"
+    assert "final" not in init_subject(folder, nearby=False)
+
+
 def test_forces_nearby_are_looked_for_unless_told_not_to(tmp_path):
     folder = tmp_path / "Anna"
     folder.mkdir()

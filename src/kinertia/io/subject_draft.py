@@ -78,7 +78,8 @@ def init_files(folder: str | Path, nearby: bool = True, marker_set: bool = True)
     text += ["", "[model]"]
     text += [_entry(Model, "osim", models[0].name)] if by_model else _static_lines(static, has_set)
     if not by_model:
-        text += [f"# {_entry(Model, 'osim', model.name)}" for model in models]
+        offered = models or (_models_near(folder) if nearby else [])
+        text += [f"# {_entry(Model, 'osim', _relative(model, folder))}" for model in offered]
     text += _trial_lines(folder, files, trials, nearby)
     sheets = [] if by_model else [file.name for file in files if is_measures_sheet(file)]
     if sheets:
@@ -270,6 +271,21 @@ def _here_or_near(folder: Path, files: Sequence[Path], holds: Callable[[Path], b
             if other != folder and not results and not any(map(is_capture, inside)):
                 holding += [file for file in inside if holds(file)]
     return holding
+
+
+def _models_near(folder: Path) -> list[Path]:
+    """Return OpenSim models of the folders beside this one, as of AddBiomechanics (`Models`) and OpenCap
+    (`OpenSimData/Model`).
+    """
+    beside = _entries(folder.parent)
+    places = [*beside, *(inner for one in beside if one.name == "OpenSimData" for inner in _entries(one))]
+    return [
+        file
+        for one in places
+        if one.name.lower().startswith("model")
+        for file in _entries(one)
+        if file.suffix == ".osim"
+    ]
 
 
 def _entries(folder: Path) -> list[Path]:

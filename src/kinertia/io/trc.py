@@ -201,7 +201,7 @@ def _first_row(lines: list[str]) -> int:
 def _uniform_time(
     path: Path, time: FloatArray, line_numbers: list[int], rate_hz: float
 ) -> tuple[FloatArray, tuple[Finding, ...]]:
-    """Return times on an exactly uniform grid; DataRate gives the step where the times are those of the grid, rounded."""
+    """Return times on an exactly uniform grid; DataRate gives the step where rounding explains the times."""
     _expect_even_steps(path, time, line_numbers)
     if len(time) == 1:
         return time, ()
