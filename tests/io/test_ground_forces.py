@@ -68,7 +68,8 @@ def write_xml(tmp_path):
 
 
 def named(name):
-    return column_group(FORCE, POINT, TORQUE, (f"f{name}_vx", f"f{name}_px", f"f{name}_mx"))
+    force = np.add(FORCE, (0.0, ord(name) - ord("A"), 0.0))
+    return column_group(force, POINT, TORQUE, (f"f{name}_vx", f"f{name}_px", f"f{name}_mx"))
 
 
 REAL = {
@@ -276,6 +277,16 @@ def test_identifiers_of_another_load(write, write_xml, case):
     with refused(code, None, identifier=identifier, **both) as caught:
         plates_of(force_file, write_xml("A", "B", replace=replace))
     assert caught.value.path.name == "loads.xml"
+
+
+def test_a_load_that_is_there_twice_is_refused(write):
+    """By plate and by foot, as some converters write it: the person would weigh twice as much."""
+    unused = column_group((0, 0, 0), POINT, TORQUE, ("f2_vx", "f2_px", "f2_mx"))
+    foot = column_group(FORCE, POINT, TORQUE, ("r_vx", "r_px", "r_mx"))
+    still = {name.replace("f2", "f3"): values for name, values in unused.items()}
+    assert plates_of(write(named("A"), unused, still)).names == ("fA", "f2", "f3")
+    with refused("F144", None, load="r", other="fA", identifier="r_v"):
+        plates_of(write(named("A"), unused, foot))
 
 
 def test_torques_that_nobody_measured_may_be_one_column(write, write_xml):

@@ -6,6 +6,7 @@ import re
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 from pathlib import Path, PureWindowsPath
 
 import numpy as np
@@ -80,6 +81,7 @@ def read_forces(
         findings += more
         table = read_table(path)
         _expect_columns(groups, table, path, loads_path)
+    _expect_different(groups, table, path)
     time, time_findings = uniform_times(path, table.time)
     table = replace(table, time=time, values=table.values[: len(time)])
     turn = np.eye(3) if turn is None else turn
@@ -253,6 +255,15 @@ def _expect_own_columns(groups: Sequence[_Columns], path: Path) -> None:
             if owner != group.force and _plate_name(owner) != _plate_name(group.force):
                 mixed = {"load": Quantity(group.name), "what": Quantity(what), "identifier": Quantity(named)}
                 raise FileError.found(path, "F145", **mixed, force=Quantity(group.force), owner=Quantity(owner))
+
+
+def _expect_different(groups: Sequence[_Columns], table: TimeTable, path: Path) -> None:
+    """Raise FileError where two plates have the same force in every row, as where it is given by plate and by foot."""
+    loaded = [(group, force) for group in groups if (force := _triple(table, group.force)).any()]
+    for (one, force), (other, same) in combinations(loaded, 2):
+        if np.array_equal(force, same):
+            both = {"load": Quantity(f"the force of {other.name}"), "other": Quantity(f"the force of {one.name}")}
+            raise FileError.found(path, "F144", **both, identifier=Quantity(other.force))
 
 
 def _plate_name(identifier: str) -> tuple[str, ...]:
