@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 
 from kinertia.findings.finding import Severity
+from kinertia.io.osim.reader import read_osim
 from kinertia.settings import Subject
 from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow.person import Person
@@ -43,6 +44,17 @@ def test_another_spelling_is_read_as_the_static_trials(person, of_static, of_wal
     assert {(one.evidence["written"].value, one.evidence["label"].value) for one in found} >= {
         (of_walk(label), of_static(label)) for label in ("R.ASIS", "L.Heel")
     }
+    assert max(one.severity for one in result.findings) < Severity.ERROR
+
+
+@pytest.mark.parametrize("of_walk", [str.lower, "Walk_{}".format, lambda label: label.replace(".", " ")])
+def test_another_spelling_is_read_as_the_models(recording_of, file_of, of_walk):
+    walk = recording_of("gait2354/subject01_walk1.trc", "gait2354/subject01_walk1_grf.mot")
+    model = read_osim(file_of("gait2354/subject01_scaled.osim"))
+    trials = (TrialInput(spelled(walk, of_walk)),)
+    result = screen(Person(Subject(name="anna", mass_kg=72.6), trials, model=model))
+    read = result.context.trials[0].recording.markers.labels
+    assert set(read) & set(model.skeleton.labels) == set(walk.markers.labels) & set(model.skeleton.labels)
     assert max(one.severity for one in result.findings) < Severity.ERROR
 
 

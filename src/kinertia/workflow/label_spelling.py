@@ -1,4 +1,4 @@
-"""Gives markers of trials the labels of the static trial, where these differ in spelling only."""
+"""Gives markers of trials the labels of the static trial or the model, where these differ in spelling only."""
 
 from __future__ import annotations
 
@@ -15,11 +15,13 @@ from kinertia.workflow.person import Person
 
 
 def spelled_alike(person: Person) -> Person:
-    """Return the person, with trials labelled as the static trial where only then the marker set fits them (L103)."""
+    """Return the person, with trials labelled as the static trial or the model where only then the marker set fits them
+    (L103).
+    """
     marker_set, static = person.labels, person.static
-    if static is None or person.model is not None or isinstance(marker_set, MarkerSetError):
+    if isinstance(marker_set, MarkerSetError) or (static is None and person.model is None):
         return person
-    known = static.markers.labels
+    known = marker_set.labels if static is None or person.model is not None else static.markers.labels
     trials = [replace(one, recording=_spelled(one.recording, marker_set, known)) for one in person.trials]
     return replace(person, trials=trials)
 
