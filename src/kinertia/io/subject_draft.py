@@ -274,9 +274,7 @@ def _here_or_near(folder: Path, files: Sequence[Path], holds: Callable[[Path], b
 
 
 def _models_near(folder: Path) -> list[Path]:
-    """Return OpenSim models of the folders beside this one, as of AddBiomechanics (`Models`) and OpenCap
-    (`OpenSimData/Model`).
-    """
+    """Return OpenSim models of the folders beside this one, where AddBiomechanics and OpenCap put them."""
     beside = _entries(folder.parent)
     places = [*beside, *(inner for one in beside if one.name == "OpenSimData" for inner in _entries(one))]
     return [
