@@ -91,6 +91,14 @@ def test_rates_whose_times_are_rounded(write, rate, decimals):
     np.testing.assert_allclose(markers.time, np.arange(500) / rate, atol=1e-9)
 
 
+def test_blanks_do_not_show_which_marker_is_missing(write):
+    """Markers behind the missing one would take each other's places."""
+    text = (HEADER + ROWS).replace("L Heel", "L.Heel").replace("0.01\t1\t2\t3", "0.01\t\t\t")
+    assert np.isnan(read_trc(write(text)).positions[1, 0]).all()
+    with refused("F105", 7, found="5 values"):
+        read_trc(write(text.replace("\t", " ")))
+
+
 def test_times_with_many_digits_precede_a_rounded_rate(write):
     """59.94 Hz in the times and 60 in the header: 2.5 ms after as many seconds."""
     rows = "".join(f"{k}\t{k / 59.94:.6f}\t1\t2\t3\t4\t5\t6\n" for k in range(151))

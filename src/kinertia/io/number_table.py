@@ -70,7 +70,7 @@ def read_rows(
         lines: all lines of the file.
         first_line: one-based number of the line where the rows begin.
         columns: number of cells that a row has.
-        may_be_short: rows that end early are filled up with NaN.
+        may_be_short: rows that end early are filled up with NaN, if tabs separate their cells.
 
     Returns:
         (n, columns) the numbers, and the one-based line number of each row.
@@ -108,6 +108,8 @@ def _row(path: Path, number: int, line: str, columns: int, may_be_short: bool) -
     cells = line.split("\t") if "\t" in line else line.split()
     if len(cells) > columns or (len(cells) < columns and not may_be_short):
         raise wrong_cells(path, number, len(cells), columns)
+    if 1 < len(cells) < columns and "\t" not in line:
+        raise wrong_cells(path, number, len(cells), columns, ", as blanks do not show which are missing")
     try:
         row = list(map(float, cells))
     except ValueError:
