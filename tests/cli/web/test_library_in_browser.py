@@ -63,6 +63,7 @@ def test_a_fit_that_ends_repeats_no_form(browser, app, monkeypatch, tmp_path, c3
     page.on("request", lambda request: request.method == "POST" and sent.append(request.url.rpartition("/")[2]))
     page.goto(f"{app.address}people/{person.name}")
     page.get_by_role("button", name="Estimate again").click()
+    playwright.expect(page.locator("[data-progress]")).to_have_count(1)  # else the page that answers closes the list
     page.get_by_text("Single files, or into a folder").click()
     page.get_by_label("Folder on this computer").fill(str(tmp_path / "mine"))
     page.get_by_role("button", name="Write the results there").click()
