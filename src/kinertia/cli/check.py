@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from kinertia.cli.findings_view import show_overview, show_waived_in_vain
+from kinertia.cli.findings_view import show_idle_waivers, show_overview
 from kinertia.cli.options import (
     Calibrate,
     Forces,
@@ -205,7 +205,7 @@ def _show(checked: _Checked, page: Path | None, verbose: bool, waive: Sequence[s
     for overview in checked.overviews:
         show_overview(overview, verbose)
     found = [one for overview in checked.overviews for one in overview.findings]
-    show_waived_in_vain(waive, found, ("file", "recording", "person"))
+    show_idle_waivers(waive, found, ("file", "recording", "person"))
     if checked.lacking:
         out.print(f"kinertia fit also needs, under [subject]: {', '.join(checked.lacking)}", soft_wrap=True)
     if page is not None:

@@ -48,13 +48,14 @@ def show_all(findings: Sequence[Finding]) -> None:
             out.print(f"    explains {muted.line}", soft_wrap=True)
 
 
-def show_waived_in_vain(codes: Sequence[str], findings: Sequence[Finding], stages: Sequence[str] = STAGES) -> None:
-    """Show which codes of `--waive` waived nothing, and why; what rules of other stages would find is not known."""
+def show_idle_waivers(codes: Sequence[str], findings: Sequence[Finding], stages: Sequence[str] = STAGES) -> None:
+    """Show which codes of `--waive` had no effect, and why. Nothing is known of rules in other stages than these."""
     for code in codes:
-        alike = [one for one in findings if one.code.startswith(code)]
-        asked = all(rule(one).stage in stages for one in matching(code))
-        if (alike or asked) and not any(one.status == "waived" for one in alike):
-            why = dict.fromkeys(f"{one.code} is {_WHY_NOT[one.severity is Severity.ERROR]}" for one in alike)
+        found = [one for one in findings if one.code.startswith(code)]
+        later = any(rule(one).stage not in stages for one in matching(code))
+        had_effect = any(one.status == "waived" for one in found)
+        if not had_effect and (found or not later):
+            why = dict.fromkeys(f"{one.code} is {_WHY_NOT[one.severity is Severity.ERROR]}" for one in found)
             out.print(f"note: --waive {code} has no effect: {', '.join(why) or 'it was not found'}", soft_wrap=True)
 
 

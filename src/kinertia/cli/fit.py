@@ -10,7 +10,7 @@ from typing import Annotated, Any, get_args
 import numpy as np
 import typer
 
-from kinertia.cli.findings_view import show_overview, show_waived_in_vain
+from kinertia.cli.findings_view import show_idle_waivers, show_overview
 from kinertia.cli.fit_report import report_tables
 from kinertia.cli.next_commands import next_commands
 from kinertia.cli.options import (
@@ -189,7 +189,7 @@ def _show(fit: Fit, run: _Run, verbose: bool, tables: bool) -> None:
     if verbose or tables:
         report_tables(fit)
     show_overview(fit.overview, verbose)
-    show_waived_in_vain(run.overrule.waive, fit.overview.findings)
+    show_idle_waivers(run.overrule.waive, fit.overview.findings)
     out.print(f"results in {run.folder}", soft_wrap=True)
 
 

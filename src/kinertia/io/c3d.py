@@ -22,7 +22,7 @@ from kinertia.findings.finding import Finding, finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.io.c3d_events import file_events
-from kinertia.io.c3d_outputs import OWN_GROUP, USUAL_UNITS, unit_factor
+from kinertia.io.c3d_outputs import OUTPUT_TYPES, OWN_GROUP, USUAL_UNITS, unit_factor
 from kinertia.io.c3d_plates import PLATE_TYPES, lab_plates, person_on_plates, plate_left_out, to_ground_plates
 from kinertia.io.c3d_structure import doubts_about, with_plain_samples
 from kinertia.io.c3d_subject import subject_data
@@ -257,12 +257,6 @@ def _outputs(parameters: Any, labels: list[str]) -> set[str]:
 
 
 _NAME = re.compile(r"(?:.*:)?([LR])(Vicon)?((?:Hip|Knee|Ankle)(?:Angles|Moment|Power))")
-_KINDS = {
-    "Angles": ("ANGLES", "ANGLE_UNITS"),
-    "Moment": ("MOMENTS", "MOMENT_UNITS"),
-    "Power": ("POWERS", "POWER_UNITS"),
-}
-"""By the end of their names: type of outputs, and the parameter with their unit."""
 
 
 def file_outputs(
@@ -294,6 +288,6 @@ def file_outputs(
 
 
 def _factor(parameters: Any, name: str) -> float | None:
-    kind, parameter = next(one for end, one in _KINDS.items() if name.endswith(end))
-    stated = str(parameter_values(parameters, "POINT", parameter, [""])[0]).strip()
+    kind, unit = next(one for one in OUTPUT_TYPES.items() if name.upper().endswith(one))
+    stated = str(parameter_values(parameters, "POINT", f"{unit}_UNITS", [""])[0]).strip()
     return unit_factor(kind, stated or USUAL_UNITS[kind])

@@ -30,7 +30,8 @@ _EDITOR = "Kinertia "
 _BLOCK = 512
 _ORDERS = {84: "<", 86: ">"}
 _MOST_IN_LIST = 255
-_TYPES = {"ANGLES": "ANGLE", "FORCES": "FORCE", "MOMENTS": "MOMENT", "POWERS": "POWER"}
+OUTPUT_TYPES = {"ANGLES": "ANGLE", "FORCES": "FORCE", "MOMENTS": "MOMENT", "POWERS": "POWER"}
+"""Types of outputs; each has its unit in a parameter of this name and _UNITS."""
 _UNITS = {
     "ANGLES": {"deg": 1.0, "degree": 1.0, "degrees": 1.0, "rad": 180.0 / np.pi, "radians": 180.0 / np.pi},
     "FORCES": {"n": 1.0, "kn": 1e3},
@@ -114,7 +115,7 @@ def frames_of(path: Path) -> C3dFrames:
     rate_hz = struct.unpack_from(f"{parts.order}f", parts.before, 20)[0]
     each = parts.words[:, : 4 * parts.points].reshape(len(parts.words), parts.points, 4).astype(float)
     seen = (each[..., 3] >= 0) & np.isfinite(each[..., :3]).all(axis=-1)
-    stated = {kind: parts.section.get("POINT", f"{name}_UNITS") for kind, name in _TYPES.items()}
+    stated = {kind: parts.section.get("POINT", f"{name}_UNITS") for kind, name in OUTPUT_TYPES.items()}
     units = {kind: str(texts[0]) for kind, texts in stated.items() if texts is not None and len(texts) and texts[0]}
     for kind, unit in units.items():
         if unit_factor(kind, unit) is None:
@@ -152,7 +153,7 @@ def with_outputs(
     described += [""] * (parts.points - len(described)) + [one.description for one in outputs]
     _put_list(section, "DESCRIPTIONS", described)
     groups = list(_texts(section, "TYPE_GROUPS"))
-    for kind, name in _TYPES.items():
+    for kind, name in OUTPUT_TYPES.items():
         ours = [label for label, one in zip(labels, outputs, strict=True) if one.kind == kind]
         if not ours:
             continue
@@ -225,7 +226,7 @@ def _without_ours(parts: _Parts) -> _Parts:
     _put_list(section, "LABELS", [labels[k] for k in kept])
     if described:
         _put_list(section, "DESCRIPTIONS", [described[k] for k in kept if k < len(described)])
-    for kind in _TYPES:
+    for kind in OUTPUT_TYPES:
         listed = _listed(section, kind)
         if ours & set(listed):
             _put_list(section, kind, [label for label in listed if label not in ours])

@@ -126,10 +126,10 @@ def _moment(platform: Any, kind: int, unit: float, moment_unit: float) -> FloatA
 
 
 def _unit_of_matrix(platform: Any, unit: float, stated: float) -> float | None:
-    """Return the unit of the moments that the matrix of a type 4 plate gives: that of its channels or N `unit`.
+    """Return the unit (N m) of a type 4 plate's moments after its calibration matrix, or None if it stays unknown.
 
-    The larger one that puts the mean loaded centre of pressure on the plate counts, since with a smaller one it is
-    always near the middle; None if neither does.
+    It is either the `stated` unit or newtons times the `unit` of lengths. The larger one that puts the mean centre of
+    pressure under load on the plate is chosen: with too small a unit, it is always near the middle.
     """
     corners, force = unit * platform["corners"].T, platform["force"].T
     loaded = np.linalg.norm(force, axis=1) > 5 * LOAD_THRESHOLD_N

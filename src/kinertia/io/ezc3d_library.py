@@ -36,11 +36,11 @@ except ImportError:
 ONLY_ASCII_PATHS = sys.platform == "win32"
 _COPY = "copy.c3d"
 _INTEGER, _FLOAT = 2, 4
+"""Types of a parameter as ezc3d has them."""
 _PLATE_TYPES = {
     **dict.fromkeys(("USED", "TYPE", "ZERO", "CHANNEL"), _INTEGER),
     **dict.fromkeys(("CORNERS", "ORIGIN", "CAL_MATRIX"), _FLOAT),
 }
-"""Type of a parameter as ezc3d has it."""
 _SECONDS, _SECONDS_PER_BYTE = 6.0, 1e-5
 _WAITING = 20.0
 _BYTES, _BYTES_PER_BYTE = 800_000_000, 20

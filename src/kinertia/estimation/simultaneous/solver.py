@@ -226,10 +226,10 @@ class _Place(NamedTuple):
 
 
 def _continued(problem: MapProblem, point: Point, judged: _Judged) -> Point:
-    """Return the optimum, starting from a point near it, and from the Gaussian of the instruments there.
+    """Return the optimum, starting from a point near it and from the instruments' Gaussian there.
 
-    That is updated with these knots' own data: where an instrument may be on time or late, another's is negative, and
-    would let it run away.
+    The Gaussian is updated with the data at these knots. Its precision may be negative where fault-free and faulty are
+    both likely; with other data, such a Gaussian would let the error grow without limit.
     """
     at = _Place(problem.slope(point), judged)
     for _ in range(_MOST_CONTINUED):
