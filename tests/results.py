@@ -71,7 +71,7 @@ def context(*errors, ready=(), shown=None, prior=None, mass_kg=None, trials=None
 
 def well_known(plates=("left",)):
     """Trials that show everything of these plates."""
-    size = 4 * len(plates) + 4
+    size = 5 * len(plates) + 4
     return InstrumentInformation(tuple(plates), 1e8 * np.eye(size), np.zeros(size))
 
 

@@ -37,7 +37,9 @@ from pinocchio_model import axis_forces, pin, pinocchio_model
 
 KEPT = ("R.ASIS", "V.Sacral", "L.Shank.Front", "L.Heel", "R.Toe.Tip", "L.Elbow", "Sternum")
 """A marker or two per segment: the Jacobian does not ask whether they determine every coordinate."""
-PLATES = {name: FaultMixture.certain(sd) for name, sd in zip(PLATE_UNKNOWNS, (0.02, 0.03, 0.02, 0.01), strict=True)}
+PLATES = {
+    name: FaultMixture.certain(sd) for name, sd in zip(PLATE_UNKNOWNS, (0.02, 0.03, 0.02, 0.01, 0.02), strict=True)
+}
 FLOOR = {"x": FaultMixture.certain(0.015), "z": FaultMixture(0.005, 0.02, 0.3), "turn": FaultMixture.certain(0.03)}
 CLOCK = FaultMixture.certain(0.01)
 ZERO_N = FaultMixture(2.0, 9.0, 0.2)

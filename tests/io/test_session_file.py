@@ -5,9 +5,9 @@ import pytest
 from kinertia.io.session_file import PersonInstruments, read_session, session_text
 from refusals import refused
 
-ROW = (0.1, -2.0, 1e-17, 3.0, 1e9, 0.0, 7.0, 1.0 / 3.0)
+ROW = (0.1, -2.0, 1e-17, 3.0, 1e9, 0.0, 7.0, 1.0 / 3.0, 5.0)
 PERSON = PersonInstruments(
-    name='O\'Neill "β"', files=("9f", "a1"), plates=("plate 1",), information=(ROW,) * 8, right=ROW
+    name='O\'Neill "β"', files=("9f", "a1"), plates=("plate 1",), information=(ROW,) * 9, right=ROW
 )
 FOUND = {
     "plate 1": {"position x": (0.0182, 0.0011, "m"), "free moment": (0.001, 0.0002, "N m/N")},
@@ -47,7 +47,7 @@ def test_people_read_millimetres_and_milliseconds(written):
 @pytest.mark.parametrize(
     ("old", "new", "problem"),
     [
-        ('plates = ["plate 1"]', 'plates = ["plate 1", "plate 2"]', "must have 12 rows"),
+        ('plates = ["plate 1"]', 'plates = ["plate 1", "plate 2"]', "must have 14 rows"),
         ("right = [0.1", 'right = ["0.1"', "right"),
         ("[[person]]", "[[people]]", "person"),
         ("kinertia = ", "x = ", "kinertia"),

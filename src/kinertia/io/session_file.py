@@ -41,8 +41,8 @@ class PersonInstruments(Table):
 
     Examples:
         >>> from kinertia.io.session_file import PersonInstruments
-        >>> zeros = (0.0,) * 8
-        >>> PersonInstruments(name="A", files=("9f",), plates=("plate 1",), information=(zeros,) * 8, right=zeros).name
+        >>> zeros = (0.0,) * 9
+        >>> PersonInstruments(name="A", files=("9f",), plates=("plate 1",), information=(zeros,) * 9, right=zeros).name
         'A'
     """
 
@@ -54,7 +54,7 @@ class PersonInstruments(Table):
 
     @model_validator(mode="after")
     def _square(self) -> PersonInstruments:
-        size = 4 * len(self.plates) + 4
+        size = 5 * len(self.plates) + 4
         if {len(self.information), len(self.right), *map(len, self.information)} != {size}:
             raise ValueError(f"information and right must have {size} rows and columns for {len(self.plates)} plates")
         return self

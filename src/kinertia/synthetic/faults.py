@@ -135,7 +135,7 @@ class _Instruments:
     """Plates and synchronisation of a laboratory.
 
     The delay of the forces, and per foot's plate its offset (2, 3) m, gain (2, 1), crosstalk (2,) to the free moment,
-    and zero offset (2, 3) N; both are rotated about the vertical.
+    zero offset (2, 3) N and rotation (2,) about the vertical.
     """
 
     delay_s: float
@@ -143,7 +143,7 @@ class _Instruments:
     gain: np.ndarray
     free_moment: np.ndarray
     zero_offset_n: np.ndarray
-    turn_rad: float = 0.0
+    turn_rad: np.ndarray
 
     @classmethod
     def draw(cls, rng: np.random.Generator, prior: InstrumentPrior) -> _Instruments:
@@ -152,7 +152,8 @@ class _Instruments:
         x, z = (prior.floor[name].draw(rng) for name in "xz")
         offset = np.column_stack([plates[:, 0] + x, np.zeros(2), plates[:, 1] + z])
         delay_s = prior.delay_s.draw(rng)
-        return cls(delay_s, offset, 1.0 + plates[:, 2:3], plates[:, 3], np.zeros((2, 3)), prior.floor["turn"].draw(rng))
+        turn_rad = plates[:, 4] + prior.floor["turn"].draw(rng)
+        return cls(delay_s, offset, 1.0 + plates[:, 2:3], plates[:, 3], np.zeros((2, 3)), turn_rad)
 
     def in_trial(self, rng: np.random.Generator, prior: InstrumentPrior, one_of_several: bool) -> _Instruments:
         """Add what a trial has of its own: zero offsets, gains, and a delay if one of several or not checked."""
@@ -168,7 +169,8 @@ class _Instruments:
         if not (faults.gain or faults.plate_m or faults.delay_s):
             return None
         offset = np.array([[0.0, 0.0, 0.0], [faults.plate_m, 0.0, 0.0]])
-        return cls(faults.delay_s, offset, 1.0 + np.array([[faults.gain], [0.0]]), np.zeros(2), np.zeros((2, 3)))
+        gain = 1.0 + np.array([[faults.gain], [0.0]])
+        return cls(faults.delay_s, offset, gain, np.zeros(2), np.zeros((2, 3)), np.zeros(2))
 
     def read(self, time: np.ndarray, loads: np.ndarray) -> np.ndarray:
         """Return the plates' readings of true loads (n, 2, 6)."""

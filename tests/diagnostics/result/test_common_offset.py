@@ -8,14 +8,14 @@ from kinertia.estimation.simultaneous.instruments import InstrumentInformation, 
 from kinertia.settings import Instruments
 from results import codes, context
 
-FLOOR_X, FLOOR_Z = 8, 9
+FLOOR_X, FLOOR_Z = 10, 11
 """Places of the common offset among the unknowns of two plates, the floor and the delay."""
 
 
 def shown(x_sd_m, z_sd_m):
     """What trials say that know the common offset to these deviations, if the plates' own positions are known."""
-    information = np.diag([1e6] * 8 + [x_sd_m**-2, z_sd_m**-2, 1e8, 1e8])
-    return InstrumentInformation(("left", "right"), information, np.zeros(12))
+    information = np.diag([1e6] * 10 + [x_sd_m**-2, z_sd_m**-2, 1e8, 1e8])
+    return InstrumentInformation(("left", "right"), information, np.zeros(14))
 
 
 def test_along_the_walk_it_goes_unnoticed():

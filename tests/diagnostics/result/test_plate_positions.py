@@ -19,9 +19,9 @@ FINE = (replace(LEFT, value=0.003), RIGHT)
 
 def shown(plates, middle_sd_m, apart_sd_m=0.002):
     """What trials say that know the middle of all plates along x, and each plate's way from it, to these deviations."""
-    size = 4 * len(plates)
-    information = np.diag([*[1e6, 1e6, 1e4, 1e6] * len(plates), 1.0, 1.0, 1e6, 1e6])
-    along = np.arange(0, size, 4)
+    size = 5 * len(plates)
+    information = np.diag([*[1e6, 1e6, 1e4, 1e6, 1e6] * len(plates), 1.0, 1.0, 1e6, 1e6])
+    along = np.arange(0, size, 5)
     mean = np.full((len(plates),) * 2, 1.0 / max(len(plates), 1))
     information[np.ix_(along, along)] = (np.eye(len(plates)) - mean) / apart_sd_m**2 + mean / middle_sd_m**2
     return InstrumentInformation(tuple(plates), information, np.zeros(size + 4))

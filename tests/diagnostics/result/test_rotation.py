@@ -10,16 +10,16 @@ from kinertia.diagnostics.result.smallest_detectable import smallest_detectable
 from kinertia.estimation.simultaneous.instruments import FLOOR_PRIOR, InstrumentInformation, InstrumentPrior
 from results import codes, context, error
 
-TURN = 4 + 2
+TURN = 5 + 2
 """Place of the rotation among the unknowns of one plate, the floor and the delay."""
 
 
 def shown(turn_sd_deg, shared_with_x=0.0):
     """What trials say that know the rotation to this deviation, if the plate's position is known."""
-    information = np.diag([1e6, 1e6, 1e4, 1e6, 1e6, 1e6, 1.0 / np.radians(turn_sd_deg) ** 2, 1e8])
+    information = np.diag([1e6, 1e6, 1e4, 1e6, 1e12, 1e6, 1e6, 1.0 / np.radians(turn_sd_deg) ** 2, 1e8])
     both = shared_with_x * np.sqrt(information[0, 0] * information[TURN, TURN])
     information[0, TURN] = information[TURN, 0] = both
-    return InstrumentInformation(("left",), information, np.zeros(8))
+    return InstrumentInformation(("left",), information, np.zeros(9))
 
 
 @pytest.mark.parametrize("sd_deg", [0.3, 1.0, 1.6])
@@ -51,8 +51,23 @@ def test_it_is_reported_where_it_matters_only():
 
 
 def test_a_rotation_is_an_error_of_all_plates():
-    rotated = error("rotation", 0.05, 0.008, 0.004, "rad", plate=None)
-    (one,) = plate_rotation(context(rotated, shown=shown(0.2)))
+    rotated = [
+        error("rotation", value, 0.02, 0.004, "rad", plate=plate) for plate, value in (("left", 0.05), ("right", 0.06))
+    ]
+    (one,) = plate_rotation(context(*rotated, shown=shown(0.2)))
     assert (one.code, one.where.plate, one.where.axis) == ("P234", None, None)
-    assert one.evidence["rotation_rad"].value == 0.05
-    assert codes(plate_rotation(context(replace(rotated, sd=0.03), shown=shown(0.2)))) == []
+    assert one.evidence["rotation_rad"].value == 0.06
+    unsure = [replace(each, sd=0.04) for each in rotated]
+    assert codes(plate_rotation(context(*unsure, shown=shown(0.2)))) == []
+
+
+@pytest.mark.parametrize("other_rad", [0.001, -0.06])
+def test_a_rotation_that_the_other_plate_does_not_share_is_the_plates_own(other_rad):
+    one, other = (
+        error("rotation", value, 0.02, 0.004, "rad", plate=plate)
+        for plate, value in (("left", 0.09), ("right", other_rad))
+    )
+    found = list(plate_rotation(context(one, other, shown=shown(0.2))))
+    assert codes(found) == ["P237"] * (2 if other.found else 1)
+    assert found[0].where.plate == "left"
+    assert found[0].evidence["rotation_rad"].value == 0.09

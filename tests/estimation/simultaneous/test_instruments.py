@@ -10,18 +10,19 @@ from kinertia.settings import Instruments
 from tests.small_problem import INSTRUMENTS, small_problem
 
 PRIOR = InstrumentPrior()
+EACH = len(PLATE_UNKNOWNS)
 
 
 def shown(plates, seed=0):
     rng = np.random.default_rng(seed)
-    size = 4 * len(plates) + 4
+    size = EACH * len(plates) + 4
     root = rng.normal(size=(size, size)) * 1e3
     return InstrumentInformation(plates, root @ root.T, rng.normal(size=size) * 1e3)
 
 
 def test_what_a_posterior_adds_is_what_was_put_in():
     session, rng = shown(("a", "b")), np.random.default_rng(1)
-    before = [(np.diag(rng.uniform(1e4, 1e6, 12)), rng.normal(size=12)) for _ in range(2)]
+    before = [(np.diag(rng.uniform(1e4, 1e6, 14)), rng.normal(size=14)) for _ in range(2)]
     covariance = np.linalg.inv(session.information + sum(each for each, _ in before))
     mean = covariance @ (session.rhs + sum(each for _, each in before))
     added = InstrumentInformation.of_posterior(("a", "b"), mean, covariance, before)
@@ -30,10 +31,10 @@ def test_what_a_posterior_adds_is_what_was_put_in():
 
 
 def test_a_posterior_that_knows_less_than_before_adds_nothing_negative():
-    before = [(np.diag([1e6] * 8), np.zeros(8))]
-    covariance = np.linalg.inv(np.diag([4e6, 0.9e6, *[2e6] * 6]))
-    added = InstrumentInformation.of_posterior(("a",), np.full(8, 1e-3), covariance, before)
-    np.testing.assert_allclose(np.linalg.eigvalsh(added.information), [0.0, *[1e6] * 6, 3e6], atol=1.0)
+    before = [(np.diag([1e6] * 9), np.zeros(9))]
+    covariance = np.linalg.inv(np.diag([4e6, 0.9e6, *[2e6] * 7]))
+    added = InstrumentInformation.of_posterior(("a",), np.full(9, 1e-3), covariance, before)
+    np.testing.assert_allclose(np.linalg.eigvalsh(added.information), [0.0, *[1e6] * 7, 3e6], atol=1.0)
 
 
 @pytest.mark.parametrize("plates", [("a", "b"), ("b", "a"), ("b",), ("c", "b"), ("c",)])
@@ -42,10 +43,10 @@ def test_plates_that_are_not_there_are_marginalised(plates):
     session = shown(("a", "b"))
     every = tuple(dict.fromkeys([*plates, "a", "b"]))
     wide = session.among(every, PRIOR)
-    sd = np.array([*[PRIOR.plate[name].sd for _ in every for name in ("x", "z", "gain", "free moment")], *[1e-3] * 4])
+    sd = np.array([*[PRIOR.plate[name].sd for _ in every for name in PLATE_UNKNOWNS], *[1e-3] * 4])
     precision = np.diag(1.0 / np.square(sd))
     covariance = np.linalg.inv(wide.information + precision)
-    kept = [*range(4 * len(plates)), *range(len(sd) - 4, len(sd))]
+    kept = [*range(EACH * len(plates)), *range(len(sd) - 4, len(sd))]
     narrow = session.among(plates, PRIOR)
     own = np.linalg.inv(narrow.information + precision[np.ix_(kept, kept)])
     np.testing.assert_allclose(own, covariance[np.ix_(kept, kept)], rtol=1e-6, atol=1e-14)
@@ -56,16 +57,16 @@ def test_plates_that_are_not_there_are_marginalised(plates):
 def test_what_trials_have_of_their_own_is_marginalised():
     """Against the dense posterior of everything."""
     rng = np.random.default_rng(3)
-    root = rng.normal(size=(10, 10))
-    whole = InstrumentInformation(("a",), root @ root.T, rng.normal(size=10))
+    root = rng.normal(size=(11, 11))
+    whole = InstrumentInformation(("a",), root @ root.T, rng.normal(size=11))
     precision, pull = np.diag([2.0, 3.0]), np.array([0.5, -1.0])
     without = whole.without_own(precision, pull)
-    before = np.diag([*[1.0] * 8, 2.0, 3.0])
+    before = np.diag([*[1.0] * 9, 2.0, 3.0])
     covariance = np.linalg.inv(whole.information + before)
-    own = np.linalg.inv(without.information + np.eye(8))
-    np.testing.assert_allclose(own, covariance[:8, :8])
-    mean = covariance @ (whole.rhs + np.append(np.zeros(8), pull))
-    np.testing.assert_allclose(own @ without.rhs, mean[:8])
+    own = np.linalg.inv(without.information + np.eye(9))
+    np.testing.assert_allclose(own, covariance[:9, :9])
+    mean = covariance @ (whole.rhs + np.append(np.zeros(9), pull))
+    np.testing.assert_allclose(own @ without.rhs, mean[:9])
 
 
 @pytest.mark.parametrize("clock_sd_ms", [None, 1.0, 10.0])
@@ -83,9 +84,9 @@ def test_a_trial_that_began_with_the_others_has_hardly_a_delay_of_its_own(clock_
 
 
 def test_what_is_left_without_the_trials_own_says_nothing_negative():
-    information = np.diag([*[1.0] * 8, 2.0])
-    information[0, 8] = information[8, 0] = 1.2
-    left = InstrumentInformation(("a",), information, np.ones(9)).without_own(np.array([[-1.0]]), np.zeros(1))
+    information = np.diag([*[1.0] * 9, 2.0])
+    information[0, 9] = information[9, 0] = 1.2
+    left = InstrumentInformation(("a",), information, np.ones(10)).without_own(np.array([[-1.0]]), np.zeros(1))
     assert np.linalg.eigvalsh(left.information).min() > -1e-12
 
 
@@ -113,7 +114,7 @@ def test_columns_of_the_same_name_have_faults_in_common():
         assert correlation[rhs, left] == 0.0
     assert prior.of_unknowns(("plate 1", "plate 2")).common == ()
     assert InstrumentPrior.stated(Instruments(plate_sd_mm=1.0, gain_sd_percent=0.5)).of_unknowns(names).covariance[
-        0, 8
+        0, 10
     ] == pytest.approx(0.0)
 
 

@@ -1,4 +1,4 @@
-"""P23, do the forces point the right way? A rotation of all plates about the vertical, found or not to be seen.
+"""P23, do the forces point the right way? A rotation of plates about the vertical, found or not to be seen.
 
 A rotation shows in the direction in which the ground pushes the body. Where noisy markers say little of that, the prior
 decides that plates are fault-free, and a rotation of a few degrees goes unnoticed into the joint moments.
@@ -7,11 +7,12 @@ decides that plates are fault-free, and a rotation of a few degrees goes unnotic
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from kinertia.diagnostics.result.context import ResultContext
-from kinertia.diagnostics.result.corrections import corrected
+from kinertia.diagnostics.result.corrections import corrected, equal
 from kinertia.diagnostics.result.smallest_detectable import smallest_detectable
 from kinertia.estimation.simultaneous.calibration_entry import ROTATION
 from kinertia.findings.finding import Finding, finding
@@ -22,8 +23,14 @@ _MATTERS_RAD = float(np.radians(2.0))
 
 
 def plate_rotation(context: ResultContext) -> Iterator[Finding]:
-    """Report a rotation of all plates that was corrected, and one too small for these trials to show."""
-    yield from corrected(context, "P234", "rotation_rad", [one for one in context.errors if one.quantity == ROTATION])
+    """Report rotations that were corrected, of all plates or of one, and one too small for these trials to show."""
+    rotations = [one for one in context.errors if one.quantity == ROTATION]
+    usual_sd = context.ready.uncertainty.instruments.plate["turn"].sd
+    if equal(rotations, usual_sd) or len(rotations) == 1:
+        largest = max(rotations, key=lambda one: abs(one.value))
+        yield from corrected(context, "P234", "rotation_rad", [replace(largest, plate=None)])
+    else:
+        yield from corrected(context, "P237", "rotation_rad", rotations)
     if context.fit.posterior is None:
         return
     least = smallest_detectable(context.fit.posterior.instruments, context.ready.uncertainty.instruments, "turn")

@@ -43,6 +43,8 @@ _QUANTITIES = {
     "zero z": (ZERO, "z"),
 }
 """Quantity and axis of each unknown of the estimate."""
+_CORRECTIONS = ("x", "z", "free moment")
+"""Unknowns that the estimate adds to what was recorded: the errors are their opposites."""
 _UNITS = {**PLATE_ERRORS, **ZERO_UNKNOWNS}
 
 
@@ -112,8 +114,8 @@ def laboratory_errors(
 ) -> Iterator[Solved]:
     """Yield the errors that all trials share, without support.
 
-    A rotation also displaces plates a little, so it comes first, as the cause. A plate's position is the sum of its own
-    and the common offset: a shift of one is a shift of the other.
+    A rotation also displaces plates a little, so rotations come first, as the cause. A plate's position and rotation
+    are the sums of its own and the common ones: a shift of one is a shift of the other.
 
     Args:
         plates: per plate (5,) values of PLATE_ERRORS, as the estimate solves for them, and (5,) their standard
@@ -121,17 +123,14 @@ def laboratory_errors(
         delay_s: the delay of the forces, and its standard deviation.
         prior: of the instruments.
     """
-    floor = len(PLATE_UNKNOWNS) * len(plates)
-    for values, sds in list(plates.values())[:1]:
-        turn = list(FLOOR_UNKNOWNS).index("turn")
-        yield _of_plate(floor + turn, "turn", values[-1], prior.floor["turn"].sd, sds[-1])
-    places = count()
+    places, errors = count(), []
     for plate, (values, sds) in plates.items():
-        for unknown, value, sd in zip(PLATE_UNKNOWNS, values, sds, strict=False):
+        for unknown, value, sd in zip(PLATE_UNKNOWNS, values, sds, strict=True):
             common_sd = prior.floor[unknown].sd if unknown in prior.floor else 0.0
             prior_sd = float(np.hypot(prior.plate[unknown].sd, common_sd))
-            yield _of_plate(next(places), unknown, value, prior_sd, sd, plate=plate)
-    yield _delay(floor + len(FLOOR_UNKNOWNS), delay_s, prior.delay_s.sd)
+            errors.append(_of_plate(next(places), unknown, value, prior_sd, sd, plate=plate))
+    yield from sorted(errors, key=lambda one: one.entry.quantity != ROTATION)
+    yield _delay(len(errors) + len(FLOOR_UNKNOWNS), delay_s, prior.delay_s.sd)
 
 
 def _of_trials(found: FoundErrors, prior: InstrumentPrior, trials: Sequence[str], first: int) -> Iterator[Solved]:
@@ -166,7 +165,7 @@ def _of_plate(
     error, error_sd = float(value), float(sd)
     if quantity == GAIN:
         error, error_sd = -error / (1.0 + error), error_sd / (1.0 + error) ** 2
-    elif unknown in PLATE_UNKNOWNS:
+    elif unknown in _CORRECTIONS:
         error = 0.0 - error
     entry = CalibrationEntry(
         kind="plate",

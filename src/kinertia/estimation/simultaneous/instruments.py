@@ -18,11 +18,13 @@ PLATE_PRIOR: Mapping[str, FaultMixture] = {
     "z": FaultMixture(0.0005, 0.015, FAULT_PROBABILITY),
     "gain": FaultMixture(0.002, 0.03, FAULT_PROBABILITY),
     "free moment": FaultMixture(0.0003, 0.003, FAULT_PROBABILITY),
+    "turn": FaultMixture(float(np.radians(0.1)), float(np.radians(3.0)), FAULT_PROBABILITY),
 }
 """Names and units as in PLATE_UNKNOWNS. Place: centres of pressure of four commercial plates were off by 2.3, 2.6, 11.8
 and 14.0 mm on average (Cedraro et al. 2011, Gait Posture 33:724), part of it a constant; sound plates and others. Gain:
 scale and plates of a laboratory may differ by 2 % before it is worth a warning. Free moment: a tenth of a percent of
-the vertical force at 0.3 m, and ten times that (no source)."""
+the vertical force at 0.3 m, and ten times that (no source). Turn: plates are mounted square; a corner that was surveyed
+or entered 25 mm beside its place rotates a plate by 3 degrees (no source)."""
 FLOOR_PRIOR: Mapping[str, FaultMixture] = {
     "x": FaultMixture(0.0005, 0.005, FAULT_PROBABILITY),
     "z": FaultMixture(0.0005, 0.005, FAULT_PROBABILITY),
@@ -54,7 +56,7 @@ TRIAL_GAIN_PRIOR = FaultMixture(0.001, 0.03, 0.3)
 class InstrumentInformation:
     """Information of one person's trials on plates and synchronisation.
 
-    There are k = 4 p + 4 unknowns for p plates, the common plate offset and the delay, in this order, each plate's as
+    There are k = 5 p + 4 unknowns for p plates, the common plate offset and the delay, in this order, each plate's as
     in PLATE_UNKNOWNS, the common ones as in FLOOR_UNKNOWNS. No prior is included.
 
     Attributes:
@@ -62,9 +64,9 @@ class InstrumentInformation:
         information: (k, k) of normal equations in m, 1, N m/N, rad and s.
         rhs: (k,) their right-hand side: information times the values from these trials.
 
-    >>> shown = InstrumentInformation(("left",), np.eye(8), np.zeros(8))
+    >>> shown = InstrumentInformation(("left",), np.eye(9), np.zeros(9))
     >>> shown.among(("right", "left"), InstrumentPrior()).information.shape
-    (12, 12)
+    (14, 14)
     """
 
     plates: tuple[str, ...]

@@ -1,10 +1,10 @@
 """Defines the errors of force plates and synchronisation, and corrects ground reactions for them.
 
-Each plate may be displaced from its recorded position in the floor's plane, have a wrong gain, read a false vertical
-moment in proportion to the vertical force (crosstalk of its channels), and have a zero offset of its horizontal forces,
-which acts at its middle while somebody stands on it. All plates may be rotated about the vertical relative to the
-cameras; forces may be delayed, in all trials or in one. The plates belong to the laboratory: their displacements are in
-its axes and are shared by all trials; their zero offsets are not.
+Each plate may be displaced from its recorded position in the floor's plane, rotated about the vertical, have a wrong
+gain, read a false vertical moment in proportion to the vertical force (crosstalk of its channels), and have a zero
+offset of its horizontal forces, which acts at its middle while somebody stands on it. All plates may be displaced or
+rotated together relative to the cameras; forces may be delayed, in all trials or in one. The plates belong to the
+laboratory: their displacements are in its axes and are shared by all trials; their zero offsets are not.
 """
 
 from __future__ import annotations
@@ -20,13 +20,12 @@ from kinertia.motion.smoothing import SmoothedSpline
 from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.data import LOAD_THRESHOLD_N, FootLoads
 
-PLATE_UNKNOWNS = {"x": "m", "z": "m", "gain": "1", "free moment": "N m/N"}
-"""Errors of each plate, with units: displacement in the floor's plane, relative error of the gain, and missing vertical
-moment per vertical force."""
+PLATE_UNKNOWNS = {"x": "m", "z": "m", "gain": "1", "free moment": "N m/N", "turn": "rad"}
+"""Errors of each plate, with units: displacement in the floor's plane, relative error of the gain, missing vertical
+moment per vertical force, and rotation about the vertical through its middle."""
 FLOOR_UNKNOWNS = {"x": "m", "z": "m", "turn": "rad"}
 """Common errors of all plates: displacement relative to the floor that the cameras were calibrated to, and rotation
-relative to its axes about the vertical, each plate about its middle. Single plates are mounted square; the cameras'
-axes are laid out by hand."""
+relative to its axes about the vertical, each plate about its middle. The cameras' axes are laid out by hand."""
 PLATE_ERRORS = {**PLATE_UNKNOWNS, **FLOOR_UNKNOWNS}
 """All errors of a plate in all trials: its own and the common ones."""
 ZERO_UNKNOWNS = {"zero x": "N", "zero z": "N"}
@@ -37,7 +36,7 @@ _FIRM_N = 5 * LOAD_THRESHOLD_N
 
 
 def plates_with_floor(count: int) -> np.ndarray:
-    """Return the matrix (5 p, 4 p + 3) from the plates' own and common unknowns to PLATE_ERRORS of p plates."""
+    """Return the matrix (5 p, 5 p + 3) from the plates' own and common unknowns to PLATE_ERRORS of p plates."""
     own, floor = (
         np.array([[name == unknown for name in names] for unknown in PLATE_ERRORS], dtype=float)
         for names in (PLATE_UNKNOWNS, FLOOR_UNKNOWNS)
