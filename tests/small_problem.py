@@ -161,6 +161,12 @@ def point(problem: MapProblem, seed: int = 1) -> tuple[list[np.ndarray], np.ndar
     return coefficients, problem.layout.start + rng.normal(0.0, 0.01, problem.layout.size)
 
 
+def _turned_back(vectors: np.ndarray, angle_rad: np.ndarray) -> np.ndarray:
+    """Rotate vectors (n, 2, 3) about the vertical by minus these angles (n, 2)."""
+    cosine, sine, (x, y, z) = np.cos(angle_rad), np.sin(angle_rad), np.moveaxis(vectors, -1, 0)
+    return np.stack([cosine * x - sine * z, y, sine * x + cosine * z], axis=-1)
+
+
 def residuals(problem: MapProblem, k: int, coefficients: np.ndarray, static: np.ndarray) -> np.ndarray:
     """All residuals of trial k, each over its deviation, from first principles: no cost term is used."""
     trial, layout = problem.trials[k], problem.layout
@@ -176,10 +182,10 @@ def residuals(problem: MapProblem, k: int, coefficients: np.ndarray, static: np.
     errors = whitened(trial.markers - positions, *trial.marker_process)
     loads = trial.ground.loads(trial.time + problem.loads.delay_s(k, static)).reshape(len(trial.time), 2, 6)
     *floor, angle = static[layout[PLATE_ERRORS]][-3:]
-    of_plates = np.add(static[layout[PLATE_ERRORS]][:-3].reshape(-1, 4), [*floor, 0.0, 0.0])
+    of_plates = np.add(static[layout[PLATE_ERRORS]][:-3].reshape(-1, 5), [*floor, 0.0, 0.0, angle])
     values = dict(zip(problem.given.plates, of_plates, strict=True))
     here = np.array([values[name] for name in trial.ground.plates])[trial.ground.carrier]
-    x, z, gain, free_moment = np.moveaxis(here, -1, 0)
+    x, z, gain, free_moment, angle = np.moveaxis(here, -1, 0)
     gains = iter(static[layout[GAINS]])
     own_gains = [np.array([next(gains) for _ in each.ground.plates]) for each in problem.trials][k]
     gain = gain + own_gains[trial.ground.carrier]
@@ -190,9 +196,8 @@ def residuals(problem: MapProblem, k: int, coefficients: np.ndarray, static: np.
     zero = np.stack([zero_x, np.zeros_like(x), zero_z], axis=-1) @ trial.ground.turn.T
     zero *= trial.ground.loaded(trial.time + problem.loads.delay_s(k, static))[..., None]
     loads -= np.concatenate([zero, np.cross(middle, zero)], axis=-1)
-    back = Rotation.from_rotvec([0.0, -angle, 0.0]).as_matrix()
-    about = (loads[..., 3:] - np.cross(middle, loads[..., :3])) @ back.T
-    loads[..., :3] = loads[..., :3] @ back.T
+    about = _turned_back(loads[..., 3:] - np.cross(middle, loads[..., :3]), angle)
+    loads[..., :3] = _turned_back(loads[..., :3], angle)
     loads[..., 3:] = about + np.cross(middle, loads[..., :3])
     offset = np.stack([x, np.zeros_like(x), z], axis=-1) @ trial.ground.turn.T
     loads[..., 3:] += np.cross(offset, loads[..., :3])

@@ -12,7 +12,7 @@ def test_errors_are_recorded_minus_true():
     solved, sds = np.array([-0.01, 0.0, 0.25, -0.002, 0.05]), np.full(5, 0.001)
     errors = [one for _, _, one in laboratory_errors({"left": (solved, sds)}, (0.007, 0.001), InstrumentPrior())]
     assert [(str(one), one.value, one.unit) for one in errors] == [
-        ("all plates: rotation", 0.05, "rad"),
+        ("plate left: rotation", 0.05, "rad"),
         ("plate left: position x", 0.01, "m"),
         ("plate left: position z", 0.0, "m"),
         ("plate left: gain", -0.2, "1"),

@@ -208,7 +208,7 @@ def test_trials_share_plates_by_name_and_the_clock():
     for k, foreign in ((0, "fourth"), (1, "first")):
         static_terms = pair.normal(k, coefficients[k], static).static
         for i, name in enumerate(pair.given.plates):
-            own = np.abs(static_terms[pair.layout[PLATES]][4 * i : 4 * i + 4]).max(axis=1)
+            own = np.abs(static_terms[pair.layout[PLATES]][5 * i : 5 * i + 5]).max(axis=1)
             assert (own == 0).all() if name == foreign else (own > 0).all(), (k, name)
         assert static_terms[pair.layout[CLOCK], pair.layout[CLOCK]].item() > 0
 

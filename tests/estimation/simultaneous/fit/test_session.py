@@ -32,7 +32,7 @@ def test_forces_of_one_of_two_trials_are_late(trial):
     assert found.evidence["delay_s"].value == pytest.approx(frame_s, abs=0.003)
     # and others of the session are told of the clock, which is on time
     ours, theirs = (fit.result.instruments for fit in (sound, late))
-    assert ours.information.shape == theirs.information.shape == (12, 12)
+    assert ours.information.shape == theirs.information.shape == (14, 14)
     for shown in (ours, theirs):
         assert abs(shown.rhs[-1] / shown.information[-1, -1]) < 0.001
 
