@@ -148,11 +148,12 @@ class _Instruments:
     @classmethod
     def draw(cls, rng: np.random.Generator, prior: InstrumentPrior) -> _Instruments:
         """Draw the errors from a prior of `fit_simultaneous`."""
-        plates = np.array([[each.draw(rng) for each in prior.plate.values()] for _ in range(2)])
+        own = {name: each for name, each in prior.plate.items() if name != "turn"}
+        plates = np.array([[each.draw(rng) for each in own.values()] for _ in range(2)])
         x, z = (prior.floor[name].draw(rng) for name in "xz")
         offset = np.column_stack([plates[:, 0] + x, np.zeros(2), plates[:, 1] + z])
         delay_s = prior.delay_s.draw(rng)
-        turn_rad = plates[:, 4] + prior.floor["turn"].draw(rng)
+        turn_rad = prior.floor["turn"].draw(rng) + np.array([prior.plate["turn"].draw(rng) for _ in range(2)])
         return cls(delay_s, offset, 1.0 + plates[:, 2:3], plates[:, 3], np.zeros((2, 3)), turn_rad)
 
     def in_trial(self, rng: np.random.Generator, prior: InstrumentPrior, one_of_several: bool) -> _Instruments:

@@ -24,6 +24,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kinertia.estimation.prior import BspPrior
+from kinertia.estimation.simultaneous.adapted_prior import AdaptedPrior
 from kinertia.estimation.simultaneous.cost_term import CostTerm
 from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations, curve_deviations
 from kinertia.estimation.simultaneous.delay_profile import CostProfile
@@ -32,7 +33,7 @@ from kinertia.estimation.simultaneous.instrument_support import instrument_suppo
 from kinertia.estimation.simultaneous.knot_phases import OfPhases, followed
 from kinertia.estimation.simultaneous.linearised import Linearised, Point, Slope
 from kinertia.estimation.simultaneous.marker_offsets import as_displaced
-from kinertia.estimation.simultaneous.mixture_prior import ErrorPriors, GaussianPrior
+from kinertia.estimation.simultaneous.mixture_prior import GaussianPrior
 from kinertia.estimation.simultaneous.model_evidence import Evidence
 from kinertia.estimation.simultaneous.observed_trial import CalibrationPrior, Observation
 from kinertia.estimation.simultaneous.omitted_unknowns import with_left_out
@@ -68,11 +69,6 @@ _MOST_TRIES = 5
 """Largest number of ever shorter steps tried along one direction."""
 _LEAST_KEPT = 1e-3
 """Least share of the predicted decrease that a step must achieve."""
-_ALIKE_SD = 0.02
-"""The instruments' Gaussian is updated when their mean has moved by more, in standard deviations of all of them
-together, ..."""
-_ALIKE_SHARE = 0.3
-"""... and by more than this share of the distance of all unknowns from the optimum."""
 _NO_IMPACT = 1.05
 """Value of `Observation.impact` below which the motion follows the forces as it is."""
 _MOTION_CONVERGED = 3e-4
@@ -110,10 +106,10 @@ def estimate_simultaneous(
         problem = MapProblem(skeleton, prior, calibration, trials, terms=terms, precise=True)
         ended, model = _optimum(problem, progress)
     evidence = Evidence.of(model, ended.instruments, otherwise)
-    known = _Judged.known(ended.instruments)
+    known = AdaptedPrior.elsewhere(ended.instruments)
     held = partial(_held, problem, ended.point)
     phases, profile = both(
-        lambda: OfPhases.of(problem, ended.point, partial(_continued, judged=known)),
+        lambda: OfPhases.of(problem, ended.point, partial(_continued, adapted=known)),
         lambda: CostProfile.of(problem, ended.here, ended.instruments, ended.point, held),
     )
     model = GaussNewton.of(problem, profile.here).under(profile.instruments)
@@ -154,7 +150,7 @@ def _left_out(problem: MapProblem, model: GaussNewton, static: np.ndarray) -> tu
 
 def _searched(problem: MapProblem, progress: Callable[[float], None]) -> Ended:
     """Take quasi-Newton steps with one quadratic after another until a step is short, then one with a new quadratic."""
-    at = _Place(problem.slope(problem.beginning), _Judged.at_first(problem))
+    at = _Place(problem.slope(problem.beginning), AdaptedPrior.at_first(problem.layout.error_priors))
     begin, damping, scale, iterations = at.slope.cost, _FIRST_DAMPING, np.zeros(problem.layout.size), 0
     while True:
         iterations += 1
@@ -177,39 +173,8 @@ def _searched(problem: MapProblem, progress: Callable[[float], None]) -> Ended:
 
 
 def _ended(begin: float, at: _Place, here: Linearised, iterations: int) -> Ended:
-    cost = begin, at.slope.under(at.judged.gaussian)[0]
-    return Ended(at.slope.point, here, at.judged.gaussian, at.converged, iterations, cost)
-
-
-class _Judged(NamedTuple):
-    """The instruments' Gaussian, and the mean that it gave them (k,) when it was made."""
-
-    gaussian: GaussianPrior
-    mean: np.ndarray
-
-    @classmethod
-    def at_first(cls, problem: MapProblem) -> _Judged:
-        """Return the Gaussian of the priors, before any data."""
-        return cls(GaussianPrior.of(problem.layout.error_priors), np.full(len(problem.layout.error_priors.own), np.inf))
-
-    @classmethod
-    def known(cls, gaussian: GaussianPrior) -> _Judged:
-        """Return a Gaussian taken from another estimate with the same data."""
-        return cls(gaussian, np.full(len(gaussian.pull), np.inf))
-
-    def again(self, priors: ErrorPriors, mean: np.ndarray, covariance: np.ndarray, far: float) -> _Judged:
-        """Update the Gaussian from the posterior mean and covariance under the present one.
-
-        It is unchanged if the mean has hardly moved compared with the distance `far` from the optimum, in half the
-        square of standard deviations.
-        """
-        information, away = np.linalg.inv(covariance), mean - self.mean
-        alike = max(_ALIKE_SD**2, _ALIKE_SHARE**2 * 2.0 * far)
-        if np.isfinite(away).all() and away @ information @ away < alike:
-            return self
-        gaussian = self.gaussian.updated(priors, mean, covariance)
-        rhs = information @ mean - self.gaussian.pull + gaussian.pull
-        return _Judged(gaussian, np.linalg.solve(information - self.gaussian.precision + gaussian.precision, rhs))
+    cost = begin, at.slope.under(at.adapted.gaussian)[0]
+    return Ended(at.slope.point, here, at.adapted.gaussian, at.converged, iterations, cost)
 
 
 class _Place(NamedTuple):
@@ -220,18 +185,18 @@ class _Place(NamedTuple):
     """
 
     slope: Slope
-    judged: _Judged
+    adapted: AdaptedPrior
     converged: bool = False
     began: float = np.inf
 
 
-def _continued(problem: MapProblem, point: Point, judged: _Judged) -> Point:
+def _continued(problem: MapProblem, point: Point, adapted: AdaptedPrior) -> Point:
     """Return the optimum, starting from a point near it and from the instruments' Gaussian there.
 
     The Gaussian is updated with the data at these knots. Its precision may be negative where fault-free and faulty are
     both likely; with other data, such a Gaussian would let the error grow without limit.
     """
-    at = _Place(problem.slope(point), judged)
+    at = _Place(problem.slope(point), adapted)
     for _ in range(_MOST_CONTINUED):
         here = problem.at(at.slope.point, _LEAST_DAMPING)
         model = GaussNewton.of(problem, here, problem.bends(here.point.like(here.slope.rhs).static))
@@ -243,55 +208,55 @@ def _continued(problem: MapProblem, point: Point, judged: _Judged) -> Point:
 
 def _held(problem: MapProblem, point: Point, model: GaussNewton, instruments: GaussianPrior) -> Point:
     """Return the optimum with this Gaussian for the instruments, starting from that with another."""
-    at = _Place(problem.slope(point), _Judged.known(instruments))
+    at = _Place(problem.slope(point), AdaptedPrior.elsewhere(instruments))
     return _descended(problem, model, at, False, CONVERGED).slope.point
 
 
 def _descended(
-    problem: MapProblem, model: GaussNewton | MotionAlone, at: _Place, judging: bool, tolerance: float
+    problem: MapProblem, model: GaussNewton | MotionAlone, at: _Place, adapting: bool, tolerance: float
 ) -> _Place:
     """Take quasi-Newton steps with one quadratic, as long as they are worthwhile."""
-    slope, judged = at.slope, at.judged
+    slope, adapted = at.slope, at.adapted
     pairs, places, began = SecantPairs.none(len(slope.rhs)), slope.instruments, np.inf
     for count in range(_MOST_GRADIENTS):
-        step, promised = _answer(slope, model, pairs, judged)
-        if judging and isinstance(model, GaussNewton):
-            again = _judged_again(problem, model, slope.point, step, judged, max(promised, 0.0))
-            if again is not judged:
-                pairs = pairs.stiffer(places, again.gaussian.precision - judged.gaussian.precision)
-                judged = again
-                step, promised = _answer(slope, model, pairs, judged)
+        step, promised = _answer(slope, model, pairs, adapted)
+        if adapting and isinstance(model, GaussNewton):
+            again = _adapted_again(problem, model, slope.point, step, adapted, max(promised, 0.0))
+            if again is not adapted:
+                pairs = pairs.stiffer(places, again.gaussian.precision - adapted.gaussian.precision)
+                adapted = again
+                step, promised = _answer(slope, model, pairs, adapted)
         began = began if count else promised
         if 0.0 <= promised < tolerance:
-            return _Place(_moved(problem, slope, step), judged, True, began)
+            return _Place(_moved(problem, slope, step), adapted, True, began)
         if (count and promised > _NEAR) or not promised > 0.0:
             break
-        there = _lower(problem, slope, judged.gaussian, step, promised)
+        there = _lower(problem, slope, adapted.gaussian, step, promised)
         if there is None:
             break
         taken = there.point.vector - slope.point.vector
         change = slope.rhs - there.rhs
-        change[places] += judged.gaussian.precision @ taken[places]
+        change[places] += adapted.gaussian.precision @ taken[places]
         expected = 2.0 * promised * float(taken @ step) / float(step @ step)
         slope, pairs = there, pairs.with_pair(taken, change, expected)
-    return _Place(slope, judged)
+    return _Place(slope, adapted)
 
 
 def _answer(
-    slope: Slope, model: GaussNewton | MotionAlone, pairs: SecantPairs, judged: _Judged
+    slope: Slope, model: GaussNewton | MotionAlone, pairs: SecantPairs, adapted: AdaptedPrior
 ) -> tuple[np.ndarray, float]:
     """Return the step of all unknowns, and its predicted decrease of the cost."""
-    rhs = slope.under(judged.gaussian)[1]
-    step = pairs.step(rhs, model.under(judged.gaussian).step)
+    rhs = slope.under(adapted.gaussian)[1]
+    step = pairs.step(rhs, model.under(adapted.gaussian).step)
     return step, 0.5 * float(rhs @ step)
 
 
-def _judged_again(
-    problem: MapProblem, model: GaussNewton, point: Point, step: np.ndarray, judged: _Judged, far: float
-) -> _Judged:
+def _adapted_again(
+    problem: MapProblem, model: GaussNewton, point: Point, step: np.ndarray, adapted: AdaptedPrior, far: float
+) -> AdaptedPrior:
     """Update the instruments' Gaussian, given the step from a point to the optimum."""
-    mean, covariance = model.under(judged.gaussian).of_instruments(point, step)
-    return judged.again(problem.layout.error_priors, mean, covariance, far)
+    mean, covariance = model.under(adapted.gaussian).of_instruments(point, step)
+    return adapted.again(problem.layout.error_priors, mean, covariance, far)
 
 
 def _moved(problem: MapProblem, slope: Slope, step: np.ndarray) -> Slope:
@@ -301,13 +266,13 @@ def _moved(problem: MapProblem, slope: Slope, step: np.ndarray) -> Slope:
 
 def _last_step(problem: MapProblem, model: GaussNewton, at: _Place) -> _Place:
     """Take a step with the last quadratic, if the search has converged and the step is short."""
-    slope, judged, pairs = model.here.slope, at.judged, SecantPairs.none(len(model.here.slope.rhs))
+    slope, adapted, pairs = model.here.slope, at.adapted, SecantPairs.none(len(model.here.slope.rhs))
     if not at.converged:
-        return _Place(slope, judged)
-    step, _ = _answer(slope, model, pairs, judged)
-    judged = _judged_again(problem, model, slope.point, step, judged, 0.0)
-    step, promised = _answer(slope, model, pairs, judged)
-    return _Place(_moved(problem, slope, step), judged, True) if 0.0 <= promised < _ENDED else _Place(slope, judged)
+        return _Place(slope, adapted)
+    step, _ = _answer(slope, model, pairs, adapted)
+    adapted = _adapted_again(problem, model, slope.point, step, adapted, 0.0)
+    step, promised = _answer(slope, model, pairs, adapted)
+    return _Place(_moved(problem, slope, step), adapted, True) if 0.0 <= promised < _ENDED else _Place(slope, adapted)
 
 
 def _lower(
@@ -338,10 +303,10 @@ def _through_impacts(problem: MapProblem, point: Point) -> tuple[np.ndarray, ...
         return point.coefficients
     sure = [replace(trial, impact=1.0) for trial in problem.trials]
     following = problem.of(sure)
-    at = _Place(following.slope(replace(point, static=rigid)), _Judged.at_first(following))
+    at = _Place(following.slope(replace(point, static=rigid)), AdaptedPrior.at_first(following.layout.error_priors))
     for _ in range(_MOST_THROUGH_IMPACTS):
         alone = MotionAlone.of(following, at.slope.point, _LEAST_DAMPING)
-        at = _descended(following, alone, at, judging=False, tolerance=_MOTION_CONVERGED)
+        at = _descended(following, alone, at, adapting=False, tolerance=_MOTION_CONVERGED)
         if at.converged:
             break
     return at.slope.point.coefficients
