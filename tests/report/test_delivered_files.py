@@ -181,7 +181,7 @@ def test_a_second_fit_finds_the_instruments_put_right(request, folder_of, tmp_pa
     first = json.loads((folder / "fit.json").read_text())
     assert again.trial["window_s"] == pytest.approx(first["trials"][0]["window_s"])
     instruments = [one for one in again.summary["calibration"] if one["kind"] in ("plate", "synchronisation")]
-    assert len(instruments) == 17
+    assert len(instruments) == 18
     for one in instruments:
         assert abs(one["value"]) < one["sd"], one
     for kind, unit in (("force", "N"), ("moment", "Nm")):

@@ -18,7 +18,7 @@ from small_problem import one_plate_per_foot
 from validation.calibration_errors import DISTURBANCES, calibrated
 
 SPACING_S = 0.05
-PLATES = {"x": 0.005, "z": 0.005, "gain": 0.02, "free moment": 0.001, "turn": 0.01}
+PLATES = {"x": 0.005, "z": 0.005, "gain": 0.02, "free moment": 0.001, "turn": 0.002}
 EXACT = FaultMixture.certain(1e-9)
 
 
