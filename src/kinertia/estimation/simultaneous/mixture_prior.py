@@ -24,8 +24,6 @@ _MOST_WAYS = 1024
 _MOST_NUMBERS = 2**21
 """Size of all covariances of these combinations: for a hundred instruments and more, fewer are considered."""
 _FEWEST_WAYS = 32
-_AT_ONCE = 2**15
-"""Of these numbers are changed: larger arrays of them would leave the processor's cache."""
 _UNLIKELY = -15.0
 """Log probability relative to the likeliest combination: if none with as many faults exceeds it, the search ends."""
 
@@ -171,22 +169,22 @@ def _posterior(priors: Sequence[FaultMixture], data: np.ndarray, rhs: np.ndarray
     """Return mean (k,) and covariance (k, k) of the posterior, a sum of Gaussians.
 
     Each is weighted by the probability of its combination of faults after data with this information (k, k) and
-    right-hand side (k,). The likeliest combinations with one fault more are searched among those that add one to the
-    likeliest so far.
+    right-hand side (k,).
     """
-    faults = _Faults.of(priors)
-    ways = _Ways.sound(priors, data, rhs)
-    likeliest = float(ways.log_weight[0])
-    weight, first, second = 0.0, np.zeros(len(rhs)), np.zeros_like(data)
-    while len(ways.log_weight) and ways.log_weight.max() > likeliest + _UNLIKELY:
-        now = max(likeliest, float(ways.log_weight.max()))
-        before, own = np.exp(likeliest - now), np.exp(ways.log_weight - now)
-        weight = before * weight + own.sum()
-        first = before * first + own @ ways.centres
-        second = before * second + np.tensordot(own, ways.spread, 1) + (own * ways.centres.T) @ ways.centres
-        likeliest, ways = now, ways.one_fault_more(faults)
-    middle = first / weight
-    return middle, second / weight - np.outer(middle, middle)
+    spread = _sound_spread(priors, data)
+    every = _combinations(priors, spread, rhs)
+    likeliest = max(float(ways.log_weight.max()) for ways in every)
+    weight, middle, square = 0.0, np.zeros(len(rhs)), np.zeros_like(data)
+    with_more = np.zeros(_MOST_WAYS)
+    for ways in reversed(every):
+        own = np.exp(ways.log_weight - likeliest)
+        with_more = with_more[: len(own)] + own
+        weight += own.sum()
+        middle += own @ ways.centres
+        square += ways.squares(own, with_more)
+        with_more = np.bincount(ways.before, with_more, _MOST_WAYS).astype(float)
+    middle /= weight
+    return middle, spread + square / weight - np.outer(middle, middle)
 
 
 def log_chance(priors: ErrorPriors, data: np.ndarray, rhs: np.ndarray) -> float:
@@ -196,14 +194,26 @@ def log_chance(priors: ErrorPriors, data: np.ndarray, rhs: np.ndarray) -> float:
     and right-hand side (k,).
     """
     parts = priors.of_parts
-    data, rhs = parts.T @ data @ parts, parts.T @ rhs
-    faults = _Faults.of(priors.parts)
-    ways = _Ways.sound(priors.parts, data, rhs)
-    weights = [ways.log_weight]
-    while len(ways.log_weight) and ways.log_weight.max() > max(map(np.max, weights)) + _UNLIKELY:
-        ways = ways.one_fault_more(faults)
-        weights += [ways.log_weight] if len(ways.log_weight) else []
-    return float(np.logaddexp.reduce(np.concatenate(weights)))
+    every = _combinations(priors.parts, _sound_spread(priors.parts, parts.T @ data @ parts), parts.T @ rhs)
+    return float(np.logaddexp.reduce(np.concatenate([ways.log_weight for ways in every])))
+
+
+def _sound_spread(priors: Sequence[FaultMixture], data: np.ndarray) -> np.ndarray:
+    """Return the posterior covariance (k, k) without a fault."""
+    return np.linalg.inv(data + np.diag([prior.nominal_sd**-2.0 for prior in priors]))
+
+
+def _combinations(priors: Sequence[FaultMixture], spread: np.ndarray, rhs: np.ndarray) -> list[_Ways]:
+    """Return the combinations of faults worth considering, without a fault, with one, with two ...
+
+    The likeliest with one fault more are searched among those that add one to the likeliest so far.
+    """
+    faults, every = _Faults.of(priors), [_Ways.sound(spread, rhs)]
+    likeliest = float(every[0].log_weight[0])
+    while len(every[-1].log_weight):
+        likeliest = max(likeliest, float(every[-1].log_weight.max()))
+        every.append(every[-1].one_fault_more(faults, spread, likeliest + _UNLIKELY))
+    return every[:-1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,65 +243,84 @@ class _Faults:
 
 @dataclass(frozen=True, eq=False)
 class _Ways:
-    """Combinations of faults among k instruments, n with the same number of faults, and their posteriors.
+    """Combinations of faults among k instruments, n with the same number f of faults, and their posteriors.
+
+    Each adds a fault to a combination with one fault less. The covariance of each is that without a fault, less the
+    square of a column times a share for each fault.
 
     Attributes:
         off: (n, k) which instruments are faulty.
         log_weight: (n,) log probability of each combination, up to a common constant.
-        centres, spread: (n, k), (n, k, k) mean and covariance of its Gaussian.
+        centres, variances: (n, k) mean and variances of its Gaussian.
+        columns, shares: (n, f, k) and (n, f), those of the last fault come last.
+        before: (n,) index of the combination with one fault less.
     """
 
     off: np.ndarray
     log_weight: np.ndarray
     centres: np.ndarray
-    spread: np.ndarray
+    variances: np.ndarray
+    columns: np.ndarray
+    shares: np.ndarray
+    before: np.ndarray
 
     @classmethod
-    def sound(cls, priors: Sequence[FaultMixture], data: np.ndarray, rhs: np.ndarray) -> _Ways:
-        """Return the combination without a fault."""
-        spread = np.linalg.inv(data + np.diag([prior.nominal_sd**-2.0 for prior in priors]))
-        centre = spread @ rhs
+    def sound(cls, spread: np.ndarray, rhs: np.ndarray) -> _Ways:
+        """Return the combination without a fault, of this covariance (k, k)."""
+        k, centre = len(rhs), spread @ rhs
         log_weight = 0.5 * (centre @ rhs + np.linalg.slogdet(spread)[1])
-        return cls(np.zeros((1, len(rhs)), dtype=bool), np.array([log_weight]), centre[None], spread[None])
+        none = np.zeros((1, k), dtype=bool), np.zeros((1, 0, k)), np.zeros((1, 0)), np.zeros(1, dtype=int)
+        return cls(none[0], np.array([log_weight]), centre[None], np.diag(spread)[None], *none[1:])
 
-    def one_fault_more(self, faults: _Faults) -> _Ways:
-        """Return the likeliest that add a fault to one of these, by rank-one updates (Sherman-Morrison)."""
-        k, change, pull = len(faults.pull), faults.precision, faults.pull
-        variance = np.diagonal(self.spread, axis1=1, axis2=2)
-        left = np.where(self.off, 1.0, 1.0 + change * variance)
+    def one_fault_more(self, faults: _Faults, spread: np.ndarray, least: float) -> _Ways:
+        """Return the likeliest that add a fault to one of these, by rank-one updates (Sherman-Morrison).
+
+        `spread` (k, k) is the covariance without a fault, `least` the smallest log probability of interest.
+        """
+        k, change, pull = len(spread), faults.precision, faults.pull
+        left = np.where(self.off, 1.0, 1.0 + change * self.variances)
         moved = change * self.centres - pull
-        log_weight = self.log_weight[:, None] + faults.log_odds
-        log_weight -= 0.5 * (np.log(left) + (moved * self.centres - pull * (self.centres + pull * variance)) / left)
+        away = moved * self.centres - pull * (self.centres + pull * self.variances)
+        log_weight = self.log_weight[:, None] + faults.log_odds - 0.5 * (np.log(left) + away / left)
         log_weight[self.off] = -np.inf
-        before, fault = self._likeliest(log_weight, min(_MOST_WAYS, max(_FEWEST_WAYS, _MOST_NUMBERS // k**2)))
-        column, share = self.spread[before, :, fault], (change / left)[before, fault][:, None]
-        step = (moved / left)[before, fault][:, None]
-        spread, scaled, each = self.spread[before], share * column, 1 + _AT_ONCE // k**2
-        for some in (slice(first, first + each) for first in range(0, len(before), each)):
-            spread[some] -= scaled[some, :, None] * column[some, None, :]
+        before, fault = self._likeliest(log_weight, least, min(_MOST_WAYS, max(_FEWEST_WAYS, _MOST_NUMBERS // k**2)))
+        columns, shares, each = self.columns[before], self.shares[before], np.arange(len(before))
+        column = spread[fault] - np.einsum("nf,nfk->nk", shares * columns[each, :, fault], columns)
+        share, step = ((part / left)[before, fault][:, None] for part in (np.broadcast_to(change, left.shape), moved))
         return _Ways(
             self.off[before] | np.eye(k, dtype=bool)[fault],
             log_weight[before, fault],
             self.centres[before] - step * column,
-            spread,
+            self.variances[before] - share * np.square(column),
+            np.concatenate([columns, column[:, None]], axis=1),
+            np.concatenate([shares, share], axis=1),
+            before,
         )
 
-    def _likeliest(self, log_weight: np.ndarray, most: int) -> tuple[np.ndarray, np.ndarray]:
+    def _likeliest(self, log_weight: np.ndarray, least: float, most: int) -> tuple[np.ndarray, np.ndarray]:
         """Return the likeliest combinations with one fault more, as (m,) previous combination (n) and (m,) fault (k).
 
         Each is returned once, although it is reached as often as it has faults.
         """
-        n, k = log_weight.shape
-        met = min(most * (1 + int(self.off[0].sum())), n * k)
-        order = np.argpartition(log_weight, n * k - met, axis=None)[n * k - met :]
-        order = order[log_weight.ravel()[order] > log_weight.max() + _UNLIKELY]
-        before, fault = np.divmod(order[np.argsort(-log_weight.ravel()[order])], k)
+        k, flat = log_weight.shape[1], log_weight.ravel()
+        likely = np.flatnonzero(flat > least)
+        met = most * (1 + int(self.off[0].sum()))
+        if len(likely) > met:
+            likely = likely[np.argpartition(flat[likely], len(likely) - met)[-met:]]
+        before, fault = np.divmod(likely[np.argsort(-flat[likely])], k)
         words = _in_words(self.off)[before] | _in_words(np.eye(k, dtype=bool))[fault]
         same = np.lexsort(words.T)
         new = np.ones(len(same), dtype=bool)
         new[1:] = (words[same[1:]] != words[same[:-1]]).any(axis=1)
         once = np.sort(same[new])[:most]
         return before[once], fault[once]
+
+    def squares(self, own: np.ndarray, with_more: np.ndarray) -> np.ndarray:
+        """Return the sum (k, k) of squared means weighted with `own` (n,), less the last faults' with `with_more`."""
+        result: np.ndarray = (own * self.centres.T) @ self.centres
+        if self.shares.size:
+            result -= (with_more * self.shares[:, -1] * self.columns[:, -1].T) @ self.columns[:, -1]
+        return result
 
 
 def _in_words(off: np.ndarray) -> np.ndarray:
