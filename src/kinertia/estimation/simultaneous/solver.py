@@ -51,8 +51,12 @@ CONVERGED = 1e-3
 """Predicted decrease of half the sum of squares below which a step is the last of the search: after one more step, from
 a new quadratic, no quantity is further from the optimum than some hundredths of its standard deviation."""
 _ENDED = 0.02
-"""Predicted decrease of the step with that new quadratic below which the search ends; otherwise it continues. A
-quadratic that was made as near as this and led to the last step is the last one, too."""
+"""Predicted decrease of the step with that new quadratic below which the search ends; otherwise it continues."""
+_AT_OPTIMUM = 0.1
+"""A quadratic that was made as near as this and led to the last step is the last one, too, ..."""
+_ACCURATE = 1e-3
+"""... and so is one of which the first step left no more than this share of the predicted decrease: the optimum's would
+hardly be another."""
 _NEAR = 8.0
 """Predicted decrease below which only gradients are recomputed; above it a new quadratic is worth its time."""
 _MOST_GRADIENTS = 10
@@ -166,7 +170,7 @@ def _searched(problem: MapProblem, progress: Callable[[float], None]) -> Ended:
             if end.converged or not at.converged or iterations >= _MAX_ITERATIONS:
                 return _ended(begin, end, here, iterations)
         at = _descended(problem, model, at._replace(slope=here.slope), iterations > 1, CONVERGED)
-        if at.converged and at.began < _ENDED and damping == _LEAST_DAMPING:
+        if at.converged and at.holds and damping == _LEAST_DAMPING:
             return _ended(begin, at, here, iterations)
         stuck = at.slope.point is here.point
         damping = max(100.0 * damping, 1e-4) if stuck else max(0.01 * damping, _LEAST_DAMPING)
@@ -180,14 +184,14 @@ def _ended(begin: float, at: _Place, here: Linearised, iterations: int) -> Ended
 class _Place(NamedTuple):
     """State of the search.
 
-    The gradient, the instruments, whether the last step was short, and the predicted decrease of the first step with
-    the last quadratic.
+    The gradient, the instruments, whether the last step was short, and whether the last quadratic is about that of the
+    optimum.
     """
 
     slope: Slope
     adapted: AdaptedPrior
     converged: bool = False
-    began: float = np.inf
+    holds: bool = False
 
 
 def _continued(problem: MapProblem, point: Point, adapted: AdaptedPrior) -> Point:
@@ -217,7 +221,7 @@ def _descended(
 ) -> _Place:
     """Take quasi-Newton steps with one quadratic, as long as they are worthwhile."""
     slope, adapted = at.slope, at.adapted
-    pairs, places, began = SecantPairs.none(len(slope.rhs)), slope.instruments, np.inf
+    pairs, places, began, holds = SecantPairs.none(len(slope.rhs)), slope.instruments, np.inf, False
     for count in range(_MOST_GRADIENTS):
         step, promised = _answer(slope, model, pairs, adapted)
         if adapting and isinstance(model, GaussNewton):
@@ -227,8 +231,9 @@ def _descended(
                 adapted = again
                 step, promised = _answer(slope, model, pairs, adapted)
         began = began if count else promised
+        holds = holds or promised < (_ACCURATE * began if count == 1 else _AT_OPTIMUM if count == 0 else 0.0)
         if 0.0 <= promised < tolerance:
-            return _Place(_moved(problem, slope, step), adapted, True, began)
+            return _Place(_moved(problem, slope, step), adapted, True, holds)
         if (count and promised > _NEAR) or not promised > 0.0:
             break
         there = _lower(problem, slope, adapted.gaussian, step, promised)
