@@ -156,7 +156,9 @@ def posterior_draws(
     for k, (trial, own) in enumerate(zip(trials, roots_in_trials, strict=True)):
         in_trial = _in_trial(drawn, normal, own, problem.layout.in_root.stop)
         motions = _motions(problem, k, point, trial, in_trial, random)
-        motions += np.einsum("nj,jkc->nkc", extra, np.array([mode.motions[k] for mode in modes]))
+        for motion, shares in zip(motions, extra.astype(motions.dtype), strict=True):  # together they take memory
+            for mode, share in zip(modes, shares, strict=True):
+                motion += share * mode.motions[k]
         of_trials.append(_trial_draws(problem, k, point.static, static, motions, random))
     layout = problem.layout
     return PosteriorDraws(
@@ -185,9 +187,12 @@ def _in_trial(drawn: np.ndarray, normal: np.ndarray, root: np.ndarray, first: in
 def _motions(
     problem: MapProblem, k: int, point: Point, trial: Eliminated, static: np.ndarray, random: np.random.Generator
 ) -> np.ndarray:
-    """Draw differences (n, k, c) of a motion's coefficients, given these (n, S) of the static unknowns."""
+    """Draw differences (n, k, c) of a motion's coefficients, given these (n, S) of the static unknowns.
+
+    They are in single precision, as they are stored.
+    """
     size = (2 * len(static), *point.coefficients[k].shape)
-    steps = _Steps(static.T, random, np.empty(size))
+    steps = _Steps(static.T, random, np.empty(size, np.float32))
     after = steps.write(trial.middle)
     for branch in trial.branches:
         block = after
@@ -196,8 +201,8 @@ def _motions(
     follow, alone = np.split(steps.into, 2)
     noise = motion_noise(problem, k, point.coefficients[k], problem.in_trial(k, point))
     _narrow(alone, noise / problem.trials[k].repeats)
-    follow += alone
-    return follow
+    drawn: np.ndarray = follow + alone
+    return drawn
 
 
 @dataclass(frozen=True, eq=False)
@@ -299,7 +304,7 @@ def _trial_draws(
     plates = instruments.plates_in(k, estimate)
     return TrialDraws(
         problem.bases[k].knots,
-        motions.astype(np.float32),
+        motions,
         np.array([instruments.plates_in(k, each) for each in static]) - plates,
         plates[:, GAIN],
         ground.middles,
