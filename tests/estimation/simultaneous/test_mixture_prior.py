@@ -111,14 +111,10 @@ def test_the_plates_that_are_off_take_the_whole_error_in_every_trial():
     assert np.sqrt(np.diag(covariance)).max() < 0.005
 
 
-@pytest.mark.parametrize("count", [1, 4, 7])
-def test_the_posterior_is_that_of_all_ways_to_be_sound_or_faulty(count):
-    rng = np.random.default_rng(count)
-    priors = [FaultMixture(0.001, 0.015, *of) for of in rng.uniform([0.02, -0.01], [0.3, 0.01], (count, 2))]
-    jacobian = rng.normal(size=(2 * count, count)) / 0.006
-    data, rhs = jacobian.T @ jacobian, jacobian.T @ rng.normal(0.0, 2.0, 2 * count)
+def of_all_ways(priors, data, rhs):
+    """Mean and covariance of the posterior, from every combination of faults."""
     weights, means, covariances = [], [], []
-    for way in product([False, True], repeat=count):
+    for way in product([False, True], repeat=len(priors)):
         sd = np.array([prior.faulty_sd if off else prior.nominal_sd for off, prior in zip(way, priors, strict=True)])
         share = [
             prior.fault_probability if off else 1 - prior.fault_probability
@@ -131,11 +127,33 @@ def test_the_posterior_is_that_of_all_ways_to_be_sound_or_faulty(count):
         size = np.linalg.slogdet(covariances[-1])[1] - 2.0 * np.log(sd).sum() - np.square(centre / sd).sum()
         weights.append(np.log(share).sum() + 0.5 * (pull @ means[-1] + size))
     weight = np.exp(np.array(weights) - max(weights))
-    mean = np.average(means, axis=0, weights=weight)
     covariance = np.average(covariances, axis=0, weights=weight) + np.cov(np.transpose(means), aweights=weight, ddof=0)
+    return np.average(means, axis=0, weights=weight), covariance
+
+
+@pytest.mark.parametrize("count", [1, 4, 7])
+def test_the_posterior_is_that_of_all_ways_to_be_sound_or_faulty(count):
+    rng = np.random.default_rng(count)
+    priors = [FaultMixture(0.001, 0.015, *of) for of in rng.uniform([0.02, -0.01], [0.3, 0.01], (count, 2))]
+    jacobian = rng.normal(size=(2 * count, count)) / 0.006
+    data, rhs = jacobian.T @ jacobian, jacobian.T @ rng.normal(0.0, 2.0, 2 * count)
+    mean, covariance = of_all_ways(priors, data, rhs)
     got, spread = posterior(priors, data, rhs)
     np.testing.assert_allclose(got, mean, atol=1e-7)
     np.testing.assert_allclose(spread, covariance, atol=1e-9)
+
+
+def test_two_faults_may_explain_what_one_does():
+    """Forces of the second of two trials are late; or all are, and those of the first were early."""
+    trial = FaultMixture(0.00003, 0.010, 0.04)
+    priors = [DELAY_S, trial, trial]
+    seen = np.array([[1.0, 1.0, 0.0], [1.0, 0.0, 1.0]])
+    data, rhs = seen.T @ seen / 0.0003**2, seen.T @ [0.0, 0.010] / 0.0003**2
+    mean, covariance = of_all_ways(priors, data, rhs)
+    assert np.sqrt(covariance[1, 1]) > 0.001
+    got, spread = posterior(priors, data, rhs)
+    np.testing.assert_allclose(got, mean, rtol=1e-4)
+    np.testing.assert_allclose(spread, covariance, rtol=1e-4)
 
 
 def test_plates_that_are_mostly_one_share_a_fault():

@@ -11,7 +11,10 @@ from short_walk_fit import estimated, seen
 
 
 def test_forces_of_one_of_two_trials_are_late(trial):
-    """The delay is that trial's: neither the other one nor the plates are accused."""
+    """The delay is that trial's: neither the other one nor the plates are accused.
+
+    That both are late and the first one was early is less likely by far: three percent, as the priors say.
+    """
 
     def fit_of(*late_frames):
         late = [np.roll(trial.foot_loads, frames, axis=0) for frames in late_frames]
@@ -22,9 +25,9 @@ def test_forces_of_one_of_two_trials_are_late(trial):
     for fit, expected in ((sound, 0.0), (late, frame_s)):
         delays = [one for one in fit.posterior.calibration if one.quantity == "delay"]
         clock, first, second = sorted(delays, key=lambda one: one.trial is not None)
-        assert first.value == pytest.approx(0.0, abs=0.0002)
+        assert abs(first.value) < min(0.3 * first.sd, 0.05 * frame_s)
         assert second.value == pytest.approx(expected, abs=3.0 * second.sd)
-        assert second.sd < 0.001
+        assert max(first.sd, second.sd) < 0.25 * frame_s
         assert clock.value == pytest.approx(0.0, abs=0.0005)
     assert of_estimate(sound, "one", "two") == []
     (found,) = of_estimate(late, "one", "two")
