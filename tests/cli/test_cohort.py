@@ -56,7 +56,7 @@ def test_a_dry_run_says_who_how_much_and_what_is_missing(lacking, c3d_lab, tmp_p
     assert "no subject file; kinertia init" in printed
     assert "F191" in printed
     assert "Clara to fit 1" in printed
-    assert "4 people: 1 to fit, 0 as before, 3 without what a fit needs" in printed
+    assert "4 people: 1 to fit, 0 as before, 3 with missing inputs" in printed
     assert "On this computer, in 1 process, each with one thread" in printed
     assert "very roughly 1 min" in printed
     assert not (tmp_path / "out").exists()

@@ -83,7 +83,7 @@ def test_a_person_whose_files_hang_the_reader_is_given_up_and_the_others_are_fit
     assert records["Anna"].fitted
     lost = records[HANGING]
     assert (lost.status, lost.inputs) == (70, "")
-    assert "had no end after 0 min, and its process was ended" in lost.sentence
+    assert "did not finish within 0 min and was stopped" in lost.sentence
     assert "in hang" in Place(cohort, HANGING).log.read_text(encoding="utf-8")
     assert not Place(cohort, HANGING).results.exists()
 
@@ -115,7 +115,7 @@ def test_a_scheduler_that_is_killed_ends_the_command_and_the_next_run_finishes(t
             scheduler.kill()
             _, errors = process.communicate(timeout=120)
     assert process.returncode == 2, errors
-    assert "the Dask scheduler is gone; what is finished is kept: run the command again" in errors
+    assert "lost the Dask scheduler; finished results are kept: run the command again" in errors
     from distributed import LocalCluster
 
     with LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None) as cluster:

@@ -107,7 +107,7 @@ def test_recordings_that_two_have_teach_once(study, quick, tmp_path):
     text = (twin / "subject.toml").read_text(encoding="utf-8").replace('name = "A"', 'name = "A again"')
     (twin / "subject.toml").write_text(f"{text}\n[settings]\ncutoff_hz = 6.0\n", encoding="utf-8")
     outcome = run("cohort", study, "-o", tmp_path / "out", "--learn")
-    assert "note: A again: teaches nothing, since recordings" in outcome.out, outcome.err
+    assert "note: A again: not used for learning, since some of their recordings" in outcome.out, outcome.err
     second = {wanted.subject.name: wanted for wanted in quick[7:]}
     assert [*second] == ["A", "A again", *NAMES[1:]]
     for name, wanted in second.items():

@@ -74,7 +74,7 @@ def slurm_that(tmp_path, monkeypatch):
 
 def test_jobs_that_sbatch_refuses_are_told_at_once(slurm_that):
     slurm_that("refused")
-    with pytest.raises(KinertiaError, match=f"sbatch takes no job: {fake_slurm.REFUSAL}"):  # noqa: SIM117
+    with pytest.raises(KinertiaError, match=f"sbatch refused the job: {fake_slurm.REFUSAL}"):  # noqa: SIM117
         with slurm_cluster(SlurmFile(partition="long"), 1):
             pytest.fail("there is no cluster")
 
@@ -84,9 +84,7 @@ def test_jobs_that_sbatch_refuses_are_told_at_once(slurm_that):
 def test_jobs_of_which_none_reports_are_given_up_with_what_they_said(slurm_that, tmp_path, kept):
     folder = slurm_that("ends", "refused", "ends")
     wanted = SlurmFile(workers=2, logs=str(tmp_path / "logs") if kept else None)
-    words = (
-        r"\d SLURM jobs ended before their workers reported .*1 more were not taken by sbatch.* and none did; likely "
-    )
+    words = r"\d SLURM jobs ended before their workers reported .*1 more were refused by sbatch.* and none did; likely "
     words += f".*log says: {fake_slurm.LAST_WORDS}" if kept else '.*logs = "slurm-logs"'
     with pytest.raises(KinertiaError, match=words), slurm_cluster(wanted, 5) as client:
         list(run_jobs(client, len, [Job("Anna", tmp_path, tmp_path, "", 1, 60.0)]))

@@ -86,7 +86,7 @@ def test_several_people_need_subject_files_of_different_names(subjects, tmp_path
     shutil.copy(subjects / "anna.toml", subjects / "more")
     walk = subjects / "walk.trc"
     for wrong, words in (
-        ((subjects / "anna.toml", walk), "walk.trc: is no subject file"),
+        ((subjects / "anna.toml", walk), "walk.trc: is not a subject file"),
         ((subjects / "anna.toml", subjects / "nobody.toml"), "nobody.toml: F101 "),
     ):
         outcome = run("fit", *wrong, "-o", tmp_path / "out")

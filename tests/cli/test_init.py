@@ -35,7 +35,7 @@ def test_init_leaves_an_existing_file_alone(person):
     (person / "subject.toml").write_text("mine")
     outcome = run("init", person)
     assert outcome.status == 2
-    assert "exists already" in outcome.err
+    assert "already exists" in outcome.err
     assert (person / "subject.toml").read_text() == "mine"
 
 

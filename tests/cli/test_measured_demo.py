@@ -117,7 +117,7 @@ def test_report_has_the_fit_and_says_where_it_is_from(measured_demo):
 def test_terminal_says_what_it_is_and_judges_as_fit_does(measured_demo):
     outcome = measured_demo.outcome
     printed = words(outcome.out)
-    for needed in ("the truth is unknown", "opensim-org/opensim-models", "Apache License 2.0"):
+    for needed in ("whose truth is unknown", "opensim-org/opensim-models", "Apache License 2.0"):
         assert needed in printed
     overview = measured_demo.fit.overview
     assert overview.line in printed

@@ -137,7 +137,7 @@ def test_codes_that_do_not_exist_or_are_hard_are_refused_in_subject_files(lab, w
         assert code in found["message"]
 
 
-@pytest.mark.parametrize(("code", "words"), [("S199", "is no code of a finding"), ("L101", "cannot be waived")])
+@pytest.mark.parametrize(("code", "words"), [("S199", "is not the code of a finding"), ("L101", "cannot be waived")])
 @pytest.mark.parametrize("command", ["check", "fit"])
 def test_codes_that_do_not_exist_or_are_hard_are_refused_as_options(lab, command, code, words):
     outcome = run(command, subject_file(lab, WALK), "--waive", code)

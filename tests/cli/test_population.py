@@ -65,7 +65,7 @@ def test_a_group_is_learnt_and_used(cohort, demo_command, tmp_path):
     (tmp_path / "population.toml").write_text(with_own, encoding="utf-8")
     refused = run("fit", with_group, "-o", tmp_path / "fit")
     assert refused.status == 2
-    assert "was learnt from these trials, too, which would count twice" in refused.err
+    assert "was learnt from these trials as well, so they would count twice" in refused.err
     assert command_line(["--without", "synthetic walker"]) in refused.err
 
 
@@ -76,10 +76,10 @@ def test_what_cannot_be_learnt_is_said(cohort, tmp_path):
         ([cohort, "--without", "nobody"], "nobody is called nobody here"),
         (
             [cohort, "--without", "p0", "--without", "p1"],
-            "its mean and spread take at least 5",
+            "its mean and spread need at least 5",
         ),
         ([tmp_path], "holds no results of kinertia cohort or kinertia fit"),
-        ([cohort, cohort / "people" / "p0"], "of its files are another person's here, too"),
+        ([cohort, cohort / "people" / "p0"], "of its files also belong to another person here"),
     ):
         outcome = run("population", *arguments, "-o", tmp_path / "y.toml")
         assert outcome.status == 2
@@ -99,7 +99,7 @@ def test_a_group_is_those_whom_the_cohort_lists_by_the_names_it_lists_them_by(co
     assert outcome.status == 0, outcome.err
     printed = " ".join(outcome.out.split())
     for name in ("p0", "p5"):
-        assert f"left out: {name}: has no results by people.csv, only older ones" in printed
+        assert f"left out: {name}: has no current results according to people.csv, only older ones" in printed
     text = (tmp_path / "population.toml").read_text(encoding="utf-8")
     assert 'people = ["=p0", "p1", "p2", "p3", "p4"]' in text
     assert "hash5" not in text

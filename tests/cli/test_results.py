@@ -90,7 +90,7 @@ def test_a_folder_without_results_is_told(tmp_path, monkeypatch, command):
     monkeypatch.chdir(tmp_path / "here")
     outcome = run(command[0], tmp_path / "here", *command[1:])
     assert outcome.status == 2
-    assert "no results of kinertia fit are there" in " ".join(outcome.err.split())
+    assert "no results of kinertia fit here" in " ".join(outcome.err.split())
     assert not list((tmp_path / "here").iterdir())
 
 

@@ -129,7 +129,7 @@ def test_knees_of_models_with_opposite_signs_are_not_averaged(tmp_path):
     (part,) = _mean_curves(tmp_path)
     means = [trace["y"][0] for trace in part.figure.data if trace["name"] == "mean"]
     assert sorted(means) == [-30.0, 30.0]
-    assert "panels of their own" in part.caption
+    assert "separate panels" in part.caption
 
 
 @pytest.mark.slow
@@ -157,7 +157,7 @@ def test_a_day_is_what_its_people_say_together_with_one_prior():
     assert line["x"] == ["2026-05-03"]
     assert line["y"] == pytest.approx([100.0 * sum(seen) / noise**2 / total])
     assert line["error_y"]["array"] == pytest.approx([196.0 * total**-0.5])
-    assert part.text == ("2 people on 1 day; of 1 no date is known.",)
+    assert part.text == ("2 people on 1 day; the date is unknown for 1 more.",)
 
 
 def test_without_a_date_the_page_says_who_could_say_it():

@@ -136,5 +136,5 @@ def test_frames_are_read_when_they_are_asked_for(cohort):
     thigh = bsp[(bsp.parameter == "mass") & (bsp.segment == "thigh_r")].compute()
     assert thigh.person.tolist() == list(PEOPLE)
     assert tables["people"].person.compute().tolist()[-1] == "Clara"
-    with pytest.raises(kinertia.FileError, match="folder that kinertia cohort has written"):
+    with pytest.raises(kinertia.FileError, match="folder written by kinertia cohort"):
         kinertia.read_cohort(cohort / "people")

@@ -91,7 +91,7 @@ _MORE = {
 
 
 def application(only: str | None = None) -> typer.Typer:
-    """Build the command line with all its commands, or with one, which avoids loading what the others need."""
+    """Build the command line with all its commands, or with only one, so that the others need not be loaded."""
     app = typer.Typer(
         name="kinertia",
         no_args_is_help=True,

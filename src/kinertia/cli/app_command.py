@@ -20,20 +20,20 @@ _EXAMPLES: dict[str, Callable[[Path], object]] = {"measured": write_measured_lab
 
 def app(
     folder: Annotated[
-        Path | None, typer.Option(help="Library of people and their results; left out: Kinertia in your home folder.")
+        Path | None, typer.Option(help="Library of people and their results (default: Kinertia in your home folder).")
     ] = None,
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port on 127.0.0.1; 0 takes a free one.")] = 0,
     no_browser: Annotated[bool, typer.Option("--no-browser", help="Only show the address.")] = False,
     as_json: Annotated[
-        bool, typer.Option("--json", help="Print address and library as JSON, for scripts, before anything is served.")
+        bool,
+        typer.Option("--json", help="Print the address and library as JSON before the server starts, for scripts."),
     ] = False,
 ) -> None:
     """Check, fit and read reports in the browser, with files dropped on a page.
 
-    The page is served on this computer to this computer only, at an address
-    with a secret part; nothing is sent anywhere. What it keeps is in a folder
-    of yours, in the form that the other commands take. It ends with Ctrl-C or
-    the button on the page. Needs pip install ".\\[app]".
+    The page is served on this computer to this computer only, at an address with a secret part; nothing is sent
+    anywhere. Its data stay in a folder of yours, in the form that the other commands read. It ends with Ctrl-C or the
+    button on the page. Needs pip install ".\\[app]".
 
     [bold]Examples[/]
 
@@ -62,4 +62,4 @@ def app(
         with suppress(KeyboardInterrupt):
             server.run()
     if not as_json:
-        out.print("ended; everything that was finished is in the library")
+        out.print("stopped; all finished results are in the library")

@@ -125,7 +125,9 @@ def check(
     subjects = [path for path in files if path.suffix.lower() == ".toml"]
     given = (static, forces, loads, mass, height, sex, markers, model, calibrate or None)
     if subjects and (len(files) > 1 or any(one is not None for one in given)):
-        raise FileError(subjects[0], "a subject file says it all; give it alone, without other files and options")
+        raise FileError(
+            subjects[0], "a subject file contains everything; give it alone, without other files or options"
+        )
     overrule = overrule_of(waive)
     osim = [read_osim(path) for path in files if path.suffix.lower() == ".osim"]
     measured = [path for path in files if path.suffix.lower() != ".osim"]

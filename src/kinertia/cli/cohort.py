@@ -44,16 +44,16 @@ def cohort(
         Path,
         typer.Argument(
             help="A folder with a folder per person, each with a subject file; or a CSV file with a row per "
-            "person: subject (path of the subject file) and, if wanted, name."
+            "person: subject (path of the subject file) and, optionally, name."
         ),
     ],
     output: Output = Path("out"),
     scheduler: Annotated[
-        str | None, typer.Option(help="Address of a Dask scheduler that runs already; left out: this computer.")
+        str | None, typer.Option(help="Address of a running Dask scheduler (default: this computer).")
     ] = None,
     slurm: Annotated[
         Path | None,
-        typer.Option(help="File (.toml) that says how to ask SLURM for workers: docs/cohort.md has one to edit."),
+        typer.Option(help="File (.toml) with the SLURM settings for workers: docs/cohort.md has a template."),
     ] = None,
     learn: Annotated[
         bool,
@@ -63,31 +63,32 @@ def cohort(
             "go to the folder learnt.",
         ),
     ] = False,
-    csv: Annotated[bool, typer.Option("--csv", help="Write all tables as CSV, too.")] = False,
+    csv: Annotated[bool, typer.Option("--csv", help="Also write all tables as CSV.")] = False,
     norms: Annotated[
         Path | None, typer.Option(help="File of kinertia norms: adds Gait Profile Scores to tables and page.")
     ] = None,
     json_lines: Annotated[
-        bool, typer.Option("--json-lines", help="Print what happens as JSON, an object per line, and nothing else.")
+        bool, typer.Option("--json-lines", help="Print progress as JSON only, one object per line.")
     ] = False,
     dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Only say who would be fitted, what is missing, and roughly how long.")
+        bool,
+        typer.Option(
+            "--dry-run", help="Only list who would be fitted, what is missing, and roughly how long it would take."
+        ),
     ] = False,
     overwrite: Overwrite = False,
     quiet: Quiet = False,
     as_json: Annotated[
-        bool, typer.Option("--json", help="Print how it ended for everybody as JSON, for scripts, and nothing else.")
+        bool, typer.Option("--json", help="Print everyone's outcome as JSON only, for scripts.")
     ] = False,
 ) -> Outcome:
     """Fit everyone in a study in parallel; continue where the last run ended.
 
-    Results of each person go to out/people/NAME, as kinertia fit writes them;
-    tables of everybody beside them. Run it again after adding people or
-    correcting files: only those are fitted whose files or settings have
-    changed. It needs the extra "cohort".
+    Results of each person go to out/people/NAME, as kinertia fit writes them; tables of all people are beside them. Run
+    it again after adding people or correcting files: only people whose files or settings have changed are fitted. It
+    needs the extra "cohort".
 
-    Exit status 1 if an ERROR of somebody's result is open, or somebody could
-    not be fitted: people.csv lists who, and why.
+    Exit status 1 if a result has an open ERROR or a person could not be fitted: people.csv lists who, and why.
 
     [bold]Examples[/]
 
@@ -130,7 +131,7 @@ def cohort(
 
 
 def _plan(people: Sequence[Person], output: Path, where: _Where, lines: JsonLines) -> Outcome:
-    """Show who would be fitted, and fit nobody; status 1 where somebody lacks what a fit needs."""
+    """Show who would be fitted, without fitting anyone; status 1 if anyone's inputs are incomplete."""
     everybody = _standing(people, output, lines)
     _report_plan(everybody, where)
     plan = [_planned(one) for one in everybody]
@@ -186,7 +187,7 @@ class _Where:
         return f"On this computer, in {size.workers} process{'es' if size.workers > 1 else ''}, {each}"
 
     def workers(self, people: int) -> int:
-        """Return the number of workers; one where only the scheduler knows."""
+        """Return the number of workers; one where only the scheduler has it."""
         if self.scheduler:
             return 1
         return local_size(people).workers if self.slurm is None else min(self.slurm.workers, people)
@@ -194,14 +195,14 @@ class _Where:
 
 @dataclass(frozen=True)
 class _Wanted:
-    """Of the tables: whether as CSV, too, and norms to score gaits against."""
+    """Options of the tables: whether to write CSV as well, and norms for the gait scores."""
 
     csv: bool
     norms: Mapping[str, Norm]
 
 
 def _run(people: Sequence[Person], output: Path, where: _Where, wanted: _Wanted, lines: JsonLines) -> list[Record]:
-    """Fit the people who are due, and write tables and page of everybody."""
+    """Fit the people who are due, and write everyone's tables and page."""
     prepare_folder(output)
     everybody = _standing(people, output, lines)
     _say_due(everybody)
@@ -221,7 +222,7 @@ def _run(people: Sequence[Person], output: Path, where: _Where, wanted: _Wanted,
 def _run_again(
     people: Sequence[Person], outcomes: Sequence[Record], output: Path, where: _Where, wanted: _Wanted, lines: JsonLines
 ) -> list[Record]:
-    """Fit everybody again with group body data and session calibration from the first fits."""
+    """Refit everyone with group body data and session calibration from the first fits."""
     there = {record.person for record in outcomes if record.fitted}
     with shown_progress() as shown:
         taught = [person for person in people if person.name in there]
@@ -253,7 +254,7 @@ def _standing(people: Sequence[Person], output: Path, lines: JsonLines) -> list[
 
 
 def _fitted(everybody: Sequence[Standing], output: Path, where: _Where, lines: JsonLines) -> dict[str, Record]:
-    """Fit everybody who is due and return records by name; nothing is started if nobody is due."""
+    """Fit everyone who is due and return records by name; nothing is started if no one is due."""
     jobs = [Job.of(one, output) for one in everybody if one.due]
     records: dict[str, Record] = {}
     if not jobs:
@@ -274,7 +275,7 @@ def _fitted(everybody: Sequence[Standing], output: Path, where: _Where, lines: J
 def _say_due(everybody: Sequence[Standing]) -> None:
     due, lacking = sum(one.due for one in everybody), sum(bool(one.problem) for one in everybody)
     kept = len(everybody) - due - lacking
-    out.print(f"{len(everybody)} people: {due} to fit, {kept} as before, {lacking} without what a fit needs")
+    out.print(f"{len(everybody)} people: {due} to fit, {kept} as before, {lacking} with missing inputs")
 
 
 def _report_plan(everybody: Sequence[Standing], where: _Where) -> None:

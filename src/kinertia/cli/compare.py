@@ -27,8 +27,8 @@ from kinertia.report.saved_fit import load_fit
 
 
 def compare(
-    results: Annotated[list[Path], typer.Argument(help="Folders that kinertia fit has written, two or more.")],
-    output: Annotated[Path, typer.Option("--output", "-o", help="Folder for page and table.")] = Path("comparison"),
+    results: Annotated[list[Path], typer.Argument(help="Two or more folders written by kinertia fit.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the page and table.")] = Path("comparison"),
     overwrite: Overwrite = False,
     quiet: Quiet = False,
 ) -> Outcome:

@@ -21,7 +21,7 @@ from kinertia.trial.rms import rms_length
 
 def demo(
     measured: Annotated[
-        bool, typer.Option("--measured", help="Fit a measured walk, which is downloaded once, instead.")
+        bool, typer.Option("--measured", help="Fit a measured walk instead (downloaded once).")
     ] = False,
     output: Output = Path("out"),
     overwrite: Overwrite = False,
@@ -55,7 +55,7 @@ def _measured_demo(folder: Path) -> Outcome:
     with shown_progress() as progress:
         fit = run_measured_demo(folder, progress)
     out.print(
-        "\nA measured walk, of which the truth is unknown: OpenSim's gait2354 example, a man walking over force "
+        "\nA measured walk, whose truth is unknown: OpenSim's gait2354 example, a man walking over force "
         "plates, from https://github.com/opensim-org/opensim-models (Apache License 2.0)."
     )
     show_overview(fit.overview, verbose=False)
@@ -152,8 +152,8 @@ def _verdict(before: tuple[float, float, float], after: tuple[float, float, floa
     )
     return (
         f"The simultaneous estimate changes the literature's errors by: {shares}. It weighs "
-        "the literature against the data, corrects the whole motion, and is always physically possible; bsp.csv says "
-        "per parameter how much was measured."
+        "the literature against the data, corrects the whole motion, and is always physically possible; bsp.csv "
+        "shows how much of each parameter was measured."
     )
 
 
@@ -170,7 +170,7 @@ def _two_level_verdict(before: tuple[float, float, float], after: tuple[float, f
             "rather than the rule: see docs/validation/study.md."
         )
     return (
-        f"{finding} than the literature: with skin motion, small residuals do not mean right body segment parameters. "
-        "That is the finding of the study whose two-level method this is (docs/validation/study.md); without noise the "
-        "same method finds them exactly (kinertia study table1)."
+        f"{finding} than the literature: with skin motion, small residuals do not prove the parameters right. "
+        "The study that two-level comes from found the same (docs/validation/study.md); without noise two-level "
+        "finds them exactly (kinertia study table1)."
     )

@@ -20,7 +20,7 @@ _NARROWEST = 40
 
 
 def explain(
-    code: Annotated[str, typer.Argument(help="A code (P213), a question (P21) or a family of them (P).")],
+    code: Annotated[str, typer.Argument(help="A code (P213), a question (P21) or a family (P).")],
 ) -> Outcome:
     """Explain a finding: what it means, what it does to results, likely causes, and what to do.
 
@@ -61,7 +61,7 @@ def _show_questions(rules: Sequence[Rule]) -> None:
             asked = one.question
             out.print(f"\n{asked}  {one.asks}", style="bold", soft_wrap=True)
         out.print(f"  {one.code}  {one.severity.lower():<9}  {one.name}", soft_wrap=True)
-    out.print(f"\nmore of one: kinertia explain {rules[0].code}")
+    out.print(f"\nfor details of one: kinertia explain {rules[0].code}")
 
 
 def _show_rule(one: Rule) -> None:

@@ -26,10 +26,10 @@ def _conventions(typed: str) -> list[str]:
 
 
 def export(
-    results: Annotated[Path, typer.Argument(help="Folder that kinertia fit has written.")],
+    results: Annotated[Path, typer.Argument(help="Folder written by kinertia fit.")],
     csv: Annotated[bool, typer.Option("--csv", help="A file per table, for Excel, R and others.")] = False,
     as_json: Annotated[
-        bool, typer.Option("--json", help="One file, tables.json; which files were written is printed as JSON, too.")
+        bool, typer.Option("--json", help="One file, tables.json; the names of written files are also printed as JSON.")
     ] = False,
     mat: Annotated[bool, typer.Option("--mat", help="One file, tables.mat, for MATLAB and Octave.")] = False,
     c3d: Annotated[
@@ -52,7 +52,7 @@ def export(
             "--draws", min=0, metavar="N", help="N posterior draws as OpenSim files: model, motion and loads together."
         ),
     ] = 0,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Which of the kept draws; 0: the first.")] = 0,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the selection of draws; 0: the first ones.")] = 0,
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the files.")] = Path("export"),
     overwrite: Overwrite = False,
     quiet: Quiet = False,
@@ -71,7 +71,7 @@ def export(
     """
     if not (csv or as_json or mat or c3d or draws):
         forms = "--csv, --json, --mat, --c3d or --draws N"
-        raise typer.BadParameter(f"say in which form: {forms} (several at once are fine)")
+        raise typer.BadParameter(f"choose a form: {forms} (several at once are fine)")
     if convention is not None and convention not in CONVENTIONS:
         raise typer.BadParameter(f"--convention is {' or '.join(CONVENTIONS)}, not '{convention}'")
     results_folder(output, overwrite)

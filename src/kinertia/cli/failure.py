@@ -22,7 +22,7 @@ def show_failure(error: Exception, given: Sequence[str]) -> None:
     problem = traceback.format_exception_only(error)[-1].strip() or type(error).__name__
     where = _logged(error, given)
     sent = f"please send {where} to its developers" if where else "its log file could not be written"
-    show_error(f"Kinertia failed, which it should not on any input ({problem}); no results were written; {sent}")
+    show_error(f"Internal error of Kinertia ({problem}); no results were written; {sent}")
 
 
 def _logged(error: Exception, given: Sequence[str]) -> Path | None:

@@ -158,7 +158,9 @@ def _runs(
     if len(trials) > 1:
         for path in trials:
             if path.suffix.lower() != ".toml" and not path.is_dir():
-                raise FileError(path, "is no subject file; several are fitted by their subject files only")
+                raise FileError(
+                    path, "is not a subject file; several people can only be fitted from their subject files"
+                )
         names = [_name(path) for path in trials]
         for k, name in enumerate(names):
             if before := [path for path, other in zip(trials, names[:k], strict=False) if same_folder(name, other)]:
@@ -232,7 +234,7 @@ def _wanted(trial: Path, options: dict[str, Any], method: str | None) -> Subject
     if trial.suffix.lower() == ".toml":
         given = [name for name, value in options.items() if value is not None]
         if given:
-            raise FileError(trial, f"a subject file says it all; put {', '.join(given)} into it instead")
+            raise FileError(trial, f"a subject file contains everything; put {', '.join(given)} into it instead")
         wanted = read_subject(trial)
     else:
         wanted = _from_options(trial, options)

@@ -29,8 +29,8 @@ def report_tables(fit: Fit) -> None:
     out.print(_bsp_table(fit))
     if fit.posterior is not None:
         out.print(
-            "** measured by the data, * informed by them, no mark: little information; about as uncertain as the "
-            "prior, even where the value moved; sd: error bar\n"
+            "** well informed by the data, * partly informed, no mark: not informed (about as uncertain as the prior, "
+            "even where the value changed); sd: standard deviation\n"
         )
     named = {"measured": "stated", "literature": start_of(fit).word}
     masses = ", ".join(f"{named.get(source, source)} {value:.1f}" for source, value in mass.items())

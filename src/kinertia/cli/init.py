@@ -43,7 +43,7 @@ def init(
         return _measures(folder)
     path, own = folder / SUBJECT, folder / MARKER_SET
     if path.exists():
-        raise FileError(path, "exists already and is left alone; remove it to draft a new one")
+        raise FileError(path, "already exists and was not changed; remove it to draft a new one")
     if folder.is_dir() and not os.access(folder, os.W_OK):
         raise FileError(folder, "cannot be written to; copy the files into a folder of your own, and draft it there")
     files = init_files(folder)
@@ -55,7 +55,7 @@ def init(
         out.print(note, soft_wrap=True)
     if MARKER_SET in files:
         out.print(
-            f"no marker-set preset fits: wrote {own}, drafted from where the markers are; check it", soft_wrap=True
+            f"no marker-set preset fits: wrote {own}, drafted from the marker positions; check it", soft_wrap=True
         )
     check = command_line(["kinertia", "check", str(path)])
     out.print(f"wrote {path}: fill in what it asks for, then run: {check}", soft_wrap=True)
@@ -69,13 +69,13 @@ def _measures(folder: Path) -> Outcome:
     if not folder.is_dir():
         raise FileError.found(folder, "F101", **missing_file(folder, str(folder), "the folder of the person's files"))
     if sheet.exists():
-        raise FileError(sheet, "exists already and is left alone; remove it to write a new one")
+        raise FileError(sheet, "already exists and was not changed; remove it to write a new one")
     write_then_rename(picture, measures_picture())
     write_then_rename(sheet, measures_sheet())
     init_again = command_line(["kinertia", "init", str(folder)])
     out.print(
-        f"wrote {sheet}: fill in the column cm for what you measure, where {picture} shows; {init_again} "
-        'takes it up, and in a subject file that is there already name it under [prior]: measures = "measures.csv"',
+        f"wrote {sheet}: fill in the column cm for what you measure ({picture} shows where). Then {init_again} "
+        'uses it; a subject file that exists already needs measures = "measures.csv" under [prior]',
         soft_wrap=True,
     )
     return Outcome({"sheet": str(sheet), "picture": str(picture)})

@@ -25,7 +25,7 @@ from kinertia.workflow.session import SessionInstruments, person_instruments, se
 
 def instruments(
     subjects: Annotated[
-        list[Path], typer.Argument(help="Subject files (.toml) of the people that were measured in the session.")
+        list[Path], typer.Argument(help="Subject files (.toml) of the people measured in the session.")
     ],
     output: Annotated[Path, typer.Option("--output", "-o", help="The file to write.")] = Path("instruments.toml"),
     quiet: Quiet = False,

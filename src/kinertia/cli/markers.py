@@ -22,9 +22,10 @@ _LISTED = 6
 
 
 def markers(
-    file: Annotated[Path, typer.Argument(help="A recording (.c3d, .trc, .tsv, .csv), best the static trial.")],
+    file: Annotated[Path, typer.Argument(help="A recording (.c3d, .trc, .tsv, .csv), preferably the static trial.")],
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="File (.toml) for a draft of a marker set of your own.")
+        Path | None,
+        typer.Option("--output", "-o", help="File (.toml) to which a draft of your own marker set is written."),
     ] = None,
 ) -> Outcome:
     """Show the labels of a file against every marker-set preset, and draft a marker set from them.
@@ -59,9 +60,11 @@ def markers(
     if recognised:
         out.print(f"{recognised} is recognised by itself", soft_wrap=True)
         if speed_m_s(recording.markers) < STILL_M_S and preset_of(recording) is None:
-            out.print("but this static trial lacks landmarks of it: draft one of your own with -o", soft_wrap=True)
+            out.print(
+                "but this static trial lacks some of its landmarks: draft one of your own with -o", soft_wrap=True
+            )
     elif output is None:
-        out.print("no preset is recognised; for a draft of your own: -o our_lab.toml", soft_wrap=True)
+        out.print("no preset fits these labels; to draft your own: -o our_lab.toml", soft_wrap=True)
     content = {"labels": labels, "presets": presets, "recognised": recognised, "draft": None}
     return Outcome(content if output is None else {**content, **_draft(recording, output)})
 
@@ -69,7 +72,7 @@ def markers(
 def _draft(recording: Recording, output: Path) -> dict[str, Any]:
     """Write a draft, and report what it lacks."""
     if output.exists():
-        raise FileError(output, "exists already and is left alone; remove it, or give another name")
+        raise FileError(output, "already exists and was not changed; remove it, or give another name")
     draft = draft_marker_set(recording, output.stem)
     write_then_rename(output, draft.text)
     for note in draft.notes:

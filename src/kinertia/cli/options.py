@@ -82,13 +82,13 @@ Waive = Annotated[
     typer.Option("--waive", metavar="CODE", help="Go on in spite of this ERROR; shown as waived. May be repeated."),
 ]
 Output = Annotated[Path, typer.Option("--output", "-o", help="Folder for the results; Kinertia's own are replaced.")]
-Overwrite = Annotated[bool, typer.Option("--overwrite", help="Write into a folder that holds other files, too.")]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Write even if the folder holds other files.")]
 Loads = Annotated[
     Path | None,
     typer.Option("--loads", "--external-loads", help="OpenSim ExternalLoads (.xml) that explains the forces file."),
 ]
 Quiet = Annotated[
-    bool, typer.Option("--quiet", "-q", callback=be_quiet, help="Show errors only; the exit status says the rest.")
+    bool, typer.Option("--quiet", "-q", callback=be_quiet, help="Show errors only; the exit status gives the outcome.")
 ]
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Show every assumption and detail as well.")]
 
@@ -101,7 +101,7 @@ def overrule_of(waive: Sequence[str] | None) -> Overrule:
     """
     overrule = Overrule(waive=tuple(code.upper() for code in waive or ()))
     for code in unknown_codes(overrule):
-        hard = "cannot be waived: nothing can be computed with it" if matching(code) else "is no code of a finding"
+        hard = "cannot be waived: nothing can be computed with it" if matching(code) else "is not the code of a finding"
         raise typer.BadParameter(f"{code} {hard}; see kinertia explain {code[:1]}")
     return overrule
 

@@ -14,7 +14,7 @@ import typer
 from kinertia.cli.terminal import out, print_json
 from kinertia.errors import KinertiaError, findings_of
 
-_AS_JSON = Annotated[bool, typer.Option("--json", help="Print the results as JSON, for scripts, and nothing else.")]
+_AS_JSON = Annotated[bool, typer.Option("--json", help="Print the results as JSON only, for scripts.")]
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Outcome:
 def add_command(
     app: typer.Typer, command: Callable[..., Any], name: str | None = None, panel: str | None = None
 ) -> None:
-    """Register a command of `app`; one that returns an `Outcome` gets `--json`, which prints it in place of all words.
+    """Register a command of `app`; one that returns an `Outcome` gets `--json`, which prints it instead of all text.
 
     A command that has an `as_json` of its own receives the option, too. `panel` is its heading in `kinertia --help`.
     """

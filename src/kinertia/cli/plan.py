@@ -28,7 +28,7 @@ from kinertia.workflow.from_files import prepare_subject
 def plan(
     subject: Annotated[
         Path | None,
-        typer.Argument(help="Subject file (.toml) whose trials to choose from; the package's motions if left out."),
+        typer.Argument(help="Subject file (.toml) with the trials to choose from (default: the built-in motions)."),
     ] = None,
     output: Output = Path("out"),
     overwrite: Overwrite = False,

@@ -29,7 +29,7 @@ _SHOWN = 12
 
 def population(
     results: Annotated[
-        list[Path], typer.Argument(help="Folders of kinertia cohort, or of kinertia fit, of people of one group.")
+        list[Path], typer.Argument(help="Folders written by kinertia cohort or kinertia fit, for people of one group.")
     ],
     output: Annotated[Path, typer.Option("--output", "-o", help="The file to write.")] = Path("population.toml"),
     without: Annotated[
@@ -87,7 +87,7 @@ def _read(results: list[PersonResults], without: set[str]) -> tuple[list[PersonI
                 continue
             own = _recordings(saved)
             if twice := set(own) & set(files):
-                problem = f"{len(twice)} of its files are another person's here, too; give each once"
+                problem = f"{len(twice)} of its files also belong to another person here; give each once"
                 raise PriorError(f"{one.folder}: {problem}")
             try:
                 person = information_of(saved.fit)
@@ -118,6 +118,6 @@ def _report(learnt: LearntPrior) -> None:
     out.print(table)
     counts = ", ".join(f"{words.count(word)} {word}" for word in ("measured", "informed", "assumed"))
     out.print(
-        f"{learnt.people} people; means in the literature's deviations from its values, the plainest first; of a "
-        f"further person's parameters {counts} by the group"
+        f"{learnt.people} people; means relative to the literature, in its standard deviations, clearest first; "
+        f"parameters of another person, by the group's information: {counts}"
     )

@@ -24,5 +24,5 @@ def as_named_now(given: Sequence[str]) -> list[str]:
     if command in MOVED:
         raise KinertiaError(f"kinertia {command} moved to the repository: run {MOVED[command]} in a clone of it")
     for old in [name for name in RENAMED if name in given]:
-        err.print(f"{old} is called {RENAMED[old]} now; the old name goes with the next version")
+        err.print(f"{old} is now {RENAMED[old]}; the old name will be removed in the next version")
     return [RENAMED.get(one, one) for one in given]

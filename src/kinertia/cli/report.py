@@ -26,7 +26,7 @@ from kinertia.report.saved_fit import read_saved
 
 
 def report(
-    results: Annotated[Path, typer.Argument(help="Folder that kinertia fit has written.")],
+    results: Annotated[Path, typer.Argument(help="Folder written by kinertia fit.")],
     norms: Annotated[
         Path | None, typer.Option(help="CSV file with norms, drawn as bands: quantity,percent,mean,sd.")
     ] = None,
@@ -70,7 +70,7 @@ def report(
 
 def score_text(degrees: float) -> str:
     """Format the score for a terminal; without complete curves of both sides there is none."""
-    return f"{degrees:.1f} degrees" if np.isfinite(degrees) else "not available: a side lacks complete curves"
+    return f"{degrees:.1f} degrees" if np.isfinite(degrees) else "not available: one side has no complete curves"
 
 
 def _norms_for(fit: Fit, path: Path) -> tuple[dict[str, Norm], list[str]]:

@@ -32,7 +32,7 @@ def results_of_people(results: list[Path]) -> list[PersonResults]:
                 if listed is None or inert(folder.name) in listed:
                     found.append(PersonResults(folder, folder.name))
                 else:
-                    older = "has no results by people.csv, only older ones"
+                    older = "has no current results according to people.csv, only older ones"
                     out.print(f"left out: {folder.name}: {older}", soft_wrap=True)
         elif people := sorted(path.glob(f"*/{FIT_FILE}")):
             found += [PersonResults(one.parent) for one in people]

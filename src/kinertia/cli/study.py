@@ -23,8 +23,10 @@ from kinertia.studies.table1 import CONDITIONS, Table1, measured_trial, run_tabl
 from kinertia.studies.table1_variants import run_variants
 
 study = typer.Typer(no_args_is_help=True, help="Studies on synthetic trials with known truth.")
-Seed = Annotated[int, typer.Option(min=0, help="Same seed, same numbers, whatever the number of processes.")]
-Workers = Annotated[int | None, typer.Option(min=1, help="Processes; one per core if left out.")]
+Seed = Annotated[
+    int, typer.Option(min=0, help="Seed of the random numbers; results do not depend on the number of processes.")
+]
+Workers = Annotated[int | None, typer.Option(min=1, help="Processes (default: one per core).")]
 
 
 def table1(
@@ -36,7 +38,9 @@ def table1(
     ] = None,
     variants: Annotated[
         bool,
-        typer.Option("--variants", help="The noisy half again, one thing changed at a time; some 15 minutes."),
+        typer.Option(
+            "--variants", help="Repeat the noisy conditions, changing one thing at a time (about 15 minutes)."
+        ),
     ] = False,
     output: Output = Path("out"),
     overwrite: Overwrite = False,
@@ -128,7 +132,7 @@ def sensitivity(
 
 
 def _say_where(output: Path, files: Sequence[str], picture: str) -> None:
-    """List the files of the results, and how to get the picture, too, where matplotlib is missing."""
+    """List the files of the results, and how to get the picture if matplotlib is missing."""
     drawn = has_matplotlib()
     out.print(f"results in {output}: {', '.join([*files, picture] if drawn else files)}", soft_wrap=True)
     if not drawn:

@@ -1,7 +1,7 @@
 """Runs the demo: a synthetic person is measured, estimated and compared with the truth.
 
-The truth differs from the literature as people do and is known to nobody but the comparison at the end: the estimator
-reads the laboratory's files.
+The truth differs from the literature as much as people do. Only the comparison at the end uses it; the estimator reads
+the laboratory's files.
 """
 
 from __future__ import annotations

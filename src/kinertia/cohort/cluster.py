@@ -1,6 +1,6 @@
 """Fits a cohort on a running Dask cluster, or on one that SLURM starts (`slurm`).
 
-What is to be done where, and again where a process was killed, is Dask's to say. One process works on one person at a
+Dask decides what runs where, and repeats the work of a process that was killed. One process works on one person at a
 time, with one thread of the linear algebra library, as Dask sets it for its workers.
 """
 
@@ -57,8 +57,8 @@ def doubts_of_workers(client: Any, address: str) -> list[str]:
         return [f"no worker has reported to {address} yet, and the run waits until one does; start some: {start}"]
     if (most := max(threads.values())) > 1:
         return [
-            f"workers of {address} have up to {most} threads, and fit as many people in one process, where nobody is "
-            f"given up whose files hang; start them with one thread: {start}"
+            f"workers at {address} have up to {most} threads and fit that many people in one process, where a fit that "
+            f"hangs cannot be stopped; start them with one thread: {start}"
         ]
     return []
 
@@ -85,7 +85,7 @@ def run_jobs(client: Any, fit_person: Callable[[Job], Record], jobs: Sequence[Jo
         elif future.status == "error":
             yield Finished(_failed(job, future.exception()))
         else:
-            raise KinertiaError("the Dask scheduler is gone; what is finished is kept: run the command again")
+            raise KinertiaError("lost the Dask scheduler; finished results are kept: run the command again")
         future.release()
 
 

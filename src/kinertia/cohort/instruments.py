@@ -32,8 +32,8 @@ COLUMNS = (
 _COLOURS = (style.BLUE, style.VERMILION, style.GREEN, style.ORANGE, style.SKY, style.BLACK)
 _WITHIN = 1.96
 _UNDATED = (
-    "No date is known: the recordings say none (C3D files may in TRIAL:DATE, Qualisys files in TIME_STAMP), nor do "
-    "the subject files (date = 2026-05-03 under [instruments])."
+    "No date is known: neither the recordings (TRIAL:DATE in C3D files, TIME_STAMP in Qualisys files) nor the subject "
+    "files (date = 2026-05-03 under [instruments]) state one."
 )
 
 
@@ -57,12 +57,13 @@ def drift(rows: pd.DataFrame) -> Iterator[Part]:
     people, days = dated["person"].nunique(), dated["date"].nunique()
     without = rows["person"].nunique() - people
     counts = f"{people} people on {days} day{'s' if days > 1 else ''}"
-    text = (f"{counts}; of {without} no date is known." if without else f"{counts}.",)
-    figure = small_multiples(panels, "Plates and clock over time, one panel for each kind of error.", {"type": "date"})
+    text = (f"{counts}; the date is unknown for {without} more." if without else f"{counts}.",)
+    figure = small_multiples(
+        panels, "Plate and synchronisation errors over time, one panel for each kind of error.", {"type": "date"}
+    )
     caption = (
-        "How far plates and clock are off by all people of a day together, with 95 % intervals. The estimate starts "
-        "from instruments that are sound: days on which little is known lean towards zero. Every number: "
-        "instruments.parquet."
+        "Plate and synchronisation errors of each day, from all its people, with 95 % intervals. The estimate starts "
+        "from zero errors: days with little information stay near zero. All numbers: instruments.parquet."
     )
     yield Part("Instruments over time", text, figure, caption)
 

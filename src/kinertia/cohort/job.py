@@ -66,7 +66,7 @@ class Job:
     def killed(self, times: int = RETRIES + 1) -> Record:
         """Return the record of a person whose process was killed each time."""
         sentence = (
-            f"the process that fitted it was killed {times} times, mostly for lack of memory; the next run tries "
+            f"the process that fitted it was killed {times} times, probably for lack of memory; the next run tries "
             "again: close other programs, or use a computer with more memory"
         )
         return self.record(FAILED, sentence, settled=False)

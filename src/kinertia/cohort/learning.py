@@ -1,9 +1,9 @@
 """Teaches a cohort its own group prior: subject files for a second fit, each person left out of the prior.
 
-Of bodies it is the group's prior (`estimation.learnt_prior`), learnt for a tenth of the people at a time from all
-others. Of plates and clock it is what the people of one day say (`estimation.session`), out of which a fit leaves its
-own. The second fits are a cohort of their own, whose subject files name both; what changes in them is what makes a
-person due again, as ever.
+For bodies this is the group's prior (`estimation.learnt_prior`), learnt from all others for a tenth of the people at a
+time. For plates and synchronisation it is the combined information of one day's people (`estimation.session`), from
+which a fit leaves out its own. The second fits are a cohort of their own, whose subject files name both; as in any
+cohort, a person is fitted again when they change.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ def write_second_study(
         progress: called as the work progresses.
 
     Returns:
-        the people of the second study, and sentences on what could not be learnt, and from whom.
+        the people of the second study, and sentences about what could not be learnt and whose data were not used.
 
     Raises:
         KinertiaError: nothing can be learnt at all.
@@ -95,7 +95,10 @@ def write_second_study(
         everybody.append(_read(cohort, person, notes))
     once = {one.name for one in _others((), everybody)}
     twice = [one.name for one in everybody if one.name not in once]
-    notes += [f"{name}: teaches nothing, since recordings of theirs are another person's here, too" for name in twice]
+    notes += [
+        f"{name}: not used for learning, since some of their recordings also belong to another person here"
+        for name in twice
+    ]
     (folder / _DONE).unlink(missing_ok=True)
     for name in ("priors", "sessions", "subjects"):
         (folder / name).mkdir(parents=True, exist_ok=True)
@@ -149,7 +152,7 @@ def _read(cohort: Path, person: Person, notes: list[str]) -> _Known:
             check_plates(wanted)
             of_person.instruments = person_instruments(fit, of_person.recordings)
     except KinertiaError as error:
-        notes.append(f"{person.name}: plates and clock are not shared: {error}")
+        notes.append(f"{person.name}: plate and synchronisation errors are not shared: {error}")
     return of_person
 
 
@@ -160,8 +163,8 @@ def _teach_bodies(
     parts = [list(people[k::PARTS]) for k in range(min(PARTS, len(people)))]
     others = [_others(part, people) for part in parts]
     if min(map(len, others), default=0) < FEWEST_PEOPLE:
-        found = f"{len(people)} people whose fits can teach"
-        notes.append(f"no prior was learnt: {found}; each one's takes at least {FEWEST_PEOPLE} others")
+        found = f"{len(people)} people whose fits can be learnt from"
+        notes.append(f"no prior was learnt: {found}; each one needs at least {FEWEST_PEOPLE} others")
         return
     bodies = [[one.body for one in of if one.body is not None] for of in others]
     try:
@@ -177,7 +180,7 @@ def _teach_bodies(
 
 
 def _others(part: Sequence[_Known], people: Sequence[_Known]) -> list[_Known]:
-    """Return everybody who shares no recording with this part or with someone before: each counts once."""
+    """Return the people who share no recording with this part or with someone before: each counts once."""
     met = {name for one in part for name in one.recordings}
     others = []
     for one in people:
@@ -205,7 +208,10 @@ def _teach_instruments(folder: Path, people: Sequence[_Known], notes: list[str])
         else:
             days.setdefault((day, _stated(one.wanted.instruments)), []).append(one)
     if undated:
-        notes.append(f"{undated} people without a date ([instruments] date): their plates and clock are not shared")
+        notes.append(
+            f"{undated} people without a date ([instruments] date): their plate and synchronisation errors are not "
+            "shared"
+        )
     for k, ((day, _), of_day) in enumerate(sorted(days.items(), key=lambda item: item[0])):
         sharing = [one for one in of_day if _plates([one]) & _plates(_others([one], of_day))]
         if not sharing:
@@ -237,7 +243,7 @@ def _second(folder: Path, one: _Known) -> Person:
     for table, entries in one.entries.items():
         tables[table] = {**tables.get(table, {}), **entries}
     path = _subject_of(folder, one.name)
-    heading = f"{one.name}, with what the cohort teaches; written by kinertia cohort --learn"
+    heading = f"{one.name}, refitted with group data; written by kinertia cohort --learn"
     write_then_rename(path, subject_text(tables, heading))
     return Person(one.name, path)
 

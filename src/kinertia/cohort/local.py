@@ -85,7 +85,7 @@ class _Crew:
         self._over = Event()
 
     def work(self) -> None:
-        """Fit people until nobody waits."""
+        """Fit people until none are waiting."""
         try:
             with ExitStack() as opened:
                 process = None
@@ -125,7 +125,7 @@ class _Crew:
                 continue
 
     def stop(self) -> None:
-        """End all processes, and let no other begin."""
+        """End all processes, and start no more."""
         self._over.set()
         for process in list(self._running):
             process.kill()

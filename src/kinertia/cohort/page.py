@@ -1,6 +1,6 @@
 """Writes `cohort.html`: verdicts and findings of a cohort, changes, outliers, and mean curves.
 
-Made from the cohort's tables: of ten thousand people, curves are summed up piece by piece, and names held once.
+Made from the cohort's tables: for ten thousand people, curves are summed in pieces and names are stored once.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ def _read(folder: Path, table: str, columns: Sequence[str]) -> pd.DataFrame:
 
 
 def _changes(bsp: pd.DataFrame) -> Iterator[Part]:
-    """Draw the estimate minus literature, segment by segment, over people."""
+    """Draw the estimate minus literature, segment by segment, across people."""
     change = bsp["estimate"] - bsp["literature"]
     segments = list(dict.fromkeys(bsp["segment"]))
     panels: dict[str, Mapping[str, Sequence[float]]] = {}
@@ -75,7 +75,9 @@ def _changes(bsp: pd.DataFrame) -> Iterator[Part]:
         grouped = (factor * change[chosen]).groupby(bsp["segment"][chosen], observed=True)
         panels[title] = {word: grouped.quantile(share)[segments].tolist() for word, share in _QUANTILES.items()}
     figure = dot_figure(
-        [segment_name(segment) for segment in segments], panels, "Change by the estimate, by segment, over people."
+        [segment_name(segment) for segment in segments],
+        panels,
+        "Change made by the estimate, by segment, across people.",
     )
     caption = "Estimate minus literature. Every number: cohort.parquet (kinertia cohort --csv: cohort.csv)."
     yield Part("What the estimates changed", figure=figure, caption=caption)
@@ -115,7 +117,7 @@ def _outliers(bsp: pd.DataFrame) -> Part:
         + f": {NAMES[PARAMETERS.index(name)]} of {segment_name(segment)}, {value:.1f} spreads from the others"
         for value, person, segment, name in far[:_MOST_OUTLIERS]
     ]
-    text = "Whose change of a parameter is more than six spreads (by the median, or error bars) from the median of all."
+    text = "People in whom a parameter changed by over six spreads (by the median, or error bars) more than the median."
     return Part("Far from the others", (text if listed else f"Nobody: {text[0].lower()}{text[1:]}",), listed=listed)
 
 
@@ -135,7 +137,7 @@ def _mean_curves(folder: Path) -> Iterator[Part]:
             np.add.at(sums[curve], at, np.column_stack([np.ones_like(value), value, value**2]))
     if sums:
         text = "Over the gait cycle (%): mean and SD of all strides of all people, both sides"
-        apart = "; people whose models call opposite directions positive are in panels of their own"
+        apart = "; models of opposite sign conventions have separate panels"
         caption = f"{text}{apart if len(sums) > len({quantity for quantity, _ in sums}) else ''}."
         order = list(_CURVES)
         shown = sorted(sums, key=lambda curve: (order.index(curve[0]), curve[1]))

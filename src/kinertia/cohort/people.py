@@ -33,15 +33,15 @@ class Person:
 
 
 def people_of(study: Path, output: Path) -> list[Person]:
-    """List everybody in a study, by name (folders) or in the order of the rows (CSV).
+    """List all people in a study, by name (folders) or in the order of the rows (CSV).
 
     Args:
         study: a folder with one folder per person, each with a subject file; or a CSV file with the columns `subject`
-            (path of a subject file, from the CSV file's folder) and, if wanted, `name`.
+            (path of a subject file, from the CSV file's folder) and, optionally, `name`.
         output: folder for the results, which may be inside the study and is not a person's.
 
     Raises:
-        FileError: no such study, nobody in it, columns missing, or names that cannot be folders side by side.
+        FileError: no such study, no one in it, columns missing, or names that cannot be folders side by side.
     """
     if study.is_dir():
         people = list(_of_folders(study, output.resolve()))
@@ -122,7 +122,7 @@ def _of_rows(path: Path) -> Iterator[tuple[int, Person]]:
 
 
 def _name_of(subject: Path) -> str:
-    """Return what distinguishes a subject file from others: its own name, or its folder's."""
+    """Return the name that distinguishes a subject file from others: its own, or its folder's."""
     return subject.resolve().parent.name if subject.stem.lower() == "subject" else subject.stem
 
 

@@ -1,7 +1,7 @@
 """Starts a process of Kinertia that works on one person at a time and answers in lines of JSON.
 
-The page (`cli.web`) and cohorts on this computer work so: a crash, or files that hang a reader, take nobody else down,
-and whoever cancels ends the process.
+The page (`cli.web`) and cohorts on this computer work this way: a crash, or files that hang a reader, affect no one
+else, and cancelling ends the process.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class Process:
         self._log.append(self._process.stderr.read())
 
     def ask(self, line: str) -> None:
-        """Write a line to its standard input; of a process that has ended nothing is asked."""
+        """Write a line to its standard input, unless it has ended."""
         assert self._process.stdin is not None
         with suppress(OSError):
             self._process.stdin.write(line + "\n")

@@ -1,8 +1,8 @@
 """Records the state of each person of a cohort, and decides who has to be fitted again.
 
-A person's results and the record of what they are from appear in one folder at once (`people/NAME/person.json`); of a
-person who cannot be fitted there is only the record (`failed/NAME.json`). A record says by one SHA-256 what went into
-the fit: every entry of the subject file, with the content of the files in place of their names.
+A person's results and the record of what they are from appear in one folder at once (`people/NAME/person.json`); a
+person who cannot be fitted has only the record (`failed/NAME.json`). A record identifies what went into the fit by one
+SHA-256: every entry of the subject file, with the content of the files in place of their names.
 """
 
 from __future__ import annotations
@@ -159,9 +159,9 @@ def keep(cohort: Path, record: Record) -> None:
 
 
 def standings(people: Sequence[Person], cohort: Path) -> Iterator[Standing]:
-    """Yield everybody's state, one after the other: all files are read for their hashes.
+    """Yield each person's state in turn: all files are read for their hashes.
 
-    A person listed a second time, by all inputs of a fit but the name, would count twice in every table, and is not
+    A person listed a second time, by all inputs of a fit but the name, would count twice in every table and is not
     fitted.
     """
     met: dict[str, str] = {}

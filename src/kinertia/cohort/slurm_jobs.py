@@ -1,7 +1,8 @@
 """Replaces SLURM jobs that end before their workers report, and gives up where none ever does.
 
-A worker that it has seen and lost, dask-jobqueue replaces. Of a job that ends earlier (no such Python on the node, no
-way back to this computer, a node that fails) it hears nothing, and waits; SLURM's queue tells.
+dask-jobqueue replaces a worker that has reported and is then lost. If a job ends before it reports (no such Python on
+the node, no connection to this computer, a node that fails), dask-jobqueue keeps waiting; SLURM's queue shows such
+jobs.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ def replaced_jobs(cluster: Any, client: Any, wanted: SlurmFile, jobs: int) -> It
     try:
         refused = cluster.sync(_asked, cluster, jobs)
         if refused and all(job.job_id is None for job in cluster.workers.values()):
-            raise KinertiaError(f"--slurm: sbatch takes no job: {one_line(refused)}; correct the file of --slurm")
+            raise KinertiaError(f"--slurm: sbatch refused the job: {one_line(refused)}; correct the file of --slurm")
         cluster.adapt(minimum_jobs=jobs, maximum_jobs=jobs)  # another job for each that is no longer there
         thread.start()
         yield
@@ -113,13 +114,13 @@ class _Lookout:
         ended = [job_id for job_id in self._in_vain if job_id is not None]
         refused = len(self._in_vain) - len(ended)
         said = f"{len(ended)} SLURM jobs ended before their workers reported to {self._cluster.scheduler_address}"
-        also = f" ({refused} more were not taken by sbatch)" if refused else ""
+        also = f" ({refused} more were refused by sbatch)" if refused else ""
         causes = (
             "the nodes have no such Python or no Kinertia (python, before), do not reach this computer (interface), or "
             "memory_gb or time do not suffice"
         )
         if self._wanted.logs is None:
-            evidence = 'with logs = "slurm-logs" SLURM keeps what they say'
+            evidence = 'set logs = "slurm-logs" to keep their output'
         else:
             evidence = f"the last one's log says: {_last_line(Path(self._wanted.logs), ended)}"
         return f"--slurm: {said}{also}, and none did; likely {causes}; {evidence}"

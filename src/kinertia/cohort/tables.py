@@ -1,4 +1,4 @@
-"""Writes the tables of a cohort: a person's rows beside the person's results, everybody's gathered from there.
+"""Writes the tables of a cohort: each person's rows beside the results, then all rows together.
 
 They are Parquet files: columns with types, compressed, of which programs read only what they ask for.
 """
@@ -127,10 +127,10 @@ def _write_rows(path: Path, name: str, person: str, columns: Mapping[str, Any]) 
 def write_tables(
     cohort: Path, records: Iterable[Record], with_csv: bool, norms: Mapping[str, Norm] = MappingProxyType({})
 ) -> None:
-    """Write everybody's rows, in the order of the records, into the folder of the cohort; each table at once.
+    """Write all people's rows, in the order of the records, into the folder of the cohort; each table at once.
 
-    In memory is one piece at a time, however many people there are. The list of people is a CSV file, too, always.
-    Scores are against the norms; without any there are none.
+    Only one piece at a time is in memory, however many people there are. The list of people is always written as CSV
+    too. Scores are against the norms; without any there are none.
     """
     from pyarrow import parquet
 
@@ -163,16 +163,17 @@ def fitted_people(cohort: Path) -> set[str] | None:
 def read_cohort(folder: str | Path) -> dict[str, Any]:
     """Return the tables of a cohort as lazy frames, which are read when they are computed.
 
-    They are Dask's data frames: what pandas users write works on them, `compute()` makes a pandas table of the result,
-    and a filter reads of the files what it needs. DuckDB and pyarrow read the same Parquet files as well; Dask is what
-    cohorts are fitted with, so that it is there already, and with a `Client` of a cluster it computes there.
+    They are Dask data frames: most pandas code works on them, `compute()` returns a pandas table, and a filter reads
+    only the parts of the files that it needs. DuckDB and pyarrow can read the same Parquet files. With a `Client` of a
+    cluster, Dask computes there.
 
     Args:
-        folder: that `kinertia cohort` has written.
+        folder: folder written by `kinertia cohort`.
 
     Returns:
         by name: "cohort" (body segment parameters), "trials", "findings", "cycles", "instruments" (plates and
-        synchronisation), "scores" (of gait, against norms), and "people", who is in it and how it ended.
+        synchronisation), "scores" (of gait, against norms), and "people" (who is in the cohort, and how each fit
+        ended).
 
     Raises:
         FileError: no cohort is there.
@@ -190,7 +191,7 @@ def read_cohort(folder: str | Path) -> dict[str, Any]:
     for name in _COLUMNS:
         path = Path(folder) / f"{name}.parquet"
         if not path.is_file():
-            raise FileError(path, "no such file; give a folder that kinertia cohort has written")
+            raise FileError(path, "no such file; give a folder written by kinertia cohort")
         tables[name] = dataframe.read_parquet(path)
     return tables
 

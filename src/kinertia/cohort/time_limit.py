@@ -1,8 +1,8 @@
 """Ends a fit that takes too long: its process is killed from outside, and a log says where it was.
 
-A reader of files may hang in compiled code, which lets nothing else of its process run: neither the thread that Dask
-has for it, nor one that would watch. The watchdog of `faulthandler` needs neither. Dask starts another process in its
-place and tries the person again there, which the log then prevents.
+A file reader may hang in compiled code that blocks every other thread of its process, Dask's and any watchdog's. The
+watchdog of `faulthandler` works without them. Dask then starts another process and tries the person again, which the
+log prevents.
 """
 
 from __future__ import annotations
@@ -45,8 +45,8 @@ def was_ended(log: Path, run: str) -> bool:
 def no_end(seconds: float, log: Path) -> str:
     """Describe the time limit that was exceeded."""
     return (
-        f"its fit had no end after {seconds / 60.0:.0f} min, and its process was ended; look for what is unusual in "
-        f"its files, and send {log} to Kinertia's developers, which says where it was; the next run tries again"
+        f"the fit did not finish within {seconds / 60.0:.0f} min and was stopped; look for anything unusual in the "
+        f"files, and send {log}, which shows where the fit was, to Kinertia's developers; the next run tries again"
     )
 
 

@@ -1,7 +1,7 @@
 """Fits one person of a cohort after another, as its standard input asks: `python -m kinertia.cohort.worker`.
 
-Each line is a `Job`; the answer is a line of JSON, what `Finished` holds. It ends with its input, in the midst of a fit
-too: then the command that asks is gone.
+Each line is a `Job`; the answer is a line of JSON, what `Finished` holds. It ends with its input, even during a fit,
+since the command that started it is then gone.
 """
 
 from __future__ import annotations

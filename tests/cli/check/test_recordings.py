@@ -72,7 +72,7 @@ def test_labels_of_another_marker_set_are_one_error(lab):
     [
         (["no.trc"], "no.trc: F101 "),
         (["walk_grf.mot"], "holds forces only"),
-        (["walk.trc", "static.trc", "walk_grf.mot", "more_grf.mot"], "goes with none of the marker files"),
+        (["walk.trc", "static.trc", "walk_grf.mot", "more_grf.mot"], "matches none of the marker files by name"),
         (["walk.trc", "--mass", "-5"], "mass_kg = -5"),
         (["walk.trc", "--mass", "0"], "mass_kg = 0"),
         (["walk.xlsx"], "a '.xlsx' file cannot be checked"),

@@ -133,7 +133,7 @@ def test_forces_of_a_static_trial_are_said_to_be_that(person, synthetic_lab):
         shutil.copyfile(synthetic_lab / source, person.folder / name)
     recognise(person)
     (row,) = [row for row in file_table(person.files(), entries(person)) if row.name == "static1_grf.mot"]
-    assert row.kind == "forces of a static trial, by its name: not needed, of that only the markers are used"
+    assert row.kind == "forces of a static trial, by its name: not needed (only its markers are used)"
     assert row.use == ""
 
 
@@ -203,7 +203,7 @@ def test_what_is_no_number_is_said_and_nothing_is_written(person, c3d_lab):
     assert person.subject.read_text(encoding="utf-8") == before
     assert {field.key: field.value for field in fields(entries(person), {"mass_kg": "heavy"})}["mass_kg"] == "heavy"
     for text in ("1e400", "nan", "-inf"):
-        with pytest.raises(SettingsError, match=rf"Body mass \(kg\): '{text}' is no number that anything"):
+        with pytest.raises(SettingsError, match=rf"Body mass \(kg\): '{text}' is not a usable number"):
             write_form(person, {"mass_kg": text})
     assert person.subject.read_text(encoding="utf-8") == before
 

@@ -76,7 +76,7 @@ def test_a_folder_is_dragged_onto_the_page_and_an_archive_is_refused(tab, tmp_pa
         archive.write(c3d_lab / "walk.c3d", "walk.c3d")
     tab.page.get_by_text("Add files").click()
     tab.drag(tmp_path / "session.zip")
-    said = "session.zip: not taken: an archive is not unpacked here; unpack it, and drop the folder"
+    said = "session.zip: not accepted: archives are not unpacked here; unpack it and drop the folder"
     playwright.expect(tab.page.locator(".problems")).to_contain_text(said)
     tab.quiet()
 
@@ -86,7 +86,7 @@ def test_nobody_stays_in_the_library_of_whom_no_file_was_taken(browser, app, tmp
     (tmp_path / "only.pdf").write_text("not for Kinertia")
     tab = Tab(browser, app).home().drop(tmp_path / "only.pdf")
     playwright.expect(tab.page.locator("[role=status]")).to_have_text("No file was taken.")
-    playwright.expect(tab.page.locator(".problems")).to_contain_text("only.pdf: not taken")
+    playwright.expect(tab.page.locator(".problems")).to_contain_text("only.pdf: not accepted")
     assert {person.name for person in app.library.people()} == before
     tab.quiet()
 

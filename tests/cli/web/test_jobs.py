@@ -91,7 +91,7 @@ def test_a_crash_takes_neither_the_page_nor_the_next_one_down(library, worker):
     worker("print('noise')\nif folder.name == 'Anna': os.abort()\nsay(stage='done', share=1.0)")
     with fitting(library, "Anna", "Ben") as (jobs, anna, ben):
         until(lambda: not jobs.busy(ben))
-    assert "Kinertia failed" in anna.notes()["fit"]["message"]
+    assert "Internal error of Kinertia" in anna.notes()["fit"]["message"]
     assert str(anna.folder / "failure.log") in anna.notes()["fit"]["message"]
     assert ben.notes()["fit"] == {}
 
@@ -101,7 +101,7 @@ def test_a_fit_that_was_killed_is_no_failure_of_ours(library, worker):
     worker("import signal\nos.kill(os.getpid(), signal.SIGKILL)")
     with fitting(library, "Anna") as (jobs, person):
         until(lambda: not jobs.busy(person))
-    assert "ended from outside" in person.notes()["fit"]["message"]
+    assert "operating system ended it" in person.notes()["fit"]["message"]
     assert "memory" in person.notes()["fit"]["message"]
     assert not (person.folder / jobs_module.LOG).exists()
 

@@ -164,4 +164,4 @@ def test_results_go_to_a_folder_of_the_users_and_among_no_others_files(tmp_path)
         assert "holds files that are not results of Kinertia (thesis.doc)" in refused.text
         assert "--overwrite" not in refused.text
         assert [path.name for path in (tmp_path / "others").iterdir()] == ["thesis.doc"]
-        assert "give the whole path" in app.post("/people/Anna/copy", "folder=mine").text
+        assert "give the full path" in app.post("/people/Anna/copy", "folder=mine").text

@@ -81,7 +81,7 @@ def test_a_crash_of_one_fit_is_said_and_the_next_one_is_done(browser, app, monke
     crash = "import os, sys\nif 'Crashing' in sys.argv[2]: os.abort()"
     monkeypatch.setattr(work, "WORKER", (sys.executable, "-c", crash))
     tab = Tab(browser, app)
-    for name, said in (("Crashing", "Kinertia failed"), ("Next", "")):
+    for name, said in (("Crashing", "Internal error of Kinertia"), ("Next", "")):
         tab.page.goto(f"{app.address}people/{ready(app.library, name, c3d_lab).name}")
         tab.estimate()
         playwright.expect(tab.page.locator("[data-progress]")).to_have_count(0)

@@ -103,7 +103,7 @@ def test_markers_of_a_model_are_its_own(person, synthetic_lab):
 def test_the_page_shows_and_saves_them(tmp_path, c3d_lab):
     with running(tmp_path / "library") as app:
         person = app.library.add("Anna")
-        assert "no recording is named" in app.ask("/people/Anna/markers").text
+        assert "no recording is marked" in app.ask("/people/Anna/markers").text
         shutil.copyfile(c3d_lab / "static.c3d", person.folder / "static.c3d")
         write(person, {"model": {"static": "static.c3d"}, "trial": [{"markers": "static.c3d"}]})
         page = app.ask("/people/Anna/markers").text

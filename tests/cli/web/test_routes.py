@@ -93,7 +93,7 @@ def test_a_failure_of_ours_is_said_and_the_page_goes_on(app, monkeypatch):
     app.library.add("Anna")
     answer = app.ask("/")
     assert answer.status == 500
-    assert "Kinertia failed, which it should not on any input (RuntimeError: a bug)" in answer.text
+    assert "Internal error of Kinertia (RuntimeError: a bug)" in answer.text
     assert app.ask("/people/Anna").status == 200
 
 

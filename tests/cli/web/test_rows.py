@@ -46,8 +46,8 @@ def test_a_row_without_its_name_goes():
 @pytest.mark.parametrize(
     ("form", "sentence"),
     [
-        ({"segment:2:mass_kg": "8,9 +- 0,4"}, "measured: a row with Mass (kg) '8,9 +- 0,4' has no segment; say which"),
-        ({"attached:2:segment": "torso"}, "carried: a row with Segment 'torso' has no name; say which it is"),
+        ({"segment:2:mass_kg": "8,9 +- 0,4"}, "measured: a row with Mass (kg) '8,9 +- 0,4' has no segment; fill it in"),
+        ({"attached:2:segment": "torso"}, "carried: a row with Segment 'torso' has no name; fill it in"),
         ({"segment:2:segment": "thigh_r", "segment:2:mass_kg": "9"}, "measured: thigh_r has two rows; give all its"),
     ],
 )

@@ -85,7 +85,7 @@ def test_names_that_no_file_may_have_are_refused(served, person, name):
     before = sorted(person.folder.iterdir())
     status, told = drop(served, person, name)
     assert status == 422
-    assert "not taken" in told["problem"]
+    assert "not accepted" in told["problem"]
     assert sorted(person.folder.iterdir()) == before
 
 
@@ -138,7 +138,7 @@ def test_who_sends_a_refused_file_is_heard_out(served, person, size):
 def test_other_kinds_are_refused_with_all_that_are_taken(served, person, name, what):
     status, told = drop(served, person, name)
     assert status == 422
-    assert told["problem"].startswith(f"{name}: not taken: {what} is none that Kinertia reads; those are ")
+    assert told["problem"].startswith(f"{name}: not accepted: {what} is none that Kinertia reads; those are ")
     assert all(ending in told["problem"] for ending in uploads.ENDINGS)
 
 
@@ -149,7 +149,7 @@ def test_a_zip_bomb_is_refused_unread(served, person):
     before = sorted(person.folder.iterdir())
     status, told = drop(served, person, "lab.zip", bomb.getvalue())
     assert status == 422
-    assert "an archive is not unpacked here; unpack it" in told["problem"]
+    assert "archives are not unpacked here; unpack it" in told["problem"]
     assert sorted(person.folder.iterdir()) == before
 
 

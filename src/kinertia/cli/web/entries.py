@@ -42,7 +42,7 @@ _LABELS = {
     "elbow_width_mm": "Elbow width (mm)",
 }
 _MARKER_SET = "marker_set"
-_ABOUT_MARKER_SET = "left open: found from the labels where they have most of a preset's"
+_ABOUT_MARKER_SET = "blank: detected from the labels if most of a preset's are there"
 USE = "use:"
 """Prefix of the form's fields for the use of a file; the file's name follows."""
 
@@ -176,7 +176,7 @@ def _number(key: str, text: str) -> float:
     except ValueError as error:
         raise SettingsError(f"{label}: {error}") from None
     if not math.isfinite(number):
-        raise SettingsError(f"{label}: '{text}' is no number that anything measured can have; write it like 72.6")
+        raise SettingsError(f"{label}: '{text}' is not a usable number; write it like 72.6")
     return number
 
 

@@ -1,6 +1,6 @@
 """Lists the files of a person as a table to correct: a row per file, with its use.
 
-The table is another face of the subject file: `file_table` makes it of the entries, `with_uses` entries of it.
+The table is another view of the subject file: `file_table` makes it from the entries, `with_uses` the entries from it.
 """
 
 from __future__ import annotations
@@ -68,20 +68,20 @@ def _kind(file: Path, capture: bool, captures: Sequence[Path]) -> tuple[str, tup
         what = "markers and force plates (C3D)" if suffix == ".c3d" else f"markers ({suffix[1:].upper()})"
         return what, (("static", "static trial"), ("trial", "walk or other motion"), unused)
     if has_force_columns(file):
-        of_static = " of a static trial, by its name: not needed, of that only the markers are used"
+        of_static = " of a static trial, by its name: not needed (only its markers are used)"
         what = f"forces{of_static if STATIC_NAME.search(file.stem) else ''}"
         return what, (*((f"forces:{one.name}", f"forces of {one.name}") for one in captures), unused)
     if holds_loads(file):
         named = ((f"loads:{one.name}", f"explains the forces of {one.name}") for one in captures)
-        return "what the columns of forces are (ExternalLoads)", (*named, unused)
+        return "meaning of the force columns (ExternalLoads)", (*named, unused)
     if suffix == ".osim":
         return "OpenSim model", (("osim", "model, in place of a static trial"), unused)
     if suffix == ".toml" and "landmarks" in _toml(file):
         return "marker set", (("markers", "marker set"), unused)
     if suffix == ".csv" and "information" in _first_line(file):
-        return "body segment parameters of an earlier fit", (("bsp", "what the estimate starts from"), unused)
+        return "body segment parameters of an earlier fit", (("bsp", "prior of the estimate"), unused)
     if is_measures_sheet(file):
-        return "girths and lengths of the person", (("measures", "what was measured of the body"), unused)
+        return "girths and lengths of the person", (("measures", "body measurements"), unused)
     if suffix in (".toml", ".csv"):
         return "used only where the text of the subject file names it", ()
     return "nothing that Kinertia reads", ()

@@ -1,7 +1,7 @@
 """Admits requests only from this browser, by the token in the address, and from pages of this server.
 
 Any web page may send requests to 127.0.0.1, and a name that leads there makes it read the answers too (DNS rebinding).
-So every request needs the token, the server's own name in `Host`, and no other site behind it.
+So every request needs the token and the server's own name in `Host`, and must not come from another site.
 """
 
 from __future__ import annotations
@@ -71,9 +71,9 @@ class Guard:
             return "Kinertia answers on 127.0.0.1 only."
         given = scope["path"].split("/", 2)[1]
         if not secrets.compare_digest(given.encode(), self._token.encode()):
-            return "This address is not the one that kinertia app has shown: open that one."
+            return "This is not the address that kinertia app printed: open that one."
         origins: list[list[str]] = [[]] + [[f"http://{host}"] for host in self._hosts]
         site = headers.get("sec-fetch-site", "none")
         if headers.getlist("origin") not in origins or site not in ("none", "same-origin"):
-            return "Kinertia answers no other site."
+            return "Kinertia does not answer requests from other sites."
         return ""

@@ -15,7 +15,7 @@ KINDS = ("check", "fit")
 _PATIENCE_S = 5.0
 _ENDED_FROM_OUTSIDE = (-9, -15)
 """SIGKILL and SIGTERM, as Python reports them."""
-_OUTSIDE = "It was ended from outside, as the system does where memory runs out: close other programs, start it again."
+_OUTSIDE = "The operating system ended it, most likely because memory ran out: close other programs and start it again."
 
 
 class Job(Work):
@@ -46,7 +46,7 @@ class Job(Work):
             return {"how": "failed", "message": _OUTSIDE}
         path.write_text(ended.log, encoding="utf-8")
         reason = ended.log.strip().rpartition("\n")[2] or f"its process ended with status {ended.status}"
-        sentence = f"Kinertia failed, which it should not on any input ({reason}); please send {path} to its developers"
+        sentence = f"Internal error of Kinertia ({reason}); please send {path} to its developers"
         return {"how": "failed", "message": sentence}
 
 

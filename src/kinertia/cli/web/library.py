@@ -6,7 +6,7 @@
             check/check.html                            what `kinertia check` wrote
             results/                                    what `kinertia fit` wrote
 
-Nothing is known of a person but what is in the folder: no index could contradict it.
+All that is known about a person is in the folder: there is no index that could contradict it.
 """
 
 from __future__ import annotations
@@ -142,7 +142,7 @@ class Library:
             yield
 
     def people(self) -> list[Person]:
-        """List everybody, most recently changed first."""
+        """List all people, most recently changed first."""
         found = [Person(path) for path in self.folder.iterdir() if (path / _RECORD).is_file() and not path.is_symlink()]
         return sorted(found, key=Person.changed, reverse=True)
 
@@ -167,7 +167,7 @@ class Library:
         try:
             os.rename(person.folder, self.folder / name)
         except OSError as error:
-            problem = f"cannot be renamed ({error.strerror}); close the program that has a file of it open"
+            problem = f"cannot be renamed ({error.strerror}); close the program that has one of its files open"
             raise FileError(person.folder, problem) from error
         return Person(self.folder / name)
 
@@ -191,7 +191,7 @@ class Library:
             os.rename(person.folder, aside)
             shutil.rmtree(aside)
         except OSError as error:
-            problem = f"cannot be deleted ({error.strerror}); close the program that has a file of it open"
+            problem = f"cannot be deleted ({error.strerror}); close the program that has one of its files open"
             raise FileError(person.folder, problem) from error
 
 

@@ -160,7 +160,9 @@ def _recording(person: Person, content: Mapping[str, Any]) -> tuple[Path, str | 
     for trial in trials if isinstance(trials, list) else ():
         if "markers" in trial:
             return person.folder / trial["markers"], trial.get("length_unit")
-    raise FileError(person.folder, "no recording is named static trial or walk yet; choose one in the table of files")
+    raise FileError(
+        person.folder, "no recording is marked as static trial or walk yet; choose one in the table of files"
+    )
 
 
 def _fullest_frame(markers: Markers) -> FloatArray:

@@ -117,7 +117,7 @@ def expect(person: Person | None) -> Person:
         HTTPException: there is no person of that name.
     """
     if person is None:
-        raise HTTPException(404, "nobody of this name is in the library")
+        raise HTTPException(404, "no one of this name is in the library")
     return person
 
 
@@ -129,5 +129,5 @@ def chosen_folder(text: str) -> Path:
     """
     path = Path(text.strip().strip('"')).expanduser()
     if not path.is_absolute():
-        raise FileError(text.strip() or "folder", "give the whole path of the folder, from the drive or / on")
+        raise FileError(text.strip() or "folder", "give the full path of the folder, starting at the drive or /")
     return path

@@ -90,7 +90,7 @@ class _Actions:
         self._examples = examples
 
     async def home(self, request: Request) -> Response:
-        """List everybody in the library, with a place to drop files for a new person."""
+        """List all people in the library, with a place to drop files for a new person."""
         people = [standing(person, self._jobs) for person in self._library.people()]
         return page(
             request,
@@ -110,7 +110,7 @@ class _Actions:
         return JSONResponse({"address": answer.headers["location"]}) if wants_json else answer
 
     async def add_example(self, request: Request) -> Response:
-        """Add an example person, ready to be checked and fitted; where one cannot be had, the others are added."""
+        """Add an example person, ready to be checked and fitted; if one is not available, the others are added."""
         kind = request.path_params["kind"]
         if kind not in self._examples:
             raise HTTPException(404, "there is no such example")
@@ -361,10 +361,7 @@ async def _no_file(request: Request, error: Exception) -> Response:
 async def _failed(request: Request, error: Exception) -> Response:
     """Report an internal error of Kinertia; the terminal has all of it."""
     problem = traceback.format_exception_only(error)[-1].strip()
-    sentence = (
-        f"Kinertia failed, which it should not on any input ({problem}); "
-        "please send what its terminal shows to its developers"
-    )
+    sentence = f"Internal error of Kinertia ({problem}); please send what its terminal shows to its developers"
     return _error_page(request, sentence, 500)
 
 

@@ -1,6 +1,6 @@
 """Shows repeated entries of a subject file (measured segments, attached items) as rows of a form.
 
-What stands in a row is written as it was typed, numbers as numbers; what is wrong with it, `read_subject` says.
+Rows are written as typed, numbers as numbers; `read_subject` reports what is wrong with them.
 """
 
 from __future__ import annotations
@@ -148,7 +148,7 @@ def _with_heads(kind: str, typed: Sequence[Mapping[str, str]], written: int) -> 
         if head not in row:
             if row and number >= written:
                 key, text = next(iter(row.items()))
-                raise SettingsError(f"{title}: a row with {_LABELS[key]} '{text}' has no {head}; say which it is")
+                raise SettingsError(f"{title}: a row with {_LABELS[key]} '{text}' has no {head}; fill it in")
             continue
         if kind == _SEGMENT and any(one[head] == row[head] for one in kept):
             raise SettingsError(f"{title}: {row[head]} has two rows; give all its values in one")

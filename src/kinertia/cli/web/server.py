@@ -101,6 +101,6 @@ def _listening(port: int) -> socket.socket:
         taken.listen()  # a browser that is opened before `run` waits
     except (OSError, OverflowError) as error:
         taken.close()
-        problem = f"--port {port}: cannot be had ({error}); give another, or none for one that is free"
+        problem = f"--port {port}: is not available ({error}); give another, or leave it out to use a free one"
         raise SettingsError(problem) from error
     return taken

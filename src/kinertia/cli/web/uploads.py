@@ -32,15 +32,15 @@ def harmless_name(given: str) -> str:
     if name.startswith(".") or not sound:
         raise FileError(
             shown,
-            "not taken: a file's name must be one on every system (none of < > : \" / \\ | ? *, no dot first or last, "
-            f"no device of Windows, at most {_LONGEST_NAME} bytes); rename it",
+            "not accepted: a file's name must be valid on every system (none of < > : \" / \\ | ? *, no dot first or "
+            f"last, no device of Windows, at most {_LONGEST_NAME} bytes); rename it",
         )
     suffix = Path(name).suffix.lower()
     if suffix == ".zip":
-        raise FileError(name, "not taken: an archive is not unpacked here; unpack it, and drop the folder")
+        raise FileError(name, "not accepted: archives are not unpacked here; unpack it and drop the folder")
     if suffix not in ENDINGS:
         kind = f"a '{suffix}' file" if suffix else "a file without an ending"
-        raise FileError(name, f"not taken: {kind} is none that Kinertia reads; those are {', '.join(ENDINGS)}")
+        raise FileError(name, f"not accepted: {kind} is none that Kinertia reads; those are {', '.join(ENDINGS)}")
     return name
 
 
@@ -53,7 +53,7 @@ async def receive(person: Person, given: str, chunks: AsyncIterator[bytes]) -> P
     name = harmless_name(given)
     files = [path for path in person.files() if not same_folder(path.name, name)]
     if len(files) >= MOST_FILES:
-        raise FileError(name, f"not taken: {len(files)} files are here, the most of one person; remove some")
+        raise FileError(name, f"not accepted: {len(files)} files are here, the most of one person; remove some")
     left = 1_000_000 * LARGEST_PERSON_MB - sum(path.stat().st_size for path in files)
     text = name.lower().endswith(".toml")
     largest_mb, what = (_LARGEST_TOML_MB, "a TOML file") if text else (LARGEST_FILE_MB, "one file")
@@ -63,9 +63,9 @@ async def receive(person: Person, given: str, chunks: AsyncIterator[bytes]) -> P
             async for chunk in chunks:
                 left -= len(chunk)
                 if file.tell() + len(chunk) > 1_000_000 * largest_mb:
-                    raise FileError(name, f"not taken: larger than {largest_mb} MB, the most of {what}")
+                    raise FileError(name, f"not accepted: larger than {largest_mb} MB, the most of {what}")
                 if left < 0:
-                    raise FileError(name, f"not taken: all files of a person have {LARGEST_PERSON_MB} MB at most")
+                    raise FileError(name, f"not accepted: all files of a person have {LARGEST_PERSON_MB} MB at most")
                 file.write(chunk)
         os.replace(temporary, person.folder / name)
     except BaseException:

@@ -2,8 +2,8 @@
 
 With `prepare` alone it compiles what the first fit on a machine would compile.
 
-A crash does not take the page down, and whoever cancels ends the process. It says on standard output how far it is, a
-line of JSON each: `{"stage": ..., "share": ...}`, and at the end `{"error": ...}` if a file or entry was at fault.
+A crash does not affect the page, and cancelling ends the process. Progress is reported on standard output, in lines of
+JSON: `{"stage": ..., "share": ...}`, and at the end `{"error": ...}` if a file or entry was at fault.
 """
 
 from __future__ import annotations

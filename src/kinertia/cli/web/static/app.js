@@ -145,7 +145,7 @@
         names.add(name);
         const largest = 1e6 * Number(this.root.dataset.largestMb);
         if (file.size > largest) {
-          this.problem(`${file.name}: not taken: larger than ${this.root.dataset.largestMb} MB, the most of one file`);
+          this.problem(`${file.name}: not accepted: larger than ${this.root.dataset.largestMb} MB, the most of one file`);
           continue;
         }
         const answer = await fetch(`${address}/files?name=${encodeURIComponent(file.name)}`, { method: "POST", body: file, headers: { accept: "application/json" } });
