@@ -63,7 +63,7 @@ def _restored(kind: type[KinertiaError], args: tuple[object, ...], data: dict[st
 
 
 class FileError(KinertiaError):
-    """A file is missing, unreadable, or not what its name says.
+    """A file is missing, unreadable, or not what its name suggests.
 
     Attributes:
         path: the file.

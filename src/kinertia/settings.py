@@ -182,8 +182,8 @@ class Subject(Table):
     knee_width_mm: float | None = Field(
         default=None, gt=30.0, lt=200.0, description="built-in model, sets without medial markers: knee width, mm"
     )
-    ankle_width_mm: float | None = Field(default=None, gt=20.0, lt=150.0, description="the same of the ankle, mm")
-    elbow_width_mm: float | None = Field(default=None, gt=20.0, lt=150.0, description="the same of the elbow, mm")
+    ankle_width_mm: float | None = Field(default=None, gt=20.0, lt=150.0, description="ankle width, likewise, mm")
+    elbow_width_mm: float | None = Field(default=None, gt=20.0, lt=150.0, description="elbow width, likewise, mm")
     ranges_deg: dict[str, RangeDeg] | None = Field(
         default=None,
         description="joints that move farther than most people's: `{ knee_angle_r = [-20, 150] }`, degrees",
@@ -230,7 +230,7 @@ class Settings(Table):
 class Instruments(Table):
     """Standard deviations that the laboratory states for its instruments.
 
-    What it does not state is taken from the literature.
+    Values that it does not state are taken from the literature.
 
     Examples:
         >>> kinertia.Instruments(plate_sd_mm=2.0).clock_sd_ms is None
@@ -240,20 +240,23 @@ class Instruments(Table):
     plate_sd_mm: float | None = Field(
         default=None,
         gt=0.0,
-        description="how far centres of pressure are off along each axis, from a spot check, mm",
+        description="size of centre-of-pressure errors along each axis (SD), from a spot check, mm",
     )
     clock_sd_ms: float | None = Field(
-        default=None, gt=0.0, description="how far forces are late or early, from a synchronisation check, ms"
+        default=None, gt=0.0, description="size of the synchronisation delay (SD), from a synchronisation check, ms"
     )
     gain_sd_percent: float | None = Field(
-        default=None, gt=0.0, le=20.0, description="how far vertical forces are off, from known weights, % of the force"
+        default=None,
+        gt=0.0,
+        le=20.0,
+        description="size of vertical gain errors (SD), from known weights, % of the force",
     )
     same_plates: bool = Field(
         default=False, description="true: columns of the same name are the same plate in all force files (.mot, .sto)"
     )
     zeroed: bool = Field(
         default=False,
-        description="true: the plates were zeroed; what they read while nobody stands on them stays in their loads",
+        description="true: the plates were zeroed; their unloaded reading is not subtracted",
     )
 
 
@@ -269,9 +272,9 @@ class PriorSettings(Table):
         default=None,
         ge=0.0,
         lt=1.0,
-        description="how alike left and right are: 0 not at all, 0.9 as the literature's prior has it",
+        description="correlation of left and right: 0 for none, 0.9 as in the literature prior",
     )
-    masses_kept: bool = Field(default=False, description="true: segment masses stay as the prior has them")
+    masses_kept: bool = Field(default=False, description="true: segment masses are fixed at the prior")
 
 
 class KnownSegment(Table):
@@ -293,7 +296,7 @@ class KnownSegment(Table):
     iyy_kgm2: StatedPositive | None = Field(default=None, description="about the y axis")
     izz_kgm2: StatedPositive | None = Field(default=None, description="about the z axis")
     prosthesis: bool = Field(
-        default=False, description="true: not the body's own: neither like the tables nor like the other side"
+        default=False, description="true: the segment is a prosthesis; ignore reference data and symmetry"
     )
     source: str | None = Field(default=None, description="how it was measured; shown in the notes of a fit")
 
@@ -323,11 +326,11 @@ class Attached(Table):
     """
 
     name: str = Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$", description="a name of its own, of letters, digits and _")
-    segment: str = Field(description='segment that it moves with, like "torso"; of an OpenSim model a body')
+    segment: str = Field(description='segment that it moves with, like "torso"; in an OpenSim model a body')
     mass_kg: AttachedMass = Field(description='kg: a number, "10 +- 0.5", or "unknown": then it is estimated')
     on_scale: bool = Field(description="true: mass_kg of [subject] was weighed with it; false: without")
     com_mm: Place = Field(description="its centre of mass in the segment: [forwards, upwards, to the right], mm")
-    com_sd_mm: float = Field(default=30.0, gt=0.0, le=500.0, description="how far that may be off along each axis, mm")
+    com_sd_mm: float = Field(default=30.0, gt=0.0, le=500.0, description="SD of that along each axis, mm")
     size_mm: Size | None = Field(
         default=None,
         description="its extent along the same axes, for its inertia: that of a solid block; left out: of a ball of "
@@ -341,7 +344,7 @@ class Overrule:
 
     Attributes:
         waive: ERRORs that do not block; shown as waived in every output.
-        ignore: findings below ERROR that are not shown and lower no verdict.
+        ignore: findings below ERROR that are not shown and do not lower the verdict.
 
     Examples:
         >>> kinertia.Overrule(waive=("P244",)).waive
@@ -363,7 +366,7 @@ def _codes(value: object) -> tuple[str, ...]:
             written = one[:1].upper() + one[1:].upper().replace("O", "0")
             near = get_close_matches(written, all_rules(), n=3, cutoff=0.5)
             hint = f"the nearest are {', '.join(near)}" if near else "see kinertia explain"
-            raise ValueError(f"'{one}' is no code, question or family; {hint}")
+            raise ValueError(f"'{one}' is not a code, question or family; {hint}")
     return tuple(value)
 
 
@@ -383,7 +386,8 @@ class Diagnostics(Table):
     """
 
     ignore: Annotated[tuple[str, ...], BeforeValidator(_codes)] = Field(
-        default=(), description='findings below ERROR that are not shown and lower no verdict, like ["M102", "R40"]'
+        default=(),
+        description='findings below ERROR that are not shown and do not lower the verdict, like ["M102", "R40"]',
     )
     waive: Annotated[tuple[str, ...], BeforeValidator(_waivable)] = Field(
         default=(), description='ERRORs that do not stop an estimate and are shown as waived, like ["P244"]'

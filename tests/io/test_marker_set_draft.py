@@ -100,7 +100,7 @@ def test_mirrored_axes_keep_the_labels_and_are_named(tmp_path):
     draft, text = drafted(tmp_path, recording(mirrored))
     assert draft.landmarks["heel_r"] == ("R.Heel",)
     assert "R.Thigh.Upper" in draft.segments["thigh_r"]
-    assert "NOTE: the labels say right where the person's left is" in text
+    assert "NOTE: right labels are on the person's left" in text
 
 
 def test_one_swapped_pair_keeps_its_labels_and_is_named(tmp_path):
@@ -108,7 +108,7 @@ def test_one_swapped_pair_keeps_its_labels_and_is_named(tmp_path):
     positions["R.Heel"], positions["L.Heel"] = positions["L.Heel"], positions["R.Heel"]
     draft, text = drafted(tmp_path, recording(positions))
     assert draft.landmarks["heel_r"] == ("R.Heel",)
-    assert "SAYS THE OTHER SIDE" in text.split("heel_r = ")[1].splitlines()[0]
+    assert "ITS LABEL IS OF THE OTHER SIDE" in text.split("heel_r = ")[1].splitlines()[0]
 
 
 def test_a_side_without_an_inner_marker_gets_a_width_and_a_wand(tmp_path):
@@ -167,7 +167,7 @@ def test_a_marker_that_is_hardly_ever_seen_is_not_used(tmp_path):
     static.markers.positions[1:, static.markers.labels.index("R.Heel")] = np.nan
     draft, text = drafted(tmp_path, static)
     assert "heel_r" not in draft.landmarks
-    assert "R.Heel: seen in 20 % of the frames only" in text
+    assert "R.Heel: visible in only 20 % of the frames" in text
 
 
 def test_what_one_side_lacks_is_placed_as_on_the_other_by_its_label(tmp_path):
@@ -178,7 +178,7 @@ def test_what_one_side_lacks_is_placed_as_on_the_other_by_its_label(tmp_path):
             static.markers.positions[:, static.markers.labels.index(label)] += np.array([-0.3, 0.35, 0.0])
     draft, text = drafted(tmp_path, static)
     assert draft.landmarks["heel_r"] == ("R.Heel",)
-    assert "as on the other side, by its label" in text
+    assert "as on the other side, going by its label" in text
 
 
 @pytest.mark.parametrize(
@@ -211,4 +211,4 @@ def test_of_somebody_who_moves_a_frame_is_taken_and_said_so(tmp_path):
     moving = replace(standing.markers, positions=standing.markers.positions + along)
     draft, text = drafted(tmp_path, replace(standing, markers=moving))
     assert set(draft.landmarks) >= LEGS
-    assert "NOTE: nobody stands still here" in text
+    assert "NOTE: no one stands still here" in text

@@ -189,7 +189,10 @@ def test_a_rucksack_that_nobody_declared_is_named(tmp_path):
     [
         ({"segment": "trunk"}, r"\[\[attached\]\] rucksack: the model has no segment 'trunk'; it has pelvis, "),
         ({"name": "torso"}, r"\[\[attached\]\] torso: there is a segment of this name already"),
-        ({"name": "ground"}, r"\[\[attached\]\] ground: OpenSim calls the laboratory so; give it another name"),
+        (
+            {"name": "ground"},
+            r"\[\[attached\]\] ground: this is OpenSim's name for the laboratory; give it another name",
+        ),
     ],
 )
 def test_what_cannot_be_is_an_error(change, words):
@@ -228,5 +231,5 @@ def test_two_level_refuses():
     subject = walking_subject()
     person = Subject(name="A", mass_kg=MASS_KG, height_m=1.8, sex="male")
     settings = Settings(method="two-level")
-    with pytest.raises(SettingsError, match="two-level knows the body only"):
+    with pytest.raises(SettingsError, match="the two-level method estimates the body only"):
         prepare(person, subject.static, [], settings, attached=[Attached(mass_kg=1.0, **PACK)])

@@ -49,7 +49,7 @@ def test_a_static_trial_is_missing_where_one_is_needed(subject):
 def test_a_prosthesis_is_no_mirror_image(c3d_lab):
     wanted = read_subject(c3d_lab / "subject.toml")
     wanted = wanted.model_copy(update={"segments": {"shank_l": KnownSegment(prosthesis=True)}})
-    with pytest.raises(SettingsError, match=r"shank_l: a prosthesis is no mirror image .* symmetry = false"):
+    with pytest.raises(SettingsError, match=r"shank_l: a prosthesis does not mirror .* symmetry = false"):
         prepare_subject(with_settings(wanted, method="two-level"))
     two_level = prepare_subject(with_settings(wanted, method="two-level", symmetry=False))
     (unused,) = [one for one in two_level.findings if one.code == "F194"]

@@ -115,7 +115,7 @@ def test_a_group_is_of_the_built_in_model(ready):
     """Nothing is learnt from fits with OpenSim models, so that no other group could help."""
     size = len(ready.prior.covariance)
     group = LearntPrior(ready.prior.mean.segments, np.zeros(size), np.ones(size), np.eye(size), 12)
-    with pytest.raises(PriorError, match="of the built-in model's segments; OpenSim models have others"):
+    with pytest.raises(PriorError, match="is for the built-in model; OpenSim models have other segments"):
         with_known_body(replace(ready, file=object()), PriorSettings(), None, {}, group)
 
 

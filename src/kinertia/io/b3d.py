@@ -1,7 +1,7 @@
-"""Reads subjects of AddBiomechanics (`.b3d`): several trials in one file, by nimblephysics where it installs.
+"""Reads subjects of AddBiomechanics (`.b3d`): several trials in one file, by nimblephysics if it can be installed.
 
-Axes are OpenSim's (x forward, y up), lengths m, forces N. What is read is what the laboratory recorded, markers and
-force plates; AddBiomechanics' own model, motion and corrected forces stay in the file.
+Axes are OpenSim's (x forward, y up), lengths m, forces N. Only what the laboratory recorded is read, markers and force
+plates, but not the model, motion and corrected forces of AddBiomechanics.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from kinertia.io.number_table import expect_file
 from kinertia.trial.data import Markers, PlateLoads, Recording
 
 _HOW = (
-    "needs nimblephysics, which is not installed: pip install nimblephysics (it has packages for few versions of "
+    "needs nimblephysics, which is not installed: pip install nimblephysics (available for few versions of "
     "Python), or download TRC and MOT files from AddBiomechanics"
 )
 
@@ -27,7 +27,7 @@ def read_b3d(path: str | Path) -> tuple[Recording, ...]:
     Trials are named as in the file; two of one name get numbers. Mass and height are the subject's.
 
     Raises:
-        FileError: no such file, nimblephysics is not installed, or the file is none of AddBiomechanics'.
+        FileError: no such file, nimblephysics is not installed, or the file is not from AddBiomechanics.
     """
     path = Path(path)
     expect_file(path)
@@ -39,7 +39,7 @@ def read_b3d(path: str | Path) -> tuple[Recording, ...]:
         subject = biomechanics.SubjectOnDisk(str(path))
         count = subject.getNumTrials()
     except (RuntimeError, ValueError) as error:
-        raise FileError(path, f"is no subject of AddBiomechanics, or damaged ({error})") from error
+        raise FileError(path, f"is not an AddBiomechanics subject, or is damaged ({error})") from error
     names = [subject.getTrialName(k) or f"trial {k + 1}" for k in range(count)]
     recordings = [
         _recording(subject, k, name if names.count(name) == 1 else f"{name}_{k + 1}")
@@ -47,7 +47,7 @@ def read_b3d(path: str | Path) -> tuple[Recording, ...]:
         if subject.getTrialLength(k) > 1
     ]
     if not recordings:
-        raise FileError(path, "holds no trial with frames; is it a subject of AddBiomechanics?")
+        raise FileError(path, "holds no trial with frames; is it an AddBiomechanics subject?")
     return tuple(recordings)
 
 
@@ -89,8 +89,8 @@ def about_origin(force: np.ndarray, torque: np.ndarray, point: np.ndarray) -> np
     """Return moments (n, p, 3) N m about the ground origin, whichever of both reference points the torques (n, p, 3)
     have.
 
-    Laboratories wrote torques about the centre of pressure or the origin, and the file does not state which. About
-    the centre of pressure nothing is left of their horizontal parts.
+    Laboratories wrote torques about the centre of pressure or the origin, and the file does not state which. About the
+    centre of pressure their horizontal parts vanish.
     """
     arm = np.cross(point, force)
     horizontal = [0, 2]

@@ -25,8 +25,8 @@ def read_belt(stated: float | tuple[float, float] | Path | None) -> Belt | None:
     may be the force file, a column `belt_speed`, of two belts `belt_speed_right` and `belt_speed_left`.
 
     Raises:
-        FileError: the file is missing or broken, lacks the columns, time does not grow, or a speed is no
-            treadmill's.
+        FileError: the file is missing or broken, lacks the columns, time does not increase, or a speed is impossible
+            for a treadmill.
     """
     if stated is None:
         return None
@@ -35,7 +35,7 @@ def read_belt(stated: float | tuple[float, float] | Path | None) -> Belt | None:
     path = stated
     time, speed = _from_table(path) if path.suffix.lower() in (".mot", ".sto") else _from_csv(path)
     if not (np.isfinite(speed).all() and (np.diff(time) > 0).all()):
-        raise FileError.found(path, "F181", problem=Quantity("times must grow, with a speed at each of them"))
+        raise FileError.found(path, "F181", problem=Quantity("times must increase, with a speed for each"))
     if speed.min() < 0 or speed.max() > _FASTEST_M_S:
         range_ = Quantity((float(speed.min()), float(speed.max())), "m/s", limit=_FASTEST_M_S)
         problem = f"speeds from {speed.min():g} to {speed.max():g} m/s; a treadmill's are 0 to {_FASTEST_M_S:g} m/s"

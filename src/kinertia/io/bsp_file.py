@@ -45,7 +45,7 @@ def read_bsp(path: Path) -> BspTable:
     for row in read_csv(path, _COLUMNS, "the bsp.csv of a simultaneous fit"):
         line, segment, parameter, written_unit = row.line, *(row.cells[name] for name in _COLUMNS[:3])
         if parameter not in PARAMETERS:
-            raise _wrong(path, line, segment, parameter, f"no such parameter; those are {', '.join(PARAMETERS)}")
+            raise _wrong(path, line, segment, parameter, f"no such parameter; expected one of {', '.join(PARAMETERS)}")
         unit = UNITS[PARAMETERS.index(parameter)]
         if written_unit != unit:
             raise _wrong(path, line, segment, parameter, f"its unit is '{written_unit}'; expected {unit}")

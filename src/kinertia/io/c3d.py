@@ -1,8 +1,7 @@
 """Reads C3D files: markers, force plates and the subject's measurements, through ezc3d.
 
-The parts of a C3D file that are only conventions are checked against the data: which axis is vertical,
-whether plates tell the force on the person or the force on the plate, whether a plate lies where its corners
-say.
+The parts of a C3D file that are only conventions are checked against the data: which axis is vertical, whether plates
+measure the force on the person or on the plate, whether a plate lies where its corners are.
 """
 
 from __future__ import annotations
@@ -66,8 +65,8 @@ def read_c3d(path: str | Path, length_unit: str | None = None, standing: bool = 
 
     Args:
         path: the file.
-        length_unit: unit of its lengths, "mm", "cm" or "m", whatever it states; by the file, or by the size of a person
-            where it says nothing, if None.
+        length_unit: unit of its lengths, "mm", "cm" or "m", which overrules the file; if None, the file's or, where it
+            states none, the one that makes markers the size of a person.
         standing: read poses as one frame of the same person standing upright, as a static trial.
 
     Raises:
@@ -130,7 +129,7 @@ def _open(path: Path) -> tuple[C3dContent, list[Finding]]:
         reason = f"their type ({unknown}) cannot be read" if unknown else f"ezc3d cannot read them ({file['trouble']})"
         findings.append(plate_left_out(path, None, reason))
     if not file["data"]["points"].shape[1] and _poses(file) is None:
-        found = "no points, nor poses of pelvis, thighs, shanks, feet and toes as Theia has them"
+        found = "no points, and no Theia poses of pelvis, thighs, shanks, feet and toes"
         raise FileError.found(path, "F164", found=Quantity(found))
     return file, findings
 
@@ -184,7 +183,7 @@ def _length_unit(path: Path, parameters: Any, positions: FloatArray, stated: str
     low, high = _PERSON_M
     likely = [name for name, metres in METRES_PER_UNIT.items() if low < size * metres < high]
     if len(likely) != 1:
-        unit = f"not stated, and no person's markers reach {size:.3g} of one"
+        unit = f"not stated, and markers {size:.3g} units apart fit none"
         extent = {"extent": Quantity(size, "1")} if np.isfinite(size) else {}
         raise unknown_unit(path, "lengths (POINT:UNITS)", unit, known=extent)
     extent_m = Quantity(size * METRES_PER_UNIT[likely[0]], "m", usual=_PERSON_M)

@@ -29,7 +29,7 @@ def add_analysis(section: ParameterSection, measures: Sequence[Measure], subject
     Args:
         section: parameters of the file.
         measures: at most 255.
-        subject: whose they are; empty where the file names nobody.
+        subject: name of the person; empty where the file has no names.
     """
     names, described = (section.get(_GROUP, name) for name in ("NAMES", "DESCRIPTIONS"))
     stated = 0 if names is None else len(names)

@@ -45,7 +45,7 @@ class _Row(NamedTuple):
 
 
 def subject_of(section: ParameterSection, prefix: str) -> str:
-    """Return the name that a file's events have for the trial's person; empty where it names nobody.
+    """Return the name that a file's events have for the trial's person; empty where the file has no names.
 
     Args:
         section: parameters of the file.
@@ -65,8 +65,8 @@ def add_events(
 ) -> int:
     """Add the events that a file does not state, with their method as description; return how many were added.
 
-    The file's own events keep their values and order. Nothing changes where there is none to add. Events that another
-    person has (`subjects_of_person`) state nothing of this one.
+    The file's own events keep their values and order. Nothing changes where there is none to add. Events of another
+    person (`subjects_of_person`) do not count.
 
     Args:
         section: parameters of the file.
@@ -116,7 +116,7 @@ def _rows(section: ParameterSection) -> list[_Row]:
 
 
 def _put(section: ParameterSection, rows: Sequence[_Row]) -> None:
-    """Write all events; flags are bytes as in Vicon's files, or what they are in this one."""
+    """Write all events; flags are bytes as in Vicon's files, or keep the type that they have in this file."""
     flags = np.int8 if section.get(_GROUP, "GENERIC_FLAGS") is None else np.int16
     lists: dict[str, Value] = {
         "CONTEXTS": [row.context for row in rows],

@@ -28,7 +28,7 @@ def file_events(parameters: Any, labels: Sequence[str] = ()) -> tuple[FileEvent,
 
     Args:
         parameters: parameters of the file, as ezc3d has them.
-        labels: labels of the markers; people with a prefix there are not the trial's person.
+        labels: labels of the markers; people with a prefix are not the trial's person.
 
     Events of other people are left out (`subjects_of_person`).
     """
@@ -50,7 +50,8 @@ def file_events(parameters: Any, labels: Sequence[str] = ()) -> tuple[FileEvent,
 
 
 def person_among(names: Sequence[str], others: Collection[str]) -> str:
-    """Return the trial's person among the SUBJECTS of a file, where other people are known; empty where it is open."""
+    """Return the trial's person among the SUBJECTS of a file, where other people are known; empty where it is
+    unknown."""
     left = [name for name in dict.fromkeys(names) if name and name not in others]
     return left[0] if len(left) == 1 else ""
 
@@ -58,7 +59,7 @@ def person_among(names: Sequence[str], others: Collection[str]) -> str:
 def subjects_of_person(subjects: Iterable[str], person: str, others: Collection[str]) -> set[str]:
     """Return which subjects of events are the person: this name and the empty one, if an event has this name.
 
-    Otherwise the person was renamed or is unknown, and every subject counts that is not one of the others.
+    Otherwise the person was renamed or is unknown, and every subject that is not one of the others counts.
     """
     found = set(subjects) - set(others)
     return found & {person, ""} if person in found and person else found

@@ -1,7 +1,7 @@
 """Writes model outputs into a copy of a C3D file: points, their types, and parameters of Kinertia's own.
 
-ezc3d would write the whole file anew: header, order and width of parameters, analog samples by their scales. Here the
-bytes of markers, analog samples, events and all parameters but the lists of points stay as they are. Files of integers
+ezc3d would rewrite the whole file: header, order and width of parameters, analog samples by their scales. Here the
+bytes of markers, analog samples, events and all parameters but the lists of points are unchanged. Files of integers
 become files of floats, as Vicon's own do when it adds model outputs: in the markers' steps of a tenth of a unit moments
 would end at 3276 and powers be rounded to 0.1. Their numbers stay.
 """
@@ -138,10 +138,10 @@ def with_outputs(
         frames: of the file; what Kinertia wrote into it before is replaced.
         outputs: with labels that no other point has.
         prefix: of labels, "Anna:"; empty for none.
-        units: of the types, for a file that states none; left open beside others whose unit is another (`USUAL_UNITS`).
+        units: of the types, for a file that states none; omitted if other outputs have different units (`USUAL_UNITS`).
         own: entries of the group KINERTIA by name: value, and shape as `ParameterSection.put` has it.
-        events: of which those are added that the file does not state.
-        measures: of strides, for a file that states none.
+        events: events; those that the file lacks are added.
+        measures: measures of strides, for a file that states none.
 
     Raises:
         TooManyParameters: they do not fit.

@@ -1,4 +1,4 @@
-"""Reads force plates of a C3D file: from what ezc3d gives to loads about the ground origin.
+"""Reads force plates of a C3D file: converts ezc3d's output to loads about the ground origin.
 
 ezc3d gives each plate's force in lab axes and, for types 2 to 4, its moment about the middle of the plate's
 four corners, also in lab axes, in units made of POINT:UNITS. For type 1 the file holds the centre of pressure
@@ -108,7 +108,8 @@ def plate_left_out(path: Path, plate: str | None, reason: str, **evidence: Quant
 
 
 def contradicting_moments(path: Path, plate: str, misses: float) -> Finding:
-    """Return F153: moments miss the centre of pressure by this share, which was used without a free moment."""
+    """Return F153: moments contradict the centre of pressure by this share; the latter was used without a free
+    moment."""
     return finding("F153", Where(path.name, plate=plate), misses=Quantity(misses, "1", limit=MOMENTS_FIT))
 
 
@@ -152,7 +153,7 @@ def plate_axes(corners: FloatArray) -> FloatArray:
 def to_ground_plates(
     path: Path, plates: LabPlates | None, rotation: FloatArray, time: FloatArray
 ) -> tuple[PlateLoads | None, list[Finding]]:
-    """Return loads on the person in ground axes, zero where nobody stands on a plate."""
+    """Return loads on the person in ground axes, zero for unloaded plates."""
     if plates is None:
         return None, []
     force, moment = plates.force @ rotation.T, plates.moment @ rotation.T
@@ -176,7 +177,7 @@ def to_ground_plates(
 
 
 def person_on_plates(platforms: Any, people: Sequence[str], labels: Sequence[str], positions: FloatArray) -> str:
-    """Return the one of several people who is much nearer to the plates while they are loaded; empty if nobody is.
+    """Return the one of several people who is much nearer to the plates while they are loaded; empty if there is none.
 
     Args:
         platforms: plates as ezc3d has them.
@@ -200,7 +201,7 @@ def person_on_plates(platforms: Any, people: Sequence[str], labels: Sequence[str
 
 
 def _corner_trouble(corners: FloatArray) -> tuple[str, dict[str, Quantity]]:
-    """Return why corners (4, 3) m cannot be a plate's, and the lengths of its edges; nothing where they can."""
+    """Return why corners (4, 3) m cannot belong to a plate, and the lengths of the edges; nothing where they can."""
     edges = np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1)
     low, high = _EDGE_LIMITS_M
     if (

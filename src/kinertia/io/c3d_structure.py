@@ -1,7 +1,7 @@
 """Checks the structure of a C3D file before ezc3d reads it, which trusts every count and offset.
 
-One wrong byte in them ends its process, or never ends, or fills the memory. What cannot be read is an error here; what
-only contradicts itself is for a process that may end (`ezc3d_library`).
+One wrong byte in them can crash ezc3d, hang it, or fill the memory. Unreadable files raise an error here; files that
+only contradict themselves are read in a process that may crash (`ezc3d_library`).
 """
 
 from __future__ import annotations
@@ -79,10 +79,10 @@ def doubts_about(path: Path, numbers_of_frames: bool = True) -> str:
 
     Args:
         path: the file.
-        numbers_of_frames: whether those of TRIAL count, which programs that cut frames off leave as they were.
+        numbers_of_frames: whether to check the numbers in TRIAL, which programs that crop a recording leave unchanged.
 
     Raises:
-        FileError: it is empty, no C3D file, shorter than announced, or its parameters cannot be parsed.
+        FileError: it is empty, not a C3D file, shorter than announced, or its parameters cannot be parsed.
     """
     block, start, section = _sections(path)
     size = path.stat().st_size
@@ -125,10 +125,10 @@ def trial_date(path: Path) -> tuple[int, ...]:
 
 
 def with_plain_samples(path: Path) -> bytes | None:
-    """Return an integer C3D file with ANALOG:OFFSET subtracted from its samples, where ezc3d would not; else None.
+    """Return an integer C3D file with ANALOG:OFFSET subtracted from its samples, if ezc3d would not do it; else None.
 
-    ezc3d takes samples to be signed, and offsets to be positive. Some files state that their samples are unsigned, and
-    they are not: in signed samples around zero those below would be the largest.
+    ezc3d assumes signed samples and positive offsets. Some files wrongly state that their samples are unsigned:
+    negative samples would then be read as the largest.
 
     Raises:
         FileError: a sample is farther from its offset than 16 bits hold; or as `doubts_about`.
@@ -259,7 +259,7 @@ def _parameters(path: Path, section: bytes, order: str) -> tuple[_Parameters, st
 
 
 def _header_doubt(header: _Header, end: int) -> str:
-    """Describe what in the header is impossible."""
+    """Describe impossible values in the header."""
     if not (math.isfinite(header.rate_hz) and 0.01 < header.rate_hz < 1e6):
         return f"its frame rate is {header.rate_hz:g} Hz"
     if not math.isfinite(header.scale) or header.scale == 0:
@@ -272,7 +272,7 @@ def _header_doubt(header: _Header, end: int) -> str:
 
 
 def _doubt(header: _Header, parameters: _Parameters) -> str:
-    """Describe what in the parameters contradicts the header or other parameters."""
+    """Describe parameters that contradict the header or other parameters."""
 
     def value(group: str, name: str, default: float) -> float:
         entry = parameters.get((group, name))
@@ -364,5 +364,5 @@ def _plate_doubt(parameters: _Parameters, channels: float) -> str:
     if 4 in types[:count] and len(entry("CAL_MATRIX").numbers) < 36 * count:
         return f"FORCE_PLATFORM:CAL_MATRIX does not fit {count} plates"
     if not all(1 <= number <= channels for number in entry("CHANNEL").numbers[: int(rows) * count]):
-        return "FORCE_PLATFORM:CHANNEL names channels that are not there"
+        return "FORCE_PLATFORM:CHANNEL names channels that do not exist"
     return ""

@@ -1,8 +1,8 @@
-"""Reads what a C3D file says of the person: mass, stature and body measures.
+"""Reads a person's mass, stature and body measures from a C3D file.
 
 The format has no place for them. Vicon's Plug-in Gait writes them to PROCESSING (`Bodymass` in kg, `Height` and
-`LKneeWidth` in mm), others to SUBJECTS or SUBJECT, in spellings and units of their own. Of a file with several people
-nothing is taken: nobody knows whose it is.
+`LKneeWidth` in mm), others to SUBJECTS or SUBJECT, in spellings and units of their own. Nothing is read from a file
+with several people, since it is unknown whose data they are.
 """
 
 from __future__ import annotations

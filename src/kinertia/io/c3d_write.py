@@ -90,7 +90,7 @@ def _add_plates(file: Any, plates: PlateLoads, samples_per_frame: int) -> None:
 def _ordered(corners: FloatArray) -> FloatArray:
     """Order corners (4, 3) in lab axes by the quadrants of the plate's axes: (+, +), (-, +), (-, -), (+, -).
 
-    The plate's z points down, as plates are built, and its x as near to the lab's as a corner allows.
+    The plate's z points down, as plates are built, and its x is as close to the lab's as a corner allows.
     """
     x, y, _ = (corners - corners.mean(axis=0)).T
     clockwise = np.argsort(np.arctan2(y, x))[::-1]  # from above; counterclockwise about the plate's z

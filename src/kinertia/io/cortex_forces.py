@@ -1,8 +1,8 @@
 """Reads force files of Cortex (Motion Analysis): `walk.forces` beside `walk.trc`.
 
 A text file: `[Force Data]`, `NumberOfForcePlates=2`, `SampleRate=1200.000000`, `NumberOfSamples=6000`, a line of
-columns `#Sample FX1 FY1 FZ1 X1 Y1 Z1 MZ1 FX2 ...`, and a row per sample. Of each plate force (N), centre of pressure
-(mm) and free moment, in the laboratory's axes, which are those of the markers. The corners of the plates are not in it.
+columns `#Sample FX1 FY1 FZ1 X1 Y1 Z1 MZ1 FX2 ...`, and a row per sample. Each plate has force (N), centre of pressure
+(mm) and free moment, in the laboratory's axes, like the markers. The file does not contain the corners of the plates.
 Sample 1 is at time zero.
 """
 
@@ -42,7 +42,7 @@ def read_cortex_forces(path: str | Path, turn: FloatArray | None = None) -> tupl
         the plates, whose corners are unknown, and what was found.
 
     Raises:
-        FileError: the file is missing, broken, or lacks columns; samples are lost; or its forces are vertical along
+        FileError: the file is missing, broken, or lacks columns; samples are missing; or its forces are vertical along
             another axis than the markers.
     """
     path, turn = Path(path), np.eye(3) if turn is None else turn

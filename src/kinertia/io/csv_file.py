@@ -1,7 +1,7 @@
-"""Reads tables that people write in a spreadsheet: CSV with a heading, in every country's form.
+"""Reads tables written in a spreadsheet: CSV with a heading, in any country's format.
 
 Cells are separated by commas, semicolons or tabs. Where commas do not separate cells they may be decimal marks; where
-they do, one with one or two digits behind it in a quoted cell is one, too ("1,234" might be a thousand).
+they do, a comma in a quoted cell is a decimal mark if one or two digits follow ("1,234" might be a thousand).
 """
 
 from __future__ import annotations
@@ -108,7 +108,7 @@ def read_csv(path: Path, columns: Sequence[str], expected: str) -> Iterator[Row]
         raise mismatch(path, expected, "text not in UTF-8", "CSV in UTF-8 (Excel: 'CSV UTF-8')") from None
     first = next((number for number, line in enumerate(lines) if line.strip()), None)
     if first is None:
-        raise FileError.found(path, "F104", found=Quantity(f"it is empty, and no {expected}"))
+        raise FileError.found(path, "F104", found=Quantity(f"it is empty; expected {expected}"))
     table, separator, heading = _opened(lines[first:])
     if lacking := [name for name in columns if name not in heading]:
         raise mismatch(path, expected, f"the columns {', '.join(heading)}", f"also {', '.join(lacking)}", first + 1)
@@ -126,7 +126,7 @@ def read_csv(path: Path, columns: Sequence[str], expected: str) -> Iterator[Row]
         yield Row(path, line, by_column, decimal_commas=separator != ",")
     if empty:
         rows = {"rows": Quantity(0, "1")}
-        found = Quantity(f"it has a heading and no rows, and is no {expected}")
+        found = Quantity(f"it has a heading but no rows; expected {expected}")
         raise FileError.found(path, "F104", first + 1, **rows, found=found)
 
 
@@ -135,7 +135,7 @@ _FORMULA = ("=", "+", "-", "@", "\t", "\r")
 
 
 def inert(cell: T) -> T | str:
-    """Return a cell that no spreadsheet program takes for a formula: such text gets a leading apostrophe, numbers stay.
+    """Return a cell that no spreadsheet program interprets as a formula: such text gets a leading apostrophe.
 
     Names come from files that others made: Excel would run a body called `=cmd|' /C calc'!A0`.
     """

@@ -1,10 +1,8 @@
-"""Loads ezc3d and works around its limits: where it is missing, and for paths with umlauts.
+"""Loads ezc3d and works around its limits: missing wheels, and paths with umlauts.
 
-ezc3d has no wheel for Linux on ARM: Kinertia works there without it, on every file but C3D. On Windows its C++ reads
-the letters of a path in the machine's code page, so that it does not find `C:/Users/Müller/walk.c3d`: such a file
-goes through a copy whose path is ASCII.
-
-Its C++ also ends the process, or never ends, on some damaged files: those are read in a process of their own.
+ezc3d has no wheel for Linux on ARM: Kinertia works there without it, on every file but C3D. On Windows its C++ reads a
+path in the machine's code page and does not find `C:/Users/Müller/walk.c3d`: such a file is read from a copy whose path
+is ASCII. On some damaged files its C++ also crashes the process or never ends: those are read in a separate process.
 """
 
 from __future__ import annotations
@@ -57,7 +55,7 @@ class C3dTrouble(Exception):
 
 
 def expect_ezc3d(path: Path) -> None:
-    """Raise a FileError about a C3D file that says how to install ezc3d, unless it is there."""
+    """Raise a FileError about a C3D file, with how to install ezc3d, unless it is installed."""
     if ezc3d is None:
         how = "conda install -c conda-forge ezc3d; pip has none for Linux on ARM"
         kinds = {"kind": Quantity("C3D files"), "others": Quantity("export TRC and MOT files")}
@@ -159,7 +157,7 @@ def _with_plates(path: Path) -> tuple[Any, str]:
 
 
 def parameter_values(parameters: Any, group: str, name: str, default: Sequence[Any] = ()) -> Sequence[Any]:
-    """Return the values of one parameter of a `C3dContent` in file order, whatever its shape.
+    """Return the values of one parameter of a `C3dContent` in file order, for any shape.
 
     USED and TYPE of p plates are p values, and CHANNEL 6 p: some writers make them p x 1, or one row.
     """
@@ -195,7 +193,7 @@ def read_apart(path: Path) -> C3dContent:
         except subprocess.TimeoutExpired:
             raise C3dTrouble(f"reading it took more than {_WAITING * seconds:.0f} s") from None
         if not result.is_file():
-            raise C3dTrouble(f"the library that reads it broke down, exit status {done.returncode}")
+            raise C3dTrouble(f"the library that reads it crashed, exit status {done.returncode}")
         content = pickle.loads(result.read_bytes())
     if isinstance(content, str):
         raise C3dTrouble(content)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 def locked(path: Path) -> FileLock | None:
     """Lock a file, created if necessary, until the lock is released; None where another process holds it.
 
-    None also where no file can be made, or a network drive knows no locks.
+    None also where no file can be created, or a network drive does not support locks.
     """
     from filelock import FileLock, Timeout  # takes 40 ms to load
 
@@ -33,7 +33,8 @@ def locked(path: Path) -> FileLock | None:
 
 @contextmanager
 def sole_use(path: Path, what: str) -> Iterator[None]:
-    """Ensure that nobody else works on `what` during the block; a file beside the lock at `path` states who does.
+    """Ensure that no other process works on `what` during the block; a file beside the lock at `path` states which one
+    does.
 
     Raises:
         FileError: another process does, on this computer or on another with the same drive.
@@ -51,9 +52,9 @@ def sole_use(path: Path, what: str) -> Iterator[None]:
 
 
 def _by(holder: Path) -> str:
-    """Return who is stated to be at work."""
+    """Return the stated holder of the lock."""
     try:
         known = json.loads(holder.read_text(encoding="utf-8"))
         return f" by process {known['pid']} on {known['host']}"
     except (OSError, ValueError, KeyError, TypeError):
-        return " (or its drive cannot be written to, or knows no locks)"
+        return " (or its drive cannot be written to, or does not support locks)"

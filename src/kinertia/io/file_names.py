@@ -45,7 +45,7 @@ def trouble_as_folders(trials: Sequence[str]) -> tuple[int, str] | None:
             return index, f"the results have a file {taken}, not a folder"
         for before in trials[:index]:
             if same_folder(before, name):
-                same = "" if before == name else "; Windows and macOS take both for one folder"
+                same = "" if before == name else "; Windows and macOS treat both as one folder"
                 return index, f"trial '{before}' is there already{same}"
     return None
 
@@ -82,7 +82,7 @@ def missing_file(path: Path, written: str, expected: str = "") -> dict[str, Quan
     exists = os.path.isdir(folder)
     names = {one.name.lower(): one.name for one in folder.iterdir() if one.name[0] != "."} if exists else {}
     nearest = [names[near] for near in get_close_matches(path.name.lower(), sorted(names), n=3, cutoff=0.4)]
-    hint = "nothing there has a name like it" if exists else "that folder does not exist"
+    hint = "nothing there has a similar name" if exists else "that folder does not exist"
     if nearest:
         hint = f"the nearest name{'s' * (len(nearest) > 1)} there: {', '.join(nearest)}"
     hint = _foreign_path(written) or hint

@@ -56,15 +56,14 @@ def read_forces(
 
     Args:
         mot_path, loads_path: the files.
-        turn: rotation (3, 3) from the axes of the file to ground axes, where they are others.
+        turn: rotation (3, 3) from the axes of the file to ground axes, where these differ.
 
     Returns:
         the plates, and what was assumed while reading.
 
     Raises:
-        FileError: a file is missing or broken, a column that is needed is not there, a load is not expressed
-            in ground or acts on another segment than a foot, time does not grow, a loaded sample is NaN, or the forces
-            point down.
+        FileError: a file is missing or broken, a required column is missing, a load is not expressed in ground or acts
+            on a segment other than a foot, time does not increase, a loaded sample is NaN, or the forces point down.
     """
     findings: tuple[Finding, ...] = ()
     if loads_path is None:
@@ -92,7 +91,7 @@ def read_forces(
 
 
 def _plate_load(path: Path, table: TimeTable, group: _Columns, turn: FloatArray) -> PlateLoad:
-    """Return force (k, 3) and moment about the ground origin (k, 3), zero where nobody stands on the plate."""
+    """Return force (k, 3) and moment about the ground origin (k, 3), zero while the plate is unloaded."""
     force = _triple(table, group.force) @ turn.T
     _expect_numbers(path, table, group, group.force, np.ones(len(force), dtype=bool))
     moment = np.cross(np.nan_to_num(_triple(table, group.point)) @ turn.T, force)
@@ -198,7 +197,7 @@ def _datafile(root: ElementTree.Element, loads_path: Path) -> tuple[Path, tuple[
     named = PureWindowsPath(name)  # knows both separators
     beside = loads_path.parent / named.name
     if named.root and beside.is_file():
-        read = _relocated(name, f"it does not exist, and {beside.name} beside the file was read")
+        read = _relocated(name, f"it does not exist; {beside.name} in the same folder was read instead")
         return beside, (with_evidence("F148", Where(loads_path.name), read),)
     raise FileError.found(loads_path, "F148", **_relocated(name, f"there is no file {path.absolute()}"))
 

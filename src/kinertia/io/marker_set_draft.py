@@ -1,7 +1,7 @@
 """Drafts a first marker set from a standing person's recording: `kinertia markers`.
 
-Markers are placed by geometry, with their labels as hints. Where nobody stands, labels alone decide, by what they are
-called in the presets (`R.Knee`, `RKNE`, `r_knee_study`) or nearly so; what is left is listed to be placed by hand.
+Markers are placed by geometry, with their labels as hints. Where no one stands, labels alone decide, going by the same
+or similar names in the presets (`R.Knee`, `RKNE`, `r_knee_study`); other labels are listed to be placed by hand.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class MarkerSetDraft:
 
 
 def preset_of(static: Recording) -> MarkerSet | None:
-    """Return the preset that can make a model of this static trial, whatever its joint widths; None if none can."""
+    """Return the preset that can make a model of this static trial, with any joint widths; None if none can."""
     labels = static.markers.labels
     preset = nearest_preset(labels)
     widths = dict.fromkeys(preset.widths.values(), _ANY_WIDTH_M) | static.measurements
@@ -89,7 +89,7 @@ def _widths(landmarks: Mapping[str, Sequence[str]], recording: Recording) -> dic
 
 
 def places_of(recording: Recording) -> Placement:
-    """Locate the markers on the body by geometry or, if nobody stands, by the labels that are known."""
+    """Locate the markers on the body by geometry or, if no one stands, by the labels that are known."""
     placed = place_markers(recording)
     if placed.landmarks:
         return placed

@@ -81,8 +81,8 @@ def marker_set_of(markers: Markers, named: MarkerSet | None = None) -> MarkerSet
 
 def nearest_preset(labels: Sequence[str]) -> MarkerSet:
     """Return the preset nearest to the labels: of presets that the labels cover except for trunk and arms, the one with
-    most labels, letter by letter before `spelled_as` they are; else the one that shares most of its labels, be it many
-    or few, in the same order; of nested presets the larger. It is spelled as the labels are where it fits.
+    most labels, exact spelling before `spelled_as`; else the one that shares most of its labels, in the same order of
+    preference; of nested presets the larger. If it fits, it takes the spelling of the labels.
     """
     read = [read_marker_set(name) for name in preset_names()]
     presets = [with_posterior_pelvis(preset, labels) for preset in read]
@@ -118,7 +118,7 @@ def _marker_set(document: TomlFile, path: Path) -> MarkerSet:
         raise _wrong(path, line, "[segments] pelvis must list at least three markers")
     for side in ("asis_r", "asis_l"):
         if side not in content.get("landmarks", {}):
-            problem = f"[landmarks] lacks {side}, which makes the pelvis frame and shows which way one faces"
+            problem = f"[landmarks] lacks {side}, which defines the pelvis frame and the heading"
             raise _wrong(path, document.line(("landmarks",)), problem)
     return MarkerSet(
         name=str(content.get("name", path.stem)),

@@ -51,7 +51,7 @@ def read_measures(path: Path) -> BodyMeasures:
     """Read a sheet. Rows without a value were not measured; an SD that was removed is the sheet's own.
 
     Raises:
-        FileError: no such file, an unknown measure or one twice, no value at all, or one that cannot be; with the line.
+        FileError: no such file, an unknown measure or one twice, no value at all, or an impossible one; with the line.
     """
     known = {one.name: one for one in measures()}
     values: dict[str, tuple[float, float]] = {}

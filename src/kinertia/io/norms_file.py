@@ -4,8 +4,8 @@
     knee_angle_angle,0,5.1,3.9
     knee_angle_angle,1,6.0,4.1
 
-Names and units of the quantities are those of `cycles.csv`. Percents may be coarser than there. `kinertia norms` adds
-the number of people (n), spans of age and speed, and the convention of each quantity.
+Names and units of the quantities are those of `cycles.csv`. Percents may be coarser. `kinertia norms` adds the number
+of people (n), spans of age and speed, and the convention of each quantity.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def read_norms(path: str | Path) -> dict[str, Norm]:
     """Read norms by quantity ("knee_angle_moment").
 
     Raises:
-        FileError: the file is missing or not text, lacks a column, or has a row that cannot be; with the line.
+        FileError: the file is missing or not text, lacks a column, or has an impossible row; with the line.
     """
     curves: dict[str, dict[float, tuple[float, float]]] = {}
     stated: dict[str, list[Row]] = {}
@@ -76,7 +76,7 @@ def _expect_sound(row: Row, percent: float, sd: float) -> None:
     if not 0 <= percent <= 100:
         raise _wrong(row.path, row.line, f"percent is {percent:g}", percent=Quantity(percent, "1", limit=100.0))
     if sd < 0:
-        raise _wrong(row.path, row.line, f"sd is {sd:g}, and no SD is negative", sd=Quantity(sd, "1", limit=0.0))
+        raise _wrong(row.path, row.line, f"sd is {sd:g}; it must not be negative", sd=Quantity(sd, "1", limit=0.0))
 
 
 def _wrong(path: Path, line: int | None, problem: str, **evidence: Quantity) -> FileError:

@@ -17,7 +17,7 @@ from kinertia.trial.data import FloatArray
 
 
 def read_lines(path: Path) -> list[str]:
-    """Read the lines of a text file, whatever its line ends.
+    """Read the lines of a text file with any line ends.
 
     Raises:
         FileError: the file is missing, empty or not text.

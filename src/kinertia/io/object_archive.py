@@ -2,11 +2,11 @@
 
 The file is a NumPy archive (`.npz`): a zip with one `.npy` member per array, named after its place
 ("fit.trials.0.motion.q"), and `structure.json` for everything else. Plain rather than netCDF or Parquet: a result is a
-tree of a few hundred arrays of all shapes, no table and no grid; NumPy's format is documented in one page (NEP 1),
-MATLAB, R and Julia read it, and it needs no package that Kinertia does not have anyway. Nothing in it is ever executed,
-as pickled objects would be.
+tree of a few hundred arrays of all shapes, not a table or a grid; NumPy's format is documented in one page (NEP 1),
+MATLAB, R and Julia can read it, and it needs no further package. Nothing in it is ever executed, unlike pickled
+objects.
 
-Numbers come back bit by bit. An object that stands in several places is written once.
+Numbers are restored exactly. An object used in several places is written once.
 """
 
 from __future__ import annotations

@@ -42,7 +42,7 @@ def check_folder(folder: str | Path, sub_folders: Collection[str] = (), files: C
     Args:
         folder: folder that is replaced as a whole when results are complete, with everything else in it.
         sub_folders: names in it that results need as folders.
-        files: names of results, as far as they are known already.
+        files: names of results that are already known.
     """
     folder = _real(folder)
     _expect_place(folder)
@@ -83,7 +83,7 @@ def _irreplaceable(folder: Path) -> str:
     """Return why a folder cannot be replaced by another; empty if it can."""
     here = Path.cwd().resolve()
     if folder == here or folder in here.parents:
-        return "is the current folder, or holds it"
+        return "is the current folder, or contains it"
     if folder == _real(os.path.expanduser("~")):
         return "is your home folder"
     if os.path.ismount(folder):
@@ -111,7 +111,7 @@ def expect_own_folder(folder: str | Path, otherwise: str = "") -> None:
 
     Args:
         folder: need not exist yet.
-        otherwise: what else can be done than to give another folder, as the end of the error's sentence.
+        otherwise: what can be done instead of giving another folder, as the end of the error's sentence.
     """
     folder = Path(folder)
     _expect_place(_real(folder))
@@ -158,10 +158,10 @@ def _existing(folder: Path) -> Path:
 def complete_folder(folder: str | Path, kind: str) -> Iterator[Path]:
     """Yield a hidden folder for new results, which replace those in `folder` when the block ends without an error.
 
-    They replace all files of the last results of this kind, not only those of the same names; what else is in `folder`
-    stays. The folder is replaced as a whole and at once: whatever happens to this process, it holds the
-    old results or the new ones. After an error or an interruption everything is as it was; an interruption while
-    folders are being exchanged takes effect after that.
+    They replace all files of the last results of this kind, not only those with the same names; other files in `folder`
+    stay. The folder is replaced as a whole and at once: even if this process is killed, it holds either the old results
+    or the new ones. After an error or an interruption everything is as it was; an interruption while folders are being
+    exchanged takes effect after that.
 
     Args:
         folder: folder of the results, made if necessary.

@@ -52,8 +52,8 @@ def read_trial(wanted: SubjectFile, files: TrialFiles) -> TrialInput:
     """Read one of the trials of a subject file, by its name there.
 
     Columns of the same name in the force files of two trials need not come from the same plate (laboratories sort steps
-    into such files), so each trial's are plates of their own, unless the subject file says that they are the same; the
-    plates of C3D files are those of the laboratory.
+    into such files), so each trial has plates of its own, unless the subject file states that they are the same; the
+    plates of C3D files are the laboratory's.
 
     Raises:
         KinertiaError: a file is missing or broken.
@@ -67,7 +67,7 @@ def read_trial(wanted: SubjectFile, files: TrialFiles) -> TrialInput:
 
 
 def _as_zeroed(wanted: SubjectFile, recording: Recording) -> Recording:
-    """Restore what unloaded plates read in their loads, where the laboratory states that they were zeroed."""
+    """Restore the unloaded readings of plates in their loads, where the laboratory states that they were zeroed."""
     if not wanted.instruments.zeroed or recording.plates is None:
         return recording
     return replace(recording, plates=with_idle_levels(recording.plates))

@@ -1,11 +1,11 @@
 """Computes moments of a plate's force about the laboratory's origin.
 
-Files do not say about which point their moments are: the middle of the plate, of its surface, or the origin. But the
-force at the centre of pressure has no horizontal moment about it. So the point c is the one for which
+Files do not state the reference point of their moments: the middle of the plate, of its surface, or the origin. But the
+force has no horizontal moment about the centre of pressure. So the point c is the one for which
 
     M - (p - c) x F
 
-has none, by least squares over the loaded samples; what is left is the free moment.
+has none, by least squares over the loaded samples; the rest is the free moment.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class PlateMoments(NamedTuple):
 
     Attributes:
         about_origin: (k, 3) N m; without a free moment where moments and centre of pressure contradict each other.
-        misses: share of the horizontal moments by which they do; infinite where nobody stands on the plate.
+        misses: share of the horizontal moments by which they do; infinite while the plate is unloaded.
     """
 
     about_origin: FloatArray

@@ -1,7 +1,7 @@
-"""Writes and reads what `kinertia population` learnt of a group, as one TOML text.
+"""Writes and reads what `kinertia population` learnt about a group, as one TOML text.
 
-At its top stands, for people, what was learnt of each parameter. Below it are mean and covariance in relative
-parameters, and the files that they are from, so that nobody's recordings count twice.
+The top lists, for readers, what was learnt about each parameter. Below are mean and covariance in relative parameters,
+and the files that they are from, so that no recordings count twice.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ def read_population(path: Path) -> PopulationFile:
     Raises:
         FileError: no such file, or not one that `kinertia population` wrote; with the line.
     """
-    document = read_toml(path, "what kinertia population wrote (population.toml)")
+    document = read_toml(path, "a file of kinertia population (population.toml)")
     try:
         return PopulationFile.model_validate(document.content)
     except ValidationError as error:
@@ -84,7 +84,7 @@ def population_text(population: PopulationFile) -> str:
         f"# {len(population.people)} people of a group, learnt by kinertia population. For the fits of others of it:",
         "#     [prior]",
         '#     population = "population.toml"',
-        "# Mean (+- how well it is known) and spread within the group, in the literature's deviations from its values:",
+        "# Mean (+- how well it is known) and spread within the group, relative to the literature, in its SDs:",
     ]
     spread = np.sqrt(np.diag(np.array(population.covariance)))
     names = [f"{segment} {parameter}" for segment in population.segments for parameter in PARAMETERS]

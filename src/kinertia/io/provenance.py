@@ -62,7 +62,8 @@ def names_from_common_folder(paths: Sequence[PurePath]) -> list[str]:
 
 
 def command_line(words: Sequence[str], windows: bool = os.name == "nt") -> str:
-    """Join words to one line that a shell splits into these again: cmd and PowerShell know no POSIX single quotes."""
+    """Join words to one line that a shell splits into these again: cmd and PowerShell do not support POSIX single
+    quotes."""
     return subprocess.list2cmdline(words) if windows else shlex.join(words)
 
 
@@ -74,7 +75,7 @@ def sha256(path: Path) -> str:
 
 @cache
 def versions() -> dict[str, str]:
-    """Return the versions of everything that numbers depend on, as far as installed."""
+    """Return the versions of all installed packages that numbers depend on."""
     installed = {"Python": platform.python_version()}
     for name in _COMPUTES:
         with contextlib.suppress(PackageNotFoundError):  # ezc3d, where it has no wheel

@@ -2,8 +2,8 @@
 
 QTM writes a trial's markers to `walk.tsv` and each plate to a file of its own, `walk_f_1.tsv`, `walk_f_2.tsv`
 (`walk_f.tsv` where there is one). Both begin with lines of a name and a value. Forces are in the laboratory's axes or
-in the plate's own, as the header's DESCRIPTION says; the corners in it tell where the plate is. Lengths are mm, moments
-N m.
+in the plate's own, as stated in DESCRIPTION in the header, whose corners give the plate's position. Lengths are mm,
+moments N m.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def read_qualisys(path: str | Path, forces: Sequence[Path] | None = None) -> Rec
         forces: the files of its plates; those beside it by QTM's names if None.
 
     Raises:
-        FileError: a file is missing, broken, or none that QTM writes.
+        FileError: a file is missing, broken, or not written by QTM.
     """
     path = Path(path)
     beside = plates_beside(path) if forces is None else list(forces)

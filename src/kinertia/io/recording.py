@@ -1,4 +1,4 @@
-"""Reads one trial from its files, whatever their formats."""
+"""Reads one trial from its files, in any format."""
 
 from __future__ import annotations
 
@@ -39,7 +39,8 @@ def read_recording(
     Args:
         markers_path: a .trc or .c3d file, a .tsv file of Qualisys, or a .csv file of Vicon.
         forces_path: a .mot or .sto file, or a .forces file of Cortex; its forces precede those of the markers' file.
-            Of Qualisys also the .tsv file of a plate: those of the trial's other plates beside it are read, too.
+            Also the .tsv file of a Qualisys plate: the files of the trial's other plates beside it are then read as
+            well.
         loads_path: an OpenSim ExternalLoads .xml file that identifies the force columns. Without
             `forces_path` its own datafile is read.
         length_unit: of a .c3d file's lengths, "mm", "cm" or "m", overriding the file.
@@ -47,7 +48,7 @@ def read_recording(
 
     Returns:
         the recording; its `plates` is None where no file holds usable force plates. A person who stands along Z in a
-        .trc file is turned to Y up, and the forces of a file with them.
+        .trc file is rotated to Y up, together with the forces of a file.
 
     Raises:
         FileError: a file is missing, broken, or of a kind that Kinertia does not read.
@@ -144,7 +145,8 @@ def _expect_kind(path: Path, suffixes: tuple[str, ...], what: str) -> None:
 
 
 def _expect_laboratory(path: Path, recording: Recording) -> None:
-    """Raise a FileError for positions or loads that no laboratory has: a broken number spoils all that follows."""
+    """Raise a FileError for positions or loads that are impossible in a laboratory: one broken number spoils
+    everything."""
     markers, plates = recording.markers, recording.plates
     far = np.argwhere(np.abs(markers.positions) > _FARTHEST_M)
     if far.size:

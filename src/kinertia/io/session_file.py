@@ -1,7 +1,7 @@
-"""Writes and reads what `kinertia instruments` found of a session's plates and synchronisation.
+"""Writes and reads what `kinertia instruments` found about a session's plates and synchronisation.
 
-At its top stands, for people, what was found of all trials together. Below it is what each person's trials say, as
-information (inverse covariance) and right-hand side, so that a fit can add what the others say without its own.
+The top lists, for readers, what was found from all trials together. Below is the information from each person's trials
+(inverse covariance and right-hand side), so that a fit can add the others' information without its own.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ def read_session(path: Path) -> tuple[PersonInstruments, ...]:
     Raises:
         FileError: no such file, or not one that `kinertia instruments` wrote; with the line.
     """
-    document = read_toml(path, "what kinertia instruments wrote (instruments.toml)")
+    document = read_toml(path, "a file of kinertia instruments (instruments.toml)")
     try:
         return SessionFile.model_validate(document.content).people
     except ValidationError as error:

@@ -1,4 +1,4 @@
-"""Reads how to ask SLURM for workers: a TOML file that a laboratory adapts to its cluster once."""
+"""Reads the SLURM settings for workers: a TOML file that a laboratory adapts to its cluster once."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class SlurmFile(Table):
 
     workers: int = Field(default=10, ge=1, le=10_000, description="jobs to ask for; each fits one person at a time")
     memory_gb: float = Field(default=4.0, ge=1.0, description="of each job")
-    time: str = Field(default="04:00:00", description="after which SLURM ends a job, hours:minutes:seconds")
+    time: str = Field(default="04:00:00", description="time limit of a job, hours:minutes:seconds")
     partition: str | None = Field(default=None, description="left out: the cluster's default")
     account: str | None = Field(default=None, description="who pays")
     directives: Lines = Field(default=(), description='further lines for sbatch, like ["--qos=low"]')
@@ -39,7 +39,7 @@ def read_slurm(path: Path) -> SlurmFile:
     """Read and check the file.
 
     Raises:
-        FileError: no such file, an unknown key, or a value that cannot be; with the line.
+        FileError: no such file, an unknown key, or an impossible value; with the line.
     """
     document = read_toml(path, "a file that says how to ask SLURM for workers")
     try:

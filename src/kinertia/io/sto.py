@@ -156,7 +156,7 @@ def expect_once(path: Path, labels: Sequence[str], line: int | None) -> None:
 
 
 def _wrong_counts(path: Path, header: dict[str, tuple[str, int]], rows: int, columns: int) -> tuple[Finding, ...]:
-    """Find counts in the header that the file contradicts: no error, since rows decide (OpenSim reads it, too)."""
+    """Find counts in the header that the file contradicts: not an error, since rows decide (as in OpenSim)."""
     return tuple(
         other_count(path, line, float(stated) if stated.isdecimal() else stated, count, what)
         for keys, count, what in ((_ROW_KEYS, rows, "rows"), (_COLUMN_KEYS, columns, "columns"))

@@ -46,13 +46,13 @@ def init_files(folder: str | Path, nearby: bool = True, marker_set: bool = True)
     """Draft a subject file for the recordings in a folder (not its subfolders), and a marker set where none fits the
     static trial; writes nothing.
 
-    The static trial is the one with such a name ("static", "cal"), else the shortest without movement; forces and loads
-    go with the trial whose name is most like theirs, and are looked for in the folders in it and beside it where the
-    folder itself has none and `nearby` is True; mass and height come from a C3D file that holds them. The only OpenSim
-    model of a folder replaces a static trial that no name identifies; others are commented lines. A sheet of girths and
-    lengths is used, but not with a model, whose segments are cut elsewhere; of several, one is to be chosen. What stays
-    unknown is a commented line marked FILL IN, and so is a trial for which no forces were found. Recordings whose names
-    begin like another static trial's are left out and named in a comment.
+    The static trial is identified by its name ("static", "cal"), else it is the shortest recording without movement.
+    Forces and loads belong to the trial with the most similar name; if the folder has none and `nearby` is True,
+    folders in it and beside it are searched. Mass and height come from a C3D file that states them. The only OpenSim
+    model of a folder replaces a static trial that no name identifies; other models are commented lines. A sheet of
+    girths and lengths is used, but not with a model, whose segments are defined differently; of several sheets one must
+    be chosen. Unknown entries, and trials without forces, are commented lines marked FILL IN. Recordings whose names
+    begin like another static trial's are left out and listed in a comment.
 
     Raises:
         FileError: no such folder, or no file of markers in it.
@@ -99,7 +99,7 @@ def _static_lines(static: Path | None, has_set: bool) -> list[str]:
 
 
 def _trial_lines(folder: Path, files: Sequence[Path], trials: Sequence[Path], nearby: bool) -> list[str]:
-    """Return a table per trial with the forces and loads that are most like it by name."""
+    """Return a table per trial with the forces and loads of the most similar names."""
     alone = [trial for trial in trials if not _brings_forces(trial)]
     forces, loads = (
         _here_or_near(folder, files, holds) if nearby else [file for file in files if holds(file)]
@@ -149,7 +149,7 @@ def _expect_files(folder: Path) -> list[Path]:
     files = sorted(path for path in folder.iterdir() if not path.name.startswith("."))  # archives of Macs have twins
     for file in files:
         if not _is_utf8(file.name):
-            reason = Quantity("it is not UTF-8, so that no subject file can hold it")
+            reason = Quantity("its name is not UTF-8, so a subject file cannot contain it")
             raise FileError.found(file, "F192", name=Quantity(ascii(file.name)), problem=reason)
     if not any(map(is_capture, files)):
         problem = f"holds no file of markers ({', '.join(MARKER_FILES)})"
@@ -158,7 +158,7 @@ def _expect_files(folder: Path) -> list[Path]:
             problem += f", but its folder {_relative(inside[0], folder)} does; give that one"
         elif inside:
             listed = ", ".join(_relative(one, folder) for one in inside[:_LISTED]) + (", ..." * (len(inside) > _LISTED))
-            problem += f", but its folders {listed} do; give one person's, with the static trial in it"
+            problem += f", but its folders {listed} do; give the folder of one person, with the static trial in it"
         action = Quantity("Give a folder with the recordings of one person")
         raise FileError.found(folder, "F108", problem=Quantity(problem), action=action)
     return files

@@ -1,4 +1,4 @@
-"""Reads the subject file: one TOML text that says who walked, which files hold the trials, and how to estimate.
+"""Reads the subject file: one TOML text that states who walked, which files hold the trials, and how to estimate.
 
     [subject]
     sex = "female"                 # "male" or "female"
@@ -20,9 +20,8 @@
     [settings]                     # every one has a default, see `kinertia.settings.Settings`
     cutoff_hz = 6.0
 
-    [instruments]                  # what the laboratory knows of plates and clock; all may be left out
-    plate_sd_mm = 2.0              # from a spot check of the centre of pressure
-    session = "instruments.toml"   # what `kinertia instruments` wrote
+    [instruments]                  # errors of plates and synchronisation; all may be left out plate_sd_mm = 2.0
+    # from a spot check of the centre of pressure session = "instruments.toml"   # what `kinertia instruments` wrote
 
     [segment.thigh_r]              # what was measured of a segment; as many as there are
     mass_kg = "8.9 +- 0.4"
@@ -41,7 +40,7 @@
     [diagnostics]                  # for the person; [trial.diagnostics] for the trial above it
     ignore = ["M102"]              # findings that do not count; `waive` for ERRORs that do not stop an estimate
 
-`read_subject` checks it whole and names the line of what is wrong; `kinertia.io.subject_draft` drafts one.
+`read_subject` checks all of it and states the line of an error; `kinertia.io.subject_draft` drafts one.
 """
 
 from __future__ import annotations
@@ -101,7 +100,7 @@ def subject_file_in(folder: Path) -> Path:
 
 
 def read_subject(path: str | Path, to_fit: bool = True) -> SubjectFile:
-    """Read and check a subject file; what the study file above it overrules applies, too.
+    """Read and check a subject file, with the overrules of the study file above it.
 
     Args:
         path: the file.
@@ -163,7 +162,7 @@ def subject_from_options(content: Mapping[str, Any]) -> SubjectFile:
     """Build a subject file from a dictionary of its form, as the command line makes it; paths are relative to here.
 
     Raises:
-        SettingsError: something is missing, wrong or not there; the message states the entry.
+        SettingsError: an entry is missing or wrong, or a file does not exist; the message states the entry.
     """
     try:
         result = SubjectFile.model_validate(content, context={"folder": Path.cwd()})
@@ -204,7 +203,7 @@ def _no_sex(wanted: SubjectFile) -> Finding:
 
 
 def expect_one_model(static: Path | None, markers: str | Path | None, osim: Path | None, calibrate: bool) -> None:
-    """Raise an error for entries of [model] that do not go together, whatever their source.
+    """Raise an error for entries of [model] that do not go together.
 
     Raises:
         SettingsError: they belong to the built-in and to an OpenSim model (F193).
@@ -220,7 +219,7 @@ def _two_models(
     if osim is not None:
         for key, given in (("static", static), ("markers", markers)):
             if given is not None:
-                return ("model", key), _conflict("osim", f"{key} in [model] (the OpenSim model has all of it)")
+                return ("model", key), _conflict("osim", f"{key} in [model] (the OpenSim model contains it already)")
     elif calibrate:
         built_in = "a static trial (the built-in model is always calibrated)"
         return ("model", "calibrate"), _conflict("calibrate in [model]", built_in)

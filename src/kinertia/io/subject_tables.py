@@ -21,7 +21,7 @@ class Model(Table):
 
     static: File | None = Field(default=None, description="static trial, .c3d, .trc, .tsv or .csv")
     length_unit: LengthUnit | None = Field(
-        default=None, description="of a static C3D file that says none, or a wrong one: mm, cm or m"
+        default=None, description="unit of a static C3D file that states none, or a wrong one: mm, cm or m"
     )
     markers: MarkerSetName | None = Field(default=None, description="preset or TOML file; left out: detected")
     osim: File | None = Field(default=None, description="scaled OpenSim model, .osim, in place of a static trial")
@@ -36,14 +36,14 @@ class TrialFiles(Table):
     forces: File | None = Field(
         default=None, description="plate forces, .mot, .sto or .forces; C3D, .tsv and .csv have their own"
     )
-    loads: File | None = Field(default=None, description="ExternalLoads .xml: what the columns are")
+    loads: File | None = Field(default=None, description="ExternalLoads .xml: meaning of the force columns")
     length_unit: LengthUnit | None = Field(
-        default=None, description="of a C3D file that says none, or a wrong one: mm, cm or m"
+        default=None, description="unit of a C3D file that states none, or a wrong one: mm, cm or m"
     )
     window_s: Window | None = Field(default=None, description="[start, end], s; left out: measured part")
     use: TrialUse = Field(
         default="all",
-        description='"kinematics": its markers alone, for joint centres, joint axes and places of markers',
+        description='"kinematics": only its markers are used, for joint centres, joint axes and marker positions',
     )
     belt_speed_m_s: BeltSpeed | None = Field(
         default=None,
@@ -65,9 +65,9 @@ class TrialFiles(Table):
 class InstrumentsFiles(Instruments):
     """Statements of the laboratory about its instruments, and the file of its session."""
 
-    session: File | None = Field(default=None, description="what kinertia instruments wrote of the same session")
+    session: File | None = Field(default=None, description="file of kinertia instruments for the same session")
     date: datetime.date | None = Field(
-        default=None, description="day of the recording, 2026-05-03; left out: as the recordings say, if they do"
+        default=None, description="day of the recording, 2026-05-03; left out: as stated in the recordings"
     )
 
 
@@ -78,7 +78,7 @@ class PriorFiles(PriorSettings):
         default=None, description="bsp.csv of an earlier fit: its estimates and sd in place of the literature's"
     )
     population: File | None = Field(
-        default=None, description="what kinertia population learnt of the person's group, in place of the literature's"
+        default=None, description="file of kinertia population for the person's group, in place of the literature"
     )
     measures: File | None = Field(
         default=None, description="girths and lengths of the person: the sheet of kinertia init --measures, filled in"

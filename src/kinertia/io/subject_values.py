@@ -48,7 +48,7 @@ def _trial_name(value: object) -> str:
     """Check that a name can be a folder's: the results of several trials go to one folder each."""
     if isinstance(value, str) and value.strip(" .") and not set(value) & set("/\\\0"):
         return value
-    problem = Quantity("it must be one that a folder can have: not empty, and without / and \\")
+    problem = Quantity("it must be a valid folder name: not empty, and without / and \\")
     raise CodedError("F192", name=Quantity(shown(value)), problem=problem)
 
 

@@ -1,9 +1,9 @@
 """Reads Theia's C3D files: poses of segments (group ROTATION), and virtual markers made of them.
 
-Each segment has a frame at its proximal joint: x to the right, y forwards, z up along the segment; where the next
-segment's frame stands in it is constant but for noise, and tells where joints are. Every segment of the 27-DOF model
-gets three virtual markers or more at those landmarks that the marker set "theia" names, so that the joint centres of
-the model are Theia's.
+Each segment has a frame at its proximal joint: x to the right, y forwards, z up along the segment; the position of the
+next segment's frame in it is constant except for noise, and gives the joint centres. Every segment of the 27-DOF model
+gets at least three virtual markers at the landmarks of the marker set "theia", so that the joint centres of the model
+are Theia's.
 """
 
 from __future__ import annotations
@@ -107,7 +107,7 @@ def virtual_places(poses: Poses) -> dict[str, tuple[str, FloatArray]]:
 
 
 def _upper_places(poses: Poses) -> dict[str, tuple[str, FloatArray]]:
-    """Return the virtual markers of trunk and arms, as far as present."""
+    """Return the virtual markers of trunk and arms, if present."""
     places: dict[str, tuple[str, FloatArray]] = {}
     arms = {side: [f"{side}_{name}" for name in ("uarm", "larm", "hand")] for side in "rl"}
     if not {"torso", *(arm[0] for arm in arms.values())} <= set(poses.rotation):

@@ -1,4 +1,4 @@
-"""Reads TOML with the line of every table and key, so that errors can name it."""
+"""Reads TOML with the line of every table and key, so that errors can state it."""
 
 from __future__ import annotations
 

@@ -34,9 +34,8 @@ def read_trc(path: str | Path) -> Markers:
     """Read marker trajectories (m, ground axes as in the file) from a TRC file.
 
     Empty cells, NaN and the triples 0 0 0 and -9999 -9999 -9999 are missing markers; `subject:` before the labels is
-    taken off; of repeated labels the one in most frames is kept. Frame times that were rounded when written are put
-    back on the uniform grid they came from.
-    `read_trc_recording` reports what was assumed.
+    removed; of repeated labels the one in most frames is kept. Frame times that were rounded when written are put back
+    on the uniform grid they came from. `read_trc_recording` reports what was assumed.
 
     Raises:
         FileError: the file is missing or is not a complete, consistent TRC file; with the line.
@@ -45,7 +44,8 @@ def read_trc(path: str | Path) -> Markers:
 
 
 def read_trc_recording(path: str | Path) -> Recording:
-    """Read markers as `read_trc` does, with the file's unit and findings about assumptions; Y is taken to point up."""
+    """Read markers as `read_trc` does, with the file's unit and findings about assumptions; Y is assumed to point
+    up."""
     path = Path(path)
     lines = read_lines(path)
     header = _header(path, lines)
@@ -178,7 +178,7 @@ def _expect_whole(path: Path, lines: list[str], rows: int, frames: int, line: in
 
 
 def _other_markers(path: Path, lines: list[str], labels: tuple[str, ...], count: int) -> list[Finding]:
-    """Find a header that counts other markers than the labels and the columns of numbers, which agree.
+    """Find a header whose number of markers differs from the labels and the columns of numbers, which agree.
 
     Raises:
         FileError: labels and columns do not agree either, so that labels cannot be assigned.

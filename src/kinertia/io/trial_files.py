@@ -15,9 +15,8 @@ _KINDS = (".c3d", ".trc", ".tsv", ".csv")
 def trial_file(provenance: Provenance | None, name: str, results: Path, recordings: Path | None) -> Path:
     """Find the file with the markers of a trial.
 
-    Searches `recordings` if given, else the folder of the results, `lab` there (the demo's) and above it,
-    the working folder, and the folders used by the fit. Of the places that have a file of its name, the one
-    whose content was fitted.
+    Searches `recordings` if given, else the folder of the results, `lab` there (the demo's) and above it, the working
+    folder, and the folders used by the fit. Of several files of its name, the one whose content was fitted is returned.
 
     Args:
         provenance: provenance of the fit; None if it was saved from Python, where only its name is known.
@@ -26,7 +25,7 @@ def trial_file(provenance: Provenance | None, name: str, results: Path, recordin
         recordings: folder of the files.
 
     Raises:
-        FileError: it is not there, or it has changed since.
+        FileError: it is missing, or has changed since.
     """
     stated = None if provenance is None else provenance.trials.get(name)
     if provenance is None or stated is None:

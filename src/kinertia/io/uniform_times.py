@@ -39,10 +39,11 @@ def uniform_times(path: Path, time: FloatArray) -> tuple[FloatArray, tuple[Findi
     """Return times (k,) s of forces unchanged, or on the even grid that they were rounded from, with findings.
 
     Only the times show the rate: the grid is the straight line through them (T102). At 2000 Hz and in whole
-    milliseconds every other step is zero. A last sample that alone is off is left out (T105): then the times are k - 1.
+    milliseconds every other step is zero. If only the last time is irregular, its sample is left out (T105): then the
+    times are k - 1.
 
     Raises:
-        FileError: samples are lost or repeated, or time goes back.
+        FileError: samples are missing or repeated, or time goes back.
     """
     try:
         return _even(path, time)

@@ -1,9 +1,9 @@
 """Reads CSV and TXT files that Vicon Nexus exports as ASCII: sections of trajectories and devices.
 
 A section has a line with its name, one with its rate, one with what the columns belong to, one with the columns' names,
-one with units, and then a row per frame or, of devices, per sub frame. A force plate is three groups of a device:
-`... - Force`, `... - Moment` and `... - CoP`. Nexus writes centres of pressure in the laboratory's axes, and forces in
-those or in the plate's; which, is seen from whether they agree (`plate_moments`).
+one with units, and then a row per frame or, of devices, per sub frame. A force plate is three groups of a device: `...
+- Force`, `... - Moment` and `... - CoP`. Nexus writes centres of pressure in the laboratory's axes, and forces in the
+same axes or in the plate's, depending on which agree (`plate_moments`).
 """
 
 from __future__ import annotations
@@ -148,7 +148,7 @@ def _numbers(path: Path, line: int, row: Sequence[str], width: int) -> list[floa
 
 
 def _markers(path: Path, section: _Section) -> tuple[Markers, list[Finding]]:
-    """Read markers in the laboratory's axes, m, with findings; columns not in a unit of length are no markers."""
+    """Read markers in the laboratory's axes, m, with findings; columns not in a unit of length are not markers."""
     owners = [owner for owner in dict.fromkeys(section.owners) if len(section.columns(owner, "XYZ")) == 3]
     places = {owner: section.columns(owner, "XYZ") for owner in owners}
     places = {o: at for o, at in places.items() if section.units[at[0]] in METRES_PER_UNIT}

@@ -1,6 +1,6 @@
-"""Makes a hidden folder beside results in the making, locked while its process lives.
+"""Makes a hidden folder for unfinished results, locked while its process lives.
 
-A killed process cleans up nothing, but the system takes its lock back: what nobody holds is what nobody needs.
+A killed process cannot clean up, but the system releases its lock: an unlocked folder is no longer needed.
 """
 
 from __future__ import annotations

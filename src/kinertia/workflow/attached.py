@@ -1,10 +1,10 @@
 """Adds what is not body: a rucksack, a held weight, an orthosis, an exoskeleton, shoes.
 
 Each becomes a segment of its own, welded to the one that it moves with: it enters the dynamics, the error bars and the
-exported model as every segment does. What its mass, place and size are known by is its prior. The motion cannot tell
-it from the segment that carries it, but the scale can: the body was weighed with it, or without. The masses of the
-body's segments are shares of what the scale leaves for the body, so they are lighter the heavier the thing that was
-weighed with it.
+exported model like any segment. What is known about its mass, place and size is its prior. The motion cannot
+distinguish it from the segment that carries it, but the scale can: the body was weighed with it, or without. The masses
+of the body's segments are shares of the body mass that remains on the scale, so they are lighter the heavier an item
+weighed with the body.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ def _check(skeleton: Skeleton, attached: Sequence[Attached]) -> None:
                 f"{', '.join(skeleton.segments)}"
             )
         if one.name == _GROUND:
-            raise PriorError(f"[[attached]] {_GROUND}: OpenSim calls the laboratory so; give it another name")
+            raise PriorError(f"[[attached]] {_GROUND}: this is OpenSim's name for the laboratory; give it another name")
         if one.name in taken:
             raise PriorError(f"[[attached]] {one.name}: there is a segment of this name already; give it another")
         taken.append(one.name)

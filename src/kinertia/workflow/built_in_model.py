@@ -285,7 +285,7 @@ def _adapted(calibrated: Calibrated) -> Iterator[Finding]:
 
 
 def _unblocked(trials: Sequence[Turned], screened: Screened, found: Sequence[Finding]) -> list[Turned]:
-    """Return the trials that can go on after all that was found.
+    """Return the trials that remain usable after all findings.
 
     Raises:
         BlockedError: none can.

@@ -19,7 +19,7 @@ _FEWEST = 2
 def with_doubted_mass(prior: BspPrior, findings: Sequence[Finding]) -> BspPrior:
     """Return the prior at the plates' mass, where several occasions or plates agree that the stated mass is wrong.
 
-    They are not scaled to it. Whoever ignores the finding keeps the stated mass.
+    They are not scaled to it. A user who ignores the finding keeps the stated mass.
     """
     for one in findings:
         if one.code != _DOUBTED or one.severity is not Severity.WARNING or not one.is_open:
@@ -35,7 +35,7 @@ def with_doubted_mass(prior: BspPrior, findings: Sequence[Finding]) -> BspPrior:
 def at_mass_of_plates(ready: Prepared, fitted: SimultaneousFit) -> Prepared | None:
     """Return the person at the mass that all plates agree on in an estimate.
 
-    None if the plates do not contradict the stated mass alike, if something was attached, or if the user ignores it.
+    None if not all plates contradict the stated mass equally, if something was attached, or if the user ignores it.
     """
     gain = common_gain(fitted.posterior.instrument_errors)
     ignored = any(_DOUBTED.startswith(code) for code in ready.overrule.ignore)

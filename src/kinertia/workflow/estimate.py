@@ -51,7 +51,7 @@ def estimate_bsp(
     overrule: Overrule | None = None,
     calibrate: bool = False,
 ) -> Fit:
-    """Estimate a person's body segment parameters from one or more trials, with the built-in or an own model.
+    """Estimate a person's body segment parameters from one or more trials, with the built-in model or the user's own.
 
     Args:
         subject: mass and height may be None where a recording carries them; height and sex with an OpenSim model.
@@ -65,11 +65,11 @@ def estimate_bsp(
             model's, if None.
         attached: what the person wore or carried in all trials.
         overrule: findings that do not block, or are not shown.
-        calibrate: let markers and joint centres of an OpenSim model move; else they stay where it has them.
+        calibrate: let markers and joint centres of an OpenSim model move; else they are fixed.
 
     Raises:
-        KinertiaError: the subject, a marker set, the model or a trial cannot be used; the message says why and what to
-            do.
+        KinertiaError: the subject, a marker set, the model or a trial cannot be used; the message states why and what
+            to do.
     """
     ready = prepare(subject, source, inputs, settings, marker_set, progress, attached, overrule, calibrate)
     return estimate(ready if prior is None else replace(ready, prior=prior), progress)

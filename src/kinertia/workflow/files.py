@@ -55,7 +55,7 @@ def files_by_name(
     pairs = _matched(marked, beside)
     alone = [path for path in beside if path not in pairs.values()]
     if alone:
-        goes = "goes with none of the marker files by its name" if marked else "holds forces only"
+        goes = "matches none of the marker files by name" if marked else "holds forces only"
         raise _unpaired(alone[0], goes, f"Check it together with its markers ({', '.join(MARKER_FILES)})")
     wanted = [RecordingFiles(path, pairs.get(path)) for path in marked]
     if forces is not None:

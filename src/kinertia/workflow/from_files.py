@@ -1,6 +1,7 @@
 """Leads from a subject file to its recordings, to what an estimator needs, and to a `Fit`.
 
-What only some subject files name is imported where it is read: all of it together takes as long as reading a trial.
+Modules that only some subject files need are imported where they are used: all together take as long as reading a
+trial.
 """
 
 from __future__ import annotations
@@ -66,7 +67,7 @@ def _expect_no_mirrored_prosthesis(wanted: SubjectFile) -> None:
     if names and wanted.settings.method == "two-level" and wanted.settings.symmetry:
         raise SettingsError.of_entry(
             ", ".join(names),
-            "a prosthesis is no mirror image of the other side; use the default method, or symmetry = false",
+            "a prosthesis does not mirror the other side; use the default method, or symmetry = false",
         )
 
 
@@ -119,14 +120,14 @@ def _group(wanted: SubjectFile, path: Path) -> LearntPrior:
     file = read_population(path)
     if set(recordings(wanted)) & set(file.files):
         raise PriorError(
-            f"{path.name} was learnt from these trials, too, which would count twice; write one for this person: "
+            f"{path.name} was learnt from these trials as well, so they would count twice; write one for this person: "
             f"kinertia population ... {command_line(['--without', wanted.subject.name])}"
         )
     return LearntPrior.from_file(file)
 
 
 def check_plates(wanted: SubjectFile) -> None:
-    """Check that plates named alike in this person's and the session's files are the same plates.
+    """Check that plates with the same name in this person's and the session's files are the same plates.
 
     Raises:
         SessionError: they are columns of force files, and the subject file does not state that those are plates.
@@ -135,8 +136,8 @@ def check_plates(wanted: SubjectFile) -> None:
     if files and not wanted.instruments.same_plates:
         raise SessionError(
             f"{files[0].name}: columns of force files need not be plates (some laboratories sort steps into them, a "
-            "column for each foot); if the same columns are the same plate in all files of the session, say so in the "
-            "subject file: same_plates = true under [instruments]"
+            "column for each foot); if the same columns are the same plate in all files of the session, set "
+            "same_plates = true under [instruments] in the subject file"
         )
 
 

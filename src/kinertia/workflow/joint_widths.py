@@ -18,7 +18,8 @@ _SIDES = {"r": "right", "l": "left"}
 def with_widths(
     static: Recording, trials: Sequence[Recording], marker_set: MarkerSet, subject: Subject
 ) -> tuple[Recording, MarkerSet]:
-    """Return the static trial with all known widths and S105 for each from another file, and the set that names them.
+    """Return the static trial with all known widths and S105 for each from another file, and the set that includes
+    them.
 
     The subject file takes precedence over the static trial, and that over the other trials.
     """

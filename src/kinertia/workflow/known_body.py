@@ -1,9 +1,8 @@
-"""Collects what is known of this person's body besides the tables: measured segments, an earlier session.
+"""Collects what is known about this person's body besides the tables: measured segments, an earlier session.
 
-An earlier estimate takes the place of the literature's values and deviations; correlations stay the literature's, for
-a table of deviations has none. Measured parameters are then added as what they are, measurements with errors of their
-own: the mean moves towards them by how well each is known, and what goes with them (the other side, the trunk that a
-thigh is cut from) moves along.
+An earlier estimate replaces the values and SDs of the literature, but not its correlations, since a table of SDs has
+none. Measured parameters are then added as measurements with errors: the mean moves towards them according to their
+precision, and correlated parameters (of the other side, or the trunk that a thigh is cut from) move with them.
 """
 
 from __future__ import annotations
@@ -47,7 +46,7 @@ def with_known_body(
     group: LearntPrior | None = None,
     measures: BodyMeasures | None = None,
 ) -> Prepared:
-    """Update the prior of a prepared person of whom more is known than mass, height and sex.
+    """Update the prior of a prepared person with what is known besides mass, height and sex.
 
     Args:
         ready: the person with the literature's prior.
@@ -58,7 +57,7 @@ def with_known_body(
         measures: girths and lengths of the person.
 
     Raises:
-        PriorError: both an earlier estimate and a group, a segment that the model has not, either of another model, or
+        PriorError: both an earlier estimate and a group, a segment that the model lacks, either of another model, or
             measures that cannot be used.
     """
     body = len(ready.prior.mean.segments)
@@ -112,14 +111,12 @@ def _leaning_on(
         if earlier is not None:
             raise PriorError("[prior] has both bsp and population; the person's own estimate says more: keep bsp")
         if ready.file is not None:
-            raise PriorError(
-                "[prior] population is learnt of the built-in model's segments; OpenSim models have others"
-            )
+            raise PriorError("[prior] population is for the built-in model; OpenSim models have other segments")
         prior = replace(group.of(literature_prior(ready.literature)), mass_sd_kg=prior.mass_sd_kg)
         found.append(_leans_on(f"learnt from {group.people} people in place of the literature's"))
     if earlier is not None:
         prior = _from_earlier(prior, earlier)
-        found.append(_leans_on(f"{earlier.name} in place of the literature; the same trials must not be in it"))
+        found.append(_leans_on(f"{earlier.name} in place of the literature; it must not include these trials"))
     if settings.sides_correlation is not None:
         covariance = with_symmetry(prior.covariance, prior.mean.segments, settings.sides_correlation)
         prior = replace(prior, covariance=covariance)
@@ -150,7 +147,7 @@ def _with_measures(
 ) -> tuple[BspPrior, list[Finding]]:
     """Return the prior updated by girths and lengths, and the findings about them."""
     if ready.file is not None:
-        raise PriorError("[prior] measures are of the built-in model's segments, which OpenSim models cut elsewhere")
+        raise PriorError("[prior] measures are for the built-in model; OpenSim models divide the body differently")
     body_kg, height_m = ready.carried.body_kg, known_value(ready.subject.height_m)
     artificial = [name for name, known in segments.items() if known.prosthesis]
     body_sd = body_sd_kg(known_value(ready.subject.mass_kg), ready.attached)

@@ -1,7 +1,7 @@
 """Adapts a user's own OpenSim model to a person and the trials.
 
 The model's scaling, markers and joints stay as they are unless calibration is asked for, and so does the laboratory's
-frame: the trial is not turned. The prior is around the model's own body segment parameters, at the mass on the scale.
+frame: the trial is not rotated. The prior is around the model's own body segment parameters, at the mass on the scale.
 """
 
 from __future__ import annotations
@@ -134,7 +134,7 @@ def with_centre_offsets(model: OsimModel, skeleton: Skeleton) -> Skeleton:
 
 
 def _marker_sd(skeleton: Skeleton) -> dict[str, float]:
-    """Return by segment how far (SD, m) its markers may be from their positions in the model."""
+    """Return by segment the SD (m) of its markers' positions from those in the model."""
     upper = ("torso", "upper_arm", "forearm")
     return {s: UPPER_BODY_SD_M if kind_of(s) in upper else LOWER_BODY_SD_M for s in skeleton.segments}
 

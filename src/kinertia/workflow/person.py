@@ -40,7 +40,7 @@ class Person:
         overrule: what the user overrules, for all trials.
         overrule_of: what the user overrules in single trials, by name.
         unread: findings of files that could not be read.
-        files_only: whether files are checked by themselves, beside which there may be others.
+        files_only: whether single files are checked, besides which there may be others.
 
     Examples:
         >>> person = kinertia.read_person(kinertia.read_subject("lab/subject.toml"))  # the files of `kinertia demo`

@@ -1,4 +1,4 @@
-"""Defines what both sources of a model, the built-in one and a user's file, make of a person and the trials."""
+"""Defines the model of a person that both sources, the built-in model and a user's file, return."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ class PersonModel:
     Attributes:
         subject: with what the files add.
         note: which model it is.
-        trials: those that can go on, in the axes in which they are solved.
+        trials: usable trials, in the axes in which they are solved.
         skeleton: adapted to them.
         prior: of the body segment parameters.
         uncertainty: what else the estimate may move.
         findings: what adapting it showed.
-        assumed: findings of what was done to the model on the way.
+        assumed: findings about assumptions made for the model.
         elbow_rotations_rad, torso_rotation_rad: as in `Prepared`.
     """
 

@@ -1,6 +1,6 @@
 """Prepares screened recordings for an estimator, with the built-in model or the user's own.
 
-The road is one: the trials that can be used, a model adapted to them, their kinematics. The two sources of a model
+There is one road: the usable trials, a model adapted to them, and their kinematics. The two sources of a model
 (`built_in_model`, `opensim_model`) take the same and return the same, a `PersonModel`.
 """
 
@@ -68,7 +68,9 @@ def prepared(screened: Screened, settings: Settings, progress: Progress = lambda
     """
     person = screened.person
     if person.attached and settings.method == "two-level":
-        raise SettingsError.of_entry("method", "two-level knows the body only; with [[attached]] use the default")
+        raise SettingsError.of_entry(
+            "method", "the two-level method estimates the body only; with [[attached]] use the default"
+        )
     check_trials(person.recordings)
     usable = screened.usable
     progress("calibration", 0.0)

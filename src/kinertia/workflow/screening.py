@@ -113,10 +113,10 @@ class Screened:
 
     @cached_property
     def usable(self) -> list[RecordingContext]:
-        """The trials that can be used, and those whose markers alone can.
+        """The usable trials, and those of which only the markers are usable.
 
         Raises:
-            BlockedError: none can, or something stops everything.
+            BlockedError: none is usable, or something stops everything.
         """
         trials = [one for one in self.context.trials if one.name not in self.left_out]
         if self.stops or not trials:
@@ -235,7 +235,7 @@ def _of_recording(context: RecordingContext, questions: Sequence[Question[Record
 
 
 def _of_person(context: PersonContext, found: Sequence[Finding]) -> list[Finding]:
-    """Check the person with the trials that are not blocked: another person's forces would put the mass in doubt."""
+    """Check the person with the trials that are not blocked: another person's forces would contradict the mass."""
     blocked = {one.where.trial for one in blocking(explained(found))}
     sound = replace(context, trials=[one for one in context.trials if one.name not in blocked], found=tuple(found))
     of_person = [one for one in found if one.where.trial is None]

@@ -1,4 +1,4 @@
-"""Combines what the trials of several people say of a session's plates and synchronisation."""
+"""Combines the information from several people's trials on a session's plates and synchronisation."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def person_instruments(fit: Fit, files: Sequence[str]) -> PersonInstruments:
         SessionError: the fit is by the two-level estimate, which takes instruments as exact.
     """
     if fit.posterior is None:
-        problem = 'the two-level estimate takes plates and clock as exact; use method = "simultaneous"'
+        problem = 'the two-level estimate assumes exact plates and synchronisation; use method = "simultaneous"'
         raise SessionError(f"{fit.subject.name}: {problem}")
     shown = fit.posterior.instruments
     return PersonInstruments(
@@ -107,7 +107,7 @@ def with_instruments(
         ready: the person with the literature's SDs.
         stated: statements of the laboratory.
         session: information from people measured with the same instruments.
-        files: SHA-256 of this person's files: whoever shares one is the same person and adds nothing.
+        files: SHA-256 of this person's files: people who share one are the same person and are left out.
 
     Raises:
         SessionError: none of the others stood on any of this person's plates.
@@ -118,14 +118,18 @@ def with_instruments(
     if others and not own & theirs:
         raise SessionError(
             f"none of the session's plates ({', '.join(sorted(theirs))}) is among this person's "
-            f"({', '.join(sorted(own))}); plates are told by their names"
+            f"({', '.join(sorted(own))}); plates are matched by name"
         )
     prior = InstrumentPrior.stated(stated, [_information(person) for person in others])
     findings = ready.findings
     if session:
         left_out = [person.name for person in session if person not in others]
-        of = f"plates and clock are known from {_listed([p.name for p in others])}" if others else "nothing of others"
-        own_trials = f"; what {_listed(left_out)} said is left out: the same files are in this fit" if left_out else ""
+        of = (
+            f"plates and synchronisation are known from {_listed([p.name for p in others])}"
+            if others
+            else "nothing of others"
+        )
+        own_trials = f"; {_listed(left_out)} left out: the same files are in this fit" if left_out else ""
         findings = (*findings, finding("S408", source=Quantity(f"session: {of}{own_trials}")))
     return replace(ready, uncertainty=replace(ready.uncertainty, instruments=prior), findings=findings)
 

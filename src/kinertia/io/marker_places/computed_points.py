@@ -42,7 +42,7 @@ def unusable_points(markers: Markers) -> dict[str, str]:
         else:
             lower, upper = (one, other) if apart[:, 1].mean() > 0 else (other, one)
             if np.abs(place[lower][:, 1]).max() < _ON_FLOOR_M:
-                found[lower] = f"the point of the floor below {upper}"
+                found[lower] = f"the point on the floor below {upper}"
     return found
 
 
@@ -58,7 +58,7 @@ def computed_points(markers: Markers) -> dict[str, str]:
         if label in found:
             continue
         if pair := _middle_of(own, {other: at for other, at in place.items() if other != label}):
-            found[label] = f"always in the middle of {pair[0]} and {pair[1]}"
+            found[label] = f"always midway between {pair[0]} and {pair[1]}"
     pairs = sides(list(place))
     hinted = {label: bool(roles(label, label in pairs)) for label in place}
     if markers.time[-1] - markers.time[0] > _LONG_S:  # within less, quiet markers keep their distances by chance

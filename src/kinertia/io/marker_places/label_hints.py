@@ -37,7 +37,7 @@ _LEFT = re.compile(r"^(left|right)(?=[\W_]|[A-Z])|^(left|right)|(left|right)$", 
 
 
 def is_named_virtual(label: str) -> bool:
-    """Return whether a label is that of a joint centre, a projection, a centre of mass or pressure, or a length."""
+    """Return whether a label denotes a joint centre, a projection, a centre of mass or pressure, or a length."""
     return _VIRTUAL.search(label) is not None
 
 

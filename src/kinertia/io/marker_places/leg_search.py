@@ -33,7 +33,7 @@ class Found:
     """Landmarks found so far, with their markers and scores.
 
     Attributes:
-        markers: landmark -> index of the marker; `metatarsal_inner_r` and the like are parts of one.
+        markers: landmark -> index of the marker; names such as `metatarsal_inner_r` are parts of one.
         scores: landmark -> how well it fits, above zero.
     """
 
@@ -181,9 +181,9 @@ def metatarsals(found: Mapping[str, int], side: str) -> tuple[list[int], str]:
     """Return the markers whose mean is the middle of the metatarsal heads, and a description."""
     inner, outer, middle = (found.get(f"metatarsal_{which}_{side}") for which in ("inner", "outer", "middle"))
     if inner is not None and outer is not None:
-        return [inner, outer], "middle of the inner and the outer metatarsal heads"
+        return [inner, outer], "midpoint of the medial and lateral metatarsal heads"
     if middle is not None:
-        return [middle], "a metatarsal head in the middle"
+        return [middle], "a central metatarsal head"
     for one, which in ((inner, "inner"), (outer, "outer")):
         if one is not None:
             return [one], f"only a marker of the {which} metatarsal heads: the middle of the foot is a little beside it"

@@ -62,7 +62,7 @@ def place_markers(recording: Recording) -> Placement:
     """
     markers = recording.markers
     left_out = {
-        label: f"seen in {share * 100:.0f} % of the frames only"
+        label: f"visible in only {share * 100:.0f} % of the frames"
         for label, share in zip(markers.labels, markers.seen.mean(axis=0), strict=True)
         if share <= _OFTEN
     }
@@ -72,18 +72,18 @@ def place_markers(recording: Recording) -> Placement:
     computed = computed_points(markers)
     result = Placement(left_out=left_out)
     if len(markers.labels) - len(computed) < _FEWEST:
-        result.notes.append("too few markers to tell where they are")
+        result.notes.append("too few markers to place them")
         return result
     pairs, moves = sides(recording.markers.labels), speed_m_s(markers) > STILL_M_S
     postures = _frames(markers) if moves else [np.nanmedian(markers.positions, axis=0)]
     body, found, margin = max((_best_body(markers.labels, each, computed, pairs) for each in postures), key=_score)
     if found.score < _SURE:
-        result.notes.append("nobody was found who stands upright, and labels alone decide: give the static trial")
+        result.notes.append("no one stands upright here, so only the labels were used: give the static trial")
         return result
     if moves:
-        result.notes.append("nobody stands still here: the static trial shows better where the markers are")
+        result.notes.append("no one stands still here: the static trial shows the marker positions better")
     if margin < _CLEAR:
-        result.notes.append("which way the person faces is not clear: check left and right")
+        result.notes.append("the heading of the person is unclear: check left and right")
     find_upper_body(body, found)
     _explain(result, body, found, computed)
     _complete_by_label(result, pairs)
@@ -143,7 +143,7 @@ def _explain(result: Placement, body: StandingBody, found: Found, computed: Mapp
     """Record what was found in the result, on the sides stated by the labels."""
     if body.mirrored:
         result.notes.append(
-            "the labels say right where the person's left is, by the feet: the axes may be mirrored; labels were kept"
+            "right labels are on the person's left, judging by the feet: the axes may be mirrored; labels were kept"
         )
     of_landmark: dict[str, list[int]] = {}
     for landmark, marker in found.markers.items():
@@ -188,7 +188,7 @@ def _complete_by_label(result: Placement, pairs: Mapping[str, tuple[str, str]]) 
         there = counterparts(own)
         if side in _OPPOSITE and other not in result.landmarks and len(there) == len(own):
             result.landmarks[other] = there
-            result.how[other] = "as on the other side, by its label"
+            result.how[other] = "as on the other side, going by its label"
     for name, own in list(result.segments.items()):
         base, _, side = name.rpartition("_")
         if side in _OPPOSITE and (there := counterparts(own)):
@@ -215,5 +215,5 @@ def _how(body: StandingBody, landmark: str, markers: Sequence[int], computed: Ma
     words.append("the label agrees" if hinted else "by its place alone")
     words += [f"computed ({computed[body.labels[k]]})" for k in markers if body.labels[k] in computed]
     if landmark.endswith(("_r", "_l")) and _on_side(body, landmark, markers) != landmark and not body.mirrored:
-        words.append("ITS LABEL SAYS THE OTHER SIDE than its place")
+        words.append("ITS LABEL IS OF THE OTHER SIDE")
     return ", ".join(words)

@@ -1,6 +1,6 @@
-"""Tabulates where markers of people who stand are, as shares of the stature: forward, up, outward (x, y, z).
+"""Tabulates marker positions of standing people, as shares of the stature: forward, up, outward (x, y, z).
 
-Means and deviations were set by hand from published standing trials of adults and children, with room for posture.
+Means and SDs were set by hand from published standing trials of adults and children, with allowance for posture.
 """
 
 from __future__ import annotations

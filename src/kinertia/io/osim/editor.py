@@ -1,6 +1,6 @@
 """Writes other mass properties, markers and joint places into an OpenSim model file.
 
-Only the numbers that change are replaced in the file's own text; everything else stays byte for byte.
+Only the numbers that change are replaced in the text of the file; everything else is unchanged, byte for byte.
 """
 
 from __future__ import annotations

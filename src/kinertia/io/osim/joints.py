@@ -1,6 +1,6 @@
 """Reads joints of an OpenSim file, format 3 or 4, as axes in order: translations, then body-fixed rotations.
 
-OpenSim's joints are all such lists; a CustomJoint says by which function of which coordinate each axis moves, the
+All OpenSim joints are such lists; a CustomJoint defines the function and the coordinate by which each axis moves, the
 others have one coordinate per axis. Constant axes become locked coordinates of their own (`<joint>/<axis>`).
 """
 
@@ -105,7 +105,7 @@ class Frames:
             owner, path = frame.name, self._values.text(frame, "socket_parent")
         body = path.strip().split("/")[-1]
         if body not in self._bodies:
-            problem = f"it hangs on '{path.strip()}', which the file does not have, expected a body or a frame"
+            problem = f"it is attached to '{path.strip()}', which is not in the file, expected a body or a frame"
             self._values.fail(user, problem, "O103")
         return body, (rotation, translation)
 

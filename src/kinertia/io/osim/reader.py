@@ -1,7 +1,7 @@
 """Reads OpenSim model files (.osim, formats 3 and 4): bodies, joints, coordinates, markers as a `Skeleton`.
 
-Muscles, wrapping, geometry and controllers are not read; `kinertia.io.osim.editor` hands them through untouched. What
-cannot be represented is an error that names it.
+Muscles, wrapping, geometry and controllers are not read; `kinertia.io.osim.editor` passes them through unchanged. An
+element that cannot be represented raises an error that identifies it.
 """
 
 from __future__ import annotations
@@ -166,7 +166,9 @@ def _couplings(values: Values, model: Element, joints: Sequence[JointElement]) -
         if values.flag(element, "isDisabled", False) or not values.flag(element, "isEnforced", True):
             continue
         if element.tag != "CoordinateCouplerConstraint":
-            values.fail(element, "of constraints only a CoordinateCouplerConstraint is, set isEnforced to false")
+            values.fail(
+                element, "the only constraint supported is a CoordinateCouplerConstraint, set isEnforced to false"
+            )
         leaders = values.text(element, "independent_coordinate_names").split()
         dependent = values.text(element, "dependent_coordinate_name")
         for name in (*leaders, dependent):

@@ -1,7 +1,7 @@
 """Parses XML with each element's line and place in the file, so that a single value can be replaced.
 
-OpenSim files go back to the user with everything byte for byte that Kinertia did not estimate; that rules out parsing
-and writing again.
+In OpenSim files returned to the user, everything that Kinertia did not estimate is unchanged, byte for byte; this rules
+out parsing and writing them again.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ def parse(content: bytes) -> Element:
 
     def start(tag: str, attributes: dict[str, str]) -> None:
         if len(stack) > _DEEPEST:
-            raise XmlError(f"more than {_DEEPEST} elements inside one another", parser.CurrentLineNumber)
+            raise XmlError(f"more than {_DEEPEST} levels of nested elements", parser.CurrentLineNumber)
         at = parser.CurrentByteIndex
         match = _START_TAG.match(content, at)
         end = match.end() if match else at
