@@ -49,7 +49,7 @@ class RecordingContext:
         marker_set: which label is which landmark, or the markers of an OpenSim model; None where none fits.
         static: the static trial that goes with it; None for the static trial itself, and without one.
         is_static: it is given as the static trial, or the only one in which the person stands.
-        without_forces: its markers alone are used.
+        without_forces: only its markers are used.
         forces_refused: because its forces cannot be.
         window_s: the window that the user vouches for.
         height_m: stature, where it is known.
@@ -277,7 +277,7 @@ class RecordingContext:
 
     @cached_property
     def trial_on_plates(self) -> Trial | None:
-        """The trial without frames in which a foot bears load beyond its plate, or somebody else stands on one, unless
+        """The trial without frames in which a foot bears load beyond its plate, or another person stands on one, unless
         the user vouches for a window; None where it is impossible, or hardly any frames are left.
         """
         trial = self.trial
@@ -292,7 +292,7 @@ class RecordingContext:
 
     @cached_property
     def foreign_load(self) -> ForeignLoad | None:
-        """What plates bear beside the person for a while; None where that is nothing, or no mass is stated."""
+        """A temporary load on the plates besides the person; None without one, or if no mass is stated."""
         if self.trial is None or self.mass_kg is None or self.is_static:
             return None
         weighed = force_mass(self.segment_of_label, self.trial, self.travel.kind == "stands still")
@@ -361,7 +361,7 @@ class RecordingContext:
 
     @property
     def whole_plate_masses(self) -> Mapping[str, float]:
-        """`plate_masses` of plates that bear all of the person, and nobody else."""
+        """`plate_masses` of plates that bear all of the person and no one else."""
         names = () if self.plates is None else self.plates.names
         other = self.plates_reached_beyond | {names[one.plate] for one in self.foreign_contacts}
         return {name: kg for name, kg in self.plate_masses.items() if name not in other}

@@ -1,4 +1,4 @@
-"""Holds one person with all recordings, as questions about the person see them."""
+"""Holds one person with all recordings, for the questions about the person."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class PersonContext:
         total_mass: stated masses of the body and of attached items; None where no mass is known.
         found: findings of the recordings themselves, where a question depends on them.
         more_statics: recordings in which the person stands, of which none is the static trial.
-        files_only: whether files are checked by themselves, beside which there may be others.
+        files_only: whether single files are checked, besides which there may be others.
     """
 
     subject: Subject

@@ -1,7 +1,7 @@
 """Asks questions, lets causes explain their consequences, and applies what the user overrules.
 
-A question returns all findings that apply, or fits every hypothesis and returns the best. Nothing hides a finding but
-the relation `supersedes` of the catalogue: there is no order of evaluation that matters.
+A question returns all findings that apply, or fits every hypothesis and returns the best. Only the relation
+`supersedes` of the catalogue hides findings: the order of evaluation does not matter.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ class Question(Generic[Context]):
     Attributes:
         code: first three characters of its codes, "P21".
         ask: function that answers it.
-        unless: codes, questions or families whose ERROR leaves it without meaning: then it is not asked.
+        unless: codes, questions or families whose ERROR makes it meaningless: then it is not asked.
     """
 
     code: str
@@ -36,7 +36,7 @@ class Question(Generic[Context]):
 def asked(
     questions: Iterable[Question[Context]], context: Context, found: Sequence[Finding] = (), trial: str | None = None
 ) -> list[Finding]:
-    """Ask these questions, unless earlier findings leave one without meaning, and return the findings.
+    """Ask these questions, except those that earlier findings make meaningless, and return the findings.
 
     Args:
         questions: in the order in which they are asked.

@@ -1,8 +1,8 @@
 """Defines a finding: what was found, where, with its size, what follows and what to do.
 
 All quantities are SI; `kinertia.findings.display` makes them readable. A quantity about an instrument is its *error*,
-recorded minus true: positive means reads too much, lies too far along the positive axis, is turned counter-clockwise
-seen from above, comes too late.
+recorded minus true: positive means that it reads too much, lies too far along the positive axis, is rotated
+counter-clockwise seen from above, or is delayed.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ Status = Literal["open", "waived", "ignored"]
 
 
 class Severity(IntEnum):
-    """Importance of a finding: ERROR blocks, WARNING lowers a verdict, CORRECTED and INFO lower none.
+    """Importance of a finding: an ERROR blocks, a WARNING lowers the verdict, CORRECTED and INFO do not.
 
     Examples:
         >>> kinertia.Severity.ERROR > kinertia.Severity.WARNING > kinertia.Severity.CORRECTED > kinertia.Severity.INFO

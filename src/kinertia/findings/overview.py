@@ -20,13 +20,13 @@ USES: Final = (USE, WITH_CARE, DO_NOT_USE)
 
 @dataclass(frozen=True)
 class Overview:
-    """What findings come to.
+    """Summary of findings.
 
     Attributes:
         findings: all of them, muted and overruled ones included.
         rules: how many rules were asked.
-        trials: how many trials there are, without those of which markers alone were asked for.
-        left_out: names of the trials that were not used, or of which the markers alone were.
+        trials: number of trials, without those used only for their markers on request.
+        left_out: names of the trials that were not used, or only for their markers.
 
     Examples:
         >>> from kinertia.findings.overview import Overview
@@ -88,7 +88,8 @@ class Overview:
 
     @property
     def markers_only(self) -> set[str | None]:
-        """Names of the trials whose markers alone are used: as asked for (P280), or since forces are refused (P283)."""
+        """Names of the trials of which only the markers are used: on request (P280), or because forces are unusable
+        (P283)."""
         asked, refused = ({one.where.trial for one in self.findings if one.code == code} for code in ("P280", "P283"))
         return asked - set(self.left_out) | refused
 

@@ -34,10 +34,10 @@ def test_children_and_giants_pass(factor):
 @pytest.mark.parametrize(
     ("factor", "words", "length_m"),
     [
-        (1000.0, "The distance of the joints of body", 500.0),
-        (100.0, "The distance of the joints of body", 50.0),
-        (3.28, "The largest distance of two joints", 4.0),  # feet
-        (0.001, "The largest distance of two joints", 0.001),
+        (1000.0, "The distance between the joints of body", 500.0),
+        (100.0, "The distance between the joints of body", 50.0),
+        (3.28, "The largest distance between two joints", 4.0),  # feet
+        (0.001, "The largest distance between two joints", 0.001),
     ],
 )
 def test_other_units(factor, words, length_m):

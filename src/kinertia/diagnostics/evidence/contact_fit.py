@@ -1,7 +1,7 @@
 """Measures how well loads fit the feet: whether they act under them, and begin and end when the feet do.
 
-Every explanation of loads that do not (another rate, a delay, plates interchanged, rotated or displaced) is judged by
-how well they fit once it is undone.
+Each explanation of a misfit (another rate, a delay, plates interchanged, rotated or displaced) is judged by how well
+the loads fit once it is undone.
 """
 
 from __future__ import annotations
@@ -30,7 +30,8 @@ class ContactFit:
     """Agreement of the loads on plates with the feet, in time and place.
 
     Attributes:
-        delay_rms_s: RMS of how far loads begin and end from foot contact and foot off; infinite where too few do.
+        delay_rms_s: RMS delay of the beginning and end of loads from foot contact and foot off; infinite where too few
+            are known.
         far_m: distance from the feet of the load that is farthest from them.
     """
 

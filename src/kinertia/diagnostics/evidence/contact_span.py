@@ -8,10 +8,9 @@ from kinertia.trial.foot_motion import AROUND_LOAD_S
 
 
 def contact_span_s(plates: PlateLoads) -> tuple[float, float] | None:
-    """Find the first and last time (s) of the part used with loads on plates; None where nobody steps on them.
+    """Find the first and last time (s) of the part used with loads on plates; None where no one steps on them.
 
-    Before and after, people come and go: feet are out of the cameras' view, or markers are lost, and nothing depends on
-    it.
+    Before and after it people come and go: feet leave the cameras' view or markers are lost, which does not matter.
     """
     loads = [load for p in range(len(plates.names)) for load in loads_on(plates, p)]
     if not loads:

@@ -1,4 +1,4 @@
-"""Finds frames that repeat the one before in all markers: lost frames that were filled with copies.
+"""Finds frames that repeat the one before in all markers: dropped frames that were filled with copies.
 
 On 17 measured recordings of motions and ten synthetic ones no frame repeats the one before it.
 """
@@ -29,8 +29,8 @@ class CopiedFrames:
     Attributes:
         copied: (n,) which marker frames are copies.
         amid_motion: markers stop in them and go on just before and after; those at the ends do not count.
-        insertions: how many of them were put in between two consecutive frames, so that the time of everything after
-            is off, where the others take the place of lost frames.
+        insertions: how many of them were put in between two consecutive frames, which delays everything after them,
+            whereas the others replace dropped frames.
     """
 
     copied: BoolArray
@@ -92,7 +92,7 @@ def _repeated(distance: FloatArray) -> BoolArray:
 def _amid_motion(distance: FloatArray, repeated: BoolArray) -> bool:
     """Return whether markers stop in repeated frames (n - 1,) and move on beside them.
 
-    Coordinates that are rounded repeat as well, where a person hardly moves.
+    Rounded coordinates also repeat while a person hardly moves.
     """
     if not repeated.any():
         return False

@@ -150,8 +150,8 @@ def _velocity(time: FloatArray, place: FloatArray) -> FloatArray:
     """Compute velocities (n, m, 3) m/s of markers (n, m, 3) between neighbouring frames or, where noisy, frames farther
     apart.
 
-    Noise is taken from third differences, which hardly show how feet move: poses from video jitter by some mm in every
-    frame, a speed of 0.4 m/s that no standing foot has.
+    Noise is estimated from third differences, which contain little of the feet's motion: poses from video jitter by
+    some mm in every frame, an apparent speed of 0.4 m/s in a foot on the ground.
     """
     step = float(np.median(np.diff(time)))
     third = np.abs(np.diff(place, 3, axis=0))

@@ -1,9 +1,9 @@
 """Computes body mass from vertical force and markers, before inverse kinematics.
 
 Over a window the mean vertical force is m (g + dv / T), where dv is how much faster upwards the body's centre moves at
-its end than at its beginning. The centre's velocity is that of the markers' centre, each segment at its usual share of
-the body's mass: no model is fitted, so that nothing of ours can be wrong but a decimetre a second. Less where the body
-does at the end what it does at the beginning: over whole strides and steps, and in standing.
+its end than at its beginning. The velocity is that of the marker-based centre, in which each segment has its usual
+share of body mass. No model is fitted; the centre's velocity is wrong by about 0.1 m/s, and by less where the body
+moves at the end as at the beginning: over whole strides and steps, and in standing.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ it is beyond 0.3 for no sample, in landings, of which markers smooth the impact,
 
 
 class ForeignLoad(NamedTuple):
-    """What plates bear beside the person for a while: its share of body weight, and from when to when."""
+    """A temporary load on the plates besides the person: its share of body weight, and its start and end."""
 
     surplus: float
     span_s: tuple[float, float]

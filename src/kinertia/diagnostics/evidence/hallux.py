@@ -1,4 +1,4 @@
-"""Estimates where the big toe is that has no marker, as the last point of push-off."""
+"""Estimates the position of a big toe without a marker, as the last point of push-off."""
 
 from __future__ import annotations
 

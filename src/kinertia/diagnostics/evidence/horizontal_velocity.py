@@ -1,4 +1,4 @@
-"""Computes the body's velocity by its markers, and as the horizontal forces would cause it."""
+"""Computes the body's velocity from its markers, and from the horizontal forces."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ LEAST_CHANGE_M_S, _FOLLOWS = 0.02, 0.7
 
 @dataclass(frozen=True, eq=False)
 class CausedVelocity:
-    """Velocities (n, 3) m/s over (n,) s of the pelvis, of the marker-based centre, and of a body of this mass as the
-    forces cause it.
+    """Velocities (n, 3) m/s over (n,) s of the pelvis, of the marker-based centre, and of a body of this mass under the
+    measured forces.
     """
 
     time: FloatArray

@@ -1,4 +1,4 @@
-"""Compares the body's velocity with the one that forces cause, as read and without a supposed fault."""
+"""Compares the body's velocity with the force-derived one, as recorded and without a supposed fault."""
 
 from __future__ import annotations
 
@@ -79,15 +79,15 @@ class VelocityResidual:
         )
 
     def once(self, residual: float, limit: float) -> Quantity:
-        """Return the residuals before and after a fault is undone, as evidence; `limit` up to which it is shown."""
+        """Return the residuals before and after a fault is undone, as evidence, with their `limit`."""
         return Quantity((self.as_read, residual), "m/s", limit=limit)
 
 
 def steady_scaled(
     time: FloatArray, force: FloatArray, parts: Sequence[CausedVelocity], axis: int
 ) -> tuple[float, tuple[Scaled, ...]]:
-    """Compute what is left without a linear trend, which zero offsets cause: the residual (m/s) of forces as recorded,
-    and if all plates, or one, have a gain error. Arguments as of `VelocityResidual.of`.
+    """Compute residuals without the linear trend that zero offsets cause: the residual (m/s) of forces as recorded, and
+    if all plates, or one, have a gain error. Arguments as of `VelocityResidual.of`.
     """
     caused = [part.caused[:, axis] for part in parts]
     moved = [(part.pelvis[:, axis] + part.centre[:, axis]) / 2 for part in parts]

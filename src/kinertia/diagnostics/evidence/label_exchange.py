@@ -1,4 +1,4 @@
-"""Finds the labels that fit a static trial or a model once they are exchanged."""
+"""Finds labels that fit a static trial or a model once they are swapped."""
 
 from __future__ import annotations
 

@@ -19,8 +19,8 @@ STEP_N, _FEWEST = 350.0, 10
 def adult_share(plates: PlateLoads | None, mass_kg: float | None = None) -> float:
     """Return body weight as a share of a 70 kg adult's, at most 1: limits in newtons are an adult's times this share.
 
-    Where no mass is stated, the heaviest loads on all plates stand for body weight. They are 1.1 times it in a walk and
-    more in a run: too heavy rather than too light, so that a limit is never lower than the person's.
+    Where no mass is stated, the heaviest loads on all plates stand for body weight. They are 1.1 times body weight in a
+    walk and more in a run: an overestimate, so that a limit is never too low for the person.
     """
     if mass_kg is not None:
         return min(1.0, mass_kg * GRAVITY_M_S2 / _ADULT_N)

@@ -114,7 +114,7 @@ def overhangs(
 
 
 def _by_pressure(contact: PlateContact, corners: FloatArray) -> list[Overhang]:
-    """Find an overhang that no marker shows, by a centre of pressure nearer to the edge than a whole foot allows."""
+    """Find an overhang that no marker shows, from a centre of pressure nearer to the edge than a whole foot allows."""
     firm = contact.weight > _FIRM * contact.weight.max()
     beyond = beyond_edges(corners[contact.plate], contact.place)[firm]
     if np.median(beyond) >= 0.0 or beyond.max() < -_NO_FOOT_M:
@@ -143,8 +143,8 @@ def _by_pressure(contact: PlateContact, corners: FloatArray) -> list[Overhang]:
 
 
 def _stance(contact: PlateContact) -> tuple[float, float]:
-    """Return first and last time (s) of a load, or of the foot's stance where that lasts longer: a part that is beside
-    the plate lands before it is loaded, or leaves after.
+    """Return the first and last time (s) of a load, or of the foot's stance where that lasts longer: a part of the foot
+    beside the plate lands before the load begins, or leaves after it ends.
     """
     first, last = float(contact.time[0]), float(contact.time[-1])
     spans = [(start, end) for start, end, _ in contact.trajectory.stance_spans if start < last and end > first]
@@ -174,7 +174,7 @@ def _overhang(contact: PlateContact, corners: FloatArray, time: FloatArray, foot
 
 
 def _heel_lifted(foot: FootPoints, height: FloatArray, toes: BoolArray) -> BoolArray:
-    """Return (n,) whether, of points of these heights (n, m), the one farthest from these toes (m,) is lifted: from
+    """Return (n,) whether the point farthest from the toes (m,) is lifted, given heights (n, m) of the points: from
     then on the toes bear load.
     """
     away = np.linalg.norm(foot.place - foot.place[:, toes].mean(axis=1, keepdims=True), axis=2)

@@ -1,6 +1,7 @@
 """Compares distances between markers of one segment: they show whose body it is, and the cameras' scale.
 
-Compared are pelvis, legs and feet: medians over the frames. The upper body is left out, whose skin moves with the arms.
+Medians over the frames are compared for pelvis, legs and feet, but not for the upper body, whose skin moves with the
+arms.
 """
 
 from __future__ import annotations

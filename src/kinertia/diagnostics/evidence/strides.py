@@ -43,7 +43,7 @@ def periods(loads: FootLoads) -> tuple[list[float], list[float]]:
 def swing_in_turn(feet: tuple[FootTrajectory, FootTrajectory], part_s: tuple[float, float]) -> bool:
     """Return whether one foot swings and then the other, by their markers: one step on a plate shows no stride.
 
-    Feet that leave and land together jump. A foot that lands while the other stays lifted is a landing.
+    Feet that leave and land together jump; a foot that lands while the other stays lifted is a landing.
 
     Args:
         feet: right and left.
@@ -84,7 +84,7 @@ def _swings(foot: FootTrajectory) -> list[tuple[float, float]]:
 
 
 def _later_s(swing: tuple[float, float], other: tuple[float, float]) -> list[float]:
-    """Return the delays (s) of another swing's foot-off and foot contact, as far as both are known."""
+    """Return the delays (s) of another swing's foot off and foot contact, where both are known."""
     return [second - first for first, second in zip(swing, other, strict=True) if np.isfinite(second - first)]
 
 

@@ -1,8 +1,8 @@
 """Finds impossible trajectories: spikes, jumps, frozen markers, gaps filled with straight lines.
 
-A body is slow: from one frame to the next a marker goes nearly as far as it did before and will do after. By how much
-it does not, its step, is at most 12 mm on the fault-free trials at hand (60 frames a second and more, runs and jumps
-included; 28 mm where one marker was labelled again), and that of the median marker 1.5 mm.
+Bodies move smoothly: from one frame to the next a marker moves nearly as far as in the frames before and after. The
+difference, its step, is at most 12 mm on the fault-free reference trials (60 frames a second and more, runs and jumps
+included; 28 mm where one marker was relabelled), and 1.5 mm for the median marker.
 """
 
 from __future__ import annotations
@@ -138,7 +138,7 @@ def steps(position: FloatArray) -> FloatArray:
 
 
 def _spikes(markers: Markers, off: FloatArray, far: BoolArray, single: BoolArray) -> tuple[Spikes, ...]:
-    """Collect spikes from frames (n - 2, m) that are far off, and from those that are off alone."""
+    """Collect spikes from frames (n - 2, m) that are far displaced, and from single displaced frames."""
     found = []
     for k in range(len(markers.labels)):
         often = np.count_nonzero(far[:, k]) > MOST_SPIKES
@@ -258,12 +258,13 @@ def _off_neighbours(position: FloatArray) -> FloatArray:
 
 
 def _local_peaks(off: FloatArray) -> BoolArray:
-    """Find local peaks: of three frames around a spike the middle one is farthest off."""
+    """Find local peaks: of three frames around a spike the middle one is displaced most."""
     beside = np.pad(off, ((1, 1), (0, 0)))
     return np.asarray((off >= beside[2:]) & (off >= beside[:-2]))
 
 
 def _is_single(off: FloatArray) -> BoolArray:
-    """Find single frames that are off: their neighbours are then half as far off, but as far where a marker jumps."""
+    """Find single displaced frames: their neighbours are then displaced by half as much, but equally where a marker
+    jumps."""
     beside = np.pad(off, ((1, 1), (0, 0)))
     return np.asarray(off > _SINGLE * np.maximum(beside[2:], beside[:-2]))

@@ -1,8 +1,8 @@
 """L20: do the labels make a body? Left and right, front and back, lateral and medial of a person, by the markers alone.
 
-Which way somebody faces is known from the feet and the pelvis, without any side; then every pair of landmarks shows
-whether its right one is on the right, and every joint whether its lateral landmark is outside. What is already
-explained by a swap is not examined further. Directions are medians over the frames: a few bad frames do not count.
+The heading is known from the feet and the pelvis, whatever their sides; then every pair of landmarks shows whether its
+right one is on the right, and every joint whether its lateral landmark is outside. What is already explained by a swap
+is not examined further. Directions are medians over the frames: a few bad frames do not count.
 """
 
 from __future__ import annotations
@@ -170,9 +170,10 @@ def _swapped_sides(body: _Body, right: FloatArray) -> Iterator[Finding]:
 
 
 def _swapped_labels(body: _Body, right: FloatArray) -> Iterator[Finding]:
-    """L202, as a WARNING, of pairs on head, trunk and pelvis that are no landmarks, in segments that others show, too.
+    """L202, as a WARNING, of pairs on head, trunk and pelvis that are not landmarks, in segments that also have other
+    markers.
 
-    Nobody turns the head so far that its right side is on the left of the body.
+    No one turns the head so far that its right side is on the left of the body.
     """
     markers = body.context.all_markers
     landmarks = {label for own in body.marker_set.landmarks.values() for label in own}
@@ -259,8 +260,8 @@ def _lateral(body: _Body, right: FloatArray) -> Iterator[Finding]:
 
 
 def _elbows(body: _Body, right: FloatArray) -> Iterator[Finding]:
-    """L208 of elbows: the lateral side of an arm may point anywhere, but elbows bend forwards only; and the lateral
-    side of a straight arm is never medial where it hangs, nor below where it is raised.
+    """L208 of elbows, which bend only forwards: the lateral side of an arm may point anywhere, but in a straight arm it
+    is not medial when the arm hangs, nor below when the arm is raised.
     """
     for side, sign in (("r", 1.0), ("l", -1.0)):
         names = [f"{name}_{side}" for name in ("elbow_lateral", "elbow_medial", "acromion", "wrist")]

@@ -1,4 +1,4 @@
-"""L106 and S311: which way does the person face, and which way does the person walk?"""
+"""L106 and S311: which way does the person face and walk?"""
 
 from __future__ import annotations
 

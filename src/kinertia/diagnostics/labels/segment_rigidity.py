@@ -1,11 +1,10 @@
-"""L213 and L214: do the markers of a segment move together? Labels that are wrong in every file alike show in nothing
-else.
+"""L213 and L214: do the markers of a segment move together? Nothing else shows labels that are wrong in every file.
 
 On twelve fault-free trials, from squats to runs, distances within pelvis, thighs, shanks, feet and arms change by up to
 39 mm (from the tenth to the ninetieth percentile of the frames; 20 mm in walks), and those between landmarks that one
-joint joins by up to 38 mm. Markers on the other leg, or on the segment above, change theirs by 70 to 500 mm. Soft
-thighs may come up to 75 mm, but then their markers go with no other segment. Of 1867 swaps of two labels of pelvis
-and legs in eight of these trials which change a distance by more than 60 mm, this finds all but six.
+joint joins by up to 38 mm. Markers on the other leg, or on the segment above, change theirs by 70 to 500 mm. On soft
+thighs the change may reach 75 mm, but their markers then move with no other segment. Of 1867 swaps of two labels of
+pelvis and legs in eight of these trials that change a distance by more than 60 mm, all but six are found.
 """
 
 from __future__ import annotations
@@ -57,7 +56,7 @@ class _Pair(NamedTuple):
 def rigidity(context: RecordingContext) -> Iterator[Finding]:
     """L213, one per marker that does not move with its segment; L214, one per segment on the wrong leg.
 
-    Markers whose trajectories have faults of their own are left out. Noise beyond that of cameras widens the limits.
+    Markers with faulty trajectories are left out. Noise beyond that of cameras widens the limits.
     """
     if context.marker_set is None:
         return
@@ -121,7 +120,8 @@ def _better(markers: Markers, marker_set: MarkerSet, odd: str, change_m: float) 
 
 
 def _crossed(context: RecordingContext, markers: Markers, marker_set: MarkerSet, least_m: float) -> Iterator[Finding]:
-    """Find whole segments that move with the other leg: a set without markers at the joints has no other sign."""
+    """Find whole segments that move with the other leg: a set without markers at the joints shows it in no other
+    way."""
     crossed: dict[tuple[str, str], tuple[float, float]] = {}
     measured = 0
     for upper, lower in _NEIGHBOURS:

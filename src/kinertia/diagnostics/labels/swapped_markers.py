@@ -1,8 +1,7 @@
-"""L212 and R106, by the model of the static trial: finds labels that are swapped by trying the swap.
+"""Finds swapped labels by trying each swap with the model of the static trial: L212 and R106.
 
-Swapped markers pull the model away, so that the largest error need not be theirs, and the model that fits best may be
-far from the truth (a foot turned round). What gives them away is that everything falls into place once they are
-swapped back.
+Swapped markers pull the model away, so they need not have the largest errors, and the best fit may be far from the
+truth (a foot turned round). They are recognised by how well everything fits once they are swapped back.
 """
 
 from __future__ import annotations
@@ -88,8 +87,9 @@ def _complete_frames(skeleton: Skeleton, name: str, markers: Markers) -> tuple[S
     few frames of its markers and their errors (f, m) from the best fit; R103 of the rarest coordinate where no frame
     shows all.
 
-    No frame with a straight elbow shows how the arm has turned about itself, and none needs to; which way an elbow
-    bends does not matter here. A single marker shows where an arm points, as long as it does not turn.
+    Frames with a straight elbow do not show how the arm has rotated about its own axis, nor need they; the bending
+    direction of an elbow does not matter here. A single marker shows where an arm points, as long as the arm does not
+    rotate.
     """
     free = [name for name in ARM_ROTATIONS if _arm_markers(skeleton, markers, name[-1]) >= _FEWEST_TO_TURN]
     model = skeleton.unbounded(ELBOWS).free(free)
@@ -129,7 +129,7 @@ def _swapped_errors(skeleton: Skeleton, labels: tuple[str, ...], measured: np.nd
 def _typical(errors: np.ndarray) -> np.ndarray:
     """Return the typical error (..., m) of errors (..., f, m): the median over frames, 0 for a marker that is not seen.
 
-    The fit starts from the upright pose and may be lost in one of them.
+    The fit starts from the upright pose and may fail in one of them.
     """
     seen = np.isfinite(errors).any(axis=-2)
     return np.where(seen, np.nanmedian(np.where(seen[..., None, :], errors, 0.0), axis=-2), 0.0)

@@ -1,4 +1,4 @@
-"""M14: are unit of length, vertical axis and floor right, by a person's shape and by where the feet stand?
+"""M14: are unit of length, vertical axis and floor right, going by the person's shape and by where the feet stand?
 
 On six fault-free walks over 1.5 to 4.3 m the places where feet stand rise by up to 0.07 degrees along the walkway, and
 lie on a line within 2 mm; cameras that are tilted by 3 degrees show 2.9 to 3.1.

@@ -1,8 +1,9 @@
-"""M15: are there computed points among the measured markers? Programs write joint centres beside the markers that they
-made them of.
+"""M15: are there computed points among the measured markers? Programs export joint centres with the markers that they
+were computed from.
 
-A marker on the skin keeps no place to a tenth of a millimetre: a point that does, in axes through markers of another
-segment or on the line between two, was computed from them. It says nothing new, and counts as if it were measured.
+No marker on the skin keeps its place within a tenth of a millimetre: a point that does, in axes through markers of
+another segment or on the line between two, was computed from them. It contains no new information but would count as a
+measurement.
 """
 
 from __future__ import annotations

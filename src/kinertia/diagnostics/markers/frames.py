@@ -1,7 +1,7 @@
 """M12: are all frames measured frames? Missing, copied and interpolated ones.
 
-On 17 measured recordings of motions and ten synthetic ones no frame repeats the one before it, hardly any lies in the
-middle between its neighbours, and the median marker's step (`trajectory_faults`) is at most 1.5 mm.
+On 17 measured recordings of motions and ten synthetic ones no frame repeats the one before it, hardly any lies midway
+between its neighbours, and the median marker's step (`trajectory_faults`) is at most 1.5 mm.
 """
 
 from __future__ import annotations
@@ -118,14 +118,14 @@ def _median_step_m(markers: Markers) -> FloatArray:
 
 
 def _frames_lost(markers: Markers, cut: int) -> int:
-    """Return the number of missing frames, from how far markers move across a cut and beside it."""
+    """Return the number of missing frames, from how far markers move across a cut and next to it."""
     went = np.linalg.norm(np.diff(markers.positions, axis=0), axis=-1)
     usual = float(np.nanmedian(np.concatenate([went[cut : cut + 1], went[cut + 2 : cut + 3]])))
     return max(1, round(float(np.nanmedian(went[cut + 1])) / max(usual, 1e-4)) - 1)
 
 
 def _between(position: FloatArray) -> BoolArray:
-    """Find frames (n - 2,) in which most markers are midway between their neighbours, if in others they are not."""
+    """Find frames (n - 2,) in which most markers are midway between their neighbours, unless they are in all frames."""
     bend = np.linalg.norm(np.diff(position, n=2, axis=0), axis=2)
     shown = np.isfinite(bend).any(axis=1)
     went = np.linalg.norm(np.diff(position, axis=0), axis=2)

@@ -1,9 +1,10 @@
-"""Were markers smoothed so much that the motion is gone? A filter that is too strong leaves the file looking tidy.
+"""Were markers smoothed so much that part of the motion is lost? A filter that is too strong leaves a tidy-looking
+file.
 
-A foot that swings and lands is quick, and the body goes up and down as the forces make it. Both are properties of
-sound files whatever the laboratory: on 20 measured and synthetic walks and runs, 0.8 to 6 % of the energy of the feet's
-motion is above 4 Hz (0.4 % once filtered at 6 Hz, 0.02 % and less at 2 Hz), and forces move the body 0.8 to 1.05 times
-as fast as its markers show.
+A foot swings and lands fast, and the body moves up and down as the forces accelerate it. Both hold in fault-free files
+of any laboratory: on 20 measured and synthetic walks and runs, 0.8 to 6 % of the energy of the feet's motion is above 4
+Hz (0.4 % once filtered at 6 Hz, 0.02 % and less at 2 Hz), and forces move the body 0.8 to 1.05 times as fast as its
+markers show.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ _MOSTLY_SEEN = 0.9
 
 
 def over_smoothed(context: RecordingContext) -> Iterator[Finding]:
-    """M133: markers without the fast part of the motion that the forces show; no finding where nobody steps."""
+    """M133: markers without the fast part of the motion that the forces show; no finding without steps."""
     trial, owners, changes = context.trial, context.segment_of_label, context.velocity_changes
     if trial is None or changes is None or not context.has_strides:
         return

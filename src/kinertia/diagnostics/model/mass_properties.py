@@ -1,8 +1,7 @@
 """Are a model's masses and inertias possible?
 
-How dense a body must at least be follows from its mass and inertia alone. Of all bodies of one density with the same
-mass and the same sum of second moments, the sphere is the largest. Its density is therefore the smallest that the body
-can have: nothing in a person is denser than bone, at 2000 kg/m3.
+Mass and inertia alone determine the smallest density that a body can have: that of a uniform sphere with the same mass
+and the same sum of second moments. Nothing in a person is denser than bone, at 2000 kg/m3.
 """
 
 from __future__ import annotations

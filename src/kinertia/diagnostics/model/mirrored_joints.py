@@ -1,8 +1,8 @@
-"""Does the left of a model mirror its right? Finds the joint of one side that has the other side's frames.
+"""Does the left of a model mirror its right? Finds the joint of one side that has the frames of the other side.
 
 A pair of joints is compared in ground axes and in the axes of the bodies that carry them, and the better of the two
-counts: bodies' axes may be chosen freely on both sides, and whatever is askew above a joint is not the joint's fault.
-Of places, what different lengths of the two segments explain is taken off.
+counts: the axes of bodies may be chosen freely on each side, and a skewed joint further up is not the fault of this
+one. Differences in position that the lengths of the two segments explain are subtracted.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ sign: 18 mm."""
 
 
 def mirrored_joints(context: PersonContext) -> Iterator[Finding]:
-    """O302 and O303: axes (O302) and positions (O303) of joints of which left and right do not mirror each other.
+    """O302 and O303: axes (O302) and positions (O303) of joints whose left and right do not mirror each other.
 
     A position changes the sign of z in its mirror image, a direction or orientation those of x and y.
     """

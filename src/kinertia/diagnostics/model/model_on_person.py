@@ -1,13 +1,13 @@
-"""Is an OpenSim model that of the person who moves, with the markers where they are on the person?
+"""Does an OpenSim model belong to the person in the trials, with its markers where they are on the person?
 
-A fit that lets markers and joint centres move (`calibrate`) makes nearly any model fit the markers: what is wrong with
-it goes into joint centres and bones, and so into joint moments, and nothing else tells. So the markers of the model in
-its default pose are compared with those of the trial: their distances in one segment, as `same_person` does with a
-static trial, and their arrangement as a whole.
+A fit that lets markers and joint centres move (`calibrate`) makes nearly any model fit the markers: its errors go
+unnoticed into joint centres and segment lengths, and so into joint moments. Therefore the markers of the model in its
+default pose are compared with the markers of the trial: by distances within segments, as `same_person` compares a
+static trial, and by their arrangement as a whole.
 
-On eleven sound pairs of model and trial from seven laboratories the median ratio of distances is within 1.1 %, their
-difference 5 mm (RMS; 11 mm in one). The arrangement of pelvis and trunk fits the person's 0.02 to 0.3 times as far off
-as its mirror image; where left and right are exchanged at least 3 times (of pelvis and thighs 0.7 and 1.3).
+On eleven fault-free pairs of model and trial from seven laboratories the median ratio of distances is within 1.1 %,
+their difference 5 mm (RMS; 11 mm in one). The misfit of pelvis and trunk to the person is 0.02 to 0.3 times the misfit
+of their mirror image, and at least 3 times if left and right are interchanged (for pelvis and thighs 0.7 and 1.3).
 """
 
 from __future__ import annotations

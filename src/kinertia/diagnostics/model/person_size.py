@@ -1,4 +1,4 @@
-"""Are the lengths of a model those of a person in metres? A model in millimetres reads without an error."""
+"""Are the lengths of a model those of a person in metres? A model in millimetres can be read without an error."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def length_unit(context: PersonContext) -> Iterator[Finding]:
         count = Quantity(len(wrong), "1")
         yield finding("O301", length_m=farthest, extent_m=extent, count=count, what=Quantity(what))
     elif len(skeleton.joints) >= _WHOLE and not _SMALLEST_M <= extent_m <= _LARGEST_M:
-        what = "The largest distance of two joints"
+        what = "The largest distance between two joints"
         yield finding("O301", length_m=extent, extent_m=extent, what=Quantity(what))
 
 
@@ -44,10 +44,10 @@ def _lengths(skeleton: Skeleton, bsp: BodySegmentParameters) -> list[tuple[float
     lengths = []
     for body, places in joints.items():
         apart = max(float(np.linalg.norm(place - places[0])) for place in places)
-        lengths.append((apart, f"The distance of the joints of body {body}"))
+        lengths.append((apart, f"The distance between the joints of body {body}"))
     for body, mass, centre in zip(bsp.segments, bsp.mass_kg, bsp.com_m, strict=True):
         off = _nearest_m(centre, joints.get(body, [])) if mass > 0 else 0.0
-        lengths.append((off, f"The distance of the mass centre of body {body} from its joints"))
+        lengths.append((off, f"The distance between the centre of mass of body {body} and its joints"))
     for marker in skeleton.markers:
         off = _nearest_m(marker.position, joints.get(marker.segment, []))
         lengths.append((off, f"The distance of marker {marker.label} from the joints of its body {marker.segment}"))

@@ -31,7 +31,7 @@ _OUTLYING_SD = 2.0
 
 
 def placeholders(context: PersonContext) -> Iterator[Finding]:
-    """O211: placeholder inertias that nobody measured: three equal moments, or moments of at most two digits."""
+    """O211: placeholder inertias that were never measured: three equal moments, or moments of at most two digits."""
     if context.model is None:
         return
     bsp = context.model.bsp
@@ -136,7 +136,7 @@ def arms_in_torso(context: PersonContext) -> Iterator[Finding]:
 
 
 def compared_with_tables(context: PersonContext) -> Iterator[Finding]:
-    """O415: what was not compared of a model that is checked on its own, and why."""
+    """O415: what was not compared in a model that is checked on its own, and why."""
     if context.model is None or context.has_trials:
         return
     subject = context.subject
@@ -145,9 +145,9 @@ def compared_with_tables(context: PersonContext) -> Iterator[Finding]:
     check = check_model(context.model.skeleton, context.model.bsp)
     reasons = [f"{' and '.join(wanted)} not stated"] if wanted else []
     if check.segments.geometry is None:
-        reasons.append("a joint of trunk or legs was not found by the names of the bodies")
+        reasons.append("a joint of the trunk or legs could not be identified from the names of the bodies")
     if not check.has_arms:
-        reasons.append("it has no arms, so that of the torso only the mass was, with torso and arms")
+        reasons.append("it has no arms, so of the torso only the mass was compared, with the tables' torso and arms")
     if check.segments.unknown:
         reasons.append(f"no segment is known for {', '.join(check.segments.unknown)}")
     if reasons:

@@ -1,4 +1,4 @@
-"""Do the model's ranges of motion keep coordinates from where the markers show them?"""
+"""Do the model's ranges of motion keep coordinates from the values that the markers show?"""
 
 from __future__ import annotations
 

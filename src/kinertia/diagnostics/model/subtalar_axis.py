@@ -1,8 +1,8 @@
 """Does the subtalar axis of a model point forward, up and inward, as it does in people?
 
-All models that OpenSim users scale have one axis, 37 degrees up from the sole and 9 degrees inward. People had 41 and
-23 degrees on average, with deviations of 9 and 11 (Isman and Inman 1969), 12 degrees from it: one that is far off is
-more likely a mistake, most often an orientation that was lost.
+All models that OpenSim users scale have the same axis, 37 degrees up from the sole and 9 degrees inward. People had 41
+and 23 degrees on average (SD 9 and 11; Isman and Inman 1969), 12 degrees from it. A very different axis is more likely
+a mistake, most often a lost orientation.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Are axes and units of the forces right, by the plates themselves?"""
+"""Are axes and units of the forces right, going by the plates alone?"""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _LONGEST_ARM_M, _USUAL_ARM_M, _FEWEST = 0.15, 0.04, 10
 
 
 def axes_and_units(context: RecordingContext) -> Iterator[Finding]:
-    """P201 to P203: forces in other axes or other units, by the plates themselves."""
+    """P201 to P203: forces in other axes or other units, going by the plates alone."""
     plates = context.plates
     if plates is None:
         return
@@ -56,7 +56,7 @@ def axes_and_units(context: RecordingContext) -> Iterator[Finding]:
 def _peak_of_weak_loads(plates: PlateLoads) -> float | None:
     """Return the peak (N) where all loads are too small for a person and yet come and go as loads do; else None.
 
-    A plate that nobody steps on has noise, at times of some newtons, a zero or a drift, too.
+    A plate that no one steps on shows noise of up to some newtons, and perhaps an offset or a drift.
     """
     idle = plates.idle or ()
     peak = max((one.peak_n for one in idle), default=0.0)

@@ -1,11 +1,11 @@
-"""Are the loads under the feet, at the time when these stand? All explanations of loads that are not compete.
+"""Are the loads under the feet, and at the right time? The explanations of loads that are not compete.
 
 On fault-free trials, measured in six laboratories and made by OpenSim, loads act within 40 mm of the line from heel to
-toe (median over the load), and right and left are off that line by the same outwards, within 8 mm (26 mm with one plate
-20 mm off).
+toe (median over the load), and right and left loads are equally far outside that line, within 8 mm (26 mm with one
+plate displaced by 20 mm).
 
-Who lands on the toes, sways or holds a foot in the air has markers of the feet that are slow, or quick, at other times
-than plates are loaded. But a landing changes the body's velocity by metres a second, so that a delay shows.
+In people who land on the toes, sway or hold a foot in the air, markers of the feet are slow, or fast, at other times
+than plates are loaded. But a landing changes the body's velocity by metres a second, which shows a delay.
 """
 
 from __future__ import annotations
@@ -134,14 +134,15 @@ def _offset(context: RecordingContext) -> Iterator[Finding]:
     mean = (np.mean(means[0], axis=0) + np.mean(means[1], axis=0)) / 2
     if np.linalg.norm(mean) > _OFFSET_M:
         offset = Quantity((float(mean[0]), float(mean[1])), "m", limit=_OFFSET_M, usual=(-0.008, 0.008))
-        yield _origin(context, offset, len(contacts), "both feet off their line from heel to toe")
+        yield _origin(context, offset, len(contacts), "loads of both feet displaced from the line between heel and toe")
         return
     if lands_on_heels(context):
         yield from _ends(context, contacts)
 
 
 def _ends(context: RecordingContext, contacts: Sequence[PlateContact]) -> Iterator[Finding]:
-    """P243: loads that begin behind the heel or end in front of the toes, as an offset along the foot first does."""
+    """P243: loads that begin behind the heel or end in front of the toes, as happens first with an offset along the
+    foot."""
     # both of two contacts, so that a second foot on one plate does not count
     ends = np.sort([one.ends_m for one in contacts], axis=0)
     begin, end = float(ends[len(ends) // 2, 0]), float(ends[(len(ends) - 1) // 2, 1])
@@ -184,7 +185,7 @@ _DELAY_S = 0.03
 
 
 def forces_keep_time(context: RecordingContext) -> bool:
-    """Return whether vertical velocities show, without strides, that the forces are neither late nor early."""
+    """Return whether vertical velocities show, without strides, that the forces are not delayed."""
     if context.has_strides:
         return False
     found = [one for part in context.velocities for one in vertical_match_of(part) if one.left <= MOST_LEFT]

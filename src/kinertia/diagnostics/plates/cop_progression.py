@@ -2,7 +2,7 @@
 
 From the first third of a step to the last it moves forwards on the foot by 0.06 to 0.82 of the distance from heel to
 forefoot in the walks and runs of 14 people, most of them children (in a drop jump by 16 to 20 mm), and by -0.37 or less
-on a plate that is mirrored along the walk. Whoever lands on the toes pushes off from them, too.
+on a plate that is mirrored along the walk. People who land on the toes also push off from them.
 """
 
 from __future__ import annotations

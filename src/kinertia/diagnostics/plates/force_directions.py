@@ -1,9 +1,10 @@
-"""Do the forces point the right way? Rotated forces and reversed signs compete for what the motion contradicts.
+"""Do the forces point the right way? Rotated forces and reversed signs compete to explain forces that the motion
+contradicts.
 
-The ground accelerates the body as the markers show it: forces integrated over time are the changes of the velocity of
-the centre of mass. The pelvis moves nearly as that does when walking, the markers' centre when limbs swing (running),
-but not when the trunk bends (squats). Along each horizontal axis the mean of both correlations with what the forces
-cause is 0.5 and more on fault-free walks and runs, 0.2 in squats.
+Forces integrated over time are the changes of the velocity of the centre of mass. The pelvis moves nearly like it in
+walking, and so does the marker-based centre when limbs swing (running), but not when the trunk bends (squats). Along
+each horizontal axis the mean of both correlations with the force-derived velocity is at least 0.5 on fault-free walks
+and runs, 0.2 in squats.
 """
 
 from __future__ import annotations
@@ -51,8 +52,8 @@ class _Hypothesis:
 def force_directions(context: RecordingContext) -> Iterator[Finding]:
     """P231 to P233 and P236: the hypothesis with the smallest residual; other sufficient ones are among its causes.
 
-    One about both axes is weighed against the best of each axis. Without strides the trunk bends, so that pelvis and
-    markers' centre must both oppose the forces, and only a wrong sign of all of them is looked for.
+    One about both axes is weighed against the best of each axis. Without strides the trunk bends: then pelvis and
+    marker-based centre must both oppose the forces, and only a wrong sign of all forces is considered.
     """
     trial, plates, parts, changes = context.trial, context.plates, context.velocities, context.velocity_changes
     if trial is None or plates is None or changes is None:
@@ -126,8 +127,8 @@ def _reversed_plate(
 ) -> Iterator[_Hypothesis]:
     """P233: one plate has the wrong sign, where others have it right.
 
-    With its sign reversed, the forces must move the body much more as the markers show: more than with that of any
-    other plate, or of all, or with another zero.
+    With its sign reversed, the forces must agree with the markers much better, and better than with the sign of any
+    other plate or of all plates reversed, or with another zero.
     """
     best = int(np.argmin(residual.plate_reversed))
     left = float(residual.plate_reversed[best])
@@ -163,7 +164,8 @@ def _misread_plate(
 ) -> _Hypothesis | None:
     """P236: the axes of one plate are rotated by 90 degrees or exchanged, where others are right.
 
-    Undone, the forces must move the body much more as the markers show, and more than if any sign or zero is wrong.
+    With this undone, the forces must agree with the markers much better, and better than if any sign or zero is
+    corrected.
     """
     as_read = float(np.linalg.norm([one.as_read for one in residuals.values()]))
     if len(plates.names) < 2 or not context.has_strides or as_read < _LEAST_REVERSED_M_S:
@@ -200,7 +202,7 @@ def _best_explained(plates: PlateLoads, parts: Sequence[CausedVelocity], axis: i
 
 
 def _by_centre(parts: Sequence[CausedVelocity]) -> Sequence[CausedVelocity]:
-    """Return the windows with the marker-based centre in place of the pelvis, too."""
+    """Return the windows with the pelvis replaced by the marker-based centre."""
     return [replace(part, pelvis=part.centre) for part in parts]
 
 

@@ -1,4 +1,4 @@
-"""Asks whether the plates bear somebody else for a while, beside the person or elsewhere."""
+"""Asks whether the plates bear another person for a while, with the participant or elsewhere."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from kinertia.findings.quantity import Quantity
 
 
 def foreign_load(context: RecordingContext) -> Iterator[Finding]:
-    """P284, an ERROR where hardly any frames are left without that load."""
+    """P284: a foreign load; an ERROR if it leaves hardly any frames."""
     found = context.foreign_load
     if found is None:
         return
@@ -25,7 +25,7 @@ def foreign_load(context: RecordingContext) -> Iterator[Finding]:
 
 
 def stray_loads(context: RecordingContext) -> Iterator[Finding]:
-    """P285: loads under no foot, which are left out."""
+    """P285: loads that are under no foot and were left out."""
     names = () if context.plates is None else context.plates.names
     for one in context.stray_contacts:
         where = context.at(plate=names[one.plate], span_s=(float(one.time[0]), float(one.time[-1])))

@@ -1,13 +1,13 @@
-"""Are the free moments right, by the plates themselves?
+"""Are the free moments right, going by the plates alone?
 
-At a centre of pressure no torque is horizontal, by definition: in eleven fault-free force files the median lever arm is
-0.0 mm, the 99th percentile at most 10 mm (where forces are smallest). Torques about the middle of the plate are
-horizontal, too, with arms of some 20 mm and more.
+By definition the moment about the centre of pressure has no horizontal part: in eleven fault-free force files the
+median lever arm is 0.0 mm, the 99th percentile at most 10 mm (where forces are smallest). Moments about the middle of
+the plate have horizontal parts, with lever arms of some 20 mm and more.
 
-Where only the vertical torque is there, a fixed point may explain it: about another point than the centre of pressure
-the horizontal forces turn, too, by their distance from it. On 25 fault-free trials the free moment is at most 0.023 m
+Where the file has only the vertical moment, a fixed point may explain it: about a point other than the centre of
+pressure, the horizontal forces also have a vertical moment. On 25 fault-free trials the free moment is at most 0.023 m
 (0.033 m in synthetic laboratories) times the vertical force (95th percentile), or no point accounts for more than a
-fifth of it. About the middle of the plate it is 0.037 to 0.086 m, and 1.9 to 11 times what is left about that point.
+fifth of it. About the middle of the plate it is 0.037 to 0.086 m, and 1.9 to 11 times the residual about that point.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _LONG_ARM_M, _USUAL_PERCENT, _ACCOUNTED, _FEWEST = 0.034, 95.0, 1.8, 20
 
 
 def free_moments(context: RecordingContext) -> Iterator[Finding]:
-    """P261 to P264: free moments that contradict the plates' own forces."""
+    """P261 to P264: free moments that contradict the forces of their plate."""
     plates = context.plates
     if plates is None:
         return
@@ -70,7 +70,7 @@ def _columns(context: RecordingContext, plates: PlateLoads) -> Iterator[Finding]
 
 
 def _is_rotated(columns: TorqueColumns, across_nm: float) -> bool:
-    """Return whether a free moment is in the column of a horizontal axis: the columns are of its size."""
+    """Return whether a free moment is in the column of a horizontal axis: the columns have its size."""
     some = columns.lever_arm_m > 0.0 and _SOME_NM < across_nm < _LARGEST_NM
     return bool(some and columns.rms_nm[1] < _LITTLE * across_nm)
 

@@ -1,8 +1,8 @@
-"""Are the plates' gains right? By the weight of the same body on each plate, and by what their forces do to it.
+"""Are the plates' gains right, going by the weight of one body on each plate, and by how their forces accelerate it?
 
-While one foot stands alone, its plate carries and accelerates all of the body: on the fault-free trials at hand two
-plates agree within 2 %, and within 6 % where the estimate finds a gain of 6 %. Over a second and more, the vertical
-velocity of the body shows more: a plate that reads too much pushes it up whenever it is stood on.
+In single support one plate carries and accelerates all of the body: on the fault-free reference trials two plates agree
+within 2 %, and within 6 % where the estimate finds a gain error of 6 %. Over a second and more, the vertical velocity
+of the body shows more: a plate that reads too much pushes the body up whenever it is loaded.
 """
 
 from __future__ import annotations
@@ -104,7 +104,7 @@ def _by_vertical_velocity(context: RecordingContext, plates: PlateLoads) -> Find
 def _disagreeing(
     context: RecordingContext, names: tuple[str, str], mass_kg: tuple[float, float], **evidence: Quantity
 ) -> Finding:
-    """P221 of the plate that reads more and the one that reads less; which of them is wrong remains unknown."""
+    """P221: the plate that reads more and the one that reads less; which of them is wrong remains unknown."""
     plates = {"plate": Quantity(names[0]), "other": Quantity(names[1])}
     masses = {"mass_kg": Quantity(mass_kg[0], "kg"), "other_kg": Quantity(mass_kg[1], "kg")}
     return with_evidence("P221", context.at(**context.along(1)), {**masses, **plates, **evidence})
@@ -113,7 +113,8 @@ def _disagreeing(
 def _scaled_axis(
     context: RecordingContext, plates: PlateLoads, long: Sequence[CausedVelocity], axis: int
 ) -> Finding | None:
-    """P222: the axis of one plate, or of all, that reads a multiple of the true force, beside a zero offset or not."""
+    """P222: the axis of one plate, or of all, that reads a multiple of the true force, with or without a zero
+    offset."""
     residual = VelocityResidual.of(plates.time, plates.force, long, axis)
     steady = steady_scaled(plates.time, plates.force, long, axis)
     for as_read, scaled in ((residual.as_read, residual.scaled), steady):

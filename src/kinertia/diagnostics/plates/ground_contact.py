@@ -1,4 +1,5 @@
-"""Is ground contact complete? Loads sorted by foot, frames with complete contact, feet beside or together on plates."""
+"""Is ground contact complete? Covers loads sorted by foot, frames with complete contact, and feet beside plates or both
+on one."""
 
 from __future__ import annotations
 
@@ -30,8 +31,8 @@ marker it is up to 0.19 of the way to the other foot, which stands on the floor.
 
 def complete_contact(context: RecordingContext) -> Iterator[Finding]:
     """T104, P271, P278: no trial can be made of the recording; P279: it has too few frames with complete contact; P273,
-    P274, P275, P277: how its loads were sorted by foot; P280, P283: its markers alone are used, as asked for or since
-    its forces cannot be; F191, T104: hardly any frames are in the window stated for these, or in the trial.
+    P274, P275, P277: how its loads were sorted by foot; P280, P283: only its markers are used, as requested or because
+    its forces are unusable; F191, T104: hardly any frames are in the window stated for these, or in the trial.
     """
     if context.is_static:
         return
@@ -107,7 +108,8 @@ def _to_toes(
 
 
 def _under_both(contact: PlateContact) -> BoolArray:
-    """Return (k,) where the load is between the feet, or off its own foot while the other bears a good part of it."""
+    """Return (k,) where the load is between the feet, or away from its own foot while the other bears a good part of
+    it."""
     own, other = np.linalg.norm(contact.offset_m, axis=2)[[contact.foot, 1 - contact.foot]]
     opposite = np.prod(contact.offset_m, axis=0).sum(axis=1) < 0
     away: BoolArray = np.minimum(own, other) > BETWEEN_M

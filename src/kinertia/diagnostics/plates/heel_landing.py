@@ -15,12 +15,13 @@ def lands_on_heels(context: RecordingContext) -> bool:
 
 
 def goes_forwards(context: RecordingContext) -> bool:
-    """Return whether loads can be expected between heel and toe: whole feet are visible and nobody walks backwards."""
+    """Return whether loads can be expected between heel and toe: whole feet are visible and the person does not walk
+    backwards."""
     return shows_whole_feet(context) and not context.walks_backwards
 
 
 def shows_feet_alike(context: RecordingContext) -> bool:
-    """Return whether the same markers of both feet are visible: else their lines from heel to toe are not alike."""
+    """Return whether the same markers of both feet are visible: else their lines from heel to toe differ."""
     if context.marker_set is None:
         return False
     landmarks, seen = context.marker_set.landmarks, context.seen_labels
@@ -31,7 +32,8 @@ def shows_feet_alike(context: RecordingContext) -> bool:
 
 
 def shows_whole_feet(context: RecordingContext) -> bool:
-    """Return whether heel and forefoot of both feet are visible: loads are between them, foot-off is not heel-off."""
+    """Return whether heel and forefoot of both feet are visible: loads are between them, and foot off is not heel
+    off."""
     feet, marker_set = context.foot_trajectories, context.marker_set
     if feet is None or marker_set is None:
         return False

@@ -1,4 +1,4 @@
-"""Finds loads that lie where another plate is: channels, or corners, of two plates interchanged."""
+"""Finds loads at the position of another plate: the channels, or corners, of two plates are interchanged."""
 
 from __future__ import annotations
 

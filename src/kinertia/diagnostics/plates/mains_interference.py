@@ -1,7 +1,7 @@
 """Finds mains interference in the forces: a cable without shield, a ground loop.
 
-On 26 recordings of nine laboratories the forces have 0.9 N at most at 50 or 60 Hz, and there at most 3.4 times as much
-as 10 to 16 Hz beside them (0.2 N at least are counted): impacts have all frequencies alike.
+On 26 recordings of nine laboratories the forces have at most 0.9 N at 50 or 60 Hz, at most 3.4 times as much as 10 to
+16 Hz away (taken as 0.2 N at least): impacts contain all frequencies equally.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """How finely were forces recorded, in size and in time? Rounded values, and filters that are far too strong.
 
 On 26 recordings of nine laboratories forces have steps of 4.9 N at most (one plate behind a 12-bit converter), and no
-plate reads less than nothing for more than 3 ms beside a load.
+plate reads negative forces for more than 3 ms next to a load.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Finds plates that are rotated or mirrored in the file: undone, the centre of pressure is under the feet.
+"""Finds plates that are rotated or mirrored in the file: once this is undone, centres of pressure are under the feet.
 
-A load goes from the heel to the ball of its foot. On fourteen fault-free trials it is 16 to 75 mm from there (RMS over
-a whole contact); about the middle of a rotated or mirrored plate, 106 mm and more.
+A load moves from the heel to the ball of its foot. On fourteen fault-free trials it is 16 to 75 mm from that line (RMS
+over a whole contact); with a plate rotated or mirrored about its middle, 106 mm and more.
 """
 
 from __future__ import annotations

@@ -1,4 +1,5 @@
-"""Are the plates' signals intact? Dead channels, lost and repeated samples, spikes, amplifiers at their end."""
+"""Are the plates' signals intact? Covers dead channels, dropped and repeated samples, spikes and saturated
+amplifiers."""
 
 from __future__ import annotations
 
@@ -112,7 +113,7 @@ def _repeated_samples(context: RecordingContext, plates: PlateLoads) -> Iterator
 
 
 def _saturated(context: RecordingContext, plates: PlateLoads) -> Iterator[Finding]:
-    """Find forces that reach their largest value along an axis and stay there, where a foot's would rise further."""
+    """Find forces that stay at their largest value along an axis where the force of a foot would rise further."""
     for name, wrench in wrenches(plates):
         for axis, least in enumerate((_FULL_RANGE_ACROSS_N, _FULL_RANGE_N, _FULL_RANGE_ACROSS_N)):
             # vertical forces have one sign; sideways a foot pushes equally hard both ways

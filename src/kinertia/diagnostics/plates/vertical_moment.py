@@ -1,8 +1,8 @@
-"""Does the ground turn a walking person ever further to one side? What the plates' vertical moments show.
+"""Do the plates' vertical moments rotate a walking person ever further to one side?
 
 The body's angular momentum about the vertical through its centre of mass grows by the vertical moment of the ground
-reactions about it. Gait repeats itself, so that over whole strides the mean is next to nothing: in symmetric gait the
-free moments under the right and the left foot are mirror images and cancel.
+reactions about it. Gait is periodic, so the mean over whole strides is nearly zero: in symmetric gait the free moments
+under the right and the left foot are mirror images and cancel.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class MeanVerticalMoment:
 
     @property
     def contradicts(self) -> bool:
-        """Whether nobody can walk with this moment."""
+        """Whether this moment is impossible in walking."""
         return abs(self.moment_nm) > self.allowed_nm
 
     @property
@@ -89,7 +89,7 @@ def vertical_moment(context: RecordingContext) -> Iterator[Finding]:
 def mean_vertical_moment(loads: FootLoads, time: FloatArray, centre: FloatArray) -> MeanVerticalMoment | None:
     """Compute mean vertical moments over as many whole strides as the middle of a measured window holds.
 
-    The position of the body need not be accurate: the horizontal forces of whole strides cancel, too.
+    The position of the body need not be accurate, since the horizontal forces of whole strides cancel as well.
 
     Args:
         loads: loads with foot contacts or foot-offs that are whole strides apart.

@@ -1,4 +1,4 @@
-"""Are the plates' zeros right, by what plates read while nobody stands on them?"""
+"""Are the plates' zeros right, going by their unloaded readings?"""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ _UNKNOWN = IdleReading((np.nan, np.nan, np.nan), np.nan, 0.0, 0.0)
 def zeros(context: RecordingContext) -> Iterator[Finding]:
     """P211, P213 and P216: zero offsets of every plate and axis; limits in newtons are those of adults.
 
-    Readers subtract a constant level from the loads (P216). One that is not constant, and one of plates stated to
-    be zeroed, is still in them (P213).
+    Readers subtract a constant level from the loads (P216). A level that is not constant, or of plates stated to be
+    zeroed, remains in the loads (P213).
     """
     plates, share = context.plates, context.adult_share
     if plates is None:
@@ -50,7 +50,7 @@ def zeros(context: RecordingContext) -> Iterator[Finding]:
 
 
 def idle_levels(context: RecordingContext) -> Iterator[Finding]:
-    """P216: what a plate that is stood on reads while unloaded, which has been subtracted from its loads."""
+    """P216: the unloaded reading of a plate in use, which has been subtracted from its loads."""
     plates = context.plates
     for p, idle in enumerate(() if plates is None else plates.idle or ()):
         assert plates is not None
@@ -83,7 +83,7 @@ def _zero(
 
 
 def _steady_minimum(vertical: FloatArray, share: float) -> float | None:
-    """Return the small steady force (N) of a plate that was walked over, where others show none; None without one.
+    """Return the small steady force (N) of a plate that was walked over, where the others show none; None without one.
 
     It counts as a load, so that no contact on that plate begins or ends.
     """

@@ -1,8 +1,9 @@
 """Do plates show a horizontal force that does not accelerate the body?
 
 Forces integrated over time are the changes of the velocity of the centre of mass. On fault-free trials the trends of
-the pelvis' velocity and of what the forces cause agree within 8 N. A wrong zero of one plate pushes whenever that plate
-is stood on; what all plates show alike is a force that no plate measures, or the verticals differ.
+the pelvis velocity and of the force-derived velocity agree within 8 N. A wrong zero of one plate acts whenever that
+plate is loaded; an offset common to all plates is an unmeasured force, or markers and forces differ in the vertical
+direction.
 """
 
 from __future__ import annotations
@@ -35,8 +36,8 @@ _AGREES = 0.5
 def zeros_under_load(context: RecordingContext) -> Iterator[Finding]:
     """P212 and P214: zero offsets under load along each horizontal axis.
 
-    Their limits are the same for children: of six of 25 to 60 kg who walk straight and turn, forces of up to 27 N
-    accelerate nothing by the pelvis' markers, in windows below 1 s, and zeros of one plate seem to be up to 11 N.
+    Their limits are the same for children: in six children of 25 to 60 kg who walk straight and turn, up to 27 N seem
+    not to accelerate the pelvis, in windows below 1 s, and zeros of one plate seem to be up to 11 N.
     """
     parts, plates = context.velocities, context.plates
     if plates is None or not parts:
@@ -98,8 +99,8 @@ def _levels(plates: PlateLoads, axis: int) -> FloatArray | None:
 def _plate_zero(
     context: RecordingContext, plates: PlateLoads, parts: Sequence[CausedVelocity], axis: int, all_plates: bool
 ) -> Finding | None:
-    """P212: a force of one loaded plate that does not accelerate the body, unless all plates show it as well, or nobody
-    takes strides: the body's horizontal velocity is then not known as well.
+    """P212: a force of one loaded plate that does not accelerate the body, unless all plates show it as well, or there
+    are no strides: the body's horizontal velocity is then less certain.
     """
     long = [part for part in parts if span_s(part.time) >= _LEAST_WINDOW_S]
     if not long or not context.has_strides:

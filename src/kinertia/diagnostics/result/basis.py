@@ -1,4 +1,4 @@
-"""R11 and R40, what is the result based on? Filters, forces, and what the prior decides."""
+"""R11 and R40, what is the result based on? Reports filters, forces, and what the prior decides."""
 
 from __future__ import annotations
 

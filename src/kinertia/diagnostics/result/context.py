@@ -1,4 +1,4 @@
-"""Holds what questions about a result are asked of: the fit, and the person that it was made of."""
+"""Holds the subject of questions about a result: the fit, and the person that it was made from."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class ResultContext:
     def along(self, axis: str | None, trial: str | None, plate: str | None = None) -> Where:
         """Return the place of a plate (None: all) in a trial (None: all), along a laboratory axis ("x", "z", None).
 
-        An axis that is called differently in some trials has no name.
+        An axis with different names in the trials has none here.
         """
         if axis not in _GROUND_AXES:
             return Where(trial=trial, plate=plate)

@@ -1,8 +1,8 @@
 """Reports instrument errors that an estimate has corrected: their size, and how sure their cause is.
 
-Where an error moves joint moments beyond their error bars and nothing contradicts it, the instrument is its cause. Else
-it may as well be the model's own: soft tissue that lags looks like late forces, a trunk that bends like a displaced
-plate. Such an error is called apparent, and no instrument need be checked for it alone.
+Where an error moves joint moments beyond their error bars and nothing contradicts it, the instrument is its cause.
+Otherwise the model may equally be the cause: soft tissue that lags looks like a delay of the forces, a trunk that bends
+like a displaced plate. Such an error is called apparent and is no reason to check an instrument.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def correction(
         headline: Quantity(one.value, one.unit, _SD * one.prior_sd, (-one.prior_sd, one.prior_sd), one.sd),
         "moved": Quantity(one.moved or 0.0, "1", limit=1.0),
         "kind": Quantity("an apparent" if unsure else "a clear"),
-        "condition": Quantity(" if other people's trials show it, too" if unsure else ""),
+        "condition": Quantity(" if other people's trials also show it" if unsure else ""),
     }
     since = f", since {one.contradicted_by} contradicts it" if one.contradicted_by else ""
     causes = (f"soft tissue or the model{since}", "the instrument") if unsure else ("the instrument",)

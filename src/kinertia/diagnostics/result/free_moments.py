@@ -1,11 +1,11 @@
-"""P26, are the free moments right? Their sign, and errors that the estimate found of them.
+"""P26, are the free moments right? Reports a wrong sign, and errors found by the estimate.
 
-In some measured walks the motion needs other free moments than the plates measure, by 3 to 6 N m/kN, to one side under
-the right foot and to the other under the left; in single stance the vertical moment is off by 1 to 3 N m before the
-estimate, too, likewise. Where reversing their sign does not explain it, two plates have no reason to err like that. The
-body has: it is what legs, trunk and arms that turn against one another would need if their angular momentum were wrong
-by some tenths of a kg m2/s, as a trunk that bends, or skin over pelvis and shoulders, may make it. A wrong plate shows
-under one foot, or under both to the same side, as does the mean over whole strides.
+In some measured walks the motion needs free moments that differ from the measured ones by 3 to 6 N m/kN, in opposite
+directions under the right and the left foot; in single support the vertical moment is also wrong by 1 to 3 N m before
+the estimate. If reversing their sign does not explain it, two plates are unlikely to be the cause. The model is more
+likely: an error of some tenths of a kg m2/s in the angular momentum of legs, trunk and arms has this effect, and a
+trunk that bends, or skin over pelvis and shoulders, can cause it. The error of a plate appears under one foot, or under
+both in the same direction, and in the mean over whole strides.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""P22, are the plates' gains right? What the estimate found of them against the stated mass.
+"""P22, are the plates' gains right? Reports what the estimate found relative to the stated mass.
 
-The estimate knows a gain by the stated mass alone: plates that read a tenth more may read too much, or carry a tenth
-more. Two plates have two amplifiers and two calibrations, and a person has one mass, so that what both lack alike is
-the mass's, or what was carried, before it is the plates'.
+The estimate determines gains only from the stated mass: plates that read a tenth more may read too much, or carry a
+tenth more. Two plates have two amplifiers and two calibrations, but a person has one mass, so an error common to both
+plates is first attributed to the mass, or to something carried.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""R30, are the joint angles a person's? By the ranges of motion that anatomy knows, or that the user states."""
+"""R30, are the joint angles possible, going by anatomical ranges of motion or those that the user states?"""
 
 from __future__ import annotations
 

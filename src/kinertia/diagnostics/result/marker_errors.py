@@ -1,4 +1,5 @@
-"""M16 and M17, do markers stay where they were put? Markers that drift or moved, and joints that trials corrected."""
+"""M16 and M17, do markers stay where they were put? Reports markers that drift or moved, and joints corrected by
+trials."""
 
 from __future__ import annotations
 

@@ -1,9 +1,10 @@
-"""P24, are the loads under the feet? Positions of plates that were corrected, and whether it was the right plate.
+"""P24, are the loads under the feet? Reports corrected plate positions, and whether it was the right plate.
 
-Along the way a person walks, plates that are all off by as much look like a trunk whose centre of mass lies elsewhere.
-So straight walks in one direction know how far two plates are apart, and hardly where either stands: the prior decides
-which is the faulty one, mostly well. In a walk the other way the body is turned and the plates are not: on OpenSim-made
-walks with one plate 20 mm off, it brings the deviation of that plate's position from 5 to 1.2 mm.
+Along the walking direction, an equal displacement of all plates looks like a displaced centre of mass of the trunk. So
+straight walks in one direction determine the distance of two plates, but hardly the position of either: the prior
+decides which one is faulty, mostly correctly. In a walk in the opposite direction the body is turned and the plates are
+not: on OpenSim-made walks with one plate displaced by 20 mm, it lowers the SD of that plate's position from 5 to 1.2
+mm.
 """
 
 from __future__ import annotations
@@ -45,8 +46,8 @@ def plate_positions(context: ResultContext) -> Iterator[Finding]:
 
 
 def _ambiguous(context: ResultContext, axis: str, errors: Sequence[CalibrationEntry]) -> list[Finding]:
-    """P247: a plate seems displaced, but another may be instead. How uncertain each is does not count, since that is
-    what is ambiguous, but plates must differ for certain.
+    """P247: a plate seems displaced, but another may be instead. The uncertainty of each plate is ignored, since it is
+    what is ambiguous, but the difference of the plates must be certain.
     """
     prior, posterior = context.ready.uncertainty.instruments, context.fit.posterior
     off = [one for one in errors if one.notable and not one.contradicted_by]
@@ -73,7 +74,7 @@ def position_deviations(shown: InstrumentInformation, prior: InstrumentPrior, ax
 
     Args:
         shown: information of the trials on plates and synchronisation, without any prior.
-        prior: what was known of them before.
+        prior: their prior.
         axis: "x" or "z".
     """
     priors, size = prior.of_unknowns(shown.plates), len(PLATE_UNKNOWNS)

@@ -1,10 +1,10 @@
-"""R30, may the result be used? Residuals and markers by OpenSim's guideline; these thresholds stand nowhere else.
+"""R30, may the result be used? Residuals and markers by OpenSim's guideline; these thresholds are defined here only.
 
 The guideline for residual reduction ("Simulation with OpenSim - Best Practices" and Hicks et al. 2015, J Biomech Eng
 137:020905) also wants the peak force below 5 % of the largest external force. OpenSim judges each axis on its own; here
-it is the length of the vector, as in `fit.json`, which is stricter. Judged are residuals with forces at the motion's
-bandwidth: what is faster no motion of the model can follow. Those with forces at full bandwidth, which OpenSim's tools
-find, stand beside them; where only they are beyond the guideline, that is information.
+it is the length of the vector, as in `fit.json`, which is stricter. Residuals with forces at the motion's bandwidth are
+judged, since no motion of the model can follow faster forces. Residuals with forces at full bandwidth, which OpenSim's
+tools find, are reported with them; if only these exceed the guideline, the finding is an INFO.
 """
 
 from __future__ import annotations
@@ -99,7 +99,8 @@ def _by_guideline(trial: TrialFit, guideline: Guideline, judged: np.ndarray, who
 def _markers(context: ResultContext, trial: TrialFit) -> Iterator[Finding]:
     """R304: markers far from the model. Calibrating hides gross errors, and helps no further once it has been done.
 
-    Arms and trunk move in ways that the model's shoulders cannot, and bar nothing: an error is one of pelvis and legs.
+    Arms and trunk move in ways that the model's shoulders cannot follow, so only markers of pelvis and legs can cause
+    an ERROR.
     """
     errors_m, labels = trial.marker_errors_m["final"], trial.kinematics.ik.labels
     segments = {marker.label: str(segment_of(marker.segment)) for marker in trial.skeleton.markers}

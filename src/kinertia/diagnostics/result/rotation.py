@@ -1,7 +1,8 @@
-"""P23, do the forces point the right way? A rotation of plates about the vertical, found or not to be seen.
+"""P23, do the forces point the right way? Reports a rotation of plates about the vertical, or that none can be seen.
 
-A rotation shows in the direction in which the ground pushes the body. Where noisy markers say little of that, the prior
-decides that plates are fault-free, and a rotation of a few degrees goes unnoticed into the joint moments.
+A rotation shows in the direction in which the ground accelerates the body. Where noisy markers contain little
+information on that, the prior takes the plates as fault-free, and a rotation of a few degrees goes unnoticed into the
+joint moments.
 """
 
 from __future__ import annotations

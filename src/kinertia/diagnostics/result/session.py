@@ -1,4 +1,4 @@
-"""S50, was everybody of a session measured with the same instruments?"""
+"""S50, were all people of a session measured with the same instruments?"""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
 """M14, do loads still act along the feet once plates are corrected? If not, the body leans, and no plate is displaced.
 
-Cameras that are tilted sideways displace the body against its loads, and so do displaced plates. The dynamics of the
-whole body cannot distinguish the two; the feet can. On 31 recordings the loads of both feet, averaged, are within 7 mm
-of the lines from heel to toe. With plates 20 mm off, on nine walks, they are 14 to 26 mm beside these lines, and the
-correction moves them back; with cameras tilted by 1.5 degrees it moves them away.
+Cameras that are tilted sideways displace the body relative to its loads, and so do displaced plates. The dynamics of
+the whole body cannot distinguish the two; the feet can. On 31 recordings the loads of both feet, averaged, are within 7
+mm of the lines from heel to toe. With plates displaced by 20 mm, on nine walks, they are 14 to 26 mm beside these
+lines, and the correction moves them back; with cameras tilted by 1.5 degrees it moves them away.
 """
 
 from __future__ import annotations

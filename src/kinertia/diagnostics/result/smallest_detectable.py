@@ -9,11 +9,11 @@ from kinertia.estimation.simultaneous.plates import FLOOR_UNKNOWNS
 
 
 def smallest_detectable(shown: InstrumentInformation, prior: InstrumentPrior, unknown: str) -> float:
-    """Return the smallest error of all plates at which the trials make it likelier than fault-free plates.
+    """Return the smallest error of all plates that the trials make likelier than fault-free plates.
 
     Args:
         shown: information of the trials on plates and synchronisation, without any prior.
-        prior: what was known of them before, from other people of the session, too.
+        prior: their prior, including information from other people of the session.
         unknown: one of FLOOR_UNKNOWNS.
     """
     place = len(shown.rhs) - 1 - len(FLOOR_UNKNOWNS) + list(FLOOR_UNKNOWNS).index(unknown)

@@ -1,7 +1,7 @@
-"""R20, is the estimate sound? Convergence, bodies that can exist, and distance from what was expected.
+"""R20, is the estimate sound? Checks convergence, physical possibility, and distance from the prior.
 
-A side that is heavier is the body's, or something on it, even where that drives single parameters far; where single
-parameters are far for no such reason, a wrong joint, plate or marker is likelier than an unusual body.
+If one side is heavier, the cause is the body or something worn on it, even if single parameters are far from the prior.
+If they are far without such a reason, a wrong joint, plate or marker is likelier than an unusual body.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def soundness(context: ResultContext) -> Iterator[Finding]:
 
 
 def _impossible(fit: Fit) -> Iterator[Finding]:
-    """R202: impossible bodies; light bodies of a model that were kept as they are do not condemn the estimate."""
+    """R202: impossible bodies; light bodies of a model that were not estimated do not count against the estimate."""
     impossible = impossible_segments(fit.estimate)
     fixed = set()
     if fit.posterior is not None:
@@ -79,7 +79,8 @@ def away_from_expected(fit: Fit) -> np.ndarray:
 
 
 def _far_parameters(fit: Fit) -> Iterator[Finding]:
-    """R203: every parameter beyond CONTRADICTION_SD; those of arms, whose shoulders lack an axis, condemn nothing."""
+    """R203: every parameter beyond CONTRADICTION_SD; parameters of arms, whose shoulders lack an axis, do not count
+    against the estimate."""
     away = away_from_expected(fit)
     beyond = np.abs(away) > CONTRADICTION_SD
     arms = np.array([str(segment_of(name)).startswith(_ARMS) for name in fit.estimate.segments])
@@ -122,7 +123,7 @@ def _far_centres(fit: Fit) -> Iterator[Finding]:
 
 def _unlike(whole: Unlikeness) -> Finding:
     """R204: the likeliest causes first: wrong joint centres affect both sides equally, a prosthesis does not."""
-    wrong_first = (f"{_WRONG}: left and right are off alike", _WORN, _OTHER)
+    wrong_first = (f"{_WRONG}: left and right deviate equally", _WORN, _OTHER)
     causes = wrong_first if whole.both_sides else (_WORN, _OTHER, _WRONG)
     limb = next((name for name in whole.segments if name.endswith(("_r", "_l"))), None)
     return finding(

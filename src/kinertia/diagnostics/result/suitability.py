@@ -1,7 +1,7 @@
 """Rates the fitness of each output for its use, with a reason and a number.
 
-Findings judge the estimate as a whole; here follows from them what that means for each of the things that people take
-from it: an ERROR that affects it bars its use, a WARNING makes it one with care.
+Findings judge the estimate as a whole; here their consequences for each output are derived: an ERROR that affects it
+means "do not use", a WARNING "use with care".
 """
 
 from __future__ import annotations
@@ -153,7 +153,7 @@ def _of_parameters(fit: Fit, name: str) -> tuple[int, str]:
     """Return level and reason from how well the data inform these parameters."""
     shown, nouns = informed(fit, name), GROUPS[name].nouns
     if fit.posterior is None:
-        return 1, "no error bars (two-level): nobody knows which of them this recording informs"
+        return 1, "no error bars (two-level): it is unknown which of them this recording informs"
     if shown is None:
         return 1, f"no {nouns} were estimated"
     values = prior_values(fit)

@@ -20,7 +20,8 @@ _QUANTITIES = {"mass_kg": ("mass", "kg"), "height_m": ("stature", "m")}
 
 
 def stated_and_filed(context: PersonContext) -> Iterator[Finding]:
-    """S103: a mass or stature in files that differs from the one used; no doubt where the plates confirm that one."""
+    """S103: a mass or stature in files that differs from the one used; not reported where the plates confirm that
+    one."""
     for name, (quantity, unit) in _QUANTITIES.items():
         stated = getattr(context.subject, name)
         in_files: dict[float, list[str]] = {}

@@ -1,5 +1,5 @@
-"""Were two recordings of a person made with the same scale of the cameras? Another calibration makes all distances
-longer or shorter alike; a marker that moved, or skin, makes only some so.
+"""Were two recordings of a person made with the same camera scale? Another calibration changes all distances by the
+same share; a marker that moved, or skin, changes only some.
 
 Compared are pairs of markers of one segment, at least 80 mm apart: the median of their ratios, with a standard error by
 their scatter, since skin moves markers on soft thighs by several percent. Of ten fault-free pairs of a motion and a

@@ -1,12 +1,11 @@
-"""Is the stated mass the one that the plates carry?
+"""Is the stated mass the one that the plates measure?
 
-Every occasion on which all of the person is on the plates is compared: each trial, by whole strides where it holds
-them, and those in which the person stands. What is wrong, the mass or the plates, shows where they differ: a wrong
-mass is wrong by all plates and in all trials, and so is a load that was not declared, while of two plates with
-different gains only one contradicts it.
+Every occasion on which the plates support all of the person is compared: each trial, by whole strides where it has
+them, and recordings of standing. Whether the mass or the plates are wrong shows in their differences: all plates and
+all trials contradict a wrong mass or an undeclared load, but only one of two plates with different gains does.
 
-Of fault-free trials two plates agree on the mass within 2 %. A support of 50 N that is there all the time and a gain of
-7 % differ by 10 N in walking, less than the markers' centre shows: they look the same.
+On fault-free trials two plates agree on the mass within 2 %. In walking, a constant support of 50 N and a gain of 7 %
+differ by 10 N, less than the marker-based centre can show, so they look the same.
 """
 
 from __future__ import annotations

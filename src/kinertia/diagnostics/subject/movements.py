@@ -1,7 +1,7 @@
-"""Do the trials show the two movements that inform most of what walking leaves open, trunk sway and squats?
+"""Do the trials include trunk sway and squats, the two movements that complement walking best?
 
-In the package's own laboratory trunk sway as one more trial lowers the errors of moments of inertia by a third, more
-than any other movement (`kinertia plan` predicts both for a person's own trials).
+In the synthetic laboratory, adding a trial of trunk sway lowers the errors of moments of inertia by a third, more than
+any other movement (`kinertia plan` predicts both for a person's own trials).
 """
 
 from __future__ import annotations

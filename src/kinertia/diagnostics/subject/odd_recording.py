@@ -9,7 +9,7 @@ T = TypeVar("T")
 
 
 def odd_ones(first: T, other: T, witnesses: Iterable[tuple[float, float]]) -> tuple[T, ...]:
-    """Return the one that more of the other recordings are farther from; both where there are none, or on a tie.
+    """Return the one that most other recordings are farther from; both if there are none, or on a tie.
 
     Args:
         first, other: the two that disagree.

@@ -1,8 +1,8 @@
-"""Are static trial and trials of one person, in one session? Distances between markers of one segment show it.
+"""Are the static trial and the trials of one person, in one session? Distances between markers of one segment show it.
 
-Compared are pelvis, legs and feet: medians over the frames. The upper body is left out, whose skin moves with the arms.
-On ten fault-free pairs of a static trial and a trial, measured in five laboratories, distances differ by 4.6 mm RMS at
-most, and single ones by 17 mm; their ratio is within 1.2 %.
+Medians over the frames are compared for pelvis, legs and feet, but not for the upper body, whose skin moves with the
+arms. On ten fault-free pairs of a static trial and a trial, measured in five laboratories, distances differ by 4.6 mm
+RMS at most, and single ones by 17 mm; their ratio is within 1.2 %.
 """
 
 from __future__ import annotations
@@ -134,8 +134,8 @@ def _other_person(
     *,
     whole: bool,
 ) -> Iterator[Finding]:
-    """S203: distances at another scale, or farther off than markers that are re-applied, or as far where body data
-    differ, too; the latter unless a few labels explain the differences (not `whole`).
+    """S203: distances at another scale, or that differ more than after markers are re-applied, or as much where body
+    data also differ; the latter unless a few labels explain the differences (not `whole`).
     """
     off, ratio = distances.differences(), distances.ratio()
     rms_m, typical_m = rms(off), float(np.median(np.abs(off)))
@@ -188,8 +188,8 @@ class _Moved:
 def _moved_markers(
     distances: SegmentDistances, least_m: float, least_share: float, exchanged: Collection[str] = ()
 ) -> tuple[_Moved, ...]:
-    """Find the few markers without which all distances agree, except those of exchanged labels; none where distances
-    differ without them, too.
+    """Find the few markers without which all distances agree, except those of swapped labels; none where distances also
+    differ without them.
     """
     off = distances.differences()
     before, after = distances.lengths()

@@ -36,7 +36,7 @@ def standing(context: RecordingContext) -> Iterator[Finding]:
 
 
 def no_static(context: PersonContext) -> Iterator[Finding]:
-    """S207: there is neither a static trial nor a model, and a walk replaces it; S208: no walk can."""
+    """S207: there is neither a static trial nor a model, and a walk replaces them; S208: no walk can."""
     unread = any(one.rule.stage == "file" and one.where.trial is None for one in context.found)
     if not context.trials or context.standing or context.model or context.files_only or unread:
         return
@@ -85,7 +85,7 @@ def _lowest(context: RecordingContext, percentile: float) -> tuple[str, float] |
 
 
 def flat_feet(context: RecordingContext) -> Iterator[Finding]:
-    """S202: a foot that is not on the floor as the other is; the axes of a foot assume that it stands flat."""
+    """S202: a foot that is not on the floor like the other; foot axes assume that the foot is flat on the floor."""
     if context.marker_set is None:
         return
     apart = {}

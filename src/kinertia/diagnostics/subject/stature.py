@@ -1,8 +1,8 @@
 """Does the stated stature belong to the person in the static trial? Landmarks show it, in any posture.
 
-From ankle to knee, knee to front of the pelvis, and from there to the shoulder it is 0.79 to 0.84 of the stature on the
-reference recordings; lengths of parts vary by 4 to 5 % between people, their sum by less, as what one leg has more the
-trunk has less.
+The distances from ankle to knee, to the front of the pelvis and to the shoulder add up to 0.79 to 0.84 of stature on
+the reference recordings. Single distances vary by 4 to 5 % between people, their sum by less, since people with longer
+legs have shorter trunks.
 """
 
 from __future__ import annotations

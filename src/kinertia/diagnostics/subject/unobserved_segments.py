@@ -1,4 +1,4 @@
-"""Reports what it costs that markers do not show the upper body.
+"""Reports the effect of an upper body without markers.
 
 The figures are differences of the joint moments (RMS over the window) with and without the markers of arms and head, or
 of all of the upper body, in the walks of gait2354 and of Rajagopal's model: 1 to 7 N m in the legs and 3 to 11 N m at
@@ -17,7 +17,7 @@ from kinertia.model.marker_set import in_words
 from kinertia.model.skeleton import Skeleton
 
 _UPRIGHT = "upright on the pelvis, with literature values"
-_HANGING = "hanging straight at the trunk, which carries them"
+_HANGING = "hanging straight down from the trunk, which carries them"
 
 
 def unobserved_segments(skeleton: Skeleton) -> Iterator[Finding]:

@@ -1,4 +1,4 @@
-"""Does the stated belt speed fit? Feet that stand on a treadmill go with its belt."""
+"""Does the stated belt speed fit? Feet in stance move with the belt."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Do loads come when the feet stand? Delays and rates of plates against foot markers.
+"""Do loads begin and end with stance? Compares delays and rates of plates with foot markers.
 
 On fault-free trials, measured in six laboratories and made by OpenSim, loads begin and end within 25 ms of foot contact
 and foot off, and last 0.96 to 1.22 times as long.
@@ -69,7 +69,7 @@ def stance_durations(context: RecordingContext) -> Iterator[Hypothesis]:
 
 def _stances(contacts: Sequence[PlateContact], feet: Feet) -> list[float]:
     """Return how long (s) feet stand while they are loaded, or all stance phases where none is loaded. Before and
-    after, somebody may stand on a box or turn round.
+    after, the person may stand on a box or turn round.
     """
     loaded = [(one.foot, one.time[0], one.time[-1]) for one in contacts]
     whole = [(k, start, end) for k, foot in enumerate(feet) for start, end, all_of_it in foot.stance_spans if all_of_it]
@@ -90,7 +90,7 @@ def _several_steps(contact: PlateContact, plates: PlateLoads) -> bool:
 
 def contact_delays(context: RecordingContext) -> Iterator[Hypothesis]:
     """T201, T211 and T212: loads that begin and end earlier or later than foot contact and foot-off: increasingly
-    (T201), or equally (T211; T212 where no synchronisation is so late, or loads are under no foot even then).
+    (T201), or equally (T211; T212 where no synchronisation is that late, or loads are under no foot even then).
     """
     plates, feet = context.plates, context.foot_trajectories
     if plates is None or feet is None:

@@ -1,4 +1,4 @@
-"""Do the events of a file come when the forces do?"""
+"""Do the events of a file coincide with the forces?"""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def file_events(context: RecordingContext) -> Iterator[Finding]:
 
 
 def _by_motion(context: RecordingContext) -> Iterator[GaitEvent]:
-    """Detect foot strikes and foot offs as the begin and end of stance phases that the trial shows."""
+    """Detect foot strikes and foot offs as the beginning and end of stance phases that the trial shows."""
     for side, foot in zip(FEET, context.foot_trajectories or (), strict=False):
         for start, end, _ in foot.stance_spans:
             if start > foot.time[0]:

@@ -1,8 +1,8 @@
-"""Do forces keep time with the markers, by how they move the body up and down?
+"""Do forces keep time with the markers, going by the body's vertical motion?
 
-The body goes up and down by its markers as the forces cause, but for a factor near one: vertical velocities show a
-delay, and its growth, from the first and the last of a second. Two steps are enough, where single contacts are too few.
-A rate that is wrong for both enters accelerations squared, and so that factor.
+The vertical velocity from the markers equals the force-derived one, except for a factor near one: over a second it
+shows a delay and its growth. Two steps suffice, where single contacts would be too few. If the rate of both is wrong,
+it enters the accelerations, and so the factor, squared.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def force_rate(context: RecordingContext) -> Iterator[Finding]:
 
 
 def _wrong_rate(context: RecordingContext) -> Iterator[Finding]:
-    """T202, where all of the load is known: a foot beyond its plate seems to move the body at another rate."""
+    """T202, only where all of the load is known: a foot beyond its plate looks like another rate."""
     changes = context.velocity_changes_on_plates
     if changes is None:
         return

@@ -1,11 +1,11 @@
-"""Do the forces of two trials of a person go with each other's markers?
+"""Do the forces of two trials of a person belong to each other's markers?
 
-Walks of one person are alike, so that interchanged force files pass for plates that are off. But the body goes up and
-down as its own forces cause: of nine pairs of walks of one person, measured and made, what their own forces leave of
-the vertical velocities is 0.6 to 0.8 times what those of the other walk leave.
+Walks of one person are so similar that interchanged force files look like displaced plates. But the vertical velocity
+follows its own forces: in nine pairs of walks of one person, measured and synthetic, the residual with their own forces
+is 0.6 to 0.8 times the residual with the forces of the other walk.
 
-Both are compared over the same time, since a short window leaves less. Where two trials are overlapping parts of one
-recording, this is where they overlap, and the other's forces are their own.
+Both are compared over the same time, since residuals of short windows are smaller. Where two trials are parts of one
+recording, they are compared where they overlap, and there the forces are the same.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
 """T21, do the forces of one plate lag behind those of the others? Judged by the body's vertical velocity.
 
-Plates of two makers may reach the recorder through different devices. A late plate takes over the body's weight too
-late and keeps it too long: the sum of all forces is too small at one step and too large at the next. On 22 fault-free
-walks and runs plates differ by up to 5 ms, and by 10 and 13 ms where this explains next to nothing; one plate that is
-20 or 30 ms late shows 15 to 40 ms in all but two of 27. A foot over the edge of a plate also looks late or early, but
-only at one end of its step, while the forces of a late plate are late from beginning to end.
+Plates of two makers may be recorded through different devices. A delayed plate takes over the body's weight too late
+and keeps it too long: the sum of all forces is too small at one step and too large at the next. On 22 fault-free walks
+and runs plates differ by up to 5 ms, and by 10 and 13 ms where this explains almost nothing; one plate that is 20 or 30
+ms late shows 15 to 40 ms in all but two of 27. A foot over the edge of a plate also looks late or early, but only at
+one end of its step, while the forces of a late plate are late from beginning to end.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Which single correction of time puts all loads under feet that stand: another rate, or another start?
+"""Which single time correction, a rate or a delay, puts all loads under feet in stance?
 
-A wrong rate and a delay look alike to a single contact. But files that begin together and run at different rates part
-as time goes on, so that loads end later than they begin, and later ones are later still.
+A single contact cannot distinguish a wrong rate from a delay. But files that begin together and run at different rates
+diverge, so the delay of a load grows from its beginning to its end, and from load to load.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ class _Best:
 
 
 def fitted_rate_or_delay(context: RecordingContext) -> Iterator[Hypothesis]:
-    """T201 where loads fit the feet at another rate and at no delay; T211 where they are under no foot until a delay
-    is undone (a belt takes late loads along). Loads of feet that reach beyond their plates begin late or end early.
+    """T201 where loads fit the feet at another rate and at no delay; T211 where they are under no foot until a delay is
+    undone (on a belt, delayed loads move along). Loads of feet that reach beyond their plates begin late or end early.
     """
     plates, feet, contacts = context.whole_loads, context.foot_trajectories, context.whole_contacts
     if plates is None or context.plates is None or feet is None or not contacts:

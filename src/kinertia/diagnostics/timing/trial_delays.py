@@ -1,10 +1,11 @@
-"""Are the forces of all trials of a person equally late? The simultaneous estimate finds each trial's delay; nothing
-else does, and whoever is late may have lost more than time.
+"""Are the forces of all trials of a person equally delayed? Only the simultaneous estimate finds each trial's delay,
+and a delayed trial may have other faults.
 
-The body goes up and down by its markers as the forces cause, but for a delay: that of the forces' clock, and some ms
-that skin, trunk and arms add, alike whenever somebody moves. Of one person's trials (two walks, squats, parts of walks
-and runs) either way to tell it differs by up to 8 ms, but both in one direction by at most 4 ms; even those of eight
-people with skin motion of their own differ by at most 10 ms so. Parts of less than a second differ by up to 15 ms.
+The vertical velocity from the markers follows the force-derived one with a delay: the synchronisation delay of the
+forces, and some ms added by skin, trunk and arms, which are the same in all movements. Between trials of one person
+(two walks, squats, parts of walks and runs) each of the two measures of it differs by up to 8 ms, but both in one
+direction by at most 4 ms; even trials of eight people with different skin motion differ by at most 10 ms. Parts of less
+than a second differ by up to 15 ms.
 """
 
 from __future__ import annotations
@@ -42,7 +43,7 @@ class TrialDelay(NamedTuple):
 
 
 def trial_delay(context: RecordingContext) -> TrialDelay | None:
-    """Compute the delay over all windows that are long enough; None where none is, or nobody moves."""
+    """Compute the delay over all windows that are long enough; None where none is, or without movement."""
     if context.trial is None or context.travel.kind == "stands still":
         return None
     found, spans = [], []
@@ -60,7 +61,7 @@ def trial_delay(context: RecordingContext) -> TrialDelay | None:
 
 
 def trial_delays(person: PersonContext) -> Iterator[Finding]:
-    """T213: trials whose forces have another delay than those of the other trials."""
+    """T213: trials whose delay differs from the other trials'."""
     if len(person.trials) > 1:
         yield from uneven_delays([trial_delay(one) for one in person.trials])
 
