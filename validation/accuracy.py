@@ -139,7 +139,7 @@ def _calibrated(case: tuple[str, int]) -> Calibrated:
 def main(
     people: Annotated[int, typer.Option(min=2, help="People in each laboratory.")] = 40,
     seed: Annotated[int, typer.Option(help="Of people and noise.")] = 1,
-    workers: Annotated[int | None, typer.Option(help="Processes; one per core if left out.")] = None,
+    workers: Annotated[int | None, typer.Option(help="Processes (default: one per core).")] = None,
     skin: Annotated[Path | None, typer.Option(help="File of measured skin: only that laboratory and its page.")] = None,
     keep: Annotated[Path | None, typer.Option(help="Folder for its walks, which are used again.")] = None,
 ) -> None:

@@ -196,7 +196,7 @@ def main(
         ),
     ] = None,
     details: Annotated[Path | None, typer.Option(help="Write every finding to this JSON file.")] = None,
-    workers: Annotated[int | None, typer.Option(help="Processes; one per core if left out.")] = None,
+    workers: Annotated[int | None, typer.Option(help="Processes (default: one per core).")] = None,
 ) -> None:
     """Inject every fault into every walk, and write the page."""
     with TemporaryDirectory() as folder:

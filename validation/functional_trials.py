@@ -216,7 +216,7 @@ a fit, while other programs ran.
 
 def main(
     people: Annotated[int, typer.Option(min=2, help="In each line.")] = 40,
-    workers: Annotated[int | None, typer.Option(help="Processes; one per core if left out.")] = None,
+    workers: Annotated[int | None, typer.Option(help="Processes (default: one per core).")] = None,
 ) -> None:
     """Run everything and write the page."""
     rows = []

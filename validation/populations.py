@@ -88,7 +88,7 @@ def populations_markdown(study: PopulationsStudy) -> str:
 def main(
     people: Annotated[int, typer.Option(min=2, help="People of each population.")] = 24,
     seed: Annotated[int, typer.Option(help="Of people and noise.")] = 1,
-    workers: Annotated[int | None, typer.Option(help="Processes; one per core if left out.")] = None,
+    workers: Annotated[int | None, typer.Option(help="Processes (default: one per core).")] = None,
 ) -> None:
     """Simulate and estimate everybody, and write the tables into the page."""
     write_part("populations", populations_markdown(run_populations(people, seed, workers)))

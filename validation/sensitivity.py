@@ -16,7 +16,7 @@ from validation.page import PAGES, write_page
 def main(
     draws: Annotated[int, typer.Option(min=2, help="People in each condition.")] = 24,
     seed: Annotated[int, typer.Option(help="Of people and noise.")] = 1,
-    workers: Annotated[int | None, typer.Option(help="Processes; one per core if left out.")] = None,
+    workers: Annotated[int | None, typer.Option(help="Processes (default: one per core).")] = None,
 ) -> None:
     """Run the study, and write the page and its picture."""
     result = run_sensitivity(draws, seed, workers)

@@ -74,7 +74,7 @@ def test_a_joint_held_still_hides_all_that_moves_across_it(person, trial):
     prior = literature_prior(person.literature)
     base = base_parameters(held, person.literature, prior.sd, [motion], [ROOT_SD])
     assert base.count == 103 - 7
-    assert "anything moving between upper_arm_r and forearm_r: their joint is held still" in base.never
+    assert "anything moving between upper_arm_r and forearm_r: their joint is fixed" in base.never
 
 
 def test_gain_is_the_prior_deviation_over_that_of_least_squares(person, trial, base):

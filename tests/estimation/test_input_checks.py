@@ -52,7 +52,7 @@ def test_without_sex_there_is_no_table():
     ("names", "problem"),
     [
         (("walk", "walk"), "trial 'walk': trial 'walk' is there already; results have a folder for each"),
-        (("walk", "Walk"), "Windows and macOS take both for one folder"),
+        (("walk", "Walk"), "Windows and macOS treat both as one folder"),
         (("walk", "../walk"), "folders cannot have it on every system"),
         (("walk", "bsp.csv"), "the results have a file bsp.csv"),
     ],

@@ -113,7 +113,7 @@ def test_a_segment_that_was_kept_is_grey_and_says_so(fit):
     kept = replace(fit, posterior=replace(posterior, prior_sd=prior_sd, sd=sd))
     for shown in ("mass", "information"):
         drawn = outlines(body_figure(kept, shown))["pelvis"]
-        assert {(trace["text"], trace["fillcolor"]) for trace in drawn} == {("pelvis: kept", "#E9E9E9")}
+        assert {(trace["text"], trace["fillcolor"]) for trace in drawn} == {("pelvis: fixed", "#E9E9E9")}
 
 
 @pytest.mark.parametrize(("axis", "shifts"), [(0, (1, 0, -1)), (1, (0, 0, 0)), (2, (0, -1, 0))])

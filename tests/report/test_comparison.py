@@ -47,14 +47,14 @@ def test_without_error_bars_nothing_is_called_changed(fit, two_level):
 
 
 def test_error_bars_are_explained_where_there_are_any(fit, two_level):
-    explained = ("beyond 1.96 times its own deviation", "by more than the error bars say", "± sd")
+    explained = ("beyond 1.96 times its SD", "by more than the error bars say", "± sd")
     without = Elements(render_comparison({"a": fit, "b": two_level})).text
     assert not [words for words in explained if words in without]
-    assert "the two-level method gives no error bars, so nothing tells a change from chance: b" in without
+    assert "the two-level method gives no error bars, so a change cannot be distinguished from chance: b" in without
     both = Elements(render_comparison({"a": fit, "b": two_level, "c": fit})).text
     assert all(words in both for words in explained)
     (said,) = remarks({"a": two_level, "b": fit})
-    assert said.endswith("so nothing tells a change from chance: a, which all are compared with")
+    assert said.endswith("so a change cannot be distinguished from chance: a, the reference of the comparison")
 
 
 @pytest.mark.parametrize("findings", [FAULT_FREE, FAULTY, UNUSABLE])
@@ -75,7 +75,7 @@ def test_two_persons_and_two_models_are_pointed_out(fit, fit_with_model):
     said = " ".join(remarks({"a": fit, "b": own}))
     assert "different models" in said
     assert "do not share these segments" in said
-    assert "knee_angle of b is positive the other way: its moments are drawn with the sign of a" in said
+    assert "knee_angle of b has the opposite sign: its moments are drawn with the sign of a" in said
     compared = differences(fit, own)  # of those that both have
     assert {(one.segment, one.same, one.changed) for one in compared} == {
         ("pelvis", False, None),

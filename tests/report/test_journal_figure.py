@@ -110,13 +110,15 @@ def test_without_strides_moments_are_over_time(fit, tmp_path):
 def test_what_cannot_be_drawn_is_told(fit, tmp_path, without):
     with pytest.raises(KinertiaError, match="no figure 'moment'; expected one of moments, angles"):
         fit.figure("moment", tmp_path / "a.svg")
-    with pytest.raises(KinertiaError, match=r"for the screen: fit\.plot\.skeleton\(\); in files, .* bsp, departures"):
+    with pytest.raises(
+        KinertiaError, match=r"exists on screen only: fit\.plot\.skeleton\(\); in files, .* bsp, departures"
+    ):
         fit.figure("skeleton", tmp_path / "a.svg")
-    with pytest.raises(KinertiaError, match="the figure 'bsp' is of all trials; one trial has moments"):
+    with pytest.raises(KinertiaError, match="the figure 'bsp' shows all trials; for one trial there are moments"):
         fit.figure("bsp", tmp_path / "a.svg", trial=fit.trials[0].name)
     with pytest.raises(KinertiaError, match="no trial 'nowhere'"):
         fit.figure("residuals", tmp_path / "a.svg", trial="nowhere")
-    with pytest.raises(FileError, match=r"'\.docx' is no format of figures; expected one of \.svg"):
+    with pytest.raises(FileError, match=r"'\.docx' is not a figure format; expected one of \.svg"):
         fit.figure("moments", tmp_path / "a.docx")
     with pytest.raises(FileError, match=r"cannot be written: No such file"):
         fit.figure("forces", tmp_path / "nowhere" / "a.png")

@@ -38,11 +38,11 @@ def test_the_picture_of_the_pages_is_this_one():
 def test_the_command_writes_sheet_and_picture_and_overwrites_neither(tmp_path):
     outcome = run("init", tmp_path, "--measures")
     assert outcome.status == 0, outcome.err
-    assert 'under [prior]: measures = "measures.csv"' in outcome.out
+    assert 'measures = "measures.csv" under [prior]' in outcome.out
     assert (tmp_path / "measures.csv").read_text(encoding="utf-8") == measures_sheet()
     assert (tmp_path / "measures.svg").read_text(encoding="utf-8") == measures_picture()
     assert not (tmp_path / "subject.toml").exists()
     again = run("init", tmp_path, "--measures")
     assert again.status != 0
-    assert "exists already and is left alone" in again.err
+    assert "already exists and was not changed" in again.err
     assert " F101 " in run("init", tmp_path / "elsewhere", "--measures").err

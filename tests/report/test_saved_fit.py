@@ -68,7 +68,7 @@ def test_what_it_is_from_comes_along(demo_run):
 def test_folders_without_results_are_told(tmp_path):
     with pytest.raises(FileError, match="no such folder"):
         kinertia.load_fit(tmp_path / "nowhere")
-    with pytest.raises(FileError, match="no results of kinertia fit are there"):
+    with pytest.raises(FileError, match="no results of kinertia fit here"):
         kinertia.load_fit(tmp_path)
     (tmp_path / "fit.json").write_text("{}")
     with pytest.raises(FileError, match="run kinertia fit again"):

@@ -8,7 +8,7 @@ and of moments of inertia, with errors of
 
 - the measurements, and the expectation where nothing was measured;
 - the densities: the spread between Chandler's, Clauser's and Dempster's, the three sets of the package;
-- the shape: nobody is made of stadium solids (5 % of a mass, 8 % more of a moment; assumed here. The one of the five
+- the shape: no body consists of stadium solids (5 % of a mass, 8 % more of a moment; assumed here. The one of the five
   people who was weighed is 7 % lighter than his geometric body, with errors of all three kinds);
 - the cuts: where a segment ends is a matter of definition, in which the tables differ by 14-16 % of the mass of thigh
   and upper arm; what one segment gains the next loses.

@@ -35,12 +35,12 @@ def forces_used(reactions: GroundReactions, settings: Settings, motion_hz: float
     if reactions.impact_n < NOTABLE_IMPACT_N:
         return ForcesUsed(which, why)
     size = f"impacts of {reactions.impact_n:.1f} N (RMS over the trial)"
-    spikes = "spikes into the moments of knee and hip (Bisseling and Hof 2006, J Biomech 39:2438)"
+    spikes = "spikes in the moments of knee and hip (Bisseling and Hof 2006, J Biomech 39:2438)"
     faster = f"faster than the motion ({motion_hz:g} Hz)"
     if settings.force_cutoff_hz == "none":
         return ForcesUsed(f"{which}, {size} included", f"{why}; they are {faster} and put {spikes}")
     keep = 'to keep them: force_cutoff_hz = "none" under [settings]'
-    return ForcesUsed(f"{which}, less {size}", f"{why}; they are {faster} and would put {spikes}; {keep}")
+    return ForcesUsed(f"{which}, less {size}", f"{why}; they are {faster} and would cause {spikes}; {keep}")
 
 
 def forces_before(reactions: GroundReactions, settings: Settings) -> str:

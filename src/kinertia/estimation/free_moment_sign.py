@@ -1,6 +1,6 @@
 """Determines the sign of the plates' free moments: the one with which the estimate fits better.
 
-In some laboratories, all files have the wrong sign of the vertical moments: the free moments are then off by twice
+In some laboratories, all files have the wrong sign of the vertical moments: the free moments are then wrong by twice
 their own size. The estimates with either sign show which is likelier, for all trials of a person together
 (`simultaneous.model_evidence`). For 28 measured trials from eight laboratories the log odds of the opposite sign are
 between -50 and -2.6 where the sign is right. Where it is wrong, they are 12 to 59 in walks and squats; in drop jumps,
@@ -97,7 +97,7 @@ def with_likelier_sign(ready: Prepared, fit: Callable[[Prepared, Sequence[Kinema
 def with_undisputed_plates(known: InstrumentPrior, errors: Sequence[CalibrationEntry]) -> InstrumentPrior:
     """Return the prior without large plate displacements along axes on which only one sign displaces a plate.
 
-    Both signs are equally likely, and the plate is rather where the file has it. Its position keeps the standard
+    Both signs are equally likely, and the plate is more likely where the file has it. Its position keeps the standard
     deviation of all plates, which then enters the uncertainty of the moments.
     """
     disputed = {one.axis for one in errors if one.quantity == POSITION and one.contradicted_by == OTHER_SIGN}

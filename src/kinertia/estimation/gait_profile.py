@@ -46,7 +46,7 @@ def gait_profile(fit: Fit, norms: Mapping[str, Norm]) -> GaitProfile:
         raise KinertiaError("no trial has a stride, and without strides there is no Gait Profile Score")
     if not set(CLINICAL_ANGLES) & {quantity for quantity, _ in curves}:
         legs = "legs are not hip, knee and ankle with axes forward, up and right"
-        raise KinertiaError(f"there are no clinical angles of the model {fit.skeleton.name}: its {legs}")
+        raise KinertiaError(f"there are no clinical angles for the model {fit.skeleton.name}: its {legs}")
     return scores(curves, norms, remarks(fit, norms[_PELVIS[0]]))
 
 

@@ -207,7 +207,7 @@ def _hidden_between(parent: str, child: str, hidden: int) -> str:
     if hidden == 3:
         return f"mass moving between {parent} and {child} on the axis of their joint, however it is spread along it"
     if hidden == len(PARAMETERS):
-        return f"anything moving between {parent} and {child}: their joint is held still"
+        return f"anything moving between {parent} and {child}: their joint is fixed"
     return f"{hidden} combinations of {parent} and {child}"
 
 

@@ -83,7 +83,7 @@ def _filed(subject: Subject, field: str, recordings: Sequence[Recording]) -> Any
 
 
 def mass_by_force_kg(literature: BodySegmentParameters, foot_loads: np.ndarray, residual: np.ndarray) -> float:
-    """Compute body mass (kg) from the vertical ground reaction over a window, whatever the CoM's acceleration.
+    """Compute body mass (kg) from the vertical ground reaction over a window, for any acceleration of the CoM.
 
     The residual of the uncorrected motion is P = m (a + g) - F with the literature's m, so the mass that leaves no
     mean vertical residual is m F / (F + P), with means over the window.

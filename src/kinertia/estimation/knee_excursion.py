@@ -1,4 +1,4 @@
-"""Decides whether trials show the axes of the knees: by how far the knees bend in them."""
+"""Decides whether trials show the axes of the knees, from how far the knees bend."""
 
 from __future__ import annotations
 

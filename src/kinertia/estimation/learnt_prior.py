@@ -8,10 +8,11 @@ the literature's, which applies to a person of the tables.
 
 The prior of the group:
 
-- its people are as far from their mean as the literature's are from the tables, which counts as much as 120 people;
-- its mean differs from the tables much in some parameters and little in most: Student's t with 3 degrees of freedom,
-  one draw for a parameter of both sides (Tipping 2001, J Mach Learn Res 1:211, does it for single weights). A normal
-  prior spreads a heavy trunk over whatever else would explain the trials, and many people are needed to correct that;
+- people vary about the group's mean as they do about the tables; this assumption has the weight of 120 people;
+- the group's mean differs much from the tables in a few parameters and little in most: Student's t with 3 degrees of
+  freedom, one draw for a parameter of both sides (Tipping 2001, J Mach Learn Res 1:211, does it for single weights). A
+  normal prior would attribute a heavy trunk in part to any other parameter that could explain the trials, and many
+  people would be needed to correct that;
 - a heavier mean segment has proportionally larger moments of inertia.
 
 All parameters are relative: distance from the person's own literature values, in the literature's standard deviations.
@@ -122,7 +123,7 @@ def learn(people: Sequence[PersonInformation]) -> LearntPrior:
         PriorError: there are too few people, or they were estimated with different models.
     """
     if len(people) < FEWEST_PEOPLE:
-        reason = f"its mean and spread take at least {FEWEST_PEOPLE}"
+        reason = f"its mean and spread need at least {FEWEST_PEOPLE}"
         raise unusable(f"A group of {len(people)}", reason, people=Quantity(len(people), "1", limit=FEWEST_PEOPLE))
     segments = people[0].segments
     if other := next((one for one in people if one.segments != segments), None):

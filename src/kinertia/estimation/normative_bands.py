@@ -48,7 +48,7 @@ class Control:
         """
         by_side = mean_curves(fit)
         if not by_side:
-            raise KinertiaError(f"{fit.subject.name}: no strides, and no curves over the gait cycle")
+            raise KinertiaError(f"{fit.subject.name}: no strides, hence no curves over the gait cycle")
         curves = {}
         for quantity in dict.fromkeys(name for name, _ in by_side):
             sides = np.array([by_side[quantity, side] for side in FEET if (quantity, side) in by_side])

@@ -116,7 +116,7 @@ def information_of(fit: Fit) -> PersonInformation:
     factor = fit.expected.total_mass_kg / own.mean.total_mass_kg
     literature, own = (each.at_mass(factor * each.mass_kg, each.mass_sd_kg) for each in (literature, own))
     if fit.file is not None or not np.allclose(fit.posterior.prior_sd, own.sd, rtol=_OWN_PRIOR):
-        raise unusable(name, "estimated with another prior than the tables' for the built-in model")
+        raise unusable(name, "estimated with a prior other than the tables for the built-in model")
     return person_information(name, literature, own, fit.estimate, fit.posterior.covariance)
 
 

@@ -11,10 +11,10 @@ de Leva's.
   elsewhere in that study. Standard deviations of masses stay, those of centres of mass and inertias grow.
 - child: head and trunk are heavier, thighs, shanks and feet lighter than an adult's (Jensen 1986, J Biomech 19:359);
   his coefficients could not be checked. Standard deviations grow.
-- other: anybody else whom the tables do not describe, for example pregnant or very muscular people. Standard deviations
+- other: anyone else whom the tables do not describe, for example pregnant or very muscular people. Standard deviations
   grow.
 - obese: trunks are heavier, thighs and shanks lighter for the same mass (Chambers et al. 2010, Clin Biomech 25:131,
-  people over 65); de Leva's masses were off by up to 60 % on average in a sample of working adults (Merrill et al.
+  people over 65); de Leva's masses were wrong by up to 60 % on average in a sample of working adults (Merrill et al.
   2019). Standard deviations grow.
 """
 

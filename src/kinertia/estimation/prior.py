@@ -62,7 +62,7 @@ class BspPrior:
     """Gaussian prior of body segment parameters, with the total mass measured by the scale.
 
     Attributes:
-        mean: need not be physically consistent (a start off by 50 % is not); estimates always are.
+        mean: need not be physically consistent (a start with errors of 50 % is not); estimates always are.
         covariance: (10 s, 10 s) of the table rows (mass, CoM, moments, products), segment after segment.
         mass_kg, mass_sd_kg: the total mass by the scale, and its standard deviation.
         weighed: (s,) whether the scale's mass includes each segment; None: all.
@@ -96,9 +96,9 @@ class BspPrior:
         if not np.all(variances > 0):
             k = int(np.argmin(variances > 0))
             name = f"{self.mean.segments[k // 10]}.{PARAMETERS[k % 10]}"
-            raise PriorError(f"the variance of {name} is {variances[k]:g}; every deviation must be positive", name)
+            raise PriorError(f"the variance of {name} is {variances[k]:g}; every variance must be positive", name)
         if not self.mass_sd_kg > 0:
-            raise PriorError(f"the deviation of the body mass is {self.mass_sd_kg:g} kg; it must be positive")
+            raise PriorError(f"the standard deviation of the body mass is {self.mass_sd_kg:g} kg; it must be positive")
         correlation = self.covariance / np.outer(self.sd, self.sd)
         if not np.allclose(correlation, correlation.T):
             raise PriorError("the covariance is not symmetric")

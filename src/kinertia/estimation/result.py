@@ -268,7 +268,7 @@ class Fit:
 
     @property
     def attached_kg(self) -> float:
-        """Estimated mass (kg) of the objects that the person wore or carried: of segments that are not in the model."""
+        """Estimated mass (kg) of the objects that the person wore or carried, which are extra segments."""
         own = SEGMENTS if self.file is None else self.file.bsp.segments
         rows = zip(self.estimate.segments, self.estimate.mass_kg.tolist(), strict=True)
         return float(sum(mass for segment, mass in rows if segment not in own))

@@ -69,7 +69,7 @@ def intervals(window: Window) -> list[Window]:
     """Divide the window into equal integration intervals of at most LONGEST_INTERVAL_S, about a stride.
 
     With two constants per coordinate the corrected pelvis stays near the measured one only for so long: literature BSPs
-    are off by some 10 N m, which rotates the pelvis by 0.3 rad within 2.4 s. The study's trials were one stride.
+    leave errors of some 10 N m, which rotates the pelvis by 0.3 rad within 2.4 s. The study's trials were one stride.
     """
     count = int(np.ceil(span_s(window.time) / LONGEST_INTERVAL_S * (1.0 - 1e-9)))
     edges = np.linspace(0, len(window.time), max(count, 1) + 1).round().astype(int)

@@ -113,7 +113,7 @@ def _implausible(field: str, quantity: str, value: object, shown: Quantity, unit
 def reference_lengths(height_m: float, sex: str) -> dict[str, float]:
     """Return segment lengths (m) of the tables' reference subjects, scaled by stature; names as in `BodyGeometry`.
 
-    They are for lengths that nobody measured. Torso and foot are Dumas', the rest de Leva's.
+    They replace lengths that were not measured. Torso and foot are Dumas', the rest de Leva's.
     """
     dumas, deleva = _dumas_table(sex), _deleva_table(sex)
     torso = dumas["thorax"].length_m + dumas["abdomen"].length_m

@@ -70,7 +70,7 @@ def _trunk(marks: Landmarks) -> Iterator[Assumption]:
     )
     acromia = _lacking(marks, "acromion_r", "acromion_l")
     if torso and acromia and (spine := _lacking(marks, "c7", "sternal_notch")):
-        yield Assumption("torso", (*acromia, *spine), "the trunk is taken to be upright in it")
+        yield Assumption("torso", (*acromia, *spine), "the trunk is assumed to be upright in it")
     if acromia and any(arms):
         instead = "the shoulder mirrors the other one" if len(acromia) == 1 else "shoulders are placed by stature"
         yield Assumption("shoulders", acromia, instead)
@@ -85,11 +85,13 @@ def _arm(marks: Landmarks, side: str) -> Iterator[Assumption]:
         segments = marks.marker_set.segments
         worn = [*segments.get(f"upper_arm_{side}", ()), *segments.get(f"forearm_{side}", ())]
         if any(label in marks.markers for label in worn):
-            yield Assumption(part, (elbow[0], wrist), "the arm hangs at the trunk, and its markers are not used")
+            yield Assumption(
+                part, (elbow[0], wrist), "the arm is assumed to hang from the trunk, and its markers are not used"
+            )
     elif wrist not in marks:
-        yield Assumption(part, (wrist,), "the forearm is taken to continue the upper arm in it")
+        yield Assumption(part, (wrist,), "the forearm is assumed to continue the upper arm")
     elif not any(name in marks for name in elbow):
         yield Assumption(part, elbow[:1], "the elbow is placed between shoulder and wrist")
     if 0 < len(seen) < len(named):
         lost = ", ".join(label for label in named if label not in seen)
-        yield Assumption(f"wrist_{side}", (lost,), "the other marker is taken for the middle of the wrist")
+        yield Assumption(f"wrist_{side}", (lost,), "the other marker is taken as the middle of the wrist")

@@ -146,7 +146,7 @@ def _points(x: ArrayLike, y: ArrayLike, fewest: int) -> tuple[np.ndarray, np.nda
     if len(knots) != len(values) or len(knots) < fewest:
         raise ValueError(f"{len(knots)} x and {len(values)} y; expected as many, at least {fewest}")
     if not (np.diff(knots) > 0).all():
-        raise ValueError("x does not grow from point to point")
+        raise ValueError("x must increase from point to point")
     return knots, values
 
 

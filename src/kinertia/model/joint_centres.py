@@ -109,7 +109,7 @@ def find_landmarks(static: Recording, marker_set: MarkerSet) -> Landmarks:
 
 
 def frame(y: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """Return the rotation (3, 3) whose y axis is along y and whose z axis is as near to z as possible."""
+    """Return the rotation (3, 3) whose y axis is along y and whose z axis is as close to z as possible."""
     y = y / np.linalg.norm(y)
     x = np.cross(y, z)
     x = x / np.linalg.norm(x)

@@ -108,7 +108,7 @@ class MarkerSet:
 
 
 def spelled_as(marker_set: MarkerSet, labels: Sequence[str]) -> MarkerSet:
-    """Return the set with missing labels spelled as in the recording, if only one of its labels comes into question.
+    """Return the set with missing labels spelled as in the recording, if only one of its labels is possible.
 
     Spellings may differ in capitals and punctuation, be another known name of the marker, or begin with a person's name
     that all labels share, as in "Anna_LASI".
@@ -149,7 +149,7 @@ def spellings(wanted: Sequence[str], labels: Sequence[str]) -> dict[str, str]:
 
 
 def shared_prefix(labels: Sequence[str]) -> str:
-    """Return what nearly all labels have before their first underscore, with it; empty if they differ."""
+    """Return the prefix that nearly all labels have up to their first underscore; empty if they differ."""
     parts = Counter(label[: label.find("_") + 1] for label in labels).most_common(1)
     return parts[0][0] if parts and parts[0][1] >= _PREFIX_SHARE * len(labels) else ""
 
@@ -221,7 +221,7 @@ def is_worn(marker_set: MarkerSet, labels: Sequence[str]) -> bool:
 def fits_person(marker_set: MarkerSet, labels: Sequence[str]) -> bool:
     """Decide whether a preset is used and has heels and metatarsals here, without which no foot can be built.
 
-    Two laboratories' sets may share most labels and not these.
+    The marker sets of two laboratories may share most labels but not these.
     """
     sides = [[label for side in "rl" for label in marker_set.landmarks.get(f"{name}_{side}", ())] for name in _FOOT]
     return is_worn(marker_set, labels) and all(set(own) & set(labels) for own in sides if own)

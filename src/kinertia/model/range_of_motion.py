@@ -39,7 +39,7 @@ class RangeOfMotion:
 
     @property
     def of_anybody(self) -> tuple[float, float]:
-        """Limits that include everybody: mean and three SDs."""
+        """Limits that include practically everyone: mean and three SDs."""
         return self.low - _SURE * self.low_sd, self.high + _SURE * self.high_sd
 
     @property

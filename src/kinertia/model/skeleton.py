@@ -186,7 +186,7 @@ class Skeleton:
         return replace(self, locked={k: v for k, v in self.locked.items() if k not in names})
 
     def unbounded(self, names: Iterable[str]) -> Skeleton:
-        """Return the skeleton with unlimited ranges of these coordinates, whatever model and anatomy state."""
+        """Return the skeleton with unlimited ranges of these coordinates, disregarding model and anatomy."""
         return replace(self, ranges={**self.ranges, **dict.fromkeys(names, ANYTHING)})
 
     def with_markers(self, markers: Sequence[Marker]) -> Skeleton:

@@ -1,10 +1,10 @@
 """Selects one cutoff for motion and forces of a trial before any estimate.
 
-Generalised cross-validation takes everything that is not white noise for motion. Markers that were smoothed before
+Generalised cross-validation treats everything that is not white noise as motion. Markers that were smoothed before
 export contain no white noise any more, and skin motion is not white: in half of the trials of other laboratories it
 chooses no smoothing at all. The bandwidth of the body's motion follows from the ground reactions, whose sum is its mass
-times the acceleration of its centre of mass: the search ends where they contain hardly anything faster, at 6 Hz in
-squats and slow walks, 8 or 10 Hz in brisk walks, 15 Hz in runs and jumps.
+times the acceleration of its centre of mass: the search ends where they contain little above it, at 6 Hz in squats and
+slow walks, 8 or 10 Hz in brisk walks, 15 Hz in runs and jumps.
 """
 
 from __future__ import annotations
@@ -50,9 +50,9 @@ def common_cutoff(time: np.ndarray, pelvis: np.ndarray, trial: Trial) -> Cutoff:
     reason = "chosen by cross-validation"
     if hz > 0.999 * end:
         reason = (
-            "where the search of cross-validation ends, since the ground reactions have hardly anything faster"
+            "the upper limit of the automatic search: the ground reactions contain little above it"
             if end < ENDS_HZ[-1]
-            else "where the search of cross-validation ends"
+            else "the upper limit of the automatic search"
         )
     return Cutoff(
         hz,

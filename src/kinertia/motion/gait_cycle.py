@@ -164,7 +164,7 @@ def _foot_is_shown(skeleton: Skeleton, kinematics: Kinematics, event: GaitEvent)
 
 
 def strides_of(skeleton: Skeleton, kinematics: Kinematics) -> tuple[Stride, ...]:
-    """Find all strides of a trial, right foot first; none if nobody walks or runs."""
+    """Find all strides of a trial, right foot first; none without walking or running."""
     events = found_events(skeleton, kinematics)
     strikes = {side: [e for e in events if e.event.side == side and e.event.kind == "heel strike"] for side in FEET}
     offs = {side: [e.event.time_s for e in events if e.event[1:] == (side, "toe off")] for side in FEET}

@@ -1,4 +1,4 @@
-"""Prepares the ground reactions for joint moments: at full rate, without what no motion can follow.
+"""Prepares the ground reactions for joint moments: at full rate, without forces that the motion cannot follow.
 
 Below the hip, joint moments are forces times lever arms, and forces change within milliseconds where a foot lands or
 leaves; filtered like the motion they are wrong there by several N m. But not every fast force belongs in a joint
@@ -84,12 +84,12 @@ class GroundReactions:
 
     @cached_property
     def point(self) -> np.ndarray:
-        """Centres of pressure (k, 2, 3) m, held where there is next to no load."""
+        """Centres of pressure (k, 2, 3) m, constant where there is almost no load."""
         return _points(self.wrench)
 
     @property
     def torque(self) -> np.ndarray:
-        """Moment (k, 2, 3) N m about `point`: the free moment, and next to nothing about the horizontal axes."""
+        """Moment (k, 2, 3) N m about `point`: the free moment, and almost nothing about the horizontal axes."""
         return self.wrench[..., 3:] - np.cross(self.point, self.wrench[..., :3])
 
     def at(self, time: np.ndarray) -> np.ndarray:

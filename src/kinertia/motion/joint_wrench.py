@@ -19,7 +19,7 @@ class LegJoint:
     Attributes:
         name: "Hip", "Knee" or "Ankle".
         side: "r" or "l".
-        parent, child: segments that it connects; for the ankle shank and foot, whatever is between.
+        parent, child: segments that it connects; for the ankle shank and foot, with any bodies between them.
         joints: its joints in the skeleton, in order: for the ankle talocrural and subtalar.
     """
 

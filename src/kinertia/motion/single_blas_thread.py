@@ -1,8 +1,8 @@
 """Limits BLAS to one thread for computations on small matrices, such as those of a body.
 
-Threads double the time there, and multiply it by ten on a busy machine. Functions that compute for longer than a moment
-are decorated with `one_blas_thread`, each step separately, so that it also applies to callers of single steps; the
-user's setting is restored afterwards.
+More threads would double the time, or multiply it by ten on a busy machine. Functions that compute for longer than a
+moment are decorated with `one_blas_thread`, each step separately, so that it also applies to callers of single steps;
+the user's setting is restored afterwards.
 """
 
 from __future__ import annotations

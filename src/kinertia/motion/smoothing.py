@@ -17,7 +17,7 @@ a double (zero-phase) third-order Butterworth filter whose gain is 1/2 at fc: Wo
 the half-power frequency of the single pass names the double pass. On samples the law holds within 0.2 % of
 (f/fc)^6 up to a quarter of the sampling rate.
 
-*Generalised cross-validation (GCV)* chooses p per column without being told the noise: it minimises
+*Generalised cross-validation (GCV)* chooses p per column without knowledge of the noise: it minimises
 
     GCV(p) = n RSS(p) / (n - trace A(p))^2,        A: the matrix that takes samples to fitted values.
 

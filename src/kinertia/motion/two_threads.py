@@ -76,7 +76,7 @@ def both(first: Callable[[], T], second: Callable[[], R]) -> tuple[T, R]:
 
 
 def in_one_thread() -> None:
-    """Start no second thread in this process from now on: other processes use the other cores."""
+    """Start no second thread in this process from now on, since other processes use the other cores."""
     _second.acquire(blocking=False)
 
 

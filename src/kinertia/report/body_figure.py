@@ -1,7 +1,7 @@
-"""Draws the body from front and sides: where the estimate changed it, or what the data say about it.
+"""Draws the body from front and sides, coloured by changes or by how well the data inform each segment.
 
-A segment is drawn as a capsule as long as it is, of the volume that its mass before the estimate takes in water. It is
-a sketch to find segments by, not a measurement of the person's shape.
+A segment is drawn as a capsule of its length, with the volume of water that has its mass before the estimate. It is a
+sketch to identify segments, not a measurement of the person's shape.
 """
 
 from __future__ import annotations
@@ -286,7 +286,7 @@ def _by_information(fit: Fit, posterior: Posterior) -> _Colours:
     percent[np.setdiff1d(np.arange(len(percent)), estimated_rows(fit))] = np.nan
     words = [evidence(value) for value in posterior.information[:, 0]]
     texts = [
-        f"{segment_name(name)}: {f'{value:.0f} % ({word})' if np.isfinite(value) else 'kept'}"
+        f"{segment_name(name)}: {f'{value:.0f} % ({word})' if np.isfinite(value) else 'fixed'}"
         for name, value, word in zip(fit.estimate.segments, percent, words, strict=True)
     ]
     return _Colours(
@@ -295,6 +295,6 @@ def _by_information(fit: Fit, posterior: Posterior) -> _Colours:
         ("#FFFFFF", style.between("#FFFFFF", style.BLUE, 0.5), style.BLUE),
         "information on the mass (%)",
         texts,
-        f"The body from the right, the front and the left, coloured by what the data say about each mass. "
+        f"The body from the right, the front and the left, coloured by how much the data inform each mass. "
         f"{'; '.join(texts)}.",
     )

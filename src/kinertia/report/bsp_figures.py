@@ -1,4 +1,4 @@
-"""Draws body segment parameters: changes with intervals, and what the data say about each."""
+"""Draws body segment parameters: changes with intervals, and how well the data inform each."""
 
 from __future__ import annotations
 
@@ -191,7 +191,7 @@ def information_figure(fit: Fit) -> Figure | None:
     segments = [segment_name(fit.estimate.segments[i]) for i in shown]
     best = np.unravel_index(int(np.nanargmax(percent)), percent.shape)
     alt = (
-        f"Map of what the data say about each parameter, in percent; most about {NAMES[best[1]]} of "
+        f"Map of how much the data inform each parameter, in percent; most of all {NAMES[best[1]]} of "
         f"{segments[best[0]]}, {percent[best]:.0f} %; median {np.nanmedian(percent):.0f} %."
     )
     rows, columns = np.nonzero(np.isfinite(percent))

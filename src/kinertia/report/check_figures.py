@@ -34,7 +34,7 @@ _LEAST_PX, _MOST_PX = 150, 460
 def force_figure(check: RecordingCheck) -> Figure | None:
     """Draw forces on every plate over time, with contacts by foot and intervals that no fit can use; None without.
 
-    Plates that carry nothing are left out if others carry something.
+    Unloaded plates are left out if others are loaded.
     """
     plates = check.recording.plates
     if plates is None:

@@ -1,7 +1,7 @@
 """Compares several results: what differs by more than the error bars.
 
-Sessions of one person, two methods or two models on one recording: rows are body segment parameters and strides,
-the first result is what the others are compared with.
+Sessions of one person, two methods or two models on one recording: rows are body segment parameters and strides; the
+others are compared with the first result.
 """
 
 from __future__ import annotations
@@ -113,23 +113,25 @@ def remarks(fits: Mapping[str, Fit]) -> list[str]:
     for other_name, other in others:
         if abs(first.mass_kg - other.mass_kg) > 0.1 * first.mass_kg:
             notes.append(
-                f"{name} is of {first.mass_kg:.1f} kg, {other_name} of {other.mass_kg:.1f} kg: is it the same person?"
+                f"{name} has {first.mass_kg:.1f} kg, {other_name} {other.mass_kg:.1f} kg: is it the same person?"
             )
         lacking = sorted(set(first.estimate.segments) ^ set(other.estimate.segments))
         if lacking:
             notes.append(f"{name} and {other_name} do not share these segments: {', '.join(lacking)}")
         if unlike := sorted({segment_name(one.segment) for one in differences(first, other) if not one.same}):
             notes.append(
-                f"{name} and {other_name} are of different models: origin and extent differ of {', '.join(unlike)}, "
-                "which have other joints or neighbours, so that nothing tells whether their parameters changed"
+                f"{name} and {other_name} use different models: {', '.join(unlike)} differ in origin and extent (other "
+                "joints or neighbours), so their parameters cannot be compared"
             )
         notes += [
             sentence for joint in _MOMENTS if (sentence := _sign_remark(joint, (name, first), (other_name, other)))
         ]
     without = [one for one, fit in fits.items() if fit.posterior is None]
     if without:
-        subjects = f"{name}, which all are compared with" if name in without else ", ".join(without)
-        notes.append(f"the two-level method gives no error bars, so nothing tells a change from chance: {subjects}")
+        subjects = f"{name}, the reference of the comparison" if name in without else ", ".join(without)
+        notes.append(
+            f"the two-level method gives no error bars, so a change cannot be distinguished from chance: {subjects}"
+        )
     return notes
 
 
@@ -141,9 +143,9 @@ def _sign_remark(joint: str, first: tuple[str, Fit], other: tuple[str, Fit]) -> 
         return ""
     signs = {same_sign(joint, side, fit.skeleton, other_fit.skeleton) for side in FEET}
     if -1 in signs:
-        return f"{joint} of {other_name} is positive the other way: its moments are drawn with the sign of {name}"
+        return f"{joint} of {other_name} has the opposite sign: its moments are drawn with the sign of {name}"
     return (
-        f"{joint} of {other_name} turns about another axis than in {name}: its moments are not drawn"
+        f"{joint} of {other_name} rotates about a different axis than in {name}: its moments are not drawn"
         if 0 in signs
         else ""
     )

@@ -58,8 +58,7 @@ class Coordinate:
 def panels_of(skeleton: Skeleton) -> list[Coordinate]:
     """List the coordinates of a skeleton in order, left and right together.
 
-    Coordinates of an OpenSim model's legs are titled by their movement, whatever their sign, the others by their
-    names.
+    Leg coordinates of an OpenSim model are titled by their movement, for either sign, others by their names.
     """
     sides = by_side(skeleton.coordinates)
     ours = skeleton.name == "gait27"
@@ -102,8 +101,8 @@ def title_of(skeleton: Skeleton, column: int) -> str:
 def load_title(one: Coordinate, what: str) -> str:
     """Title the moment about a coordinate with its sign: "Hip flexion +" as "Hip moment, flexion +".
 
-    Words that a figure of three panels beside one another has no room for are left out: "Trunk bending, to the right +"
-    is "Trunk moment, bending right +".
+    Words for which a figure with three panels side by side has no room are left out: "Trunk bending, to the right +" is
+    "Trunk moment, bending right +".
     """
     if not one.title.endswith(" +"):
         return f"{one.title} {what}"

@@ -1,4 +1,4 @@
-"""Writes what `kinertia crossval` found: rows for the terminal, `crossval.json` and a page."""
+"""Writes the results of `kinertia crossval`: rows for the terminal, `crossval.json` and a page."""
 
 from __future__ import annotations
 
@@ -54,21 +54,21 @@ def render_crossval(held_out: Sequence[HeldOut], before: str) -> str:
             title: {name: [row[k] for row in rows] for name, rows in values.items()}
             for k, title in enumerate(CROSSVAL_HEADINGS[2:])
         },
-        f"What is left of each held-out trial with the BSPs of the {before} and with those from the other trials.",
+        f"Residuals of each held-out trial with the BSPs of the {before} and with those from the other trials.",
     )
     sentence = crossval_sentence(held_out)
     part = Part(
         "Trials held out",
         (
             f"Motion and calibration were estimated with frozen BSPs: the {before}'s, and those from the other trials. "
-            "The objective is half the sum of squares that is left, each over its deviation: smaller is better.",
+            "The objective is half the sum of squared residuals, each divided by its SD: smaller is better.",
         ),
         figure,
         "Force and moment: RMS residual at the pelvis. Markers: RMS distance.",
         headings=CROSSVAL_HEADINGS,
         rows=crossval_rows(held_out, before),
     )
-    return render_parts("Do the BSPs hold elsewhere?", sentence[0].upper() + sentence[1:] + ".", [part])
+    return render_parts("Do the BSPs hold in other trials?", sentence[0].upper() + sentence[1:] + ".", [part])
 
 
 def save_crossval(held_out: Sequence[HeldOut], before: str, folder: str | Path) -> Path:

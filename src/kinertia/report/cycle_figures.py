@@ -1,8 +1,8 @@
 """Draws curves over the gait cycle: all strides, right and left each from its own heel strike on.
 
 Strides are thin; the mean of those that are complete, or were measured longest (`common_strides`), is thick with a band
-of one standard deviation around it; the estimate's own 95 % band is the darker one. What the usual pipeline gives is
-dotted. Where nothing was measured there is a gap.
+of one standard deviation around it; the estimate's own 95 % band is the darker one. The result of the usual pipeline is
+dotted. There are gaps where nothing was measured.
 """
 
 from __future__ import annotations

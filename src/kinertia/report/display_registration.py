@@ -1,4 +1,4 @@
-"""Tells `kinertia.trial.display` how trials and fits are shown and saved; loaded when one first is."""
+"""Registers with `kinertia.trial.display` how trials and fits are shown and saved; loaded at the first use."""
 
 from __future__ import annotations
 

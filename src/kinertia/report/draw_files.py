@@ -15,13 +15,13 @@ def write_draws(fit: Fit, folder: Path, count: int, seed: int = 0) -> None:
     """Write `count` posterior draws, each into a sub-folder: `draw_001`, `draw_002` ...
 
     Each holds `model.osim`, `kinematics.mot`, `ground_reactions.mot` and `external_loads.xml`; with several trials the
-    last three are in a folder per trial, and all share the model. The spread of another program's results from them is
-    the posterior deviation of its result.
+    last three are in a folder per trial, and all share the model. The SD of another program's results over the draws is
+    the posterior SD of its result.
 
     Args:
         fit: a fit by the simultaneous method.
         folder: folder to write to.
-        count: number of draws; a result keeps 200, of long trials fewer.
+        count: number of draws; a result keeps 200, fewer for long trials.
         seed: selects draws and their order.
 
     Raises:

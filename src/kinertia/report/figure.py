@@ -1,7 +1,7 @@
 """Defines a figure as plain data, for plotly.js in a report and plotly's package in a notebook.
 
-A report loads no plotly for that: its own objects check every value against a schema, which took a fifth of a fit's
-time; here the tests do so once, for every figure that there is.
+Reports do not load plotly for this: its objects check every value against a schema, which took a fifth of a fit's time;
+here the tests check every figure once.
 """
 
 from __future__ import annotations

@@ -137,7 +137,7 @@ def beside_figure(trial: TrialFit, compared: list[Beside], most_frames: int = MO
 
 
 def beside_summary(fit: Fit) -> list[dict[str, Any]]:
-    """Return what `kinertia compare --json` prints of the files' own outputs, per trial, joint, side, quantity."""
+    """Return the files' own outputs for `kinertia compare --json`, per trial, joint, side, quantity."""
     return [
         {
             "trial": one.trial,

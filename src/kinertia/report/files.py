@@ -162,7 +162,7 @@ def _write_trial(fit: Fit, trial: TrialFit, folder: Path) -> None:
 
 
 def coordinates_table(fit: Fit, trial: TrialFit) -> TimeTable:
-    """Arrange coordinates over time, in degrees and m; of an OpenSim model all that it has."""
+    """Arrange coordinates over time, in degrees and m; all coordinates of the file for an OpenSim model."""
     time, q = (trial.time, trial.motion.q) if trial.course is None else (trial.kinematics.course_time, trial.course)
     if fit.file is None:
         names, angles = fit.skeleton.coordinates, fit.skeleton.rotational
@@ -266,7 +266,7 @@ def _trial_summary(fit: Fit, trial: TrialFit) -> dict[str, Any]:
 
 
 def _displacements(fit: Fit, trial: TrialFit) -> dict[str, list[float]]:
-    """Return how far markers are displaced in this trial from their positions in the model, in their segments."""
+    """Return the displacements of markers in this trial from their positions in the model, in segment axes."""
     moved = trial.skeleton.marker_locals - fit.skeleton.marker_locals
     return {label: row.tolist() for label, row in zip(fit.skeleton.labels, moved, strict=True) if row.any()}
 

@@ -1,6 +1,6 @@
 """Shows findings on pages: what to do next, by severity, corrections, explanations.
 
-One view for the report, for check.html and for the page in the browser, so that each says the same of a finding.
+The report, check.html and the page in the browser share one view, so that they describe a finding in the same way.
 """
 
 from __future__ import annotations

@@ -23,14 +23,15 @@ def write_ground_reactions(
 ) -> None:
     """Write `ground_reactions.mot` and `external_loads.xml`.
 
-    Per foot: force (N), the point on the ground where it acts (m), torque there (N m), in ground axes. Where there is
-    no load the point stays where it was or will be: OpenSim lays splines through the columns, which would swing at a
+    Per foot: force (N), the point on the ground where it acts (m), torque there (N m), in ground axes. Without load the
+    point is constant at its nearest loaded position: OpenSim fits splines to the columns, which would oscillate at a
     jump.
 
     Args:
         folder: folder to write to.
         reactions: reactions on the motion's time base.
-        window_s: first and last time of the motion; some samples outside are written, too: splines err at ends.
+        window_s: first and last time of the motion; some samples outside are also written, since splines are inaccurate
+            at their ends.
         feet: bodies on which the right and the left foot's forces act.
         remark: a line of the header.
     """

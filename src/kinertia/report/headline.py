@@ -1,7 +1,7 @@
 """Writes the report's first part: fitness for use, and what the estimate changed.
 
-Findings say what is wrong; `suitability` says what follows for each output, and here that is read for the purposes that
-people have.
+Findings state what is wrong and `suitability` the consequence for each output; this module applies it to the purposes
+that people have.
 """
 
 from __future__ import annotations
@@ -113,7 +113,7 @@ def _motion(fit: Fit, trial: TrialFit) -> list[str]:
 def _knowledge(fit: Fit) -> tuple[str, ...]:
     if fit.posterior is None:
         return (
-            "the two-level method has no error bars, so that it is unknown which parameters the data inform. Small "
+            "the two-level method has no error bars, so it is unknown which parameters the data inform. Small "
             "residuals alone prove nothing about single parameters; use the simultaneous method",
         )
     posterior = fit.posterior
@@ -133,8 +133,8 @@ def _knowledge(fit: Fit) -> tuple[str, ...]:
         sentences.append(kept)
     if never := posterior.base.never:
         sentences.append(
-            f"{hidden_combinations(fit)} combinations show in no motion, such as {never[0]}: all are listed above the "
-            "table"
+            f"{hidden_combinations(fit)} combinations cannot be seen in any motion, such as {never[0]}: all are listed "
+            "above the table"
         )
     return tuple(sentences)
 

@@ -1,6 +1,6 @@
 """Draws `fit.figure`: the report's figures as files for papers, by matplotlib.
 
-Two columns wide (180 mm), letters of 7 points, which stay letters in SVG and PDF files.
+They are two columns wide (180 mm), with 7-point text that stays text in SVG and PDF files.
 """
 
 from __future__ import annotations
@@ -70,9 +70,9 @@ def save_figure(fit: Fit, name: str, path: str | Path, trial: str | None = None)
     if name not in FOR_PAPERS:
         raise KinertiaError(_no_figure(name))
     if trial is not None and name not in OF_TRIALS:
-        raise KinertiaError(f"the figure '{name}' is of all trials; one trial has {', '.join(OF_TRIALS)}")
+        raise KinertiaError(f"the figure '{name}' shows all trials; for one trial there are {', '.join(OF_TRIALS)}")
     if path.suffix.lower() not in _FORMATS:
-        raise FileError(path, f"'{path.suffix}' is no format of figures; expected one of {', '.join(_FORMATS)}")
+        raise FileError(path, f"'{path.suffix}' is not a figure format; expected one of {', '.join(_FORMATS)}")
     expect_matplotlib()
     import matplotlib as mpl
 
@@ -89,7 +89,7 @@ def save_figure(fit: Fit, name: str, path: str | Path, trial: str | None = None)
 def _no_figure(name: str) -> str:
     papers = f"expected one of {', '.join(FOR_PAPERS)}"
     if not name.startswith("_") and hasattr(FitFigures, name):
-        return f"the figure '{name}' is for the screen: fit.plot.{name}(); in files, {papers}"
+        return f"the figure '{name}' exists on screen only: fit.plot.{name}(); in files, {papers}"
     return f"there is no figure '{name}'; {papers}"
 
 

@@ -1,4 +1,4 @@
-"""Draws the markers' errors: how far the model is from each, and when each was not seen."""
+"""Draws marker errors: the distance of each marker from the model, and when it was not visible."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def marker_figure(trial: TrialFit, drifting: tuple[str, ...] = ()) -> Figure:
 
 
 def gap_figure(markers: Markers, windows_s: Sequence[tuple[float, float]], name: str) -> Figure | None:
-    """Draw when each marker was not visible, over the whole trial; None where all always were.
+    """Draw when each marker was not visible, over the whole trial; None if all always were.
 
     Args:
         markers: markers of the model or the marker set.

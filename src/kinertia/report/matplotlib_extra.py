@@ -15,6 +15,6 @@ def has_matplotlib() -> bool:
 
 
 def expect_matplotlib() -> None:
-    """Raise a KinertiaError that says how to install matplotlib, unless it is there."""
+    """Raise a KinertiaError, with how to install matplotlib, unless it is installed."""
     if not has_matplotlib():
         raise KinertiaError(f"figures in files need matplotlib, which is not installed: {HOW}")

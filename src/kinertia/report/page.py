@@ -204,7 +204,7 @@ def residual_rows(trials: Sequence[TrialFit]) -> list[dict[str, Any]]:
 
 
 def bsp_rows(fit: Fit) -> list[dict[str, Any]]:
-    """Return table rows in kg, mm and kg m2; each number as it is, to sort by, and as text."""
+    """Return table rows in kg, mm and kg m2; each number as a value, for sorting, and as text."""
     away, posterior = departures(fit), fit.posterior
     before, after = fit.literature.table(), fit.estimate.table()
     rows = []

@@ -1,7 +1,7 @@
 """Lays out small multiples: many panels in one plotly figure.
 
-The page lays the panels out anew for its width: `layout.meta.arrangements` holds, per number of columns and for
-"print", what plotly's `relayout` needs for it.
+The page rearranges the panels for its width: `layout.meta.arrangements` holds the input of plotly's `relayout` for each
+number of columns and for "print".
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class Panel:
 
 
 def plain(text: str) -> str:
-    """Escape text that plotly would take for markup, as names of markers and trials may hold it."""
+    """Escape text that plotly would interpret as markup, which names of markers and trials may contain."""
     return html.escape(text)
 
 

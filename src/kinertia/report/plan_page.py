@@ -1,4 +1,4 @@
-"""Writes what `kinertia plan` found: rows for the terminal, `plan.csv`, `plan.json` and a page."""
+"""Writes the results of `kinertia plan`: rows for the terminal, `plan.csv`, `plan.json` and a page."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from kinertia.studies.plan import Plan
 
 PLAN_HEADINGS = ("recorded", "measured", "informed", "assumed", "mass", "CoM", "Ixx Iyy Izz")
 PLAN_CAPTION = (
-    "How many of the parameters each recording would leave measured, informed, assumed (the literature's); and the "
-    "error bars over those of the literature, mean by class. Below the single recordings: the best two and three "
-    "together."
+    "How many parameters each recording would inform well (measured), partly (informed) and not at all (assumed: the "
+    "literature's), and the error bars as a share of the literature's, mean by class. Below the single recordings: "
+    "the best sets of two and three."
 )
 _CLASSES = {"mass": slice(0, 1), "CoM": slice(1, 4), "Ixx Iyy Izz": slice(4, 7)}
 
@@ -56,17 +56,17 @@ def render_plan(planned: Plan) -> str:
     bars = bar_figure(
         names,
         {title: [one[word] for one in counts] for word, title in words.items()},
-        "How many parameters each recording would leave measured, informed and assumed.",
+        "How many parameters each recording would inform well, partly and not at all.",
         "body segment parameters",
     )
     shares = [_shares(planned, chosen) for chosen in planned.sd]
     dots = dot_figure(
         names,
-        {what: {"error bar over the literature's": [one[what] for one in shares]} for what in _CLASSES},
+        {what: {"error bar as a share of the literature's": [one[what] for one in shares]} for what in _CLASSES},
         "Predicted error bars over those of the literature, mean by class, for each recording.",
     )
     parts = [
-        Part("What each recording would tell", (PLAN_CAPTION,), bars, headings=PLAN_HEADINGS, rows=plan_rows(planned)),
+        Part("What each recording would show", (PLAN_CAPTION,), bars, headings=PLAN_HEADINGS, rows=plan_rows(planned)),
         Part(
             "Error bars",
             ("1 is no better than the literature; 0.5 halves its error bar.",),

@@ -43,8 +43,8 @@ def as_plotly(figure: Figure) -> go.Figure:
 class FitFigures(Generic[T]):
     """Figures of a fit, one method for each.
 
-    Figures over time show one trial, by default the first. What cannot be drawn raises a KinertiaError that states
-    why, and which figure can be drawn instead.
+    Figures over time show one trial, by default the first. A figure that cannot be drawn raises a KinertiaError with
+    the reason, and with a figure that can be drawn instead.
 
     Attributes:
         fit: the fit.
@@ -160,8 +160,8 @@ name plotly's server, too, for the case that the first is not kept."""
 class NotebookFigure(go.Figure):  # type: ignore[misc]  # plotly has no types
     """Figure like plotly's own that is also drawn in pages made of a notebook by `nbconvert --to html`.
 
-    In Jupyter plotly leaves output in a cell that only Jupyter's extension draws: cells of such a page are empty. Here
-    HTML is added to it, unless another of plotly's renderers was chosen.
+    Plotly's cell output is drawn only by Jupyter's extension, so such a page would have empty cells. Here HTML is added
+    to it, unless another of plotly's renderers was chosen.
     """
 
     def _ipython_display_(self) -> None:

@@ -95,12 +95,12 @@ def read_saved(folder: str | Path) -> SavedFit:
         problem = f"holds no {FIT_FILE}: " + (
             "these results are from a version that did not write it; run kinertia fit again"
             if older
-            else "no results of kinertia fit are there; give the folder that its option -o named"
+            else "no results of kinertia fit here; give the folder named by its option -o"
         )
         raise FileError(folder, problem)
     saved = read_archive(path, _KINDS)
     if not isinstance(saved, SavedFit):
-        raise FileError(path, "is no result of kinertia fit; give another folder")
+        raise FileError(path, "is not a result of kinertia fit; give another folder")
     return saved
 
 

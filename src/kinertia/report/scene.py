@@ -1,4 +1,4 @@
-"""Assembles what stands where in every frame of a 3-D view, and how a page carries it.
+"""Assembles the content of every frame of a 3-D view, and encodes it for a page.
 
 `templates/scene_view.js` plays it: a small drawing of lines, dots and ellipses needs no 3-D library and stays smooth.
 """

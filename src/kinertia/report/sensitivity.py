@@ -51,7 +51,7 @@ def sensitivity_figure(sensitivity: Sensitivity) -> Figure:
     )
     for row in range(len(SHOWN), len(sensitivity.parameters), len(SHOWN)):
         axis.axhline(row - 0.5, color="white", linewidth=1.5)
-    figure.colorbar(picture, ax=axis, shrink=0.4, label="RMS error / that of the literature")
+    figure.colorbar(picture, ax=axis, shrink=0.4, label="RMS error relative to the literature")
     return figure
 
 
@@ -72,7 +72,7 @@ many people a share is known to some {percent:.0f} % of its value. The command w
 **Sensitive** (small error at a quarter of either noise, not at twice): {sensitive}
 
 **Shown by no condition** (error above 0.9 whatever is recorded here): {never} of {count} parameters ({never_classes}).
-For these the literature's value stands; their error bars say so.
+These keep the literature's values, as their error bars show.
 
 **Recording more**, mean over all {count} parameters, skin motion: {strides}.
 
@@ -82,7 +82,7 @@ For these the literature's value stands; their error bars say so.
 {picture}"""
 
 _PICTURE = """
-![RMS error of every parameter in every condition, over that of the literature](sensitivity.png)
+![RMS error of every parameter in every condition, relative to the literature](sensitivity.png)
 """
 
 

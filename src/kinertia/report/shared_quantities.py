@@ -1,7 +1,7 @@
-"""Finds the quantities that two models share: names alone do not say it.
+"""Finds the quantities that two models share: names alone do not show them.
 
-The torso of a model without arms is torso and arms; the origin of a pelvis is where its maker put it; and a knee angle
-is flexion in one model and extension in another (gait2354).
+The torso of a model without arms includes the arms; the origin of a pelvis depends on its author; and a knee angle is
+flexion in one model and extension in another (gait2354).
 """
 
 from __future__ import annotations
@@ -19,7 +19,8 @@ _ALIKE = 0.7
 
 
 def same_segment(segment: str, one: Skeleton, other: Skeleton) -> bool:
-    """Return whether a segment has in both the same joint to the same parent, and the same segments joined to it.
+    """Return whether in both models a segment has the same joint to the same parent, and the same segments joined to
+    it.
 
     Items welded to it, such as a rucksack, do not matter.
     """

@@ -68,7 +68,7 @@ def table1_rows(table: Table1) -> list[list[str]]:
 
 
 def short(value: float, digits: int) -> str:
-    """Format a number as the tables print it."""
+    """Format a number as printed in the tables."""
     return f"{value:.{digits}g}".replace("e-0", "e-")
 
 

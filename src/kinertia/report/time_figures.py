@@ -1,6 +1,6 @@
 """Draws figures over time: root residuals, coordinates and joint moments of a trial.
 
-Frames that were not used are shaded; upright lines are gait events, solid where a foot lands, dashed where it leaves.
+Frames that were not used are shaded; vertical lines are gait events, solid at foot contact, dashed at foot off.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ _AXES = ("forward", "upward", "to the right")
 
 
 def residual_figure(trial: TrialFit, most_frames: int = MOST_FRAMES, start: Start = LITERATURE) -> Figure:
-    """Draw the force (N) and moment (N m) at the pelvis that the model needs and the plates do not give, stage by
-    stage, with forces at the bandwidth of the motion; the estimate's at full bandwidth, too.
+    """Draw the residual force (N) and moment (N m) at the pelvis, stage by stage, with forces at the bandwidth of the
+    motion, and for the estimate also at full bandwidth.
     """
     thin, axis = _thin(len(trial.time), most_frames), time_axis(trial.kinematics)
     marks = [*_unused(trial.kinematics, axis), *_lines(_shown_events(trial.kinematics))]
@@ -238,7 +238,7 @@ def time_axis(kinematics: Kinematics) -> dict[str, Any]:
 
 
 def _unused(kinematics: Kinematics, axis: dict[str, Any]) -> list[dict[str, Any]]:
-    """Shade what lies outside the windows."""
+    """Shade times outside the windows."""
     starts, ends = zip(*kinematics.windows_s, strict=True)
     spans = zip((axis["range"][0], *ends), (*starts, axis["range"][1]), strict=True)
     return [

@@ -47,7 +47,7 @@ def start_of(person: Fit | Prepared) -> Start:
 
 
 def expected_of(fit: Fit) -> Start:
-    """Return the names of the prior's mean: "prior" where more is known of a person than the start."""
+    """Return the names of the prior's mean: "prior" where more is known about a person than the starting values."""
     return PRIOR if fit.more_known else start_of(fit)
 
 

@@ -1,9 +1,9 @@
 """Tests whether body segment parameters from some trials explain another one better than the literature's.
 
-Small residuals prove nothing on the trials for which they were minimised. Here one trial after the other is held out;
-the parameters come from the rest and are fixed, and on the held-out trial only motion and calibration are estimated.
-The remaining objective (half the sum of squares of markers, root residuals and calibration over their standard
-deviations) is compared with that of the literature's parameters, fixed in the same way.
+Small residuals prove nothing on the trials for which they were minimised. Here each trial is held out in turn; the
+parameters come from the rest and are fixed, and on the held-out trial only motion and calibration are estimated. The
+remaining objective (half the sum of squares of markers, root residuals and calibration over their standard deviations)
+is compared with that of the literature's parameters, fixed in the same way.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ def cross_validate(
     """Hold out every trial in turn.
 
     The skeleton is calibrated on all trials at once, and the sign of free moments determined from all of them, for both
-    sets of parameters alike.
+    sets of parameters.
 
     Args:
         ready: the person, with two trials or more.

@@ -1,7 +1,7 @@
 """Predicts the uncertainty of every body segment parameter for candidate motions, to decide what to record.
 
-Candidates are measured trials of a person, or the package's synthetic motions of its own person with skin motion of
-published size in the walk, up to twice that in the others. Nothing is estimated: standard deviations follow from the
+Candidates are measured trials of a person, or the package's motions of its synthetic person, with skin motion of
+published size in the walk and up to twice that in the others. Nothing is estimated: standard deviations follow from the
 information of each trial at the literature's parameters (`predicted.Information`), which is summed over several trials,
 except for errors that recur (`error_repetition`).
 """
@@ -62,7 +62,8 @@ class Plan:
         return result
 
     def counts(self, candidates: tuple[str, ...]) -> dict[str, int]:
-        """Count the parameters that these candidates would leave measured, informed, assumed."""
+        """Count the parameters that these candidates would inform well (measured), partly (informed) and not
+        (assumed)."""
         words = [evidence(value) for value in self.information(candidates).ravel()]
         return {word: words.count(word) for word in ("measured", "informed", "assumed")}
 

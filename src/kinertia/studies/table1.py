@@ -1,6 +1,6 @@
 """Repeats the study's Table 1: which BSPs can be recovered from gait, with and without noise and pelvis correction.
 
-Each draw takes a start (every one of the 49 parameters off by uniform +/-50 %) and, for the noisy conditions, the
+Each draw takes a start (every one of the 49 parameters changed by uniform +/-50 %) and, for the noisy conditions, the
 study's marker noise; noisy markers go through inverse kinematics and GCV smoothing with the true skeleton. The
 two-level estimator never sees the truth. `Setup` holds these steps, each of which can be replaced
 (`kinertia.studies.table1_variants`).

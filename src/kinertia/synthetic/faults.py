@@ -1,7 +1,7 @@
 """Makes synthetic walks with given instrument faults, for the accuracy study.
 
 The truth is a `SyntheticTrial`; the laboratory has noisy markers, loads measured by its own plates, and its own
-skeleton. Only these three are returned, as `Kinematics`; the estimator gets no more than from files.
+skeleton. Only these three are returned, as `Kinematics`; the estimator gets only what files would contain.
 """
 
 from __future__ import annotations
@@ -157,7 +157,8 @@ class _Instruments:
         return cls(delay_s, offset, 1.0 + plates[:, 2:3], plates[:, 3], np.zeros((2, 3)), turn_rad)
 
     def in_trial(self, rng: np.random.Generator, prior: InstrumentPrior, one_of_several: bool) -> _Instruments:
-        """Add what a trial has of its own: zero offsets, gains, and a delay if one of several or not checked."""
+        """Add the errors of a single trial: zero offsets, gains, and a delay if it is one of several or was not
+        checked."""
         zero = np.array([[prior.zero_offset_n.draw(rng), 0.0, prior.zero_offset_n.draw(rng)] for _ in range(2)])
         own = one_of_several or prior.delay_s.fault_probability > 0.0
         trial_delay_s = prior.trial_delay_s.draw(rng) if own else 0.0

@@ -206,7 +206,7 @@ def consistent_trial(
 
     Raises:
         KinertiaError: the iteration does not converge: the window is longer than about two strides, or the BSPs are far
-            off.
+            from the truth.
     """
     wrench = foot_loads.sum(axis=1)
     start, integration, current = motion.q[:, :6], Integration(time), motion

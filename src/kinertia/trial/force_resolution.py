@@ -1,6 +1,6 @@
-"""Measures how long forces overshoot beside a load, as they do after far too strong filtering.
+"""Measures how long forces overshoot next to a load, an effect of far too strong filtering.
 
-On 26 recordings of nine laboratories no plate reads below zero for more than 3 ms beside a load.
+On 26 recordings of nine laboratories no plate reads below zero for more than 3 ms next to a load.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _SHORTEST_LOAD_S, _LEAST_LOAD_N, _BRIDGED_S = 0.15, 200.0, 0.05
 def ringing_s(time: FloatArray, vertical: FloatArray) -> float:
     """Return for how long (s) a plate reads below zero just before foot contact and just after foot off.
 
-    It is 0 unless both happen. Nobody pulls on a plate, but a zero-phase filter spreads a load in this way.
+    It is 0 unless both happen. A foot cannot pull on a plate, but a zero-phase filter spreads a load in this way.
 
     Args:
         time, vertical: (k,) s and N, as read.

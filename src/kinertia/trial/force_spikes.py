@@ -1,9 +1,9 @@
 """Finds and bridges spikes in the signals of a force plate: electrical disturbances of a few samples.
 
-A foot loads a plate more slowly: a force that jumps and is back after 2 ms, while it hardly changes before and after,
-is not a foot's. On 71 plates, recorded at 900 to 2000 Hz, forces differed from their median over 8 ms by at most 119 N
-vertically (ringing as a heel landed on one plate; 50 N on the others) and 24 N horizontally. One sample of 2 kN at
-1000 Hz, left in the forces, changed joint moments by up to ten standard deviations.
+A foot loads a plate more slowly: a force that jumps and returns within 2 ms, and hardly changes before and after, does
+not come from a foot. On 71 plates, recorded at 900 to 2000 Hz, forces differed from their median over 8 ms by at most
+119 N vertically (ringing as a heel landed on one plate; 50 N on the others) and 24 N horizontally. One sample of 2 kN
+at 1000 Hz, left in the forces, changed joint moments by up to ten standard deviations.
 """
 
 from __future__ import annotations

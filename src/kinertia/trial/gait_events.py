@@ -56,7 +56,7 @@ def contradicted_events(trial: Trial) -> list[tuple[FileEvent, GaitEvent]]:
 
 
 def sides_exchanged(trial: Trial) -> bool:
-    """Decide whether the events coincide with the loads of the other foot and hardly with those of their own."""
+    """Decide whether the events coincide with the loads of the other foot, and hardly any with their own."""
     edges, stated = load_edges(trial.loads), _stated(trial)
     return _agreeing(_exchanged(stated), edges) > _PLAINLY * _agreeing(stated, edges)
 
@@ -72,7 +72,7 @@ def counted_from_first_frame(trial: Trial) -> bool:
 
 
 def events_of_other_foot(events: Iterable[FileEvent], shown: Sequence[GaitEvent]) -> list[FileEvent]:
-    """Return the stated events at whose times the other foot does what they state, and their own foot does not."""
+    """Return the stated events that match the other foot at their times, but not their own foot."""
     wrong = []
     for one in events:
         if (stated := one.of_gait) is None:

@@ -81,8 +81,8 @@ def ground_contact(markers: Markers, loads: FootLoads, feet: FootMarkers, belt: 
     leaves when it rises to the speed seen where a plate ceases to be loaded. Up to `CONTACT_SLACK_S` of such ground
     contact right before or after a load is the markers' inaccuracy; what remains is widened by `CONTACT_MARGIN_S`.
 
-    A foot without load that stands still, at whatever height, is on a step, a box or the frame of a treadmill if the
-    plates carry less than usual meanwhile; from landing to leaving, as above.
+    A foot without load that stands still, at any height, is on a step, a box or the frame of a treadmill if the plates
+    carry less than usual meanwhile; from foot contact to foot off, as above.
 
     Frames outside the recorded forces are not measured. Frames in the air (no foot on the ground, no load) are measured
     only between measured frames, for up to `LONGEST_FLIGHT_S`: then plates have measured both take-off and landing. A
@@ -116,7 +116,7 @@ def ground_contact(markers: Markers, loads: FootLoads, feet: FootMarkers, belt: 
 
 
 def _learned(moves: Sequence[FootMotion], loaded: BoolArray) -> tuple[float, float, float]:
-    """Derive the clearance (m) and the landing and leaving speeds (m/s) from the loaded feet of this trial.
+    """Derive the clearance (m) and the speeds (m/s) at foot contact and foot off from the loaded feet of this trial.
 
     If no contact begins (or ends) within the trial, the largest speed of a loaded foot is used instead.
     """
@@ -151,7 +151,8 @@ def _largest(values: FloatArray) -> float:
 
 
 def _usual(speeds: Sequence[float]) -> float:
-    """Return the largest of the speeds that is not an outlier: what was not a landing must not set the threshold."""
+    """Return the largest of the speeds that is not an outlier: something other than a landing must not set the
+    threshold."""
     values = np.array(speeds)
     finite = values[np.isfinite(values)]
     if finite.size >= _FEWEST_TO_JUDGE:

@@ -15,7 +15,7 @@ _NOWHERE = (np.nan, np.nan, np.nan)
 
 
 class IdleReading(NamedTuple):
-    """Reading of a force plate while nobody stands on it.
+    """Reading of a force plate while it is unloaded.
 
     Attributes:
         level_n: median force along X, Y, Z, N; NaN if it is hardly ever unloaded.
@@ -23,7 +23,7 @@ class IdleReading(NamedTuple):
         peak_n: the largest vertical force of the whole recording, N.
         overshoot_s: for how long the vertical force is below zero just before foot contact and just after foot off, s;
             0 unless it does both.
-        like_steps: the vertical force rises and falls as under feet, at whatever scale.
+        like_steps: the vertical force rises and falls as under feet, at any scale.
         level_nm: median moment about the ground origin, N m; if the file has none for the unloaded plate, the moment of
             `level_n` acting at the mean centre of pressure.
         twist_nm: largest component of the moment about the mean centre of pressure, N m.

@@ -27,7 +27,7 @@ sample to sample; noise about a zero offset of some newtons with the same standa
 
 
 def idle_reading(time: FloatArray, force: FloatArray, moment: FloatArray) -> IdleReading:
-    """Determine the reading of a plate while nobody stands on it.
+    """Determine the reading of a plate while it is unloaded.
 
     Args:
         time: (k,) s.
@@ -109,7 +109,7 @@ def _mean_point(force: FloatArray, moment: FloatArray) -> FloatArray:
 
 
 def _like_steps(time: FloatArray, vertical: FloatArray) -> bool:
-    """Decide whether a force (k,) of whatever unit looks like the load of feet.
+    """Decide whether a force (k,) of any unit looks like the load of feet.
 
     It does if it acts in one direction, is mostly either near zero or near its full size, and stays so for a while; or
     if it is always present and sways smoothly. Noise, drift and mains interference have both signs or never return to

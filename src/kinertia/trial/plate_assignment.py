@@ -91,7 +91,7 @@ def no_forces(recording: Recording) -> Finding:
 
 
 def assign_plates(recording: Recording, feet: FootMarkers) -> tuple[FootLoads, tuple[Finding, ...]]:
-    """Assign every load to the foot above it, whatever the files declare.
+    """Assign every load to the foot above it, regardless of what the files declare.
 
     A contact is a run of loaded samples on one plate, with gaps below `BRIDGED_GAP_S` bridged; contacts
     shorter than `SHORTEST_CONTACT_S` are noise. It is assigned to the foot whose mean marker position is nearest to its

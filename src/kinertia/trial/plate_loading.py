@@ -51,7 +51,7 @@ class PlateLoad(NamedTuple):
 
 
 def without_idle(time: FloatArray, force: FloatArray, moment: FloatArray) -> PlateLoad:
-    """Subtract what the plate reads while nobody stands on it, and set unloaded samples to zero.
+    """Subtract the plate's unloaded reading, and set unloaded samples to zero.
 
     Args:
         time: (k,) s.

@@ -1,6 +1,6 @@
 """Searches sample times for the nearest samples, samples within a span, and contiguous runs.
 
-Rounding errors of the times change no result.
+Rounding errors of the times do not change results.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ def nearest_samples(time: npt.NDArray[np.float64], at: npt.NDArray[np.float64]) 
 
 
 def within(time: npt.NDArray[np.float64], start_s: float, end_s: float) -> npt.NDArray[np.bool_]:
-    """Return the mask of times from start_s to end_s, both included, whatever their rounding errors."""
+    """Return the mask of times from start_s to end_s, both included, despite rounding errors."""
     return (time >= start_s - TIME_TOLERANCE_S) & (time <= end_s + TIME_TOLERANCE_S)
 
 

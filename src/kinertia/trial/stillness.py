@@ -1,4 +1,4 @@
-"""Decides whether anybody moves in a recording, from the speed of the markers."""
+"""Decides whether anyone moves in a recording, from the speed of the markers."""
 
 from __future__ import annotations
 

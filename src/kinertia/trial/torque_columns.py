@@ -1,7 +1,7 @@
 """Identifies what the torque columns of a force file hold: free moments about the vertical, or something else.
 
-A force file has a point of application beside each torque, and nothing but the program that wrote it ensures that they
-match. At the centre of pressure, by definition, no torque is horizontal: in eleven correct force files the median is
+A force file has a point of application for each torque, and only the program that wrote it ensures that they match. By
+definition the torque about the centre of pressure has no horizontal part: in eleven correct force files the median is
 0.0 mm times the vertical force, the 99th percentile at most 10 mm (where forces are smallest). Torques about the middle
 of the plate do have horizontal parts, of some 20 mm and more. A point that never moves (the plate's middle, the origin)
 is not a centre of pressure: force and torque are then what acts at that point, which is no error.

@@ -95,7 +95,8 @@ class CostTerm:
         return root
 
     def left_out(self, static: np.ndarray) -> np.ndarray | None:
-        """Return how an unknown of unit SD outside the vector displaces the others (S,) for the data; None without one.
+        """Return the change of the others (S,) that, for the data, equals an unknown of unit SD outside the vector;
+        None without one.
 
         Several such unknowns have (S, u).
         """

@@ -1,8 +1,8 @@
 """Estimates how much of the marker errors repeats with every stride, and in the person's other trials.
 
 Skin motion follows the joints: it is the same in every stride, and in the next walk. Errors that recur do not average
-out. Neither do those of a rigid model, which recur with the same strides. The information of so many strides and trials
-counts once: the standard deviations of markers and forces are multiplied by the square root of the number of repeats.
+out, nor do the errors of a rigid model, which recur with the same strides. Their information counts only once: the
+standard deviations of markers and forces are multiplied by the square root of the number of repeats.
 
 Whether errors recur is determined from their correlation, summed over all marker coordinates; a repeat counts in
 proportion to its correlation. The errors of two walks agree only at the same phase, so the best lag is searched for.

@@ -30,7 +30,8 @@ _LESS_WEIGHT = 2.0
 def impact_factors(
     time: np.ndarray, force: np.ndarray, dynamic: np.ndarray, spacing_s: float, force_sd: float
 ) -> np.ndarray:
-    """Return the factors (n,) by which the SD of the root residual is larger because of what the motion cannot follow.
+    """Return the factors (n,) by which the SD of the root residual is larger because of forces that the motion cannot
+    follow.
 
     The acceleration of a quintic spline is a cubic spline with the same knots: what such splines leave of the force
     counts as its error, in the frames within half a knot interval.

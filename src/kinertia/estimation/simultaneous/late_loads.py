@@ -1,6 +1,6 @@
 """Computes loads on the feet if the delay of the forces is known only to a standard deviation.
 
-Where a foot lands or leaves, forces change within less than that, and a time derivative does not describe the effect of
+At foot contact and foot off, forces change within a shorter time, and a time derivative does not describe the effect of
 a delay. It is replaced by the regression of the loads on the delay, over all likely delays (statistical linearisation),
 which enters like a derivative. Its residual is added as independent. Both together are the mean square change of the
 loads, however they change.

@@ -5,13 +5,14 @@ The errors of a marker coordinate are a second-order autoregressive process with
     e[t] = (r + s) e[t-1] - r s e[t-2] + white noise,
 
 with the same standard deviation in every frame. The inverse of its covariance, the information, is banded: a frame is
-coupled to itself and the two on either side, so the normal matrix stays banded, too. A gap starts the process anew.
+coupled to itself and the two on either side, so the normal matrix stays banded, too. The process starts again after a
+gap.
 
 Skin motion is slow. With s = 0, a first-order process, the spectrum falls only with the square of the frequency: marker
 errors would affect the accelerations, and with them joint moments, more than they do. With s = r it falls with the
-fourth power. But the cameras' noise is in every frame, and for errors that last long, in a slow movement or a posture,
-such a spectrum would soon be below it: the estimate would follow the noise. So s is as near to r as the observed
-innovation of the errors allows: the part of a frame's error that the two frames before do not predict.
+fourth power. But every frame has camera noise, and for long-lasting errors, as in a slow movement or a posture, such a
+spectrum would fall below it: the estimate would follow the noise. So s is as close to r as the observed innovation of
+the errors allows, the part of a frame's error that the two previous frames do not predict.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Computes the evidence for a recording against the same one interpreted differently (reversed free moments).
+"""Compares the evidence for a recording with that of another interpretation of it (reversed free moments).
 
 The evidence is the probability of the data with all unknowns integrated out: motion, body and calibration by the
 quadratic at the optimum (Laplace), instruments by their exact priors, fault-free or faulty in every combination. The

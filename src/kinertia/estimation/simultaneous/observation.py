@@ -132,7 +132,7 @@ def _middle(displaced: np.ndarray) -> np.ndarray:
 def _spread(skeleton: Skeleton, apart: np.ndarray, freedom: np.ndarray) -> np.ndarray:
     """Return the RMS (m,) of distances (t, m, 3) with these degrees of freedom (m, 3), segment by segment.
 
-    It is the same for all markers of a segment but for how many of them err in common.
+    It is the same for all markers of a segment, except for the number of markers with common errors.
     """
     alike = markers_alike(skeleton, apart)
     result = np.zeros(len(alike))
@@ -238,7 +238,7 @@ def _observed(
 
 
 def reading(observation: Observation, kinematics: Kinematics, bandwidth: Bandwidth) -> Observation:
-    """Return the observation with the ground reactions of these kinematics, which differ in nothing else."""
+    """Return the observation with the ground reactions of these kinematics, otherwise the same."""
     ground = _ground(kinematics, observation.time, bandwidth.motion_hz, bandwidth.force)
     return replace(observation, ground=ground)
 

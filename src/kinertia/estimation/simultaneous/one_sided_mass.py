@@ -1,11 +1,11 @@
 """Tests whether one side is heavier than the other, as with a prosthesis, an orthosis or an ankle weight.
 
 People's left and right are similar (the prior's correlation is 0.9), so a wrong mass of one leg also changes the other
-leg: the changes of the two sides look alike, the difference between them does not. So differences are judged, in
-standard deviations of people's differences. In walks with an undeclared prosthesis, cast or ankle weight, the mass of a
-foot or a shank differs by 4 to 8 of them, and centres of mass across the limb by 1. A load that is on no plate for a
-while, a handrail or one delayed plate makes centres of mass differ by 6 and more, too. Errors of plates,
-synchronisation and joints make nothing differ by more than 2, except the zero offset of a plate's vertical force.
+leg: both sides change in a similar way, but their difference is not usual. So differences are judged, in standard
+deviations of people's differences. In walks with an undeclared prosthesis, cast or ankle weight, the mass of a foot or
+a shank differs by 4 to 8 of them, and centres of mass across the limb by 1. A load that is on no plate for a while, a
+handrail or one delayed plate also makes centres of mass differ by 6 and more. Errors of plates, synchronisation and
+joints make nothing differ by more than 2, except the zero offset of a plate's vertical force.
 """
 
 from __future__ import annotations

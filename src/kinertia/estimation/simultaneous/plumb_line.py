@@ -1,4 +1,4 @@
-"""Computes which zero offsets of horizontal forces a tilt between force plates and cameras imitates.
+"""Computes the horizontal zero offsets that a tilt between force plates and cameras imitates.
 
 Plates are levelled, and the cameras' frame is laid on the floor, each to about 0.1 degrees. A tilt of 0.14 degrees
 turns 0.24 % of the vertical force into a horizontal one: 1.5 N under a person of 60 kg. In one trial this cannot be
@@ -17,7 +17,7 @@ TILT_SD_RAD = float(np.radians(0.14))
 
 
 def mean_loads_n(trial: Observation) -> np.ndarray:
-    """Return the mean vertical force (p,) on each of the trial's plates, while somebody stands on it."""
+    """Return the mean vertical force (p,) on each of the trial's plates, while it is loaded."""
     if not trial.ground.plates:
         return np.zeros(0)
     frames = np.flatnonzero(trial.dynamic)

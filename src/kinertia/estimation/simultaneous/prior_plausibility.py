@@ -42,10 +42,10 @@ class Unlikeness:
         combinations: number of these.
         chance: share of the prior's people at the same or a larger distance.
         segments: those that have changed most, the largest change first.
-        both_sides: whether the first of them and its other side have changed alike: misplaced joint centres have this
+        both_sides: whether the first of them and its other side have changed equally: misplaced joint centres have this
             effect, a prosthesis does not.
         one_sided: the heavier side, if mass asymmetry is the largest difference; through the prior the other side
-            changes too, so that both may seem to have changed alike.
+            changes too, so that both may seem to have changed equally.
     """
 
     distance2: float
@@ -80,7 +80,7 @@ def unlikeness(prior: BspPrior, estimate: BodySegmentParameters, covariance: np.
 
 
 def _alike(segments: Sequence[str], moved: np.ndarray, k: int) -> bool:
-    """Decide whether segment k and its other side changed (s, 10) alike in the parameter that changed most."""
+    """Decide whether segment k and its other side changed (s, 10) equally in the parameter that changed most."""
     name = segments[k]
     other = name[:-1] + {"r": "l", "l": "r"}.get(name[-1], "")
     if name[-2:] not in ("_r", "_l") or other not in segments:

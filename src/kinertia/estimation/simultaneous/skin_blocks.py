@@ -2,9 +2,9 @@
 
 Measured over the bone of a walking person (Cereatti et al. 2017, J Biomech, doi 10.1016/j.jbiomech.2017.02.004), the
 thigh's skin moves fore and aft by some 6 mm in the first 12 % of the stride, with twice the acceleration that it has
-elsewhere. Markers that move together look like a thigh that swings: nothing of it is left in the residuals, from which
-the motion's errors are read (`motion_noise`). The bars of hip flexion moments are longer there by what that person's
-skin does. Draws of the posterior are not wider.
+elsewhere. Markers that move together look like a thigh that swings: it leaves no residuals, from which the motion's
+errors are derived (`motion_noise`). The error bars of hip flexion moments are longer there, by the effect of that
+person's skin. Draws of the posterior are not wider.
 """
 
 from __future__ import annotations
