@@ -194,7 +194,7 @@ def damaged(content: bytes, rng: random.Random, text: bool) -> bytes:
 
 
 def forked(path: Path) -> ezc3d_library.C3dContent:
-    """`read_apart` without the time that Python takes to start: the same function under the same limits."""
+    """`read_in_subprocess` without the time that Python takes to start: the same function under the same limits."""
     with tempfile.TemporaryDirectory() as folder:
         result = Path(folder) / "content"
         child = os.fork()
@@ -248,7 +248,10 @@ def run(folder: Path, seed: int, first: int, cases: int, commands: int) -> int:
     os.chdir(folder)
     write_files(folder)
     sound = {name: (folder / name.replace("table", "walk")).read_bytes() for name in READERS}
-    c3d.read_apart, ezc3d_library._SECONDS = forked, 0.2  # of ten milliseconds; nobody waits for a library that hangs
+    c3d.read_in_subprocess, ezc3d_library._SECONDS = (
+        forked,
+        0.2,
+    )  # of ten milliseconds; nobody waits for a library that hangs
     used = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0]) * 4096
     resource.setrlimit(resource.RLIMIT_AS, (used + BYTES, used + BYTES))
     accepted = 0

@@ -10,7 +10,7 @@ import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.person_context import PersonContext
-from kinertia.estimation.carried_mass import CarriedMass
+from kinertia.estimation.total_mass import TotalMass
 from kinertia.findings.finding import Finding
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.imported_model import OsimModel
@@ -30,7 +30,7 @@ def person(
 ) -> PersonContext:
     """A person with these recordings; what is stated of the subject are further arguments."""
     stated = Subject(name="person", **subject)
-    total = None if stated.mass_kg is None else CarriedMass.of(stated.mass_kg, attached)
+    total = None if stated.mass_kg is None else TotalMass.of(stated.mass_kg, attached)
     still = None if static is None else RecordingContext(static, marker_set, is_static=True)
     moving = [RecordingContext(one, marker_set, still) for one in trials]
     others = [RecordingContext(one, marker_set, is_static=True) for one in more_statics]

@@ -7,10 +7,10 @@ import numpy as np
 from kinertia.diagnostics.result.context import ResultContext
 from kinertia.diagnostics.result.questions import ESTIMATE_QUESTIONS
 from kinertia.diagnostics.runner import asked, explained
-from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.estimation.simultaneous.calibration_entry import DELAY, CalibrationEntry
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation, InstrumentPrior
 from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINTY
+from kinertia.estimation.total_mass import TotalMass
 from kinertia.findings.finding import Severity
 from kinertia.settings import Settings
 from kinertia.synthetic.walk import walking_subject
@@ -58,7 +58,7 @@ def context(*errors, ready=(), shown=None, prior=None, mass_kg=None, trials=None
     found = SimpleNamespace(instrument_errors=errors, instruments=shown or well_known(), **known)
     trials = [SimpleNamespace(name=name, kinematics=k) for name, k in (trials or {"walk": walking()}).items()]
     prepared = {
-        "carried": CarriedMass.of(74.6, ()),
+        "total_mass": TotalMass.of(74.6, ()),
         "uncertainty": SimpleNamespace(instruments=prior or InstrumentPrior()),
         **dict(ready),
     }
@@ -100,7 +100,7 @@ def of_estimate(fitted, *names, literature=None):
         **body,
     )
     ready = SimpleNamespace(
-        carried=CarriedMass.of(literature.total_mass_kg, ()),
+        total_mass=TotalMass.of(literature.total_mass_kg, ()),
         uncertainty=GAIT27_UNCERTAINTY,
         attached=(),
         elbow_rotations_rad={},

@@ -243,7 +243,7 @@ def _body(problem: MapProblem, static: tuple[float, ...]) -> tuple[Skeleton, pin
     values, layout = np.array(static), problem.layout
     locked = dict(zip(problem.calibration.coordinates, values[layout[STILL]], strict=True))
     positions = values[layout[PLACES]].reshape(-1, 3)
-    skeleton = problem.skeleton.with_places(positions).lock(locked)
+    skeleton = problem.skeleton.with_positions(positions).lock(locked)
     return skeleton, pinocchio_model(skeleton, problem.model.bsp(values))
 
 

@@ -264,7 +264,7 @@ def _again(person: PersonOutcome, group: BspPrior) -> PersonOutcome:
     seen = known(person.information)
     estimate, covariance = seen.with_prior(group)
     sd = np.sqrt(np.diag(covariance)).reshape(-1, 10)
-    unlike = unlikeness(group, estimate, covariance).unlike
+    unlike = unlikeness(group, estimate, covariance).implausible
     return _compared(person.trial, estimate, group.mean, sd, unlike, seen)
 
 
@@ -293,7 +293,7 @@ def _outcome(
     if np.array_equal(prior.mean.table(), adults.mean.table()):
         information = person_information("", adults, prior, result.bsp, result.bsp_covariance)
     sd = np.sqrt(np.diag(result.bsp_covariance)).reshape(-1, 10)
-    unlike = unlikeness(prior, result.bsp, result.bsp_covariance).unlike
+    unlike = unlikeness(prior, result.bsp, result.bsp_covariance).implausible
     return _compared(trial, result.bsp, prior.mean, sd, unlike, information)
 
 

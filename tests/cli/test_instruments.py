@@ -76,9 +76,9 @@ def test_what_the_laboratory_states_is_used_and_checked(c3d_lab, tmp_path):
 def test_people_who_contradict_each_other_are_named():
     def person(name, delay_s):
         information = np.diag([1e4] * 8 + [1e8])
-        right = tuple((information @ [*[0.0] * 8, delay_s]).tolist())
+        rhs = tuple((information @ [*[0.0] * 8, delay_s]).tolist())
         rows = tuple(map(tuple, information.tolist()))
-        return PersonInstruments(name=name, files=(name,), plates=("plate 1",), information=rows, right=right)
+        return PersonInstruments(name=name, files=(name,), plates=("plate 1",), information=rows, rhs=rhs)
 
     alike = session_instruments([person("A", 0.010), person("B", 0.0101)], Instruments())
     assert alike.contradictions == ()

@@ -161,8 +161,8 @@ def test_a_filled_in_sheet_is_part_of_the_prior_and_of_the_notes(c3d_lab, tmp_pa
         replace(ready, findings=()), PriorFiles(), None, {}, measures=BodyMeasures("dan.csv", stated(factor=1.1))
     )
     (found,) = [one for one in of_another.findings if one.code == "S404"]
-    assert (found.where.file, found.evidence["stated_kg"].value) == ("dan.csv", ready.carried.body_kg)
-    assert found.evidence["yeadon_kg"].value > 1.2 * ready.carried.body_kg
+    assert (found.where.file, found.evidence["stated_kg"].value) == ("dan.csv", ready.total_mass.body_kg)
+    assert found.evidence["yeadon_kg"].value > 1.2 * ready.total_mass.body_kg
 
 
 def test_what_is_a_prosthesis_on_both_sides_says_nothing_of_the_others():

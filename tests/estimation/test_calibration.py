@@ -43,8 +43,8 @@ def adapt(skeleton, recordings, *deviations):
     return calibration.adapt(skeleton, AdaptationInputs(trials, first_poses(skeleton, trials), *deviations))
 
 
-def hold_uninformed(skeleton, trials, may_hold):
-    return calibration.hold_uninformed(skeleton, trials, first_poses(skeleton, trials), may_hold)
+def lock_undetermined(skeleton, trials, may_lock):
+    return calibration.lock_undetermined(skeleton, trials, first_poses(skeleton, trials), may_lock)
 
 
 def test_moved_markers_come_back(skeleton):
@@ -130,7 +130,7 @@ def test_sampling_takes_at_most_sixty_frames_a_tenth_of_a_second_apart():
 
 def test_arms_without_markers_are_held_and_named(skeleton):
     markers = dropped(walk(skeleton), ARM)
-    held_skeleton, held = hold_uninformed(skeleton, [trial(markers)], HELD)
+    held_skeleton, held = lock_undetermined(skeleton, [trial(markers)], HELD)
     assert held == ("arm_flex_r", "arm_add_r", "elbow_flex_r")
     assert {name: held_skeleton.locked[name] for name in held} == dict.fromkeys(held, 0.0)
     assert len(held_skeleton.coordinates) == 24
@@ -138,14 +138,14 @@ def test_arms_without_markers_are_held_and_named(skeleton):
 
 def test_a_forearm_without_markers_holds_the_elbow_alone(skeleton):
     markers = dropped(walk(skeleton), ["L.Wrist.Lat", "L.Wrist.Med"])
-    assert hold_uninformed(skeleton, [trial(markers)], HELD)[1] == ("elbow_flex_l",)
-    assert hold_uninformed(skeleton, [trial(walk(skeleton))], HELD) == (skeleton, ())
+    assert lock_undetermined(skeleton, [trial(markers)], HELD)[1] == ("elbow_flex_l",)
+    assert lock_undetermined(skeleton, [trial(walk(skeleton))], HELD) == (skeleton, ())
 
 
 def test_a_leg_without_markers_is_an_error(skeleton):
     foot = [m.label for m in skeleton.markers if m.segment == "foot_l"]
     with pytest.raises(TrialError) as caught:
-        hold_uninformed(skeleton, [trial(dropped(walk(skeleton), foot))], HELD)
+        lock_undetermined(skeleton, [trial(dropped(walk(skeleton), foot))], HELD)
     found = caught.value.finding
     assert (found.code, found.where.trial, "L.Heel" in found.where.markers) == ("R103", "walk", True)
     assert "ankle_angle_l" in found.where.part
@@ -154,7 +154,7 @@ def test_a_leg_without_markers_is_an_error(skeleton):
 def test_arm_markers_in_one_trial_only_are_an_error_that_names_the_other(skeleton):
     trials = [trial(walk(skeleton), "with"), trial(dropped(walk(skeleton), ARM), "bare")]
     with pytest.raises(TrialError) as caught:
-        hold_uninformed(skeleton, trials, HELD)
+        lock_undetermined(skeleton, trials, HELD)
     found = caught.value.finding
     assert (found.code, found.where.trial, "arm_flex_r" in found.where.part) == ("R103", "bare", True)
 
@@ -226,7 +226,7 @@ def test_an_arm_that_one_trial_does_not_show_is_held_in_all(skeleton):
     poses = first_poses(skeleton, trials)
     left = calibration.without_partly_shown(skeleton, poses, ARM_COORDINATES)
     assert set(skeleton.labels) - set(left.labels) == set(ARM)
-    held, names = hold_uninformed(left, trials, HELD)
+    held, names = lock_undetermined(left, trials, HELD)
     assert set(names) == {"arm_flex_r", "arm_add_r", "elbow_flex_r"}
     assert "elbow_flex_l" in held.coordinates
     again = calibration.without_partly_shown(skeleton, poses[:1], ARM_COORDINATES)

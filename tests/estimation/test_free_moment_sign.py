@@ -8,8 +8,8 @@ import pytest
 from kinertia.diagnostics.result.free_moments import reversed_sign
 from kinertia.estimation.free_moment_sign import (
     VERTICAL,
-    left_moments_nm,
-    left_without_offsets_nm,
+    residual_moments_nm,
+    residual_moments_without_offsets_nm,
     with_undisputed_plates,
 )
 from kinertia.estimation.simultaneous.calibration_entry import POSITION, CalibrationEntry
@@ -34,7 +34,7 @@ def turned(fit, factor=-1.0):
 
 
 def left_by(trial):
-    return left_moments_nm(trial.residuals["literature"][:, VERTICAL], trial.kinematics.foot_loads)
+    return residual_moments_nm(trial.residuals["literature"][:, VERTICAL], trial.kinematics.foot_loads)
 
 
 @pytest.fixture(params=["demo", "measured"])
@@ -72,9 +72,9 @@ def test_an_offset_under_one_foot_is_no_wrong_sign():
     loads[:100, 0, 1] = loads[100:, 1, 1] = 700.0
     loads[:100, 0, 4] = 3.0 + 0.5 * np.sin(phase)
     left = np.concatenate([np.full(100, -6.0), np.zeros(100)])
-    as_is, turned_nm = left_moments_nm(left, loads)
+    as_is, turned_nm = residual_moments_nm(left, loads)
     assert turned_nm < 0.8 * as_is
-    as_is, turned_nm = left_without_offsets_nm(left, loads)
+    as_is, turned_nm = residual_moments_without_offsets_nm(left, loads)
     assert as_is < 1e-9 < 0.3 < turned_nm
 
 

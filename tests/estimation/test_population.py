@@ -175,11 +175,11 @@ def test_people_of_the_prior_are_rarely_unlike_it_and_others_are():
     people = [unlikeness(PRIOR, PRIOR.draw(rng), exact) for _ in range(200)]
     assert {one.combinations for one in people} == {120}
     assert np.mean([one.chance < 0.05 for one in people]) < 0.15
-    assert np.mean([one.unlike for one in people]) < 0.03
+    assert np.mean([one.implausible for one in people]) < 0.03
     light = PRIOR.mean.table()
     light[SEGMENTS.index("shank_l"), 0] *= 0.5
     far = unlikeness(PRIOR, BodySegmentParameters.from_table(SEGMENTS, light), exact)
-    assert far.unlike
+    assert far.implausible
     assert far.segments[0] == "shank_l"
     assert not far.both_sides
     assert far.one_sided.lighter[0] == "shank_l"
@@ -188,17 +188,17 @@ def test_people_of_the_prior_are_rarely_unlike_it_and_others_are():
     for side in "rl":
         off[SEGMENTS.index(f"shank_{side}"), 1] -= 16.0 * PRIOR.sd[SEGMENTS.index(f"shank_{side}"), 1]
     joints = unlikeness(PRIOR, BodySegmentParameters.from_table(SEGMENTS, off), exact)
-    assert joints.unlike
+    assert joints.implausible
     assert joints.both_sides
     assert joints.one_sided is None
-    assert not unlikeness(PRIOR, PRIOR.mean, PRIOR.covariance).unlike, "data that say nothing contradict nothing"
+    assert not unlikeness(PRIOR, PRIOR.mean, PRIOR.covariance).implausible, "data that say nothing contradict nothing"
 
 
 @pytest.mark.slow
 def test_an_undeclared_prosthesis_is_named_and_a_declared_one_is_estimated_better():
     adults, own = run_person(1, ("prosthesis", 0))
-    assert adults.unlike
-    assert not own.unlike
+    assert adults.implausible
+    assert not own.implausible
     rows = [SEGMENTS.index(name) for name in ("shank_l", "foot_l")]
     error, before = (np.abs(one.errors[rows, 0]).sum() for one in (own, adults))
     assert error < before

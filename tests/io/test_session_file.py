@@ -7,7 +7,7 @@ from refusals import refused
 
 ROW = (0.1, -2.0, 1e-17, 3.0, 1e9, 0.0, 7.0, 1.0 / 3.0, 5.0)
 PERSON = PersonInstruments(
-    name='O\'Neill "β"', files=("9f", "a1"), plates=("plate 1",), information=(ROW,) * 9, right=ROW
+    name='O\'Neill "β"', files=("9f", "a1"), plates=("plate 1",), information=(ROW,) * 9, rhs=ROW
 )
 FOUND = {
     "plate 1": {"position x": (0.0182, 0.0011, "m"), "free moment": (0.001, 0.0002, "N m/N")},
@@ -58,3 +58,9 @@ def test_another_file_is_refused(written, old, new, problem):
     with refused("F184", problem=problem) as caught:
         read_session(written)
     assert caught.value.line is not None
+
+
+def test_the_name_that_the_right_hand_side_had_is_still_read(written):
+    people = read_session(written)
+    written.write_text(written.read_text(encoding="utf-8").replace("rhs = [", "right = ["), encoding="utf-8")
+    assert read_session(written) == people

@@ -205,7 +205,7 @@ def test_a_marker_that_is_off_its_place_and_vanishes_leaves_no_jump(skeleton, ga
     _, motion = smooth_motion(skeleton, n=90)
     places = skeleton.marker_locals.copy()
     places[skeleton.labels.index("R.Shank.Front")] += 0.03
-    off = markers_of(skeleton.with_places(places), motion.q)
+    off = markers_of(skeleton.with_positions(places), motion.q)
     whole = solve_ik(skeleton, off).q
     gapped = solve_ik(skeleton, without(off, ["R.Shank.Front"], gap)).q
     alone = solve_ik(skeleton, without(off, ["R.Shank.Front"])).q

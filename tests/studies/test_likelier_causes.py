@@ -31,7 +31,7 @@ def with_force(person, change):
     return person.with_plates(loads_of(person.plates, more, point, torque))
 
 
-def with_places(person, change):
+def with_positions(person, change):
     """Other places (n, m, 3) m of the markers of the walk."""
     return person.in_walk(lambda markers: replace(markers, positions=change(markers)))
 
@@ -70,7 +70,7 @@ def test_markers_that_were_smoothed_too_much(person, tmp_path):
         high = butter(2, 2.0 / (markers.rate_hz / 2))
         return filtfilt(*high, markers.positions, axis=0)
 
-    assert next(iter(reversed(found(tmp_path, with_places(person, change))))) == "M133"
+    assert next(iter(reversed(found(tmp_path, with_positions(person, change))))) == "M133"
 
 
 def test_markers_that_were_smoothed_as_usual(person, tmp_path):
@@ -78,7 +78,7 @@ def test_markers_that_were_smoothed_as_usual(person, tmp_path):
         high = butter(2, 6.0 / (markers.rate_hz / 2))
         return filtfilt(*high, markers.positions, axis=0)
 
-    assert found(tmp_path, with_places(person, change)) == {}
+    assert found(tmp_path, with_positions(person, change)) == {}
 
 
 def test_small_spikes_are_no_jumps(person, tmp_path):
@@ -87,7 +87,7 @@ def test_small_spikes_are_no_jumps(person, tmp_path):
         places[7::15, markers.labels.index(person.marker_set.segments["shank_r"][0])] += 0.03
         return places
 
-    codes = set(found(tmp_path, with_places(person, change)))
+    codes = set(found(tmp_path, with_positions(person, change)))
     assert "M111" in codes
     assert "M112" not in codes
 

@@ -78,7 +78,7 @@ def test_who_vouches_for_the_zeros_keeps_them():
     np.testing.assert_allclose(kept.force[loaded, 0], (force + LEVEL_N)[loaded], atol=1e-9)
     np.testing.assert_allclose(kept.moment[STEP, 0], (moment + LEVEL_NM)[STEP], atol=1e-9)
     assert not kept.force[~loaded].any()
-    assert kept.idle[0].left_n == load.idle.level_n
+    assert kept.idle[0].remaining_n == load.idle.level_n
     assert with_idle_levels(kept).force is not plates.force
     np.testing.assert_array_equal(with_idle_levels(kept).force, kept.force)
 

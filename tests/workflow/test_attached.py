@@ -7,7 +7,6 @@ import pytest
 from pydantic import ValidationError
 
 from kinertia.errors import BlockedError, PriorError, SettingsError
-from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.estimation.prepared import Prepared
 from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.simultaneous.bandwidth import Bandwidth
@@ -15,6 +14,7 @@ from kinertia.estimation.simultaneous.fit import calibration_prior
 from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINTY
 from kinertia.estimation.simultaneous.observation import observe
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous
+from kinertia.estimation.total_mass import TotalMass
 from kinertia.findings.finding import Severity
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.motion.dynamics import inverse_dynamics, residual
@@ -75,7 +75,7 @@ def test_the_inertia_is_that_of_a_block():
 
 def test_the_scale_weighs_what_stood_on_it():
     on, beside = (Attached(mass_kg=4.0, **{**PACK, "name": name, "on_scale": name == "on"}) for name in ("on", "off"))
-    assert CarriedMass.of(70.0, [on, beside]) == CarriedMass(66.0, 74.0, pytest.approx(0.04))
+    assert TotalMass.of(70.0, [on, beside]) == TotalMass(66.0, 74.0, pytest.approx(0.04))
     prior = with_attached(ready(on, beside)).prior
     assert prior.weighed == (*(True,) * 12, True, False)
     mean, covariance = prior.given_scale()
@@ -222,7 +222,7 @@ def test_entries_that_cannot_be_say_what_is_expected(change, words):
 def test_things_that_weigh_more_than_the_scale_said_are_an_error():
     heavy = [Attached(mass_kg=35, **{**PACK, "name": name, "on_scale": True}) for name in ("bag", "vest")]
     with pytest.raises(PriorError, match=r"leaves 2\.6 kg of 72\.6 kg") as caught:
-        CarriedMass.of(72.6, heavy)
+        TotalMass.of(72.6, heavy)
     assert caught.value.finding.code == "S406"
     assert "F191" not in str(caught.value)
 

@@ -16,7 +16,7 @@ from kinertia.model.imported_model import OsimModel
 from kinertia.motion.inverse_kinematics import solve_ik
 from kinertia.settings import Subject
 from kinertia.trial.trial_input import TrialInput
-from kinertia.workflow.opensim_model import at_mass, kind_of, parted, with_centre_offsets
+from kinertia.workflow.opensim_model import at_mass, kind_of, partition, with_centre_offsets
 from kinertia.workflow.prepare import prepare
 from recordings import here
 from refusals import expect_evidence, expect_filled, refused
@@ -121,13 +121,13 @@ def test_light_bodies_are_held_and_all_are_kept(prepared, model):
 
 def test_of_bodies_that_move_as_one_the_heaviest_is_estimated(other_model):
     """Subtalar and toe joints are locked in this model, wrists too; a hand weighs 0.52 kg."""
-    prior, held = parted(other_model.skeleton, other_model.bsp)
+    prior, held = partition(other_model.skeleton, other_model.bsp)
     assert {"talus_r", "toes_r", "hand_r", "patella_r"} <= set(held.segments)
     assert {"calcn_r", "radius_r", "ulna_r", "femur_r"} <= set(prior.mean.segments)
 
 
 def test_prior_deviations_go_by_the_names_of_bodies(other_model):
-    prior, _ = parted(other_model.skeleton, other_model.bsp)
+    prior, _ = partition(other_model.skeleton, other_model.bsp)
     share = dict(zip(prior.mean.segments, prior.sd[:, 0] / prior.mean.mass_kg, strict=True))
     for body, kind in (("femur_l", "thigh"), ("calcn_r", "foot"), ("ulna_r", "forearm"), ("torso", "torso")):
         assert kind_of(body) == kind
@@ -142,7 +142,7 @@ def test_prior_deviations_go_by_the_names_of_bodies(other_model):
         ),
         markers=(),
     )
-    prior, _ = parted(skeleton, strange)
+    prior, _ = partition(skeleton, strange)
     row = prior.mean.segments.index("backpack")
     assert prior.sd[row, 0] / prior.mean.mass_kg[row] == pytest.approx(OTHER_MASS_SD)
 
@@ -286,7 +286,7 @@ def test_joints_that_do_not_mirror_each_other_are_said(model, walk, prepared):
 
 
 def test_markers_in_millimetres_are_refused(model, walk):
-    skeleton = model.skeleton.with_places(1000.0 * model.skeleton.marker_locals)
+    skeleton = model.skeleton.with_positions(1000.0 * model.skeleton.marker_locals)
     m = 1000.0 * np.linalg.norm(model.skeleton.marker_locals[model.skeleton.labels.index("Top.Head")])
     with blocked("O301") as found:
         prepare(SUBJECT, replace(model, skeleton=skeleton), [TrialInput(walk)])

@@ -107,7 +107,7 @@ def compile_markers() -> None:
         skeleton,
         np.zeros((frames, markers, 3)),
         np.zeros((frames, coordinates)),
-        (np.ones(markers), ErrorProcess.alike_over(3.0)),
+        (np.ones(markers), ErrorProcess.double_over(3.0)),
         (SkinPatterns.none(frames, markers), np.zeros(0)),
         np.arange(coordinates),
         np.arange(0),

@@ -14,7 +14,7 @@ from kinertia.io.marker_set_draft import draft_marker_set, preset_of
 from kinertia.io.marker_set_file import nearest_preset, preset_names, read_marker_set
 from kinertia.io.output_folder import write_then_rename
 from kinertia.io.recording import read_recording
-from kinertia.model.marker_set import fits_person, share_worn, spelled_as
+from kinertia.model.marker_set import fits_person, label_share, spelled_as
 from kinertia.trial.data import Recording
 from kinertia.trial.stillness import STILL_M_S, speed_m_s
 
@@ -45,7 +45,7 @@ def markers(
     out.print(f"{len(labels)} labels: {', '.join(labels)}", soft_wrap=True)
     table = plain_table("preset", "labels present", "absent")
     sets = {name: spelled_as(read_marker_set(name), labels) for name in preset_names()}
-    shares = {name: share_worn(one, labels) for name, one in sets.items()}
+    shares = {name: label_share(one, labels) for name, one in sets.items()}
     presets = []
     for name in sorted(shares, key=lambda name: -shares[name]):
         wanted = sets[name].labels

@@ -15,7 +15,7 @@ from kinertia.diagnostics.evidence.copied_frames import FEWEST_FRAMES, without_c
 from kinertia.diagnostics.evidence.foot_trajectories import FootTrajectory, foot_trajectories
 from kinertia.diagnostics.evidence.force_mass import ForceMass, ForeignLoad, force_mass
 from kinertia.diagnostics.evidence.hallux import halluces
-from kinertia.diagnostics.evidence.horizontal_velocity import CausedVelocity, VelocityChanges, caused_velocities
+from kinertia.diagnostics.evidence.horizontal_velocity import ForceVelocity, VelocityChanges, force_velocities
 from kinertia.diagnostics.evidence.landmarks import CLEAR, cosine, headings, landmark_positions, most_forwards
 from kinertia.diagnostics.evidence.loaded_plates import adult_share
 from kinertia.diagnostics.evidence.marker_precision import MarkerPrecision
@@ -314,9 +314,9 @@ class RecordingContext:
         return adult_share(self.plates, self.mass_kg)
 
     @cached_property
-    def velocities(self) -> Sequence[CausedVelocity]:
+    def velocities(self) -> Sequence[ForceVelocity]:
         """Body velocity from the markers and from the forces, one entry per measured window."""
-        return () if self.trial is None else caused_velocities(self.trial, self.segment_of_label)
+        return () if self.trial is None else force_velocities(self.trial, self.segment_of_label)
 
     @cached_property
     def velocity_changes(self) -> VelocityChanges | None:
@@ -329,7 +329,7 @@ class RecordingContext:
         trial = self.trial_on_plates
         if not (self.overhangs or self.foreign_contacts):
             return self.velocity_changes
-        parts = () if trial is None else caused_velocities(trial, self.segment_of_label)
+        parts = () if trial is None else force_velocities(trial, self.segment_of_label)
         return VelocityChanges.of(parts) if parts else None
 
     @cached_property

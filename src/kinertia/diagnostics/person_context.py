@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.estimation.carried_mass import CarriedMass
+from kinertia.estimation.total_mass import TotalMass
 from kinertia.findings.finding import Finding, Severity
 from kinertia.model.imported_model import OsimModel
 from kinertia.model.marker_set import MarkerSet
@@ -36,7 +36,7 @@ class PersonContext:
     marker_set: MarkerSet | None = None
     model: OsimModel | None = None
     calibrated: bool = False
-    total_mass: CarriedMass | None = None
+    total_mass: TotalMass | None = None
     found: Sequence[Finding] = field(default=())
     more_statics: Sequence[RecordingContext] = ()
     files_only: bool = False

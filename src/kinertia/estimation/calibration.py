@@ -71,7 +71,7 @@ class Adaptation:
 
 
 def first_poses(skeleton: Skeleton, trials: Sequence[Trial]) -> list[InverseKinematics]:
-    """Solve the `sampled` frames of each trial to a millimetre, as needed by `hold_uninformed` and `adapt`."""
+    """Solve the `sampled` frames of each trial to a millimetre, as needed by `lock_undetermined` and `adapt`."""
     return [solve_ik(skeleton, sampled(trial.markers), trial.name, gain_tolerance_m2=_ENOUGH_M2) for trial in trials]
 
 
@@ -187,8 +187,8 @@ class _Point(NamedTuple):
     cost: float
 
 
-def hold_uninformed(
-    skeleton: Skeleton, trials: Sequence[Trial], poses: Sequence[InverseKinematics], may_hold: Mapping[str, float]
+def lock_undetermined(
+    skeleton: Skeleton, trials: Sequence[Trial], poses: Sequence[InverseKinematics], may_lock: Mapping[str, float]
 ) -> tuple[Skeleton, tuple[str, ...]]:
     """Lock the coordinates that no marker determines; return the skeleton and their names.
 
@@ -196,7 +196,7 @@ def hold_uninformed(
         skeleton: from the static trial.
         trials: the trials it will be used for.
         poses: their `first_poses`.
-        may_hold: the coordinates that may be undetermined, and the values at which they are locked.
+        may_lock: the coordinates that may be undetermined, and the values at which they are locked.
 
     Raises:
         TrialError: R103, a trial never determines another coordinate, or one that another trial determines.
@@ -205,14 +205,14 @@ def hold_uninformed(
     for ik in poses:
         shown = np.isfinite(ik.q).any(axis=0)
         never.append([name for name, known in zip(ik.coordinates, shown, strict=True) if not known])
-    held = [name for name in skeleton.coordinates if all(name in names for names in never) and name in may_hold]
+    held = [name for name in skeleton.coordinates if all(name in names for names in never) and name in may_lock]
     for trial, names in zip(trials, never, strict=True):
         lost = [name for name in names if name not in held]
         if lost:
             moved = [joint.child for joint in skeleton.joints if {axis.coordinate for axis in joint.axes} & set(lost)]
             worn = tuple(marker.label for marker in skeleton.markers if marker.segment in moved)
             raise TrialError.found(trial.name, "R103", Where(part=", ".join(lost), markers=worn))
-    return skeleton.lock({name: may_hold[name] for name in held}), tuple(held)
+    return skeleton.lock({name: may_lock[name] for name in held}), tuple(held)
 
 
 def without_partly_shown(skeleton: Skeleton, poses: Sequence[InverseKinematics], names: Collection[str]) -> Skeleton:

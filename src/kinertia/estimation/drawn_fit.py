@@ -75,7 +75,7 @@ def _bsp(estimate: BodySegmentParameters, draws: PosteriorDraws, number: int) ->
 def _skeleton(fit: Fit, skeleton: Skeleton, draws: PosteriorDraws, number: int) -> Skeleton:
     """Move joint centres, axes and markers to those of a draw, except markers that are fixed in the model."""
     values = dict(zip(draws.coordinates, draws.coordinate_values[number].tolist(), strict=True))
-    return skeleton.lock(values).with_places(skeleton.marker_locals + draws.places[number])
+    return skeleton.lock(values).with_positions(skeleton.marker_locals + draws.places[number])
 
 
 def _trial(
@@ -87,7 +87,7 @@ def _trial(
     spline = interpolate(time, course)
     motion = Motion(*(spline(time, order) for order in range(3))).cut(k.frames - k.frames[0])
     reactions = _reactions(trial.reactions, draws, number)
-    own = skeleton.with_places(skeleton.marker_locals + in_trial)
+    own = skeleton.with_positions(skeleton.marker_locals + in_trial)
     loads = inverse_dynamics(own, bsp, motion, reactions.at(k.time))
     return replace(
         trial,

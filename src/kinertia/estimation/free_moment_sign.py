@@ -66,14 +66,14 @@ def with_likelier_sign(ready: Prepared, fit: Callable[[Prepared, Sequence[Kinema
         fit: the simultaneous estimate of a person, which also evaluates the same trials with other ground reactions.
     """
     rms_nm = rms(np.concatenate([_free_nm(k.foot_loads) for k in ready.kinematics]))
-    left = _left_turned(ready) if rms_nm >= _NONE_NM else np.inf
-    if left > _PLAINLY:
+    residual = _reversal_ratio(ready) if rms_nm >= _NONE_NM else np.inf
+    if residual > _PLAINLY:
         return Signed(fit(ready, ()), ready)
     turned = tuple(
         replace(k, trial=replace(k.trial, loads=with_turned_free_moments(k.trial.loads))) for k in ready.kinematics
     )
     other = replace(ready, kinematics=turned)
-    likely_wrong = left < 1.0 / _PLAINLY
+    likely_wrong = residual < 1.0 / _PLAINLY
     first, second = (other, ready) if likely_wrong else (ready, other)
     fitted = fit(first, second.kinematics)
     found, otherwise = fitted.result.evidence
@@ -111,48 +111,48 @@ def _with_sign(fitted: SimultaneousFit, sign: FreeMomentSign) -> SimultaneousFit
     return replace(fitted, posterior=replace(fitted.posterior, free_moment_sign=sign))
 
 
-def _left_turned(ready: Prepared) -> float:
+def _reversal_ratio(ready: Prepared) -> float:
     """Return how many times as large the residual vertical moment is with the sign reversed, averaged over the trials.
 
     It is the residual of forces and measured motion with literature parameters.
     """
     ratios = []
     for k in ready.kinematics:
-        left = residual(ready.skeleton, ready.literature, k.motion, k.foot_loads.sum(axis=1))[:, VERTICAL]
-        as_is, turned = _left_nm(left, _free_nm(k.foot_loads))
+        moment_nm = residual(ready.skeleton, ready.literature, k.motion, k.foot_loads.sum(axis=1))[:, VERTICAL]
+        as_is, turned = _rms_moments_nm(moment_nm, _free_nm(k.foot_loads))
         ratios.append(turned / as_is)
     return float(np.exp(np.mean(np.log(ratios))))
 
 
-def left_moments_nm(left: np.ndarray, foot_loads: np.ndarray) -> tuple[float, float]:
+def residual_moments_nm(residual: np.ndarray, foot_loads: np.ndarray) -> tuple[float, float]:
     """Return the RMS residual vertical moment (N m, mean removed), as measured and with the free moments reversed.
 
     Both are equal where the free moments are too small to judge.
 
     Args:
-        left: (w,) N m, residual as measured.
+        residual: (w,) N m, residual as measured.
         foot_loads: (w, 2, 6) on both feet.
     """
     free = _free_nm(foot_loads)
-    as_is, turned = _left_nm(left, free)
+    as_is, turned = _rms_moments_nm(residual, free)
     return (as_is, as_is) if 2.0 * np.std(free) < _LARGE * as_is else (as_is, turned)
 
 
-def left_without_offsets_nm(left: np.ndarray, foot_loads: np.ndarray) -> tuple[float, float]:
-    """Return the results of `left_moments_nm`, less moment errors proportional to the load of either foot.
+def residual_moments_without_offsets_nm(residual: np.ndarray, foot_loads: np.ndarray) -> tuple[float, float]:
+    """Return the results of `residual_moments_nm`, less moment errors proportional to the load of either foot.
 
     A displaced plate under one foot is not a wrong sign, although the reversed moments may fit the motion better.
     """
     free = _free_nm(foot_loads)
-    loads = np.column_stack([foot_loads[..., 1], np.ones(len(left))])
-    both = np.column_stack([left, left + 2.0 * free])
+    loads = np.column_stack([foot_loads[..., 1], np.ones(len(residual))])
+    both = np.column_stack([residual, residual + 2.0 * free])
     rest = both - loads @ np.linalg.lstsq(loads, both, rcond=None)[0]
     as_is, turned = (float(each) for each in rest.std(axis=0))
     return as_is, turned
 
 
-def _left_nm(left: np.ndarray, free: np.ndarray) -> tuple[float, float]:
-    return float(np.std(left)), float(np.std(left + 2.0 * free))
+def _rms_moments_nm(residual: np.ndarray, free: np.ndarray) -> tuple[float, float]:
+    return float(np.std(residual)), float(np.std(residual + 2.0 * free))
 
 
 def _free_nm(foot_loads: np.ndarray) -> np.ndarray:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.estimation.input_checks import known
 from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.simultaneous.model_uncertainty import ModelUncertainty
+from kinertia.estimation.total_mass import TotalMass
 from kinertia.findings.finding import Finding
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.imported_model import OsimModel
@@ -73,6 +73,6 @@ class Prepared:
     functional: tuple[Kinematics, ...] = ()
 
     @property
-    def carried(self) -> CarriedMass:
+    def total_mass(self) -> TotalMass:
         """Mass of the body alone and total mass that the forces support, from the stated mass."""
-        return CarriedMass.of(known(self.subject.mass_kg), self.attached)
+        return TotalMass.of(known(self.subject.mass_kg), self.attached)

@@ -30,8 +30,8 @@ from kinertia.io.ezc3d_library import (
     C3dTrouble,
     expect_ezc3d,
     parameter_values,
-    read_apart,
     read_content,
+    read_in_subprocess,
     text_list,
 )
 from kinertia.io.lab_axes import to_ground
@@ -118,7 +118,7 @@ def _open(path: Path) -> tuple[C3dContent, list[Finding]]:
     findings = []
     try:
         with _plain(path) as readable:
-            file = read_apart(readable) if doubt else read_content(readable)
+            file = read_in_subprocess(readable) if doubt else read_content(readable)
     except C3dTrouble as error:
         problem = f"{doubt}; {error}" if doubt else str(error)
         raise FileError.found(path, "F106", what=Quantity(problem)) from None

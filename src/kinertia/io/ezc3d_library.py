@@ -177,7 +177,7 @@ def text_list(parameters: Any, group: str, name: str) -> list[str]:
     return continued(entries, name)
 
 
-def read_apart(path: Path) -> C3dContent:
+def read_in_subprocess(path: Path) -> C3dContent:
     """Run `read_content` in a separate process, with limits of time and memory.
 
     Raises:

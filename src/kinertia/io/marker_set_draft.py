@@ -15,7 +15,7 @@ from kinertia.io.marker_places.placement import Placement, place_markers
 from kinertia.io.marker_set_file import marker_set_of, nearest_preset, preset_names, read_marker_set
 from kinertia.io.toml_lines import quoted
 from kinertia.model.gait27 import build_gait27
-from kinertia.model.marker_set import LANDMARKS, SEGMENTS, WIDTHS, MarkerSet, folded, share_worn
+from kinertia.model.marker_set import LANDMARKS, SEGMENTS, WIDTHS, MarkerSet, folded, label_share
 from kinertia.trial.data import Recording
 
 _NEAR = 0.85
@@ -146,7 +146,7 @@ def _names(table: str, labels: Sequence[str]) -> Iterator[tuple[str, str]]:
     last and so takes precedence.
     """
     presets = map(read_marker_set, preset_names())
-    for preset in sorted(presets, key=lambda preset: (share_worn(preset, labels), len(preset.labels))):
+    for preset in sorted(presets, key=lambda preset: (label_share(preset, labels), len(preset.labels))):
         entries = preset.landmarks if table == "landmarks" else preset.segments
         for entry, own in entries.items():
             # a landmark of several labels is their middle, none of them alone

@@ -21,8 +21,8 @@ from kinertia.model.marker_set import (
     WIDTHS,
     MarkerSet,
     fits_person,
+    label_share,
     mismatch,
-    share_worn,
     spelled_as,
     with_posterior_pelvis,
     without_computed_sacrum,
@@ -93,7 +93,7 @@ def nearest_preset(labels: Sequence[str]) -> MarkerSet:
 
     def nearness(k: int) -> tuple[float, ...]:
         both = presets[k], spelled[k]
-        return *(worn(one) for one in both), *(share_worn(one, labels) for one in both), len(presets[k].labels)
+        return *(worn(one) for one in both), *(label_share(one, labels) for one in both), len(presets[k].labels)
 
     best = max(range(len(presets)), key=nearness)
     return spelled[best] if fits_person(spelled[best], labels) else presets[best]

@@ -26,16 +26,16 @@ class PlateMoments(NamedTuple):
 
     Attributes:
         about_origin: (k, 3) N m; without a free moment where moments and centre of pressure contradict each other.
-        misses: share of the horizontal moments by which they do; infinite while the plate is unloaded.
+        mismatch: share of the horizontal moments by which they do; infinite while the plate is unloaded.
     """
 
     about_origin: FloatArray
-    misses: float
+    mismatch: float
 
     @property
     def agree(self) -> bool:
         """Whether moments and centre of pressure agree."""
-        return self.misses <= MOMENTS_FIT
+        return self.mismatch <= MOMENTS_FIT
 
     @classmethod
     def of(cls, force: FloatArray, moment: FloatArray, point: FloatArray) -> PlateMoments:
@@ -55,7 +55,7 @@ class PlateMoments(NamedTuple):
         centre = np.linalg.lstsq(rows, rest[:, :2].T.ravel(), rcond=None)[0]
         left = moment - at + np.cross(centre, force)
         size = moment[loaded, :2] - moment[loaded, :2].mean(axis=0)
-        misses = float(np.sqrt(np.square(left[loaded, :2]).sum() / max(np.square(size).sum(), 1e-12)))
-        if misses <= MOMENTS_FIT:
+        mismatch = float(np.sqrt(np.square(left[loaded, :2]).sum() / max(np.square(size).sum(), 1e-12)))
+        if mismatch <= MOMENTS_FIT:
             at[:, 2] += left[:, 2]
-        return cls(at, misses)
+        return cls(at, mismatch)

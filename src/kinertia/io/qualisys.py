@@ -185,8 +185,8 @@ def _plate(path: Path) -> _Plate:
         force, moment, point = force @ turned, moment @ turned, corners.mean(axis=0) + point @ turned
     moments = PlateMoments.of(force, moment, point)
     name = (header.get("FORCE_PLATE_NAME") or [path.stem])[0] or path.stem
-    wrong = not moments.agree and np.isfinite(moments.misses)
-    findings = [contradicting_moments(path, name, moments.misses)] if wrong else []
+    wrong = not moments.agree and np.isfinite(moments.mismatch)
+    findings = [contradicting_moments(path, name, moments.mismatch)] if wrong else []
     return _Plate(name, _rate(path, header), force, moments.about_origin, corners, findings)
 
 

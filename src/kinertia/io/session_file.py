@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import AliasChoices, Field, ValidationError, model_validator
 
 from kinertia.errors import FileError
 from kinertia.findings.quantity import Quantity
@@ -37,12 +37,12 @@ class PersonInstruments(Table):
         files: SHA-256 of every file that this was computed from.
         plates: names of the plates.
         information: (k, k) on the unknowns of each plate, of all plates together and of the synchronisation, SI.
-        right: (k,) right-hand side of the information.
+        rhs: (k,) right-hand side of the information.
 
     Examples:
         >>> from kinertia.io.session_file import PersonInstruments
         >>> zeros = (0.0,) * 9
-        >>> PersonInstruments(name="A", files=("9f",), plates=("plate 1",), information=(zeros,) * 9, right=zeros).name
+        >>> PersonInstruments(name="A", files=("9f",), plates=("plate 1",), information=(zeros,) * 9, rhs=zeros).name
         'A'
     """
 
@@ -50,13 +50,13 @@ class PersonInstruments(Table):
     files: tuple[str, ...] = Field(strict=False)
     plates: tuple[str, ...] = Field(strict=False)
     information: tuple[Annotated[tuple[float, ...], Field(strict=False)], ...] = Field(strict=False)
-    right: tuple[float, ...] = Field(strict=False)
+    rhs: tuple[float, ...] = Field(strict=False, validation_alias=AliasChoices("rhs", "right"))
 
     @model_validator(mode="after")
     def _square(self) -> PersonInstruments:
         size = 5 * len(self.plates) + 4
-        if {len(self.information), len(self.right), *map(len, self.information)} != {size}:
-            raise ValueError(f"information and right must have {size} rows and columns for {len(self.plates)} plates")
+        if {len(self.information), len(self.rhs), *map(len, self.information)} != {size}:
+            raise ValueError(f"information and rhs must have {size} rows and columns for {len(self.plates)} plates")
         return self
 
 
@@ -116,7 +116,7 @@ def session_text(
         lines += ["", "[[person]]", f"name = {json.dumps(person.name, ensure_ascii=False)}"]
         lines += [f"files = {json.dumps(person.files)}", f"plates = {json.dumps(person.plates, ensure_ascii=False)}"]
         rows = ",\n".join(f"    {_numbers(row)}" for row in person.information)
-        lines += [f"information = [\n{rows},\n]", f"right = {_numbers(person.right)}"]
+        lines += [f"information = [\n{rows},\n]", f"rhs = {_numbers(person.rhs)}"]
     return "\n".join(lines) + "\n"
 
 

@@ -195,8 +195,8 @@ def _plates(
         force, moments_found, rotated = _in_lab_axes(force, moment, point)
         if rotated:
             findings.append(finding("F154", Where(path.name, plate=name)))
-        if not moments_found.agree and np.isfinite(moments_found.misses):
-            findings.append(contradicting_moments(path, name, moments_found.misses))
+        if not moments_found.agree and np.isfinite(moments_found.mismatch):
+            findings.append(contradicting_moments(path, name, moments_found.mismatch))
         names.append(name)
         forces.append(force)
         moments.append(moments_found.about_origin)
@@ -226,9 +226,9 @@ _TURNS = [
 def _in_lab_axes(force: FloatArray, moment: FloatArray, point: FloatArray) -> tuple[FloatArray, PlateMoments, bool]:
     """Return force and moments in the axes of the centre of pressure, and whether they were rotated to them."""
     tried = [PlateMoments.of(force @ turn.T, moment @ turn.T, point) for turn in _TURNS]
-    best = int(np.argmin([one.misses for one in tried]))
-    if not np.isfinite(tried[best].misses):
+    best = int(np.argmin([one.mismatch for one in tried]))
+    if not np.isfinite(tried[best].mismatch):
         return force, tried[0], False
-    if tried[best].misses > _MUCH_BETTER * tried[0].misses:
+    if tried[best].mismatch > _MUCH_BETTER * tried[0].mismatch:
         best = 0
     return force @ _TURNS[best].T, tried[best], best != 0

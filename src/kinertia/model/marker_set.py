@@ -200,22 +200,22 @@ def without_computed_sacrum(marker_set: MarkerSet, markers: Markers) -> MarkerSe
 
 def check_marker_set(marker_set: MarkerSet, labels: Sequence[str]) -> None:
     """Raise MarkerSetError if a marker set that the user named does not match these labels."""
-    if not is_worn(marker_set, labels):
+    if not matches_labels(marker_set, labels):
         raise mismatch(marker_set, labels)
 
 
-def share_worn(marker_set: MarkerSet, labels: Sequence[str]) -> float:
+def label_share(marker_set: MarkerSet, labels: Sequence[str]) -> float:
     """Return the share of the set's labels that are among these."""
     wanted = set(marker_set.labels)
     return len(wanted & set(labels)) / len(wanted)
 
 
-def is_worn(marker_set: MarkerSet, labels: Sequence[str]) -> bool:
+def matches_labels(marker_set: MarkerSet, labels: Sequence[str]) -> bool:
     """Decide whether these labels match the set: most of its own, or of those of its pelvis, legs and feet.
 
     Without trunk and arms a set still makes a model, without legs it does not.
     """
-    return max(share_worn(marker_set, labels), _legs_worn(marker_set, labels)) >= ENOUGH_LABELS
+    return max(label_share(marker_set, labels), _leg_label_share(marker_set, labels)) >= ENOUGH_LABELS
 
 
 def fits_person(marker_set: MarkerSet, labels: Sequence[str]) -> bool:
@@ -224,10 +224,10 @@ def fits_person(marker_set: MarkerSet, labels: Sequence[str]) -> bool:
     The marker sets of two laboratories may share most labels but not these.
     """
     sides = [[label for side in "rl" for label in marker_set.landmarks.get(f"{name}_{side}", ())] for name in _FOOT]
-    return is_worn(marker_set, labels) and all(set(own) & set(labels) for own in sides if own)
+    return matches_labels(marker_set, labels) and all(set(own) & set(labels) for own in sides if own)
 
 
-def _legs_worn(marker_set: MarkerSet, labels: Sequence[str]) -> float:
+def _leg_label_share(marker_set: MarkerSet, labels: Sequence[str]) -> float:
     """Return the share of the labels of pelvis, legs and feet that are among these."""
     legs = {label for name, own in marker_set.segments.items() if name.startswith(_LEGS) for label in own}
     return len(legs & set(labels)) / max(len(legs), 1)

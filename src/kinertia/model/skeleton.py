@@ -195,7 +195,7 @@ class Skeleton:
         other.__dict__.update(tree=self.tree, map=self.map)  # markers move nothing
         return other
 
-    def with_places(self, positions: np.ndarray) -> Skeleton:
+    def with_positions(self, positions: np.ndarray) -> Skeleton:
         """Return the skeleton with its markers at these positions (m, 3) in their segments."""
         rows = zip(self.markers, positions, strict=True)
         return self.with_markers([replace(marker, position=place) for marker, place in rows])

@@ -32,14 +32,14 @@ class ThreeAngles:
     columns: tuple[int, ...]
     middles: float
 
-    def twins(self, angles: np.ndarray) -> np.ndarray:
+    def equivalent(self, angles: np.ndarray) -> np.ndarray:
         """Return the other three angles (..., 3) for the same orientations."""
         first, middle, last = np.moveaxis(angles, -1, 0)
         return np.stack([first + np.pi, self.middles - middle, last + np.pi], axis=-1)
 
 
 @dataclass(frozen=True, eq=False)
-class EqualAngles:
+class EquivalentAngles:
     """Coordinates of a skeleton that have equivalent values.
 
     Attributes:
@@ -55,7 +55,7 @@ class EqualAngles:
     neutral: np.ndarray
 
     @classmethod
-    def of(cls, model: Skeleton) -> EqualAngles:
+    def of(cls, model: Skeleton) -> EquivalentAngles:
         """Find the equivalent angles of a skeleton."""
         joints = tuple(angles for joint in model.joints if (angles := _three_angles(model, joint)) is not None)
         taken = {column for joint in joints for column in joint.columns}
@@ -68,7 +68,7 @@ class EqualAngles:
         q = q.copy()
         for joint in self.joints:
             own, goal = q[..., joint.columns], to[..., joint.columns]
-            equals = [goal + within_half_a_turn(one - goal) for one in (own, joint.twins(own))]
+            equals = [goal + within_half_a_turn(one - goal) for one in (own, joint.equivalent(own))]
             same, twin = (np.abs(one - goal).sum(axis=-1, keepdims=True) for one in equals)
             q[..., joint.columns] = np.where(twin < same, equals[1], equals[0])
         goal = to[..., self.single]
@@ -98,11 +98,13 @@ class EqualAngles:
         """
         paths = angles[None]
         if joint is not None:
-            twins = joint.twins(angles)
-            stay, change = (np.abs(within_half_a_turn(one[1:] - angles[:-1])).sum(axis=1) for one in (angles, twins))
+            equivalent = joint.equivalent(angles)
+            stay, change = (
+                np.abs(within_half_a_turn(one[1:] - angles[:-1])).sum(axis=1) for one in (angles, equivalent)
+            )
             # changes between second solutions are as large as between the angles themselves
             other = np.concatenate([[False], np.logical_xor.accumulate(change < stay)])[:, None]
-            paths = np.stack([np.where(other, twins, angles), np.where(other, angles, twins)])
+            paths = np.stack([np.where(other, equivalent, angles), np.where(other, angles, equivalent)])
         choices = self._whole_turns(np.unwrap(paths, axis=1), columns)
         # the middle angle identifies the solution: the others may differ by full turns
         middle = self._from_neutral(choices, columns)[:, len(columns) // 2]

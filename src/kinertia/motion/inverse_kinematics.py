@@ -17,9 +17,9 @@ from scipy.interpolate import PchipInterpolator
 
 from kinertia.errors import MarkerSetError, TrialError
 from kinertia.model.skeleton import Skeleton
-from kinertia.motion.angle_continuity import EqualAngles
+from kinertia.motion.angle_continuity import EquivalentAngles
 from kinertia.motion.frame_chunks import pieces
-from kinertia.motion.marker_gaps import HeldErrors
+from kinertia.motion.marker_gaps import GapOffsets
 from kinertia.motion.marker_sums import variances
 from kinertia.motion.pose_fit import PoseFit, Stop, fit_poses
 from kinertia.motion.single_blas_thread import one_blas_thread
@@ -103,7 +103,7 @@ def solve_ik(
     q[:, :6], placed = _place_root(model, measured, name)
     if not placed.any():
         raise TrialError.found(name, "R101")
-    fine, equal = np.flatnonzero(placed), EqualAngles.of(model)
+    fine, equal = np.flatnonzero(placed), EquivalentAngles.of(model)
     stop = Stop(gain_tolerance_m2, most_steps)
     choosing = replace(stop, choosing=True)
     if consecutive:
@@ -125,7 +125,7 @@ def solve_ik(
         _hold_in_gaps(model, measured, placed, q, stop)
     errors = np.full(measured.shape[:2], np.nan)
     for some in (fine[piece] for piece in pieces(len(fine))):
-        errors[some] = _misses(model, measured[some], q[some])
+        errors[some] = _distances(model, measured[some], q[some])
     q[~informed] = np.nan
     q = equal.continuous(q) if consecutive else equal.nearest(q, np.broadcast_to(equal.neutral, q.shape))
     return InverseKinematics(markers.time, model.coordinates, q, model.labels, errors, converged)
@@ -133,13 +133,13 @@ def solve_ik(
 
 def _hold_in_gaps(model: Skeleton, measured: np.ndarray, placed: np.ndarray, q: np.ndarray, stop: Stop) -> None:
     """Solve frames with missing markers again, with the offsets that these have before and after (`marker_gaps`)."""
-    gaps = HeldErrors(measured, placed)
+    gaps = GapOffsets(measured, placed)
     for _ in range(_ROUNDS):
         for some in (gaps.frames[piece] for piece in pieces(len(gaps.frames))):
             q[some] = fit_poses(model, gaps.filled(model, q, some), q[some], stop).q
 
 
-def _misses(model: Skeleton, measured: np.ndarray, q: np.ndarray) -> np.ndarray:
+def _distances(model: Skeleton, measured: np.ndarray, q: np.ndarray) -> np.ndarray:
     """Return the distances (n, m) m between measured and model markers."""
     result: np.ndarray = np.linalg.norm(measured - model.marker_positions(model.pose(q)), axis=-1)
     return result
@@ -170,7 +170,7 @@ def _as_good(cost: np.ndarray, other: np.ndarray) -> np.ndarray:
 
 
 def _carry_on(
-    model: Skeleton, measured: np.ndarray, time: np.ndarray, poses: PoseFit, equal: EqualAngles, stop: Stop
+    model: Skeleton, measured: np.ndarray, time: np.ndarray, poses: PoseFit, equal: EquivalentAngles, stop: Stop
 ) -> None:
     """Solve frames that lie far from their neighbours again from there, outwards from the best one and back.
 
@@ -195,14 +195,14 @@ def _carry_on(
             far[near.start : near.start + len(time[near]) - 1] = _far(equal, time[near], poses.q[near])
 
 
-def _far(equal: EqualAngles, time: np.ndarray, q: np.ndarray) -> np.ndarray:
+def _far(equal: EquivalentAngles, time: np.ndarray, q: np.ndarray) -> np.ndarray:
     """Return the mask (n - 1,) of frame pairs whose poses q (n, c) are farther apart than a person moves."""
     change = np.abs(equal.nearest(q[1:], q[:-1]) - q[:-1]).max(axis=1)
     result: np.ndarray = change > _FAR_RAD + _FAR_RAD_S * np.diff(time)
     return result
 
 
-def _strangeness(measured: np.ndarray, poses: PoseFit, equal: EqualAngles) -> np.ndarray:
+def _strangeness(measured: np.ndarray, poses: PoseFit, equal: EquivalentAngles) -> np.ndarray:
     """Return mean squared marker distances (n,) m2 plus one square centimetre per square rad away from neutral."""
     seen = np.isfinite(measured).all(axis=-1).sum(axis=1)
     away = np.square(

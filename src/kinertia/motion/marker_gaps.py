@@ -13,7 +13,7 @@ import numpy as np
 from kinertia.model.skeleton import Skeleton
 
 
-class HeldErrors:
+class GapOffsets:
     """Interpolated marker offsets in the gaps of a trial.
 
     Args:

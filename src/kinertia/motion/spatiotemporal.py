@@ -86,7 +86,7 @@ class _Ground:
         """Determine the velocity of the ground from feet in stance."""
         return cls(_belt_velocities(feet, strides), belt)
 
-    def way(self, side: str, start_s: float, end_s: float) -> np.ndarray:
+    def displacement(self, side: str, start_s: float, end_s: float) -> np.ndarray:
         """Return the displacement (3,) m of a foot in stance with the ground."""
         velocity = self.velocity[side]
         if self.belt is None:
@@ -97,7 +97,7 @@ class _Ground:
 
 def _path(feet: FeetUnderPelvis, ground: _Ground, stride: Stride) -> np.ndarray:
     start, end = (_at(feet, feet.heel[stride.side], time) for time in (stride.start_s, stride.end_s))
-    return np.asarray((end - start - ground.way(stride.side, stride.start_s, stride.end_s)) * [1.0, 0.0, 1.0])
+    return np.asarray((end - start - ground.displacement(stride.side, stride.start_s, stride.end_s)) * [1.0, 0.0, 1.0])
 
 
 def _measures(feet: FeetUnderPelvis, ground: _Ground, stride: Stride) -> Spatiotemporal:
@@ -108,7 +108,7 @@ def _measures(feet: FeetUnderPelvis, ground: _Ground, stride: Stride) -> Spatiot
     rightward = np.array([-heading[2], 0.0, heading[0]])
     landed = _at(feet, feet.heel[other], stride.opposite_strike_s)
     step = _at(feet, feet.heel[stride.side], stride.end_s) - landed
-    step -= ground.way(other, stride.opposite_strike_s, stride.end_s)
+    step -= ground.displacement(other, stride.opposite_strike_s, stride.end_s)
     width = float(step @ rightward)
     return Spatiotemporal(
         stride_time_s=lasted,

@@ -43,12 +43,12 @@ def with_upright_trunk(skeleton: Skeleton, trial: Trial) -> Trial:
     lumbar = translation + rotation @ np.asarray(joint.translation)
     upright = _facing(rotation[:, :, 0], trial.markers.rate_hz)
     places = [lumbar + upright @ marker.position for marker in VIRTUAL_TRUNK]
-    markers = with_places(trial.markers, [marker.label for marker in VIRTUAL_TRUNK], np.stack(places, axis=1))
+    markers = with_positions(trial.markers, [marker.label for marker in VIRTUAL_TRUNK], np.stack(places, axis=1))
     own = {marker.label: TRUNK_SD_M for marker in VIRTUAL_TRUNK}
     return replace(trial, markers=markers, virtual_sd_m={**trial.virtual_sd_m, **own})
 
 
-def with_places(markers: Markers, labels: Sequence[str], positions: FloatArray) -> Markers:
+def with_positions(markers: Markers, labels: Sequence[str], positions: FloatArray) -> Markers:
     """Append markers with these positions (n, k, 3) m."""
     return Markers(markers.time, (*markers.labels, *labels), np.concatenate([markers.positions, positions], axis=1))
 

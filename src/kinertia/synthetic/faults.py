@@ -127,7 +127,7 @@ def _misplaced(skeleton: Skeleton, rng: np.random.Generator) -> Skeleton:
     centres = (*HIP_OFFSETS, *LUMBAR_OFFSETS, *SHOULDER_OFFSETS)
     skeleton = skeleton.lock({name: skeleton.locked[name] + rng.normal(0.0, JOINT_CENTRE_SD_M) for name in centres})
     places = skeleton.marker_locals + rng.normal(0.0, MARKER_SD_M, skeleton.marker_locals.shape)
-    return skeleton.with_places(places)
+    return skeleton.with_positions(places)
 
 
 @dataclass(frozen=True, eq=False)

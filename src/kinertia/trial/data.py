@@ -362,7 +362,7 @@ class Trial:
         """Return first and last time (s) of every contiguous run of measured frames, longest run first."""
         return windows(self.markers.time, self.measured)
 
-    def carried_windows(self) -> list[tuple[float, float]]:
+    def total_force_windows(self) -> list[tuple[float, float]]:
         """Return windows (s) in which the sum of all loads is known, longest first; both feet may be on one plate."""
         if self.loads.on_shared_plate is None:
             return self.windows()

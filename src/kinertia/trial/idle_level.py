@@ -49,7 +49,7 @@ class IdleReading(NamedTuple):
         return self.constant and (max(map(abs, self.level_n)) > ZEROED_N or abs(self.twist_nm) > ZEROED_NM)
 
     @property
-    def left_n(self) -> tuple[float, float, float]:
+    def remaining_n(self) -> tuple[float, float, float]:
         """Part of `level_n` that is still in the loads, N."""
         return (0.0, 0.0, 0.0) if self.subtracted else self.level_n
 

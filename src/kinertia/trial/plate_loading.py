@@ -113,7 +113,7 @@ def _loaded(time: FloatArray, vertical: FloatArray, idle: IdleReading) -> BoolAr
     """Return the mask (k,) of samples whose vertical force (k,) exceeds the reading of the unloaded plate."""
     if np.isnan(idle.noise_n):
         return vertical >= load_threshold_n(vertical)
-    course = vertical - idle.left_n[1]
+    course = vertical - idle.remaining_n[1]
     if idle.noise_n > _NOISY_N:
         period = min(max(1, round(_MAINS_S / float(np.median(np.diff(time))))), len(course))
         mean = np.convolve(course, np.full(period, 1.0 / period), mode="valid")
@@ -121,7 +121,7 @@ def _loaded(time: FloatArray, vertical: FloatArray, idle: IdleReading) -> BoolAr
     blocks = course[idle_blocks(time, vertical)]
     usual = np.abs(blocks[np.abs(blocks.mean(axis=1)) < _WANDERS_N])
     beyond_n = _BEYOND_IDLE * float(np.percentile(usual, _IDLE_PERCENT)) if usual.size else 0.0
-    threshold_n = max(LOAD_THRESHOLD_N - idle.left_n[1], LOAD_THRESHOLD_N / 2, beyond_n)
+    threshold_n = max(LOAD_THRESHOLD_N - idle.remaining_n[1], LOAD_THRESHOLD_N / 2, beyond_n)
     loaded = course >= threshold_n
     if beyond_n >= threshold_n:
         for first, last in runs(loaded):

@@ -15,10 +15,10 @@ from dataclasses import replace
 import numpy as np
 
 from kinertia.errors import PriorError
-from kinertia.estimation.carried_mass import mass_of
 from kinertia.estimation.input_checks import known
 from kinertia.estimation.prepared import Prepared
 from kinertia.estimation.prior import SECOND_MOMENT_SD, BspPrior, inertia_covariance
+from kinertia.estimation.total_mass import mass_of
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where

@@ -15,11 +15,10 @@ from kinertia.estimation.calibration import (
     AdaptationInputs,
     adapt,
     first_poses,
-    hold_uninformed,
+    lock_undetermined,
     turn_about,
     without_partly_shown,
 )
-from kinertia.estimation.carried_mass import CarriedMass
 from kinertia.estimation.elbow_direction import elbow_rotations, with_elbows_that_bend_forwards
 from kinertia.estimation.input_checks import complete_subject, known
 from kinertia.estimation.knee_excursion import show_knee_axes
@@ -32,6 +31,7 @@ from kinertia.estimation.simultaneous.model_uncertainty import (
     WITHOUT_STATIC,
     ModelUncertainty,
 )
+from kinertia.estimation.total_mass import TotalMass
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
@@ -113,7 +113,7 @@ def calibrate(
         skeleton, poses = with_elbows_that_bend_forwards(complete, trials)
     free_axes = show_knee_axes(poses) if free_axes is None else free_axes
     elbows = elbow_rotations(model.skeleton, skeleton)
-    skeleton, _ = hold_uninformed(skeleton, trials, poses, dict.fromkeys(ARM_COORDINATES, 0.0))
+    skeleton, _ = lock_undetermined(skeleton, trials, poses, dict.fromkeys(ARM_COORDINATES, 0.0))
     found = [one for trial in trials for one in labels_by_model(skeleton, trial)]
     everywhere = set(model.skeleton.labels).intersection(*(trial.markers.labels for trial in trials))
     skeleton, head = without_head(skeleton, acromia, everywhere)
@@ -213,7 +213,7 @@ def built_in_model(screened: Screened, trials: Sequence[Turned], settings: Setti
     left = _unblocked(facing_x, screened, [*screened.findings, *found])
     if len(left) < len(facing_x):  # the skeleton is adapted to those that are used
         calibrated = calibrate(model, [one.trial for one in left], landmarks.acromia, stated_axes)
-    body_kg = CarriedMass.of(known(subject.mass_kg), person.attached).body_kg
+    body_kg = TotalMass.of(known(subject.mass_kg), person.attached).body_kg
     literature = literature_bsp(body_kg, height_m, sex, model.geometry, settings.bsp)
     return PersonModel(
         subject=subject,

@@ -14,11 +14,11 @@ import numpy as np
 
 from kinertia.errors import PriorError
 from kinertia.estimation.body_measures import with_measures
-from kinertia.estimation.carried_mass import body_sd_kg
 from kinertia.estimation.input_checks import known as known_value
 from kinertia.estimation.learnt_prior import LearntPrior
 from kinertia.estimation.prepared import Prepared
 from kinertia.estimation.prior import BspPrior, literature_prior, updated, with_symmetry
+from kinertia.estimation.total_mass import body_sd_kg
 from kinertia.findings.display import shown
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
@@ -148,7 +148,7 @@ def _with_measures(
     """Return the prior updated by girths and lengths, and the findings about them."""
     if ready.file is not None:
         raise PriorError("[prior] measures are for the built-in model; OpenSim models divide the body differently")
-    body_kg, height_m = ready.carried.body_kg, known_value(ready.subject.height_m)
+    body_kg, height_m = ready.total_mass.body_kg, known_value(ready.subject.height_m)
     artificial = [name for name, known in segments.items() if known.prosthesis]
     body_sd = body_sd_kg(known_value(ready.subject.mass_kg), ready.attached)
     prior, body = with_measures(prior, ready.skeleton, measures.values, body_kg, height_m, artificial, body_sd)

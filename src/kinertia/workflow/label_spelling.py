@@ -9,7 +9,7 @@ from kinertia.errors import MarkerSetError
 from kinertia.findings.finding import finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
-from kinertia.model.marker_set import MarkerSet, is_worn, spellings
+from kinertia.model.marker_set import MarkerSet, matches_labels, spellings
 from kinertia.trial.data import Recording
 from kinertia.workflow.person import Person
 
@@ -30,7 +30,7 @@ def _spelled(recording: Recording, marker_set: MarkerSet, known: Sequence[str]) 
     labels = recording.markers.labels
     read_as = {written: label for label, written in spellings(known, labels).items()}
     alike = tuple(read_as.get(label, label) for label in labels)
-    if is_worn(marker_set, labels) or not is_worn(marker_set, alike):
+    if matches_labels(marker_set, labels) or not matches_labels(marker_set, alike):
         return recording
     found = [
         finding("L103", Where(markers=(written,)), written=Quantity(written), label=Quantity(label))

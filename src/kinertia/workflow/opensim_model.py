@@ -12,13 +12,13 @@ from dataclasses import replace
 import numpy as np
 
 from kinertia.diagnostics.model.model_on_person import moved_markers
-from kinertia.estimation.calibration import AdaptationInputs, adapt, first_poses, hold_uninformed
-from kinertia.estimation.carried_mass import CarriedMass
+from kinertia.estimation.calibration import AdaptationInputs, adapt, first_poses, lock_undetermined
 from kinertia.estimation.estimated_bodies import estimated_bodies
 from kinertia.estimation.input_checks import complete_subject, known
 from kinertia.estimation.population import population_prior
 from kinertia.estimation.prior import SCALE_SD, BspPrior, literature_prior
 from kinertia.estimation.simultaneous.model_uncertainty import JOINT_CENTRE_SD_M, MARKER_SD_M, ModelUncertainty
+from kinertia.estimation.total_mass import TotalMass
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
@@ -47,18 +47,18 @@ def opensim_model(screened: Screened, trials: Sequence[Turned], model: OsimModel
     person = screened.person
     subject = complete_subject(person.subject, person.recordings, mass_only=True)
     measured = [one.trial for one in trials]
-    may_hold = {c.name: c.default for c in model.coordinates if c.name not in model.skeleton.coordinates[:6]}
+    may_lock = {c.name: c.default for c in model.coordinates if c.name not in model.skeleton.coordinates[:6]}
     skeleton = with_stated_ranges(replace(model.skeleton, feet=_feet(model)), subject)
     poses = first_poses(skeleton, measured)
-    skeleton, idle = hold_uninformed(skeleton, measured, poses, may_hold)
+    skeleton, idle = lock_undetermined(skeleton, measured, poses, may_lock)
     moved: list[Finding] = []
     if person.calibrate:
         given = AdaptationInputs(measured, poses, _marker_sd(skeleton), {})
         skeleton = adapt(with_centre_offsets(model, skeleton), given).skeleton
         moved = list(moved_markers(model.skeleton, skeleton, [trial.markers for trial in measured]))
-    body_kg = CarriedMass.of(known(subject.mass_kg), person.attached).body_kg
+    body_kg = TotalMass.of(known(subject.mass_kg), person.attached).body_kg
     own, factor = at_mass(model.bsp, body_kg)
-    prior, held = parted(skeleton, own)
+    prior, held = partition(skeleton, own)
     centres = {name: JOINT_CENTRE_SD_M for name in skeleton.locked if "/offset_" in name}
     return PersonModel(
         subject=subject,
@@ -151,7 +151,7 @@ def at_mass(bsp: BodySegmentParameters, mass_kg: float) -> tuple[BodySegmentPara
     return scaled, factor
 
 
-def parted(skeleton: Skeleton, own: BodySegmentParameters) -> tuple[BspPrior, BodySegmentParameters | None]:
+def partition(skeleton: Skeleton, own: BodySegmentParameters) -> tuple[BspPrior, BodySegmentParameters | None]:
     """Return a prior around the model's own parameters of bodies to be estimated, and the parameters of all others."""
     estimated, rest = _split(skeleton, own)
     prior = literature_prior(estimated, [kind_of(name) for name in estimated.segments])

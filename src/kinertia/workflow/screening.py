@@ -26,7 +26,7 @@ from kinertia.diagnostics.runner import Question, asked, blocking, explained, ov
 from kinertia.diagnostics.subject import questions as subject
 from kinertia.diagnostics.timing import questions as timing
 from kinertia.errors import BlockedError, KinertiaError, MarkerSetError, SubjectError
-from kinertia.estimation.carried_mass import CarriedMass
+from kinertia.estimation.total_mass import TotalMass
 from kinertia.findings.finding import Finding
 from kinertia.settings import Subject
 from kinertia.trial.data import Recording
@@ -222,9 +222,9 @@ def _stated(person: Person) -> Subject:
     return person.completed
 
 
-def _total(mass_kg: float, person: Person) -> CarriedMass | None:
+def _total(mass_kg: float, person: Person) -> TotalMass | None:
     try:
-        return CarriedMass.of(mass_kg, person.attached)
+        return TotalMass.of(mass_kg, person.attached)
     except KinertiaError:
         return None
 

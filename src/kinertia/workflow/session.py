@@ -65,7 +65,7 @@ def person_instruments(fit: Fit, files: Sequence[str]) -> PersonInstruments:
         files=tuple(files),
         plates=shown.plates,
         information=tuple(map(tuple, shown.information.tolist())),
-        right=tuple(shown.rhs.tolist()),
+        rhs=tuple(shown.rhs.tolist()),
     )
 
 
@@ -139,4 +139,4 @@ def _listed(names: Sequence[str]) -> str:
 
 
 def _information(person: PersonInstruments) -> InstrumentInformation:
-    return InstrumentInformation(person.plates, np.array(person.information), np.array(person.right))
+    return InstrumentInformation(person.plates, np.array(person.information), np.array(person.rhs))

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.evidence.horizontal_velocity import caused_velocities
+from kinertia.diagnostics.evidence.horizontal_velocity import force_velocities
 from kinertia.diagnostics.plates.force_directions import force_directions
 from kinertia.io.marker_set_file import choose_marker_set
 from loads_and_feet import on_one_plate
@@ -88,7 +88,7 @@ def test_the_axes_of_one_plate(walk, plate, kind):
     context = context_of(misread(walk, plate, kind))
     found = [*force_directions(context)]
     if not found:  # a plate that hardly counts in the frames that do, such as one of subject A
-        apart = context.velocity_changes.caused - context.velocity_changes.centre
+        apart = context.velocity_changes.by_forces - context.velocity_changes.centre
         assert np.linalg.norm(apart[:, [0, 2]].std(axis=0)) < 0.1
         return
     assert [(one.code, one.evidence["plate"].value) for one in found] == [("P236", walk.plates.names[plate])]
@@ -135,7 +135,7 @@ def test_signs_over_two_windows(walk):
     cut = np.abs(trial.markers.time - (start + 0.45 * (end - start))) < 1.5 / trial.markers.rate_hz
     parted = replace(trial, measured=trial.measured & ~cut)
     assert len([one for one in parted.windows() if one[1] <= end]) == 2
-    context.__dict__["velocities"] = caused_velocities(parted, context.segment_of_label)
+    context.__dict__["velocities"] = force_velocities(parted, context.segment_of_label)
     assert [*force_directions(context)] == []
 
 
@@ -143,7 +143,7 @@ def test_fault_free_walks_on_one_belt(walk):
     """Of both feet only the sum is known, which is all that moves the body."""
     belt = context_of(on_one_plate(walk)).trial
     assert max(b - a for a, b in belt.windows()) < 0.7
-    assert belt.carried_windows()[0] == pytest.approx(context_of(walk).trial.windows()[0], abs=0.25)
+    assert belt.total_force_windows()[0] == pytest.approx(context_of(walk).trial.windows()[0], abs=0.25)
     assert loaded(on_one_plate(walk)) == []
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.evidence.horizontal_velocity import caused_velocities
+from kinertia.diagnostics.evidence.horizontal_velocity import force_velocities
 from kinertia.diagnostics.plates.cop_positions import forces_keep_time
 from kinertia.diagnostics.plates.questions import LOADED_QUESTIONS, PLACE_QUESTIONS
 from kinertia.diagnostics.runner import asked
@@ -74,5 +74,5 @@ def test_the_mass_of_a_body_that_lands():
     force[:, 0, 1] = 60.0 * (GRAVITY_M_S2 + acceleration)
     markers = Markers(time, ("P", "T"), places)
     trial = Trial("landing", markers, FootLoads(at, force, 0.0 * force), np.ones(len(time), dtype=bool))
-    (part,) = caused_velocities(trial, {"P": "pelvis", "T": "torso"})
+    (part,) = force_velocities(trial, {"P": "pelvis", "T": "torso"})
     assert part.mass_kg == pytest.approx(60.0, rel=0.02)

@@ -57,8 +57,8 @@ def test_zeros(axis, level_n, severity):
         assert (zero.code, zero.severity.name, zero.where) == (*expected, there)
         assert zero.evidence["level_n"].value == pytest.approx(level_n, abs=0.5)
         loaded = plates().force[..., 1] > 50.0
-        left_n = (wrong.force - plates().force)[loaded].mean(axis=0)
-        np.testing.assert_allclose(left_n, zeroed * level_n * np.eye(3)[axis], atol=0.1)
+        remaining_n = (wrong.force - plates().force)[loaded].mean(axis=0)
+        np.testing.assert_allclose(remaining_n, zeroed * level_n * np.eye(3)[axis], atol=0.1)
 
 
 def test_all_zeros_that_are_wrong_are_found():

@@ -216,7 +216,7 @@ def test_the_plates_come_first_where_the_static_trial_has_the_stated_mass(lab, f
 def test_a_handrail_for_a_while(lab):
     """It explains why the mass is too small."""
     walked, _, marker_set = lab
-    start, end = RecordingContext(walked, marker_set).trial.carried_windows()[0]
+    start, end = RecordingContext(walked, marker_set).trial.total_force_windows()[0]
     time, third = walked.plates.time, (end - start) / 3
     held = np.where((time > start + third) & (time < end - third), 0.4, 1.0)[:, None, None]
     plates = replace(walked.plates, force=held * walked.plates.force, moment=held * walked.plates.moment)

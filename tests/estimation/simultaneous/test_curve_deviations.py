@@ -177,9 +177,9 @@ def test_deviations_are_those_of_the_dense_covariance(estimate, noise):
     late = delay_sd_s(problem, full[n:, n:])
     left = derivatives_at(problem, coefficients, static, late)[1]
     more = {
-        "moments": impacts + left.left,
-        "powers": (impacts + left.left) * speed**2,
-        "ground_forces": noise_n**2 + left.ground_left,
+        "moments": impacts + left.delay_squares,
+        "powers": (impacts + left.delay_squares) * speed**2,
+        "ground_forces": noise_n**2 + left.ground_delay_squares,
     }
     by = dense_derivatives(problem, coefficients, static, delay_sd_s=late)
     by_noise = dense_derivatives(problem, coefficients, static, np.sqrt(noise), late, grown(problem, static))
@@ -239,7 +239,7 @@ def test_deviations_of_two_trials_are_those_of_one_dense_matrix(estimate, noise)
     expected = np.einsum("dri,ij,drj->dr", shaken, motion / 2.0, shaken, optimize=True)
     of_static = chains[0] @ covariance @ chains[0].T
     expected += np.einsum("dri,ij,drj->dr", through, of_static, through, optimize=True)
-    left = derivatives_at(pair, coefficients, in_trial, late)[1].left
+    left = derivatives_at(pair, coefficients, in_trial, late)[1].delay_squares
     expected = np.sqrt(expected + of_impacts(pair, coefficients, in_trial) + left)
     np.testing.assert_allclose(sds[0].moments, expected, rtol=1e-3)
 

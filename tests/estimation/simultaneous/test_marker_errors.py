@@ -4,7 +4,7 @@ import pytest
 from kinertia.estimation.simultaneous.marker_errors import ErrorInformation, ErrorProcess
 from tests.small_problem import process_covariance
 
-PROCESSES = [ErrorProcess(), ErrorProcess.alike_over(9.0), ErrorProcess.with_smaller(0.2, 9.0)]
+PROCESSES = [ErrorProcess(), ErrorProcess.double_over(9.0), ErrorProcess.with_smaller(0.2, 9.0)]
 
 
 def made(process: ErrorProcess, n: int, rng: np.random.Generator, columns: int = 40) -> np.ndarray:
@@ -24,7 +24,7 @@ def together(errors: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("frames", [1.0, 1.5, 4.0, 30.0])
 @pytest.mark.parametrize("smaller", [None, 0.0, 0.15])
 def test_the_poles_make_errors_alike_over_so_many_frames(frames, smaller):
-    double = ErrorProcess.alike_over(frames)
+    double = ErrorProcess.double_over(frames)
     process = double if smaller is None else ErrorProcess.with_smaller(smaller, frames)
     assert process.frames == pytest.approx(frames, rel=1e-9)
     assert process_covariance(process, np.abs(np.arange(-2000, 2001))).sum() == pytest.approx(frames, rel=1e-9)
@@ -39,7 +39,7 @@ def test_news_is_what_a_frame_shows_beyond_the_two_before_it():
 
 @pytest.mark.parametrize("frames", [1.0, 3.0, 12.0, 60.0])
 def test_a_process_with_a_double_pole_is_found_again(frames):
-    process = ErrorProcess.alike_over(frames)
+    process = ErrorProcess.double_over(frames)
     recovered, variance = ErrorProcess.read(frames, together(made(process, 4000, np.random.default_rng(1)))[None])
     assert variance == pytest.approx(1.0, abs=0.03)
     assert recovered.larger == pytest.approx(process.larger, abs=0.04)
@@ -50,10 +50,10 @@ def test_a_process_with_a_double_pole_is_found_again(frames):
 def test_no_less_news_than_in_the_errors_where_the_cameras_add_theirs(white):
     """Slow errors of a posture, and white noise: as the double pole alone has it, a frame would tell far too much."""
     rng = np.random.default_rng(2)
-    slow = made(ErrorProcess.alike_over(46.0), 4000, rng)
+    slow = made(ErrorProcess.double_over(46.0), 4000, rng)
     errors = np.sqrt(1.0 - white) * slow + np.sqrt(white) * rng.standard_normal(slow.shape)
     seen, frames = together(errors), 46.0 * (1.0 - white) + white
-    double = ErrorProcess.alike_over(frames)
+    double = ErrorProcess.double_over(frames)
     recovered, variance = ErrorProcess.read(frames, seen[None])
     for process, scale, least, most in ((recovered, variance, 0.6, 1.0 + 1e-9), (double, 1.0, 1.4, np.inf)):
         beyond = np.array([1.0, *(-each for each in process.of_before)])

@@ -32,12 +32,12 @@ def test_root_mean_squares(seen):
 def test_markers_that_err_alike(seen):
     skeleton, errors = seen
     errors[:, 0] = np.nan
-    result, filled = module.markers_alike(skeleton, errors), np.nan_to_num(errors)
+    result, filled = module.markers_in_common(skeleton, errors), np.nan_to_num(errors)
     for segment in np.unique(skeleton.marker_segments):
         own = filled[:, skeleton.marker_segments == segment]
         expected = max(1.0, np.square(own.sum(axis=1)).sum() / np.square(own).sum())
         np.testing.assert_allclose(result[skeleton.marker_segments == segment], expected)
-    np.testing.assert_array_equal(module.markers_alike(skeleton, np.zeros_like(errors)), 1.0)
+    np.testing.assert_array_equal(module.markers_in_common(skeleton, np.zeros_like(errors)), 1.0)
 
 
 def test_products_with_the_two_frames_before(seen):

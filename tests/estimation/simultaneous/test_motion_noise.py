@@ -24,7 +24,7 @@ def trial() -> SyntheticTrial:
 @pytest.fixture(scope="module")
 def expected(trial) -> np.ndarray:
     """Errors as the estimate expects them, m."""
-    process, (n, m, _) = ErrorProcess.alike_over(FRAMES_ALIKE), trial.markers.positions.shape
+    process, (n, m, _) = ErrorProcess.double_over(FRAMES_ALIKE), trial.markers.positions.shape
     fresh = np.random.default_rng(0).normal(0.0, np.sqrt(process.new), (500 + n, m, 3))
     return SD_M * lfilter([1.0], [1.0, *(-each for each in process.of_before)], fresh, axis=0)[500:]
 

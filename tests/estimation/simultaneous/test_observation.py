@@ -144,7 +144,7 @@ def test_markers_off_their_places_are_not_noise(trial):
     noisy = camera_noise(trial.markers, 0.002, rng)
     kinematics = kinematics_of(trial, noisy)
     places = trial.skeleton.marker_locals + rng.normal(0.0, 0.01, trial.skeleton.marker_locals.shape)
-    moved = trial.skeleton.with_places(places)
+    moved = trial.skeleton.with_positions(places)
     (rhs, _), (wrong, _) = (separate(skeleton, kinematics) for skeleton in (trial.skeleton, moved))
     np.testing.assert_allclose(wrong.marker_sd, rhs.marker_sd, rtol=1e-6)
 

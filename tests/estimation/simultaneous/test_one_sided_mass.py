@@ -44,7 +44,7 @@ def found(deviations):
 def test_a_prosthesis_is_the_lighter_side_with_the_models_own_names(foot):
     """Also where it pushes a foot beyond what single parameters may, which was called a wrong joint or plate."""
     whole = found({("tibia_l", 0): -3.0, ("calcn_l", 0): foot, ("calcn_r", 0): 0.5})
-    assert whole.unlike
+    assert whole.implausible
     assert set(whole.one_sided.lighter) == {"tibia_l", "calcn_l"}
     assert not whole.one_sided.added
 
@@ -53,7 +53,7 @@ def test_what_is_worn_is_the_heavier_side():
     """The prior pulls the normal side along: its centre of mass moves by half as much, and more."""
     moves = {("tibia_r", 0): 2.2, ("calcn_r", 0): 2.4, ("calcn_r", 2): -2.5, ("calcn_l", 2): -1.9}
     whole = found(moves)
-    assert whole.unlike
+    assert whole.implausible
     assert set(whole.one_sided.heavier) == {"tibia_r", "calcn_r"}
     assert whole.one_sided.added
     assert not whole.both_sides
@@ -73,7 +73,7 @@ def test_centres_of_mass_at_odds_are_no_heavier_side(moves):
 
 def test_where_no_side_is_heavier_segments_of_the_model_are_named():
     whole = found({(f"{name}_{side}", column): 2.9 for name in BODIES.values() for side in "rl" for column in (0, 1)})
-    assert whole.unlike
+    assert whole.implausible
     assert whole.one_sided is None
     assert whole.both_sides
     assert {name[:-2] for name in whole.segments} <= set(BODIES.values())

@@ -33,7 +33,7 @@ def body_centre(owners: Mapping[str, str], markers: Markers) -> FloatArray | Non
     for column, label in enumerate(markers.labels):
         owner = owners.get(label, "")
         if _share(owner) and seen[:, column].mean() >= _SEEN:
-            places.setdefault(owner, []).append(bridged_way(markers.time, markers.positions[:, column]))
+            places.setdefault(owner, []).append(bridged_trajectory(markers.time, markers.positions[:, column]))
     if not places.keys() & {"pelvis", "torso"}:
         return None
     shares = {name: _share(name) for name in places}
@@ -46,9 +46,9 @@ def _share(segment: str) -> float:
     return _SHARES.get(segment.removesuffix("_r").removesuffix("_l"), 0.0)
 
 
-def bridged_way(time: FloatArray, way: FloatArray) -> FloatArray:
+def bridged_trajectory(time: FloatArray, trajectory: FloatArray) -> FloatArray:
     """Return a trajectory (n, k) with unknown values bridged by straight lines."""
-    known = np.isfinite(way).all(axis=1)
+    known = np.isfinite(trajectory).all(axis=1)
     if known.all():
-        return way
-    return np.stack([np.interp(time, time[known], along[known]) for along in way.T], axis=1)
+        return trajectory
+    return np.stack([np.interp(time, time[known], along[known]) for along in trajectory.T], axis=1)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kinertia.diagnostics.evidence.body_centre import bridged_way
+from kinertia.diagnostics.evidence.body_centre import bridged_trajectory
 from kinertia.trial.belt import Belt
 from kinertia.trial.data import FEET, BoolArray, FloatArray, Markers
 from kinertia.trial.ground_contact import bridged
@@ -250,4 +250,4 @@ def _ends(time: FloatArray, place: FloatArray) -> tuple[FloatArray, FloatArray, 
                 usual[one, other] = float(np.nanmedian(apart[:, one, other]))
     one, other = np.unravel_index(int(np.argmax(usual)), usual.shape)
     both = seen[:, one] & seen[:, other]
-    return bridged_way(time, flat[:, one]), bridged_way(time, flat[:, other]), both
+    return bridged_trajectory(time, flat[:, one]), bridged_trajectory(time, flat[:, other]), both

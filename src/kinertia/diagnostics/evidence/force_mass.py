@@ -113,7 +113,7 @@ def force_mass(segment_of_label: Mapping[str, str], trial: Trial, standing: bool
     """
     if not trial.measured.any():
         return None
-    start, end = trial.carried_windows()[0]
+    start, end = trial.total_force_windows()[0]
     around, time = trial.markers.cut(start - _AROUND_S, end + _AROUND_S), trial.markers.cut(start, end).time
     place = body_centre(segment_of_label, around) if len(time) >= _FEWEST_FRAMES else None
     loads = trial.loads

@@ -21,7 +21,7 @@ LEAST_CHANGE_M_S, _FOLLOWS = 0.02, 0.7
 
 
 @dataclass(frozen=True, eq=False)
-class CausedVelocity:
+class ForceVelocity:
     """Velocities (n, 3) m/s over (n,) s of the pelvis, of the marker-based centre, and of a body of this mass under the
     measured forces.
     """
@@ -29,14 +29,14 @@ class CausedVelocity:
     time: FloatArray
     pelvis: FloatArray
     centre: FloatArray
-    caused: FloatArray
+    by_forces: FloatArray
     mass_kg: float
 
-    def cut(self, start_s: float, end_s: float) -> CausedVelocity:
+    def cut(self, start_s: float, end_s: float) -> ForceVelocity:
         """Return the part with start_s <= time <= end_s."""
         inside = within(self.time, start_s, end_s)
-        pelvis, centre, caused = (each[inside] for each in (self.pelvis, self.centre, self.caused))
-        return CausedVelocity(self.time[inside], pelvis, centre, caused, self.mass_kg)
+        pelvis, centre, by_forces = (each[inside] for each in (self.pelvis, self.centre, self.by_forces))
+        return ForceVelocity(self.time[inside], pelvis, centre, by_forces, self.mass_kg)
 
     def by(self, time: FloatArray, force: FloatArray) -> FloatArray:
         """Return the velocity (n,) m/s that a force (k,) N over time (k,) s gives this mass."""
@@ -51,25 +51,25 @@ class VelocityChanges:
 
     pelvis: FloatArray
     centre: FloatArray
-    caused: FloatArray
+    by_forces: FloatArray
 
     @classmethod
-    def of(cls, parts: Sequence[CausedVelocity]) -> VelocityChanges:
+    def of(cls, parts: Sequence[ForceVelocity]) -> VelocityChanges:
         """Join the velocities of these windows."""
-        pelvis, centre, caused = (
+        pelvis, centre, by_forces = (
             joined_without_trend(parts, [getattr(part, name) for part in parts])
-            for name in ("pelvis", "centre", "caused")
+            for name in ("pelvis", "centre", "by_forces")
         )
-        return cls(pelvis, centre, caused)
+        return cls(pelvis, centre, by_forces)
 
     def vertical_ratio(self, shown: FloatArray) -> float | None:
         """Return the ratio of the force-derived vertical velocity to the one shown (n, 3); None where the two do not
         correlate.
         """
-        up, caused = shown[:, 1], self.caused[:, 1]
-        if min(up.std(), caused.std()) < LEAST_CHANGE_M_S or np.corrcoef(up, caused)[0, 1] < _FOLLOWS:
+        up, by_forces = shown[:, 1], self.by_forces[:, 1]
+        if min(up.std(), by_forces.std()) < LEAST_CHANGE_M_S or np.corrcoef(up, by_forces)[0, 1] < _FOLLOWS:
             return None
-        return float((up * caused).sum() / (up * up).sum())
+        return float((up * by_forces).sum() / (up * up).sum())
 
 
 def without_trend(time: FloatArray, values: FloatArray) -> FloatArray:
@@ -80,14 +80,14 @@ def without_trend(time: FloatArray, values: FloatArray) -> FloatArray:
     return result
 
 
-def joined_without_trend(parts: Sequence[CausedVelocity], values: Sequence[FloatArray]) -> FloatArray:
+def joined_without_trend(parts: Sequence[ForceVelocity], values: Sequence[FloatArray]) -> FloatArray:
     """Join values (n,) or (n, k) of all windows, each without its linear trend."""
     return np.concatenate([without_trend(part.time, each) for part, each in zip(parts, values, strict=True)])
 
 
-def caused_velocities(trial: Trial, owners: Mapping[str, str]) -> list[CausedVelocity]:
+def force_velocities(trial: Trial, owners: Mapping[str, str]) -> list[ForceVelocity]:
     """Compute body velocities in every long enough window in which the total force is known."""
-    windows = trial.carried_windows()
+    windows = trial.total_force_windows()
     if not windows:
         return []
     markers = trial.markers.cut(
@@ -119,6 +119,6 @@ def caused_velocities(trial: Trial, owners: Mapping[str, str]) -> list[CausedVel
             continue
         mass_kg = float(force[:, 1].mean()) / specific
         impulse = np.cumsum((force[1:] + force[:-1]) / 2 * np.diff(time)[:, None], axis=0)
-        caused = np.concatenate((np.zeros((1, 3)), impulse)) / mass_kg
-        parts.append(CausedVelocity(time, pelvis_m(time, 1), centre, caused, mass_kg))
+        by_forces = np.concatenate((np.zeros((1, 3)), impulse)) / mass_kg
+        parts.append(ForceVelocity(time, pelvis_m(time, 1), centre, by_forces, mass_kg))
     return parts

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinertia.diagnostics.evidence.horizontal_velocity import CausedVelocity, joined_without_trend
+from kinertia.diagnostics.evidence.horizontal_velocity import ForceVelocity, joined_without_trend
 from kinertia.findings.quantity import Quantity
 from kinertia.trial.data import FloatArray
 
@@ -52,12 +52,12 @@ class VelocityResidual:
     scaled: tuple[Scaled, ...]
 
     @classmethod
-    def of(cls, time: FloatArray, force: FloatArray, parts: Sequence[CausedVelocity], axis: int) -> VelocityResidual:
+    def of(cls, time: FloatArray, force: FloatArray, parts: Sequence[ForceVelocity], axis: int) -> VelocityResidual:
         """Compute the residuals along X (0) or Z (2), of forces (k, p, 3) N of plates or feet over (k,) s."""
         body = _centred([(part.pelvis[:, axis] + part.centre[:, axis]) / 2 for part in parts])
-        caused = _centred([part.caused[:, axis] for part in parts])
-        off = caused - body
-        reversed_, zeroed, zero_offset_n, scaled = [], [], [], [_scaled(None, off, caused)]
+        by_forces = _centred([part.by_forces[:, axis] for part in parts])
+        off = by_forces - body
+        reversed_, zeroed, zero_offset_n, scaled = [], [], [], [_scaled(None, off, by_forces)]
         for p, own_force in enumerate(np.moveaxis(force, 1, 0)):
             own, one_newton = (
                 _centred([part.by(time, each) for part in parts])
@@ -67,10 +67,10 @@ class VelocityResidual:
             scaled.append(_scaled(p, off, own))
             reversed_.append(np.std(off - 2.0 * own))
             zeroed.append(np.std(off - zero_offset_n[-1] * one_newton))
-        trends = joined_without_trend(parts, [part.caused[:, axis] - part.centre[:, axis] for part in parts])
+        trends = joined_without_trend(parts, [part.by_forces[:, axis] - part.centre[:, axis] for part in parts])
         return cls(
             float(np.std(off)),
-            float(np.std(caused + body)),
+            float(np.std(by_forces + body)),
             float(np.std(trends)),
             np.array(reversed_),
             np.array(zeroed),
@@ -78,37 +78,37 @@ class VelocityResidual:
             tuple(scaled),
         )
 
-    def once(self, residual: float, limit: float) -> Quantity:
+    def evidence(self, residual: float, limit: float) -> Quantity:
         """Return the residuals before and after a fault is undone, as evidence, with their `limit`."""
         return Quantity((self.as_read, residual), "m/s", limit=limit)
 
 
 def steady_scaled(
-    time: FloatArray, force: FloatArray, parts: Sequence[CausedVelocity], axis: int
+    time: FloatArray, force: FloatArray, parts: Sequence[ForceVelocity], axis: int
 ) -> tuple[float, tuple[Scaled, ...]]:
     """Compute residuals without the linear trend that zero offsets cause: the residual (m/s) of forces as recorded, and
     if all plates, or one, have a gain error. Arguments as of `VelocityResidual.of`.
     """
-    caused = [part.caused[:, axis] for part in parts]
+    by_forces = [part.by_forces[:, axis] for part in parts]
     moved = [(part.pelvis[:, axis] + part.centre[:, axis]) / 2 for part in parts]
-    off = joined_without_trend(parts, caused) - joined_without_trend(parts, moved)
+    off = joined_without_trend(parts, by_forces) - joined_without_trend(parts, moved)
     by_plate = [[part.by(time, own) for part in parts] for own in force[..., axis].T]
     plates = [None, *range(len(by_plate))]
-    each = zip(plates, [caused, *by_plate], strict=True)
+    each = zip(plates, [by_forces, *by_plate], strict=True)
     return float(np.std(off)), tuple(_scaled(plate, off, joined_without_trend(parts, own)) for plate, own in each)
 
 
-def rotated_residual(parts: Sequence[CausedVelocity], angle: float) -> float:
+def rotated_residual(parts: Sequence[ForceVelocity], angle: float) -> float:
     """Compute the residual (m/s) of both horizontal axes, forces rotated back by `angle` (rad) about the vertical."""
     # from Z to X is a positive rotation about Y
-    caused, pelvis, centre = (
+    by_forces, pelvis, centre = (
         _centred([getattr(part, name)[:, 2] + 1j * getattr(part, name)[:, 0] for part in parts])
-        for name in ("caused", "pelvis", "centre")
+        for name in ("by_forces", "pelvis", "centre")
     )
-    return float(np.sqrt(np.mean(np.square(np.abs(caused * np.exp(-1j * angle) - (pelvis + centre) / 2)))))
+    return float(np.sqrt(np.mean(np.square(np.abs(by_forces * np.exp(-1j * angle) - (pelvis + centre) / 2)))))
 
 
-def misread_plate_residuals(time: FloatArray, force: FloatArray, parts: Sequence[CausedVelocity]) -> FloatArray:
+def misread_plate_residuals(time: FloatArray, force: FloatArray, parts: Sequence[ForceVelocity]) -> FloatArray:
     """Compute the residuals (p, r) m/s of both horizontal axes if one plate's axes are rotated or exchanged.
 
     Args:
@@ -118,15 +118,15 @@ def misread_plate_residuals(time: FloatArray, force: FloatArray, parts: Sequence
     Returns:
         per plate the residual if its axes are exchanged with either sign, or rotated by 90 degrees either way.
     """
-    body, caused = (
+    body, by_forces = (
         _centred([each[:, 2] + 1j * each[:, 0] for each in of_parts])
-        for of_parts in ([(part.pelvis + part.centre) / 2 for part in parts], [part.caused for part in parts])
+        for of_parts in ([(part.pelvis + part.centre) / 2 for part in parts], [part.by_forces for part in parts])
     )
     residuals = []
     for own_force in np.moveaxis(force, 1, 0):
         own = _centred([part.by(time, own_force[:, 2]) + 1j * part.by(time, own_force[:, 0]) for part in parts])
         true = (1j * own.conj(), -1j * own.conj(), 1j * own, -1j * own)
-        residuals.append([np.sqrt(np.mean(np.square(np.abs(caused - body - own + each)))) for each in true])
+        residuals.append([np.sqrt(np.mean(np.square(np.abs(by_forces - body - own + each)))) for each in true])
     return np.array(residuals)
 
 

@@ -11,32 +11,32 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinertia.diagnostics.evidence.horizontal_velocity import CausedVelocity
+from kinertia.diagnostics.evidence.horizontal_velocity import ForceVelocity
 from kinertia.trial.data import FloatArray
 
-MOST_LEFT = 0.22
+LARGEST_RESIDUAL = 0.22
 """Largest residual of a delay; a larger one has another fault as its reason."""
 _STEPS = 5
 
 
 @dataclass(frozen=True)
 class VerticalVelocityFit:
-    """Fit of shown(t) = factor * (caused(t + delay + growth * t) + gain * own(t)), up to a zero offset and a level.
+    """Fit of shown(t) = factor * (forces(t + delay + rate_error * t) + gain * own(t)), up to a zero offset and a level.
 
     Attributes:
-        delay_s, growth: delay of the forces in the middle, and its growth in seconds per second.
+        delay_s, rate_error: delay of the forces in the middle, and its growth in seconds per second.
         gain: gain by which one plate reads more than the others.
-        left: unexplained share (residual SD over the SD of what is shown).
+        residual: unexplained share (residual SD over the SD of what is shown).
     """
 
     delay_s: float
     rate_error: float
     gain: float
-    left: float
+    residual: float
 
 
 def vertical_match(
-    part: CausedVelocity, shown: FloatArray, own: FloatArray | None = None, growing: bool = False
+    part: ForceVelocity, shown: FloatArray, own: FloatArray | None = None, growing: bool = False
 ) -> VerticalVelocityFit | None:
     """Fit the vertical velocity by Gauss-Newton; None where the velocities do not follow the forces.
 
@@ -47,7 +47,7 @@ def vertical_match(
         growing: whether the delay may change over time.
     """
     after = part.time - part.time.mean()
-    caused, accelerated = part.caused[:, 1], np.gradient(part.caused[:, 1], part.time)
+    by_forces, accelerated = part.by_forces[:, 1], np.gradient(part.by_forces[:, 1], part.time)
     delay = rate_error = 0.0
     for _ in range(_STEPS):
         at = part.time + delay + rate_error * after
@@ -55,7 +55,7 @@ def vertical_match(
         if inside.sum() < len(at) / 2:
             return None
         pushed = np.interp(at[inside], part.time, accelerated)
-        moved, since = np.interp(at[inside], part.time, caused), after[inside]
+        moved, since = np.interp(at[inside], part.time, by_forces), after[inside]
         columns = [moved, pushed, np.ones_like(since), since]
         columns += [since * pushed] if growing else []
         columns += [] if own is None else [np.interp(at[inside], part.time, own)]
@@ -71,7 +71,7 @@ def vertical_match(
 
 
 def vertical_match_of(
-    part: CausedVelocity, own: FloatArray | None = None, growing: bool = False
+    part: ForceVelocity, own: FloatArray | None = None, growing: bool = False
 ) -> Sequence[VerticalVelocityFit]:
     """Fit pelvis and marker-based centre of mass; empty where either does not follow the forces."""
     found = [vertical_match(part, shown, own, growing) for shown in (part.pelvis, part.centre)]

@@ -9,7 +9,14 @@ from kinertia.diagnostics.context import RecordingContext
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.io.marker_set_file import nearest_preset
-from kinertia.model.marker_set import MarkerSet, fits_person, is_worn, nearest_labels, no_marker_set, with_nearest
+from kinertia.model.marker_set import (
+    MarkerSet,
+    fits_person,
+    matches_labels,
+    nearest_labels,
+    no_marker_set,
+    with_nearest,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +46,7 @@ def match_labels(labels: Sequence[str], marker_set: MarkerSet | None) -> tuple[M
     if not wanted.landmarks:
         fits = bool(set(wanted.labels) & set(labels))
     else:
-        fits = fits_person(wanted, labels) if marker_set is None else is_worn(wanted, labels)
+        fits = fits_person(wanted, labels) if marker_set is None else matches_labels(wanted, labels)
     used = wanted if fits else None
     others = tuple(label for label in labels if label not in wanted.labels)
     missing = nearest_labels([label for label in wanted.labels if label not in labels], others)

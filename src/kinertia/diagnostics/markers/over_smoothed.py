@@ -15,7 +15,7 @@ from itertools import combinations
 import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.evidence.body_centre import bridged_way
+from kinertia.diagnostics.evidence.body_centre import bridged_trajectory
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.trial.data import Markers
@@ -54,7 +54,7 @@ def _quick_share(markers: Markers, owners: Mapping[str, str]) -> float | None:
         seen = np.asarray(np.isfinite(markers.positions[:, k]).all(axis=1))
         if not owners.get(label, "").startswith("foot") or seen.mean() < _MOSTLY_SEEN:
             continue
-        velocity = np.gradient(bridged_way(markers.time, markers.positions[:, k]), markers.time, axis=0)
+        velocity = np.gradient(bridged_trajectory(markers.time, markers.positions[:, k]), markers.time, axis=0)
         velocity -= velocity.mean(axis=0)
         if np.quantile(np.linalg.norm(velocity, axis=1), 0.95) < _LEAST_SWING_M_S:
             continue

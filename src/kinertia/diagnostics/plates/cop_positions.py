@@ -19,7 +19,7 @@ import numpy as np
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.contact_fit import Hypothesis
 from kinertia.diagnostics.evidence.plate_contacts import FAR_M, PlateContact, displaced
-from kinertia.diagnostics.evidence.vertical_acceleration import MOST_LEFT, vertical_match_of
+from kinertia.diagnostics.evidence.vertical_acceleration import LARGEST_RESIDUAL, vertical_match_of
 from kinertia.diagnostics.plates.heel_landing import (
     goes_forwards,
     lands_on_heels,
@@ -188,5 +188,5 @@ def forces_keep_time(context: RecordingContext) -> bool:
     """Return whether vertical velocities show, without strides, that the forces are not delayed."""
     if context.has_strides:
         return False
-    found = [one for part in context.velocities for one in vertical_match_of(part) if one.left <= MOST_LEFT]
+    found = [one for part in context.velocities for one in vertical_match_of(part) if one.residual <= LARGEST_RESIDUAL]
     return bool(found) and max(abs(one.delay_s) for one in found) < _DELAY_S

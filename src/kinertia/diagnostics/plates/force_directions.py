@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.evidence.horizontal_velocity import LEAST_CHANGE_M_S, CausedVelocity, VelocityChanges
+from kinertia.diagnostics.evidence.horizontal_velocity import LEAST_CHANGE_M_S, ForceVelocity, VelocityChanges
 from kinertia.diagnostics.evidence.horizontal_velocity_residual import (
     CLEARLY_BEST,
     DISTINGUISHABLE,
@@ -117,7 +117,7 @@ def _reversed_axis(context: RecordingContext, residual: VelocityResidual, correl
         "P232",
         context.at(**context.along(axis)),
         correlation=Quantity(correlation, "1", limit=_OPPOSED, usual=_USUAL_CORRELATION),
-        velocity_residual_m_s=residual.once(residual.all_reversed, residual.as_read),
+        velocity_residual_m_s=residual.evidence(residual.all_reversed, residual.as_read),
     )
     return _Hypothesis(found, residual.all_reversed)
 
@@ -144,7 +144,7 @@ def _reversed_plate(
     ):
         return
     evidence = {
-        "velocity_residual_m_s": residual.once(left, limit),
+        "velocity_residual_m_s": residual.evidence(left, limit),
         "rivals_m_s": Quantity((*rivals, zeroed), "m/s"),
     }
     sign, corners, _ = causes = rule("P233").causes
@@ -190,7 +190,7 @@ def _misread_plate(
     return _Hypothesis(found, residual)
 
 
-def _best_explained(plates: PlateLoads, parts: Sequence[CausedVelocity], axis: int) -> VelocityResidual:
+def _best_explained(plates: PlateLoads, parts: Sequence[ForceVelocity], axis: int) -> VelocityResidual:
     """Return the residual by pelvis and marker-based centre, or by the centre alone where that leaves less of long
     windows: the pelvis of runners sways along the direction of travel.
     """
@@ -201,12 +201,12 @@ def _best_explained(plates: PlateLoads, parts: Sequence[CausedVelocity], axis: i
     return min(found, key=lambda one: min(one.as_read, float(one.plate_reversed.min())))
 
 
-def _by_centre(parts: Sequence[CausedVelocity]) -> Sequence[CausedVelocity]:
+def _by_centre(parts: Sequence[ForceVelocity]) -> Sequence[ForceVelocity]:
     """Return the windows with the pelvis replaced by the marker-based centre."""
     return [replace(part, pelvis=part.centre) for part in parts]
 
 
-def _one_zero_off(trial: Trial, parts: Sequence[CausedVelocity], axis: int) -> bool:
+def _one_zero_off(trial: Trial, parts: Sequence[ForceVelocity], axis: int) -> bool:
     """Return whether a zero offset under one foot explains more than reversing the sign of all plates."""
     residual = VelocityResidual.of(trial.loads.time, trial.loads.force, parts, axis)
     return bool(residual.plate_zeroed.min() < DISTINGUISHABLE * residual.all_reversed)
@@ -218,9 +218,9 @@ def _correlations(changes: VelocityChanges, strides: bool) -> dict[int, float]:
     """
     result = {}
     for axis in HORIZONTAL:
-        caused, *shown = (part[:, axis] for part in (changes.caused, changes.pelvis, changes.centre))
-        still = min(part.std() for part in (caused, *shown)) < LEAST_CHANGE_M_S
-        both = [] if still else [np.corrcoef(caused, part)[0, 1] for part in shown]
+        by_forces, *shown = (part[:, axis] for part in (changes.by_forces, changes.pelvis, changes.centre))
+        still = min(part.std() for part in (by_forces, *shown)) < LEAST_CHANGE_M_S
+        both = [] if still else [np.corrcoef(by_forces, part)[0, 1] for part in shown]
         result[axis] = float(np.mean(both) if strides else np.max(both)) if both else np.nan
     return result
 
@@ -230,7 +230,7 @@ def _angle(changes: VelocityChanges) -> tuple[float, float]:
     correlation once it is undone: of the mean over pelvis and marker-based centre.
     """
     # from Z to X is a positive rotation about Y
-    caused, *shown = (part[:, 2] + 1j * part[:, 0] for part in (changes.caused, changes.pelvis, changes.centre))
-    sizes = [max(float(np.linalg.norm(caused) * np.linalg.norm(part)), 1e-12) for part in shown]
-    turn = sum(complex(np.vdot(part, caused)) / size for part, size in zip(shown, sizes, strict=True)) / len(shown)
+    by_forces, *shown = (part[:, 2] + 1j * part[:, 0] for part in (changes.by_forces, changes.pelvis, changes.centre))
+    sizes = [max(float(np.linalg.norm(by_forces) * np.linalg.norm(part)), 1e-12) for part in shown]
+    turn = sum(complex(np.vdot(part, by_forces)) / size for part, size in zip(shown, sizes, strict=True)) / len(shown)
     return float(np.degrees(np.angle(turn))), abs(turn)

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.evidence.horizontal_velocity import CausedVelocity
+from kinertia.diagnostics.evidence.horizontal_velocity import ForceVelocity
 from kinertia.diagnostics.evidence.horizontal_velocity_residual import (
     CLEARLY_BEST,
     HORIZONTAL,
@@ -75,13 +75,16 @@ def _by_vertical_velocity(context: RecordingContext, plates: PlateLoads) -> Find
             continue
         read, rate = vertical_match_of(part), vertical_match_of(part, growing=True)
         own = [part.by(plates.time, vertical) for vertical in plates.force[..., 1].T]
-        used = [p for p, caused in enumerate(own) if np.ptp(caused) > 0.0]
+        used = [p for p, by_forces in enumerate(own) if np.ptp(by_forces) > 0.0]
         by_plate = {p: found for p in used if (found := vertical_match_of(part, own[p]))}
         if not read or len(by_plate) < 2:
             continue
-        best = min(by_plate, key=lambda p: sum(each.left for each in by_plate[p]))
-        gain, residual = np.array([(each.gain, each.left) for each in by_plate[best]]).T
-        rivals = np.array([_RESIDUAL_SHARE * each.left for each in read]), np.array([e.left for e in rate or read])
+        best = min(by_plate, key=lambda p: sum(each.residual for each in by_plate[p]))
+        gain, residual = np.array([(each.gain, each.residual) for each in by_plate[best]]).T
+        rivals = (
+            np.array([_RESIDUAL_SHARE * each.residual for each in read]),
+            np.array([e.residual for e in rate or read]),
+        )
         if abs(np.sign(gain).sum()) < len(gain) or np.abs(gain).min() < _LEAST_GAIN or (residual > rivals).any():
             continue
         # this plate should read more by this factor: by it alone the body weighs less by the same
@@ -95,7 +98,7 @@ def _by_vertical_velocity(context: RecordingContext, plates: PlateLoads) -> Find
             (heavy, light),
             (heavy_kg, light_kg),
             gain=Quantity(heavy_kg / light_kg - 1.0, "1", limit=_LEAST_GAIN, usual=(0.0, 0.01)),
-            residual_share=Quantity((float(np.mean([each.left for each in read])), float(residual.mean())), "1"),
+            residual_share=Quantity((float(np.mean([each.residual for each in read])), float(residual.mean())), "1"),
             method=Quantity("vertical velocity"),
         )
     return None
@@ -111,7 +114,7 @@ def _disagreeing(
 
 
 def _scaled_axis(
-    context: RecordingContext, plates: PlateLoads, long: Sequence[CausedVelocity], axis: int
+    context: RecordingContext, plates: PlateLoads, long: Sequence[ForceVelocity], axis: int
 ) -> Finding | None:
     """P222: the axis of one plate, or of all, that reads a multiple of the true force, with or without a zero
     offset."""

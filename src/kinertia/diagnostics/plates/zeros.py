@@ -39,7 +39,7 @@ def zeros(context: RecordingContext) -> Iterator[Finding]:
             drift = Quantity(idle.drift_n, "N", limit=_limit_n(_DRIFT_N, share))
             yield finding("P211", context.at(plate=name, **context.along(1)), drift_n=drift)
         vertical = False
-        for axis, level_n in enumerate(idle.left_n):
+        for axis, level_n in enumerate(idle.remaining_n):
             if abs(level_n) > _limit_n(_ZERO_N, share) and not (drifts and axis == 1):
                 far = axis == 1 and abs(level_n) > _FAR_FROM_ZERO_N * share
                 vertical |= axis == 1

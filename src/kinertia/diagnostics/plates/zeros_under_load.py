@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.evidence.horizontal_velocity import CausedVelocity
+from kinertia.diagnostics.evidence.horizontal_velocity import ForceVelocity
 from kinertia.diagnostics.evidence.horizontal_velocity_residual import CLEARLY_BEST, HORIZONTAL, VelocityResidual
 from kinertia.findings.finding import Finding, with_evidence
 from kinertia.findings.quantity import Quantity
@@ -49,7 +49,7 @@ def zeros_under_load(context: RecordingContext) -> Iterator[Finding]:
 
 
 def _unexplained(
-    context: RecordingContext, plates: PlateLoads, parts: Sequence[CausedVelocity], axis: int
+    context: RecordingContext, plates: PlateLoads, parts: Sequence[ForceVelocity], axis: int
 ) -> Finding | None:
     """P214: the trend of the force-derived velocity beyond the pelvis', as a force; longer windows count more.
 
@@ -79,10 +79,10 @@ def _unexplained(
     return with_evidence("P214", context.at(**context.along(axis)), evidence, causes=causes)
 
 
-def _trend_n(shown: Sequence[FloatArray], parts: Sequence[CausedVelocity], axis: int) -> float:
+def _trend_n(shown: Sequence[FloatArray], parts: Sequence[ForceVelocity], axis: int) -> float:
     """Return the force (N) by which the forces change the body's velocity more than shown (n, 3) m/s in each window."""
     trends = [
-        part.mass_kg * np.polyfit(part.time - part.time.mean(), part.caused[:, axis] - velocity[:, axis], 1)[0]
+        part.mass_kg * np.polyfit(part.time - part.time.mean(), part.by_forces[:, axis] - velocity[:, axis], 1)[0]
         for velocity, part in zip(shown, parts, strict=True)
     ]
     return float(np.average(trends, weights=[np.ptp(part.time) ** 3 for part in parts]))
@@ -92,12 +92,12 @@ def _levels(plates: PlateLoads, axis: int) -> FloatArray | None:
     """Return the forces (p,) N that unloaded plates read along an axis and that are still in their loads; None unless
     known for each plate.
     """
-    levels = np.array([idle.left_n[axis] for idle in plates.idle or ()])
+    levels = np.array([idle.remaining_n[axis] for idle in plates.idle or ()])
     return levels if levels.size and np.isfinite(levels).all() else None
 
 
 def _plate_zero(
-    context: RecordingContext, plates: PlateLoads, parts: Sequence[CausedVelocity], axis: int, all_plates: bool
+    context: RecordingContext, plates: PlateLoads, parts: Sequence[ForceVelocity], axis: int, all_plates: bool
 ) -> Finding | None:
     """P212: a force of one loaded plate that does not accelerate the body, unless all plates show it as well, or there
     are no strides: the body's horizontal velocity is then less certain.
@@ -119,7 +119,7 @@ def _plate_zero(
         return None
     evidence = {
         "offset_n": Quantity(zero_offset_n, "N", limit=limit_n, usual=(-9.0, 9.0)),
-        "velocity_residual_m_s": residual.once(zeroed, limit_m_s),
+        "velocity_residual_m_s": residual.evidence(zeroed, limit_m_s),
     }
     levels = _levels(plates, axis)
     if levels is not None:

@@ -14,7 +14,7 @@ from collections.abc import Iterator, Sequence
 
 from kinertia.diagnostics.result.context import ResultContext
 from kinertia.diagnostics.result.corrections import corrected
-from kinertia.estimation.free_moment_sign import VERTICAL, left_moments_nm, left_without_offsets_nm
+from kinertia.estimation.free_moment_sign import VERTICAL, residual_moments_nm, residual_moments_without_offsets_nm
 from kinertia.estimation.result import TrialFit
 from kinertia.estimation.simultaneous.calibration_entry import FREE_MOMENT, CalibrationEntry
 from kinertia.findings.finding import Finding, finding, with_evidence
@@ -61,8 +61,8 @@ def reversed_sign(trial: TrialFit) -> Iterator[Finding]:
     evidence of its own.
     """
     left, loads = trial.residuals["literature"][:, VERTICAL], trial.kinematics.foot_loads
-    as_is, reversed_nm = left_moments_nm(left, loads)
-    without, reversed_without = left_without_offsets_nm(left, loads)
+    as_is, reversed_nm = residual_moments_nm(left, loads)
+    without, reversed_without = residual_moments_without_offsets_nm(left, loads)
     if reversed_nm < _LESS * as_is and reversed_without < _LESS * without:
         evidence = {"rms_nm": Quantity(as_is, "N m"), "reversed": Quantity(reversed_nm, "N m", limit=_LESS * as_is)}
         yield with_evidence("P265", Where(trial=trial.name), evidence)

@@ -44,7 +44,7 @@ def forces_of_the_motion(context: ResultContext) -> Iterator[Finding]:
 
 def total_mass(context: ResultContext) -> Iterator[Finding]:
     """S113: an estimated total mass that follows the plates more than the stated mass."""
-    total_kg, stated = context.fit.estimate.total_mass_kg, context.ready.carried
+    total_kg, stated = context.fit.estimate.total_mass_kg, context.ready.total_mass
     limit = _TOTAL * stated.total_kg + 2.0 * stated.sd_kg
     if abs(total_kg - stated.total_kg) > limit:
         yield finding(

@@ -47,7 +47,7 @@ def soundness(context: ResultContext) -> Iterator[Finding]:
     yield from _impossible(fit)
     yield from _far_centres(fit) if fit.posterior is None else _far_parameters(fit)
     whole = None if fit.posterior is None else fit.posterior.unlikeness
-    if whole is not None and whole.unlike:
+    if whole is not None and whole.implausible:
         yield _unlike(whole) if whole.one_sided is None else _side_heavier(whole.one_sided)
 
 

@@ -49,7 +49,7 @@ class CameraScale:
         error, se: median share and its standard error.
         pairs, alike, segments: number of distances, and how many of the segments differ in the same direction.
         shown: most of it that a segment with several distances shows, as a share.
-        left_m: RMS difference of the distances that is left once the scale is corrected.
+        residual_m: RMS difference of the distances that is left once the scale is corrected.
     """
 
     error: float
@@ -58,14 +58,14 @@ class CameraScale:
     alike: int
     segments: int
     shown: float
-    left_m: float
+    residual_m: float
 
     @property
     def differs(self) -> bool:
         """Whether a different camera scale is the likeliest explanation."""
         far = abs(self.error) > max(_OTHER_SCALE, _ERRORS * self.se)
         alike = self.alike >= _ALIKE * self.segments and self.shown >= _SHOWN
-        return far and alike and self.left_m <= SAME_SESSION_M
+        return far and alike and self.residual_m <= SAME_SESSION_M
 
     def finding(self, trial: str, reference: str, sign: float = 1.0) -> Finding:
         """Return S205 for this trial; `sign` is -1 where the other recording has the wrong scale."""
@@ -128,5 +128,5 @@ def _scale(distances: SegmentDistances, usual: float) -> CameraScale | None:
     alike = sum(np.sign(one) == np.sign(share - usual) for one in off)
     several = [one for one, k in zip(off, np.unique(owners), strict=True) if (owners == k).sum() >= _SEVERAL]
     shown = max((float(one / (share - usual)) for one in several), default=0.0) if share != usual else 0.0
-    left_m = rms(after / (1.0 + share - usual) - before)
-    return CameraScale(share - usual, float(error), len(shares), int(alike), len(off), shown, left_m)
+    residual_m = rms(after / (1.0 + share - usual) - before)
+    return CameraScale(share - usual, float(error), len(shares), int(alike), len(off), shown, residual_m)

@@ -19,7 +19,7 @@ import numpy as np
 from kinertia.diagnostics.evidence.force_mass import MISSING, ForceMass, UnmeasuredSupport
 from kinertia.diagnostics.person_context import PersonContext
 from kinertia.diagnostics.subject.odd_recording import odd_ones
-from kinertia.estimation.carried_mass import CarriedMass
+from kinertia.estimation.total_mass import TotalMass
 from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
@@ -66,11 +66,11 @@ class _Occasion:
         """Share by which the stated mass may differ before nothing is computed with it."""
         return ERROR_SHARE if self.count == 1 else AGREED_SHARE
 
-    def allowed_kg(self, total: CarriedMass, share: float) -> float:
+    def allowed_kg(self, total: TotalMass, share: float) -> float:
         """Return by how much (kg) the stated mass may differ."""
         return share * total.total_kg + 2.0 * float(np.hypot(self.sd_kg, total.sd_kg))
 
-    def differs(self, total: CarriedMass, share: float) -> bool:
+    def differs(self, total: TotalMass, share: float) -> bool:
         """Return whether the stated mass differs by more than allowed."""
         return abs(self.mass_kg - total.total_kg) > self.allowed_kg(total, share)
 
@@ -141,7 +141,7 @@ def _occasion(name: str | None, mass: ForceMass, standing: bool = False) -> _Occ
     return _Occasion(name, mass.mass_kg, float(np.hypot(mass.sd_kg, _REPEATED * mass.mass_kg)), mass.over, standing)
 
 
-def _apart(context: PersonContext, total: CarriedMass) -> dict[str, UnmeasuredSupport]:
+def _apart(context: PersonContext, total: TotalMass) -> dict[str, UnmeasuredSupport]:
     """Return the trials by name in which part of the weight is off the plates for a while."""
     known = {one.name: one.force_mass for one in context.trials if one.force_mass is not None}
     return {name: found for name, mass in known.items() if (found := mass.unmeasured(total.total_kg)) is not None}
@@ -216,7 +216,7 @@ def _together(occasions: Sequence[_Occasion]) -> list[_Occasion]:
 
 
 def _contradiction(
-    context: PersonContext, one: _Occasion, total: CarriedMass, witnesses: Sequence[_Occasion]
+    context: PersonContext, one: _Occasion, total: TotalMass, witnesses: Sequence[_Occasion]
 ) -> Iterator[Finding]:
     """S111, with the causes that the evidence supports, and the unit that explains it."""
     where, ratio = Where(trial=one.trial), one.mass_kg / total.total_kg

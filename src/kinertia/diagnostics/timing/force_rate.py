@@ -12,7 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.evidence.vertical_acceleration import MOST_LEFT, vertical_match_of
+from kinertia.diagnostics.evidence.vertical_acceleration import LARGEST_RESIDUAL, vertical_match_of
 from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.trial.sampled_time import span_s
@@ -67,11 +67,11 @@ def _growing_delays(context: RecordingContext) -> Iterator[Finding]:
         if span_s(part.time) < _LEAST_WINDOW_S:
             continue
         found = vertical_match_of(part, growing=True)
-        if not found or max(one.left for one in found) > MOST_LEFT:
+        if not found or max(one.residual for one in found) > LARGEST_RESIDUAL:
             continue
         # with another gain under one foot the body seems to be pushed ever earlier, or later, within two steps
         gains = vertical_match_of(part, own=part.by(trial.loads.time, trial.loads.force[:, 0, 1]))
-        if any(one.left > other.left for one, other in zip(found, gains, strict=False)):
+        if any(one.residual > other.residual for one, other in zip(found, gains, strict=False)):
             continue
         delay, rate_error = np.array([one.delay_s for one in found]), np.array([one.rate_error for one in found])
         if np.abs(rate_error).min() < _LEAST_GROWTH or abs(np.sign(rate_error).sum()) < len(rate_error):

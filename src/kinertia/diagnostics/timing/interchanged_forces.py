@@ -19,8 +19,8 @@ import numpy as np
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.horizontal_velocity import (
     LEAST_WINDOW_S,
-    CausedVelocity,
-    caused_velocities,
+    ForceVelocity,
+    force_velocities,
     without_trend,
 )
 from kinertia.diagnostics.person_context import PersonContext
@@ -52,25 +52,25 @@ def interchanged_forces(person: PersonContext) -> Iterator[Finding]:
                 )
 
 
-def _with_forces_of(one: RecordingContext, other: RecordingContext) -> list[CausedVelocity]:
+def _with_forces_of(one: RecordingContext, other: RecordingContext) -> list[ForceVelocity]:
     assert one.trial is not None
     assert other.trial is not None
-    return caused_velocities(replace(one.trial, loads=other.trial.loads), one.segment_of_label)
+    return force_velocities(replace(one.trial, loads=other.trial.loads), one.segment_of_label)
 
 
-def _over(windows: Sequence[CausedVelocity], parts: Sequence[CausedVelocity]) -> Sequence[CausedVelocity]:
+def _over(windows: Sequence[ForceVelocity], parts: Sequence[ForceVelocity]) -> Sequence[ForceVelocity]:
     """Return the parts where they overlap these windows; whole where none does for long enough."""
     cut = [part.cut(window.time[0], window.time[-1]) for part in parts for window in windows]
     return [part for part in cut if len(part.time) > 1 and span_s(part.time) >= LEAST_WINDOW_S] or parts
 
 
-def _residual(parts: Sequence[CausedVelocity]) -> float:
+def _residual(parts: Sequence[ForceVelocity]) -> float:
     """Return the share of the vertical velocities of pelvis and markers that forces do not explain; NaN if unknown."""
     shown, left = [], []
     for part in parts:
-        caused = without_trend(part.time, part.caused)[:, 1]
+        by_forces = without_trend(part.time, part.by_forces)[:, 1]
         for velocity in (part.pelvis, part.centre):
             up = without_trend(part.time, velocity)[:, 1]
             shown.append(np.square(up).sum())
-            left.append(np.square(up - caused).sum())
+            left.append(np.square(up - by_forces).sum())
     return float(np.sqrt(sum(left) / sum(shown))) if shown else float("nan")

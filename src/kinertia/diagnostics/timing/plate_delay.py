@@ -14,7 +14,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.evidence.horizontal_velocity import CausedVelocity, joined_without_trend
+from kinertia.diagnostics.evidence.horizontal_velocity import ForceVelocity, joined_without_trend
 from kinertia.findings.finding import Finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.trial.centre_of_pressure import FIRM_LOAD_N
@@ -41,12 +41,14 @@ def plate_delay(context: RecordingContext) -> Iterator[Finding]:
     if len(used) < 2:
         return
     time, vertical = plates.time, plates.force[:, used, 1]
-    off = joined_without_trend(parts, [(one.pelvis + one.centre)[:, 1] / 2 - one.caused[:, 1] for one in parts])
+    off = joined_without_trend(parts, [(one.pelvis + one.centre)[:, 1] / 2 - one.by_forces[:, 1] for one in parts])
     pushed = _accelerations(parts, time, vertical)
-    caused = np.stack([joined_without_trend(parts, [one.by(time, own) for one in parts]) for own in vertical.T], axis=1)
+    by_forces = np.stack(
+        [joined_without_trend(parts, [one.by(time, own) for one in parts]) for own in vertical.T], axis=1
+    )
     delays_s, own = _fitted(pushed, off)
     _, together = _fitted(pushed.sum(axis=1, keepdims=True), off)
-    _, gains = _fitted(caused, off)
+    _, gains = _fitted(by_forces, off)
     late, early = int(np.argmax(delays_s)), int(np.argmin(delays_s))
     difference_s = float(delays_s[late] - delays_s[early])
     if difference_s <= _DIFFERENCE_S or own > _EXPLAINS * together or own > _CLEARLY_BEST * gains:
@@ -70,7 +72,7 @@ def plate_delay(context: RecordingContext) -> Iterator[Finding]:
     )
 
 
-def _accelerations(parts: Sequence[CausedVelocity], time: FloatArray, force: FloatArray) -> FloatArray:
+def _accelerations(parts: Sequence[ForceVelocity], time: FloatArray, force: FloatArray) -> FloatArray:
     """Return accelerations (n, p) m/s2 of the body by forces (k, p) N over (k,) s, in all windows."""
     return np.stack(
         [

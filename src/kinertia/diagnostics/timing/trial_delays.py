@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.evidence.vertical_acceleration import MOST_LEFT, vertical_match_of
+from kinertia.diagnostics.evidence.vertical_acceleration import LARGEST_RESIDUAL, vertical_match_of
 from kinertia.diagnostics.person_context import PersonContext
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
@@ -51,7 +51,7 @@ def trial_delay(context: RecordingContext) -> TrialDelay | None:
         if span_s(part.time) < _LEAST_WINDOW_S:
             continue
         both = vertical_match_of(part)
-        if both and max(one.left for one in both) <= MOST_LEFT:
+        if both and max(one.residual for one in both) <= LARGEST_RESIDUAL:
             found.append([one.delay_s for one in both])
             spans.append(span_s(part.time))
     if not found:

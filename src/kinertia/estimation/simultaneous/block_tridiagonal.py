@@ -61,7 +61,7 @@ class BlockBand:
         return self._single if precision == np.float32 else self
 
     def forward(self, rhs: np.ndarray, in_place: bool = False) -> np.ndarray:
-        """Solve L x = right; right is (b, k, m), of the factor's precision, and may be overwritten if `in_place`."""
+        """Solve L x = rhs; rhs is (b, k, m), of the factor's precision, and may be overwritten if `in_place`."""
         result = rhs if in_place else rhs.copy()
         for i in range(len(result)):
             if i:
@@ -70,7 +70,7 @@ class BlockBand:
         return result
 
     def backward(self, rhs: np.ndarray, after: np.ndarray | None = None, in_place: bool = False) -> np.ndarray:
-        """Solve L^T x = right (b, k, m); `after` (k, m) is the next block of the solution if the matrix continues."""
+        """Solve L^T x = rhs (b, k, m); `after` (k, m) is the next block of the solution if the matrix continues."""
         result, known = rhs if in_place else rhs.copy(), after
         for i in range(len(result) - 1, -1, -1):
             if known is not None:

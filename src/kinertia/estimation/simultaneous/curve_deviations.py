@@ -166,9 +166,9 @@ class _Curves:
         spread.variances(seen, root[in_root, in_root], self.variance, rows)
         loaded = self.reactions.at(problem.trials[self.k].time[chosen])[..., :3] != 0.0
         self.variance.ground_forces[rows] += np.square(self.reactions.noise_n * loaded)
-        self.variance.ground_forces[rows] += by.ground_left.reshape(-1, 2, 3)
-        self.variance.moments[rows] += by.left
-        self.variance.powers[rows] += by.left * np.square(self.speed[rows])
+        self.variance.ground_forces[rows] += by.ground_delay_squares.reshape(-1, 2, 3)
+        self.variance.moments[rows] += by.delay_squares
+        self.variance.powers[rows] += by.delay_squares * np.square(self.speed[rows])
 
 
 @dataclass(frozen=True)

@@ -163,7 +163,7 @@ def fit_simultaneous(
         result=result,
         bsp=uncertainty.whole(result.bsp),
         skeleton=calibrated,
-        skeletons=tuple(calibrated.with_places(calibrated.marker_locals + moved) for moved in offsets_m),
+        skeletons=tuple(calibrated.with_positions(calibrated.marker_locals + moved) for moved in offsets_m),
         posterior=_posterior(result, prior, seen, trials, motions, uncertainty),
         motions=motions,
         courses=tuple(m.q[at[0] : at[-1] + 1] for m, at in zip(result.motions, dynamic, strict=True)),

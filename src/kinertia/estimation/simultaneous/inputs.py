@@ -109,7 +109,7 @@ class FreedModel:
 
     def placed(self, static: np.ndarray) -> Skeleton:
         """Return the freed skeleton with its estimated marker positions."""
-        return self.given.free.with_places(static[self.layout[PLACES]].reshape(-1, 3))
+        return self.given.free.with_positions(static[self.layout[PLACES]].reshape(-1, 3))
 
     def locked(self, static: np.ndarray) -> Skeleton:
         """Return the skeleton as calibrated by the unknowns."""

@@ -56,7 +56,7 @@ def instrument_support(
     delay_sd_s = [float(np.linalg.norm(root[late(k)].sum(axis=0))) for k in range(len(curves))]
     each_trial = enumerate(zip(curves, delay_sd_s, strict=True))
     moved = [moved_moments(model.problem, k, point, *each) for k, each in each_trial]
-    return InstrumentSupport(np.max(moved, axis=0), trials_apart(model, gaussian))
+    return InstrumentSupport(np.max(moved, axis=0), contradicted_errors(model, gaussian))
 
 
 def moved_moments(
@@ -78,7 +78,7 @@ def moved_moments(
     return result
 
 
-def trials_apart(model: GaussNewton, gaussian: GaussianPrior) -> np.ndarray:
+def contradicted_errors(model: GaussNewton, gaussian: GaussianPrior) -> np.ndarray:
     """Return the mask (k,) of the laboratory's instruments for which one trial and all the others disagree.
 
     Each estimate includes the priors; they disagree beyond 95 % for any of the trials.
@@ -88,9 +88,9 @@ def trials_apart(model: GaussNewton, gaussian: GaussianPrior) -> np.ndarray:
     result = np.zeros(len(gaussian.pull), dtype=bool)
     if count < 2:
         return result
-    rights = _rights(model)
-    prior_right = here.point.like(here.slope.under(gaussian)[1]).static
-    prior_right = prior_right - sum(trial.gradient.static_rhs for trial in here.trials)
+    right_hand_sides = _right_hand_sides(model)
+    prior_rhs = here.point.like(here.slope.under(gaussian)[1]).static
+    prior_rhs = prior_rhs - sum(trial.gradient.static_rhs for trial in here.trials)
     prior = here.information.copy()
     prior[layout.errors, layout.errors] += gaussian.precision
     every = sum(each.information for each in model.displaced)
@@ -98,15 +98,15 @@ def trials_apart(model: GaussNewton, gaussian: GaussianPrior) -> np.ndarray:
     # by chance one of twenty instruments, however many trials there are; with two, each contradicts the other
     apart_sd = -ndtri(0.025 / (count if count > 2 else 1))
     for k, own in enumerate(model.displaced):
-        alone = _posterior(prior + own.information, prior_right + rights[k], layout.in_root.stop, layout.errors)
-        rest = prior_right + sum(rights) - rights[k]
+        alone = _posterior(prior + own.information, prior_rhs + right_hand_sides[k], layout.in_root.stop, layout.errors)
+        rest = prior_rhs + sum(right_hand_sides) - right_hand_sides[k]
         others = _posterior(prior + every - own.information, rest, layout.in_root.stop, layout.errors)
         apart = np.abs(alone[0] - others[0]) > apart_sd * np.hypot(alone[1], others[1])
         result[shared] |= apart[shared]
     return result
 
 
-def _rights(model: GaussNewton) -> list[np.ndarray]:
+def _right_hand_sides(model: GaussNewton) -> list[np.ndarray]:
     """Return, per trial, the right-hand side (S,) on the static unknowns, motion and displacements eliminated."""
     pull, places = model.here.point.like(model.here.slope.rhs), model.problem.layout.displaced
     result = []

@@ -25,13 +25,13 @@ class LateLoads:
     Attributes:
         loads: (n, 2, 6) without delay.
         slope: (n, 2, 6) per s of delay.
-        left: (m, n, 2, 6) residuals from the slope for m delays, times the root of their probability, so that the sum
-            of squares is a mean square; empty (m = 0) if the delay is known.
+        residual: (m, n, 2, 6) residuals from the slope for m delays, times the root of their probability, so that
+            the sum of squares is a mean square; empty (m = 0) if the delay is known.
     """
 
     loads: np.ndarray
     slope: np.ndarray
-    left: np.ndarray
+    residual: np.ndarray
 
 
 def late_loads(reactions: GroundReactions, time: np.ndarray, sd_s: float = 0.0) -> LateLoads:

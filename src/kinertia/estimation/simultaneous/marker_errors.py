@@ -33,7 +33,7 @@ _STEPS = 32
 class ErrorProcess(NamedTuple):
     """Poles of the process, the larger first; white noise has none.
 
-    >>> process = ErrorProcess.alike_over(9.0)
+    >>> process = ErrorProcess.double_over(9.0)
     >>> round(process.larger, 3), process.larger == process.smaller, round(process.frames, 6)
     (0.571, True, 9.0)
     """
@@ -42,7 +42,7 @@ class ErrorProcess(NamedTuple):
     smaller: float = 0.0
 
     @classmethod
-    def alike_over(cls, frames: float) -> ErrorProcess:
+    def double_over(cls, frames: float) -> ErrorProcess:
         """Return the process with a double pole that is correlated over so many neighbouring frames.
 
         The number of frames is the sum of its correlations over all lags: (1 + r)^3 / ((1 + r^2) (1 - r)).
@@ -95,7 +95,7 @@ class ErrorProcess(NamedTuple):
             products: (k, 3, 3) mean products of the errors of a frame and of the two before it, for several kinds of
                 errors; the largest innovation counts.
         """
-        double = cls.alike_over(frames)
+        double = cls.double_over(frames)
         slow = [cls.with_smaller(float(s), frames) for s in np.linspace(double.smaller, 0.0, _STEPS)[1:]]
         short = [cls.with_smaller(0.0, float(f)) for f in np.geomspace(max(frames, 1.0), 1.0, _STEPS)[1:]]
         for process in (double, *slow, *short):

@@ -113,7 +113,7 @@ def marker_noise(
     per_frame = 3 * seen.sum() / np.count_nonzero(seen.any(axis=1))
     lost = np.sqrt(per_frame / max(per_frame - len(skeleton.coordinates), 1.0))
     sd = np.maximum(lost * root_mean_square(errors), SMALLEST_MARKER_SD_M)
-    frames = frames_alike(errors, sd)
+    frames = correlated_frames(errors, sd)
     usual = float(np.median(sd))
     labels = [label for label, shown in zip(skeleton.labels, seen.any(axis=0), strict=True) if shown]
     deviations = dict(zip(skeleton.labels, map(float, sd), strict=True))
@@ -122,7 +122,7 @@ def marker_noise(
         frames / rate_hz,
         tuple(label for label in labels if deviations[label] > _WANDERING * usual),
     )
-    effective = sd * np.sqrt(markers_alike(skeleton, errors) / (1.0 - taken))
+    effective = sd * np.sqrt(markers_in_common(skeleton, errors) / (1.0 - taken))
     return noise, effective, frames, lost**2 * _products(skeleton, errors, effective)
 
 
@@ -145,7 +145,7 @@ def root_mean_square(errors: np.ndarray) -> np.ndarray:
     return np.sqrt(squares / np.maximum(counts, 1))
 
 
-def frames_alike(errors: np.ndarray, sd_m: np.ndarray | float) -> float:
+def correlated_frames(errors: np.ndarray, sd_m: np.ndarray | float) -> float:
     """Return over how many neighbouring frames errors (n, m, 3) of these standard deviations (m,) are correlated."""
     return Repetition.of(weighed(errors, sd_m)).frames
 
@@ -154,7 +154,7 @@ def _products(skeleton: Skeleton, errors: np.ndarray, sd_m: np.ndarray) -> np.nd
     """Return mean products (2, 3, 3) of the errors (n, m, 3), over their SDs (m,), of a frame and of the two before it.
 
     The first are of each marker, the second of the errors that the markers of a segment have in common, counted as in
-    `markers_alike`.
+    `markers_in_common`.
     """
     result, count = np.zeros((2, 3, 3)), 0
     of_segments = _of_segments(skeleton)
@@ -183,7 +183,7 @@ def weighed(errors: np.ndarray, sd_m: np.ndarray | float) -> np.ndarray:
     return np.nan_to_num(result, copy=False).reshape(len(errors), -1)
 
 
-def markers_alike(skeleton: Skeleton, errors: np.ndarray) -> np.ndarray:
+def markers_in_common(skeleton: Skeleton, errors: np.ndarray) -> np.ndarray:
     """Return how many markers (m,) of each marker's segment err in common, from errors (n, m, 3); 1 if independent.
 
     The variance of a sum of k equal errors is k times that of k independent ones. NaN (not seen) counts as no error.

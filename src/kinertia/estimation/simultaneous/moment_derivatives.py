@@ -28,7 +28,8 @@ class MomentDerivatives:
         static: (d, c, s) derivatives by the static unknowns that root equations depend on.
         impact: (d, c) contribution of impact transients.
         ground: (d, 6, s) derivative of the ground reactions on the right foot, then the left (N).
-        left, ground_left: (d, c), (d, 6) mean squares of what the delay of the forces does besides (`LateLoads.left`).
+        delay_squares, ground_delay_squares: (d, c), (d, 6) mean squares of the remaining effect of the delay of the
+            forces (`LateLoads.residual`).
     """
 
     value: np.ndarray
@@ -38,8 +39,8 @@ class MomentDerivatives:
     static: np.ndarray
     impact: np.ndarray
     ground: np.ndarray
-    left: np.ndarray
-    ground_left: np.ndarray
+    delay_squares: np.ndarray
+    ground_delay_squares: np.ndarray
 
 
 def moment_derivatives(
@@ -80,12 +81,12 @@ def moment_derivatives(
     late = late_loads(reactions, problem.trials[k].time[frames], delay_sd_s)
     loads, by_load = _loads(problem, k, static, reactions, frames, late)
     fast = reactions.impact_at(problem.trials[k].time[frames])
-    left = np.zeros((len(late.left), *tau.shape))
+    left = np.zeros((len(late.residual), *tau.shape))
     for foot, name in enumerate(skeleton.feet):
         moved = np.flatnonzero(skeleton.support[skeleton.segments.index(name)])
         take_load(*axes, moved, loads[foot], by_load[foot], layout.errors.start, tau, dq, by_static)
         impact[:, moved] -= (pose.axes[:, moved] @ fast[:, foot, :, None])[..., 0]
-        left[..., moved] -= np.einsum("dai,mdi->mda", pose.axes[:, moved], late.left[:, :, foot])
+        left[..., moved] -= np.einsum("dai,mdi->mda", pose.axes[:, moved], late.residual[:, :, foot])
     by_q, by_qd, by_qdd = (
         skeleton.map.to_coordinates(part.transpose(0, 2, 1), pose.slopes).transpose(0, 2, 1)
         for part in skeleton.map.derivatives_to_coordinates((dq, dv, da), q, qd, qdd)
@@ -98,7 +99,7 @@ def moment_derivatives(
     ground = by_load[:, :, :3].transpose(1, 0, 2, 3).reshape(len(q), -1, layout.in_root.stop)
     of_delays = [np.square(skeleton.map.to_coordinates(each, pose.slopes)[:, moving]) for each in left]
     squares = np.sum(of_delays, axis=0) if of_delays else np.zeros(value.shape)
-    of_ground = np.square(late.left[..., :3]).sum(axis=0).reshape(len(q), -1)
+    of_ground = np.square(late.residual[..., :3]).sum(axis=0).reshape(len(q), -1)
     return MomentDerivatives(value, by_q, by_qd, by_qdd, by_static, impact, ground, squares, of_ground)
 
 

@@ -18,9 +18,9 @@ from kinertia.estimation.simultaneous.impacts import impact_factors
 from kinertia.estimation.simultaneous.marker_noise import (
     MarkerNoise,
     WithoutSkin,
-    frames_alike,
+    correlated_frames,
     marker_noise,
-    markers_alike,
+    markers_in_common,
     root_mean_square,
     taken_by_chance,
     weighed,
@@ -82,7 +82,7 @@ def observe(
     rates = [each.trial.markers.rate_hz for each in trials]
     skin = skin_patterns(skeleton, [each.smooth for each in errors], [bool(each.trial.loads.plates) for each in trials])
     usual = [root_mean_square(each.varying) for each in errors]
-    frames = [frames_alike(each.varying, sd) for each, sd in zip(errors, usual, strict=True)]
+    frames = [correlated_frames(each.varying, sd) for each, sd in zip(errors, usual, strict=True)]
     places = np.stack([each.displaced for each in errors])
     rest = WithoutSkin.of([each.varying for each in errors], places, skin, frames)
     pairs = [
@@ -134,7 +134,7 @@ def _spread(skeleton: Skeleton, apart: np.ndarray, freedom: np.ndarray) -> np.nd
 
     It is the same for all markers of a segment, except for the number of markers with common errors.
     """
-    alike = markers_alike(skeleton, apart)
+    alike = markers_in_common(skeleton, apart)
     result = np.zeros(len(alike))
     for segment in np.unique(skeleton.marker_segments):
         own = skeleton.marker_segments == segment

@@ -59,7 +59,7 @@ class Observation:
     def marker_process(self) -> tuple[np.ndarray, ErrorProcess]:
         """Standard deviations (m,) of the markers' errors, m, and the process that they follow from frame to frame."""
         if self.frame_products is None:
-            return self.marker_sd, ErrorProcess.alike_over(self.marker_frames)
+            return self.marker_sd, ErrorProcess.double_over(self.marker_frames)
         process, variance = ErrorProcess.read(self.marker_frames, self.frame_products)
         return np.sqrt(variance) * self.marker_sd, process
 

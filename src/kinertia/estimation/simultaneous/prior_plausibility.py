@@ -56,7 +56,7 @@ class Unlikeness:
     one_sided: OneSided | None = None
 
     @property
-    def unlike(self) -> bool:
+    def implausible(self) -> bool:
         """Whether the person is implausible under the prior."""
         return self.chance < UNLIKE_CHANCE
 

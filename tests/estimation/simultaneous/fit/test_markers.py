@@ -48,7 +48,7 @@ def test_markers_that_stay_do_so_in_every_trial(trial):
     """Else a second trial would make a model with wrong marker places look right."""
     rng = np.random.default_rng(0)
     places = trial.skeleton.marker_locals + rng.normal(0.0, 0.012, trial.skeleton.marker_locals.shape)
-    wrong = replace(trial, skeleton=trial.skeleton.with_places(places))
+    wrong = replace(trial, skeleton=trial.skeleton.with_positions(places))
     markers = [camera_noise(trial.markers, sd_m, rng) for sd_m in (0.001, 0.002)]
     kinematics = [kinematics_of(wrong, each, trial.foot_loads) for each in markers]
     outcome = estimated(wrong, kinematics, uncertainty=replace(GAIT27_UNCERTAINTY, marker_sd_m=None))

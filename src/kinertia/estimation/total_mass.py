@@ -18,7 +18,7 @@ _LIGHTEST_KG = 10.0
 
 
 @dataclass(frozen=True)
-class CarriedMass:
+class TotalMass:
     """Mass of the body alone and total mass with all attached objects, in kg.
 
     Attributes:
@@ -30,9 +30,9 @@ class CarriedMass:
         >>> pack = kinertia.Attached(
         ...     name="rucksack", segment="torso", mass_kg="10 +- 0.5", com_mm=[-200, 300, 0], on_scale=False
         ... )
-        >>> from kinertia.estimation.carried_mass import CarriedMass
-        >>> CarriedMass.of(70.0, [pack])
-        CarriedMass(body_kg=70.0, total_kg=80.0, sd_kg=0.5)
+        >>> from kinertia.estimation.total_mass import TotalMass
+        >>> TotalMass.of(70.0, [pack])
+        TotalMass(body_kg=70.0, total_kg=80.0, sd_kg=0.5)
     """
 
     body_kg: float
@@ -44,7 +44,7 @@ class CarriedMass:
         return f"{self.total_kg:.1f} kg" + (f", {beside:.1f} kg of it attached" if beside else "")
 
     @classmethod
-    def of(cls, stated_mass_kg: float, attached: Sequence[Attached]) -> CarriedMass:
+    def of(cls, stated_mass_kg: float, attached: Sequence[Attached]) -> TotalMass:
         """Compute the masses from the stated mass.
 
         Raises:
