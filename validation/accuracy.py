@@ -58,7 +58,7 @@ estimator where starts come from helps the masses and costs in the inertias.
 
 Errors put into the truth of a walk of 2.5 s (people unlike the literature, 1 mm of camera noise, prior of the
 literature), five people each. Per quantity: RMS error / mean posterior deviation (largest error in posterior
-deviations). Priors: plates and clock as in every fit, sound or faulty; hips 10 mm. BSPs: RMS errors of mass (kg), CoM
+deviations). Priors: plates and synchronisation as in every fit, fault-free or faulty; hips 10 mm. BSPs: RMS errors of mass (kg), CoM
 (mm), inertia (kg m2) with calibration free, held at its wrong values, and of the literature.
 
 {calibration}

@@ -120,7 +120,7 @@ OpenSim, and subject4's, scaled by AddBiomechanics (two walks and a series of sq
 
 *As it is*: markers and joints stay where the model has them; the estimate knows how far off they are. *Calibrated*
 (`--calibrate`): markers, and the centres of joints that turn about three axes (hips, back, shoulders), may move. Plates
-and clock are calibrated in both.
+and synchronisation are calibrated in both.
 
 ## Residual at the root, and markers
 

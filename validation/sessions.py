@@ -185,7 +185,7 @@ def document(sections: Sequence[str]) -> str:
 
 TEXT = """# Trials of one session
 
-Error bars of measured people can be judged without knowing the truth: trials of one session share plates and clock,
+Error bars of measured people can be judged without knowing the truth: trials of one session share plates and synchronisation,
 those of one person the body. Every trial below is fitted alone by `kinertia fit`, and what the fits say of the same
 unknown is compared.
 

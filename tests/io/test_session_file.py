@@ -48,7 +48,7 @@ def test_people_read_millimetres_and_milliseconds(written):
     ("old", "new", "problem"),
     [
         ('plates = ["plate 1"]', 'plates = ["plate 1", "plate 2"]', "must have 14 rows"),
-        ("right = [0.1", 'right = ["0.1"', "right"),
+        ("rhs = [0.1", 'rhs = ["0.1"', "rhs"),
         ("[[person]]", "[[people]]", "person"),
         ("kinertia = ", "x = ", "kinertia"),
     ],

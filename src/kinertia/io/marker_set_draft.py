@@ -22,7 +22,7 @@ _NEAR = 0.85
 _ANY_WIDTH_M, _USUAL_HEIGHT_M = 0.09, 1.7
 """Whether landmarks suffice depends on neither."""
 _LEG = ("asis", "knee_lateral", "ankle_lateral", "heel", "metatarsal")
-_WIDTHS = """# Joints without an inner marker: the widths in the PROCESSING group of the static C3D file, by its names.
+_WIDTHS = """# Joints without a medial marker: the widths in the PROCESSING group of the static C3D file, by its names.
 # For other files give them as knee_width_mm and so on under [subject] of a subject file."""
 _NEEDED = tuple(name for name in LANDMARKS if not name.startswith(("thigh_wand", "shank_wand", "head_top")))
 

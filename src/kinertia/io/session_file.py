@@ -100,10 +100,10 @@ def session_text(
         people: information from each person.
     """
     lines = [
-        "# Plates and clock of a session, found by kinertia instruments. For use in its fits, in the subject files:",
+        "# Plate and synchronisation errors of a session, from kinertia instruments. To use them, in the subject files:",
         "#     [instruments]",
         f"#     session = {json.dumps(name, ensure_ascii=False)}",
-        "# A fit leaves out what its own trials have said here. Values are errors, recorded minus true.",
+        "# A fit leaves out what its own trials contributed here. Values are errors, recorded minus true.",
         f"kinertia = {json.dumps(version)}",
     ]
     for instrument, quantities in values.items():
