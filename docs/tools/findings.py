@@ -18,7 +18,7 @@ DOCS = Path(__file__).resolve().parents[1]
 _INDEX = """# Findings
 
 Kinertia checks files, recordings, people, models and results with {count} rules. What a rule finds is a *finding*: it
-says what is wrong with its size, what that does to the results, what the likely causes are, and one thing to do.
+states what is wrong with its size, what that does to the results, the likely causes, and one thing to do.
 `kinertia explain P213` shows the same as these pages.
 
 A code is a family's letter, two digits for the question and one for the answer: P213 is one answer to P21, "Are the
@@ -35,7 +35,7 @@ A finding that *explains* another one hides it: of a recording with two labels s
 forces that seem to act beside the feet. The hidden ones are in `fit.json`, and folded below their cause in the report.
 
 A quantity about an instrument is its error, recorded minus true. Positive means: it reads too much, lies too far
-along the positive axis, is rotated counter-clockwise seen from above, or comes too late.
+along the positive axis, is rotated counter-clockwise seen from above, or is delayed.
 
 ## Overruling { #overruling }
 
