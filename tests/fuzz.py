@@ -144,7 +144,7 @@ def few_frames(recording: Recording) -> Recording:
     frames, samples = slice(60, 72), slice(60 * ratio, 71 * ratio + 1)
     loads = replace(plates, time=plates.time[samples], force=plates.force[samples], moment=plates.moment[samples])
     seen = Markers(markers.time[frames], markers.labels, markers.positions[frames])
-    return replace(recording, markers=seen, plates=replace(loads, idle=None))
+    return replace(recording, markers=seen, plates=replace(loads, unloaded=None))
 
 
 READERS = {

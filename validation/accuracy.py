@@ -31,15 +31,15 @@ markers and forces.
 {moments}
 
 At hips and back the estimate is better in every laboratory, and with wrong instruments everywhere below them, too.
-Where instruments *and* skeleton are exact, as no laboratory's are, the usual pipeline knows knee and ankle better: it
-trusts them, the estimate lets markers and joint centres move. On trials that OpenSim made, with OpenSim's own tools as
-the usual pipeline and its model kept as it is: [peers](peers.md).
+Where instruments *and* skeleton are exact, as in no laboratory, the usual pipeline is better at knee and ankle: it
+trusts them, whereas the estimate lets markers and joint centres move. On trials made by OpenSim, with OpenSim's own
+tools as the usual pipeline and its model kept as it is: [peers](peers.md).
 
 ## The study's noise, from starts 50 % off
 
 RMS errors of the 49 parameters of [the study](study.md), mean over {draws} draws: the walk of the package
 (1.14 m/s, one stride and margins, 41 markers, 100 Hz), the study's sinusoidal noise on every marker coordinate,
-every parameter of the start off by uniform +/-50 %. Both estimators see the same starts and markers and know the
+every parameter of the start changed by uniform +/-50 %. Both estimators see the same starts and markers and know the
 skeleton. The simultaneous estimate also knows that the start is within some 50 % ({uniform_sd:.2f} of its value as
 standard deviation), that left mirrors right, and the total mass within 0.5 %. It reads the noise from the markers, as
 `kinertia fit` does.
@@ -47,19 +47,19 @@ standard deviation), that left mirrors right, and the total mass within 0.5 %. I
 {study}
 
 **How good an estimate could be on this walk.** *At best* is the Cramér-Rao bound of an
-estimate that knows all that none can know: forces count as exact, and the covariance of the noise over time is that of
+estimate with perfect knowledge: forces count as exact, and the covariance of the noise over time is that of
 the study's sinusoids, so that only what they leave free is information, seen by cameras of 0.1 mm or even 0.01 mm. The
 moments of inertia are then still off by 0.05 kg m2: the trunk hardly turns at 1.14 m/s, so that one
 stride says little about its moments, which dominate the RMS, and they stay near the start. The lines after
 "simultaneous" change one thing each. How the noise is weighted changes the result by a few percent; telling the
-estimator where starts come from helps the masses and costs in the inertias.
+estimator where starts come from helps the masses and worsens the inertias.
 
 ## Calibration
 
 Errors put into the truth of a walk of 2.5 s (people unlike the literature, 1 mm of camera noise, prior of the
 literature), five people each. Per quantity: RMS error / mean posterior deviation (largest error in posterior
-deviations). Priors: plates and synchronisation as in every fit, fault-free or faulty; hips 10 mm. BSPs: RMS errors of mass (kg), CoM
-(mm), inertia (kg m2) with calibration free, held at its wrong values, and of the literature.
+deviations). Priors: plates and synchronisation as in every fit, fault-free or faulty; hips 10 mm. BSPs: RMS errors of
+mass (kg), CoM (mm), inertia (kg m2) with calibration free, held at its wrong values, and of the literature.
 
 {calibration}
 

@@ -19,8 +19,8 @@ from kinertia.estimation.simultaneous.fisher_information import Information
 from kinertia.estimation.simultaneous.observed_trial import Observation
 from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.report.truth_comparison import JOINTS
-from kinertia.studies.drawn_people import Scenario, estimate_person
 from kinertia.studies.parallel import in_parallel
+from kinertia.studies.simulated_people import Scenario, estimate_person
 from kinertia.synthetic.faults import Faults
 from kinertia.synthetic.walk import SyntheticTrial
 from kinertia.trial.rms import rms

@@ -36,7 +36,7 @@ from validation.measured_person import MeasuredPerson, write_person
 from validation.measured_person import read_person as read_measured
 from validation.mistakes import MISTAKES, Mistake
 
-Outcome = Literal["named", "warned", "harmless", "silent", "not possible"]
+Outcome = Literal["identified", "warned", "harmless", "unnoticed", "not possible"]
 """Outcome of a fault: identified; other findings are new; moments within their SDs; neither; there is
 nothing to make it with."""
 _WALK_S, _PLATE_RATE_HZ, _START, _SAMPLES_PER_FRAME = 2.7, 1000.0, 0.75, 10
@@ -184,7 +184,7 @@ def outcome_of(sound: SoundWalk, mistake: Mistake) -> FaultOutcome:
     with TemporaryDirectory() as folder:
         path = write_person(Path(folder), person)
         by_check = judged(case, mistake, sound.checked, checked(path), "check")
-        if by_check is not None and by_check.outcome == "named":
+        if by_check is not None and by_check.outcome == "identified":
             return by_check
         try:
             fit = fit_subject(path)
@@ -192,7 +192,7 @@ def outcome_of(sound: SoundWalk, mistake: Mistake) -> FaultOutcome:
             by_fit = judged(case, mistake, sound.findings, findings_of(error), "fit")
             return by_check or by_fit or replace(case, outcome="warned", said=str(error), by="fit")
     sd, nm = change(sound.moments, moments_of(fit))
-    silent = replace(case, outcome="harmless" if sd <= 1.0 else "silent")
+    silent = replace(case, outcome="harmless" if sd <= 1.0 else "unnoticed")
     by_fit = judged(case, mistake, sound.findings, fit.findings, "fit")
     return replace(by_fit or by_check or silent, change_sd=sd, change_nm=nm)
 
@@ -216,15 +216,15 @@ def checked(subject: Path) -> tuple[Finding, ...]:
 def judged(
     case: FaultOutcome, mistake: Mistake, sound: Sequence[Finding], findings: Sequence[Finding], by: str
 ) -> FaultOutcome | None:
-    """Return the outcome by new findings compared with the fault-free files: "named" where a code of the fault is among
-    them, "warned" where only others are; None where nothing is new.
+    """Return the outcome by new findings compared with the fault-free files: "identified" where a code of the fault is
+    among them, "warned" where only others are; None where nothing is new.
     """
     new = [one for one in reported(findings) if _is_new(one, reported(sound))]
     naming = [one for one in new if one.code in mistake.codes]
     if not new:
         return None
     first = (naming or new)[0]
-    outcome: Outcome = "named" if naming else "warned"
+    outcome: Outcome = "identified" if naming else "warned"
     return replace(case, outcome=outcome, code=first.code, said=first.message, by=by)
 
 

@@ -24,19 +24,20 @@ from validation.measured_data import data_folder
 from validation.page import write_page
 from validation.walks import subject_files
 
-_CODE_HEADINGS = ("code", "finding", "named", "warned", "fault-free walks")
+_CODE_HEADINGS = ("code", "finding", "identified", "warned", "fault-free walks")
 SOUND_LABORATORIES = 10
-_OUTCOMES = ("named", "warned", "harmless", "silent")
+_OUTCOMES = ("identified", "warned", "harmless", "unnoticed")
 _PAGE = """# Which faults are identified?
 
 Laboratories make mistakes: swapped labels, a wrong axis, another person's static trial. Each of {count} known ones was
 made in the files of {walks} walks, one at a time, and given to `kinertia check`; what it did not identify was fitted.
 `python -m validation faults SUBJECT ...` does so with your own walks.
 
-- **named**: a new open finding has a code of the fault (by `check` or, marked \\*, by the fit, which may correct it)
+- **identified**: a new open finding has a code of the fault (by `check` or, marked \\*, by the fit, which may
+  correct it)
 - **warned**: new findings have other codes only
 - **harmless**: nothing is new, and no joint moment of the legs changes by more than its standard deviation (RMS)
-- **silent**: nothing is new, and one does
+- **unnoticed**: nothing is new, and one does
 - –: the walk has nothing to make the fault with (Plug-in Gait has no medial markers, force files have no plates)
 
 {summary}
@@ -47,36 +48,39 @@ made in the files of {walks} walks, one at a time, and given to `kinertia check`
 
 {codes}
 
-## What cannot be named
+## What cannot be identified
 
-- The other sex: it changes the literature's values by less than people of one sex differ. Joint moments change by 0.3
-  to 0.7 of their deviations, in one of seven walks by 1.4.
-- Turned plates, where markers are noisy: they show in the direction in which they push the body, to a third of a degree
-  in most walks, but to 1.6 degrees in the Gait 2354 walk (60 frames a second), where 3 degrees may be chance and change
-  moments by twice their deviations. A note of the fit then says from which angle on its trials show a turn. The path of
-  the centre of pressure under the feet tells less: on sound walks, right and left together, it is up to 4 degrees askew
-  to the line from heel to toe.
-- A floor that is too low by less than thick soles are high. It is named where the feet's lowest marker is more than
-  50 mm above the floor; on fourteen people it is 23 to 44 mm. The forces would show it to 13 to 24 mm: too little.
-- A wrong rate of a C3D file by less than a factor of 1.8. Markers and forces share its clock, so that loads still begin
-  when feet land. Only the body's ups and downs show it: at 1.2 times the rate forces move it 0.7 times as fast as its
-  markers show in the Plug-in Gait walk of subject A, and 0.8 to 1.05 times (by the markers' centre) on sound trials.
-- A zero of one loaded plate, or a gain by less than 7.5 %, in less than a second of measured steps: its share of so
-  short a motion is not told from what pelvis and limbs do against one another.
-- What is told by another cause, or hardly: somebody else's foot on a plate, a step over its edge and cameras that are
-  tilted to the side (gains and places of plates are doubted), free moments that are too large, forces of another trial
-  of the same person (a rate), and another scale of the cameras in static trial and walk alike (places of plates). Of an
-  origin of the plates 40 mm too deep nothing is said, and moments change by 1.2 to 3 deviations; nor always of centres
-  of pressure that were filtered later than the forces, or of half of the cameras' volume that is 15 to 30 mm higher.
-- Of a person's own OpenSim model: joint centres or axes that are off on both sides alike by 20 to 30 mm or 15 degrees,
-  markers of both feet that are 20 mm too far forward in the model, and bones that are 5 to 10 % too long or short with
-  markers placed on the person. Joint moments change by 5 to 14 N m, more than their deviations, which take a model's
-  joints as exact, or with `--calibrate` as known to a centimetre. Nor, with such a model, of markers that are 20 mm
+- The other sex: its effect on the literature's values is smaller than the differences between people of one sex.
+  Joint moments change by 0.3 to 0.7 of their SDs, in one of seven walks by 1.4.
+- Rotated plates, if markers are noisy: rotations show in the direction in which the plates accelerate the body,
+  within a third of a degree in most walks, but within 1.6 degrees in the Gait 2354 walk (60 frames a second), where 3
+  degrees may be chance and change moments by two SDs. A note of the fit then states from which angle on its trials
+  show a rotation. The path of the centre of pressure under the feet shows less: on fault-free walks, right and left
+  together, it is up to 4 degrees from the line between heel and toe.
+- A floor that is too low by less than the height of thick soles. It is identified if the feet's lowest marker is more
+  than 50 mm above the floor; on fourteen people it is 23 to 44 mm. The forces would show it within 13 to 24 mm: too
+  little.
+- A wrong rate of a C3D file by less than a factor of 1.8. Markers and forces share its time base, so loads still
+  begin at foot contact. Only the vertical motion shows it: at 1.2 times the rate forces move the body 0.7 times as
+  fast as the markers show in the Plug-in Gait walk of subject A, and 0.8 to 1.05 times (marker-based centre) on
+  fault-free trials.
+- A zero offset of one loaded plate, or a gain error below 7.5 %, in less than a second of measured steps: its effect
+  cannot be distinguished from the motion of pelvis and limbs relative to each other.
+- Faults reported with another cause, or hardly at all: another person's foot on a plate, a step over its edge and
+  cameras tilted sideways (reported as gains and positions of plates), free moments that are too large, forces of
+  another trial of the same person (as a rate), and the same wrong camera scale in static trial and walk (as positions
+  of plates). An origin of the plates 40 mm too deep is not reported, and moments change by 1.2 to 3 SDs; nor always
+  are centres of pressure that were filtered later than the forces, or half of the cameras' volume being 15 to 30 mm
+  higher.
+- In a person's own OpenSim model: joint centres or axes displaced on both sides equally by 20 to 30 mm or 15 degrees,
+  markers of both feet that are 20 mm too far forward in the model, and bones that are 5 to 10 % too long or short
+  with markers placed on the person. Joint moments change by 5 to 14 N m, more than their SDs, which take a model's
+  joints as exact, or with `--calibrate` as known to a centimetre. Nor, with such a model, markers that are 20 mm
   further along the walkway than the plates (7 to 11 N m).
 - Forces that were low-passed at 5 Hz and set to zero below a threshold afterwards. Without the threshold the filter's
-  ringing beside each load tells them. What is left under the feet does not: of sound walks, too, 2 to 10 % of the
-  energy of the force's changes is above 6 Hz, and of walks filtered at 5 Hz 1 to 4 %; loads begin and end within 20 ms
-  of when they did; and between 3 and 7 Hz sound forces move the body 0.4 to 1.3 times as fast as the markers show,
+  overshoot next to each load shows it. The load itself does not: on fault-free walks, too, 2 to 10 % of the energy of
+  force changes is above 6 Hz, and on walks filtered at 5 Hz 1 to 4 %; loads begin and end within 20 ms of the
+  original times; and between 3 and 7 Hz fault-free forces move the body 0.4 to 1.3 times as fast as the markers show,
   filtered ones 0.2 to 1.0 times.
 
 ## What is found in fault-free walks
@@ -94,7 +98,7 @@ def faults_markdown(
     sound: Sequence[SoundWalk], outcomes: Sequence[FaultOutcome], laboratories: Sequence[SoundWalk]
 ) -> str:
     """Return the tables and their summary."""
-    emphasised = {"silent": "**silent**", "named*": "named \\*"}
+    emphasised = {"unnoticed": "**unnoticed**", "identified*": "identified \\*"}
     *most, last = [[row[0], *(emphasised.get(cell, cell) for cell in row[1:])] for row in faults_rows(sound, outcomes)]
     return _PAGE.format(
         count=len(most) - 1,
@@ -114,7 +118,7 @@ def code_rows(fault_free: Sequence[SoundWalk], outcomes: Sequence[FaultOutcome])
     """Return a row for each code: how many faults it identifies, for how many it is the first other finding, and in how
     many fault-free walks it is found.
     """
-    named, warned = (Counter(one.code for one in outcomes if one.outcome == kind) for kind in ("named", "warned"))
+    named, warned = (Counter(one.code for one in outcomes if one.outcome == kind) for kind in ("identified", "warned"))
     without = Counter(code for walk in fault_free for code in {one.code for one in reported(walk.findings)})
     codes = sorted({*named, *warned, *without} - {""})
     return [[code, rule(code).name, str(named[code]), str(warned[code]), str(without[code])] for code in codes]
@@ -128,7 +132,7 @@ def faults_rows(sound: Sequence[SoundWalk], outcomes: Sequence[FaultOutcome]) ->
     mistakes = dict.fromkeys(one.mistake for one in outcomes)
     rows = [[name, *(_cell(by_case[walk.name, name]) for walk in sound)] for name in mistakes]
     rows.insert(0, ["none: the walk as it is", *(_codes(walk) for walk in sound)])
-    return [*rows, ["named / possible", *(_named(walk.name, outcomes) for walk in sound)]]
+    return [*rows, ["identified / possible", *(_named(walk.name, outcomes) for walk in sound)]]
 
 
 def faults_sentence(
@@ -138,8 +142,9 @@ def faults_sentence(
     sums = counts(outcomes)
     possible = sum(sums.values())
     return (
-        f"Of {possible} faults, {sums['named']} are named ({100 * sums['named'] / max(possible, 1):.0f} %), "
-        f"{sums['warned']} warned of with other codes, {sums['harmless']} harmless, and {sums['silent']} silent. "
+        f"Of {possible} faults, {sums['identified']} are identified "
+        f"({100 * sums['identified'] / max(possible, 1):.0f} %), {sums['warned']} reported with other codes, "
+        f"{sums['harmless']} harmless, and {sums['unnoticed']} unnoticed. "
         f"Of {len(sound)} fault-free walks {_count(sound, Severity.ERROR)} are blocked, and "
         f"{_count(sound, Severity.WARNING)} have a warning. Of {len(laboratories)} other people in fault-free "
         f"synthetic laboratories {_count(laboratories, Severity.ERROR)} are blocked, and "
@@ -166,12 +171,12 @@ def _findings_of_sound(sound: Sequence[SoundWalk]) -> list[str]:
 def _cell(one: FaultOutcome) -> str:
     if one.outcome == "not possible":
         return "–"
-    return one.outcome + ("*" if one.outcome == "named" and one.by == "fit" else "")
+    return one.outcome + ("*" if one.outcome == "identified" and one.by == "fit" else "")
 
 
 def _named(walk: str, outcomes: Sequence[FaultOutcome]) -> str:
     own = [one for one in outcomes if one.walk == walk and one.outcome != "not possible"]
-    return f"{sum(one.outcome == 'named' for one in own)} / {len(own)}"
+    return f"{sum(one.outcome == 'identified' for one in own)} / {len(own)}"
 
 
 def faults_summary(

@@ -71,17 +71,17 @@ _POSITIONS = _codes("P242", "P243", "P244", "P246")
 MISTAKES = (
     # labels
     Mistake(
-        "outer and inner knee markers swapped in the static trial, one leg",
+        "lateral and medial knee markers swapped in the static trial, one leg",
         markers.exchanged(("knee_lateral_r", "knee_medial_r"), where="static"),
         _codes("L208", "L212"),
     ),
     Mistake(
-        "outer and inner ankle markers swapped in the static trial, one leg",
+        "lateral and medial ankle markers swapped in the static trial, one leg",
         markers.exchanged(("ankle_lateral_l", "ankle_medial_l"), where="static"),
         _codes("L208", "L212"),
     ),
     Mistake(
-        "outer and inner elbow markers swapped in the static trial, one arm",
+        "lateral and medial elbow markers swapped in the static trial, one arm",
         markers.exchanged(("elbow_lateral_r", "elbow_medial_r"), where="static"),
         _codes("L208", "L212"),
     ),

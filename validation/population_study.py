@@ -34,8 +34,8 @@ from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import inverse_dynamics
 from kinertia.motion.kinematics import Kinematics
 from kinertia.settings import Attached, Instruments, Subject
-from kinertia.studies.drawn_people import WALK_S
 from kinertia.studies.parallel import in_parallel
+from kinertia.studies.simulated_people import WALK_S
 from kinertia.synthetic.faults import Faults, measured
 from kinertia.synthetic.manner import Manner
 from kinertia.synthetic.walk import HEIGHT_M, MASS_KG, SEX, SyntheticTrial, walk, walking_subject

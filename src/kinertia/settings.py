@@ -333,8 +333,8 @@ class Attached(Table):
     com_sd_mm: float = Field(default=30.0, gt=0.0, le=500.0, description="SD of that along each axis, mm")
     size_mm: Size | None = Field(
         default=None,
-        description="its extent along the same axes, for its inertia: that of a solid block; left out: of a ball of "
-        "the density of water",
+        description="size along the same axes, for its inertia as a solid block; left out: a ball with the density "
+        "of water",
     )
 
 

@@ -2,7 +2,7 @@
 
 from kinertia.cli.compiling import compile_markers
 from kinertia.estimation.simultaneous import marker_terms
-from kinertia.studies.drawn_people import Scenario, estimate_person
+from kinertia.studies.simulated_people import Scenario, estimate_person
 from kinertia.synthetic.faults import Faults
 
 

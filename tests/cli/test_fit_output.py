@@ -69,7 +69,7 @@ def test_a_fit_with_a_model_says_model_and_what_is_kept(fit):
     assert "literature" not in shown.replace("from the literature", "")
     assert re.search(r"RMS \(max\), +model +corrected +estimate", shown)
     assert re.search(r"total mass \(kg\): stated 72\.6, model [\d.]+, estimate [\d.]+", shown)
-    assert len(re.findall(r"^ +sd +kept *$", shown, re.MULTILINE)) == 1
+    assert len(re.findall(r"^ +sd +fixed *$", shown, re.MULTILINE)) == 1
 
 
 NOT_CONVERGED = finding("R201", iterations=Quantity(30, "1"))

@@ -49,7 +49,7 @@ def test_count_is_what_joints_hide(base):
     assert base.count == 120 - 5 - 3 * 4
     assert len(base.never) == 9
     assert "mass moving between pelvis and thigh_r at the centre of their joint" in base.never
-    knee = "mass moving between thigh_l and shank_l on the axis of their joint, however it is spread along it"
+    knee = "mass moving between thigh_l and shank_l on the axis of their joint, with any distribution along it"
     assert knee in base.never
 
 

@@ -136,7 +136,7 @@ def test_what_an_idle_plate_reads_is_taken_off_its_loads(tmp_path):
         read_c3d(write_c3d(tmp_path / name, points, labels, steps + more, plate)).plates
         for name, more in (("sound.c3d", 0.0 * level), ("wrong.c3d", level))
     )
-    assert (sound.idle[0].subtracted, wrong.idle[0].subtracted) == (False, True)
+    assert (sound.unloaded[0].subtracted, wrong.unloaded[0].subtracted) == (False, True)
     np.testing.assert_allclose(wrong.force, sound.force, atol=1e-3)
     np.testing.assert_allclose(wrong.moment, sound.moment, atol=1e-2)
 

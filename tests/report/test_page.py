@@ -122,7 +122,7 @@ def test_held_segments_are_named_and_not_counted(of_model):
     held = [row for row in bsp_rows(of_model) if row["segment"].startswith("forearm")]
     assert len(held) == 20
     assert {row["evidence"] for row in held} == {"held"}
-    assert page.count("<td>kept</td>") == 20
+    assert page.count("<td>fixed</td>") == 20
     assert "nan" not in re.findall(r'data-sort="([^"]*)"', page)
 
 

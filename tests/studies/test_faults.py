@@ -36,9 +36,9 @@ from validation.mistakes import MISTAKES, Mistake
 from validation.walks import subject_files
 
 NOT_POSSIBLE = {
-    "outer and inner knee markers swapped in the static trial, one leg",
-    "outer and inner ankle markers swapped in the static trial, one leg",
-    "outer and inner elbow markers swapped in the static trial, one arm",
+    "lateral and medial knee markers swapped in the static trial, one leg",
+    "lateral and medial ankle markers swapped in the static trial, one leg",
+    "lateral and medial elbow markers swapped in the static trial, one arm",
 }
 """Plug-in Gait has no inner markers."""
 LEFT_TO_THE_FIT = {
@@ -86,7 +86,7 @@ def test_mistakes_are_named(mistake, person, sound, tmp_path):
         assert judgement is None
     else:
         assert judgement is not None
-        assert judgement.outcome == "named", judgement.code
+        assert judgement.outcome == "identified", judgement.code
 
 
 @pytest.mark.parametrize("name", ["all left and right labels swapped", "forces 100 ms late"])
@@ -117,8 +117,8 @@ def outcome(before, after):
 def test_a_new_code_of_the_fault_names_it_whatever_else_is_new():
     jump, zero = finding("M112", Where(trial="walk"), Severity.ERROR), finding("P213", WALK)
     assert outcome([], [jump]) == ("warned", "M112")
-    assert outcome([], [jump, zero]) == ("named", "P213")
-    assert outcome([jump], [jump, zero]) == ("named", "P213")
+    assert outcome([], [jump, zero]) == ("identified", "P213")
+    assert outcome([jump], [jump, zero]) == ("identified", "P213")
     assert outcome([], [zero.muted("P211")]) is None
     assert outcome([], [finding("R111", Where(trial="walk"))]) is None, "an assumption"
 
@@ -126,10 +126,10 @@ def test_a_new_code_of_the_fault_names_it_whatever_else_is_new():
 def test_what_is_found_without_the_fault_is_new_where_it_is_worse_or_another_size():
     zero = finding("P213", WALK)
     assert outcome([zero], [zero]) is None
-    assert outcome([zero], [zero.at(Severity.ERROR)]) == ("named", "P213")
+    assert outcome([zero], [zero.at(Severity.ERROR)]) == ("identified", "P213")
     small, alike, large = (finding("P213", WALK, level_n=Quantity(value, "N", sd=1.0)) for value in (5.0, 7.0, 9.0))
     assert outcome([small], [alike]) is None
-    assert outcome([small], [large]) == ("named", "P213")
+    assert outcome([small], [large]) == ("identified", "P213")
 
 
 def test_changes_are_counted_in_deviations():
@@ -149,9 +149,9 @@ def outcomes():
         SoundWalk("other", None, FAULTY, FAULTY, JointMoments(None, (), None, None)),
     ]
     of_mistakes = [
-        FaultOutcome("one", "a", "named", "P213", "said", "check"),
-        FaultOutcome("other", "a", "named", "P215", "said", "fit", 2.0, 3.0),
-        FaultOutcome("one", "b", "silent", change_sd=2.0, change_nm=3.0),
+        FaultOutcome("one", "a", "identified", "P213", "said", "check"),
+        FaultOutcome("other", "a", "identified", "P215", "said", "fit", 2.0, 3.0),
+        FaultOutcome("one", "b", "unnoticed", change_sd=2.0, change_nm=3.0),
         FaultOutcome("other", "b", "not possible"),
         FaultOutcome("one", "c", "harmless", change_sd=0.5, change_nm=1.0),
         FaultOutcome("other", "c", "warned", "M113", "other", "check"),
@@ -162,14 +162,14 @@ def outcomes():
 
 def test_page(outcomes):
     page = faults_markdown(*outcomes)
-    assert "| a | named | named \\* |" in page
-    assert "| b | **silent** | – |" in page
-    assert "Of 5 faults, 2 are named (40 %), 1 warned of with other codes, 1 harmless, and 1 silent." in page
-    assert "| **named / possible** | **1 / 3** | **1 / 2** |" in page
+    assert "| a | identified | identified \\* |" in page
+    assert "| b | **unnoticed** | – |" in page
+    assert "Of 5 faults, 2 are identified (40 %), 1 reported with other codes, 1 harmless, and 1 unnoticed." in page
+    assert "| **identified / possible** | **1 / 3** | **1 / 2** |" in page
     assert "| none: the walk as it is | none | M113 P213 T214 P215 |" in page
     assert "Of 2 fault-free walks 1 are blocked, and 2 have a warning." in page
     assert "- one: nothing\n- other: M113 " in page
-    assert counts(outcomes[1]) == {"named": 2, "warned": 1, "harmless": 1, "silent": 1}
+    assert counts(outcomes[1]) == {"identified": 2, "warned": 1, "harmless": 1, "unnoticed": 1}
     content = json.loads(json.dumps(faults_summary(*outcomes)))
     assert content["outcomes"][0]["change_nm"] is None
     assert [one["code"] for one in content["sound"]["other"]] == [one.code for one in FAULTY]
@@ -189,8 +189,8 @@ def test_own_walks_are_printed_and_leave_the_page_alone(outcomes, c3d_lab, tmp_p
     monkeypatch.setattr(faults, "write_page", None)
     faults.main([c3d_lab / "subject.toml"], tmp_path / "details.json")
     assert list(asked) == ["synthetic walk", "synthetic walker"]
-    assert "| b | **silent** | – |" in capsys.readouterr().out
-    assert json.loads((tmp_path / "details.json").read_text())["outcomes"][2]["outcome"] == "silent"
+    assert "| b | **unnoticed** | – |" in capsys.readouterr().out
+    assert json.loads((tmp_path / "details.json").read_text())["outcomes"][2]["outcome"] == "unnoticed"
 
 
 def test_measured_walks_have_subject_files(tmp_path):
@@ -223,8 +223,8 @@ def test_study_of_a_walk(tmp_path):
     assert sound.moments is not None
     assert not any(one.severity is Severity.ERROR for one in reported(sound.findings))
     by_name = {one.mistake: one for one in outcomes_of_faults}
-    assert (by_name["forces in kg"].outcome, by_name["forces in kg"].by) == ("named", "check")
+    assert (by_name["forces in kg"].outcome, by_name["forces in kg"].by) == ("identified", "check")
     other = by_name["the other sex"]
-    assert other.outcome in ("harmless", "named", "warned")
+    assert other.outcome in ("harmless", "identified", "warned")
     assert other.change_sd < 1.0
     assert outcome_of(sound, Mistake("none", lambda person, rng: None, frozenset())).outcome == "not possible"

@@ -10,7 +10,7 @@ from kinertia.estimation.simultaneous.fisher_information import Information
 from kinertia.estimation.simultaneous.instruments import InstrumentPrior
 from kinertia.estimation.simultaneous.mixture_prior import FaultMixture
 from kinertia.estimation.simultaneous.problem import MapProblem
-from kinertia.studies.drawn_people import held
+from kinertia.studies.simulated_people import held
 from kinertia.synthetic.walk import walking_subject
 from validation import study_bound
 from validation.accuracy_study import at_truth

@@ -93,7 +93,7 @@ def test_files_of_two_belts(tmp_path, kind):
     [
         ("a.csv", "time_s,right_m_s\n0,1\n", "F103", {"found": "time_s, right_m_s", "expected": "speed_m_s"}),
         ("a.csv", "time_s,right_m_s,left_m_s\n0,1,50\n", "F181", {"speed_m_s": (1.0, 50.0)}),
-        ("a.csv", "time_s,speed_m_s\n1,1\n1,1\n", "F181", {"problem": "grow"}),
+        ("a.csv", "time_s,speed_m_s\n1,1\n1,1\n", "F181", {"problem": "increase"}),
         ("a.mot", "grf\nendheader\ntime\tbelt_speed_left\n0\t1\n1\t1\n", "F181", {"problem": "belt_speed_right and"}),
     ],
 )

@@ -87,7 +87,7 @@ def _bsp_table(fit: Fit) -> Table:
             table.add_row(segment, source, *cells)
             segment = ""
         if fit.posterior is not None and not fit.posterior.prior_sd[i].any():
-            table.add_row("", "sd", "kept")
+            table.add_row("", "sd", "fixed")
         elif fit.posterior is not None:
             sd = fit.posterior.sd[i]
             table.add_row(

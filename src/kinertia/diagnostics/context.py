@@ -1,4 +1,4 @@
-"""Holds one recording as its questions see it, with evidence computed once."""
+"""Holds one recording for its questions, with evidence computed once."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ _STRAIGHT = 0.87
 
 @dataclass(frozen=True, eq=False)
 class RecordingContext:
-    """One recording as its questions see it.
+    """One recording, for the questions about it.
 
     Attributes:
         recording: in ground axes, SI units; its name is the trial's.
@@ -214,7 +214,7 @@ class RecordingContext:
 
     @cached_property
     def whole_contacts(self) -> Sequence[PlateContact]:
-        """`contacts` of feet that do not reach beyond their plate by so much that a part of the load is elsewhere."""
+        """`contacts` of feet whose whole load is on their plate, with little of the foot beyond its edge."""
         far = [one for one in self.overhangs if one.overhang_m > LITTLE_BEYOND_M]
         return [
             one
@@ -355,7 +355,7 @@ class RecordingContext:
 
     @property
     def plates_reached_beyond(self) -> frozenset[str]:
-        """Names of plates that a foot reaches beyond by so much that a part of its load is elsewhere."""
+        """Names of plates that a foot exceeds so far that part of its load is elsewhere."""
         names = () if self.plates is None else self.plates.names
         return frozenset(names[one.plate] for one in self.overhangs if one.overhang_m > LITTLE_BEYOND_M)
 

@@ -205,7 +205,7 @@ def _hidden_between(parent: str, child: str, hidden: int) -> str:
     if hidden == 1:
         return f"mass moving between {parent} and {child} at the centre of their joint"
     if hidden == 3:
-        return f"mass moving between {parent} and {child} on the axis of their joint, however it is spread along it"
+        return f"mass moving between {parent} and {child} on the axis of their joint, with any distribution along it"
     if hidden == len(PARAMETERS):
         return f"anything moving between {parent} and {child}: their joint is fixed"
     return f"{hidden} combinations of {parent} and {child}"

@@ -25,7 +25,7 @@ from kinertia.io.trc import METRES_PER_UNIT
 from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads
 from kinertia.trial.force_spikes import without_spikes
 from kinertia.trial.impossible_data import impossible_load
-from kinertia.trial.plate_loading import joined, largest_n, without_idle
+from kinertia.trial.plate_loading import joined, largest_n, without_unloaded_level
 
 PLATE_TYPES = (1, 2, 3, 4)
 """Those that ezc3d reads."""
@@ -166,7 +166,7 @@ def to_ground_plates(
         if largest < -LOAD_THRESHOLD_N:
             own_force, own_moment = -own_force, -own_moment
             findings.append(finding("F157", where, force_n=Quantity(largest, "N")))
-        plate = without_idle(time, np.nan_to_num(own_force), np.nan_to_num(own_moment))
+        plate = without_unloaded_level(time, np.nan_to_num(own_force), np.nan_to_num(own_moment))
         loaded = plate.force[:, 1] >= LOAD_THRESHOLD_N
         lost = np.isnan(own_force).any(axis=1) | (loaded & np.isnan(own_moment).any(axis=1))
         if lost.any():

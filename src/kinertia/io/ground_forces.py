@@ -23,7 +23,7 @@ from kinertia.model.anatomy import segment_of
 from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads
 from kinertia.trial.force_spikes import without_spikes
 from kinertia.trial.impossible_data import impossible_load
-from kinertia.trial.plate_loading import PlateLoad, joined, largest_n, without_idle
+from kinertia.trial.plate_loading import PlateLoad, joined, largest_n, without_unloaded_level
 from kinertia.trial.torque_columns import torque_columns
 
 _FOOT_WORDS = {"r": "r", "right": "r", "l": "l", "left": "l"}
@@ -111,7 +111,7 @@ def _plate_load(path: Path, table: TimeTable, group: _Columns, turn: FloatArray)
     if largest_n(table.time, force) < -LOAD_THRESHOLD_N:
         down = {"force_n": Quantity(float(force[:, 1].min()), "N"), "column": Quantity(f"{group.force}{'xyz'[up]}")}
         raise FileError.found(path, "F157", None, Where(plate=group.name), **down)
-    plate = without_idle(table.time, force, moment)._replace(spikes=spikes)
+    plate = without_unloaded_level(table.time, force, moment)._replace(spikes=spikes)
     for identifier in filter(None, (group.point, group.torque)):
         _expect_numbers(path, table, group, identifier, plate.force[:, 1] >= LOAD_THRESHOLD_N)
     return plate

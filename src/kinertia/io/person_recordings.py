@@ -13,7 +13,7 @@ from kinertia.io.recording import read_recording
 from kinertia.io.subject_tables import SubjectFile, TrialFiles
 from kinertia.model.marker_set import MarkerSet
 from kinertia.trial.data import Recording
-from kinertia.trial.plate_loading import with_idle_levels
+from kinertia.trial.plate_loading import with_unloaded_levels
 from kinertia.trial.plate_names import with_plates_of_trial
 from kinertia.trial.trial_input import TrialInput
 
@@ -70,4 +70,4 @@ def _as_zeroed(wanted: SubjectFile, recording: Recording) -> Recording:
     """Restore the unloaded readings of plates in their loads, where the laboratory states that they were zeroed."""
     if not wanted.instruments.zeroed or recording.plates is None:
         return recording
-    return replace(recording, plates=with_idle_levels(recording.plates))
+    return replace(recording, plates=with_unloaded_levels(recording.plates))

@@ -100,7 +100,7 @@ def session_text(
         people: information from each person.
     """
     lines = [
-        "# Plate and synchronisation errors of a session, from kinertia instruments. To use them, in the subject files:",
+        "# Plate and synchronisation errors of a session, from kinertia instruments. For the subject files:",
         "#     [instruments]",
         f"#     session = {json.dumps(name, ensure_ascii=False)}",
         "# A fit leaves out what its own trials contributed here. Values are errors, recorded minus true.",

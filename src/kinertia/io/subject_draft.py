@@ -158,7 +158,7 @@ def _expect_files(folder: Path) -> list[Path]:
             problem += f", but its folder {_relative(inside[0], folder)} does; give that one"
         elif inside:
             listed = ", ".join(_relative(one, folder) for one in inside[:_LISTED]) + (", ..." * (len(inside) > _LISTED))
-            problem += f", but its folders {listed} do; give the folder of one person, with the static trial in it"
+            problem += f", but its folders {listed} do; give one person's folder, with the static trial"
         action = Quantity("Give a folder with the recordings of one person")
         raise FileError.found(folder, "F108", problem=Quantity(problem), action=action)
     return files

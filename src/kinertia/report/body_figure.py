@@ -269,7 +269,7 @@ def _by_mass(fit: Fit) -> _Colours:
     for i, name in enumerate(map(segment_name, fit.estimate.segments)):
         bar = "" if sd is None else f" ± {fixed(INTERVAL_SD * sd[i], 2)}"
         change = f"{fixed(after[i] - before[i], 2, sign=True)}{bar} kg ({fixed(percent[i], 0, sign=True)} %)"
-        texts.append(f"{name}: {change if np.isfinite(percent[i]) else 'kept'}")
+        texts.append(f"{name}: {change if np.isfinite(percent[i]) else 'fixed'}")
     reach = max(_LEAST_PERCENT, float(np.nanmax(np.abs(percent), initial=0.0)))
     return _Colours(
         percent,

@@ -14,8 +14,8 @@ from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
 from kinertia.estimation.simultaneous.fit import Posterior
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation
 from kinertia.estimation.simultaneous.marker_noise import MarkerNoise
+from kinertia.estimation.simultaneous.mass_asymmetry import OneSided
 from kinertia.estimation.simultaneous.model_evidence import FreeMomentSign
-from kinertia.estimation.simultaneous.one_sided_mass import OneSided
 from kinertia.estimation.simultaneous.posterior_draws import PosteriorDraws, TrialDraws
 from kinertia.estimation.simultaneous.prior_plausibility import Unlikeness
 from kinertia.findings.finding import Finding

@@ -1,6 +1,6 @@
 """Finds the body segment parameters that are not highly sensitive to noisy kinematics: the study's open question.
 
-People drawn from the literature's prior walk and are estimated (`drawn_people`), with one thing changed at a
+People drawn from the literature's prior walk and are estimated (`simulated_people`), with one thing changed at a
 time: amplitude and kind of the noise, number of strides, additional squats. The RMS error over people of each parameter
 is reported as a share of the literature's on the same people.
 """
@@ -14,8 +14,8 @@ from functools import partial
 import numpy as np
 
 from kinertia.model.bsp import PARAMETERS
-from kinertia.studies.drawn_people import Scenario, estimate_person
 from kinertia.studies.parallel import in_parallel
+from kinertia.studies.simulated_people import Scenario, estimate_person
 from kinertia.synthetic.faults import Faults
 from kinertia.synthetic.walk import walking_subject
 

@@ -27,9 +27,9 @@ from kinertia.trial.belt import Belt
 from kinertia.trial.file_outputs import FileOutputs
 from kinertia.trial.force_spikes import ForceSpike
 from kinertia.trial.gait_event import FileEvent
-from kinertia.trial.idle_level import IdleReading
 from kinertia.trial.impossible_data import impossible_markers, impossible_plates
 from kinertia.trial.sampled_time import nearest_samples, windows, within
+from kinertia.trial.unloaded_level import UnloadedReading
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -147,7 +147,7 @@ class PlateLoads:
             wrong: `kinertia.trial.plate_assignment` decides from the data.
         corners: (p, 4, 3) m, or None where the file has none.
         noise_n: standard deviation of each plate's vertical force while it is unloaded, N; None where it is unknown.
-        idle: reading of each plate while it was unloaded, before that was subtracted; None where it is unknown.
+        unloaded: reading of each plate while it was unloaded, before that was subtracted; None where it is unknown.
         spikes: spikes of each plate that its reader has bridged; None where it looked for none.
         torques: content of each plate's torque columns; None where the file has no points and torques.
 
@@ -166,7 +166,7 @@ class PlateLoads:
     declared_feet: tuple[str | None, ...]
     corners: FloatArray | None = None
     noise_n: tuple[float, ...] | None = None
-    idle: tuple[IdleReading, ...] | None = None
+    unloaded: tuple[UnloadedReading, ...] | None = None
     spikes: tuple[tuple[ForceSpike, ...], ...] | None = None
     torques: tuple[TorqueColumns, ...] | None = None
 

@@ -108,7 +108,7 @@ class Screened:
         return {one.where.trial for one in blocking(findings) if one.where.trial not in names or not _of_forces(one)}
 
     def overruled(self, findings: Sequence[Finding]) -> list[Finding]:
-        """Return findings, those here or more, with what explains and what overrules each."""
+        """Return these findings (default: its own), with what explains and what overrules each."""
         return overruled(explained(findings), self.person.overrule, self.person.overrule_of)
 
     @cached_property

@@ -10,7 +10,7 @@ from kinertia.diagnostics.plates.quantisation import quantisation
 from kinertia.diagnostics.plates.signals import signals
 from kinertia.trial.data import PlateLoads
 from kinertia.trial.force_resolution import ringing_s
-from kinertia.trial.plate_loading import without_idle
+from kinertia.trial.plate_loading import without_unloaded_level
 from plate_findings import plates_alone
 
 TIME = np.arange(2000) / 1000
@@ -31,9 +31,9 @@ def plates(noise_n=1.0, force=None):
         )
     force = force + np.random.default_rng(1).normal(0.0, noise_n, force.shape)
     point = np.column_stack([1.0 + 0.3 * (TIME - 0.6), np.zeros_like(TIME), 0.4 + 0.05 * np.sin(TIME)])
-    load = without_idle(TIME, force, np.cross(point, force))
+    load = without_unloaded_level(TIME, force, np.cross(point, force))
     each = (load.force[:, None], load.moment[:, None])
-    return PlateLoads(TIME, ("plate 1",), *each, declared_feet=(None,), idle=(load.idle,))
+    return PlateLoads(TIME, ("plate 1",), *each, declared_feet=(None,), unloaded=(load.unloaded,))
 
 
 def low_passed(force, cutoff_hz, order=2):
@@ -53,7 +53,7 @@ def cut(plates):
 def test_a_fault_free_plate(noise_n):
     sound = plates(noise_n)
     assert found(sound) == []
-    assert sound.idle[0].overshoot_s < 0.005  # single samples of noise
+    assert sound.unloaded[0].overshoot_s < 0.005  # single samples of noise
 
 
 @pytest.mark.parametrize("step_n", [8.0, 20.0, 50.0])
@@ -92,7 +92,7 @@ def test_centres_of_pressure_in_coarse_steps(step_m, said):
     force = np.column_stack([0.1 * stance(), stance(), 0.02 * stance()])
     x = np.round((1.0 + 0.3 * (TIME - 0.6)) / step_m) * step_m
     point = np.column_stack([x, np.zeros_like(TIME), np.full_like(TIME, 0.4)])
-    load = without_idle(TIME, force, np.cross(point, force))
+    load = without_unloaded_level(TIME, force, np.cross(point, force))
     loads = PlateLoads(TIME, ("plate 1",), load.force[:, None], load.moment[:, None], (None,))
     assert found(loads) == [("P106", pytest.approx(step_m, rel=1e-3))] * said
 

@@ -10,7 +10,7 @@ from kinertia.diagnostics.runner import asked, explained
 from kinertia.findings.finding import Severity
 from kinertia.trial.data import PlateLoads
 from kinertia.trial.force_spikes import without_spikes
-from kinertia.trial.plate_loading import with_idle_levels, without_idle
+from kinertia.trial.plate_loading import with_unloaded_levels, without_unloaded_level
 from plate_findings import codes, plates_alone
 
 TIME = np.arange(3000) / 1000
@@ -22,11 +22,11 @@ def plates(offset=(0.0, 0.0, 0.0), drift_n=0.0, factor=1.0, weight_n=700.0, zero
     force = np.outer(vertical, [0.0, 1.0, 0.0]) + np.array(offset) + np.outer(TIME / TIME[-1], [0.0, drift_n, 0.0])
     force = factor * (force + extra + np.random.default_rng(3).normal(0.0, 1.0, (len(TIME), 3)))
     force, moment, spikes = without_spikes(TIME, force, np.zeros_like(force))
-    load = without_idle(TIME, force, moment)
+    load = without_unloaded_level(TIME, force, moment)
     twist = np.outer(0.01 * load.force[:, 1], [0.0, 1.0, 0.0])
     each = (load.force[:, None], (load.moment + twist)[:, None])
-    read = PlateLoads(TIME, ("plate 1",), *each, declared_feet=(None,), idle=(load.idle,), spikes=(spikes,))
-    return with_idle_levels(read) if zeroed else read
+    read = PlateLoads(TIME, ("plate 1",), *each, declared_feet=(None,), unloaded=(load.unloaded,), spikes=(spikes,))
+    return with_unloaded_levels(read) if zeroed else read
 
 
 def found(plates, **stated):
@@ -41,7 +41,7 @@ def only(plates, **stated):
 def test_a_fault_free_plate():
     plate = plates()
     assert found(plate) == []
-    assert plate.idle[0].peak_n == pytest.approx(700, abs=5)
+    assert plate.unloaded[0].peak_n == pytest.approx(700, abs=5)
 
 
 @pytest.mark.parametrize(
@@ -74,7 +74,7 @@ def test_all_zeros_that_are_wrong_are_found():
 @pytest.mark.parametrize("level_n", [30.0, 50.0, 100.0])
 def test_a_plate_that_is_never_unloaded(level_n):
     plate = plates()
-    zero = only(replace(plate, force=plate.force + level_n * np.eye(3)[1], idle=None))
+    zero = only(replace(plate, force=plate.force + level_n * np.eye(3)[1], unloaded=None))
     assert (zero.code, zero.severity) == ("P213", Severity.ERROR)
     assert (zero.evidence["level_n"].value, zero.evidence["method"].value) == (pytest.approx(level_n), "minimum")
 
@@ -95,9 +95,9 @@ def test_feet_that_stay_in_kilonewtons():
     """As in squats, or on a belt: the plate is never unloaded."""
     vertical = 0.35 + 0.06 * np.sin(2 * np.pi * TIME)
     noise = np.random.default_rng(100).normal(0.0, 0.001, (len(TIME), 3))
-    load = without_idle(TIME, np.outer(vertical, [0.0, 1.0, 0.0]) + noise, np.zeros((len(TIME), 3)))
+    load = without_unloaded_level(TIME, np.outer(vertical, [0.0, 1.0, 0.0]) + noise, np.zeros((len(TIME), 3)))
     each = (load.force[:, None], load.moment[:, None])
-    assert only(PlateLoads(TIME, ("plate 1",), *each, declared_feet=(None,), idle=(load.idle,))).code == "P202"
+    assert only(PlateLoads(TIME, ("plate 1",), *each, declared_feet=(None,), unloaded=(load.unloaded,))).code == "P202"
 
 
 def test_a_plate_that_nobody_stands_on():
@@ -121,10 +121,10 @@ def test_an_unloaded_plate_is_not_in_kilonewtons(noise_n, extra):
     for steps in (1, 50):
         noise = np.random.default_rng(100).normal(0.0, noise_n, (len(TIME) // steps + 1, 3))
         force = np.repeat(noise, steps, axis=0)[: len(TIME)] + np.outer(extra, [0.0, 1.0, 0.0])
-        load = without_idle(TIME, force, np.zeros_like(force))
-        assert 0.3 < load.idle.peak_n < 20.0
+        load = without_unloaded_level(TIME, force, np.zeros_like(force))
+        assert 0.3 < load.unloaded.peak_n < 20.0
         each = (load.force[:, None], load.moment[:, None])
-        assert found(PlateLoads(TIME, ("plate 1",), *each, declared_feet=(None,), idle=(load.idle,))) == []
+        assert found(PlateLoads(TIME, ("plate 1",), *each, declared_feet=(None,), unloaded=(load.unloaded,))) == []
 
 
 @pytest.mark.parametrize("mass_kg", [None, 20.0])
@@ -284,8 +284,8 @@ def test_a_child_who_stands_on_two_plates_is_no_zero():
     """Each carries 98 N, as steadily as an unloaded plate."""
     vertical = 98.0 + 20.0 * np.sin(np.pi * TIME) ** 2
     noise = np.random.default_rng(100).normal(0.0, 1.0, (len(TIME), 3))
-    load = without_idle(TIME, np.outer(vertical, [0.0, 1.0, 0.0]) + noise, np.zeros((len(TIME), 3)))
+    load = without_unloaded_level(TIME, np.outer(vertical, [0.0, 1.0, 0.0]) + noise, np.zeros((len(TIME), 3)))
     force = np.repeat(load.force[:, None], 2, axis=1)
     moment = 0.01 * force * [0.0, 1.0, 0.0]
-    plate = PlateLoads(TIME, ("plate 1", "plate 2"), force, moment, (None, None), idle=(load.idle,) * 2)
+    plate = PlateLoads(TIME, ("plate 1", "plate 2"), force, moment, (None, None), unloaded=(load.unloaded,) * 2)
     assert found(plate, mass_kg=20.0) == []

@@ -7,8 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from kinertia.diagnostics.plates.zeros_under_load import zeros_under_load
-from kinertia.trial.data import IdleReading, Markers
-from kinertia.trial.plate_loading import with_idle_levels, without_idle
+from kinertia.trial.data import Markers, UnloadedReading
+from kinertia.trial.plate_loading import with_unloaded_levels, without_unloaded_level
 from plate_findings import codes, context_of, found_in, with_force
 from recordings import LONG_WALKS, WALKS, here
 
@@ -25,8 +25,8 @@ def pushed(walk, newton, axis):
 
 def with_levels(walk, *levels):
     """The walk whose unloaded plates read these (3,) N."""
-    idle = tuple(IdleReading(level, 0.0, 800.0, 0.0) for level in levels)
-    return replace(walk, plates=replace(walk.plates, idle=idle))
+    unloaded = tuple(UnloadedReading(level, 0.0, 800.0, 0.0) for level in levels)
+    return replace(walk, plates=replace(walk.plates, unloaded=unloaded))
 
 
 @pytest.mark.parametrize("axis", [0, 2])
@@ -76,11 +76,11 @@ def test_one_zero_is_one_finding(recording_of, axis):
     )
     force += rng.normal(0.0, 1.0, force.shape)
     moment += rng.normal(0.0, 0.1, moment.shape)
-    each = [without_idle(plates.time, force[:, p], moment[:, p]) for p in range(2)]
+    each = [without_unloaded_level(plates.time, force[:, p], moment[:, p]) for p in range(2)]
     read = np.stack([one.force for one in each], axis=1), np.stack([one.moment for one in each], axis=1)
-    corrected = replace(plates, force=read[0], moment=read[1], idle=tuple(one.idle for one in each))
+    corrected = replace(plates, force=read[0], moment=read[1], unloaded=tuple(one.unloaded for one in each))
     assert codes(found_in(context_of(replace(walk, plates=corrected)))) == ["P216"]
-    context = context_of(replace(walk, plates=with_idle_levels(corrected)))
+    context = context_of(replace(walk, plates=with_unloaded_levels(corrected)))
     found = found_in(context)
     assert codes(found) == ["P213"]
     (zero_found,) = [one for one in found if one.is_open]

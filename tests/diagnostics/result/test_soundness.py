@@ -9,7 +9,7 @@ import pytest
 from kinertia.diagnostics.result.context import ResultContext
 from kinertia.diagnostics.result.soundness import soundness
 from kinertia.diagnostics.runner import explained
-from kinertia.estimation.simultaneous.one_sided_mass import OneSided
+from kinertia.estimation.simultaneous.mass_asymmetry import OneSided
 from kinertia.estimation.simultaneous.prior_plausibility import Unlikeness
 from kinertia.model.bsp import BodySegmentParameters
 from results import codes

@@ -16,7 +16,7 @@ from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.settings import Attached
 from kinertia.synthetic.walk import walk, walking_subject
 from kinertia.trial.data import FootLoads, Trial
-from kinertia.trial.idle_level import IdleReading
+from kinertia.trial.unloaded_level import UnloadedReading
 from people import codes, person
 from recordings import LONG_WALKS, RUNS, SQUATS, WALKS
 
@@ -132,7 +132,7 @@ def standing_on_plates(static, walked, mass_kg):
         moment=np.cross(np.broadcast_to(point, force.shape), force),
         corners=None,
         noise_n=None,
-        idle=None,
+        unloaded=None,
         torques=None,
     )
     return replace(static, plates=plates)
@@ -261,7 +261,7 @@ def on_one_plate(stood, level_n=0.0):
             force=np.stack([plates.force.sum(axis=1) + level, 0.0 * plates.force[:, 0]], axis=1),
             moment=np.stack([plates.moment.sum(axis=1), 0.0 * plates.moment[:, 0]], axis=1),
             corners=corners,
-            idle=(IdleReading((np.nan,) * 3, np.nan, 800.0, 0.0), IdleReading((0.0,) * 3, 0.0, 0.0, 0.0)),
+            unloaded=(UnloadedReading((np.nan,) * 3, np.nan, 800.0, 0.0), UnloadedReading((0.0,) * 3, 0.0, 0.0, 0.0)),
         ),
     )
 
@@ -286,8 +286,10 @@ def test_a_plate_that_is_never_idle_in_the_static_trial_is_in_the_walk(lab):
     """It reads 60 N all day long."""
     walked, static, marker_set = lab
     stood = on_one_plate(standing_on_plates(static, walked, 72.6), level_n=60.0)
-    idle = IdleReading((0.0, 60.0, 0.0), 0.0, 800.0, 0.0, subtracted=True)
-    plates = replace(walked.plates, names=stood.plates.names, corners=stood.plates.corners, idle=(idle, idle))
+    unloaded = UnloadedReading((0.0, 60.0, 0.0), 0.0, 800.0, 0.0, subtracted=True)
+    plates = replace(
+        walked.plates, names=stood.plates.names, corners=stood.plates.corners, unloaded=(unloaded, unloaded)
+    )
     assert list(stated_mass(person([replace(walked, plates=plates)], stood, marker_set, mass_kg=72.6))) == []
     assert codes(stated_mass(person([walked], stood, marker_set, mass_kg=72.6))) == ["S111"]
 

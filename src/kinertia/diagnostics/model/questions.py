@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from kinertia.diagnostics.model.length_unit import length_unit
 from kinertia.diagnostics.model.mass_properties import (
     degenerate_inertia,
     impossible_inertia,
@@ -9,9 +10,8 @@ from kinertia.diagnostics.model.mass_properties import (
     missing_inertia,
 )
 from kinertia.diagnostics.model.mirrored_joints import mirrored_joints
-from kinertia.diagnostics.model.model_inputs import markers_and_feet, unmatched_markers
+from kinertia.diagnostics.model.missing_parts import markers_and_feet, unmatched_markers
 from kinertia.diagnostics.model.model_on_person import model_and_trials
-from kinertia.diagnostics.model.person_size import length_unit
 from kinertia.diagnostics.model.plausible_masses import (
     arms_in_torso,
     compared_with_tables,

@@ -58,8 +58,8 @@ def _peak_of_weak_loads(plates: PlateLoads) -> float | None:
 
     A plate that no one steps on shows noise of up to some newtons, and perhaps an offset or a drift.
     """
-    idle = plates.idle or ()
-    peak = max((one.peak_n for one in idle), default=0.0)
+    unloaded = plates.unloaded or ()
+    peak = max((one.peak_n for one in unloaded), default=0.0)
     if plates.force.any() or not _WEAKEST_N < peak < LOAD_THRESHOLD_N:
         return None
-    return peak if any(one.like_steps and one.peak_n > _WEAKEST_N for one in idle) else None
+    return peak if any(one.like_steps and one.peak_n > _WEAKEST_N for one in unloaded) else None

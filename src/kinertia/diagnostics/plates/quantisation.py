@@ -40,13 +40,13 @@ def quantisation(context: RecordingContext) -> Iterator[Finding]:
         step_m = max(_step(point[:, axis], _DECIMALS_M) for axis in (0, 2))
         if step_m > _COARSE_M:
             yield finding("P106", context.at(plate=name), step_m=Quantity(step_m, "m", limit=_COARSE_M))
-    for name, idle in zip(plates.names, plates.idle or (), strict=plates.idle is not None):
-        if idle.overshoot_s > _OVERSHOOT_S:
+    for name, unloaded in zip(plates.names, plates.unloaded or (), strict=plates.unloaded is not None):
+        if unloaded.overshoot_s > _OVERSHOOT_S:
             yield finding(
                 "P108",
                 context.at(plate=name),
-                overshoot_s=Quantity(idle.overshoot_s, "s", limit=_OVERSHOOT_S, usual=(0.0, 0.003)),
-                cutoff_hz=Quantity(_OVERSHOOT_HZ_S / idle.overshoot_s, "Hz"),
+                overshoot_s=Quantity(unloaded.overshoot_s, "s", limit=_OVERSHOOT_S, usual=(0.0, 0.003)),
+                cutoff_hz=Quantity(_OVERSHOOT_HZ_S / unloaded.overshoot_s, "Hz"),
             )
 
 

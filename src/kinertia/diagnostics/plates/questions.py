@@ -20,7 +20,7 @@ from kinertia.diagnostics.plates.mains_interference import mains_interference
 from kinertia.diagnostics.plates.quantisation import quantisation
 from kinertia.diagnostics.plates.signals import signals, spikes
 from kinertia.diagnostics.plates.vertical_moment import vertical_moment
-from kinertia.diagnostics.plates.zeros import idle_levels, zeros
+from kinertia.diagnostics.plates.zeros import unloaded_levels, zeros
 from kinertia.diagnostics.plates.zeros_under_load import zeros_under_load
 from kinertia.diagnostics.runner import Question
 from kinertia.diagnostics.timing.force_rate import force_rate
@@ -52,7 +52,7 @@ SIGNAL_QUESTIONS: tuple[Question[RecordingContext], ...] = (
     Question("P21", zeros, unless=_OTHER_AXES),
     Question("P26", free_moments, unless=_OTHER_AXES),
 )
-STANDING_QUESTIONS: tuple[Question[RecordingContext], ...] = (Question("P10", spikes), Question("P21", idle_levels))
+STANDING_QUESTIONS: tuple[Question[RecordingContext], ...] = (Question("P10", spikes), Question("P21", unloaded_levels))
 LOADED_QUESTIONS: tuple[Question[RecordingContext], ...] = (
     Question("M13", over_smoothed, unless=_NO_VELOCITY),
     Question("T20", force_rate, unless=_NO_VELOCITY),

@@ -11,7 +11,7 @@ from kinertia.diagnostics.evidence.loaded_plates import STEP_N
 from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray
-from kinertia.trial.idle_level import ZEROED_N, ZEROED_NM, IdleReading
+from kinertia.trial.unloaded_level import ZEROED_N, ZEROED_NM, UnloadedReading
 
 _ZERO_N, _FAR_FROM_ZERO_N, _DRIFT_N = 15.0, 40.0, 15.0
 """Zeroed plates read a few newtons; 40 N are 5 % of an adult's weight on every plate."""
@@ -20,7 +20,7 @@ _LEAST_N = 6.0
 _MOST_UNLOADED_N, _STEADY_N = 150.0, 15.0
 _UNLOADED_PERCENT = (2.0, 15.0)
 """Percentage of the record for which a plate that is walked over is at least unloaded."""
-_UNKNOWN = IdleReading((np.nan, np.nan, np.nan), np.nan, 0.0, 0.0)
+_UNKNOWN = UnloadedReading((np.nan, np.nan, np.nan), np.nan, 0.0, 0.0)
 
 
 def zeros(context: RecordingContext) -> Iterator[Finding]:
@@ -32,14 +32,16 @@ def zeros(context: RecordingContext) -> Iterator[Finding]:
     plates, share = context.plates, context.adult_share
     if plates is None:
         return
-    yield from idle_levels(context)
-    for p, (name, idle) in enumerate(zip(plates.names, plates.idle or (_UNKNOWN,) * len(plates.names), strict=True)):
-        drifts = abs(idle.drift_n) > _limit_n(_DRIFT_N, share)
+    yield from unloaded_levels(context)
+    for p, (name, unloaded) in enumerate(
+        zip(plates.names, plates.unloaded or (_UNKNOWN,) * len(plates.names), strict=True)
+    ):
+        drifts = abs(unloaded.drift_n) > _limit_n(_DRIFT_N, share)
         if drifts:
-            drift = Quantity(idle.drift_n, "N", limit=_limit_n(_DRIFT_N, share))
+            drift = Quantity(unloaded.drift_n, "N", limit=_limit_n(_DRIFT_N, share))
             yield finding("P211", context.at(plate=name, **context.along(1)), drift_n=drift)
         vertical = False
-        for axis, level_n in enumerate(idle.remaining_n):
+        for axis, level_n in enumerate(unloaded.remaining_n):
             if abs(level_n) > _limit_n(_ZERO_N, share) and not (drifts and axis == 1):
                 far = axis == 1 and abs(level_n) > _FAR_FROM_ZERO_N * share
                 vertical |= axis == 1
@@ -49,20 +51,20 @@ def zeros(context: RecordingContext) -> Iterator[Finding]:
             yield _zero(context, name, 1, least_n, "minimum", Severity.ERROR)
 
 
-def idle_levels(context: RecordingContext) -> Iterator[Finding]:
+def unloaded_levels(context: RecordingContext) -> Iterator[Finding]:
     """P216: the unloaded reading of a plate in use, which has been subtracted from its loads."""
     plates = context.plates
-    for p, idle in enumerate(() if plates is None else plates.idle or ()):
+    for p, unloaded in enumerate(() if plates is None else plates.unloaded or ()):
         assert plates is not None
-        if not idle.subtracted or not plates.force[:, p].any():
+        if not unloaded.subtracted or not plates.force[:, p].any():
             continue
-        axis = int(np.argmax(np.abs(idle.level_n)))
+        axis = int(np.argmax(np.abs(unloaded.level_n)))
         yield finding(
             "P216",
             context.at(plate=plates.names[p], **context.along(axis)),
-            level_n=Quantity(idle.level_n[axis], "N", limit=ZEROED_N, usual=(-ZEROED_N, ZEROED_N)),
-            moment_nm=Quantity(idle.twist_nm, "N m", limit=ZEROED_NM),
-            levels_n=Quantity(idle.level_n, "N"),
+            level_n=Quantity(unloaded.level_n[axis], "N", limit=ZEROED_N, usual=(-ZEROED_N, ZEROED_N)),
+            moment_nm=Quantity(unloaded.twist_nm, "N m", limit=ZEROED_NM),
+            levels_n=Quantity(unloaded.level_n, "N"),
         )
 
 

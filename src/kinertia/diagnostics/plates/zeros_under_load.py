@@ -92,7 +92,7 @@ def _levels(plates: PlateLoads, axis: int) -> FloatArray | None:
     """Return the forces (p,) N that unloaded plates read along an axis and that are still in their loads; None unless
     known for each plate.
     """
-    levels = np.array([idle.remaining_n[axis] for idle in plates.idle or ()])
+    levels = np.array([unloaded.remaining_n[axis] for unloaded in plates.unloaded or ()])
     return levels if levels.size and np.isfinite(levels).all() else None
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from kinertia.diagnostics.result.context import ResultContext
 from kinertia.estimation.result import Fit
-from kinertia.estimation.simultaneous.one_sided_mass import OneSided
+from kinertia.estimation.simultaneous.mass_asymmetry import OneSided
 from kinertia.estimation.simultaneous.prior_plausibility import UNLIKE_CHANCE, Unlikeness
 from kinertia.findings.display import first_few
 from kinertia.findings.finding import Finding, Severity, finding
@@ -31,7 +31,7 @@ CONTRADICTING_COM_M = 0.1
 """A centre of mass this far from the literature contradicts it, if no prior says how far people's are: a trunk's is off
 by 34 mm (SD)."""
 _ONE_SIDED_SD = 4.0
-"""As in `one_sided_mass`."""
+"""As in `mass_asymmetry`."""
 _ARMS = ("upper_arm", "forearm", "hand")
 _WRONG = "a misplaced marker or joint centre, or an error of a plate"
 _WORN = "something worn or carried that was not declared ([[attached]])"

@@ -185,18 +185,18 @@ def _standing(context: PersonContext) -> Iterator[_Occasion]:
 
 def _level_kg(context: PersonContext, plates: PlateLoads, loaded: Sequence[str]) -> float:
     """Return the unloaded reading (kg) of these plates by trials that show it, where the static trial does not."""
-    if plates.idle is None or plates.corners is None:
+    if plates.unloaded is None or plates.corners is None:
         return 0.0
     level_n = 0.0
-    for name, idle, corners in zip(plates.names, plates.idle, plates.corners, strict=True):
+    for name, unloaded, corners in zip(plates.names, plates.unloaded, plates.corners, strict=True):
         levels = [
             there.level_n[1]
             for trial in context.trials
-            if (other := trial.plates) is not None and other.idle is not None and other.corners is not None
-            for same, there, place in zip(other.names, other.idle, other.corners, strict=True)
+            if (other := trial.plates) is not None and other.unloaded is not None and other.corners is not None
+            for same, there, place in zip(other.names, other.unloaded, other.corners, strict=True)
             if same == name and there.subtracted and np.allclose(place, corners, atol=_SAME_PLACE_M)
         ]
-        if name in loaded and np.isnan(idle.level_n[1]) and levels:
+        if name in loaded and np.isnan(unloaded.level_n[1]) and levels:
             level_n += float(np.median(levels))
     return level_n / GRAVITY_M_S2
 

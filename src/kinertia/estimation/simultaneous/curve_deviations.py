@@ -7,7 +7,7 @@ residual uncertainty of the motion, given these, is due to the errors alone. Onl
 coefficients' covariance are needed, since six splines are active in any frame; they come from the block-banded factor
 (`BlockBand.inverse_blocks`) and the static unknowns. They are scaled by the observed size of the underlying errors
 (`motion_noise`), in moments by more where skin motion is not observable (`skin_blocks`). The delay of the forces counts
-with its whole distribution (`late_loads`): where a foot lands they change within less than its uncertainty. The part of
+with its whole distribution (`delayed_loads`): at foot contact they change within less than its uncertainty. The part of
 the forces that is faster than the motion (`GroundReactions.impact`) is added as a moving mean square: whether it acts
 on the joints or decelerates segments is unknown.
 """

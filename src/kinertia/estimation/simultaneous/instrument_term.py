@@ -13,8 +13,8 @@ from kinertia.estimation.simultaneous.instruments import InstrumentInformation
 from kinertia.estimation.simultaneous.layout import Unknowns
 from kinertia.estimation.simultaneous.mixture_prior import ErrorPriors, FaultMixture
 from kinertia.estimation.simultaneous.plate_loads import GAIN
+from kinertia.estimation.simultaneous.plate_tilt import TILT_SD_RAD, mean_loads_n
 from kinertia.estimation.simultaneous.plates import PLATE_ERRORS, ZERO_UNKNOWNS, plates_with_floor
-from kinertia.estimation.simultaneous.plumb_line import TILT_SD_RAD, mean_loads_n
 
 PLATES, CLOCK, TRIAL_DELAYS, ZEROS, GAINS = "plates", "clock", "delays", "zeros", "gains"
 
@@ -70,7 +70,7 @@ class InstrumentErrors(LoadTerm):
         return float(own @ (pull - 2.0 * shown.rhs))
 
     def left_out(self, static: np.ndarray) -> np.ndarray:
-        """Return the zero offsets that a tilt about each horizontal axis imitates (`plumb_line`)."""
+        """Return the zero offsets that a tilt about each horizontal axis imitates (`plate_tilt`)."""
         result = np.zeros((len(static), len(ZERO_UNKNOWNS)))
         for k, trial in enumerate(self.given.trials):
             for axis, places in enumerate(self.zeros_of(k).T):

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinertia.estimation.simultaneous.axis_columns import add_bodies, take_load
+from kinertia.estimation.simultaneous.delayed_loads import DelayedLoads, delayed_loads
 from kinertia.estimation.simultaneous.inputs import BSP, STILL
-from kinertia.estimation.simultaneous.late_loads import LateLoads, late_loads
 from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.model.log_cholesky import by_body, dynamic_jacobian
 from kinertia.motion.dynamics import Motion, axis_motion
@@ -29,7 +29,7 @@ class MomentDerivatives:
         impact: (d, c) contribution of impact transients.
         ground: (d, 6, s) derivative of the ground reactions on the right foot, then the left (N).
         delay_squares, ground_delay_squares: (d, c), (d, 6) mean squares of the remaining effect of the delay of the
-            forces (`LateLoads.residual`).
+            forces (`DelayedLoads.residual`).
     """
 
     value: np.ndarray
@@ -78,7 +78,7 @@ def moment_derivatives(
     shown = regressor(skeleton.tree, skeleton.gravity_m_s2, *state, np.zeros((len(q), 3)))[:, :, carrying]
     shown = by_body(shown.reshape(len(q), 6, -1), dynamic_jacobian(static[layout[BSP]]))
     add_bodies(*axes, skeleton.support[carrying], shown, by_static)
-    late = late_loads(reactions, problem.trials[k].time[frames], delay_sd_s)
+    late = delayed_loads(reactions, problem.trials[k].time[frames], delay_sd_s)
     loads, by_load = _loads(problem, k, static, reactions, frames, late)
     fast = reactions.impact_at(problem.trials[k].time[frames])
     left = np.zeros((len(late.residual), *tau.shape))
@@ -104,7 +104,7 @@ def moment_derivatives(
 
 
 def _loads(
-    problem: MapProblem, k: int, static: np.ndarray, reactions: GroundReactions, frames: np.ndarray, late: LateLoads
+    problem: MapProblem, k: int, static: np.ndarray, reactions: GroundReactions, frames: np.ndarray, late: DelayedLoads
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return loads on the feet (2, d, 6), and their derivatives by the static unknowns (2, d, 6, s)."""
     time = problem.trials[k].time[frames]

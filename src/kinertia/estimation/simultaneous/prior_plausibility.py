@@ -16,7 +16,7 @@ from scipy.linalg import eigh
 from scipy.special import chdtrc
 
 from kinertia.estimation.prior import BspPrior
-from kinertia.estimation.simultaneous.one_sided_mass import OneSided, one_sided
+from kinertia.estimation.simultaneous.mass_asymmetry import OneSided, one_sided
 from kinertia.model.bsp import BodySegmentParameters
 
 UNLIKE_CHANCE = 1e-3

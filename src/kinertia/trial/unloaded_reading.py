@@ -8,8 +8,8 @@ import numpy.typing as npt
 from kinertia.trial.centre_of_pressure import FIRM_LOAD_N
 from kinertia.trial.data import BoolArray, FloatArray
 from kinertia.trial.force_resolution import ringing_s
-from kinertia.trial.idle_level import IdleReading
 from kinertia.trial.sampled_time import runs, span_s
+from kinertia.trial.unloaded_level import UnloadedReading
 
 _BLOCK_S, _FEWEST_BLOCKS = 0.1, 4
 """Block length in whole periods of the mains, of 50 and of 60 Hz, so that interference averages to zero."""
@@ -26,7 +26,7 @@ _SWAYS, _ROUGH, _FEWEST = 0.03, 0.1, 20
 sample to sample; noise about a zero offset of some newtons with the same standard deviation jumps by more."""
 
 
-def idle_reading(time: FloatArray, force: FloatArray, moment: FloatArray) -> IdleReading:
+def unloaded_reading(time: FloatArray, force: FloatArray, moment: FloatArray) -> UnloadedReading:
     """Determine the reading of a plate while it is unloaded.
 
     Args:
@@ -35,15 +35,15 @@ def idle_reading(time: FloatArray, force: FloatArray, moment: FloatArray) -> Idl
     """
     vertical = force[:, 1]
     peak_n = float(np.abs(vertical).max(initial=0.0))
-    blocks = idle_blocks(time, vertical)
+    blocks = unloaded_blocks(time, vertical)
     if len(blocks) < _FEWEST_BLOCKS:
-        return IdleReading((np.nan,) * 3, np.nan, peak_n, ringing_s(time, vertical), _like_steps(time, vertical))
+        return UnloadedReading((np.nan,) * 3, np.nan, peak_n, ringing_s(time, vertical), _like_steps(time, vertical))
     levels = np.median(force[blocks], axis=1)
     x, y, z = (float(value) for value in np.median(levels, axis=0))
     when = time[blocks].mean(axis=1)
     drift_n = float(np.polyfit(when - when.mean(), levels[:, 1], 1)[0]) * float(time[-1] - time[0])
     level_nm, twist_nm = _moment(force, moment, blocks, np.array([x, y, z]))
-    return IdleReading(
+    return UnloadedReading(
         (x, y, z),
         drift_n,
         peak_n,
@@ -76,7 +76,7 @@ def _moment(
     return (x, y, z), float(about[np.argmax(np.abs(about))])
 
 
-def idle_blocks(time: FloatArray, vertical: FloatArray) -> npt.NDArray[np.int_]:
+def unloaded_blocks(time: FloatArray, vertical: FloatArray) -> npt.NDArray[np.int_]:
     """Return the samples (b, s) of the blocks in which a plate with this vertical force (k,) is unloaded."""
     peak_n = float(np.abs(vertical).max(initial=0.0))
     every = max(2, round(_BLOCK_S / float(np.median(np.diff(time))))) if len(time) > 1 else 2
@@ -90,8 +90,8 @@ def idle_blocks(time: FloatArray, vertical: FloatArray) -> npt.NDArray[np.int_]:
     near = [mean[np.clip(first + off, 0, len(mean) - 1)] for off in (0, -(every // 2), every // 2)]
     most = min(_IDLE_N, _IDLE_SHARE * peak_n) if peak_n > _LEAST_PEAK_N else _IDLE_N
     steady = np.ptp(near, axis=0) < _STEADY_N
-    idle: npt.NDArray[np.int_] = blocks[steady & (np.abs(near[0]) < most)]
-    return idle
+    unloaded: npt.NDArray[np.int_] = blocks[steady & (np.abs(near[0]) < most)]
+    return unloaded
 
 
 def _deviation(levels: FloatArray) -> FloatArray:

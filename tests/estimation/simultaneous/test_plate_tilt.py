@@ -3,7 +3,7 @@
 import numpy as np
 
 from kinertia.estimation.simultaneous.instrument_term import ZEROS, InstrumentErrors
-from kinertia.estimation.simultaneous.plumb_line import TILT_SD_RAD, mean_loads_n
+from kinertia.estimation.simultaneous.plate_tilt import TILT_SD_RAD, mean_loads_n
 from small_problem import small_problem
 
 

@@ -14,7 +14,7 @@ ZEROED_N, ZEROED_NM = 3.0, 1.0
 _NOWHERE = (np.nan, np.nan, np.nan)
 
 
-class IdleReading(NamedTuple):
+class UnloadedReading(NamedTuple):
     """Reading of a force plate while it is unloaded.
 
     Attributes:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from kinertia.estimation.simultaneous.late_loads import late_loads
+from kinertia.estimation.simultaneous.delayed_loads import delayed_loads
 from kinertia.motion.ground_reactions import GroundReactions
 
 SD_S = 0.003
@@ -22,7 +22,7 @@ def reactions(rise_s):
 @pytest.mark.parametrize("rise_s", [0.0003, 0.001, 0.02])
 def test_mean_squares_are_those_of_delays_by_chance(rise_s):
     walk = reactions(rise_s)
-    found = late_loads(walk, AT, SD_S)
+    found = delayed_loads(walk, AT, SD_S)
     by_chance = np.random.default_rng(1).normal(0.0, SD_S, 2000)
     expected = np.mean([np.square(walk.at(AT + delay) - found.loads) for delay in by_chance], axis=0)
     squares = np.square(SD_S * found.slope) + np.square(found.residual).sum(axis=0)
@@ -34,7 +34,7 @@ def test_mean_squares_are_those_of_delays_by_chance(rise_s):
 
 def test_where_loads_change_slowly_it_is_the_derivative():
     walk = reactions(0.02)
-    found, plain = late_loads(walk, AT, 0.001), late_loads(walk, AT)
+    found, plain = delayed_loads(walk, AT, 0.001), delayed_loads(walk, AT)
     np.testing.assert_allclose(found.slope, plain.slope, atol=0.01 * np.abs(plain.slope).max())
     assert np.sqrt(np.square(found.residual).sum(axis=0)).max() < 2.0
     assert plain.residual.shape == (0, len(AT), 2, 6)

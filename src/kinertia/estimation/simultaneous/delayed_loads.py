@@ -19,7 +19,7 @@ _DELAYS = np.linspace(-4.0, 4.0, 25)
 
 
 @dataclass(frozen=True)
-class LateLoads:
+class DelayedLoads:
     """Loads (N, N m) at n times on right and left foot, and the effect of a delay.
 
     Attributes:
@@ -34,15 +34,15 @@ class LateLoads:
     residual: np.ndarray
 
 
-def late_loads(reactions: GroundReactions, time: np.ndarray, sd_s: float = 0.0) -> LateLoads:
+def delayed_loads(reactions: GroundReactions, time: np.ndarray, sd_s: float = 0.0) -> DelayedLoads:
     """Compute the loads at times (n,) s for a delay with this SD (s); with zero SD the slope is the derivative."""
     loads, rates = reactions.with_rate(time)
     if sd_s == 0.0:
-        return LateLoads(loads, rates, np.empty((0, *loads.shape)))
+        return DelayedLoads(loads, rates, np.empty((0, *loads.shape)))
     weights = np.exp(-0.5 * np.square(_DELAYS))
     weights /= weights.sum()
     delays = sd_s * _DELAYS
     changes = np.array([reactions.at(time + delay) for delay in delays]) - loads
     slope = np.tensordot(weights * delays, changes, 1) / (weights @ np.square(delays))
     along, roots = (each[:, None, None, None] for each in (delays, np.sqrt(weights)))
-    return LateLoads(loads, slope, roots * (changes - along * slope))
+    return DelayedLoads(loads, slope, roots * (changes - along * slope))

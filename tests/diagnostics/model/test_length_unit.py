@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import upright_model as upright
-from kinertia.diagnostics.model.person_size import length_unit
+from kinertia.diagnostics.model.length_unit import length_unit
 from kinertia.io.osim.reader import read_osim
 from kinertia.model.skeleton import Marker, Skeleton
 from people import with_model
