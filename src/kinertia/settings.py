@@ -238,25 +238,19 @@ class Instruments(Table):
     """
 
     plate_sd_mm: float | None = Field(
-        default=None,
-        gt=0.0,
-        description="size of centre-of-pressure errors along each axis (SD), from a spot check, mm",
+        default=None, gt=0.0, description="SD of centres of pressure along each axis, from a spot check, mm"
     )
     clock_sd_ms: float | None = Field(
-        default=None, gt=0.0, description="size of the synchronisation delay (SD), from a synchronisation check, ms"
+        default=None, gt=0.0, description="SD of the delay between forces and markers, from a synchronisation check, ms"
     )
     gain_sd_percent: float | None = Field(
-        default=None,
-        gt=0.0,
-        le=20.0,
-        description="size of vertical gain errors (SD), from known weights, % of the force",
+        default=None, gt=0.0, le=20.0, description="SD of errors of the vertical force, from known weights, %"
     )
     same_plates: bool = Field(
         default=False, description="true: columns of the same name are the same plate in all force files (.mot, .sto)"
     )
     zeroed: bool = Field(
-        default=False,
-        description="true: the plates were zeroed; their unloaded reading is not subtracted",
+        default=False, description="true: the plates were zeroed; their unloaded reading is not subtracted"
     )
 
 
@@ -387,7 +381,7 @@ class Diagnostics(Table):
 
     ignore: Annotated[tuple[str, ...], BeforeValidator(_codes)] = Field(
         default=(),
-        description='findings below ERROR that are not shown and do not lower the verdict, like ["M102", "R40"]',
+        description='findings below ERROR that are hidden and do not lower the verdict, like ["M102", "R40"]',
     )
     waive: Annotated[tuple[str, ...], BeforeValidator(_waivable)] = Field(
         default=(), description='ERRORs that do not stop an estimate and are shown as waived, like ["P244"]'

@@ -51,7 +51,7 @@ def test_help_reads_like_a_manual():
         "0 done",
         "1 done, but an ERROR was found",
         "2 nothing could be computed: errors in files or options, one line each",
-        "70 Kinertia itself failed",
+        "70 internal error",
         "130 interrupted",
     ):
         assert status in text

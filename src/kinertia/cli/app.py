@@ -39,7 +39,7 @@ kinertia export out --csv     all tables of a fit, for other programs
 kinertia cohort STUDY -o out  fit hundreds of people, resumable, one table
 kinertia explain P213         what a finding means, and what to do about it
 
-Every command says more with --help, and has an example there.
+Each command has details and an example under --help.
 
 [bold]What it needs[/]
 
@@ -56,9 +56,9 @@ Or, with fit --model, your scaled OpenSim model (.osim), trials and body mass.
      beyond OpenSim's guideline (markers 20 mm RMS; force 10 N RMS, 25 N peak,
      5 % of the largest external force; moment 50 N m RMS, 75 N m peak); or a
      trial was left out. In check: a recording or a model cannot be used.
-     In cohort: any of these for somebody, or somebody could not be fitted.
+     In cohort: any of these for a person, or a person could not be fitted.
   2  nothing could be computed: errors in files or options, one line each
- 70  Kinertia itself failed; the line says where its log file is
+ 70  internal error; the line gives the log file
 130  interrupted; nothing half-written is left
 
 Results go to standard output, progress and errors to standard error; with
