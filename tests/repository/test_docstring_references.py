@@ -60,3 +60,12 @@ def test_what_docstrings_name_is_there():
 def test_a_dead_name_would_be_seen(tmp_path):
     (tmp_path / "one.py").write_text('"""As `two.three` and `one` have it."""\n', encoding="utf-8")
     assert unknown_names(tmp_path) == ["one.py:1 two.three"]
+
+
+def test_docstrings_of_functions_begin_with_a_verb():
+    """Those of rules would begin with their codes."""
+    trees = {path: ast.parse(path.read_text(encoding="utf-8")) for path in SOURCES.rglob("*.py")}
+    functions = [
+        (path, node) for path, tree in trees.items() for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)
+    ]
+    assert [(path, one.name) for path, one in functions if re.match(r"[A-Z]\d", ast.get_docstring(one) or "")] == []

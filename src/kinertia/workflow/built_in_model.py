@@ -276,7 +276,7 @@ def _with_trunk(model: Gait27, trials: Sequence[Turned]) -> tuple[Gait27, list[T
 
 
 def _adapted(calibrated: Calibrated) -> Iterator[Finding]:
-    """M173 and M174: markers far from their positions in the static trial, and markers on the head."""
+    """Report M173 and M174: markers far from their positions in the static trial, and markers on the head."""
     for label, distance_m in calibrated.moved_m.items():
         if distance_m > _FAR_M:
             yield finding("M173", Where(markers=(label,)), distance_m=Quantity(distance_m, "m", limit=_FAR_M))

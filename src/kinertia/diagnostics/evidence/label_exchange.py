@@ -30,7 +30,8 @@ class _Exchange(NamedTuple):
 
 
 def swapped_labels(distances: SegmentDistances, trial: str, reference: str) -> Iterator[Finding]:
-    """L212: the one swap of two labels, or of two pairs within a segment, that fits best; no finding where none does.
+    """Report L212: the one swap of two labels, or of two pairs within a segment, that fits best; no finding where none
+    does.
 
     Args:
         distances: between the markers of a segment, in the reference and in a trial.

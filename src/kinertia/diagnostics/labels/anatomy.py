@@ -61,7 +61,8 @@ class _Body:
 
 
 def anatomy(context: RecordingContext) -> Iterator[Finding]:
-    """L201 to L208: labels that contradict a person's anatomy, of a person upright, standing or moving, with Y up."""
+    """Report L201 to L208: labels that contradict a person's anatomy, of a person upright, standing or moving, with Y
+    up."""
     if context.marker_set is None or not context.marker_set.landmarks:
         return
     body = _Body(context, context.marker_set, context.landmark_positions)
@@ -101,7 +102,8 @@ def _travel(context: RecordingContext, known: Mapping[str, FloatArray]) -> Float
 
 
 def _reversed_parts(body: _Body, known: Mapping[str, FloatArray]) -> Iterator[Finding]:
-    """L203 and L205: a side of the pelvis, the pelvis, or a foot that points backwards compared with the others."""
+    """Report L203 and L205: a side of the pelvis, the pelvis, or a foot that points backwards compared with the
+    others."""
     places, feet = body.places, [heading for name, heading in known.items() if name.startswith("foot")]
     if {"asis_r", "asis_l", "psis_r", "psis_l"} <= set(places):
         sides = {side: horizontal(places[f"asis_{side}"] - places[f"psis_{side}"]) for side in "rl"}
@@ -154,7 +156,7 @@ def _rotation_from(vectors: FloatArray, others: FloatArray) -> complex:
 
 
 def _swapped_sides(body: _Body, right: FloatArray) -> Iterator[Finding]:
-    """L201, or L202 of each pair whose sides are swapped."""
+    """Report L201, or L202 of each pair whose sides are swapped."""
     pairs = [pair for pair in _PAIRS if body.shows(f"{pair}_r", f"{pair}_l")]
     across = {pair: cosine(body.places[f"{pair}_r"] - body.places[f"{pair}_l"], right) for pair in pairs}
     wrong = {pair: each for pair, each in across.items() if each < -CLEAR}
@@ -170,8 +172,8 @@ def _swapped_sides(body: _Body, right: FloatArray) -> Iterator[Finding]:
 
 
 def _swapped_labels(body: _Body, right: FloatArray) -> Iterator[Finding]:
-    """L202, as a WARNING, of pairs on head, trunk and pelvis that are not landmarks, in segments that also have other
-    markers.
+    """Report L202, as a WARNING, of pairs on head, trunk and pelvis that are not landmarks, in segments that also have
+    other markers.
 
     No one turns the head so far that its right side is on the left of the body.
     """
@@ -191,7 +193,7 @@ def _swapped_labels(body: _Body, right: FloatArray) -> Iterator[Finding]:
 
 
 def _order(body: _Body) -> Iterator[Finding]:
-    """L206: knees that are below the ankles, or a pelvis below the knees."""
+    """Report L206: knees that are below the ankles, or a pelvis below the knees."""
     for side in "rl":
         for upper, lower in (("knee_lateral", "ankle_lateral"), ("asis", "knee_lateral")):
             names = (f"{upper}_{side}", f"{lower}_{side}")
@@ -204,7 +206,7 @@ def _order(body: _Body) -> Iterator[Finding]:
 
 
 def _ankles(body: _Body) -> Iterator[Finding]:
-    """L207: ankles behind the heel, or beyond the toes."""
+    """Report L207: ankles behind the heel, or beyond the toes."""
     for side in "rl":
         toe = next((name for name in (f"metatarsal_{side}", f"toe_{side}") if name in body.places), "")
         heel, ankle = f"heel_{side}", f"ankle_lateral_{side}"
@@ -226,7 +228,7 @@ def _ankles(body: _Body) -> Iterator[Finding]:
 
 
 def _thighs(body: _Body) -> Iterator[Finding]:
-    """L206: a thigh marker that is below the knee, beside a shank marker that is above it."""
+    """Report L206: a thigh marker that is below the knee, beside a shank marker that is above it."""
     marker_set, markers = body.marker_set, body.context.all_markers
     joints = {label for name, labels in marker_set.landmarks.items() if "wand" not in name for label in labels}
     for side in "rl":
@@ -248,7 +250,7 @@ def _thighs(body: _Body) -> Iterator[Finding]:
 
 
 def _lateral(body: _Body, right: FloatArray) -> Iterator[Finding]:
-    """L208 of knees and ankles: lateral and medial labels are swapped."""
+    """Report L208 of knees and ankles: lateral and medial labels are swapped."""
     for joint in ("knee", "ankle"):
         for side, sign in (("r", 1.0), ("l", -1.0)):
             names = (f"{joint}_lateral_{side}", f"{joint}_medial_{side}")
@@ -260,8 +262,8 @@ def _lateral(body: _Body, right: FloatArray) -> Iterator[Finding]:
 
 
 def _elbows(body: _Body, right: FloatArray) -> Iterator[Finding]:
-    """L208 of elbows, which bend only forwards: the lateral side of an arm may point anywhere, but in a straight arm it
-    is not medial when the arm hangs, nor below when the arm is raised.
+    """Report L208 of elbows, which bend only forwards: the lateral side of an arm may point anywhere, but in a straight
+    arm it is not medial when the arm hangs, nor below when the arm is raised.
     """
     for side, sign in (("r", 1.0), ("l", -1.0)):
         names = [f"{name}_{side}" for name in ("elbow_lateral", "elbow_medial", "acromion", "wrist")]

@@ -15,7 +15,7 @@ _ASIS = ("asis_r", "asis_l")
 
 
 def heading(context: RecordingContext) -> Iterator[Finding]:
-    """L106: the sides of the pelvis are absent, or never visible together."""
+    """Report L106: the sides of the pelvis are absent, or never visible together."""
     if context.marker_set is None or not context.marker_set.landmarks:
         return
     places = context.landmark_positions
@@ -31,7 +31,7 @@ def heading(context: RecordingContext) -> Iterator[Finding]:
 
 
 def direction_of_travel(context: RecordingContext) -> Iterator[Finding]:
-    """S311: the person walks where neither feet nor pelvis point.
+    """Report S311: the person walks where neither feet nor pelvis point.
 
     Where no markers show the front of either, the sides of the pelvis decide, whose labels may be swapped as well.
     """

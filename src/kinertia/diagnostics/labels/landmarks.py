@@ -19,8 +19,8 @@ _USUAL_HEIGHT_M, _ANY_SEX = 1.7, "male"
 
 
 def landmarks(context: RecordingContext) -> Iterator[Finding]:
-    """L105, S206 or L107: why no model can be built from a static trial (L105, S206), and each missing part that a
-    model can do without (L107).
+    """Report L105, S206 or L107: why no model can be built from a static trial (L105, S206), and each missing part that
+    a model can do without (L107).
 
     Errors that are not about markers concern stature, which other questions cover.
     """

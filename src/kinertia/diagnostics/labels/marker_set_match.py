@@ -56,7 +56,8 @@ def match_labels(labels: Sequence[str], marker_set: MarkerSet | None) -> tuple[M
 
 
 def labels_match(context: RecordingContext) -> Iterator[Finding]:
-    """L101 to L103: no marker set fits, labels are missing, or labels are spelled differently (one finding each)."""
+    """Report L101 to L103: no marker set fits, labels are missing, or labels are spelled differently (one finding
+    each)."""
     match, used = match_labels(context.all_markers.labels, context.marker_set)
     if used is None:
         yield replace(no_marker_set(match.name, match.n_labels, match.missing), where=context.at())

@@ -54,7 +54,7 @@ class _Pair(NamedTuple):
 
 
 def rigidity(context: RecordingContext) -> Iterator[Finding]:
-    """L213, one per marker that does not move with its segment; L214, one per segment on the wrong leg.
+    """Report L213, one per marker that does not move with its segment; L214, one per segment on the wrong leg.
 
     Markers with faulty trajectories are left out. Noise beyond that of cameras widens the limits.
     """

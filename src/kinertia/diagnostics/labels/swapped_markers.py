@@ -38,8 +38,8 @@ _LOST_M = 0.08
 
 
 def labels_by_model(skeleton: Skeleton, trial: Trial | Recording) -> Iterator[Finding]:
-    """L212: two labels look swapped; else R106: the model cannot follow the markers at all; or R103: no frame shows
-    enough of them.
+    """Report L212: two labels look swapped; else R106: the model cannot follow the markers at all; or R103: no frame
+    shows enough of them.
 
     Every two of the markers with the largest errors are swapped in turn. Markers close together on a part that can
     turn freely (both wrist markers) cannot be distinguished; swapping them does no harm.
@@ -140,7 +140,7 @@ _NEAR_M = 0.04
 
 
 def label_swaps(context: RecordingContext) -> Iterator[Finding]:
-    """L211: one finding per swap; where labels return to their own markers there is another."""
+    """Report L211: one finding per swap; where labels return to their own markers there is another."""
     markers = context.measured_markers
     if len(markers.time) < 5:
         return

@@ -28,7 +28,8 @@ _USUAL_RAD = (-np.radians(0.1), np.radians(0.1))
 
 
 def unit_and_vertical(context: RecordingContext) -> Iterator[Finding]:
-    """M141 and M142: wrong unit of length, or vertical axis by the markers' extent or the line from feet to pelvis."""
+    """Report M141 and M142: wrong unit of length, or vertical axis by the markers' extent or the line from feet to
+    pelvis."""
     extent = extent_m(context.markers)
     if np.isnan(extent).any():
         return
@@ -66,7 +67,7 @@ def _feet_to_pelvis_m(context: RecordingContext) -> FloatArray | None:
 
 
 def floor_slope(context: RecordingContext) -> Iterator[Finding]:
-    """M144: a floor that rises (positive) or falls along the walk; not tested on a treadmill."""
+    """Report M144: a floor that rises (positive) or falls along the walk; not tested on a treadmill."""
     if context.feet is None or context.recording.belt is not None:
         return
     markers = context.all_markers

@@ -39,7 +39,7 @@ class _Computed(NamedTuple):
 
 
 def computed_markers(context: RecordingContext) -> Iterator[Finding]:
-    """M151, one per point that was computed from other markers; of a motion."""
+    """Report M151, one per point that was computed from other markers; of a motion."""
     markers, marker_set = context.markers, context.marker_set
     if marker_set is None:
         return

@@ -36,7 +36,7 @@ than this share of how much the quick frames bend."""
 
 
 def frames(context: RecordingContext) -> Iterator[Finding]:
-    """M121 to M123: missing frames (one finding per cut), copied frames, and interpolated frames."""
+    """Report M121 to M123: missing frames (one finding per cut), copied frames, and interpolated frames."""
     markers = context.markers
     if len(markers.time) < FEWEST_FRAMES:
         return

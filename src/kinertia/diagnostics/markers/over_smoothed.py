@@ -29,7 +29,7 @@ _MOSTLY_SEEN = 0.9
 
 
 def over_smoothed(context: RecordingContext) -> Iterator[Finding]:
-    """M133: markers without the fast part of the motion that the forces show; no finding without steps."""
+    """Report M133: markers without the fast part of the motion that the forces show; no finding without steps."""
     trial, owners, changes = context.trial, context.segment_of_label, context.velocity_changes
     if trial is None or changes is None or not context.has_strides:
         return

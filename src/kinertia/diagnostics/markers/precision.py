@@ -11,7 +11,7 @@ from kinertia.findings.quantity import Quantity
 
 
 def precision(context: RecordingContext) -> Iterator[Finding]:
-    """M131 and M132: coarsely rounded coordinates, and noisy ones."""
+    """Report M131 and M132: coarsely rounded coordinates, and noisy ones."""
     precise = context.marker_precision
     if precise.rounded:
         step = Quantity(precise.step_m, "m", limit=COARSE_M, usual=USUAL_STEP_M)

@@ -24,8 +24,8 @@ _COINCIDING_M, _COINCIDING_S, _MOSTLY = 0.003, 0.1, 0.5
 
 
 def trajectories(context: RecordingContext) -> Iterator[Finding]:
-    """M111 to M115: faults of single trajectories, one finding per marker with spikes, per jump and per filled gap; and
-    labels of one and the same marker.
+    """Report M111 to M115: faults of single trajectories, one finding per marker with spikes, per jump and per filled
+    gap; and labels of one and the same marker.
     """
     yield from _coinciding(context)
     faults, rate_hz = context.trajectory_faults, context.markers.rate_hz
@@ -55,7 +55,7 @@ def trajectories(context: RecordingContext) -> Iterator[Finding]:
 
 
 def _coinciding(context: RecordingContext) -> Iterator[Finding]:
-    """M115: pairs of labels of the marker set that coincide for a while."""
+    """Report M115: pairs of labels of the marker set that coincide for a while."""
     markers = context.markers
     if len(markers.time) < 2:
         return

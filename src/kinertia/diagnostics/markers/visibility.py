@@ -18,7 +18,8 @@ _DISPENSABLE = ("upper_arm", "forearm")
 
 
 def visible(context: RecordingContext) -> Iterator[Finding]:
-    """M101 to M104: one finding per marker (M102 and M103 over the measured window), M104 one per bare segment."""
+    """Report M101 to M104: one finding per marker (M102 and M103 over the measured window), M104 one per bare
+    segment."""
     for one in visibility(context.markers):
         if one.share == 0.0:
             yield finding("M101", context.at(markers=(one.label,)), share=Quantity(0.0, "1"))
@@ -38,7 +39,8 @@ def _in_window(context: RecordingContext) -> Markers:
 
 
 def _bare_segments(context: RecordingContext) -> Iterator[Finding]:
-    """M104: pelvis, legs, feet without markers, the trunk if the static trial shows it; of an OpenSim model, feet."""
+    """Report M104: pelvis, legs, feet without markers, the trunk if the static trial shows it; of an OpenSim model,
+    feet."""
     marker_set = context.marker_set
     if marker_set is None:
         return

@@ -21,7 +21,7 @@ _WHOLE = 6
 
 
 def length_unit(context: PersonContext) -> Iterator[Finding]:
-    """O301: joints, centres of mass or markers that are not in metres; the finding identifies the farthest."""
+    """Report O301: joints, centres of mass or markers that are not in metres; the finding identifies the farthest."""
     if context.model is None:
         return
     skeleton = context.model.skeleton

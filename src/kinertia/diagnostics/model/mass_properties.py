@@ -28,7 +28,7 @@ _NO_EXTENT_M = 1e-4
 
 
 def impossible_inertia(context: PersonContext) -> Iterator[Finding]:
-    """O201: bodies whose inertia no distribution of mass can have."""
+    """Report O201: bodies whose inertia no distribution of mass can have."""
     if context.model is None:
         return
     bsp = context.model.bsp
@@ -44,7 +44,7 @@ def impossible_inertia(context: PersonContext) -> Iterator[Finding]:
 
 
 def missing_inertia(context: PersonContext) -> Iterator[Finding]:
-    """O202: mass without inertia, or with a negative one, as if all of it were in a point."""
+    """Report O202: mass without inertia, or with a negative one, as if all of it were in a point."""
     if context.model is None:
         return
     bsp, estimated = context.model.bsp, _estimated(context)
@@ -57,7 +57,7 @@ def missing_inertia(context: PersonContext) -> Iterator[Finding]:
 
 
 def inertia_size(context: PersonContext) -> Iterator[Finding]:
-    """O203: bodies denser than anything in a person; O204: bodies larger than a person."""
+    """Report O203: bodies denser than anything in a person; O204: bodies larger than a person."""
     if context.model is None:
         return
     bsp = context.model.bsp
@@ -76,7 +76,8 @@ def inertia_size(context: PersonContext) -> Iterator[Finding]:
 
 
 def degenerate_inertia(context: PersonContext) -> Iterator[Finding]:
-    """O205: two principal moments that add up to the third exactly, as rounded ones do: a body without thickness."""
+    """Report O205: two principal moments that add up to the third exactly, as rounded ones do: a body without
+    thickness."""
     if context.model is None:
         return
     bsp = context.model.bsp

@@ -27,7 +27,7 @@ sign: 18 mm."""
 
 
 def mirrored_joints(context: PersonContext) -> Iterator[Finding]:
-    """O302 and O303: axes (O302) and positions (O303) of joints whose left and right do not mirror each other.
+    """Report O302 and O303: axes (O302) and positions (O303) of joints whose left and right do not mirror each other.
 
     A position changes the sign of z in its mirror image, a direction or orientation those of x and y.
     """

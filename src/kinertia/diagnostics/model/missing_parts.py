@@ -12,7 +12,8 @@ from kinertia.model.anatomy import segment_of
 
 
 def markers_and_feet(context: PersonContext) -> Iterator[Finding]:
-    """O106 and O107: a model without markers, which only a fit needs (O106), or without a body of a foot (O107)."""
+    """Report O106 and O107: a model without markers, which only a fit needs (O106), or without a body of a foot
+    (O107)."""
     model = context.model
     if model is None:
         return
@@ -24,7 +25,7 @@ def markers_and_feet(context: PersonContext) -> Iterator[Finding]:
 
 
 def unmatched_markers(context: PersonContext) -> Iterator[Finding]:
-    """O414: markers of a trial that the model does not have."""
+    """Report O414: markers of a trial that the model does not have."""
     if context.model is None:
         return
     known = set(context.model.skeleton.labels)

@@ -42,8 +42,8 @@ _FRAMES = 60
 
 
 def model_and_trials(context: PersonContext) -> Iterator[Finding]:
-    """O401, O402, L212, O404 and O405: each trial's markers indicate another unit (O401), left and right interchanged
-    (O402), swapped labels (L212), another scale (O404), or markers that were not placed (O405).
+    """Report O401, O402, L212, O404 and O405: each trial's markers indicate another unit (O401), left and right
+    interchanged (O402), swapped labels (L212), another scale (O404), or markers that were not placed (O405).
     """
     marker_set = context.marker_set
     if context.model is None or marker_set is None or marker_set.in_model is None:
@@ -73,7 +73,7 @@ def model_and_trials(context: PersonContext) -> Iterator[Finding]:
 
 
 def moved_markers(before: Skeleton, after: Skeleton, trials: Sequence[Markers]) -> Iterator[Finding]:
-    """O407: markers of the lower body that calibration moved farther than a marker is ever misplaced.
+    """Report O407: markers of the lower body that calibration moved farther than a marker is ever misplaced.
 
     Args:
         before, after: the model's skeleton and the calibrated one.

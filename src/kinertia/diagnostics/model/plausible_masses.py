@@ -31,7 +31,8 @@ _OUTLYING_SD = 2.0
 
 
 def placeholders(context: PersonContext) -> Iterator[Finding]:
-    """O211: placeholder inertias that were never measured: three equal moments, or moments of at most two digits."""
+    """Report O211: placeholder inertias that were never measured: three equal moments, or moments of at most two
+    digits."""
     if context.model is None:
         return
     bsp = context.model.bsp
@@ -50,8 +51,8 @@ def placeholders(context: PersonContext) -> Iterator[Finding]:
 
 
 def unlike_tables(context: PersonContext) -> Iterator[Finding]:
-    """O212: the parameter of each segment farthest from both tables, if farther than people are; a model that is fitted
-    is compared at the mass to which the fit scales it.
+    """Report O212: the parameter of each segment farthest from both tables, if farther than people are; a model that is
+    fitted is compared at the mass to which the fit scales it.
     """
     check = _checked(context)
     if check is None or not check.literature:
@@ -78,8 +79,8 @@ def unlike_tables(context: PersonContext) -> Iterator[Finding]:
 
 
 def model_mass(context: PersonContext) -> Iterator[Finding]:
-    """O213: a model mass that differs from the person's. A fit scales the masses, so that only a difference larger than
-    between people is reported there; legs alone cannot be scaled to the whole body's mass.
+    """Report O213: a model mass that differs from the person's. A fit scales the masses, so that only a difference
+    larger than between people is reported there; legs alone cannot be scaled to the whole body's mass.
     """
     stated_kg = None if context.total_mass is None else context.total_mass.body_kg
     stated_kg = context.subject.mass_kg if stated_kg is None else stated_kg
@@ -100,7 +101,7 @@ def model_mass(context: PersonContext) -> Iterator[Finding]:
 
 
 def sides(context: PersonContext) -> Iterator[Finding]:
-    """O214: pairs of bodies that do not mirror each other."""
+    """Report O214: pairs of bodies that do not mirror each other."""
     if context.model is None:
         return
     for one in side_differences(context.model.bsp):
@@ -115,7 +116,7 @@ def sides(context: PersonContext) -> Iterator[Finding]:
 
 
 def arms_in_torso(context: PersonContext) -> Iterator[Finding]:
-    """O215: a torso with the arms' inertia in a model whose arms are bodies of their own."""
+    """Report O215: a torso with the arms' inertia in a model whose arms are bodies of their own."""
     if context.model is None:
         return
     check = check_model(context.model.skeleton, context.model.bsp)
@@ -136,7 +137,7 @@ def arms_in_torso(context: PersonContext) -> Iterator[Finding]:
 
 
 def compared_with_tables(context: PersonContext) -> Iterator[Finding]:
-    """O415: what was not compared in a model that is checked on its own, and why."""
+    """Report O415: what was not compared in a model that is checked on its own, and why."""
     if context.model is None or context.has_trials:
         return
     subject = context.subject

@@ -22,7 +22,7 @@ trials with models of six makers it is 0.08 at most (knees that end straight), i
 
 
 def range_findings(skeleton: Skeleton, ik: InverseKinematics) -> Iterator[Finding]:
-    """O311 and O312: legs and trunk that stay at a clamped limit, so that other joints compensate (O311); other
+    """Report O311 and O312: legs and trunk that stay at a clamped limit, so that other joints compensate (O311); other
     coordinates that stay at one, or exceed the usual range of a joint (O312).
 
     Args:

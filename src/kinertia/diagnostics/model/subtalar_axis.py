@@ -25,7 +25,8 @@ _USUAL = (0.7872, 0.6047, -0.1209)
 
 
 def subtalar_axis(context: PersonContext) -> Iterator[Finding]:
-    """O304: a subtalar axis far from where people have it (some 40 degrees up from the sole, 10 to 20 inward)."""
+    """Report O304: a subtalar axis far from where people have it (some 40 degrees up from the sole, 10 to 20
+    inward)."""
     neutral = None if context.model is None else neutral_joints(context.model.skeleton)
     if neutral is None or neutral.sideways is None:
         return

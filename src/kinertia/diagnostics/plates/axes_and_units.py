@@ -22,7 +22,7 @@ _LONGEST_ARM_M, _USUAL_ARM_M, _FEWEST = 0.15, 0.04, 10
 
 
 def axes_and_units(context: RecordingContext) -> Iterator[Finding]:
-    """P201 to P203: forces in other axes or other units, going by the plates alone."""
+    """Report P201 to P203: forces in other axes or other units, going by the plates alone."""
     plates = context.plates
     if plates is None:
         return

@@ -19,7 +19,7 @@ _MOST_SHARE = 0.5
 
 
 def cop_on_plate(context: RecordingContext) -> Iterator[Finding]:
-    """P245: loads that act outside the corners of their plate."""
+    """Report P245: loads that act outside the corners of their plate."""
     if context.plates is None:
         return
     for p, name in enumerate(context.plates.names):

@@ -47,8 +47,8 @@ _USUAL_BEGIN_M, _USUAL_END_M = (0.035, 0.1), (-0.06, 0.025)
 
 
 def loads_and_feet(context: RecordingContext) -> Iterator[Finding]:
-    """P204, P24, T20, T21 and P243: the explanation that leaves loads nearest to the feet and to their times, with the
-    others among its causes; of equally good ones the first tested. Where loads fit: P243 of small offsets.
+    """Report P204, P24, T20, T21 and P243: the explanation that leaves loads nearest to the feet and to their times,
+    with the others among its causes; of equally good ones the first tested. Where loads fit: P243 of small offsets.
     """
     if context.is_static or context.foot_trajectories is None or not context.contacts:
         return
@@ -84,7 +84,7 @@ def _with_runners_up(ranked: Sequence[Finding]) -> Finding:
 
 
 def _other_unit(context: RecordingContext) -> Iterator[Finding]:
-    """P204: plates whose loads are all outside the laboratory: one plate, where each has columns of its own."""
+    """Report P204: plates whose loads are all outside the laboratory: one plate, where each has columns of its own."""
     plates = context.plates
     assert plates is not None
     nearest: dict[int, float] = {}
@@ -126,7 +126,7 @@ def _displaced(context: RecordingContext) -> Iterator[Hypothesis]:
 
 
 def _offset(context: RecordingContext) -> Iterator[Finding]:
-    """P243: the loads of right and left are displaced in the same direction of the laboratory."""
+    """Report P243: the loads of right and left are displaced in the same direction of the laboratory."""
     contacts = context.contacts
     means = [[one.own_offset_m for one in contacts if one.foot == foot] for foot in range(2)]
     if not all(means):
@@ -141,8 +141,8 @@ def _offset(context: RecordingContext) -> Iterator[Finding]:
 
 
 def _ends(context: RecordingContext, contacts: Sequence[PlateContact]) -> Iterator[Finding]:
-    """P243: loads that begin behind the heel or end in front of the toes, as happens first with an offset along the
-    foot."""
+    """Report P243: loads that begin behind the heel or end in front of the toes, as happens first with an offset along
+    the foot."""
     # both of two contacts, so that a second foot on one plate does not count
     ends = np.sort([one.ends_m for one in contacts], axis=0)
     begin, end = float(ends[len(ends) // 2, 0]), float(ends[(len(ends) - 1) // 2, 1])

@@ -24,8 +24,8 @@ _BACKWARDS, _FORWARDS, _USUAL = -0.35, 0.25, (0.06, 0.82)
 
 
 def cop_progression(context: RecordingContext) -> Iterator[Finding]:
-    """P251 and P252: plates whose centre of pressure never moves during a step (P251), or moves from toe to heel while
-    on another plate it moves from heel to toe (P252).
+    """Report P251 and P252: plates whose centre of pressure never moves during a step (P251), or moves from toe to heel
+    while on another plate it moves from heel to toe (P252).
     """
     plates, feet = context.plates, context.foot_trajectories
     if plates is None or feet is None or context.is_static or not lands_on_heels(context):

@@ -50,7 +50,8 @@ class _Hypothesis:
 
 
 def force_directions(context: RecordingContext) -> Iterator[Finding]:
-    """P231 to P233 and P236: the hypothesis with the smallest residual; other sufficient ones are among its causes.
+    """Report P231 to P233 and P236: the hypothesis with the smallest residual; other sufficient ones are among its
+    causes.
 
     One about both axes is weighed against the best of each axis. Without strides the trunk bends: then pelvis and
     marker-based centre must both oppose the forces, and only a wrong sign of all forces is considered.
@@ -89,7 +90,8 @@ def _rotated(
     correlations: dict[int, float],
     against: Sequence[int],
 ) -> _Hypothesis | None:
-    """P231: rotated by 180 degrees where both axes oppose the motion, else by the angle at which forces follow it."""
+    """Report P231: rotated by 180 degrees where both axes oppose the motion, else by the angle at which forces follow
+    it."""
     angle_deg, strength = _angle(changes)
     # beside an opposed axis, one that agrees with the markers shows that the forces are not rotated
     enough = -_OPPOSED if against else _CLEAR
@@ -112,7 +114,7 @@ def _rotated(
 
 
 def _reversed_axis(context: RecordingContext, residual: VelocityResidual, correlation: float, axis: int) -> _Hypothesis:
-    """P232: all plates have the wrong sign."""
+    """Report P232: all plates have the wrong sign."""
     found = finding(
         "P232",
         context.at(**context.along(axis)),
@@ -125,7 +127,7 @@ def _reversed_axis(context: RecordingContext, residual: VelocityResidual, correl
 def _reversed_plate(
     context: RecordingContext, plates: PlateLoads, residual: VelocityResidual, axis: int
 ) -> Iterator[_Hypothesis]:
-    """P233: one plate has the wrong sign, where others have it right.
+    """Report P233: one plate has the wrong sign, where others have it right.
 
     With its sign reversed, the forces must agree with the markers much better, and better than with the sign of any
     other plate or of all plates reversed, or with another zero.
@@ -162,7 +164,7 @@ def _reversed_plate(
 def _misread_plate(
     context: RecordingContext, plates: PlateLoads, residuals: dict[int, VelocityResidual]
 ) -> _Hypothesis | None:
-    """P236: the axes of one plate are rotated by 90 degrees or exchanged, where others are right.
+    """Report P236: the axes of one plate are rotated by 90 degrees or exchanged, where others are right.
 
     With this undone, the forces must agree with the markers much better, and better than if any sign or zero is
     corrected.

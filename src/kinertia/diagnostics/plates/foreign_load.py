@@ -12,7 +12,7 @@ from kinertia.findings.quantity import Quantity
 
 
 def foreign_load(context: RecordingContext) -> Iterator[Finding]:
-    """P284: a foreign load; an ERROR if it leaves hardly any frames."""
+    """Report P284: a foreign load; an ERROR if it leaves hardly any frames."""
     found = context.foreign_load
     if found is None:
         return
@@ -25,7 +25,7 @@ def foreign_load(context: RecordingContext) -> Iterator[Finding]:
 
 
 def stray_loads(context: RecordingContext) -> Iterator[Finding]:
-    """P285: loads that are under no foot and were left out."""
+    """Report P285: loads that are under no foot and were left out."""
     names = () if context.plates is None else context.plates.names
     for one in context.stray_contacts:
         where = context.at(plate=names[one.plate], span_s=(float(one.time[0]), float(one.time[-1])))

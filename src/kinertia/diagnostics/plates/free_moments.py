@@ -34,7 +34,7 @@ _LONG_ARM_M, _USUAL_PERCENT, _ACCOUNTED, _FEWEST = 0.034, 95.0, 1.8, 20
 
 
 def free_moments(context: RecordingContext) -> Iterator[Finding]:
-    """P261 to P264: free moments that contradict the forces of their plate."""
+    """Report P261 to P264: free moments that contradict the forces of their plate."""
     plates = context.plates
     if plates is None:
         return
@@ -50,7 +50,7 @@ def free_moments(context: RecordingContext) -> Iterator[Finding]:
 
 
 def _columns(context: RecordingContext, plates: PlateLoads) -> Iterator[Finding]:
-    """P261 and P262: moment columns that are not the free moments at their centres of pressure."""
+    """Report P261 and P262: moment columns that are not the free moments at their centres of pressure."""
     for name, one in zip(plates.names, plates.torques or (), strict=plates.torques is not None):
         x, _, z = one.rms_nm
         across = float(np.hypot(x, z))
@@ -78,7 +78,8 @@ def _is_rotated(columns: TorqueColumns, across_nm: float) -> bool:
 def _about_fixed_point(
     context: RecordingContext, plates: PlateLoads, explained: Container[str | None]
 ) -> Iterator[Finding]:
-    """P261: vertical moments about a fixed point, the plate's middle or the origin (Mz for Tz), not free moments."""
+    """Report P261: vertical moments about a fixed point, the plate's middle or the origin (Mz for Tz), not free
+    moments."""
     for name, wrench in loaded_wrenches(plates, _FEWEST):
         if name in explained:
             continue
@@ -109,7 +110,7 @@ def _fixed_point(wrench: FloatArray, torque: FloatArray) -> tuple[FloatArray, Fl
 
 
 def _exchanged(context: RecordingContext, plates: PlateLoads) -> Iterator[Finding]:
-    """P263: moment columns of two plates interchanged, by the residuals of each plate while it is loaded."""
+    """Report P263: moment columns of two plates interchanged, by the residuals of each plate while it is loaded."""
     torques = plates.torques or ()
     for a, one in enumerate(torques):
         b = one.belongs_to

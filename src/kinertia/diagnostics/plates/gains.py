@@ -36,7 +36,8 @@ are as large another gain leaves 0.72 and more, or another zero explains more. B
 
 
 def gains(context: RecordingContext) -> Iterator[Finding]:
-    """P221 and P222: P221 by single support on each plate, else by vertical velocity; P222 of each horizontal axis."""
+    """Report P221 and P222: P221 by single support on each plate, else by vertical velocity; P222 of each horizontal
+    axis."""
     plates = context.plates
     if plates is None or context.trial is None:
         return
@@ -107,7 +108,7 @@ def _by_vertical_velocity(context: RecordingContext, plates: PlateLoads) -> Find
 def _disagreeing(
     context: RecordingContext, names: tuple[str, str], mass_kg: tuple[float, float], **evidence: Quantity
 ) -> Finding:
-    """P221: the plate that reads more and the one that reads less; which of them is wrong remains unknown."""
+    """Report P221: the plate that reads more and the one that reads less; which of them is wrong remains unknown."""
     plates = {"plate": Quantity(names[0]), "other": Quantity(names[1])}
     masses = {"mass_kg": Quantity(mass_kg[0], "kg"), "other_kg": Quantity(mass_kg[1], "kg")}
     return with_evidence("P221", context.at(**context.along(1)), {**masses, **plates, **evidence})
@@ -116,7 +117,7 @@ def _disagreeing(
 def _scaled_axis(
     context: RecordingContext, plates: PlateLoads, long: Sequence[ForceVelocity], axis: int
 ) -> Finding | None:
-    """P222: the axis of one plate, or of all, that reads a multiple of the true force, with or without a zero
+    """Report P222: the axis of one plate, or of all, that reads a multiple of the true force, with or without a zero
     offset."""
     residual = VelocityResidual.of(plates.time, plates.force, long, axis)
     steady = steady_scaled(plates.time, plates.force, long, axis)

@@ -30,9 +30,10 @@ marker it is up to 0.19 of the way to the other foot, which stands on the floor.
 
 
 def complete_contact(context: RecordingContext) -> Iterator[Finding]:
-    """T104, P271, P278: no trial can be made of the recording; P279: it has too few frames with complete contact; P273,
-    P274, P275, P277: how its loads were sorted by foot; P280, P283: only its markers are used, as requested or because
-    its forces are unusable; F191, T104: hardly any frames are in the window stated for these, or in the trial.
+    """Report T104, P271, P278: no trial can be made of the recording; P279: it has too few frames with complete
+    contact; P273, P274, P275, P277: how its loads were sorted by foot; P280, P283: only its markers are used, as
+    requested or because its forces are unusable; F191, T104: hardly any frames are in the window stated for these, or
+    in the trial.
     """
     if context.is_static:
         return
@@ -81,8 +82,8 @@ def _too_few_frames(context: RecordingContext) -> Finding | None:
 
 
 def both_feet(context: RecordingContext) -> Iterator[Finding]:
-    """P276: a load between the feet; both are on the plate, and only their total load is known. A foot that swings by
-    its markers is on none.
+    """Report P276: a load between the feet; both are on the plate, and only their total load is known. A foot that
+    swings by its markers is on none.
     """
     plates, feet = context.plates, context.foot_trajectories
     if plates is None or feet is None or context.is_static or not goes_forwards(context):
@@ -122,7 +123,7 @@ def _under_both(contact: PlateContact) -> BoolArray:
 
 
 def plate_edges(context: RecordingContext) -> Iterator[Finding]:
-    """P282: feet that extend beyond the plate that they stand on, onto the floor."""
+    """Report P282: feet that extend beyond the plate that they stand on, onto the floor."""
     plates = context.plates
     if plates is None or context.is_static:
         return

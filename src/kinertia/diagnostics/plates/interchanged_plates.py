@@ -25,7 +25,7 @@ _DIFFERENCE = 0.25
 
 
 def interchanged_plates(context: RecordingContext) -> Iterator[Hypothesis]:
-    """P241: loads that are under no foot at their own position, but under one at another plate's."""
+    """Report P241: loads that are under no foot at their own position, but under one at another plate's."""
     plates, feet, contacts = context.plates, context.foot_trajectories, context.contacts
     if plates is None or feet is None or len({one.plate for one in contacts}) < 2:
         return

@@ -28,7 +28,7 @@ _SHORTEST_S, _SAMPLES_PER_PERIOD, _SLOW_ORDER = 0.2, 3.0, 6
 
 
 def mains_interference(context: RecordingContext) -> Iterator[Finding]:
-    """P107: mains interference of every plate and axis, at the stronger of the two mains frequencies."""
+    """Report P107: mains interference of every plate and axis, at the stronger of the two mains frequencies."""
     plates = context.plates
     if plates is None:
         return

@@ -26,7 +26,8 @@ _OVERSHOOT_S, _OVERSHOOT_HZ_S = 0.06, 0.45
 
 
 def quantisation(context: RecordingContext) -> Iterator[Finding]:
-    """P105, P106 and P108: forces, or centres of pressure, in coarse steps; forces spread in time by a filter."""
+    """Report P105, P106 and P108: forces, or centres of pressure, in coarse steps; forces spread in time by a
+    filter."""
     plates = context.plates
     if plates is None:
         return

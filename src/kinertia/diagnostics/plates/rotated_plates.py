@@ -31,8 +31,8 @@ _OPERATIONS = (
 
 
 def rotated_plates(context: RecordingContext) -> Iterator[Hypothesis]:
-    """P242: the one correction of one plate, or of all equally, that puts all loads under the feet; nothing where none
-    or several do.
+    """Report P242: the one correction of one plate, or of all equally, that puts all loads under the feet; nothing
+    where none or several do.
     """
     plates, feet = context.plates, context.foot_trajectories
     steps = [one for one in context.contacts if one.is_step]

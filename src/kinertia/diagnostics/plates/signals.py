@@ -37,7 +37,7 @@ _QUANTISED, _STEPS = 4.0, 3.2
 
 
 def signals(context: RecordingContext) -> Iterator[Finding]:
-    """P101 to P104 and P109: faulty signals of every plate and axis."""
+    """Report P101 to P104 and P109: faulty signals of every plate and axis."""
     if context.plates is None:
         return
     for detect in (_dead_channels, _dropped_samples, _repeated_samples, _saturated):
@@ -131,7 +131,7 @@ def _saturated(context: RecordingContext, plates: PlateLoads) -> Iterator[Findin
 
 
 def spikes(context: RecordingContext) -> Iterator[Finding]:
-    """P109: each plate's largest spike, of those that the reader has bridged."""
+    """Report P109: each plate's largest spike, of those that the reader has bridged."""
     plates = context.plates
     if plates is None or plates.spikes is None:
         return

@@ -60,8 +60,8 @@ class MeanVerticalMoment:
 
 
 def vertical_moment(context: RecordingContext) -> Iterator[Finding]:
-    """P266: a mean vertical moment about the middle of the pelvis markers, in the longest measured window; not in
-    turns."""
+    """Report P266: a mean vertical moment about the middle of the pelvis markers, in the longest measured window; not
+    in turns."""
     trial = context.trial
     if trial is None or not trial.windows() or not context.has_strides or context.turns:
         return

@@ -24,7 +24,7 @@ _UNKNOWN = UnloadedReading((np.nan, np.nan, np.nan), np.nan, 0.0, 0.0)
 
 
 def zeros(context: RecordingContext) -> Iterator[Finding]:
-    """P211, P213 and P216: zero offsets of every plate and axis; limits in newtons are those of adults.
+    """Report P211, P213 and P216: zero offsets of every plate and axis; limits in newtons are those of adults.
 
     Readers subtract a constant level from the loads (P216). A level that is not constant, or of plates stated to be
     zeroed, remains in the loads (P213).
@@ -52,7 +52,7 @@ def zeros(context: RecordingContext) -> Iterator[Finding]:
 
 
 def unloaded_levels(context: RecordingContext) -> Iterator[Finding]:
-    """P216: the unloaded reading of a plate in use, which has been subtracted from its loads."""
+    """Report P216: the unloaded reading of a plate in use, which has been subtracted from its loads."""
     plates = context.plates
     for p, unloaded in enumerate(() if plates is None else plates.unloaded or ()):
         assert plates is not None

@@ -34,7 +34,7 @@ _AGREES = 0.5
 
 
 def zeros_under_load(context: RecordingContext) -> Iterator[Finding]:
-    """P212 and P214: zero offsets under load along each horizontal axis.
+    """Report P212 and P214: zero offsets under load along each horizontal axis.
 
     Their limits are the same for children: in six children of 25 to 60 kg who walk straight and turn, up to 27 N seem
     not to accelerate the pelvis, in windows below 1 s, and zeros of one plate seem to be up to 11 N.
@@ -51,7 +51,7 @@ def zeros_under_load(context: RecordingContext) -> Iterator[Finding]:
 def _unexplained(
     context: RecordingContext, plates: PlateLoads, parts: Sequence[ForceVelocity], axis: int
 ) -> Finding | None:
-    """P214: the trend of the force-derived velocity beyond the pelvis', as a force; longer windows count more.
+    """Report P214: the trend of the force-derived velocity beyond the pelvis', as a force; longer windows count more.
 
     Without strides the trunk bends, so that the pelvis moves differently: the marker-based centre must agree.
     """
@@ -99,8 +99,8 @@ def _levels(plates: PlateLoads, axis: int) -> FloatArray | None:
 def _plate_zero(
     context: RecordingContext, plates: PlateLoads, parts: Sequence[ForceVelocity], axis: int, all_plates: bool
 ) -> Finding | None:
-    """P212: a force of one loaded plate that does not accelerate the body, unless all plates show it as well, or there
-    are no strides: the body's horizontal velocity is then less certain.
+    """Report P212: a force of one loaded plate that does not accelerate the body, unless all plates show it as well, or
+    there are no strides: the body's horizontal velocity is then less certain.
     """
     long = [part for part in parts if span_s(part.time) >= _LEAST_WINDOW_S]
     if not long or not context.has_strides:

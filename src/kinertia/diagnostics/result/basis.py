@@ -16,7 +16,7 @@ _LEAST_SHARE = 0.01
 
 
 def filters(context: ResultContext) -> Iterator[Finding]:
-    """R111 and R112: a cutoff that was chosen (R111), and impacts that were given less weight (R112)."""
+    """Report R111 and R112: a cutoff that was chosen (R111), and impacts that were given less weight (R112)."""
     for trial in context.fit.trials if context.fit.settings.cutoff_hz == "gcv" else ():
         yield finding("R111", Where(trial=trial.name), cutoff_hz=Quantity(trial.kinematics.cutoff_hz, "Hz"))
     posterior = context.fit.posterior

@@ -57,8 +57,8 @@ def mirrored(errors: Sequence[CalibrationEntry]) -> bool:
 
 
 def reversed_sign(trial: TrialFit) -> Iterator[Finding]:
-    """P265: a trial whose free moments follow the measured motion once their sign is reversed, for an estimate without
-    evidence of its own.
+    """Report P265: a trial whose free moments follow the measured motion once their sign is reversed, for an estimate
+    without evidence of its own.
     """
     left, loads = trial.residuals["literature"][:, VERTICAL], trial.kinematics.foot_loads
     as_is, reversed_nm = residual_moments_nm(left, loads)

@@ -39,7 +39,7 @@ def gains(context: ResultContext) -> Iterator[Finding]:
 
 
 def _of_all(context: ResultContext, gains: Sequence[CalibrationEntry]) -> Finding:
-    """P224: a gain error of all plates, with the masses that the forces of the trials correspond to."""
+    """Report P224: a gain error of all plates, with the masses that the forces of the trials correspond to."""
     trial, total = gains[0].trial, context.ready.total_mass
     sd, limit = max(one.sd for one in gains), 2.0 * gains[0].prior_sd
     evidence = {"gain_error": Quantity(tuple(one.value for one in gains), "1", limit, sd=sd)}

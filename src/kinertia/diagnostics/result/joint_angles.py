@@ -20,7 +20,7 @@ _SURE = 2.0
 
 
 def joint_angles(context: ResultContext) -> Iterator[Finding]:
-    """R305: every coordinate that leaves its range in a trial, with its most extreme angle.
+    """Report R305: every coordinate that leaves its range in a trial, with its most extreme angle.
 
     Angles beyond the range by less than two of their own SDs are not reported.
     """

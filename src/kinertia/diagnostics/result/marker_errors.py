@@ -81,7 +81,7 @@ def corrected_joints(context: ResultContext) -> Iterator[Finding]:
 
 
 def _knee_axes(context: ResultContext) -> Iterator[Finding]:
-    """M175: knees whose axis the trials show elsewhere than the static trial, by either of its two angles."""
+    """Report M175: knees whose axis the trials show elsewhere than the static trial, by either of its two angles."""
     for side, name in _SIDES.items():
         angles = [one for one in _calibrated(context) if one.joint == f"knee_{side}" and one.quantity == AXIS]
         if any(one.found for one in angles):

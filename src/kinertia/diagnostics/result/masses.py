@@ -26,7 +26,8 @@ def mass_from_force_kg(literature: BodySegmentParameters, trial: TrialFit) -> fl
 
 
 def forces_of_the_motion(context: ResultContext) -> Iterator[Finding]:
-    """R107: trials whose forces give another body mass with the motion of inverse kinematics than with the markers'."""
+    """Report R107: trials whose forces give another body mass with the motion of inverse kinematics than with the
+    markers'."""
     for trial in context.fit.trials:
         by_markers = context.force_masses.get(trial.name)
         if by_markers is None:
@@ -43,7 +44,7 @@ def forces_of_the_motion(context: ResultContext) -> Iterator[Finding]:
 
 
 def total_mass(context: ResultContext) -> Iterator[Finding]:
-    """S113: an estimated total mass that follows the plates more than the stated mass."""
+    """Report S113: an estimated total mass that follows the plates more than the stated mass."""
     total_kg, stated = context.fit.estimate.total_mass_kg, context.ready.total_mass
     limit = _TOTAL * stated.total_kg + 2.0 * stated.sd_kg
     if abs(total_kg - stated.total_kg) > limit:
@@ -55,7 +56,7 @@ def total_mass(context: ResultContext) -> Iterator[Finding]:
 
 
 def attached_items(context: ResultContext) -> Iterator[Finding]:
-    """S407: attached items of unknown mass that the trials cannot distinguish from zero."""
+    """Report S407: attached items of unknown mass that the trials cannot distinguish from zero."""
     estimate, posterior = context.fit.estimate, context.fit.posterior
     for item in () if posterior is None else context.ready.attached:
         row = estimate.segments.index(item.name)

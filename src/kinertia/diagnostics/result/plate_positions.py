@@ -46,8 +46,8 @@ def plate_positions(context: ResultContext) -> Iterator[Finding]:
 
 
 def _ambiguous(context: ResultContext, axis: str, errors: Sequence[CalibrationEntry]) -> list[Finding]:
-    """P247: a plate seems displaced, but another may be instead. The uncertainty of each plate is ignored, since it is
-    what is ambiguous, but the difference of the plates must be certain.
+    """Report P247: a plate seems displaced, but another may be instead. The uncertainty of each plate is ignored, since
+    it is what is ambiguous, but the difference of the plates must be certain.
     """
     prior, posterior = context.ready.uncertainty.instruments, context.fit.posterior
     off = [one for one in errors if one.notable and not one.contradicted_by]

@@ -53,7 +53,7 @@ def residuals(context: ResultContext) -> Iterator[Finding]:
 
 
 def residuals_of(trial: TrialFit) -> Iterator[Finding]:
-    """R301, R302 and R303: residual forces and moments of one trial."""
+    """Report R301, R302 and R303: residual forces and moments of one trial."""
     narrow, full = (_lengths(each["estimate"]) for each in (trial.residuals, trial.full_residuals))
     for guideline, judged, whole in zip((FORCE, MOMENT), narrow, full, strict=True):
         yield from _by_guideline(trial, guideline, judged, whole)
@@ -97,7 +97,8 @@ def _by_guideline(trial: TrialFit, guideline: Guideline, judged: np.ndarray, who
 
 
 def _markers(context: ResultContext, trial: TrialFit) -> Iterator[Finding]:
-    """R304: markers far from the model. Calibrating hides gross errors, and helps no further once it has been done.
+    """Report R304: markers far from the model. Calibrating hides gross errors, and helps no further once it has been
+    done.
 
     Arms and trunk move in ways that the model's shoulders cannot follow, so only markers of pelvis and legs can cause
     an ERROR.

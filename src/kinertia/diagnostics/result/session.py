@@ -17,7 +17,7 @@ _APART_SD = 3.0
 def session_contradictions(
     person: str, own: Sequence[CalibrationEntry], others: Sequence[CalibrationEntry]
 ) -> Iterator[Finding]:
-    """S501: instrument errors that differ between one person's trials and the others' in a session.
+    """Report S501: instrument errors that differ between one person's trials and the others' in a session.
 
     Args:
         person: name of the person.

@@ -32,7 +32,7 @@ _CENTRE_HEIGHT = 0.55
 
 
 def sideways_lean(context: ResultContext) -> Iterator[Finding]:
-    """M145: an equal correction of all plates takes the loads away from both feet to one side."""
+    """Report M145: an equal correction of all plates takes the loads away from both feet to one side."""
     across = [axis for axis in "xz" if context.along(axis, None).axis == _ACROSS]
     errors = [one for one in context.errors if one.quantity == POSITION and one.axis in across]
     if len(across) != 1 or not equal(errors):

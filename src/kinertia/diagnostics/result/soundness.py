@@ -52,7 +52,8 @@ def soundness(context: ResultContext) -> Iterator[Finding]:
 
 
 def _impossible(fit: Fit) -> Iterator[Finding]:
-    """R202: impossible bodies; light bodies of a model that were not estimated do not count against the estimate."""
+    """Report R202: impossible bodies; light bodies of a model that were not estimated do not count against the
+    estimate."""
     impossible = impossible_segments(fit.estimate)
     fixed = set()
     if fit.posterior is not None:
@@ -79,8 +80,8 @@ def away_from_expected(fit: Fit) -> np.ndarray:
 
 
 def _far_parameters(fit: Fit) -> Iterator[Finding]:
-    """R203: every parameter beyond CONTRADICTION_SD; parameters of arms, whose shoulders lack an axis, do not count
-    against the estimate."""
+    """Report R203: every parameter beyond CONTRADICTION_SD; parameters of arms, whose shoulders lack an axis, do not
+    count against the estimate."""
     away = away_from_expected(fit)
     beyond = np.abs(away) > CONTRADICTION_SD
     arms = np.array([str(segment_of(name)).startswith(_ARMS) for name in fit.estimate.segments])
@@ -107,7 +108,7 @@ def _parameter(fit: Fit, row: int, parameter: str) -> Where:
 
 
 def _far_centres(fit: Fit) -> Iterator[Finding]:
-    """R203: every centre of mass that two-level has moved too far."""
+    """Report R203: every centre of mass that two-level has moved too far."""
     moved_m = np.linalg.norm(fit.estimate.com_m - fit.literature.com_m, axis=1)
     for row in np.flatnonzero(moved_m > CONTRADICTING_COM_M):
         yield finding(
@@ -122,7 +123,7 @@ def _far_centres(fit: Fit) -> Iterator[Finding]:
 
 
 def _unlike(whole: Unlikeness) -> Finding:
-    """R204: the likeliest causes first: wrong joint centres affect both sides equally, a prosthesis does not."""
+    """Report R204: the likeliest causes first: wrong joint centres affect both sides equally, a prosthesis does not."""
     wrong_first = (f"{_WRONG}: left and right deviate equally", _WORN, _OTHER)
     causes = wrong_first if whole.both_sides else (_WORN, _OTHER, _WRONG)
     limb = next((name for name in whole.segments if name.endswith(("_r", "_l"))), None)
@@ -136,7 +137,8 @@ def _unlike(whole: Unlikeness) -> Finding:
 
 
 def _side_heavier(side: OneSided) -> Finding:
-    """R205: mass asymmetry; an attached item first where the heavier side is far from the prior, else a prosthesis."""
+    """Report R205: mass asymmetry; an attached item first where the heavier side is far from the prior, else a
+    prosthesis."""
     of_segments = " or ".join(f'"{name}"' for name in side.heavier)
     tables = " and ".join(f"[segment.{name}]" for name in side.lighter)
     worn = f"an orthosis, cast or weight on the heavier side ([[attached]] with segment = {of_segments})"

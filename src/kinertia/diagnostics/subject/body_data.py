@@ -20,8 +20,8 @@ _QUANTITIES = {"mass_kg": ("mass", "kg"), "height_m": ("stature", "m")}
 
 
 def stated_and_filed(context: PersonContext) -> Iterator[Finding]:
-    """S103: a mass or stature in files that differs from the one used; not reported where the plates confirm that
-    one."""
+    """Report S103: a mass or stature in files that differs from the one used; not reported where the plates confirm
+    that one."""
     for name, (quantity, unit) in _QUANTITIES.items():
         stated = getattr(context.subject, name)
         in_files: dict[float, list[str]] = {}
@@ -43,7 +43,7 @@ def stated_and_filed(context: PersonContext) -> Iterator[Finding]:
 
 
 def population(context: PersonContext) -> Iterator[Finding]:
-    """S401: a population that the anthropometric tables do not describe."""
+    """Report S401: a population that the anthropometric tables do not describe."""
     body_kg = None if context.total_mass is None else context.total_mass.body_kg
     assumed = population_of(context.subject, body_kg).finding(context.subject)
     if assumed is not None:
@@ -51,7 +51,7 @@ def population(context: PersonContext) -> Iterator[Finding]:
 
 
 def absent_markers(context: PersonContext) -> Iterator[Finding]:
-    """M105: markers of the static trial, or else of the model, that a trial lacks."""
+    """Report M105: markers of the static trial, or else of the model, that a trial lacks."""
     if context.marker_set is None:
         return
     reference = [label for own in context.marker_set.segments.values() for label in own]
@@ -65,7 +65,7 @@ def absent_markers(context: PersonContext) -> Iterator[Finding]:
 
 
 def stated_ranges(subject: Subject) -> Iterator[Finding]:
-    """S411: each joint whose range of motion is stated in the subject file."""
+    """Report S411: each joint whose range of motion is stated in the subject file."""
     for name, degrees in (subject.ranges_deg or {}).items():
         low, high = np.radians(degrees).tolist()
         yield finding("S411", Where(part=name), range_rad=Quantity((low, high), "rad"))

@@ -88,8 +88,8 @@ def camera_scale(distances: SegmentDistances, usual: float) -> CameraScale | Non
 
 
 def trial_scales(context: PersonContext) -> Iterator[Finding]:
-    """S205: of two trials with different scales, the one that the static trial and other trials contradict, or both
-    where neither is contradicted.
+    """Report S205: of two trials with different scales, the one that the static trial and other trials contradict, or
+    both where neither is contradicted.
     """
     marker_set = context.marker_set
     if marker_set is None:

@@ -76,8 +76,8 @@ class _Occasion:
 
 
 def stated_mass(context: PersonContext) -> Iterator[Finding]:
-    """S111, S112 and P281: S111 and S112 where the stated mass contradicts the plates, P281 where part of the weight is
-    off the plates for a while.
+    """Report S111, S112 and P281: S111 and S112 where the stated mass contradicts the plates, P281 where part of the
+    weight is off the plates for a while.
     """
     total = context.total_mass
     if total is None:
@@ -113,8 +113,8 @@ def weighed_as_stated(context: PersonContext, other_kg: float) -> bool:
 
 
 def masses_of_trials(context: PersonContext) -> Iterator[Finding]:
-    """S306: of two trials whose forces give different masses, the one that static trial, other trials and stated mass
-    contradict.
+    """Report S306: of two trials whose forces give different masses, the one that static trial, other trials and stated
+    mass contradict.
     """
     known = {one.name: one.force_mass for one in context.trials if one.force_mass is not None}
     standing = [one.mass_kg for one in _standing(context)]
@@ -218,7 +218,7 @@ def _together(occasions: Sequence[_Occasion]) -> list[_Occasion]:
 def _contradiction(
     context: PersonContext, one: _Occasion, total: TotalMass, witnesses: Sequence[_Occasion]
 ) -> Iterator[Finding]:
-    """S111, with the causes that the evidence supports, and the unit that explains it."""
+    """Report S111, with the causes that the evidence supports, and the unit that explains it."""
     where, ratio = Where(trial=one.trial), one.mass_kg / total.total_kg
     if _near(ratio, _POUND):
         yield finding("S112", where, ratio=Quantity(ratio, "1"))

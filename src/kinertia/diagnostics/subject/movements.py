@@ -78,7 +78,7 @@ class InformativeMovements:
 
 
 def informative_movements(context: PersonContext) -> Iterator[Finding]:
-    """S312: no trial with forces shows trunk sway, or none shows squats."""
+    """Report S312: no trial with forces shows trunk sway, or none shows squats."""
     measured = [movements_of(one) for one in context.trials if one.plates is not None]
     known = [one for one in measured if one is not None]
     lacking = [

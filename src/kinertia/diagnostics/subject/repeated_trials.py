@@ -17,7 +17,7 @@ Span = tuple[float, float] | None
 
 
 def repeated_trials(context: PersonContext) -> Iterator[Finding]:
-    """S302 and S303: two trials whose markers (S302) or forces (S303) are identical over times that overlap."""
+    """Report S302 and S303: two trials whose markers (S302) or forces (S303) are identical over times that overlap."""
     for first, other in combinations(context.trials, 2):
         if not _overlap(first.window_s, other.window_s):
             continue

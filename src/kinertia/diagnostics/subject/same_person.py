@@ -42,8 +42,8 @@ _MOST_MOVED = 3
 
 
 def static_and_trials(context: PersonContext) -> Iterator[Finding]:
-    """L212, S203, S205, M161 and S204: swapped labels (L212), another person (S203), another camera scale (S205), moved
-    (M161) or re-applied markers (S204) in trials, compared with the static trial.
+    """Report L212, S203, S205, M161 and S204: swapped labels (L212), another person (S203), another camera scale
+    (S205), moved (M161) or re-applied markers (S204) in trials, compared with the static trial.
 
     Of several recordings in which the person stands each is compared; one that a trial contradicts while it agrees
     with another is itself the one at fault.
@@ -69,8 +69,8 @@ def static_and_trials(context: PersonContext) -> Iterator[Finding]:
 
 
 def trials_of_one_person(context: PersonContext) -> Iterator[Finding]:
-    """S305 and M161: two trials of different people (S305), or with a marker that was moved in between (M161); of the
-    two, the one that static trial and other trials contradict, or both where neither is contradicted.
+    """Report S305 and M161: two trials of different people (S305), or with a marker that was moved in between (M161);
+    of the two, the one that static trial and other trials contradict, or both where neither is contradicted.
     """
     marker_set = context.marker_set
     if marker_set is None:
@@ -134,8 +134,8 @@ def _other_person(
     *,
     whole: bool,
 ) -> Iterator[Finding]:
-    """S203: distances at another scale, or that differ more than after markers are re-applied, or as much where body
-    data also differ; the latter unless a few labels explain the differences (not `whole`).
+    """Report S203: distances at another scale, or that differ more than after markers are re-applied, or as much where
+    body data also differ; the latter unless a few labels explain the differences (not `whole`).
     """
     off, ratio = distances.differences(), distances.ratio()
     rms_m, typical_m = rms(off), float(np.median(np.abs(off)))

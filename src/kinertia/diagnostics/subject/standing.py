@@ -29,14 +29,14 @@ _WHILE_STANDING, _IN_MOTION = 50.0, 10.0
 
 
 def standing(context: RecordingContext) -> Iterator[Finding]:
-    """S201: a person who walks in the static trial."""
+    """Report S201: a person who walks in the static trial."""
     if context.travel.kind == "walks":
         distance = Quantity(context.travel.distance_m, "m", limit=_WALK_M, usual=(0.0, 0.03))
         yield finding("S201", context.at(), distance_m=distance)
 
 
 def no_static(context: PersonContext) -> Iterator[Finding]:
-    """S207: there is neither a static trial nor a model, and a walk replaces them; S208: no walk can."""
+    """Report S207: there is neither a static trial nor a model, and a walk replaces them; S208: no walk can."""
     unread = any(one.rule.stage == "file" and one.where.trial is None for one in context.found)
     if not context.trials or context.standing or context.model or context.files_only or unread:
         return
@@ -47,7 +47,7 @@ def no_static(context: PersonContext) -> Iterator[Finding]:
 
 
 def floor(context: PersonContext) -> Iterator[Finding]:
-    """M143: feet that stand above or below the floor, by the lowest marker of toes, metatarsals and heels.
+    """Report M143: feet that stand above or below the floor, by the lowest marker of toes, metatarsals and heels.
 
     It is an INFO where the trials show the floor at its height: the person then stands on something, or in thick
     soles.
@@ -85,7 +85,8 @@ def _lowest(context: RecordingContext, percentile: float) -> tuple[str, float] |
 
 
 def flat_feet(context: RecordingContext) -> Iterator[Finding]:
-    """S202: a foot that is not on the floor like the other; foot axes assume that the foot is flat on the floor."""
+    """Report S202: a foot that is not on the floor like the other; foot axes assume that the foot is flat on the
+    floor."""
     if context.marker_set is None:
         return
     apart = {}

@@ -21,7 +21,7 @@ _USUAL, _OFF = 0.815, 0.055
 
 
 def stature(context: RecordingContext) -> Iterator[Finding]:
-    """S104: a stature that the landmarks of a static trial contradict."""
+    """Report S104: a stature that the landmarks of a static trial contradict."""
     height_m = context.height_m
     if context.marker_set is None or height_m is None:
         return

@@ -21,7 +21,7 @@ _HANGING = "hanging straight down from the trunk, which carries them"
 
 
 def unobserved_segments(skeleton: Skeleton) -> Iterator[Finding]:
-    """R401: trunk or arms without enough markers, in a 27-DOF model that was adapted to its trials."""
+    """Report R401: trunk or arms without enough markers, in a 27-DOF model that was adapted to its trials."""
     locked = {name for name in ARM_COORDINATES if name in skeleton.locked}
     joined = len(locked) == len(ARM_COORDINATES)
     if VIRTUAL_TRUNK[0].label in skeleton.labels:

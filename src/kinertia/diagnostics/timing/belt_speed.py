@@ -18,7 +18,7 @@ _KM_H = 3.6
 
 
 def belt_speed(context: RecordingContext) -> Iterator[Finding]:
-    """T301: a stated belt speed that differs from the speed of feet in stance; of two feet, the larger error."""
+    """Report T301: a stated belt speed that differs from the speed of feet in stance; of two feet, the larger error."""
     belt, time = context.recording.belt, context.all_markers.time
     if belt is None or context.feet is None:
         return

@@ -36,7 +36,7 @@ _DELAY_SD_S, _LEAP_S = 0.010, 0.06
 
 
 def stance_durations(context: RecordingContext) -> Iterator[Hypothesis]:
-    """T201: feet that stand half or twice as long by the markers as by the plates."""
+    """Report T201: feet that stand half or twice as long by the markers as by the plates."""
     plates, feet, contacts = context.whole_loads, context.foot_trajectories, context.whole_contacts
     if plates is None or context.plates is None or feet is None:
         return
@@ -89,8 +89,9 @@ def _several_steps(contact: PlateContact, plates: PlateLoads) -> bool:
 
 
 def contact_delays(context: RecordingContext) -> Iterator[Hypothesis]:
-    """T201, T211 and T212: loads that begin and end earlier or later than foot contact and foot-off: increasingly
-    (T201), or equally (T211; T212 where no synchronisation is that late, or loads are under no foot even then).
+    """Report T201, T211 and T212: loads that begin and end earlier or later than foot contact and foot-off:
+    increasingly (T201), or equally (T211; T212 where no synchronisation is that late, or loads are under no foot even
+    then).
     """
     plates, feet = context.plates, context.foot_trajectories
     if plates is None or feet is None:

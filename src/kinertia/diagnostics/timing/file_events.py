@@ -21,8 +21,8 @@ from kinertia.trial.plate_assignment import FOOT_NAMES
 
 
 def file_events(context: RecordingContext) -> Iterator[Finding]:
-    """T311 to T314: the event of a file farthest from its forces (T311), events with sides exchanged, all of them
-    (T312) or a few (T313), or times that count from the first frame (T314).
+    """Report T311 to T314: the event of a file farthest from its forces (T311), events with sides exchanged, all of
+    them (T312) or a few (T313), or times that count from the first frame (T314).
     """
     trial = context.loaded
     if not isinstance(trial, Trial):

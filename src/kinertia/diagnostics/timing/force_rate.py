@@ -25,7 +25,8 @@ _LEAST_RATIO, _MOST_RATIO, _USUAL_RATIO, _TYPICAL_RATIO = 0.4, 1.8, (0.67, 0.99)
 
 
 def force_rate(context: RecordingContext) -> Iterator[Finding]:
-    """T202 and T201: a wrong rate by the velocity ratio (T202); delays that grow or shrink in a measured window (T201).
+    """Report T202 and T201: a wrong rate by the velocity ratio (T202); delays that grow or shrink in a measured window
+    (T201).
 
     Without strides the trunk bends, so that the pelvis moves differently: the marker-based centre must agree.
     """
@@ -38,7 +39,7 @@ def force_rate(context: RecordingContext) -> Iterator[Finding]:
 
 
 def _wrong_rate(context: RecordingContext) -> Iterator[Finding]:
-    """T202, only where all of the load is known: a foot beyond its plate looks like another rate."""
+    """Report T202, only where all of the load is known: a foot beyond its plate looks like another rate."""
     changes = context.velocity_changes_on_plates
     if changes is None:
         return
@@ -59,7 +60,7 @@ def _wrong(ratio: float) -> bool:
 
 
 def _growing_delays(context: RecordingContext) -> Iterator[Finding]:
-    """T201: delays that grow or shrink, tested in every window."""
+    """Report T201: delays that grow or shrink, tested in every window."""
     trial = context.trial
     if trial is None:
         return

@@ -35,7 +35,7 @@ early, either may seem to go with the other's forces, but not both."""
 
 
 def interchanged_forces(person: PersonContext) -> Iterator[Finding]:
-    """S304: two trials whose forces seem to be interchanged, one finding for each."""
+    """Report S304: two trials whose forces seem to be interchanged, one finding for each."""
     loaded = [one for one in person.trials if one.trial is not None]
     for pair in combinations(loaded, 2):
         with_others = [_with_forces_of(a, b) for a, b in (pair, pair[::-1])]

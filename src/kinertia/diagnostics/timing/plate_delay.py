@@ -33,7 +33,8 @@ limits, and for no plate with a simulated foot 10 to 30 mm over its edge."""
 
 
 def plate_delay(context: RecordingContext) -> Iterator[Finding]:
-    """T216: each plate with a delay of its own explains the vertical velocity, and neither one for all nor gains do."""
+    """Report T216: each plate with a delay of its own explains the vertical velocity, and neither one for all nor gains
+    do."""
     plates, parts = context.plates, [one for one in context.velocities if span_s(one.time) >= _LEAST_WINDOW_S]
     if plates is None or not parts or not context.has_strides:
         return

@@ -34,8 +34,9 @@ class _Best:
 
 
 def fitted_rate_or_delay(context: RecordingContext) -> Iterator[Hypothesis]:
-    """T201 where loads fit the feet at another rate and at no delay; T211 where they are under no foot until a delay is
-    undone (on a belt, delayed loads move along). Loads of feet that reach beyond their plates begin late or end early.
+    """Report T201 where loads fit the feet at another rate and at no delay; T211 where they are under no foot until a
+    delay is undone (on a belt, delayed loads move along). Loads of feet that reach beyond their plates begin late or
+    end early.
     """
     plates, feet, contacts = context.whole_loads, context.foot_trajectories, context.whole_contacts
     if plates is None or context.plates is None or feet is None or not contacts:

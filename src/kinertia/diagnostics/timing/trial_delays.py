@@ -61,14 +61,14 @@ def trial_delay(context: RecordingContext) -> TrialDelay | None:
 
 
 def trial_delays(person: PersonContext) -> Iterator[Finding]:
-    """T213: trials whose delay differs from the other trials'."""
+    """Report T213: trials whose delay differs from the other trials'."""
     if len(person.trials) > 1:
         yield from uneven_delays([trial_delay(one) for one in person.trials])
 
 
 def uneven_delays(delays: Sequence[TrialDelay | None]) -> Iterator[Finding]:
-    """T213: each trial whose delay is far from the median of three and more; of two that differ both, since it is
-    unknown which of them is wrong.
+    """Report T213: each trial whose delay is far from the median of three and more; of two that differ both, since it
+    is unknown which of them is wrong.
     """
     known = [one for one in delays if one is not None]
     if len(known) < 2:
