@@ -7,7 +7,7 @@ import pytest
 
 from kinertia.motion.model_outputs import model_outputs
 from kinertia.report.comparison import comparison_summary, render_comparison
-from kinertia.report.file_outputs import beside, beside_sentence, beside_summary
+from kinertia.report.file_outputs import compared_outputs, outputs_sentence, outputs_summary
 from kinertia.report.page import render
 from kinertia.trial.file_outputs import FileOutputs
 from report_page import figures_of
@@ -40,7 +40,7 @@ def with_outputs(fit):
 @pytest.mark.parametrize("per_kg", [True, False])
 def test_curves_that_are_the_same_and_shifted_ones(with_outputs, per_kg):
     fit = with_outputs(1.0 if per_kg else with_outputs().mass_kg)
-    compared = beside(fit, fit.trials[0])
+    compared = compared_outputs(fit, fit.trials[0])
     assert len(compared) == 18
     for one in compared:
         assert one.correlation == pytest.approx(1.0, abs=1e-9)
@@ -68,7 +68,7 @@ def test_report_and_comparison_show_them(fit, with_outputs):
     assert "after, walk</h3>" in render_comparison(both)
     summary = comparison_summary(both)["file_outputs"]
     assert summary["before"] == []
-    assert summary["after"] == beside_summary(stated)
+    assert summary["after"] == outputs_summary(stated)
     assert len(summary["after"]) == 18
-    assert beside_sentence(fit) == ""
-    assert "hip 0.00; knee 0.00; ankle 0.00" in beside_sentence(stated)
+    assert outputs_sentence(fit) == ""
+    assert "hip 0.00; knee 0.00; ankle 0.00" in outputs_sentence(stated)

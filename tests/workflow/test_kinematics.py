@@ -7,7 +7,7 @@ import pytest
 
 from generic_static import generic_model, smooth_motion
 from kinertia.trial.data import FootLoads, Markers, Trial
-from kinertia.workflow.kinematics import Turned, solved_trials
+from kinertia.workflow.kinematics import RotatedTrial, solved_trials
 
 FRAMES, RATE = 101, 100.0
 
@@ -26,11 +26,11 @@ def trial(skeleton) -> Trial:
     return Trial("walk", markers, loads, np.ones(FRAMES, dtype=bool))
 
 
-def measured_in(trial: Trial, name: str, *spans: tuple[int, int]) -> Turned:
+def measured_in(trial: Trial, name: str, *spans: tuple[int, int]) -> RotatedTrial:
     measured = np.zeros(FRAMES, dtype=bool)
     for first, last in spans:
         measured[first:last] = True
-    return Turned(replace(trial, name=name, measured=measured))
+    return RotatedTrial(replace(trial, name=name, measured=measured))
 
 
 def test_findings_are_those_of_all_trials(skeleton, trial):

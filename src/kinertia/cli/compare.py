@@ -21,7 +21,7 @@ from kinertia.report.comparison import (
     remarks,
     render_comparison,
 )
-from kinertia.report.file_outputs import beside_sentence
+from kinertia.report.file_outputs import outputs_sentence
 from kinertia.report.files import write_columns
 from kinertia.report.saved_fit import load_fit
 
@@ -55,7 +55,7 @@ def compare(
     for sentence in remarks(fits):
         out.print(f"note: {sentence}")
     for name, fit in fits.items():
-        if sentence := beside_sentence(fit):
+        if sentence := outputs_sentence(fit):
             out.print(f"{name}: {sentence}")
     for name, other in others:
         compared = differences(first, other)

@@ -175,7 +175,7 @@ def smooth(
     fitted = np.empty_like(columns)
     cutoff, sigma = np.empty(columns.shape[1]), np.empty(columns.shape[1])
     ends = np.clip((0.0, np.inf) if within_hz is None else np.multiply(within_hz, spacing), 0.1 / len(time), 1.0)
-    for visible, group in columns_alike(~np.isnan(columns)):
+    for visible, group in equal_columns(~np.isnan(columns)):
         y = _filled(columns[:, group], visible)
         if smoothing == "gcv":
             chosen = _gcv_cutoffs(system, y, visible, ends)
@@ -239,7 +239,7 @@ def _validated(
     return time, columns, values.shape[1:]
 
 
-def columns_alike(visible: NDArray[np.bool_]) -> list[tuple[NDArray[np.bool_], NDArray[np.int_]]]:
+def equal_columns(visible: NDArray[np.bool_]) -> list[tuple[NDArray[np.bool_], NDArray[np.int_]]]:
     """Group equal columns of `visible` (n, c): return each different column, and the indices of columns equal to it."""
     groups: dict[bytes, list[int]] = {}
     for column, mask in enumerate(visible.T):

@@ -21,7 +21,7 @@ from kinertia.report.coordinate_titles import load_title, panels_of
 from kinertia.report.cycle_figures import curves_of, mean_curve, mean_line
 from kinertia.report.cycle_table import stride_rows
 from kinertia.report.figure import Figure, written
-from kinertia.report.file_outputs import beside_summary, beside_view
+from kinertia.report.file_outputs import outputs_summary, outputs_view
 from kinertia.report.panels import Panel, plain, small_multiples
 from kinertia.report.rendering import rendered
 from kinertia.report.shared_quantities import same_segment, same_sign
@@ -171,7 +171,7 @@ def comparison_summary(fits: Mapping[str, Fit]) -> dict[str, Any]:
     return {
         "first": first_name,
         "remarks": remarks(fits),
-        "file_outputs": {name: beside_summary(fit) for name, fit in fits.items()},
+        "file_outputs": {name: outputs_summary(fit) for name, fit in fits.items()},
         "against_first": {
             name: [{**asdict(one), "change": one.change, "changed": one.changed} for one in differences(first, other)]
             for name, other in others
@@ -207,7 +207,7 @@ def render_comparison(fits: Mapping[str, Fit]) -> str:
         beside=[
             {**one, "name": f"{result}, {one['name']}"}
             for result, fit in fits.items()
-            for one in beside_view(fit, fit.trials[:_MOST_TRIALS], MOST_FRAMES // _MOST_TRIALS)
+            for one in outputs_view(fit, fit.trials[:_MOST_TRIALS], MOST_FRAMES // _MOST_TRIALS)
         ],
         sd=CHANGED_SD,
     )

@@ -30,7 +30,7 @@ _FEWEST = 10
 
 
 @dataclass(frozen=True, eq=False)
-class Beside:
+class OutputComparison:
     """One quantity of one joint and side, from the file and from Kinertia.
 
     Attributes:
@@ -84,7 +84,7 @@ class Beside:
         return self.rms > INTERVAL_SD * float(np.sqrt(np.nanmean(np.square(self.sd))))
 
 
-def beside(fit: Fit, trial: TrialFit) -> list[Beside]:
+def compared_outputs(fit: Fit, trial: TrialFit) -> list[OutputComparison]:
     """Pair the quantities that both have; none for a file without outputs."""
     stated = trial.kinematics.trial.outputs
     if stated is None:
@@ -93,10 +93,10 @@ def beside(fit: Fit, trial: TrialFit) -> list[Beside]:
     outputs = model_outputs(
         trial.skeleton, fit.estimate, trial.motion, loads, fit.mass_kg, "plug-in-gait", trial.deviations
     )
-    return [one for output in outputs if (one := _beside(trial, output, stated, fit.mass_kg)) is not None]
+    return [one for output in outputs if (one := _compared(trial, output, stated, fit.mass_kg)) is not None]
 
 
-def _beside(trial: TrialFit, output: ModelOutput, stated: FileOutputs, mass_kg: float) -> Beside | None:
+def _compared(trial: TrialFit, output: ModelOutput, stated: FileOutputs, mass_kg: float) -> OutputComparison | None:
     if output.name not in stated.values or output.kind not in _SHOWN:
         return None
     component, factor, unit = _SHOWN[output.kind]
@@ -106,7 +106,7 @@ def _beside(trial: TrialFit, output: ModelOutput, stated: FileOutputs, mass_kg: 
     if np.isfinite(theirs).sum() < _FEWEST:
         return None
     ours, sd = factor * output.values[:, component], factor * output.sd[:, component]
-    return Beside(trial.name, output.joint, output.side, output.kind, unit, ours, sd, theirs)
+    return OutputComparison(trial.name, output.joint, output.side, output.kind, unit, ours, sd, theirs)
 
 
 def _divisor(stated: FileOutputs, kind: str, mass_kg: float) -> float:
@@ -116,7 +116,7 @@ def _divisor(stated: FileOutputs, kind: str, mass_kg: float) -> float:
     return mass_kg if whole and kind != "ANGLES" else 1.0
 
 
-def beside_figure(trial: TrialFit, compared: list[Beside], most_frames: int = MOST_FRAMES) -> Figure:
+def outputs_figure(trial: TrialFit, compared: list[OutputComparison], most_frames: int = MOST_FRAMES) -> Figure:
     """Draw all quantities over time: ours with 95 % bands, the file's dashed."""
     panels = []
     for quantity in dict.fromkeys(one.quantity for one in compared):
@@ -136,7 +136,7 @@ def beside_figure(trial: TrialFit, compared: list[Beside], most_frames: int = MO
     return small_multiples(panels, alt, time_axis(trial.kinematics))
 
 
-def beside_summary(fit: Fit) -> list[dict[str, Any]]:
+def outputs_summary(fit: Fit) -> list[dict[str, Any]]:
     """Return the files' own outputs for `kinertia compare --json`, per trial, joint, side, quantity."""
     return [
         {
@@ -151,13 +151,13 @@ def beside_summary(fit: Fit) -> list[dict[str, Any]]:
             "beyond": one.beyond,
         }
         for trial in fit.trials
-        for one in beside(fit, trial)
+        for one in compared_outputs(fit, trial)
     ]
 
 
-def beside_sentence(fit: Fit) -> str:
+def outputs_sentence(fit: Fit) -> str:
     """State how far the files' own joint moments are from Kinertia's, joint by joint; empty where they have none."""
-    compared = [one for trial in fit.trials for one in beside(fit, trial) if one.kind == "MOMENTS"]
+    compared = [one for trial in fit.trials for one in compared_outputs(fit, trial) if one.kind == "MOMENTS"]
     parts = []
     for joint in dict.fromkeys(one.joint for one in compared):
         own = [one for one in compared if one.joint == joint]
@@ -167,18 +167,18 @@ def beside_sentence(fit: Fit) -> str:
     return f"RMS differences (N m/kg) from the files' own flexion moments: {'; '.join(parts)}" if parts else ""
 
 
-def beside_view(fit: Fit, trials: Sequence[TrialFit], most_frames: int = MOST_FRAMES) -> list[dict[str, Any]]:
+def outputs_view(fit: Fit, trials: Sequence[TrialFit], most_frames: int = MOST_FRAMES) -> list[dict[str, Any]]:
     """Return the content of a page: a figure and table rows for each trial whose file has outputs."""
     shown = []
     for trial in trials:
-        compared = beside(fit, trial)
+        compared = compared_outputs(fit, trial)
         if compared:
-            figure = written(beside_figure(trial, compared, most_frames))
+            figure = written(outputs_figure(trial, compared, most_frames))
             shown.append({"name": trial.name, "rows": [_row(one) for one in compared], "figure": figure})
     return shown
 
 
-def _row(one: Beside) -> dict[str, Any]:
+def _row(one: OutputComparison) -> dict[str, Any]:
     digits = 1 if one.kind == "ANGLES" else 2
     outside = one.outside
     return {

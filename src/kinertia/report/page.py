@@ -33,7 +33,7 @@ from kinertia.report.bsp_figures import (
 from kinertia.report.cycle_figures import MOST_STRIDES, Norms, cycle_figures, has_spread
 from kinertia.report.cycle_table import stride_rows
 from kinertia.report.figure import Figure, written
-from kinertia.report.file_outputs import beside_view
+from kinertia.report.file_outputs import outputs_view
 from kinertia.report.finding_view import FindingView
 from kinertia.report.gait_profile_view import profile_view
 from kinertia.report.headline import held_sentence, hidden_combinations, words
@@ -92,7 +92,7 @@ def render(
         asymmetry=asymmetry_sentences(fit),
         total_mass=[fit.subject.mass_kg, fit.literature.total_mass_kg, fit.estimate.total_mass_kg],
         cycle=_cycle(fit, norms),
-        beside=beside_view(fit, shown, MOST_FRAMES // len(shown)),
+        beside=outputs_view(fit, shown, MOST_FRAMES // len(shown)),
         walks=any(gait_events(trial.kinematics.trial) for trial in fit.trials),
         body={
             "mass": _written(body_figure(fit)),

@@ -56,7 +56,7 @@ from kinertia.motion.upright_trunk import shows_trunk, with_upright_trunk
 from kinertia.settings import Settings
 from kinertia.trial.data import Recording, Trial
 from kinertia.workflow.joint_widths import with_widths
-from kinertia.workflow.kinematics import Turned
+from kinertia.workflow.kinematics import RotatedTrial
 from kinertia.workflow.person import Person
 from kinertia.workflow.person_model import LOWER_BODY_SD_M, UPPER_BODY_SD_M, PersonModel, with_stated_ranges
 from kinertia.workflow.screening import Screened
@@ -181,7 +181,7 @@ class _Landmarks:
         return [label for side in "rl" for label in self.marker_set.landmarks.get(f"acromion_{side}", ())]
 
 
-def built_in_model(screened: Screened, trials: Sequence[Turned], settings: Settings) -> PersonModel:
+def built_in_model(screened: Screened, trials: Sequence[RotatedTrial], settings: Settings) -> PersonModel:
     """Build the 27-DOF model of a person from landmarks, adapted to the trials, with the literature's prior.
 
     Args:
@@ -228,7 +228,7 @@ def built_in_model(screened: Screened, trials: Sequence[Turned], settings: Setti
     )
 
 
-def _stance_of(person: Person, trials: Sequence[Turned], marker_set: MarkerSet) -> _Landmarks:
+def _stance_of(person: Person, trials: Sequence[RotatedTrial], marker_set: MarkerSet) -> _Landmarks:
     """Return a pose of the first trial with forces in place of a static trial, with the widths that are known.
 
     Raises:
@@ -246,7 +246,7 @@ def _stance_of(person: Person, trials: Sequence[Turned], marker_set: MarkerSet) 
     return _Landmarks(static, named, of_walk=True)
 
 
-def _free_axes(trials: Sequence[Turned], landmarks: _Landmarks, settings: Settings) -> bool | None:
+def _free_axes(trials: Sequence[RotatedTrial], landmarks: _Landmarks, settings: Settings) -> bool | None:
     """Decide whether axes of joints are uncertain; None: if the trials show them."""
     if settings.joint_axes is not None:
         return settings.joint_axes
@@ -264,7 +264,7 @@ def _uncertainty(free_axes: bool, without_static: bool) -> ModelUncertainty:
     return replace(known_by.with_axes(), before=dict.fromkeys(LEG_AXIS_TILTS, 0.0)) if free_axes else known_by
 
 
-def _with_trunk(model: Gait27, trials: Sequence[Turned]) -> tuple[Gait27, list[Turned]]:
+def _with_trunk(model: Gait27, trials: Sequence[RotatedTrial]) -> tuple[Gait27, list[RotatedTrial]]:
     """Return the model and its trials, with an upright trunk in trials that show too few trunk markers."""
     lacking = [not shows_trunk(model.skeleton, one.trial) for one in trials]
     if any(lacking) and VIRTUAL_TRUNK[0] not in model.skeleton.markers:
@@ -284,7 +284,7 @@ def _adapted(calibrated: Calibrated) -> Iterator[Finding]:
         yield finding("M174", Where(markers=calibrated.head))
 
 
-def _unblocked(trials: Sequence[Turned], screened: Screened, found: Sequence[Finding]) -> list[Turned]:
+def _unblocked(trials: Sequence[RotatedTrial], screened: Screened, found: Sequence[Finding]) -> list[RotatedTrial]:
     """Return the trials that remain usable after all findings.
 
     Raises:
@@ -298,7 +298,7 @@ def _unblocked(trials: Sequence[Turned], screened: Screened, found: Sequence[Fin
     return left
 
 
-def _turned(one: Turned, marker_set: MarkerSet) -> Turned:
+def _turned(one: RotatedTrial, marker_set: MarkerSet) -> RotatedTrial:
     """Return the trial rotated to face +X."""
     try:
         rotation, angle = facing(one.trial.markers, marker_set)

@@ -20,7 +20,7 @@ from kinertia.trial.without_forces import trial_without_forces
 
 
 @dataclass(frozen=True)
-class Turned:
+class RotatedTrial:
     """A trial in the axes in which it is solved.
 
     Attributes:
@@ -88,7 +88,7 @@ def expect_forces(trials: Sequence[Trial]) -> None:
 
 def solved_trials(
     skeleton: Skeleton,
-    trials: Sequence[Turned],
+    trials: Sequence[RotatedTrial],
     smoothing: float | Literal["gcv"],
     calibration_s: float,
     progress: Progress,

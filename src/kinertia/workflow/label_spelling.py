@@ -14,7 +14,7 @@ from kinertia.trial.data import Recording
 from kinertia.workflow.person import Person
 
 
-def spelled_alike(person: Person) -> Person:
+def with_model_spelling(person: Person) -> Person:
     """Return the person, with trials labelled as the static trial or the model where only then the marker set fits them
     (L103).
     """

@@ -26,14 +26,14 @@ from kinertia.model.anatomy import segment_of
 from kinertia.model.bsp import BodySegmentParameters, impossible_segments
 from kinertia.model.imported_model import OsimModel
 from kinertia.model.skeleton import Axis, Skeleton
-from kinertia.workflow.kinematics import Turned
+from kinertia.workflow.kinematics import RotatedTrial
 from kinertia.workflow.person_model import LOWER_BODY_SD_M, UPPER_BODY_SD_M, PersonModel, with_stated_ranges
 from kinertia.workflow.screening import Screened
 
 _MASS_TOLERANCE = 0.002
 
 
-def opensim_model(screened: Screened, trials: Sequence[Turned], model: OsimModel) -> PersonModel:
+def opensim_model(screened: Screened, trials: Sequence[RotatedTrial], model: OsimModel) -> PersonModel:
     """Adapt a user's model to a person and the trials.
 
     Args:

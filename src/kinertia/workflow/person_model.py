@@ -15,7 +15,7 @@ from kinertia.findings.finding import Finding
 from kinertia.model.coordinate_range import UNKNOWN, Range
 from kinertia.model.skeleton import Skeleton
 from kinertia.settings import Subject
-from kinertia.workflow.kinematics import Turned
+from kinertia.workflow.kinematics import RotatedTrial
 
 LOWER_BODY_SD_M = 0.01
 UPPER_BODY_SD_M = 0.04
@@ -40,7 +40,7 @@ class PersonModel:
 
     subject: Subject
     note: str
-    trials: Sequence[Turned]
+    trials: Sequence[RotatedTrial]
     skeleton: Skeleton
     prior: BspPrior
     uncertainty: ModelUncertainty

@@ -20,7 +20,7 @@ from kinertia.settings import Attached, Overrule, Settings, Subject
 from kinertia.trial.data import Recording
 from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow.doubted_mass import with_doubted_mass
-from kinertia.workflow.kinematics import Turned, expect_forces, solved_trials, usable_trial
+from kinertia.workflow.kinematics import RotatedTrial, expect_forces, solved_trials, usable_trial
 from kinertia.workflow.person import Person
 from kinertia.workflow.person_model import PersonModel
 from kinertia.workflow.screening import Screened, screen
@@ -76,7 +76,7 @@ def prepared(screened: Screened, settings: Settings, progress: Progress = lambda
     progress("calibration", 0.0)
     started = time.perf_counter()
     read_s = {item.recording.name: item.read_seconds for item in person.trials}
-    trials = [Turned(usable_trial(one), 0.0, read_s[one.name]) for one in usable]
+    trials = [RotatedTrial(usable_trial(one), 0.0, read_s[one.name]) for one in usable]
     expect_forces([one.trial for one in trials])
     model = _model(screened, trials, settings)
     calibration_s = (time.perf_counter() - started) / len(model.trials)
@@ -106,7 +106,7 @@ def prepared(screened: Screened, settings: Settings, progress: Progress = lambda
     )
 
 
-def _model(screened: Screened, trials: Sequence[Turned], settings: Settings) -> PersonModel:
+def _model(screened: Screened, trials: Sequence[RotatedTrial], settings: Settings) -> PersonModel:
     """Return the person's model by its source; the only place that distinguishes the two."""
     if screened.person.model is None:
         from kinertia.workflow.built_in_model import built_in_model

@@ -31,7 +31,7 @@ from kinertia.findings.finding import Finding
 from kinertia.settings import Subject
 from kinertia.trial.data import Recording
 from kinertia.workflow.joint_widths import with_widths
-from kinertia.workflow.label_spelling import spelled_alike
+from kinertia.workflow.label_spelling import with_model_spelling
 from kinertia.workflow.person import Person
 
 STATIC_QUESTIONS: tuple[Question[RecordingContext], ...] = (
@@ -126,7 +126,7 @@ class Screened:
 
 def screen(person: Person) -> Screened:
     """Check everything that can be checked before inverse kinematics."""
-    person = spelled_alike(person)
+    person = with_model_spelling(person)
     context = person_context(person)
     found = [*person.unread]
     if isinstance(person.completed, SubjectError) and person.completed.finding is not None:

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from kinertia.diagnostics.plates.heel_landing import shows_feet_alike
+from kinertia.diagnostics.plates.heel_landing import shows_feet_equally
 from kinertia.findings.finding import Severity
 from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.data import Markers
@@ -84,7 +84,7 @@ def test_a_foot_that_lacks_a_marker_is_no_measure_of_the_laboratory(lacking, ali
     }
     seen = frozenset(label for labels in landmarks.values() for label in labels if label not in lacking)
     context = SimpleNamespace(marker_set=SimpleNamespace(landmarks=landmarks), seen_labels=seen)
-    assert shows_feet_alike(context) is alike
+    assert shows_feet_equally(context) is alike
 
 
 @pytest.mark.parametrize("offset_m", [0.3, -0.3])

@@ -23,7 +23,7 @@ from kinertia.diagnostics.evidence.vertical_acceleration import LARGEST_RESIDUAL
 from kinertia.diagnostics.plates.heel_landing import (
     goes_forwards,
     lands_on_heels,
-    shows_feet_alike,
+    shows_feet_equally,
     shows_whole_feet,
 )
 from kinertia.diagnostics.plates.interchanged_plates import interchanged_plates
@@ -73,7 +73,7 @@ def loads_and_feet(context: RecordingContext) -> Iterator[Finding]:
         ranked = sorted(hypotheses, key=lambda one: one.misfit(feet))
         yield _with_runners_up([one.finding for one in ranked])
         return
-    if goes_forwards(context) and shows_feet_alike(context):
+    if goes_forwards(context) and shows_feet_equally(context):
         yield from _offset(context)
 
 

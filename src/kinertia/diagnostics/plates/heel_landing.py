@@ -20,7 +20,7 @@ def goes_forwards(context: RecordingContext) -> bool:
     return shows_whole_feet(context) and not context.walks_backwards
 
 
-def shows_feet_alike(context: RecordingContext) -> bool:
+def shows_feet_equally(context: RecordingContext) -> bool:
     """Return whether the same markers of both feet are visible: else their lines from heel to toe differ."""
     if context.marker_set is None:
         return False

@@ -7,7 +7,7 @@ from scipy.interpolate import BSpline
 from scipy.linalg import solveh_banded
 from scipy.sparse import csr_array
 
-from kinertia.motion.smoothing import columns_alike
+from kinertia.motion.smoothing import equal_columns
 
 _DEGREE = 5
 _ACTIVE = _DEGREE + 1
@@ -56,7 +56,7 @@ class MotionBasis:
         seen = np.isfinite(q)
         filled = np.where(seen, q, 0.0)
         coefficients = np.empty((self.size, q.shape[1]))
-        for mask, columns in columns_alike(seen):
+        for mask, columns in equal_columns(seen):
             value = self.values[0] * mask[:, None]
             band = np.zeros((_ACTIVE, self.size))
             for a in range(_ACTIVE):

@@ -85,10 +85,10 @@ class NormalEquations(Gradient):
         return one.band.nbytes + one.border.nbytes
 
 
-class UsedAgain:
+class EquationsPool:
     """Pool of normal equations whose memory is reused, since allocating it takes longer than filling it.
 
-    >>> room = UsedAgain()
+    >>> room = EquationsPool()
     >>> first = room.zero(8, 2, 3)
     >>> room.back(first)
     >>> room.zero(8, 2, 3) is first, room.zero(8, 2, 3) is first

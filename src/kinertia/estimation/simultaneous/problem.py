@@ -20,7 +20,7 @@ from kinertia.estimation.simultaneous.frame_blocks import TimeBlock, halves, joi
 from kinertia.estimation.simultaneous.inputs import FreedModel, Given
 from kinertia.estimation.simultaneous.layout import Layout
 from kinertia.estimation.simultaneous.linearised import Linearised, Point, Slope
-from kinertia.estimation.simultaneous.normal_equations import Gradient, NormalEquations, UsedAgain
+from kinertia.estimation.simultaneous.normal_equations import EquationsPool, Gradient, NormalEquations
 from kinertia.estimation.simultaneous.observed_trial import CalibrationPrior, Observation
 from kinertia.estimation.simultaneous.terms import TERMS
 from kinertia.model.skeleton import Skeleton
@@ -61,7 +61,7 @@ class MapProblem:
         self.loads = GroundLoads(self.given, self.terms)
         self.time_blocks = time_blocks_of_trials(self.bases, len(self.moving), self.layout.size)
         self._adding = [term for term in self.terms if type(term).add is not CostTerm.add]
-        self._room = UsedAgain()
+        self._room = EquationsPool()
 
     def of(self, trials: Sequence[Observation], phase: float = 0.0) -> MapProblem:
         """Return the same problem with other observations, and with knots this share of an interval earlier."""
