@@ -130,5 +130,5 @@ def test_too_few_people_or_two_models_are_refused():
     with pytest.raises(PriorError, match=r"S409 A group of 4 .* at least 5"):
         learn(people[:4])
     other = replace(people[0], name="x", literature=WHOLE)
-    with pytest.raises(PriorError, match=r"S409 x .* another model than p0"):
+    with pytest.raises(PriorError, match=r"S409 x .* a different model from p0"):
         learn([*people, other])

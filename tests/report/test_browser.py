@@ -123,11 +123,11 @@ def test_panels_are_switched(demo):
     mass, information = (demo.page.locator(f"#body-{name}") for name in ("mass", "information"))
     playwright.expect(mass).to_be_visible()
     playwright.expect(information).not_to_be_visible()
-    demo.page.get_by_role("radio", name="what the data say").check()
+    demo.page.get_by_role("radio", name="what the data show").check()
     playwright.expect(information).to_be_visible()
     playwright.expect(mass).not_to_be_visible()
     assert colour(demo.picture(information)) > 0.01
-    demo.page.get_by_role("radio", name="what the data say").press("ArrowLeft")
+    demo.page.get_by_role("radio", name="what the data show").press("ArrowLeft")
     playwright.expect(mass).to_be_visible()
 
 

@@ -127,7 +127,7 @@ def learn(people: Sequence[PersonInformation]) -> LearntPrior:
         raise unusable(f"A group of {len(people)}", reason, people=Quantity(len(people), "1", limit=FEWEST_PEOPLE))
     segments = people[0].segments
     if other := next((one for one in people if one.segments != segments), None):
-        raise unusable(other.name, f"estimated with another model than {people[0].name}")
+        raise unusable(other.name, f"estimated with a different model from {people[0].name}")
     # in coordinates in which the literature's people are uncorrelated, so that nothing is nearly singular
     correlations = np.mean([_correlation(one.literature.covariance) for one in people], axis=0)
     root = np.linalg.cholesky(correlations)

@@ -27,7 +27,7 @@ def curve_dataset(fit: Fit, kind: str, over: str) -> Dataset:
     """Convert curves as `Fit.to_xarray` returns them."""
     units = {str(name): unit for name, unit in UNITS.items()} if over == "percent" else _OVER_TIME
     if over not in ("percent", "time") or kind not in units:
-        hint = "over percent there are angle, clinical, moment, power and force, over time angle and moment"
+        hint = "over='percent' has angle, clinical, moment, power and force, over='time' angle and moment"
         raise KinertiaError(f"no curves of {kind!r} over {over!r}: {hint}")
     build = _over_percent if over == "percent" else _over_time
     return _dataset(fit, kind, units[kind], *build(fit, kind))

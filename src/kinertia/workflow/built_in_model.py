@@ -247,7 +247,7 @@ def _stance_of(person: Person, trials: Sequence[RotatedTrial], marker_set: Marke
 
 
 def _free_axes(trials: Sequence[RotatedTrial], landmarks: _Landmarks, settings: Settings) -> bool | None:
-    """Decide whether axes of joints are uncertain; None: if the trials show them."""
+    """Return whether joint axes are to be estimated; None where the trials decide, by whether they show them."""
     if settings.joint_axes is not None:
         return settings.joint_axes
     if landmarks.of_walk or any(not one.trial.loads.plates for one in trials):

@@ -205,7 +205,7 @@ def test_torques_in_newton_millimetres(walk):
 
 @pytest.mark.parametrize("name", SQUATS)
 def test_fault_free_squats(recording_of, name):
-    """The markers' centre goes back where the centre of mass does not: the trunk bends."""
+    """The marker-based centre goes back where the centre of mass does not: the trunk bends."""
     squats = recording_of(*SQUATS[name])
     assert loaded(squats, marker_set_for(squats.markers.labels)) == []
 

@@ -41,9 +41,9 @@ def vertical_match(
     """Fit the vertical velocity by Gauss-Newton; None where the velocities do not follow the forces.
 
     Args:
-        part: what the forces cause, over (n,) s.
-        shown: (n, 3) m/s, of the pelvis or of the markers' centre.
-        own: (n,) m/s that one plate alone causes, if its gain may be wrong.
+        part: the force-derived velocity, over (n,) s.
+        shown: (n, 3) m/s, of the pelvis or of the marker-based centre.
+        own: (n,) m/s due to one plate, if its gain may be wrong.
         growing: whether the delay may change over time.
     """
     after = part.time - part.time.mean()

@@ -181,7 +181,7 @@ def _origin(context: RecordingContext, offset: Quantity, contacts: int, method: 
 
 
 _DELAY_S = 0.03
-"""Pelvis and markers' centre follow the forces of fault-free trials within this."""
+"""Pelvis and marker-based centre follow the forces of fault-free trials within this."""
 
 
 def forces_keep_time(context: RecordingContext) -> bool:

@@ -13,7 +13,7 @@ from kinertia.findings.where import Where
 from kinertia.model.bsp import BodySegmentParameters
 
 _MOTION = 0.05
-"""Masses by force may differ by this share between inverse kinematics and the markers' centre of mass."""
+"""Masses by force may differ by this share between inverse kinematics and the marker-based centre of mass."""
 _TOTAL = 0.03
 """Share by which the estimated total mass may differ from the stated one."""
 _IDENTIFIED_SD = 2.0

@@ -36,7 +36,7 @@ _REPEATED = 0.005
 _SAME_PLACE_M = 1e-3
 """Corners of the same plate in two files."""
 _SINGLE_SUPPORT = 0.04
-"""SD of a mass by one single support, as a share: velocities of the markers' centre at its ends are known to 0.14
+"""SD of a mass by one single support, as a share: velocities of the marker-based centre at its ends are known to 0.14
 m/s."""
 _LOAD_KG = 2.0
 """Smallest surplus that may be something worn or carried."""
@@ -236,7 +236,7 @@ def _contradiction(
         "stated_kg": Quantity(total.total_kg, "kg", sd=total.sd_kg),
         "attached_kg": Quantity(total.total_kg - total.body_kg, "kg"),
         "agreeing": Quantity(_agreeing(one, total.total_kg, by_plate, witnesses), "1"),
-        "method": Quantity(f"markers' centre of mass over {one.over}"),
+        "method": Quantity(f"marker-based centre of mass over {one.over}"),
         "action": Quantity(action),
     }
     for standing in [each for each in witnesses if each.standing][:1]:

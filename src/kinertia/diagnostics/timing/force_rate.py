@@ -18,7 +18,7 @@ from kinertia.findings.quantity import Quantity
 from kinertia.trial.sampled_time import span_s
 
 _LEAST_WINDOW_S, _LEAST_GROWTH = 1.0, 0.0105
-"""By pelvis or by markers' centre the delay of 21 fault-free trials grows by -0.017 to 0.013 in windows of 1.03 to
+"""By pelvis or by marker-based centre the delay of 21 fault-free trials grows by -0.017 to 0.013 in windows of 1.03 to
 1.3 s and by up to 0.002 in longer ones, and by both in one direction by at most 0.004."""
 _LEAST_RATIO, _MOST_RATIO, _USUAL_RATIO, _TYPICAL_RATIO = 0.4, 1.8, (0.67, 0.99), 0.9
 """On 26 fault-free trials, from squats to runs; at half the true rate it is four times as much."""

@@ -175,7 +175,7 @@ def _explain(result: Placement, body: StandingBody, found: Found, computed: Mapp
 
 
 def _complete_by_label(result: Placement, pairs: Mapping[str, tuple[str, str]]) -> None:
-    """Place what was found on one side only on the other side, too, if its markers have counterparts by label."""
+    """Add to the other side what was found on one side only, if its markers have counterparts by label."""
     placed = {label for own in (*result.landmarks.values(), *result.segments.values()) for label in own}
 
     def counterparts(own: Sequence[str]) -> list[str]:
