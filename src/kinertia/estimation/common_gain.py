@@ -15,7 +15,7 @@ from kinertia.estimation.simultaneous.calibration_entry import GAIN, Calibration
 
 _FEWEST, _ALIKE = 2, 0.5
 """Fewest plates, and the smallest of their gain errors as a share of the largest. A foot that reaches over the edge of
-one plate adds to its error: 8 and 11 % for a mass that is 12 % off."""
+one plate adds to its error: 8 and 11 % for a mass that is wrong by 12 %."""
 _LEAST = 0.03
 """Share of the mass from which the estimated mass is reported to differ."""
 _UNINFORMED = (0.1, 0.9)

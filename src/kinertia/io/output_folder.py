@@ -25,7 +25,7 @@ _WRITTEN = ".kinertia.json"
 INTERRUPTIONS = tuple(
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK") if hasattr(signal, name)
 )
-"""Ctrl-C, the request to end, and the end of the terminal, as far as the system has them."""
+"""Ctrl-C, the request to end, and the end of the terminal, where the system has them."""
 _OWN = ".kinertia"
 """Prefix of hidden files that Kinertia keeps beside results: lists, locks, and unfinished results."""
 _ANYWHERE = {".DS_Store", ".localized", ".directory", ".gitkeep", ".gitignore", "desktop.ini", "Thumbs.db"}

@@ -16,15 +16,15 @@ from kinertia.trial.impossible_data import step_evidence
 
 _MOST_DECIMALS = 7
 _COARSEST_S = 0.01
-"""Times in coarser units hardly show where samples are lost."""
+"""Times in coarser units hardly show where samples are missing."""
 _OFF = 0.75
 """Largest distance of rounded times from even ones, in units: half a unit and the error of the straight line."""
 _FEWEST_ODD, _ODD_SHARE = 5, 0.02
-"""Rounding makes odd steps all the time; a lost or repeated sample makes one."""
+"""Rounding makes irregular steps all the time; a missing or repeated sample makes one."""
 _FEWEST_BEFORE_LAST = 10
-"""With fewer samples it is unknown which one is off."""
+"""With fewer samples it is unknown which one is irregular."""
 _NOTICED = 0.05
-"""Share of a step; times that are off by less stay unchanged."""
+"""Share of a step; times with smaller deviations stay unchanged."""
 
 
 def rounding_s(time: FloatArray) -> float:

@@ -14,7 +14,7 @@ import numpy as np
 TOLERANCE_DEG = 5.0
 """Error of zero angles in a static trial with slightly bent joints."""
 _SURE = 3.0
-"""Number of SDs from the mean that is assumed to include everybody."""
+"""Number of SDs from the mean that is assumed to include everyone."""
 
 
 @dataclass(frozen=True)

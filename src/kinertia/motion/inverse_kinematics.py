@@ -28,8 +28,8 @@ from kinertia.trial.rms import rms
 
 _WARM_START_EVERY_S = 0.1
 _FAR_RAD_S, _FAR_RAD = 10.0, 0.2
-"""Rad or m between frames: hardly anybody moves faster than this, beyond an initial allowance, so the frame is also
-started from its neighbour."""
+"""Rad or m between frames: people hardly ever move faster than this, beyond an initial allowance; a frame that does is
+also started from its neighbour."""
 _AS_GOOD, _AS_GOOD_M2 = 1.05, 1e-7
 """A pose is as good as another if its sum of squared distances is at most this factor times the other's plus this
 constant."""

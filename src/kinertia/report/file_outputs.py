@@ -24,7 +24,7 @@ _SHOWN = {"ANGLES": (0, 1.0, "deg"), "MOMENTS": (0, 1e-3, "N m/kg"), "POWERS": (
 _NAMES = {"ANGLES": "flexion angle", "MOMENTS": "extension moment", "POWERS": "power"}
 _ANKLE = {"ANGLES": "dorsiflexion angle", "MOMENTS": "plantarflexion moment", "POWERS": "power"}
 _PER_KG_N_M = 10.0
-"""No joint moment per kg reaches as far; larger ones are not divided by body mass."""
+"""No joint moment per kg is this large; larger ones are not divided by body mass."""
 _FEWEST = 10
 """Frames to compare."""
 

@@ -39,7 +39,7 @@ _STANCE, _SLOW_LANDING = 0.9, 2.0
 if it is at most so many times as fast as the landings."""
 
 _ALL_CARRIED = 0.85
-"""While plates carry this share of their usual load, a foot that does not move is held in the air."""
+"""While plates carry this share of their usual load, a foot that does not move is in the air."""
 
 FootMarkers = Mapping[str, Sequence[str]]
 """Labels of the markers on each foot (heel, toes, ankle), by "r" and "l"."""

@@ -14,7 +14,7 @@ from kinertia.trial.unloaded_level import UnloadedReading
 _BLOCK_S, _FEWEST_BLOCKS = 0.1, 4
 """Block length in whole periods of the mains, of 50 and of 60 Hz, so that interference averages to zero."""
 _IDLE_N, _STEADY_N, _IDLE_SHARE, _LEAST_PEAK_N = 150.0, 7.5, 0.2, 100.0
-"""While nobody steps on or off for a tenth of a second, a plate reads less than the first on average, and half a block
+"""While no one steps on or off for a tenth of a second, a plate reads less than the first on average, and half a block
 earlier or later the same within the second. If its peak is a load, it reads less than a fifth of the peak: half the
 weight of a child is 100 N."""
 _CONSTANT_N, _CONSTANT_NM, _MOST_BLOCKS = 7.5, 5.0, 0.8

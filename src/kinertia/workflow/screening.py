@@ -54,7 +54,7 @@ PERSON_QUESTIONS: tuple[Question[PersonContext], ...] = (
     *timing.PERSON_QUESTIONS,
 )
 _OF_FORCES = ("P", "T211", "T212")
-"""ERRORs that say nothing against the markers."""
+"""ERRORs that do not concern the markers."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,7 +19,7 @@ LEAST_MOTION_M = 1e-3
 _LONGEST_S = 0.15
 """Longest time between two measured frames; a person who stands still, or a frozen marker, does so for longer."""
 _ALIKE = 0.9
-"""Share of the markers that stand still at once, while in other frames they go on."""
+"""Share of the markers that are still at the same time, although they move in other frames."""
 
 
 @dataclass(frozen=True, eq=False)

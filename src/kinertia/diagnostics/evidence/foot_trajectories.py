@@ -17,7 +17,7 @@ _LOW = 0.15
 """Share of the frames in which a foot is lowest: then it goes with the ground, or with a treadmill's belt."""
 LEAST_BELT_M_S = 0.3
 _SLOW, _SLOW_M_S = 0.15, (0.3, 1.0)
-"""A foot stands while one of its markers is slower than this share of its own fast speed, within these limits."""
+"""A foot is in stance while one of its markers is slower than this share of its own fast speed, within these limits."""
 _LEAST_SWING_M_S = 1.0
 """A person whose feet never move faster takes no steps."""
 _NOISE_M_S, _FARTHEST_S = 0.15, 0.05
@@ -30,7 +30,7 @@ _LOAD_BEGINS, _LOAD_GOES_ON = 0.25, 0.65
 _TOES = 0.35
 """Length of the toes over that from heel to metatarsal heads."""
 _LANDING_S = 0.05
-"""A foot may bear load so long before it stands and after."""
+"""A foot may bear load for this long before and after its stance phase."""
 
 
 @dataclass(frozen=True, eq=False)

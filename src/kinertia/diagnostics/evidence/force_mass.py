@@ -22,10 +22,10 @@ from kinertia.trial.data import FloatArray, FootLoads, Trial
 from kinertia.trial.sampled_time import runs, span_s, within
 
 CHANGE_SD_M_S = {"standing": 0.01, "whole strides": 0.05, "steps": 0.05, "the whole window": 0.14}
-"""Standard deviation of the change of vertical velocity by markers, between both ends: half of it is what arms and
-trunk do beside their markers, half what skin does. On seven measured trials of a second and more it is 0.001 to 0.003
-m/s where the person stands, over strides and steps 0.01 to 0.02 m/s in walking and 0.02 to 0.07 in running, over other
-windows 0.03 m/s in walking and squatting and up to 0.25 in running."""
+"""Standard deviation of the change of vertical velocity by markers, between both ends: half of it is due to motion of
+arms and trunk that their markers do not show, half to skin. On seven measured trials of a second and more it is 0.001
+to 0.003 m/s where the person stands, over strides and steps 0.01 to 0.02 m/s in walking and 0.02 to 0.07 in running,
+over other windows 0.03 m/s in walking and squatting and up to 0.25 in running."""
 _FAST_HZ, _SLOW_HZ = 8.0, 4.0
 _AROUND_S = 0.25
 """Frames this near the window help to know velocities at its ends."""
@@ -33,15 +33,15 @@ _FEWEST_FRAMES = 2 * MIN_SAMPLES
 _COMPLETE, MISSING = 0.15, 0.25
 """Share of body weight within which all of it is supported, and from which on some of it is not."""
 UNMEASURED_S = 0.2
-"""A part of the weight that is missing this long is on something else, whatever the mean says: in fault-free walks,
-runs and jumps it is missing for 0.06 s at most, in flight."""
+"""Part of the weight that is missing for this long is on something else, whatever the mean: in fault-free walks, runs
+and jumps it is missing for 0.06 s at most, in flight."""
 _MOSTLY = 0.25
 """Share of the window in which all must be supported for the rest to be called an unmeasured contact."""
 
 
 FOREIGN_SHARE, _FOREIGN_S = 0.3, 0.15
-"""Share of body weight that plates bear in addition, and for how long, from which on it is somebody else's: in 29 walks
-it is beyond 0.3 for no sample, in landings, of which markers smooth the impact, for up to 0.09 s."""
+"""Share of body weight that plates bear in addition, and its duration, from which on it is another person's: in 29
+walks it is beyond 0.3 for no sample, in landings, of which markers smooth the impact, for up to 0.09 s."""
 
 
 class ForeignLoad(NamedTuple):

@@ -19,7 +19,7 @@ USUAL_HZ = 60.0
 third power."""
 _FEWEST_FRAMES = 11
 _WHOLE = 1e-3
-"""Share of a quantisation step by which its multiples may be off."""
+"""Share of a quantisation step by which its multiples may be inexact."""
 _THIRD_DIFFERENCE = float(np.sqrt(20.0))
 """SD of the third differences of noise over its own; motions have hardly any at 60 Hz and more."""
 _GAUSSIAN = 1.4826

@@ -12,7 +12,7 @@ from kinertia.trial.data import BoolArray, FloatArray, Markers, PlateLoads
 from kinertia.trial.sampled_time import within
 
 OVERHANG_M, HALLUX_M = 0.01, 0.02
-"""Markers stand off the skin by as much; so well is the place of the big toe known that has none."""
+"""Distance of markers from the skin; and uncertainty of the position of a big toe without a marker."""
 LITTLE_BEYOND_M = 0.03
 """Overhang of a heel that bears no notable load."""
 _TOE_M = 0.05

@@ -17,9 +17,10 @@ from kinertia.trial.data import FloatArray, Markers
 
 LOWER_BODY = ("pelvis", *(f"{name}_{side}" for name in ("thigh", "shank", "foot") for side in "rl"))
 FEWEST_PAIRS = 6
-"""Fewer pairs say nothing about a whole body."""
+"""Fewer pairs are not representative of a whole body."""
 SAME_SESSION_M = 0.009
-"""RMS difference of the distances: re-applied markers are 5 to 10 mm off along each axis, which makes 7 to 14."""
+"""RMS difference of the distances: re-applied markers are displaced by 5 to 10 mm along each axis, which makes 7 to
+14."""
 _FRAMES = 60
 
 

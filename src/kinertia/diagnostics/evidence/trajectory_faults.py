@@ -26,9 +26,10 @@ STRAIGHT_S = 0.15
 OFF_M = 0.015
 """Change of a marker's distances in its segment while it is frozen or moves straight, and the segment does not."""
 _SINGLE = 1.5
-"""A single frame is off by twice as much as it makes those beside it look; one before or after a jump, by as much."""
+"""A single displaced frame is displaced by twice as much as its neighbours seem to be; one before or after a jump, by
+the same."""
 _BRIEF_S = 0.06
-"""Steps to and from where a marker is off belong to one spike if they are within this; what lasts longer is a jump."""
+"""Steps to and from a displaced position belong to one spike if they are within this; anything longer is a jump."""
 _FROZEN_M = 1e-3
 
 

@@ -26,10 +26,10 @@ from kinertia.trial.data import BoolArray, FloatArray, Markers
 from kinertia.trial.sampled_time import runs
 
 _MISSING_M, _MISSING_TIMES, _USUAL_STEP_M = 0.006, 3.0, (0.0, 0.0015)
-"""Step of the median marker where frames are missing: at least so far, and so many times as far as it usually is. Noisy
-cameras move all markers, in every frame."""
+"""Step of the median marker where frames are missing: at least this distance, and this multiple of its usual step.
+Noisy cameras move all markers, in every frame."""
 _FEW_COPIED = 0.05
-"""Share of the frames up to which copies of lost frames are treated as gaps (`without_copied_frames`)."""
+"""Share of the frames up to which copies of dropped frames are treated as gaps (`without_copied_frames`)."""
 _INTERPOLATED_SHARE, _STRAIGHT = 0.4, 0.03
 """Of three frames drawn between two measured ones all lie in the middle between their neighbours: they bend by less
 than this share of how much the quick frames bend."""

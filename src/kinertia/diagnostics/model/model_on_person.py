@@ -34,10 +34,10 @@ _NOBODY = 5.0
 """Ratio of sizes that no two people have."""
 _ELSEWHERE_M = 0.014
 _ARRANGED = {("pelvis", "torso"): (5, 1.6), ("pelvis", "thigh_r", "thigh_l"): (8, 1.15)}
-"""Segments whose markers tell left from right, which pose hardly changes; how many it takes, and how many times as bad
-a fit decides. Markers in one plane fit as well as their mirror image: then the next segments are asked."""
+"""Segments whose markers distinguish left from right in any pose; how many are needed, and how many times worse a fit
+decides. Markers in one plane fit as well as their mirror image: then the next segments are used."""
 _MOVED_M = 0.055
-"""Calibration moves markers of the lower body by 5 to 36 mm on sound trials."""
+"""Calibration moves markers of the lower body by 5 to 36 mm on fault-free trials."""
 _FRAMES = 60
 
 

@@ -41,8 +41,8 @@ _BEGIN_M, _END_M = -0.015, 0.06
 first twentieth of a load is 36 to 99 mm in front of it. The last one is at most 25 mm in front of the foremost marker,
 which may be on the metatarsals."""
 _BOTH_BACK_M, _BOTH_FORWARD_M = (0.02, -0.07), (0.13, 0.035)
-"""Where the first twentieth of steps and their last one are both, on average, farther back, or farther forward, no way
-of landing or pushing off is the reason. On nine fault-free trials they are 36 to 85 mm and -58 to 25 mm."""
+"""Where the first twentieth of steps and their last one are both, on average, farther back, or farther forward, landing
+or pushing off cannot be the reason. On nine fault-free trials they are 36 to 85 mm and -58 to 25 mm."""
 _USUAL_BEGIN_M, _USUAL_END_M = (0.035, 0.1), (-0.06, 0.025)
 
 

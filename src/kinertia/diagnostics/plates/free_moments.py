@@ -27,7 +27,7 @@ from kinertia.trial.rms import rms
 _ABSENT_NM = 0.005
 """Amplifiers have more noise than this. Feet twist against the ground by some N m."""
 _COLUMNS_ARM_M, _USUAL_COLUMNS_ARM_M = 0.005, 0.001
-"""A load that is off by so much moves joint moments by 2 to 4 N m."""
+"""A load displaced by this much changes joint moments by 2 to 4 N m."""
 _LITTLE, _SOME_NM, _LARGEST_NM = 0.1, 0.2, 10.0
 """RMS of free moments of walks and runs: 0.8 to 6 N m."""
 _LONG_ARM_M, _USUAL_PERCENT, _ACCOUNTED, _FEWEST = 0.034, 95.0, 1.8, 20

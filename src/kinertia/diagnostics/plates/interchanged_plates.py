@@ -21,7 +21,7 @@ from kinertia.findings.quantity import Quantity
 from kinertia.trial.data import FloatArray, PlateLoads
 
 _DIFFERENCE = 0.25
-"""Share of their distance by which two plates may be off by other than the opposite."""
+"""Share of their distance by which the displacements of two plates may differ from being opposite."""
 
 
 def interchanged_plates(context: RecordingContext) -> Iterator[Hypothesis]:

@@ -23,7 +23,7 @@ from kinertia.findings.quantity import Quantity
 
 _OPEN_M = 1.0
 _FIXED_M = 1e-6
-"""Plates and floor that are off alike are the same: the floor stays."""
+"""Equal displacements of all plates and a displacement of the floor are the same: the floor is fixed."""
 _HARDLY_M = 0.004
 _BETTER = 0.7
 _CERTAIN = 2.0

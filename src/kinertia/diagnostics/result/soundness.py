@@ -24,12 +24,13 @@ from kinertia.model.bsp import PARAMETERS, impossible_segments
 CONTRADICTION_SD = 3.0
 """Prior SDs from which on a parameter contradicts what was expected."""
 PLAIN_CONTRADICTION_SD = 4.0
-"""A parameter this many prior SDs off is wrong by itself: chance brings it about in one of 16 000."""
+"""A parameter this many prior SDs from its expected value is wrong by itself: the probability by chance is one in 16
+000."""
 MOST_DOUBTED_SEGMENTS = 2
 """Segments with a parameter beyond CONTRADICTION_SD that are taken with care; more contradict the whole model."""
 CONTRADICTING_COM_M = 0.1
-"""A centre of mass this far from the literature contradicts it, if no prior says how far people's are: a trunk's is off
-by 34 mm (SD)."""
+"""A centre of mass this far from the literature contradicts it, if no prior states the variation between people: 34 mm
+(SD) for a trunk."""
 _ONE_SIDED_SD = 4.0
 """As in `mass_asymmetry`."""
 _ARMS = ("upper_arm", "forearm", "hand")

@@ -35,8 +35,9 @@ _OTHER_SCALE, _ERRORS = 0.01, 3.0
 _ALIKE = 2.0 / 3.0
 """Smallest share of the segments that differ in the same direction."""
 _SEVERAL, _SHOWN = 3, 0.5
-"""A single distance of a segment is up to 4 % off by skin alone, in children's feet and shanks above all, and those of
-several segments may be so in the same direction: one with so many distances must show so much of the scale."""
+"""A single distance of a segment may be wrong by up to 4 % because of skin alone, in children's feet and shanks above
+all, and those of several segments may be so in the same direction: one with so many distances must show so much of the
+scale."""
 _MEDIAN_ERROR = 1.25 * 1.4826
 """Standard error of a median of n numbers, times the root of n and over their median deviation, if they are normal."""
 

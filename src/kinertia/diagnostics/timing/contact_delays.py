@@ -29,8 +29,8 @@ _DELAY_S, _LONGEST_DELAY_S = 0.045, 0.25
 """Clocks and filters delay by less than the latter; what is later began at another time."""
 _RATE = (0.7, 1.4)
 _FEWEST_CONTACTS, _LEAST_RATE_ERROR, _CERTAIN, _EXCLUDED, _MOST_RATE_ERROR = 4, 0.004, 6.0, 3.0, 0.1
-"""Over 14 and 28 contacts of fault-free runs a delay grows by less than 0.001; with a rate that is 1 % off by 0.01.
-More than the last shows in how long loads last."""
+"""Over 14 and 28 contacts of fault-free runs a delay grows by less than 0.001; with a rate that is wrong by 1 % by
+0.01. A larger error than the last shows in the duration of loads."""
 _DELAY_SD_S, _LEAP_S = 0.010, 0.06
 """A frame or so; and how much a delay cannot change from one contact to the next."""
 
