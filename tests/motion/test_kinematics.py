@@ -82,7 +82,7 @@ def test_smoothed_coordinates_and_derivatives_are_near_the_truth(skeleton, trial
         error = getattr(kinematics.motion, name) - truth
         assert np.sqrt(np.mean(error**2)) < share * np.sqrt(np.mean(truth**2))
     assert kinematics.notes[0] == "read from nowhere"
-    assert "smoothed at 6.0 Hz, where the search" in kinematics.notes[1]
+    assert "smoothed at 6.0 Hz, the upper limit of the automatic search" in kinematics.notes[1]
     assert len(kinematics.notes) == 2
     assert kinematics.ik.converged.all()
 

@@ -21,7 +21,7 @@ LITERATURE = walking_subject().literature
 def test_a_total_mass_that_follows_the_plates(estimated, stated, expected):
     mass_kg = LITERATURE.total_mass_kg
     fit = SimpleNamespace(estimate=replace(LITERATURE, mass_kg=estimated * LITERATURE.mass_kg))
-    ready = SimpleNamespace(carried=TotalMass.of(stated * mass_kg, ()))
+    ready = SimpleNamespace(total_mass=TotalMass.of(stated * mass_kg, ()))
     found = list(total_mass(ResultContext(fit, ready)))
     assert [one.code for one in found] == expected
     assert all(one.evidence["estimate_kg"].value == pytest.approx(estimated * mass_kg) for one in found)
