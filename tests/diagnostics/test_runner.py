@@ -38,6 +38,16 @@ def test_a_waived_cause_unblocks_what_it_explains():
     assert [one.status for one in findings] == ["waived", "open"]
 
 
+def test_a_waived_cause_does_not_unblock_what_leaves_nothing_to_compute():
+    beside, none, short = (finding(code, Where(trial="walk")) for code in ("P244", "P278", "P279"))
+    findings = overruled(explained([beside, none, short]), Overrule(waive=("P244",)))
+    assert [(one.code, one.status, one.muted_by) for one in findings[:2]] == [
+        ("P244", "waived", None),
+        ("P278", "open", None),
+    ]
+    assert [one.code for one in blocking(findings)] == ["P278"]
+
+
 def test_what_is_ignored_still_explains():
     weak = finding("P213", Where(trial="walk", plate="left"), level_n=Quantity(20.0, "N"))
     drift, zero = overruled(explained([DRIFT, weak]), Overrule(ignore=("P21",)))

@@ -103,6 +103,8 @@ def overruled(
 ) -> list[Finding]:
     """Apply the status that the user gives findings: ERRORs are waived unless nothing can be computed, others ignored.
 
+    A waived ERROR explains no ERROR with which nothing can be computed: that one is open.
+
     Args:
         findings: findings with their explanations.
         overrule: what the user overrules in all trials.
@@ -116,7 +118,17 @@ def overruled(
         if any(one.code.startswith(code) for code in codes) and not (is_error and one.rule.hard):
             one = replace(one, status="waived" if is_error else "ignored")
         result.append(one)
-    return result
+    return _released(result)
+
+
+def _released(findings: list[Finding]) -> list[Finding]:
+    """Return the findings, those ERRORs open that cannot be waived and that only waived ones explain."""
+    if all(one.status != "waived" for one in findings):
+        return findings
+    hard = [one for one in findings if one.severity is Severity.ERROR and one.rule.hard]
+    open_ = explained(replace(one, muted_by=None) for one in findings if one.is_open or one in hard)
+    muted_by = {(one.code, one.where): one.muted_by for one in open_}
+    return [replace(one, muted_by=muted_by[one.code, one.where]) if one in hard else one for one in findings]
 
 
 def blocking(findings: Iterable[Finding]) -> list[Finding]:
