@@ -78,6 +78,7 @@ def test_a_waived_error_is_fitted_and_shown_as_waived_everywhere(waived):
     assert waived.content["verdict"] != "use"
     first = waived.outcome.out.splitlines()[0]
     assert re.search(r", 1 waived; \d+ rules, 1 of 1 trials", first)
+    assert "\nERROR [waived]  walk  S111 " in waived.outcome.out
     assert "--waive" not in waived.outcome.out
     page = (waived.folder / "report.html").read_text(encoding="utf-8")
     assert "S111" in Elements(page).text
@@ -91,9 +92,10 @@ def test_check_shows_a_waived_error_as_waived(lab):
     assert blocking_codes(told(*given, status=1)["findings"]) == ["S111"]
     content = told(*given, "--waive", "S111", status=0)
     assert (content["verdict"], statuses(content, "S111")) == (["use with care"], ["waived"])
-    outcome = run(*given, "--waive", "S111", "-v", "-o", lab / "out")
-    assert re.search(r"^use with care: 1 waived; \d+ rules, 1 of 1 trials$", outcome.out, re.MULTILINE)
-    assert "\nERROR [waived]  walk  S111 " in outcome.out
+    for verbose in ([], ["-v"]):
+        outcome = run(*given, "--waive", "S111", *verbose, "-o", lab / "out")
+        assert re.search(r"^use with care: 1 waived; \d+ rules, 1 of 1 trials$", outcome.out, re.MULTILINE)
+        assert "\nERROR [waived]  walk  S111 " in outcome.out
     assert "waived" in Elements((lab / "out" / "check.html").read_text(encoding="utf-8")).text
 
 

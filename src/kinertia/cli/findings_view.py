@@ -25,7 +25,8 @@ def show_overview(overview: Overview, verbose: bool) -> None:
     if verbose:
         show_all(overview.findings)
         return
-    groups = grouped(reported(overview.findings))
+    shown = [*reported(overview.findings), *in_order(overview.waived)]
+    groups = grouped(sorted(shown, key=lambda one: -one.severity))
     for group in groups[:_SHOWN]:
         _show_line(group)
     hidden = len(groups) - len(groups[:_SHOWN])
