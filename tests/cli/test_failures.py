@@ -1,5 +1,6 @@
 """Failures of Kinertia itself and trouble of the system: one line, a status, a log."""
 
+import json
 from importlib.metadata import version
 
 import pytest
@@ -40,6 +41,44 @@ def test_trouble_of_the_system_without_a_file(monkeypatch, error, line):
     outcome = run("check", "walk.trc")
     assert outcome.status == 2
     assert outcome.err.startswith(line)
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        ("check",),
+        ("fit", "--bogus"),
+        ("fit", "walk.c3d", "--mass", "abc"),
+        ("check", "walk.c3d", "--waive", "X999"),
+        ("explain", "P999"),
+        ("nothing",),
+    ],
+    ids=" ".join,
+)
+def test_an_error_of_usage_is_json_for_scripts(given):
+    outcome = run(*given, "--json")
+    assert outcome.status == 2
+    content = json.loads(outcome.out)
+    assert content["findings"] == []
+    assert content["error"]
+    assert outcome.err == f"error: {content['error']}\n"
+
+
+@pytest.mark.parametrize(("error", "status"), [(OSError("gone"), 2), (ZeroDivisionError("division by zero"), 70)])
+def test_failures_are_json_for_scripts(monkeypatch, error, status):
+    def fail(*_):
+        raise error
+
+    monkeypatch.setattr("kinertia.cli.check.check_subject", fail)
+    outcome = run("check", "walk.trc", "--json")
+    assert outcome.status == status
+    content = json.loads(outcome.out)
+    assert content["findings"] == []
+    assert outcome.err == f"error: {content['error']}\n"
+
+
+def test_help_is_no_error_of_usage():
+    assert run("check", "--json", "--help").out.lstrip().startswith("Usage: kinertia check")
 
 
 def test_trouble_with_the_disk_is_one_line(person, monkeypatch):

@@ -8,14 +8,14 @@ import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from importlib import import_module
-from typing import Annotated, NoReturn
+from typing import Annotated, Any, NoReturn, cast
 
 import typer
 
-from kinertia.cli.failure import STATUS, show_failure
-from kinertia.cli.outcome import add_command
+from kinertia.cli.failure import STATUS, failure_text
+from kinertia.cli.outcome import add_command, of_error
 from kinertia.cli.renamed_options import as_named_now
-from kinertia.cli.terminal import out, show_error, show_problem
+from kinertia.cli.terminal import out, print_json, show_error, show_problem
 from kinertia.errors import KinertiaError
 from kinertia.io.output_folder import INTERRUPTIONS
 from kinertia.io.provenance import VERSION
@@ -113,6 +113,8 @@ def application(only: str | None = None) -> typer.Typer:
 
 _INTERRUPTED = 130
 """Exit status after Ctrl-C."""
+_UsageError: type[Exception] = typer.BadParameter.__mro__[1]
+"""What typer raises for options and arguments that cannot be, under no public name."""
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -127,15 +129,22 @@ def application_for(given: Sequence[str]) -> typer.Typer:
 
 
 def run(app: typer.Typer, given: Sequence[str]) -> None:
-    """Run the command line; a user's error is one line and exit status 2, a failure of Kinertia one line and 70."""
+    """Run the command line; a user's error is one line and exit status 2, a failure of Kinertia one line and 70.
+
+    With `--json` both are JSON on standard output, too.
+    """
+    as_json = "--json" in given
     try:
         with _ended_in_order():
-            app(args=as_named_now(given), prog_name="kinertia")
+            _call(app, as_named_now(given), as_json)
     except KinertiaError as error:
+        if as_json:
+            print_json(of_error(error))
         show_problem(error)
     except OSError as error:
         where = "" if error.filename is None else f"{error.filename}: "
-        show_error(f"{where}{error.strerror or error}; check the path, its permissions and the space on the disk")
+        problem = f"{where}{error.strerror or error}; check the path, its permissions and the space on the disk"
+        _show(problem, as_json)
     except Exception as error:
         # Ctrl-C in the middle of a compiled function, which reports it so
         cause: BaseException | None = error
@@ -143,9 +152,27 @@ def run(app: typer.Typer, given: Sequence[str]) -> None:
             cause = cause.__cause__
         if isinstance(cause, KeyboardInterrupt | SystemExit):
             raise SystemExit(getattr(cause, "code", _INTERRUPTED)) from None
-        show_failure(error, given)
+        _show(failure_text(error, given), as_json)
         raise SystemExit(STATUS) from None
     raise SystemExit(2)
+
+
+def _call(app: typer.Typer, given: Sequence[str], as_json: bool) -> NoReturn:
+    """Call the command and exit; a wrong option or argument is an error like others where scripts read it."""
+    if not as_json:
+        app(args=given, prog_name="kinertia")
+    try:
+        status = app(args=given, prog_name="kinertia", standalone_mode=False)
+    except _UsageError as error:
+        raise KinertiaError(cast(Any, error).format_message()) from None
+    raise SystemExit(status)
+
+
+def _show(problem: str, as_json: bool) -> None:
+    """Show a problem that no finding describes, on standard output as well where scripts read it."""
+    if as_json:
+        print_json({"error": problem, "findings": []})
+    show_error(problem)
 
 
 @contextmanager

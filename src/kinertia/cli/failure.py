@@ -1,4 +1,4 @@
-"""Reports an internal error: one line on the terminal, and a log file for the developers."""
+"""Describes an internal error in one line, and writes a log file for the developers."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from kinertia.cli.terminal import show_error
 from kinertia.io.provenance import VERSION, command_line
 
 STATUS = 70
@@ -17,12 +16,12 @@ STATUS = 70
 _PACKAGES = ("numpy", "scipy", "numba", "pandas", "ezc3d", "pydantic", "typer", "rich")
 
 
-def show_failure(error: Exception, given: Sequence[str]) -> None:
-    """Report an internal error of Kinertia, and where its log is."""
+def failure_text(error: Exception, given: Sequence[str]) -> str:
+    """Log an internal error of Kinertia, and describe it and where its log is."""
     problem = traceback.format_exception_only(error)[-1].strip() or type(error).__name__
     where = _logged(error, given)
     sent = f"please send {where} to its developers" if where else "its log file could not be written"
-    show_error(f"Internal error of Kinertia ({problem}); no results were written; {sent}")
+    return f"Internal error of Kinertia ({problem}); no results were written; {sent}"
 
 
 def _logged(error: Exception, given: Sequence[str]) -> Path | None:

@@ -56,13 +56,8 @@ def _with_json(command: Callable[..., Outcome], hints: Mapping[str, Any]) -> Cal
     def run(*, as_json: bool, **given: Any) -> NoReturn:
         if own:
             given["as_json"] = as_json
-        try:
-            with out.capture() if as_json else nullcontext():
-                outcome = command(**given)
-        except KinertiaError as error:
-            if as_json:
-                print_json(of_error(error))
-            raise
+        with out.capture() if as_json else nullcontext():
+            outcome = command(**given)
         if as_json:
             print_json(outcome.content)
         raise typer.Exit(outcome.status)
