@@ -23,6 +23,20 @@ def test_a_cause_mutes_its_consequence_and_takes_over_its_severity():
     assert blocking([drift, zero, other]) == [drift]
 
 
+def test_equal_causes_take_over_the_severity_alike():
+    dead = [finding("P101", Where(trial="walk", plate=plate)) for plate in ("left", "right")]
+    far = finding("R203", Where(part="mass of torso"), Severity.ERROR)
+    assert [one.severity for one in explained([*dead, far])[:2]] == [Severity.ERROR, Severity.ERROR]
+
+
+def test_what_is_found_in_a_trial_left_out_explains_nothing_elsewhere():
+    """The result is that of the other trials."""
+    fixed = finding("P251", Where(trial="walk", plate="left"))
+    far, zero = finding("R203", Where(part="mass of torso"), Severity.ERROR), ZERO.at(Severity.WARNING)
+    assert [one.muted_by for one in explained([fixed, far])] == [None, "P251"]
+    assert [one.muted_by for one in explained([fixed, far, DRIFT, zero], ["walk"])] == [None, None, None, "P211"]
+
+
 def test_the_order_of_findings_does_not_matter():
     for order in ([ZERO, DRIFT], [DRIFT, ZERO]):
         assert {one.code: one.muted_by for one in explained(order)} == {"P211": None, "P213": "P211"}

@@ -6,7 +6,7 @@ A question returns all findings that apply, or fits every hypothesis and returns
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Generic, TypeVar
 
@@ -59,29 +59,36 @@ def rules_of(*questions: Question[Any]) -> int:
     return len({code for one in questions for code in matching(one.code)})
 
 
-def explained(findings: Iterable[Finding]) -> list[Finding]:
-    """Mute findings that another one explains; a cause takes over the severity of its consequences.
+def explained(findings: Iterable[Finding], left_out: Collection[str] = ()) -> list[Finding]:
+    """Mute findings that another one explains; a cause, and others like it, take over the severity of consequences.
 
     A correction of the estimate that resolves an earlier warning mutes it, and leaves it a correction.
+
+    Args:
+        findings: findings, each as it was made.
+        left_out: names of trials that are not in the result: what is found in them explains nothing elsewhere.
     """
     unique: dict[tuple[str, Where], Finding] = {}
     for one in findings:
         unique.setdefault((one.code, one.where), one)
     result = list(unique.values())
-    muted_by: dict[int, int] = {}
+    causes: dict[int, list[int]] = {}
     for k, cause in enumerate(result):
         consequences = {code for each in cause.rule.supersedes for code in matching(each)}
         for j, other in enumerate(result):
-            if j != k and other.code in consequences and cause.where.overlaps(other.where):
-                muted_by.setdefault(j, k)
+            is_here = cause.where.trial not in left_out or cause.where.trial == other.where.trial
+            if j != k and other.code in consequences and is_here and cause.where.overlaps(other.where):
+                causes.setdefault(j, []).append(k)
     severities = [one.severity for one in result]
-    for j in muted_by:
-        k = j
-        while k in muted_by:
-            k = muted_by[k]
-        severities[k] = max(severities[k], result[j].severity)
+    for j in causes:
+        last, first = j, causes[j][0]
+        while first in causes:
+            last, first = first, causes[first][0]
+        for k in causes[last]:
+            if result[k].code == result[first].code:
+                severities[k] = max(severities[k], result[j].severity)
     explained_ = [
-        replace(one, severity=severities[k], muted_by=result[muted_by[k]].code if k in muted_by else None)
+        replace(one, severity=severities[k], muted_by=result[causes[k][0]].code if k in causes else None)
         for k, one in enumerate(result)
     ]
     return [_resolved(one, explained_) for one in explained_]

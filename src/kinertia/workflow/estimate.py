@@ -105,7 +105,7 @@ def estimate(ready: Prepared, progress: Progress = lambda stage, share: None) ->
         rules=ready.rules + rules_of(*ESTIMATE_QUESTIONS, *RESULT_QUESTIONS),
         evaluations=outcome.evaluations,
     )
-    found = explained([*ready.findings, *judged(ResultContext(fit, ready))])
+    found = explained([*ready.findings, *judged(ResultContext(fit, ready))], ready.left_out)
     return replace(fit, findings=tuple(overruled(found, ready.overrule, ready.overrule_of)))
 
 

@@ -61,11 +61,20 @@ def test_findings_lower_what_they_affect(clear, severity, use):
     assert moments.codes == (("R301",) if use != "use" else ())
 
 
-def test_what_is_explained_or_ignored_lowers_nothing_and_a_waived_error_bars_nothing(clear):
+def test_what_is_ignored_lowers_nothing_and_a_waived_error_bars_nothing(clear):
     error = finding("R301", None, Severity.ERROR)
-    assert uses(clear, error.muted("P243")) == only()
     assert uses(clear, replace(finding("R301"), status="ignored")) == only()
     assert uses(clear, replace(error, status="waived")) == only(moments="use with care")
+
+
+@pytest.mark.parametrize(("status", "use"), [("open", "do not use"), ("waived", "use with care"), ("ignored", "use")])
+def test_a_cause_lowers_what_its_consequences_affect(clear, status, use):
+    """Masses 5 SDs from the literature were to be used, since a dead channel explains them."""
+    severity = Severity.WARNING if status == "ignored" else Severity.ERROR
+    cause = replace(finding("P101", Where(trial="walk", plate="left"), severity), status=status)
+    far = finding("R203", Where(part="mass of torso"), severity, parameter=Quantity("mass")).muted("P101")
+    assert uses(clear, cause, far) == only(moments=use, centres=use, masses=use)
+    assert suitability(clear, [cause, far])[1].codes == (() if use == "use" else ("P101",))
 
 
 def test_a_correction_lowers_nothing(clear):

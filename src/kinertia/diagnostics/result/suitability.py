@@ -113,7 +113,8 @@ def informed(fit: Fit, output: str) -> Informed | None:
 
 
 def _output(fit: Fit, name: str, findings: Sequence[Finding], left_out: Sequence[str]) -> Suitability:
-    lowering = [(one, level) for one in findings if (level := _lowers(one, name))]
+    causes = [(one, _cause(one, findings)) for one in findings if _affects(one, name)]
+    lowering = [(cause.code, _level(one, cause)) for one, cause in causes if cause.status != "ignored"]
     levels, reasons = [level for _, level in lowering], []
     if name in GROUPS:
         level, reason = _of_parameters(fit, name)
@@ -126,21 +127,28 @@ def _output(fit: Fit, name: str, findings: Sequence[Finding], left_out: Sequence
     if left_out:
         levels.append(1)
         reasons.append(f"{len(left_out)} of {len(fit.trials) + len(left_out)} trials left out")
-    codes = tuple(dict.fromkeys(one.code for one, _ in sorted(lowering, key=lambda each: -each[1])))
+    codes = tuple(dict.fromkeys(code for code, _ in sorted(lowering, key=lambda each: -each[1])))
     if codes:
         reasons.append(f"see {', '.join(codes)}")
     return Suitability(_TITLES[name], _ORDER[max(levels, default=0)], "; ".join(reasons), codes)
 
 
-def _lowers(one: Finding, output: str) -> int:
-    """Return by how many steps of _ORDER a finding lowers an output."""
-    if output not in one.rule.affects or not _concerns(one, output):
-        return 0
-    # the person as a whole is far from the prior, whatever single parameters are
-    explained = one.muted_by is not None and one.code != "R204"
-    if one.status == "ignored" or explained or one.severity < Severity.WARNING:
-        return 0
-    return 2 if one.severity is Severity.ERROR and one.status == "open" else 1
+def _affects(one: Finding, output: str) -> bool:
+    """Return whether a finding concerns an output, so that it, or what explains it, lowers it."""
+    return one.severity >= Severity.WARNING and output in one.rule.affects and _concerns(one, output)
+
+
+def _cause(one: Finding, findings: Sequence[Finding]) -> Finding:
+    """Return the finding that explains this one, directly or through others; itself if none does."""
+    for cause in findings:
+        if cause.code == one.muted_by and cause.where.overlaps(one.where):
+            return _cause(cause, findings)
+    return one
+
+
+def _level(one: Finding, cause: Finding) -> int:
+    """Return by how many steps of _ORDER a finding lowers an output, given the one that explains it."""
+    return 2 if one.severity is Severity.ERROR and cause.status == "open" else 1
 
 
 def _concerns(one: Finding, output: str) -> bool:
