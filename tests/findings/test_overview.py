@@ -37,6 +37,14 @@ def test_the_line_counts():
     assert overview.line == "use with care: 3 warnings, 1 corrected; 61 rules, 2 of 3 trials"
 
 
+def test_the_line_counts_what_is_overruled():
+    """Of a recording with an ignored warning it was said that nothing was found."""
+    ignored = (*(replace(one, status="ignored") for one in FROZEN), replace(DELAY.muted("P243"), status="ignored"))
+    assert Overview(ignored, 61, 1).line == "use: 3 ignored; 61 rules, 1 of 1 trials"
+    waived = replace(SPIKES, status="waived")
+    assert Overview((*ignored, waived), 61, 1).line == "use with care: 1 waived, 3 ignored; 61 rules, 1 of 1 trials"
+
+
 def test_the_worst_comes_first():
     assert [one.code for one in Overview((DELAY, *FROZEN, SPIKES), 1, 1).open] == [
         "M111",

@@ -80,6 +80,7 @@ class Overview:
             (self.count(Severity.WARNING), "warning", "warnings"),
             (self.count(Severity.CORRECTED), "corrected", "corrected"),
             (len(self.waived), "waived", "waived"),
+            (sum(one.status == "ignored" and one.muted_by is None for one in self.findings), "ignored", "ignored"),
         ]
         found = ", ".join(f"{count} {one if count == 1 else many}" for count, one, many in counts if count)
         used, by_markers = self.trials - len(self.left_out), len(self.markers_only)
