@@ -68,6 +68,16 @@ def test_what_is_ignored_still_explains():
     assert (drift.status, zero.muted_by) == ("ignored", "P211")
 
 
+def test_what_turns_out_to_be_an_error_later_is_ignored_no_more():
+    """An ignored dead channel hid nine masses far from the literature, which it explained."""
+    dead = finding("P101", Where(trial="walk", plate="left"))
+    far = finding("R203", Where(part="mass of torso"), Severity.ERROR)
+    ignore = Overrule(ignore=("P101",))
+    before = overruled(explained([dead]), ignore)
+    assert [one.status for one in before] == ["ignored"]
+    assert [one.code for one in blocking(overruled(explained([*before, far]), ignore))] == ["P101"]
+
+
 def test_errors_are_not_ignored_and_hard_ones_not_waived():
     hard = finding("P278", Where(trial="walk"))
     assert overruled([ZERO, hard], Overrule(("P278",), ("P213",))) == [ZERO, hard]

@@ -122,9 +122,8 @@ def overruled(
         rule_of_trial = (of_trials or {}).get(one.where.trial or "", Overrule())
         is_error = one.severity is Severity.ERROR
         codes = (overrule + rule_of_trial).waive if is_error else (overrule + rule_of_trial).ignore
-        if any(one.code.startswith(code) for code in codes) and not (is_error and one.rule.hard):
-            one = replace(one, status="waived" if is_error else "ignored")
-        result.append(one)
+        stands = not any(one.code.startswith(code) for code in codes) or (is_error and one.rule.hard)
+        result.append(replace(one, status="open" if stands else "waived" if is_error else "ignored"))
     return _released(result)
 
 
