@@ -62,6 +62,13 @@ def test_a_waived_cause_does_not_unblock_what_leaves_nothing_to_compute():
     assert [one.code for one in blocking(findings)] == ["P278"]
 
 
+def test_what_was_found_of_all_plates_is_not_said_to_go_unnoticed():
+    """Of plates whose rotation of 2.8 degrees was corrected it was said that 2.2 degrees would not show."""
+    found = [finding("P234"), finding("P235"), finding("P247", Where(axis="fore-aft"))]
+    hidden = [finding("P248", Where(axis=axis)) for axis in ("fore-aft", "mediolateral")]
+    assert [one.muted_by for one in explained([*found, *hidden])] == [None, "P234", None, "P247", None]
+
+
 def test_what_is_ignored_still_explains():
     weak = finding("P213", Where(trial="walk", plate="left"), level_n=Quantity(20.0, "N"))
     drift, zero = overruled(explained([DRIFT, weak]), Overrule(ignore=("P21",)))

@@ -62,6 +62,11 @@ def test_equal_findings_are_one_line():
     assert group.line.startswith("walk  M113 ")
 
 
+def test_equal_findings_of_all_plates_differ_by_their_axes():
+    (group,) = grouped(finding("P248", Where(axis=axis)) for axis in ("fore-aft", "mediolateral"))
+    assert "(also mediolateral)" in group.line
+
+
 def test_equal_findings_of_one_plate_differ_by_their_axes():
     offsets = [
         finding("P215", Where(trial="walk", plate="plate 1", axis=axis), zero_offset_n=Quantity(5.3, "N"))

@@ -161,6 +161,6 @@ def grouped(findings: Iterable[Finding]) -> list[Group]:
 
 def _place(one: Finding) -> str:
     where = one.where
-    if where.plate and where.axis:
-        return f"{where.axis} on {where.plate}"
-    return where.plate or (where.markers[0] if where.markers else None) or where.part or ""
+    if where.plate or where.axis:
+        return " on ".join(filter(None, (where.axis, where.plate)))
+    return (where.markers[0] if where.markers else None) or where.part or ""

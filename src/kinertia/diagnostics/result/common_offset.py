@@ -10,12 +10,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import numpy as np
-
 from kinertia.diagnostics.result.context import ResultContext
-from kinertia.diagnostics.result.smallest_detectable import smallest_detectable
+from kinertia.diagnostics.result.smallest_detectable import unnoticed
 from kinertia.findings.finding import Finding, finding
-from kinertia.findings.quantity import Quantity
 
 _MATTERS_M = 0.015
 """Of three walks that show 19 mm sideways, two do not show plates displaced by 20 mm: their moments err by 5 N m."""
@@ -23,10 +20,6 @@ _MATTERS_M = 0.015
 
 def common_offset(context: ResultContext) -> Iterator[Finding]:
     """Report axes along which a displacement of all plates that matters would go unnoticed."""
-    if context.fit.posterior is None:
-        return
     for axis in "xz":
-        least = smallest_detectable(context.fit.posterior.instruments, context.ready.uncertainty.instruments, axis)
-        if _MATTERS_M < least < np.inf:
-            detectable = Quantity(least, "m", limit=_MATTERS_M)
-            yield finding("P248", context.along(axis, None), detectable_m=detectable)
+        if least := unnoticed(context, axis, _MATTERS_M, "m"):
+            yield finding("P248", context.along(axis, None), detectable_m=least)

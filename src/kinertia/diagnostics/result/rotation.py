@@ -14,10 +14,9 @@ import numpy as np
 
 from kinertia.diagnostics.result.context import ResultContext
 from kinertia.diagnostics.result.corrections import corrected, equal
-from kinertia.diagnostics.result.smallest_detectable import smallest_detectable
+from kinertia.diagnostics.result.smallest_detectable import unnoticed
 from kinertia.estimation.simultaneous.calibration_entry import ROTATION
 from kinertia.findings.finding import Finding, finding
-from kinertia.findings.quantity import Quantity
 
 _MATTERS_RAD = float(np.radians(2.0))
 """In the least informative walk of the reference recordings, 3 degrees change joint moments by twice their SDs."""
@@ -32,8 +31,5 @@ def plate_rotation(context: ResultContext) -> Iterator[Finding]:
         yield from corrected(context, "P234", "rotation_rad", [replace(largest, plate=None)])
     else:
         yield from corrected(context, "P237", "rotation_rad", rotations)
-    if context.fit.posterior is None:
-        return
-    least = smallest_detectable(context.fit.posterior.instruments, context.ready.uncertainty.instruments, "turn")
-    if _MATTERS_RAD < least < np.inf:
-        yield finding("P235", detectable_rad=Quantity(least, "rad", limit=_MATTERS_RAD))
+    if least := unnoticed(context, "turn", _MATTERS_RAD, "rad"):
+        yield finding("P235", detectable_rad=least)
