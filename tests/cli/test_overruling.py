@@ -196,7 +196,7 @@ def test_a_blocked_trial_is_left_out_and_the_other_fitted(lab):
 def test_a_blocked_trial_is_left_out_by_check(lab):
     outcome = run("check", subject_file(lab, with_reversed_forces(lab), WALK))
     assert outcome.status == 1
-    verdict = r"^use with care: 1 error, 1 warning; \d+ rules, 1 of 2 trials, and the markers of 1 more"
+    verdict = r"^use with care: 1 error; \d+ rules, 1 of 2 trials, and the markers of 1 more"
     assert re.search(verdict + r"\nERROR  reversed  P232 ", outcome.out)
 
 

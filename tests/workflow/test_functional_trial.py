@@ -122,7 +122,7 @@ def test_a_trial_whose_forces_are_refused_gives_its_markers(lab):
     assert screened.left_out == ("empty",)
     assert [one.name for one in screened.usable] == ["walk", "empty"]
     assert [(one.where.trial, one.severity.name) for one in screened.findings if one.code == "P283"] == [
-        ("empty", "WARNING")
+        ("empty", "INFO")
     ]
     ready = prepared(screened, Settings())
     assert [one.trial.name for one in ready.kinematics] == ["walk"]
