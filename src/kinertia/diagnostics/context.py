@@ -181,7 +181,10 @@ class RecordingContext:
     @cached_property
     def foot_trajectories(self) -> tuple[FootTrajectory, FootTrajectory] | None:
         """Trajectories of the right and the left foot; None where a foot is hardly visible."""
-        return None if self.feet is None else foot_trajectories(self.recording.markers, self.feet, self.recording.belt)
+        if self.feet is None:
+            return None
+        # a foot that swings seems to stand in a frame that repeats the one before
+        return foot_trajectories(without_copied_frames(self.all_markers), self.feet, self.recording.belt)
 
     @cached_property
     def _all_contacts(self) -> Sequence[PlateContact]:
