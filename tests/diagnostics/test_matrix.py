@@ -15,8 +15,9 @@ from kinertia.diagnostics.runner import blocking, explained
 from kinertia.findings.finding import Severity, finding
 from kinertia.findings.rule import all_rules, matching
 from kinertia.findings.where import Where
+from kinertia.trial.data import Markers
 from kinertia.workflow.check import check_recording
-from recordings import WALKS
+from recordings import RUNS, WALKS
 
 TESTS = Path(__file__).parents[1]
 RULES = all_rules()
@@ -67,6 +68,18 @@ def test_one_repeated_frame_is_no_other_fault(recording_of, name, share):
     found = check_recording(copied, mass_kg=mass_kg, height_m=height_m).findings
     grave = {one.code for one in found if one.is_open and one.severity > Severity.CORRECTED}
     assert grave == TRUE.get(name, set()) | {"M122"}
+
+
+@pytest.mark.parametrize(("name", "step"), [("rajagopal", 4), ("hamner", 3)])
+def test_a_run_with_few_frames_a_second_is_no_fault_of_the_rates(recording_of, name, step):
+    """At 25 and 20 Hz feet stand for 4 frames, and a frame less is a quarter of that."""
+    if name not in RUNS:
+        pytest.skip("not on this machine")
+    recording = recording_of(*RUNS[name])
+    markers = recording.markers
+    few = Markers(markers.time[::step], markers.labels, markers.positions[::step])
+    found = check_recording(replace(recording, markers=few)).findings
+    assert not [one.code for one in found if one.is_open and one.severity is Severity.ERROR]
 
 
 @pytest.mark.parametrize("code", [code for code, one in RULES.items() if one.supersedes])
