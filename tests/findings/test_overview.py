@@ -67,6 +67,16 @@ def test_equal_findings_of_all_plates_differ_by_their_axes():
     assert "(also mediolateral)" in group.line
 
 
+def test_equal_findings_of_one_marker_are_counted():
+    spans = [Where(trial="walk", markers=("RTOE", "RHEE"), span_s=(at, at)) for at in (1.0, 2.0)]
+    (group,) = grouped(finding("L211", where) for where in spans)
+    assert "(1 more)" in group.line
+
+
+def test_a_model_alone_has_no_trials():
+    assert Overview((), 31, 0).line == "use: nothing found; 31 rules"
+
+
 def test_equal_findings_of_one_plate_differ_by_their_axes():
     offsets = [
         finding("P215", Where(trial="walk", plate="plate 1", axis=axis), zero_offset_n=Quantity(5.3, "N"))

@@ -85,7 +85,8 @@ class Overview:
         found = ", ".join(f"{count} {one if count == 1 else many}" for count, one, many in counts if count)
         used, by_markers = self.trials - len(self.left_out), len(self.markers_only)
         more = f", and the markers of {by_markers} more" if by_markers else ""
-        return f"{self.verdict}: {found or 'nothing found'}; {self.rules} rules, {used} of {self.trials} trials{more}"
+        trials = f", {used} of {self.trials} trials" if self.trials else ""
+        return f"{self.verdict}: {found or 'nothing found'}; {self.rules} rules{trials}{more}"
 
     @property
     def markers_only(self) -> set[str | None]:
@@ -138,9 +139,9 @@ class Group:
         """Message of the first finding, with the number of further places."""
         if len(self.findings) == 1:
             return self.first.message
-        places = [_place(one) for one in self.findings[1:]]
-        named = [place for place in places if place]
-        also = f"also {first_few(named, 3)}" if named else f"{len(places)} more"
+        places = [_place(one) for one in self.findings]
+        named = [place for place in places[1:] if place and place != places[0]]
+        also = f"also {first_few(named, 3)}" if named else f"{len(places) - 1} more"
         return f"{self.first.message.rstrip('.')} ({also})."
 
     @property
