@@ -55,6 +55,20 @@ def test_the_worst_comes_first():
     ]
 
 
+def test_findings_are_a_table():
+    table = Overview((DELAY.muted("P243"), *FROZEN, SPIKES), 1, 1).table
+    assert list(table.code) == ["M111", "M113", "M113", "M113", "T214"]
+    assert list(table.muted_by)[-1] == "P243"
+    assert table[["trial", "severity", "status", "value", "unit"]].iloc[0].tolist() == [
+        "walk",
+        "ERROR",
+        "open",
+        0.3,
+        "m",
+    ]
+    assert table.message[0] == SPIKES.message
+
+
 def test_equal_findings_are_one_line():
     (group,) = grouped(FROZEN)
     assert len(group.findings) == 3

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import csv
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import asdict
 from datetime import date
@@ -23,8 +23,8 @@ from kinertia.estimation.gait_profile import gait_profile
 from kinertia.estimation.gait_scores import OVERALL
 from kinertia.estimation.result import Fit
 from kinertia.estimation.simultaneous.calibration_entry import calibration_columns
-from kinertia.findings.finding import Finding, Severity
-from kinertia.findings.overview import Overview
+from kinertia.findings.finding import Severity
+from kinertia.findings.overview import Overview, finding_columns
 from kinertia.io.csv_file import inert, read_csv
 from kinertia.io.norms_file import Norm
 from kinertia.io.working_folder import working_folder
@@ -107,14 +107,20 @@ def write_person(folder: Path, person: str, fit: Fit, day: date | None = None, w
         day: day of the recording, if known.
         with_session: whether the fit used others' information on plates and synchronisation.
     """
-    of_person = (_bsp(fit), _trials(fit), _findings(fit.findings), _cycles(fit), _instruments(fit, day, with_session))
+    of_person = (
+        _bsp(fit),
+        _trials(fit),
+        finding_columns(fit.findings),
+        _cycles(fit),
+        _instruments(fit, day, with_session),
+    )
     for name, columns in zip(OF_A_PERSON, of_person, strict=True):
         _write_rows(folder / f"{name}.parquet", name, person, columns)
 
 
 def write_findings(path: Path, person: str, error: KinertiaError) -> None:
     """Write the findings of an error that leaves a person without results."""
-    _write_rows(path, "findings", person, _findings(findings_of(error)))
+    _write_rows(path, "findings", person, finding_columns(findings_of(error)))
 
 
 def _write_rows(path: Path, name: str, person: str, columns: Mapping[str, Any]) -> None:
@@ -221,21 +227,6 @@ def _trials(fit: Fit) -> dict[str, Any]:
         row["errors"] = " ".join(dict.fromkeys(one.code for one in own.open if one.severity is Severity.ERROR))
         rows.append(row)
     return {name: [row[name] for row in rows] for name in _COLUMNS["trials"] if name != "person"}
-
-
-def _findings(found: Sequence[Finding]) -> dict[str, Any]:
-    """Return a row for each finding, muted and overruled ones included, with the headline's value."""
-    heads = [one.headline for one in found]
-    return {
-        "trial": [one.where.trial for one in found],
-        "plate": [one.where.plate for one in found],
-        "code": [one.code for one in found],
-        "severity": [one.severity.name for one in found],
-        "status": [one.status for one in found],
-        "muted_by": [one.muted_by for one in found],
-        "value": [None if one is None else float(one.value) for one in heads],  # type: ignore[arg-type]
-        "unit": [None if one is None else one.unit for one in heads],
-    }
 
 
 def _cycles(fit: Fit) -> dict[str, Any]:

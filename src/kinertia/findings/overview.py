@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal
 
 from kinertia.findings.display import first_few
 from kinertia.findings.finding import Finding, Severity
 from kinertia.findings.rule import STAGES
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Use = Literal["use", "use with care", "do not use"]
 USE: Final = "use"
@@ -73,6 +76,14 @@ class Overview:
         return WITH_CARE if self.severity is Severity.WARNING else USE
 
     @property
+    def table(self) -> pd.DataFrame:
+        """All findings, one row each, the worst first: the columns of `findings.parquet`, and message."""
+        import pandas as pd
+
+        found = in_order(self.findings)
+        return pd.DataFrame({**finding_columns(found), "message": [one.message for one in found]})
+
+    @property
     def line(self) -> str:
         """Verdict with its basis, in one line."""
         counts = [
@@ -121,6 +132,21 @@ def consequences(findings: Sequence[Finding], causes: Iterable[Finding]) -> list
                 found.append(one)
                 waiting.append(one)
     return in_order(found)
+
+
+def finding_columns(found: Sequence[Finding]) -> dict[str, Any]:
+    """Return the columns of a table of findings, with the headline's value."""
+    heads = [one.headline for one in found]
+    return {
+        "trial": [one.where.trial for one in found],
+        "plate": [one.where.plate for one in found],
+        "code": [one.code for one in found],
+        "severity": [one.severity.name for one in found],
+        "status": [one.status for one in found],
+        "muted_by": [one.muted_by for one in found],
+        "value": [None if one is None else float(one.value) for one in heads],  # type: ignore[arg-type]
+        "unit": [None if one is None else one.unit for one in heads],
+    }
 
 
 @dataclass(frozen=True)
