@@ -79,6 +79,8 @@ def test_a_cause_lowers_what_its_consequences_affect(clear, status, use):
 
 def test_a_correction_lowers_nothing(clear):
     assert uses(clear, finding("P246")) == only()
+    resolved = finding("P212", Where(trial="walk"), Severity.CORRECTED).muted("P215")
+    assert uses(clear, finding("P215"), resolved, finding("P266", Where(trial="walk")).muted("P212")) == only()
 
 
 @pytest.mark.parametrize(

@@ -114,7 +114,7 @@ def informed(fit: Fit, output: str) -> Informed | None:
 
 def _output(fit: Fit, name: str, findings: Sequence[Finding], left_out: Sequence[str]) -> Suitability:
     causes = [(one, _cause(one, findings)) for one in findings if _affects(one, name)]
-    lowering = [(cause.code, _level(one, cause)) for one, cause in causes if cause.status != "ignored"]
+    lowering = [(cause.code, level) for one, cause in causes if (level := _level(one, cause))]
     levels, reasons = [level for _, level in lowering], []
     if name in GROUPS:
         level, reason = _of_parameters(fit, name)
@@ -148,6 +148,8 @@ def _cause(one: Finding, findings: Sequence[Finding]) -> Finding:
 
 def _level(one: Finding, cause: Finding) -> int:
     """Return by how many steps of _ORDER a finding lowers an output, given the one that explains it."""
+    if cause.status == "ignored" or cause.severity < Severity.WARNING:
+        return 0
     return 2 if one.severity is Severity.ERROR and cause.status == "open" else 1
 
 
