@@ -21,7 +21,7 @@ from kinertia.trial.rms import rms, rms_length
 Use = Literal["use", "use with care", "do not use"]
 _ORDER: tuple[Use, ...] = ("use", "use with care", "do not use")
 SHOWN_SHARE = 0.5
-"""Share of parameters that the data inform from which a table of them is this person's."""
+"""Share of parameters that the data inform from which a table of them is this person's, if they inform any well."""
 _BAND_SD = 1.96
 
 
@@ -170,14 +170,15 @@ def _of_parameters(fit: Fit, name: str) -> tuple[int, str]:
     well = f" ({shown.measured} of them well)" if shown.measured else ""
     if not shown.informed:
         return 2, f"none of {shown.total} {nouns} is informed by this recording: they remain {values}"
+    needs_care = int(shown.informed < SHOWN_SHARE * shown.total or not shown.measured)
     if shown.informed == shown.total:
-        return 0, f"all {shown.total} {nouns} are informed by this recording{well}"
+        return needs_care, f"all {shown.total} {nouns} are {'' if well else 'partly '}informed by this recording{well}"
     verb = "is" if shown.informed == 1 else "are"
     reason = (
         f"{shown.informed} of {shown.total} {nouns} {verb} partly informed by this recording{well}; the other "
         f"{shown.total - shown.informed} remain {values}"
     )
-    return int(shown.informed < SHOWN_SHARE * shown.total), reason
+    return needs_care, reason
 
 
 def prior_values(fit: Fit) -> str:
