@@ -3,12 +3,15 @@
 import json
 import re
 import shutil
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
 
 from command_line import run
+from kinertia.io.recording import read_recording
 from kinertia.io.sto import read_sto, write_sto
+from kinertia.io.trc import write_trc
 from report_page import Elements
 from spoilt_lab import blocking, blocking_codes
 
@@ -170,6 +173,16 @@ def test_a_hard_error_stays_open_where_its_question_is_waived(lab):
     alone = '[[trial]]\nmarkers = "walk.trc"\n'
     content = told("check", subject_file(lab, overruling(["P27"]), alone), status=1)
     assert blocking_codes(content["findings"]) == ["P271"]
+
+
+@pytest.mark.parametrize("command", ["check", "fit"])
+def test_a_waiver_of_what_a_reader_refuses_is_reported(lab, command):
+    """Z up in the markers, Y up in the forces."""
+    markers = read_recording(lab / "walk.trc").markers
+    write_trc(lab / "walk.trc", replace(markers, positions=markers.positions[..., [0, 2, 1]] * [1.0, -1.0, 1.0]))
+    outcome = run(command, subject_file(lab, WALK), "--waive", "P201")
+    assert outcome.status == 2
+    assert outcome.out == "note: --waive P201 has no effect: P201 is an ERROR that cannot be waived\n"
 
 
 @pytest.mark.usefixtures("few_evaluations")

@@ -8,12 +8,15 @@ import pytest
 from kinertia.errors import BlockedError
 from kinertia.findings.finding import Severity
 from kinertia.findings.rule import STAGES
+from kinertia.io.recording import read_recording
 from kinertia.io.sto import read_sto, write_sto
 from kinertia.io.subject_file import read_subject
+from kinertia.io.trc import write_trc
 from kinertia.settings import Overrule
 from kinertia.workflow.check import check_person
 from kinertia.workflow.from_files import prepare_subject
 from kinertia.workflow.person import read_person
+from kinertia.workflow.screening import screen
 from recordings import FITTED, is_here, slow_beside
 from refusals import expect_filled
 from synthetic_lab import WITH_MODEL, synthetic_arguments
@@ -127,6 +130,17 @@ def spoil_forces(path):
     forces = [name for name in table.columns if "_force_v" in name or "torque" in name]
     table[forces] /= 1000.0
     write_sto(path, table, False, path.stem)
+
+
+def test_what_the_readers_refuse_stands_though_it_is_waived(tmp_path, synthetic_lab):
+    """Z up in the markers and Y up in the forces: the trial was left out, and its ERROR shown as waived."""
+    wanted = laboratory(tmp_path, synthetic_lab, ["walk", "other"])
+    markers = read_recording(tmp_path / "other.trc").markers
+    turned = markers.positions[..., [0, 2, 1]] * [1.0, -1.0, 1.0]
+    write_trc(tmp_path / "other.trc", replace(markers, positions=turned))
+    screened = screen(replace(read_person(wanted), overrule=Overrule(waive=("P201",))))
+    assert screened.left_out == ("other",)
+    assert [(one.code, one.status) for one in screened.findings if one.where.trial == "other"] == [("P201", "open")]
 
 
 def test_a_trial_that_is_left_out_is_so_by_both(tmp_path, synthetic_lab):

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from kinertia.cli.findings_view import show_idle_waivers, show_overview
+from kinertia.cli.findings_view import show_idle_waivers, show_overview, waivers_reported
 from kinertia.cli.options import (
     Calibrate,
     Forces,
@@ -133,7 +133,7 @@ def check(
     measured = [path for path in files if path.suffix.lower() != ".osim"]
     who = Subject.model_validate({"name": "person", "mass_kg": mass, "height_m": height, "sex": sex})
     person: Person | None
-    with shown_progress() as progress:
+    with shown_progress() as progress, waivers_reported(overrule.waive):
         if subjects:
             person, read = _of_subject_file(subjects[0], progress)
         else:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 from kinertia.cli.terminal import out
+from kinertia.errors import KinertiaError, findings_of
 from kinertia.findings.finding import Finding, Severity
 from kinertia.findings.overview import Group, Overview, consequences, grouped, in_order, reported
 from kinertia.findings.rule import STAGES, matching, rule
@@ -58,6 +60,17 @@ def show_idle_waivers(codes: Sequence[str], findings: Sequence[Finding], stages:
         if not had_effect and (found or not later):
             why = dict.fromkeys(f"{one.code} is {_WHY_NOT[one.severity is Severity.ERROR]}" for one in found)
             out.print(f"note: --waive {code} has no effect: {', '.join(why) or 'it was not found'}", soft_wrap=True)
+
+
+@contextmanager
+def waivers_reported(codes: Sequence[str]) -> Iterator[None]:
+    """Show which codes of `--waive` had no effect where an error ends the command."""
+    try:
+        yield
+    except KinertiaError as error:
+        found = findings_of(error)
+        show_idle_waivers([code for code in codes if any(one.code.startswith(code) for one in found)], found)
+        raise
 
 
 def _causes(one: Finding) -> str:

@@ -10,7 +10,7 @@ from typing import Annotated, Any, get_args
 import numpy as np
 import typer
 
-from kinertia.cli.findings_view import show_idle_waivers, show_overview
+from kinertia.cli.findings_view import show_idle_waivers, show_overview, waivers_reported
 from kinertia.cli.fit_report import report_tables
 from kinertia.cli.next_commands import next_commands
 from kinertia.cli.options import (
@@ -118,7 +118,8 @@ def fit(
     summaries, status = [], 0
     for one in runs:
         try:
-            result = _fitted(one)
+            with waivers_reported(one.overrule.waive):
+                result = _fitted(one)
         except KinertiaError as error:
             if len(runs) == 1:
                 raise

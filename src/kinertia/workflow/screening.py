@@ -108,8 +108,10 @@ class Screened:
         return {one.where.trial for one in blocking(findings) if one.where.trial not in names or not _of_forces(one)}
 
     def overruled(self, findings: Sequence[Finding]) -> list[Finding]:
-        """Return these findings (default: its own), with what explains and what overrules each."""
-        return overruled(explained(findings), self.person.overrule, self.person.overrule_of)
+        """Return findings, those here or more, with what explains and overrules each; what readers refuse stands."""
+        refused = {(one.code, one.where) for one in self.person.unread}
+        found = overruled(explained(findings), self.person.overrule, self.person.overrule_of)
+        return [replace(one, status="open") if (one.code, one.where) in refused else one for one in found]
 
     @cached_property
     def usable(self) -> list[RecordingContext]:
@@ -139,7 +141,8 @@ def screen(person: Person) -> Screened:
     if unmatched is not None and unmatched.code not in {one.code for one in found}:
         found.append(unmatched)
     found += _of_person(context, found)
-    screened = Screened(person, context, tuple(overruled(explained(found), person.overrule, person.overrule_of)))
+    screened = Screened(person, context, ())
+    screened = replace(screened, findings=tuple(screened.overruled(found)))
     markers_only = _markers_only(screened)
     if not markers_only:
         return screened
