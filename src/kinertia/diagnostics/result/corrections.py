@@ -13,7 +13,7 @@ import numpy as np
 
 from kinertia.diagnostics.result.context import ResultContext
 from kinertia.estimation.simultaneous.calibration_entry import DELAY, ZERO, CalibrationEntry
-from kinertia.findings.finding import Finding, Severity, finding, with_evidence
+from kinertia.findings.finding import Finding, finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 
@@ -22,21 +22,13 @@ _FEWEST = 2
 """Equal errors of so many plates may be the error of all: of a single plate it is its own."""
 
 
-def corrected(
-    context: ResultContext,
-    code: str,
-    headline: str,
-    errors: Iterable[CalibrationEntry],
-    severity: Severity | None = None,
-) -> list[Finding]:
+def corrected(context: ResultContext, code: str, headline: str, errors: Iterable[CalibrationEntry]) -> list[Finding]:
     """List a finding for each of these errors that was found."""
-    return [correction(code, headline, context.at(one), one, severity) for one in errors if one.found]
+    return [correction(code, headline, context.at(one), one) for one in errors if one.found]
 
 
-def correction(
-    code: str, headline: str, where: Where, one: CalibrationEntry, severity: Severity | None = None
-) -> Finding:
-    """Return an error's finding; `headline` names its main quantity. Unsupported ones are not raised to `severity`."""
+def correction(code: str, headline: str, where: Where, one: CalibrationEntry) -> Finding:
+    """Return an error's finding; `headline` names its main quantity."""
     unsure = not one.supported
     evidence = {
         headline: Quantity(one.value, one.unit, _SD * one.prior_sd, (-one.prior_sd, one.prior_sd), one.sd),
@@ -46,7 +38,7 @@ def correction(
     }
     since = f", since {one.contradicted_by} contradicts it" if one.contradicted_by else ""
     causes = (f"soft tissue or the model{since}", "the instrument") if unsure else ("the instrument",)
-    return with_evidence(code, where, evidence, None if unsure else severity, causes)
+    return with_evidence(code, where, evidence, None, causes)
 
 
 def equal(errors: Sequence[CalibrationEntry], usual_sd: float = np.inf) -> bool:

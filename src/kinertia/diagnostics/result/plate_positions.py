@@ -18,7 +18,7 @@ from kinertia.diagnostics.result.corrections import corrected, correction, equal
 from kinertia.estimation.simultaneous.calibration_entry import POSITION, CalibrationEntry
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation, InstrumentPrior
 from kinertia.estimation.simultaneous.plates import FLOOR_UNKNOWNS, PLATE_UNKNOWNS
-from kinertia.findings.finding import Finding, Severity, finding
+from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 
 _OPEN_M = 1.0
@@ -36,13 +36,12 @@ def plate_positions(context: ResultContext) -> Iterator[Finding]:
     """
     for axis in "xz":
         errors = [one for one in context.errors if (one.quantity, one.axis) == (POSITION, axis)]
-        ambiguous = _ambiguous(context, axis, errors)
         if equal(errors):
             first = max(errors, key=lambda one: (one.supported, abs(one.value)))
             yield correction("P246", "offset_m", context.along(axis, None), first)
         else:
-            yield from corrected(context, "P246", "offset_m", errors, Severity.WARNING if ambiguous else None)
-        yield from ambiguous
+            yield from corrected(context, "P246", "offset_m", errors)
+        yield from _ambiguous(context, axis, errors)
 
 
 def _ambiguous(context: ResultContext, axis: str, errors: Sequence[CalibrationEntry]) -> list[Finding]:
