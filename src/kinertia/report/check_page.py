@@ -98,8 +98,9 @@ def _recording(one: RecordingCheck, anchor: str, left_out: set[str]) -> Checked:
 
 
 def _checked(name: str, anchor: str, findings: Sequence[Finding]) -> Checked:
-    found = dict.fromkeys(one.code for one in reported(findings))
-    return Checked(name, anchor, Overview(findings, 0, 1).verdict, tuple(found))
+    overview = Overview(findings, 0, 1)
+    found = dict.fromkeys(one.code for one in (*overview.waived, *reported(findings)))
+    return Checked(name, anchor, overview.verdict, tuple(found))
 
 
 def check_figures(check: RecordingCheck) -> dict[str, Any]:
