@@ -59,7 +59,7 @@ def test_every_code_is_silent_on_a_fault_free_walk(recording_of, name):
 @pytest.mark.parametrize("name", WALKS.keys() & {"synthetic", "gait2354"})
 @pytest.mark.parametrize("share", [0.35, 0.6])
 def test_one_repeated_frame_is_no_other_fault(recording_of, name, share):
-    """A swinging foot seemed to stand in it, so that 14 of 48 such frames made an ERROR of the sampling rates."""
+    """A swinging foot seemed to stand in it, so that 14 of 45 such frames made an ERROR of the sampling rates."""
     recording, (mass_kg, height_m) = recording_of(*WALKS[name]), PEOPLE[name]
     places = recording.markers.positions.copy()
     frame = int(share * len(places))

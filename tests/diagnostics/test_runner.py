@@ -76,7 +76,7 @@ def test_what_is_ignored_still_explains():
 
 
 def test_what_turns_out_to_be_an_error_later_is_ignored_no_more():
-    """An ignored dead channel hid nine masses far from the literature, which it explained."""
+    """An ignored dead channel hid nine implausible parameters, which it explained."""
     dead = finding("P101", Where(trial="walk", plate="left"))
     far = finding("R203", Where(part="mass of torso"), Severity.ERROR)
     ignore = Overrule(ignore=("P101",))

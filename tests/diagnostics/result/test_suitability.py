@@ -74,7 +74,7 @@ def test_what_is_ignored_lowers_nothing_and_a_waived_error_bars_nothing(clear):
 
 @pytest.mark.parametrize(("status", "use"), [("open", "do not use"), ("waived", "use with care"), ("ignored", "use")])
 def test_a_cause_lowers_what_its_consequences_affect(clear, status, use):
-    """Masses 5 SDs from the literature were to be used, since a dead channel explains them."""
+    """A dead channel explains implausible masses: no finding was named beside them, and nothing barred their use."""
     severity = Severity.WARNING if status == "ignored" else Severity.ERROR
     cause = replace(finding("P101", Where(trial="walk", plate="left"), severity), status=status)
     far = finding("R203", Where(part="mass of torso"), severity, parameter=Quantity("mass")).muted("P101")
