@@ -60,7 +60,7 @@ def test_netcdf_brings_it_back(fit, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"), [(("speed",), "no curves of 'speed'"), (("power", "time"), "over time angle and moment")]
+    ("arguments", "told"), [(("speed",), "no curves of 'speed'"), (("power", "time"), "over='time' angle and moment")]
 )
 def test_what_there_is_not_is_refused(fit, arguments, told):
     with pytest.raises(KinertiaError, match=told):
