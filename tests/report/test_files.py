@@ -9,6 +9,7 @@ import pytest
 
 from kinertia.diagnostics.result.suitability import suitability
 from kinertia.errors import FileError
+from kinertia.findings.finding import Severity
 from kinertia.io.output_folder import check_folder
 from kinertia.io.sto import read_sto
 from kinertia.report.files import FIT_FILES, TRIAL_FILES, save_fit, summary
@@ -66,7 +67,10 @@ def test_fit_json_keeps_its_contract(saved):
     assert [one["output"] for one in fit_summary["suitability"]] == [
         one.output for one in suitability(fit, fit.findings)
     ]
-    assert (fit_summary["warnings"], fit_summary["corrections"]) == (list(fit.warnings), list(fit.corrections))
+    with pytest.warns(DeprecationWarning, match="Fit.overview.table"):
+        assert fit_summary["warnings"] == list(fit.warnings)
+    corrections = [one.line() for one in fit.overview.open if one.severity is Severity.CORRECTED]
+    assert fit_summary["corrections"] == corrections
     assert fit_summary["notes"] == list(fit.notes)
     assert fit_summary["converged"] == fit.converged
     (trial,) = fit_summary["trials"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -186,13 +187,10 @@ class Fit:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Messages of open ERRORs and WARNINGs; deprecated: use `findings`."""
-        return tuple(one.line() for one in self.overview.open if one.severity >= Severity.WARNING)
-
-    @property
-    def corrections(self) -> tuple[str, ...]:
-        """Messages of errors detected and corrected; deprecated: use `findings`."""
-        return tuple(one.line() for one in self.overview.open if one.severity is Severity.CORRECTED)
+        """Lines of open WARNINGs and ERRORs; deprecated: use `findings`, or `overview.table`."""
+        note = "Fit.warnings will go with the next version: use Fit.findings or Fit.overview.table"
+        warnings.warn(note, DeprecationWarning, stacklevel=2)
+        return self.overview.lines(Severity.WARNING, Severity.ERROR)
 
     @cached_property
     def bsp(self) -> pd.DataFrame:

@@ -51,6 +51,10 @@ class Overview:
         """Count the open findings of this severity."""
         return sum(one.severity is severity for one in self.open)
 
+    def lines(self, *severities: Severity) -> tuple[str, ...]:
+        """Return the open findings of these severities, a line each, the most important first."""
+        return tuple(one.line() for one in self.open if one.severity in severities)
+
     @property
     def failed(self) -> bool:
         """Whether an ERROR is open, or a trial was not used."""

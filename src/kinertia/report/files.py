@@ -21,6 +21,7 @@ from kinertia.estimation.cycles import Stage, cycle_columns, spatiotemporal_colu
 from kinertia.estimation.forces_used import forces_before, forces_used
 from kinertia.estimation.identifiability import BaseParameters
 from kinertia.estimation.result import Fit, TrialFit
+from kinertia.findings.finding import Severity
 from kinertia.io.csv_file import inert
 from kinertia.io.osim.exporter import export_osim
 from kinertia.io.output_folder import complete_folder, expect_own_folder
@@ -198,8 +199,8 @@ def summary(fit: Fit) -> dict[str, Any]:
         "trials_left_out": list(fit.left_out),
         "findings": [one.to_dict() for one in fit.findings],
         "suitability": [asdict(one) for one in suitability(fit, fit.findings, fit.left_out)],
-        "warnings": list(fit.warnings),
-        "corrections": list(fit.corrections),
+        "warnings": list(fit.overview.lines(Severity.WARNING, Severity.ERROR)),
+        "corrections": list(fit.overview.lines(Severity.CORRECTED)),
         "notes": list(fit.notes),
     }
 
