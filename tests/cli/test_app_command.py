@@ -53,7 +53,7 @@ def test_it_shows_its_address_and_ends_in_order(tmp_path):
         it.kill()
         it.wait()
     assert it.returncode == 0
-    assert "ended" in rest
+    assert "stopped" in rest
     assert (tmp_path / "library").is_dir()
 
 

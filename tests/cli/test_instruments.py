@@ -49,7 +49,7 @@ def test_a_fit_leaves_out_what_it_has_said_itself(session, c3d_lab, tmp_path):
     own = prepare_subject(subject_with(tmp_path, c3d_lab, f'session = "{path.as_posix()}"'))
     assert own.uncertainty.instruments.session == ()
     (said,) = [one for one in own.findings if one.code == "S408"]
-    assert "nothing of others; what 1 person" in said.evidence["source"].value
+    assert "1 person (synthetic walker) left out" in said.evidence["source"].value
     (person,) = read_session(path)
     text = path.read_text(encoding="utf-8")
     for known in person.files:

@@ -197,8 +197,8 @@ def test_people_of_the_prior_are_rarely_unlike_it_and_others_are():
 @pytest.mark.slow
 def test_an_undeclared_prosthesis_is_named_and_a_declared_one_is_estimated_better():
     adults, own = run_person(1, ("prosthesis", 0))
-    assert adults.implausible
-    assert not own.implausible
+    assert adults.unlike
+    assert not own.unlike
     rows = [SEGMENTS.index(name) for name in ("shank_l", "foot_l")]
     error, before = (np.abs(one.errors[rows, 0]).sum() for one in (own, adults))
     assert error < before

@@ -70,7 +70,7 @@ def test_two_persons_and_two_models_are_pointed_out(fit, fit_with_model):
 
     heavy = replace(fit, subject=fit.subject.model_copy(update={"mass_kg": 90.0}))
     (said,) = remarks({"a": fit, "b": heavy})
-    assert said == "a is of 72.6 kg, b of 90.0 kg: is it the same person?"
+    assert said == "a has 72.6 kg, b 90.0 kg: is it the same person?"
     own = load_fit(fit_with_model("gait2354", True))
     said = " ".join(remarks({"a": fit, "b": own}))
     assert "different models" in said

@@ -62,7 +62,7 @@ def test_rows_of_the_form_are_filled_in_by_the_keyboard_alone(browser, app, monk
     tab = Tab(browser, app)
     page = tab.page
     page.goto(f"{app.address}people/{quote(person.name)}")
-    press(page, "measures.csv is used as", "w")
+    press(page, "measures.csv is used as", "b")
     press(page, "Population", "c")
     press(page, "Marker set", "p")
     for title, entries in (
