@@ -69,6 +69,7 @@ class FileError(KinertiaError):
         path: the file.
         line: one-based line number of the problem, or None.
         problem: what was found, what was expected and what to do.
+        also: other errors of the same file.
 
     Examples:
         >>> error = kinertia.FileError("subject.toml", "unknown key 'mas_kg'; did you mean 'mass_kg'?", line=3)
@@ -80,6 +81,7 @@ class FileError(KinertiaError):
         self.path = Path(path)
         self.line = line
         self.problem = problem
+        self.also: tuple[FileError, ...] = ()
         where = f"{self.path}" if line is None else f"{self.path}, line {line}"
         super().__init__(f"{where}: {problem}")
 
@@ -301,7 +303,8 @@ class BlockedError(KinertiaError):
 
 
 def findings_of(error: KinertiaError) -> tuple[Finding, ...]:
-    """Return all findings that stopped a fit, the single finding of another error, or none."""
+    """Return all findings that stopped a fit, those of another error, or none."""
     if isinstance(error, BlockedError):
         return error.findings
-    return () if error.finding is None else (error.finding,)
+    every = (error, *error.also) if isinstance(error, FileError) else (error,)
+    return tuple(one.finding for one in every if one.finding is not None)

@@ -41,6 +41,33 @@ def test_missing_subject_file(lab):
     expect_found(refusal, "F101", {"file": "subject.toml"}, hint="expected a subject file")
 
 
+def test_all_missing_files_of_a_subject_file_are_reported_at_once(lab):
+    """With their lines, in the terminal and as JSON: a folder that was moved takes all of its files along."""
+    subject = lab / "subject.toml"
+    subject.write_text(
+        """
+[subject]
+name = "moved"
+sex = "male"
+mass_kg = 72.6
+height_m = 1.8
+[model]
+static = "elsewhere/static.trc"
+[[trial]]
+markers = "elsewhere/walk.trc"
+forces = "elsewhere/walk.mot"
+""",
+        encoding="utf-8",
+    )
+    for command in ("check", "fit"):
+        ended = run(command, subject)
+        assert (ended.status, ended.err.count("error: "), ended.err.count(" F101 ")) == (2, 3, 3)
+        found = json.loads(run(command, subject, "--json").out)["findings"]
+        assert [one["code"] for one in found] == ["F101"] * 3
+        lines = [one["where"]["line"] for one in found]
+        assert lines == sorted(lines)
+
+
 FILES = ["walk.trc", "walk.mot", "walk.xml", "static.trc", "walk.c3d", "static.c3d"]
 
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from kinertia.cli.compiling import compile_once
-from kinertia.errors import BlockedError, KinertiaError
+from kinertia.errors import BlockedError, FileError, KinertiaError
 
 if TYPE_CHECKING:
     from rich.console import Capture, Console
@@ -84,7 +84,8 @@ def show_error(message: str) -> None:
 
 def show_problem(error: KinertiaError, of: str = "") -> None:
     """Show one line per finding that stopped something, or for the error; `of` states whose it is among several."""
-    for line in str(error).split("\n") if isinstance(error, BlockedError) else [str(error)]:
+    also = error.also if isinstance(error, FileError) else ()
+    for line in str(error).split("\n") if isinstance(error, BlockedError) else map(str, (error, *also)):
         show_error(f"{of}{line}")
     for k, line in enumerate(getattr(error, "__notes__", ())):
         err.print(f"{'then' if k else 'next'}: {line}", soft_wrap=True, markup=False, highlight=False)

@@ -75,6 +75,7 @@ from kinertia.settings import (
 T = TypeVar("T", bound=Table)
 STUDY_FILE = "kinertia.toml"
 _FORCES_NEEDED = "one trial at least needs its forces, and no trial here uses them"
+_NOT_FOUND = "F101"
 
 
 def subject_file_in(folder: Path) -> Path:
@@ -154,8 +155,11 @@ def _validated(kind: type[T], document: TomlFile, path: Path) -> T:
         # a key that is not known explains one that is missing
         errors = [one for one in errors if one["type"] == "extra_forbidden"] or errors
         lines = [(document.line(one["loc"]) or document.last_line, _finding(one)) for one in errors]
-        line, found = min(lines, key=lambda one: (one[0], one[1].message))
-        raise FileError.of(path, found, line) from None
+        first, *others = sorted(lines, key=lambda one: (one[0], one[1].message))
+        refusal = FileError.of(path, first[1], first[0])
+        if first[1].code == _NOT_FOUND:  # where a folder was moved, all of its files are missing
+            refusal.also = tuple(FileError.of(path, found, line) for line, found in others if found.code == _NOT_FOUND)
+        raise refusal from None
 
 
 def subject_from_options(content: Mapping[str, Any]) -> SubjectFile:
