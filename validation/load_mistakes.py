@@ -30,14 +30,20 @@ def with_signs(x: float, y: float, z: float) -> Change:
     return loads(change)
 
 
-def turned_about_vertical(degrees: float) -> Change:
-    """Return a fault that rotates each plate about the vertical through its middle: force directions and points."""
+def turned_about_vertical(degrees: float, alone: bool = False) -> Change:
+    """Return a fault that rotates each plate about the vertical through its middle: force directions and points.
+
+    `alone` rotates the plate that is stood on first, and no other.
+    """
     turn = Rotation.from_euler("y", degrees, degrees=True).as_matrix()
 
     def change(plates: PlateLoads) -> PlateLoads:
         force, point, torque = acting(plates)
         middle = _middles(plates, point)
-        return loads_of(plates, force @ turn.T, middle + (point - middle) @ turn.T, torque)
+        turned = np.isin(np.arange(force.shape[1]), _by_time(plates)[:1]) | (not alone)
+        force = np.where(turned[:, None], force @ turn.T, force)
+        point = np.where(turned[:, None], middle + (point - middle) @ turn.T, point)
+        return loads_of(plates, force, point, torque)
 
     return loads(change)
 

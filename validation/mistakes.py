@@ -169,7 +169,10 @@ MISTAKES = (
     Mistake("force samples of one plate missing for 50 ms", forces.one_plate(forces.dropped), _codes("P102")),
     Mistake("horizontal forces of one plate not exported", forces.one_plate(forces.vertical_alone), _codes("P101")),
     Mistake("a constant centre of pressure on one plate", forces.one_plate(forces.fixed_point), _codes("P251")),
-    Mistake("plates turned by 3 degrees about the vertical", forces.turned_about_vertical(3.0), _codes("P234")),
+    Mistake("plates turned by 3 degrees about the vertical", forces.turned_about_vertical(3.0), _codes("P234", "P237")),
+    Mistake(
+        "one plate turned by 5 degrees about the vertical", forces.turned_about_vertical(5.0, True), _codes("P237")
+    ),
     # who
     Mistake("height 20 cm too much", _more(height_m=0.2), _codes("S104")),
     Mistake("height 20 cm too little", _more(height_m=-0.2), _codes("S104")),

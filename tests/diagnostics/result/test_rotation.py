@@ -14,9 +14,9 @@ TURN = 5 + 2
 """Place of the rotation among the unknowns of one plate, the floor and the delay."""
 
 
-def shown(turn_sd_deg, shared_with_x=0.0):
+def shown(turn_sd_deg, shared_with_x=0.0, of_one=1e12):
     """What trials say that know the rotation to this deviation, if the plate's position is known."""
-    information = np.diag([1e6, 1e6, 1e4, 1e6, 1e12, 1e6, 1e6, 1.0 / np.radians(turn_sd_deg) ** 2, 1e8])
+    information = np.diag([1e6, 1e6, 1e4, 1e6, of_one, 1e6, 1e6, 1.0 / np.radians(turn_sd_deg) ** 2, 1e8])
     both = shared_with_x * np.sqrt(information[0, 0] * information[TURN, TURN])
     information[0, TURN] = information[TURN, 0] = both
     return InstrumentInformation(("left",), information, np.zeros(9))
@@ -46,6 +46,10 @@ def test_it_is_reported_where_it_matters_only():
     (one,) = plate_rotation(context(shown=shown(1.6)))
     assert one.code == "P235"
     assert np.degrees(one.evidence["detectable_rad"].value) == pytest.approx(4.04, abs=0.05)
+    assert np.degrees(one.evidence["of_one_rad"].value) < 1.0
+    (single,) = plate_rotation(context(shown=shown(0.2, of_one=1.0 / np.radians(2.0) ** 2)))
+    assert single.code == "P235"
+    assert np.degrees(single.evidence["of_one_rad"].value) == pytest.approx(6.7, abs=0.7)
     mates = replace(InstrumentPrior(), session=(shown(0.2),))
     assert list(plate_rotation(context(shown=shown(1.6), prior=mates))) == []
 

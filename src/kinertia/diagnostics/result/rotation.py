@@ -14,12 +14,15 @@ import numpy as np
 
 from kinertia.diagnostics.result.context import ResultContext
 from kinertia.diagnostics.result.corrections import corrected, equal
-from kinertia.diagnostics.result.smallest_detectable import unnoticed
+from kinertia.diagnostics.result.smallest_detectable import smallest_detectable, smallest_detectable_of_one
 from kinertia.estimation.simultaneous.calibration_entry import ROTATION
 from kinertia.findings.finding import Finding, finding
+from kinertia.findings.quantity import Quantity
 
 _MATTERS_RAD = float(np.radians(2.0))
 """In the least informative walk of the reference recordings, 3 degrees change joint moments by twice their SDs."""
+_OF_ONE_MATTERS_RAD = float(np.radians(4.0))
+"""In reference walks, 5 degrees of one plate change joint moments by one to two SDs."""
 
 
 def plate_rotation(context: ResultContext) -> Iterator[Finding]:
@@ -31,5 +34,13 @@ def plate_rotation(context: ResultContext) -> Iterator[Finding]:
         yield from corrected(context, "P234", "rotation_rad", [replace(largest, plate=None)])
     else:
         yield from corrected(context, "P237", "rotation_rad", rotations)
-    if least := unnoticed(context, "turn", _MATTERS_RAD, "rad"):
-        yield finding("P235", detectable_rad=least)
+    if context.fit.posterior is None:
+        return
+    known = context.fit.posterior.instruments, context.ready.uncertainty.instruments
+    all_rad, one_rad = smallest_detectable(*known, "turn"), smallest_detectable_of_one(*known, "turn")
+    if _MATTERS_RAD < all_rad < np.inf or _OF_ONE_MATTERS_RAD < one_rad < np.inf:
+        of_all, of_one = (
+            Quantity(all_rad, "rad", limit=_MATTERS_RAD),
+            Quantity(one_rad, "rad", limit=_OF_ONE_MATTERS_RAD),
+        )
+        yield finding("P235", detectable_rad=of_all, of_one_rad=of_one)
