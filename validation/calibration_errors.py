@@ -90,7 +90,7 @@ def calibrated(disturbance: Disturbance, seed: int, duration_s: float = 2.5, com
     plate, delay = entries["right foot", "position", "x"], entries[None, "delay", None]
     deviations = {
         "right plate, x": (disturbance.plate_m - plate.value, plate.sd),
-        "clock": (delay.value - disturbance.delay_s, delay.sd),
+        "delay": (delay.value - disturbance.delay_s, delay.sd),
         "right hip, x": result.coordinates["hip_x_r"],
         "left hip, x": result.coordinates["hip_x_l"],
     }
@@ -114,5 +114,5 @@ def calibration_section(runs: Mapping[str, Sequence[Calibrated]]) -> str:
             mass, com, inertia = np.mean([getattr(o, kind) for o in outcomes], axis=0)
             cells.append(f"{mass:.2f}, {1e3 * com:.1f}, {inertia:.3f}")
         rows.append(cells)
-    quantities = [f"{q} ({'ms' if q == 'clock' else 'mm'})" for q in next(iter(runs.values()))[0].deviations]
+    quantities = [f"{q} ({'ms' if q == 'delay' else 'mm'})" for q in next(iter(runs.values()))[0].deviations]
     return table(["put in", *quantities, "calibration free", "calibration held", "literature"], rows)

@@ -174,7 +174,7 @@ def test_what_was_put_in_comes_back_within_its_error_bars(name):
     recovered = calibrated(DISTURBANCES[name], seed=1, duration_s=1.3, compare=False)
     for quantity, (error, sd) in recovered.deviations.items():
         assert abs(error) < 3.0 * sd, quantity
-        assert sd < 0.75 * {"clock": 0.010, "right plate, x": 0.020}.get(quantity, 0.010), quantity
+        assert sd < 0.75 * {"delay": 0.010, "right plate, x": 0.020}.get(quantity, 0.010), quantity
 
 
 def test_without_forces_only_markers_count(trial, prior, calibration):
