@@ -56,7 +56,7 @@ def test_every_code_is_silent_on_a_fault_free_walk(recording_of, name):
     assert {one.code for one in found if one.is_open and one.severity > Severity.CORRECTED} == TRUE.get(name, set())
 
 
-@pytest.mark.parametrize("name", WALKS.keys() & {"synthetic", "gait2354"})
+@pytest.mark.parametrize("name", sorted(WALKS.keys() & {"synthetic", "gait2354"}))
 @pytest.mark.parametrize("share", [0.35, 0.6])
 def test_one_repeated_frame_is_no_other_fault(recording_of, name, share):
     """A swinging foot seemed to stand in it, so that 14 of 45 such frames made an ERROR of the sampling rates."""
