@@ -33,7 +33,7 @@ markers and forces.
 At hips and back the estimate is better in every laboratory, and with wrong instruments everywhere below them, too.
 Where instruments *and* skeleton are exact, as in no laboratory, the usual pipeline is better at knee and ankle: it
 trusts them, whereas the estimate lets markers and joint centres move. On trials made by OpenSim, with OpenSim's own
-tools as the usual pipeline and its model kept as it is: [peers](peers.md).
+tools as the usual pipeline and an unchanged model: [peers](peers.md).
 
 ## The study's noise, from starts 50 % off
 
@@ -47,7 +47,7 @@ standard deviation), that left mirrors right, and the total mass within 0.5 %. I
 {study}
 
 **How good an estimate could be on this walk.** *At best* is the Cramér-Rao bound of an
-estimate with perfect knowledge: forces count as exact, and the covariance of the noise over time is that of
+ideal estimate: the forces are exact, and the covariance of the noise over time is that of
 the study's sinusoids, so that only what they leave free is information, seen by cameras of 0.1 mm or even 0.01 mm. The
 moments of inertia are then still off by 0.05 kg m2: the trunk hardly turns at 1.14 m/s, so that one
 stride says little about its moments, which dominate the RMS, and they stay near the start. The lines after

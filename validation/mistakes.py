@@ -121,7 +121,7 @@ MISTAKES = (
     Mistake("cameras tilted by 3 degrees along the walk", markers.tilted("z", 3.0), _codes("M144")),
     Mistake("cameras tilted by 3 degrees to one side", markers.tilted("x", -3.0), _codes("M145")),
     Mistake(
-        "cameras calibrated anew: all markers 100 mm further on than the plates",
+        "cameras recalibrated: all markers displaced by 100 mm against the plates",
         markers.moved((0.1, 0.0, 0.0), "walk"),
         _POSITIONS,
     ),

@@ -43,5 +43,5 @@ def pooling_section(values: dict[str, np.ndarray], sds: dict[str, np.ndarray]) -
     best = np.minimum(sds["first half"], sds["second half"])
     smaller, most = np.mean(sds["halves"] <= best), np.max(sds["halves"] / best) - 1.0
     text = table(["estimate from", "RMS difference", "largest", "sd / sd of the whole, mean"], rows)
-    share = f"Deviations of the halves together are at most those of either half for {100 * smaller:.0f} % of the BSPs"
+    share = f"With both halves, the SD is no larger than with either half alone for {100 * smaller:.0f} % of the BSPs"
     return f"{text}\n\n{share}, and at most {100 * most:.1f} % larger for the others."

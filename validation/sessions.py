@@ -186,8 +186,8 @@ def document(sections: Sequence[str]) -> str:
 TEXT = """# Trials of one session
 
 Error bars of measured people can be judged without knowing the truth: trials of one session share plates and
-synchronisation, those of one person the body. Every trial below is fitted alone by `kinertia fit`, and what the fits
-say of the same unknown is compared.
+synchronisation, and trials of one person also share the body. Each trial below is fitted alone by `kinertia fit`, and
+the estimates of the same unknown are compared.
 
 *chi2/n*: squares about the weighted mean of the trials, each over its variance, divided by the degrees of freedom. All
 deviations contain the same prior, so honest ones give at most 1 on average. *Beyond 99 %*: unknowns whose chi2/n is

@@ -153,6 +153,7 @@ class _Instruments:
         x, z = (prior.floor[name].draw(rng) for name in "xz")
         offset = np.column_stack([plates[:, 0] + x, np.zeros(2), plates[:, 1] + z])
         delay_s = prior.delay_s.draw(rng)
+        # last, so that everything else of a seed does not depend on them
         turn_rad = prior.floor["turn"].draw(rng) + np.array([prior.plate["turn"].draw(rng) for _ in range(2)])
         return cls(delay_s, offset, 1.0 + plates[:, 2:3], plates[:, 3], np.zeros((2, 3)), turn_rad)
 

@@ -83,9 +83,7 @@ def _errors(people: Sequence[PersonInstruments], stated: Instruments) -> tuple[C
     plates = tuple(dict.fromkeys(name for person in people for name in person.plates))
     prior = InstrumentPrior.stated(stated, [_information(person) for person in people])
     shown, unknowns = prior.of_session(plates), prior.of_unknowns(plates)
-    before = GaussianPrior.of(unknowns)
-    covariance = np.linalg.inv(shown.information + before.precision)
-    after = before.updated(unknowns, covariance @ (shown.rhs + before.pull), covariance)
+    after = GaussianPrior.given(unknowns, shown.information, shown.rhs)
     covariance = np.linalg.inv(shown.information + after.precision)
     mean = covariance @ (shown.rhs + after.pull)
     # a foot stands on the sum of plate error and common offset

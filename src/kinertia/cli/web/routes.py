@@ -134,7 +134,7 @@ class _Actions:
 
     async def upload(self, request: Request) -> Response:
         """Receive one dropped file as the body of the request; answer with what is wrong with it, if anything."""
-        person = self._unloaded(request)
+        person = self._idle(request)
         try:
             path = await receive(person, request.query_params.get("name", ""), request.stream())
         except KinertiaError as error:
@@ -143,13 +143,13 @@ class _Actions:
 
     async def recognised(self, request: Request) -> Response:
         """Draft the subject file after files were dropped; its problems are shown on the person's page."""
-        person = self._unloaded(request)
+        person = self._idle(request)
         await run_in_threadpool(_recognised, person)
         return to(request, "people", person.name)
 
     async def remove(self, request: Request) -> Response:
         """Remove one file."""
-        person = self._unloaded(request)
+        person = self._idle(request)
         name = (await form(request)).get("file")
         for path in person.files():
             if path.name == name:
@@ -159,7 +159,7 @@ class _Actions:
 
     async def entries(self, request: Request) -> Response:
         """Save the form, and check the files if nothing is wrong with it."""
-        person = self._unloaded(request)
+        person = self._idle(request)
         given = await form(request)
         try:
             write_form(person, given)
@@ -169,14 +169,14 @@ class _Actions:
 
     async def keep(self, request: Request) -> Response:
         """Save the form before another page replaces it, such as the page without a removed file."""
-        person = self._unloaded(request)
+        person = self._idle(request)
         if person.subject.is_file():
             write_form(person, await form(request))
         return JSONResponse({})
 
     async def text(self, request: Request) -> Response:
         """Save the subject file as it was typed, and check the files if nothing is wrong with it."""
-        person = self._unloaded(request)
+        person = self._idle(request)
         typed = (await form(request)).get("text", "")
         try:
             write_text(person, typed)
@@ -220,7 +220,7 @@ class _Actions:
 
     async def rename(self, request: Request) -> Response:
         """Give the person another name in the library; nothing else changes."""
-        person = self._unloaded(request)
+        person = self._idle(request)
         renamed = self._library.rename(person, (await form(request)).get("name", ""))
         return to(request, "people", renamed.name)
 
@@ -299,7 +299,7 @@ class _Actions:
     def _person(self, request: Request) -> Person:
         return expect(self._library.person(request.path_params["name"]))
 
-    def _unloaded(self, request: Request) -> Person:
+    def _idle(self, request: Request) -> Person:
         person = self._person(request)
         if self._jobs.busy(person):
             raise HTTPException(409, "wait for the check or fit of this person, or cancel it, before changing anything")

@@ -1,9 +1,9 @@
 """Computes body mass from vertical force and markers, before inverse kinematics.
 
-Over a window the mean vertical force is m (g + dv / T), where dv is how much faster upwards the body's centre moves at
-its end than at its beginning. The velocity is that of the marker-based centre, in which each segment has its usual
-share of body mass. No model is fitted; the centre's velocity is wrong by about 0.1 m/s, and by less where the body
-moves at the end as at the beginning: over whole strides and steps, and in standing.
+Over a window the mean vertical force is m (g + dv / T), where dv is the change of the body centre's upward velocity
+from its beginning to its end. The body's centre is marker-based: each segment has its usual share of body mass. No
+model is fitted; the centre's velocity is wrong by about 0.1 m/s, and by less where the body moves at the end as at the
+beginning: over whole strides and steps, and in standing.
 """
 
 from __future__ import annotations

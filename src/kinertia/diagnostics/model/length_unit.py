@@ -1,4 +1,4 @@
-"""Are the lengths of a model those of a person in metres? A model in millimetres can be read without an error."""
+"""Are the lengths of a model in metres? Reading a model in millimetres raises no error."""
 
 from __future__ import annotations
 

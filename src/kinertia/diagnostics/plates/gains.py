@@ -29,7 +29,7 @@ from kinertia.trial.sampled_time import span_s
 _DIFFERENCE = 0.075
 _LEAST_WINDOW_S, _LEAST_GAIN, _RESIDUAL_SHARE = 1.0, 0.025, 0.9
 """In 31 fault-free trials, gains by pelvis and by marker-based centre have the same sign and are both beyond 0.5 % in
-eight, and beyond 1 % in one. They must also explain this much, which those of a jump do not."""
+eight, and beyond 1 % in one. They must also explain this share of the residual, which gains found in a jump do not."""
 _SCALED, _LEAST_RESIDUAL_M_S, _FACTORS = 0.55, 0.05, ((0.4, 0.75), (1.35, 4.0))
 """Twice the force along one axis of a walk leaves 0.08 to 0.45 of the residual; of residuals of fault-free trials that
 are as large another gain leaves 0.72 and more, or another zero explains more. Beyond these factors it is no gain."""

@@ -24,7 +24,7 @@ _UNKNOWN = UnloadedReading((np.nan, np.nan, np.nan), np.nan, 0.0, 0.0)
 
 
 def zeros(context: RecordingContext) -> Iterator[Finding]:
-    """Report P211, P213 and P216: zero offsets of every plate and axis; limits in newtons are those of adults.
+    """Report P211, P213 and P216: zero offsets of every plate and axis; limits in newtons apply to adults.
 
     Readers subtract a constant level from the loads (P216). A level that is not constant, or of plates stated to be
     zeroed, remains in the loads (P213).

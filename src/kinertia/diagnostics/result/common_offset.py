@@ -10,9 +10,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from kinertia.diagnostics.result.context import ResultContext
-from kinertia.diagnostics.result.smallest_detectable import unnoticed
+from kinertia.diagnostics.result.smallest_detectable import smallest_detectable
 from kinertia.findings.finding import Finding, finding
+from kinertia.findings.quantity import Quantity
 
 _MATTERS_M = 0.015
 """Of three walks that show 19 mm sideways, two do not show plates displaced by 20 mm: their moments err by 5 N m."""
@@ -20,6 +23,10 @@ _MATTERS_M = 0.015
 
 def common_offset(context: ResultContext) -> Iterator[Finding]:
     """Report axes along which a displacement of all plates that matters would go unnoticed."""
+    if context.fit.posterior is None:
+        return
+    known = context.fit.posterior.instruments, context.ready.uncertainty.instruments
     for axis in "xz":
-        if least := unnoticed(context, axis, _MATTERS_M, "m"):
-            yield finding("P248", context.along(axis, None), detectable_m=least)
+        least_m = smallest_detectable(*known, axis)
+        if _MATTERS_M < least_m < np.inf:
+            yield finding("P248", context.along(axis, None), detectable_m=Quantity(least_m, "m", limit=_MATTERS_M))

@@ -4,18 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from kinertia.diagnostics.result.context import ResultContext
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation, InstrumentPrior
 from kinertia.estimation.simultaneous.plates import FLOOR_UNKNOWNS, PLATE_UNKNOWNS
-from kinertia.findings.quantity import Quantity
-
-
-def unnoticed(context: ResultContext, unknown: str, matters: float, unit: str) -> Quantity | None:
-    """Return the size below which an error of all plates goes unnoticed; None if the trials show what matters."""
-    if context.fit.posterior is None:
-        return None
-    least = smallest_detectable(context.fit.posterior.instruments, context.ready.uncertainty.instruments, unknown)
-    return Quantity(least, unit, limit=matters) if matters < least < np.inf else None
 
 
 def smallest_detectable(shown: InstrumentInformation, prior: InstrumentPrior, unknown: str) -> float:

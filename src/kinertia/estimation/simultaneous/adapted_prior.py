@@ -53,10 +53,10 @@ class AdaptedPrior:
         information = np.linalg.inv(covariance)
         if np.isfinite(self.mean).all() and self._is_alike(mean, information, far):
             return self
-        gaussian = self.gaussian.updated(priors, mean, covariance)
-        rhs = information @ mean - self.gaussian.pull + gaussian.pull
-        information = information - self.gaussian.precision + gaussian.precision
-        return AdaptedPrior(gaussian, np.linalg.solve(information, rhs), information)
+        data, rhs = information - self.gaussian.precision, information @ mean - self.gaussian.pull
+        gaussian = GaussianPrior.given(priors, data, rhs)
+        information = data + gaussian.precision
+        return AdaptedPrior(gaussian, np.linalg.solve(information, rhs + gaussian.pull), information)
 
     def _is_alike(self, mean: np.ndarray, information: np.ndarray, far: float) -> bool:
         away = mean - self.mean
