@@ -40,5 +40,5 @@ def test_page(monkeypatch):
     mass, com, inertia = draw["simultaneous"]
     assert f"| simultaneous | {mass:.2f} | {1e3 * com:.1f} | {inertia:.3f} |" in page
     assert "| at best | 1 | 2 | 3 |" in page
-    assert "those of either half for 100 % of the BSPs" in page
+    assert "than with either half alone for 100 % of the BSPs" in page
     assert re.search(r"\| all three \| [\d.]+ / [\d.]+ \([\d.]+\)", page)
