@@ -173,7 +173,7 @@ def _searched(problem: MapProblem, progress: Callable[[float], None]) -> Ended:
         if at.converged and at.holds and damping == _LEAST_DAMPING:
             return _ended(begin, at, here, iterations)
         stuck = at.slope.point is here.point
-        damping = max(100.0 * damping, 1e-4) if stuck else max(0.01 * damping, _LEAST_DAMPING)
+        damping = max(100.0 * damping, 1e-4) if stuck else max(1e-4 * damping, _LEAST_DAMPING)
 
 
 def _ended(begin: float, at: _Place, here: Linearised, iterations: int) -> Ended:
