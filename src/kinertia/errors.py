@@ -6,6 +6,7 @@ attributes. The command line prints the message as one line and exits with statu
 
 from __future__ import annotations
 
+import traceback
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -28,6 +29,16 @@ def how_to_install(extra: str) -> str:
     'pip install ".[app]" in the folder of Kinertia'
     """
     return f'pip install ".[{extra}]" in the folder of Kinertia'
+
+
+def internal_error(problem: BaseException | str, sent: Path | str) -> str:
+    """Describe an error of Kinertia itself, and what its developers need to be sent.
+
+    >>> internal_error(ZeroDivisionError("division by zero"), "failure.log")
+    'Internal error of Kinertia (ZeroDivisionError: division by zero). Please send failure.log to its developers.'
+    """
+    text = traceback.format_exception_only(problem)[-1] if isinstance(problem, BaseException) else problem
+    return f"Internal error of Kinertia ({' '.join(text.split())}). Please send {sent} to its developers."
 
 
 class KinertiaError(Exception):

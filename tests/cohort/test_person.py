@@ -10,6 +10,7 @@ import pytest
 from kinertia.cohort.job import Job
 from kinertia.cohort.person import fit_person
 from kinertia.cohort.record import inputs_of, prepare_folder
+from kinertia.errors import internal_error
 from kinertia.io.subject_file import read_subject
 
 
@@ -53,7 +54,7 @@ def test_a_failure_of_kinertia_leaves_a_log(job):
         record = fit_person(job)
     assert (record.status, record.inputs) == (70, job.inputs)
     log = job.cohort / "failed" / "A.log"
-    assert str(log) in record.sentence
+    assert record.sentence == internal_error(ZeroDivisionError("0 / 0"), log)
     assert "ZeroDivisionError: 0 / 0" in log.read_text(encoding="utf-8")
 
 

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+from kinertia.errors import internal_error
 from kinertia.io.provenance import VERSION, command_line
 
 STATUS = 70
@@ -18,10 +19,7 @@ _PACKAGES = ("numpy", "scipy", "numba", "pandas", "ezc3d", "pydantic", "typer", 
 
 def failure_text(error: Exception, given: Sequence[str]) -> str:
     """Log an internal error of Kinertia, and describe it and where its log is."""
-    problem = traceback.format_exception_only(error)[-1].strip() or type(error).__name__
-    where = _logged(error, given)
-    sent = f"please send {where} to its developers" if where else "its log file could not be written"
-    return f"Internal error of Kinertia ({problem}); no results were written; {sent}"
+    return internal_error(error, _logged(error, given) or "this line and your command")
 
 
 def _logged(error: Exception, given: Sequence[str]) -> Path | None:

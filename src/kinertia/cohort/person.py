@@ -10,7 +10,7 @@ from kinertia.cohort.job import Job
 from kinertia.cohort.record import AGAINST, BAD_INPUT, FAILED, PASSED, RECORD, Place, Record, inputs_of
 from kinertia.cohort.tables import write_findings, write_person
 from kinertia.cohort.time_limit import no_end, time_limit, was_ended
-from kinertia.errors import KinertiaError
+from kinertia.errors import KinertiaError, internal_error
 from kinertia.estimation.result import Fit
 from kinertia.findings.finding import Severity
 from kinertia.io.output_folder import complete_folder, write_then_rename
@@ -96,7 +96,5 @@ def _unchanged(job: Job) -> bool:
 def _failed(job: Job, error: Exception) -> Record:
     """Record an internal error of Kinertia, with a log beside its record."""
     log = Place(job.cohort, job.person).log
-    last_line = traceback.format_exception_only(error)[-1].strip()
-    sentence = f"Internal error ({last_line}). Please send {log} to the developers."
     write_then_rename(log, "".join(traceback.format_exception(error)))
-    return job.record(FAILED, sentence, settled=not isinstance(error, MemoryError))
+    return job.record(FAILED, internal_error(error, log), settled=not isinstance(error, MemoryError))

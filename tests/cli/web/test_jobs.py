@@ -14,6 +14,7 @@ from kinertia.cli.web import work as module
 from kinertia.cli.web.jobs import Jobs
 from kinertia.cli.web.library import Library
 from kinertia.cli.web.person_page import progress
+from kinertia.errors import internal_error
 
 _PATIENCE_S = 30
 
@@ -88,11 +89,12 @@ def test_an_error_in_the_files_is_the_persons_note(library, worker):
 
 
 def test_a_crash_takes_neither_the_page_nor_the_next_one_down(library, worker):
-    worker("print('noise')\nif folder.name == 'Anna': os.abort()\nsay(stage='done', share=1.0)")
+    worker(
+        "print('noise')\nif folder.name == 'Anna': print('a bug', file=sys.stderr); os.abort()\nsay(stage='done', share=1.0)"
+    )
     with fitting(library, "Anna", "Ben") as (jobs, anna, ben):
         until(lambda: not jobs.busy(ben))
-    assert "Internal error of Kinertia" in anna.notes()["fit"]["message"]
-    assert str(anna.folder / "failure.log") in anna.notes()["fit"]["message"]
+    assert anna.notes()["fit"]["message"] == internal_error("a bug", anna.folder / "failure.log")
     assert ben.notes()["fit"] == {}
 
 

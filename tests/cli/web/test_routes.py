@@ -16,6 +16,7 @@ from kinertia.cli.measured_demo import write_measured_lab
 from kinertia.cli.synthetic_demo import write_synthetic_lab
 from kinertia.cli.web import routes
 from kinertia.cli.web.jobs import Jobs
+from kinertia.errors import internal_error
 from kinertia.io import samples
 from kinertia.io.measures_file import measures_sheet
 from kinertia.io.subject_file import read_subject
@@ -93,7 +94,7 @@ def test_a_failure_of_ours_is_said_and_the_page_goes_on(app, monkeypatch):
     app.library.add("Anna")
     answer = app.ask("/")
     assert answer.status == 500
-    assert "Internal error of Kinertia (RuntimeError: a bug)" in answer.text
+    assert internal_error(RuntimeError("a bug"), "what its terminal shows") in answer.text
     assert app.ask("/people/Anna").status == 200
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 from kinertia.cli.web.library import LOG, Person, started
 from kinertia.cli.web.work import Work
+from kinertia.errors import internal_error
 from kinertia.model.compiled import is_compiled
 
 KINDS = ("check", "fit")
@@ -46,8 +47,7 @@ class Job(Work):
             return {"how": "failed", "message": _OUTSIDE}
         path.write_text(ended.log, encoding="utf-8")
         reason = ended.log.strip().rpartition("\n")[2] or f"its process ended with status {ended.status}"
-        sentence = f"Internal error of Kinertia ({reason}); please send {path} to its developers"
-        return {"how": "failed", "message": sentence}
+        return {"how": "failed", "message": internal_error(reason, path)}
 
 
 class Jobs:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import traceback
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -25,7 +24,7 @@ from kinertia.cli.web.marker_routes import marker_routes
 from kinertia.cli.web.person_page import person_page, progress, standing
 from kinertia.cli.web.responses import archive, chosen_folder, expect, form, page, result_file, time_left, to
 from kinertia.cli.web.uploads import ENDINGS, LIMITS, receive
-from kinertia.errors import KinertiaError
+from kinertia.errors import KinertiaError, internal_error
 from kinertia.io.measures_file import measures_sheet
 from kinertia.io.output_folder import complete_folder, expect_own_folder
 from kinertia.io.samples import SIZE_MB
@@ -360,9 +359,7 @@ async def _no_file(request: Request, error: Exception) -> Response:
 
 async def _failed(request: Request, error: Exception) -> Response:
     """Report an internal error of Kinertia; the terminal has all of it."""
-    problem = traceback.format_exception_only(error)[-1].strip()
-    sentence = f"Internal error of Kinertia ({problem}); please send what its terminal shows to its developers"
-    return _error_page(request, sentence, 500)
+    return _error_page(request, internal_error(error, "what its terminal shows"), 500)
 
 
 def _error_page(request: Request, sentence: str, status: int) -> Response:
