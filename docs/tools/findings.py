@@ -109,7 +109,13 @@ def _overruling(one: Rule) -> str:
     """Whether it may be overruled; how is on the index."""
     words = [] if one.severity == "ERROR" else ["can be ignored"]
     if one.severity == "ERROR" or "ERROR" in one.escalation:
-        words.append("cannot be waived" if one.hard else "can be waived")
+        words.append(
+            "cannot be waived"
+            if one.hard
+            else "can be waived where the file could be read"
+            if one.by_readers
+            else "can be waived"
+        )
     return f"[{', '.join(words)}](../findings.md#overruling)"
 
 

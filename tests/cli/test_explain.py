@@ -36,13 +36,25 @@ def test_a_question_or_family_lists_its_codes(code):
 
 @pytest.mark.parametrize(
     ("code", "ignored", "waived"),
-    [("M113", True, False), ("P213", True, True), ("P244", False, True), ("P278", False, False), ("P215", True, False)],
+    [
+        ("M113", True, False),
+        ("P213", True, True),
+        ("P244", False, True),
+        ("P278", False, False),
+        ("P215", True, False),
+        ("F148", True, False),
+    ],
 )
 def test_it_says_how_a_finding_is_overruled(code, ignored, waived):
     text = told(code)
     assert (f'ignore = ["{code}"]' in text) == ignored
     assert (f"--waive {code}" in text) == waived
-    assert ("cannot be waived" in text) == rule(code).hard
+    assert ("cannot be waived, since" in text) == rule(code).hard
+
+
+def test_it_says_that_what_a_reader_raises_cannot_be_waived():
+    assert "cannot be waived where a file could not be read further" in told("P201")
+    assert "cannot be waived" not in told("P244")
 
 
 @pytest.mark.parametrize(("code", "expected"), [("P213", ("P213",)), ("P21", matching("P21")), ("P", matching("P"))])

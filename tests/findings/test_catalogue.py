@@ -1,7 +1,10 @@
 """The catalogue as a whole: every code has a complete entry, and no finding explains itself."""
 
+import ast
 import re
+from pathlib import Path
 
+import kinertia
 from kinertia.findings.finding import Severity
 from kinertia.findings.rule import FAMILIES, STAGES, all_rules, family_title, matching, questions, rule
 from refusals import MOST_WORDS
@@ -55,6 +58,24 @@ def test_messages_are_short():
 
 def test_remedies_are_one_sentence():
     assert codes_where(lambda one: re.search(r"[.!?] [A-Z]", one.remedy)) == []
+
+
+def test_what_a_reader_raises_cannot_be_waived():
+    """A file that cannot be read further gives nothing to compute with, whatever the user overrules."""
+    paths = Path(kinertia.__file__).parent.rglob("*.py")
+    calls = [node for path in paths for node in ast.walk(ast.parse(path.read_text("utf-8"))) if _is_raised(node)]
+    constants = {each.value for call in calls for each in ast.walk(call) if isinstance(each, ast.Constant)}
+    raised = constants & set(RULES)
+    assert len(raised) > 40
+    assert sorted(code for code in raised if not rule(code).hard and not rule(code).by_readers) == []
+    assert [code for code in codes_where(lambda one: one.by_readers) if code not in raised or rule(code).hard] == []
+
+
+def _is_raised(node):
+    """Whether a node makes an error of a code: FileError.found(path, "F104"), OsimError.about(...)."""
+    function = node.func if isinstance(node, ast.Call) else None
+    kind = getattr(getattr(function, "value", None), "id", "")
+    return kind.endswith("Error") and function.attr in ("found", "of", "about")
 
 
 def test_braces_hold_names_of_evidence_or_places():

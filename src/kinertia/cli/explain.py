@@ -111,7 +111,7 @@ def overruling(one: Rule) -> str:
         waived = (
             f'--waive {one.code}, or waive = ["{one.code}"] under [diagnostics] in the subject file, lets the fit go '
             "on; the outputs concerned are then at best to be used with care"
-        )
+        ) + ("; it cannot be waived where a file could not be read further" if one.by_readers else "")
     if one.severity == "ERROR":
         return waived
     return f"{ignored}; as an ERROR: {waived}" if "ERROR" in one.escalation else ignored

@@ -25,6 +25,7 @@ class Rule:
         detects: what it examines and its limit, for the documentation.
         escalation: when it is more or less severe, in words.
         hard: whether it cannot be waived, since nothing can be computed.
+        by_readers: whether a reader reports it, too: where a file cannot be read further it cannot be waived.
         affects: outputs that an open WARNING lowers to "use with care".
         supersedes: codes, or questions like "T20", whose findings are a consequence of this one.
         resolves: codes of warnings about the same quantity that this correction lowers to CORRECTED.
@@ -45,6 +46,7 @@ class Rule:
     detects: str = ""
     escalation: str = ""
     hard: bool = False
+    by_readers: bool = False
     affects: tuple[str, ...] = ()
     supersedes: tuple[str, ...] = ()
     resolves: tuple[str, ...] = ()
