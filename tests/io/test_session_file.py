@@ -1,8 +1,11 @@
+import re
 import tomllib
 
 import pytest
 
-from kinertia.io.session_file import PersonInstruments, read_session, session_text
+from kinertia.cli.options import own_file
+from kinertia.errors import FileError
+from kinertia.io.session_file import PersonInstruments, expect_session, read_session, session_text
 from refusals import refused
 
 ROW = (0.1, -2.0, 1e-17, 3.0, 1e9, 0.0, 7.0, 1.0 / 3.0, 5.0)
@@ -58,6 +61,30 @@ def test_another_file_is_refused(written, old, new, problem):
     with refused("F184", problem=problem) as caught:
         read_session(written)
     assert caught.value.line is not None
+
+
+@pytest.fixture
+def outdated(written):
+    """A file of an earlier version, in which plates had no rotation of their own: 4 rows a plate."""
+    text = written.read_text(encoding="utf-8").replace(", 0.0, 7.0", ", 7.0")
+    rows = re.sub(r"( {4}\[.*\],\n)\1{8}", r"\1" * 8, text)
+    written.write_text(rows, encoding="utf-8")
+    return written
+
+
+def test_a_file_of_an_earlier_version_is_named_and_can_be_made_again(outdated):
+    with refused("F184", rows=8.0, expected=9.0) as caught:
+        read_session(outdated)
+    assert "earlier version of Kinertia" in caught.value.finding.evidence["problem"].value
+    assert "kinertia instruments SUBJECT.toml ... -o instruments.toml" in caught.value.finding.remedy
+    own_file(outdated, expect_session, "kinertia instruments")
+
+
+def test_only_its_own_files_are_written_over(tmp_path):
+    other = tmp_path / "subject.toml"
+    other.write_text('[subject]\nname = "A"\n', encoding="utf-8")
+    with pytest.raises(FileError, match="not a file that kinertia instruments wrote"):
+        own_file(other, expect_session, "kinertia instruments")
 
 
 def test_the_name_that_the_right_hand_side_had_is_still_read(written):

@@ -16,7 +16,7 @@ from kinertia.errors import FileError, SessionError
 from kinertia.estimation.simultaneous.calibration_entry import SHOWN_UNIT
 from kinertia.io.output_folder import write_then_rename
 from kinertia.io.provenance import VERSION, recordings
-from kinertia.io.session_file import read_session, session_text
+from kinertia.io.session_file import expect_session, session_text
 from kinertia.io.subject_file import read_subject
 from kinertia.io.subject_tables import InstrumentsFiles, SubjectFile
 from kinertia.workflow.from_files import check_plates, fit_subject
@@ -44,7 +44,7 @@ def instruments(
     for path, each in zip(subjects, wanted, strict=True):
         if each.instruments != wanted[0].instruments:
             raise SessionError(f"{path}: [instruments] differs from that of {subjects[0]}; it is the session's")
-    own_file(output, read_session, "kinertia instruments")
+    own_file(output, expect_session, "kinertia instruments")
     people = []
     for each in wanted:
         with shown_progress() as progress:

@@ -54,10 +54,23 @@ class PersonInstruments(Table):
 
     @model_validator(mode="after")
     def _square(self) -> PersonInstruments:
-        size = 5 * len(self.plates) + 4
-        if {len(self.information), len(self.rhs), *map(len, self.information)} != {size}:
-            raise ValueError(f"information and rhs must have {size} rows and columns for {len(self.plates)} plates")
+        size, plates = 5 * len(self.plates) + 4, f"{len(self.plates)} plate{'s'[: len(self.plates) != 1]}"
+        rows = {len(self.information), len(self.rhs), *map(len, self.information)}
+        if rows == {4 * len(self.plates) + 4}:
+            raise _OutdatedError(
+                *rows, size, "an earlier version of Kinertia wrote it, without a rotation of each plate"
+            )
+        if rows != {size}:
+            raise ValueError(f"{self.name}: information and rhs must have {size} rows and columns for {plates}")
         return self
+
+
+class _OutdatedError(ValueError):
+    """A file has the unknowns of an earlier version: so many rows, where others are expected."""
+
+    def __init__(self, rows: int, expected: int, problem: str) -> None:
+        super().__init__(problem)
+        self.evidence = {"rows": Quantity(float(rows), "1"), "expected": Quantity(float(expected), "1")}
 
 
 class SessionFile(Table):
@@ -81,8 +94,21 @@ def read_session(path: Path) -> tuple[PersonInstruments, ...]:
         first = error.errors()[0]
         place = ".".join(map(str, first["loc"])) or "its numbers"
         line = document.line(first["loc"]) or document.last_line
-        evidence = {"entry": Quantity(place), "problem": Quantity(f"{place}: {first['msg']}")}
-        raise FileError.found(path, "F184", line, **evidence) from None
+        wrong = first.get("ctx", {}).get("error")
+        problem = Quantity(str(wrong) if wrong else f"{place}: {first['msg']}")
+        known = wrong.evidence if isinstance(wrong, _OutdatedError) else {}
+        raise FileError.found(path, "F184", line, entry=Quantity(place), problem=problem, **known) from None
+
+
+def expect_session(path: Path) -> None:
+    """Check that a file is one of `kinertia instruments`, of this version or an earlier one.
+
+    Raises:
+        FileError: it is another file.
+    """
+    content = read_toml(path, "a file of kinertia instruments").content
+    if not {"kinertia", "found", "person"} <= set(content):
+        raise FileError(path, "not a file of kinertia instruments")
 
 
 def session_text(

@@ -90,7 +90,7 @@ def test_an_error_in_the_files_is_the_persons_note(library, worker):
 
 def test_a_crash_takes_neither_the_page_nor_the_next_one_down(library, worker):
     worker(
-        "print('noise')\nif folder.name == 'Anna': print('a bug', file=sys.stderr); os.abort()\nsay(stage='done', share=1.0)"
+        "if folder.name == 'Anna':\n    print('a bug', file=sys.stderr)\n    os.abort()\nsay(stage='done', share=1.0)"
     )
     with fitting(library, "Anna", "Ben") as (jobs, anna, ben):
         until(lambda: not jobs.busy(ben))
