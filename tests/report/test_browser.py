@@ -265,6 +265,23 @@ def test_codes_lead_to_what_they_mean(browser, fit, tmp_path, viewport):
     page.close()
 
 
+@pytest.mark.parametrize("viewport", [DESKTOP, PHONE])
+@pytest.mark.parametrize("findings", [FAULT_FREE, UNUSABLE])
+def test_the_first_screen_has_what_may_be_used_and_what_to_do_next(browser, fit, tmp_path, findings, viewport):
+    """Every remedy that comes first is on it, and the reasons are below it on a phone."""
+    path = tmp_path / "report.html"
+    path.write_text(render(replace(fit, findings=findings, rules=61)), encoding="utf-8")
+    page = browser.new_page(viewport=viewport)
+    page.goto(path.as_uri())
+    last = page.locator("#verdict .steps, #verdict h3:has-text('Do this next') + p").bounding_box()
+    assert last["y"] + last["height"] <= viewport["height"]
+    assert page.locator("#verdict .at-a-glance .level:visible").count() == 3
+    assert page.locator("#verdict .at-a-glance .code:visible").count() == 0 or viewport is DESKTOP
+    page.get_by_text("output by output, and why").click()
+    assert page.locator("#verdict details .level:visible").count() == 5
+    page.close()
+
+
 @pytest.mark.parametrize("form", ["svg", "png", "csv"])
 def test_figures_are_saved_by_a_button(demo, fit, form):
     with demo.page.expect_download() as saving:

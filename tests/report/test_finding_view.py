@@ -102,6 +102,8 @@ def test_words_that_the_message_has_are_no_evidence_again():
         "level -23 N",
         "other heel",
     ]
+    mass = finding("S111", mass_by_force_kg=Quantity(27.2, "kg"), action=Quantity("Correct the mass"))
+    assert evidence_texts(mass) == ["mass by force 27.2 kg"], "the remedy has it"
 
 
 def test_ignored_findings_are_counted_and_nowhere_else():

@@ -22,6 +22,8 @@ from kinertia.workflow.check import ModelOverview
 from kinertia.workflow.recording import RecordingCheck
 
 _LEFT_OUT = "left out"
+_MOST_UNFOLDED = 4
+"""Files listed above what to do next; of more, only the verdicts are counted there."""
 
 
 @dataclass(frozen=True)
@@ -79,6 +81,7 @@ def render_check(
             *(_recording(one, f"recording{k}", left_out) for k, one in enumerate(recordings, start=1)),
             *(_checked(one.name, f"model{k}", one.overview.findings) for k, one in enumerate(models, start=1)),
         ],
+        most_unfolded=_MOST_UNFOLDED,
         recordings=recordings,
         pictures=[check_figures(one) for one in pictured],
         scenes=view(scenes) if scenes else None,

@@ -155,13 +155,13 @@ def place_text(where: Where, with_trial: bool = False) -> str:
 
 
 def evidence_texts(one: Finding) -> list[str]:
-    """List every quantity of a finding, "level -23 N (limit 15 N)"; words only if the message lacks them."""
+    """List every quantity of a finding, "level -23 N (limit 15 N)"; words only if message and remedy lack them."""
     named = [name for name, each in one.evidence.items() if not _is_said(one, each)]
     return [f"{outlined('{' + name + '}', '{}')} {evidence_text(one, name)}" for name in named]
 
 
 def _is_said(one: Finding, quantity: Quantity) -> bool:
-    return isinstance(quantity.value, str) and quantity.value in one.message
+    return isinstance(quantity.value, str) and quantity.value in f"{one.message} {one.remedy}"
 
 
 def evidence_text(one: Finding, name: str, signed: bool = False) -> str:
@@ -208,21 +208,27 @@ def lines(findings: Iterable[Finding], least: Severity = Severity.CORRECTED) -> 
 
 
 def digest(overview: Overview) -> dict[str, Any]:
-    """Return verdict and findings for the page in the browser: one entry for equal findings, without assumptions."""
+    """Return verdict, remedies that come first and findings for the page in the browser, without assumptions.
+
+    Equal findings have one entry.
+    """
     shown_ = [one for one in overview.findings if one.severity > Severity.INFO and one.muted_by is None]
     groups = grouped(in_order(one for one in shown_ if one.status != "ignored"))
     return {
         "verdict": overview.verdict,
         "line": overview.line,
-        "findings": [
-            {
-                "code": group.first.code,
-                "severity": group.first.severity.name,
-                "status": group.first.status,
-                "place": group.first.place,
-                "message": group.message,
-                "remedy": group.first.remedy,
-            }
-            for group in groups
-        ],
+        "steps": [_in_short(card.group) for card in FindingView([overview]).steps],
+        "findings": [_in_short(group) for group in groups],
+    }
+
+
+def _in_short(group: Group) -> dict[str, str]:
+    first = group.first
+    return {
+        "code": first.code,
+        "severity": first.severity.name,
+        "status": first.status,
+        "place": first.place,
+        "message": group.message,
+        "remedy": first.remedy,
     }

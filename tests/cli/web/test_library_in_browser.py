@@ -11,7 +11,7 @@ pytest.importorskip("starlette", reason="needs the extra app (pip install -e '.[
 pytest.importorskip("uvicorn", reason="needs the extra app (pip install -e '.[test]')")
 from app_server import running
 from app_tab import Tab, ready, with_everything
-from chromium import playwright
+from chromium import DESKTOP, PHONE, playwright
 from kinertia.cli.web import work
 
 WAITING = "import json, sys, time\nprint(json.dumps({'stage': 'estimate', 'share': 0.3}), flush=True)\ntime.sleep(90)"
@@ -133,6 +133,34 @@ def test_a_person_is_renamed_and_results_stay_those_of_the_files(tab, app, c3d_l
     results = tab.page.locator("section[aria-labelledby=results]")
     playwright.expect(results.locator(".headline")).to_have_class("headline warning")
     playwright.expect(results.get_by_text("before your last change")).to_have_count(0)
+    tab.quiet()
+
+
+@pytest.mark.parametrize("viewport", [DESKTOP, PHONE])
+def test_the_first_screen_has_what_may_be_used_and_what_to_do_next(browser, app, c3d_lab, viewport):
+    person = with_everything(app.library, f"First screen {viewport['width']}", c3d_lab)
+    outcome = json.loads((person.results / "outcome.json").read_text())
+    moments = {"name": "Joint moments for clinical use", "use": "use with care", "reason": ""}
+    current = {**outcome, "inputs": person.inputs, "purposes": [moments]}
+    (person.results / "outcome.json").write_text(json.dumps(current))
+    tab = Tab(browser, app, viewport)
+    tab.page.goto(f"{app.address}people/{quote(person.name)}")
+    first = tab.page.get_by_label("Outcome", exact=True)
+    playwright.expect(first.locator(".purposes .level")).to_have_text(["use with care"])
+    codes = [one["code"] for one in outcome["steps"]]
+    assert codes
+    assert len(codes) <= 3
+    playwright.expect(first.locator("ol a")).to_have_text(codes)
+    steps = first.locator("ol").bounding_box()
+    assert steps["y"] + steps["height"] <= viewport["height"]
+    tab.quiet()
+
+
+def test_what_is_of_other_files_is_not_on_the_first_screen(tab, app, c3d_lab):
+    person = with_everything(app.library, "Old outcome", c3d_lab)
+    tab.page.goto(f"{app.address}people/{quote(person.name)}")
+    playwright.expect(tab.page.get_by_text("before your last change").first).to_be_visible()
+    playwright.expect(tab.page.get_by_label("Outcome", exact=True)).to_have_count(0)
     tab.quiet()
 
 

@@ -149,11 +149,15 @@ def person_page(
 def _outcomes(person: Person) -> dict[str, Any]:
     """Collect everything that the template shows of the last check and the last fit; old: of other files."""
     checked, results = (_known(person.outcome(kind)) for kind in ("check", "results"))
+    fitted = results if person.fitted else {}
+    pages = {"results/report.html": fitted, "check/check.html": checked}
+    latest = [(page, one) for page, one in pages.items() if one and one.get("inputs") == person.inputs]
     return {
+        "latest": {"purposes": [], "steps": [], **latest[0][1], "page": latest[0][0]} if latest else {},
         "check": checked,
         "check_page": (person.check / "check.html").is_file(),
         "check_old": bool(checked) and checked.get("inputs") != person.inputs,
-        "results": results if person.fitted else {},
+        "results": fitted,
         "fitted": person.fitted,
         "results_old": bool(results) and results.get("inputs") != person.inputs,
         "result_files": _result_files(person),

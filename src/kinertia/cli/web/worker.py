@@ -43,6 +43,7 @@ def fit(person: Person, progress: Progress) -> None:
     from kinertia.io.provenance import provenance_of
     from kinertia.report.files import save_fit
     from kinertia.report.finding_view import digest
+    from kinertia.report.headline import words
     from kinertia.workflow.from_files import fit_subject
 
     begun = time.time()
@@ -60,6 +61,7 @@ def fit(person: Person, progress: Progress) -> None:
                 "inputs": person.inputs,
                 "summary": sha256(work / SUMMARY),
                 **digest(result.overview),
+                "purposes": [one._asdict() for one in words(result).purposes],
                 "ended": ended,
                 "seconds": round(ended - begun, 1),
             },
