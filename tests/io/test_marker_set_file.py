@@ -105,9 +105,10 @@ def test_a_preset_is_recognised_in_other_capitals_and_punctuation(name):
 
 
 @pytest.mark.parametrize("name", preset_names())
-def test_a_preset_is_recognised_behind_a_name_that_all_labels_begin_with(name):
+@pytest.mark.parametrize("prefix", ["Anna_", "Anna-", "Anna.", "Anna ", "S-01_walk-"])
+def test_a_preset_is_recognised_behind_a_name_that_all_labels_begin_with(name, prefix):
     preset = read_marker_set(name)
-    labels = [f"Anna_{label}" for label in preset.labels]
+    labels = [prefix + label for label in preset.labels]
     chosen = choose_marker_set([*labels, "wand"])
     assert chosen.name == preset.name
     assert chosen.respelled == dict(zip(preset.labels, labels, strict=True))

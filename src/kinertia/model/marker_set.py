@@ -6,6 +6,7 @@ Only marker sets contain a laboratory's labels. They come from files (`kinertia.
 from __future__ import annotations
 
 import difflib
+import re
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -53,6 +54,7 @@ whether the user named it or it is a preset. Measured recordings that lack part 
 of other laboratories' sets have up to 0.62 of the labels of Plug-in Gait, which mean something else there."""
 _PREFIX_SHARE = 0.9
 """Share of the labels that begin with a person's name: unnamed trajectories and objects have others."""
+_PREFIX_END = re.compile(r"[-_. ](?=.)")
 _COMPUTED_M = 1e-4
 _SIDES = {"r": "right", "l": "left"}
 _FOOT = ("heel", "metatarsal")
@@ -111,7 +113,7 @@ def spelled_as(marker_set: MarkerSet, labels: Sequence[str]) -> MarkerSet:
     """Return the set with missing labels spelled as in the recording, if only one of its labels is possible.
 
     Spellings may differ in capitals and punctuation, be another known name of the marker, or begin with a person's name
-    that all labels share, as in "Anna_LASI".
+    that all labels share, as in "Anna_LASI" or "Anna-LASI".
 
     Args:
         marker_set: its labels may have been retyped by hand or changed by a program.
@@ -149,9 +151,13 @@ def spellings(wanted: Sequence[str], labels: Sequence[str]) -> dict[str, str]:
 
 
 def shared_prefix(labels: Sequence[str]) -> str:
-    """Return the prefix that nearly all labels have up to their first underscore; empty if they differ."""
-    parts = Counter(label[: label.find("_") + 1] for label in labels).most_common(1)
-    return parts[0][0] if parts and parts[0][1] >= _PREFIX_SHARE * len(labels) else ""
+    """Return the longest prefix up to an underscore, hyphen, point or blank of nearly all labels; empty without one.
+
+    >>> shared_prefix(["S_01-LASI", "S_01-RASI", "S_01-LKNE_1"])
+    'S_01-'
+    """
+    parts = Counter(label[: sep.end()] for label in labels for sep in _PREFIX_END.finditer(label))
+    return max((one for one, count in parts.items() if count >= _PREFIX_SHARE * len(labels)), key=len, default="")
 
 
 def _matched(names: Mapping[str, set[str]], labels: Sequence[str], prefix: str) -> dict[str, str]:
