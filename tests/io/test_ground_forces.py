@@ -333,6 +333,14 @@ def test_uneven_time(write, tmp_path):
         plates_of(path)
 
 
+@pytest.mark.parametrize(("unit", "step"), [("milliseconds", 5 / 3), ("numbers of samples", 1.0)])
+def test_times_in_another_unit_than_seconds(tmp_path, unit, step):
+    """Forces of 600 Hz: read as seconds, two of them lay among the markers, and "use a longer trial" was the advice."""
+    path = forces_at(tmp_path / "grf.mot", step * np.arange(300))
+    with refused("T106", None, step_s=step):
+        plates_of(path)
+
+
 def forces_at(path, time):
     """A force file whose vertical force is the number of the sample, with these times."""
     count = np.arange(len(time), dtype=float)
