@@ -10,7 +10,7 @@ from kinertia.diagnostics.model.questions import PERSON_QUESTIONS
 from kinertia.diagnostics.runner import asked, explained
 from kinertia.findings.finding import Severity
 from kinertia.io.osim.reader import read_osim
-from kinertia.model.bsp import PARAMETERS
+from kinertia.model.bsp import PARAMETERS, BodySegmentParameters
 from people import UNMOVED, with_model
 from sound_models import MODELS
 from upright_model import changed, with_moments
@@ -32,6 +32,18 @@ def ball(mass_kg, density_kg_m3):
 def test_a_possible_model():
     assert found(upright.bsp()) == set()
     assert found(upright.bsp(), [UNMOVED]) == set()
+
+
+@pytest.mark.parametrize("trials", [(), [UNMOVED]])
+@pytest.mark.parametrize(
+    ("mass", "inertia", "expected"),
+    [(1000.0, 1.0, True), (1000.0, 1000.0, True), (0.001, 0.001, True), (2.20462, 1.0, False), (0.5, 0.5, False)],
+)
+def test_masses_in_another_unit_are_one_error(mass, inertia, expected, trials):
+    """In grams they were 22 warnings about inertias, and the fit scaled the masses and went on."""
+    own = upright.bsp()
+    bsp = BodySegmentParameters(own.segments, mass * own.mass_kg, own.com_m, inertia * own.inertia_kgm2)
+    assert (found(bsp, trials) == {("O206", None, Severity.ERROR)}) == expected
 
 
 @pytest.mark.parametrize(

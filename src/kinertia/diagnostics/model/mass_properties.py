@@ -23,6 +23,8 @@ _DENSEST_KG_M3 = 5000.0
 """Heavy bodies of fault-free models are at most at 1300; patellae and other light ones have guesses up to 5600."""
 _LARGEST_RADIUS_M = 0.6
 """No part of a person has a larger radius of gyration (a rod of 2 m has 0.58 m)."""
+_HEAVIEST_KG, _LIGHTEST_KG = 300.0, 1.0
+"""Largest mass that a person may have, and less than a leg of a child."""
 _NO_EXTENT_M = 1e-4
 """Root mean square distance of the mass from its centre below which there is no inertia."""
 
@@ -73,6 +75,16 @@ def inertia_size(context: PersonContext) -> Iterator[Finding]:
             severity = of_body(context, name, Severity.ERROR if mass_kg >= NEGLIGIBLE_KG else Severity.WARNING)
             large = Quantity(gyration_m, "m", limit=_LARGEST_RADIUS_M)
             yield finding("O204", Where(part=name), severity, radius_m=large, mass_kg=Quantity(mass_kg, "kg"))
+
+
+def mass_unit(context: PersonContext) -> Iterator[Finding]:
+    """Report O206: a model that weighs more than any person, or next to nothing."""
+    if context.model is None:
+        return
+    model_kg = context.model.bsp.total_mass_kg
+    for limit, beyond in ((_HEAVIEST_KG, model_kg > _HEAVIEST_KG), (_LIGHTEST_KG, 0.0 < model_kg < _LIGHTEST_KG)):
+        if beyond:
+            yield finding("O206", model_kg=Quantity(model_kg, "kg", limit=limit))
 
 
 def degenerate_inertia(context: PersonContext) -> Iterator[Finding]:

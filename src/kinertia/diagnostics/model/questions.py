@@ -7,6 +7,7 @@ from kinertia.diagnostics.model.mass_properties import (
     degenerate_inertia,
     impossible_inertia,
     inertia_size,
+    mass_unit,
     missing_inertia,
 )
 from kinertia.diagnostics.model.mirrored_joints import mirrored_joints
@@ -29,6 +30,7 @@ PERSON_QUESTIONS: tuple[Question[PersonContext], ...] = (
     Question("O20", impossible_inertia),
     Question("O20", missing_inertia),
     Question("O20", inertia_size),
+    Question("O20", mass_unit),
     Question("O20", degenerate_inertia),
     Question("O21", placeholders),
     Question("O21", unlike_tables),
