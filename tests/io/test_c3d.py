@@ -254,6 +254,19 @@ def test_files_that_are_no_trial(tmp_path):
         read_c3d(write_c3d(tmp_path / "x.c3d", points * np.nan, labels))
 
 
+def test_a_file_of_a_mips_computer_is_whole_but_unknown(tmp_path):
+    """It was called damaged, with a request of ezc3d's to open an issue on GitHub."""
+    points, labels = standing()
+    path = write_c3d(tmp_path / "x.c3d", points, labels, stepping(), SCREEN)
+    header = bytearray(path.read_bytes())
+    for at, size in ((2, 2), (4, 2), (6, 2), (8, 2), (10, 2), (12, 4), (16, 2), (18, 2), (20, 4), (300, 2)):
+        header[at : at + size] = header[at : at + size][::-1]
+    header[515] = 86
+    path.write_bytes(bytes(header))
+    with refused("F102", None, given="MIPS", expected="Intel"):
+        read_c3d(path)
+
+
 @pytest.mark.parametrize("file", here(["synthetic/walk.c3d", "pig_c3d/subject_b_walk.c3d"]))
 def test_a_file_cut_anywhere(file_of, tmp_path, file):
     whole = file_of(file).read_bytes()

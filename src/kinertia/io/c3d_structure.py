@@ -16,10 +16,11 @@ import numpy as np
 
 from kinertia.errors import FileError
 from kinertia.findings.quantity import Quantity
-from kinertia.io.number_table import mismatch
+from kinertia.io.number_table import mismatch, wrong_kind
 
 _BLOCK = 512
-_BYTE_ORDERS = {84: ("<", 15), 85: ("<", 13), 86: (">", 12)}
+_MIPS = 86
+_BYTE_ORDERS = {84: ("<", 15), 85: ("<", 13), _MIPS: (">", 12)}
 """By processor (Intel, DEC, MIPS): byte order of integers, and the header byte with the sign of POINT:SCALE,
 which is negative where numbers are stored as floats."""
 _KINDS = {-1: "c", 1: "b", 2: "h", 4: "f"}
@@ -98,6 +99,9 @@ def doubts_about(path: Path, numbers_of_frames: bool = True) -> str:
         raise _too_short(path, size, needed)
     if section[3] not in _BYTE_ORDERS:
         return f"its processor is {section[3]}"
+    if section[3] == _MIPS:
+        given = "A C3D file with the numbers of MIPS computers (big-endian)"
+        raise wrong_kind(path, given, "be read", "those of Intel: save it again with another C3D program")
     if section[3] == 85:
         return "its numbers are DEC's"
     parameters, doubt = _parameters(path, section, order)
