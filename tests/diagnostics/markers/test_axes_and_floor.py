@@ -1,12 +1,16 @@
 """Another unit, another axis up and a vertical that is tilted along the walk are found; in level laboratories never."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from kinertia.diagnostics.markers.axes_and_floor import floor_slope, unit_and_vertical
 from kinertia.findings.finding import Severity
+from kinertia.model.marker_set import MarkerSet
 from kinertia.trial.data import Markers, Recording
+from kinertia.trial.marker_quality import extent_m
 from marker_contexts import codes, context_of
 from recordings import here, marker_set_for
 
@@ -102,3 +106,15 @@ def test_axes_and_unit(turn, vertical, expected, up):
 def test_nobody():
     nothing = Markers(np.arange(3.0), ("A",), np.full((3, 1, 3), np.nan))
     assert list(unit_and_vertical(context_of(nothing))) == []
+
+
+@pytest.mark.parametrize("name", WALKS[:1])
+def test_a_few_labels_of_another_persons_model_are_no_other_unit(name, recording_of):
+    """Of a model with other labels three matched, 200 mm apart: "the unit of length is wrong", said an ERROR."""
+    markers = recording_of(name).markers
+    pelvis = marker_set_for(markers.labels).segments["pelvis"]
+    few = MarkerSet("few", {}, {"pelvis": pelvis}, {})
+    assert extent_m(markers.select(pelvis)).max() < 0.3
+    assert [*unit_and_vertical(context_of(markers, few))] == []
+    small = replace(markers, positions=markers.positions / 10)
+    assert codes(unit_and_vertical(context_of(small, few))) == ["M141"]

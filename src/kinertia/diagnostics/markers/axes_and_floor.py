@@ -31,6 +31,8 @@ def unit_and_vertical(context: RecordingContext) -> Iterator[Finding]:
     """Report M141 and M142: wrong unit of length, or vertical axis by the markers' extent or the line from feet to
     pelvis."""
     extent = extent_m(context.markers)
+    if extent.max() < _SMALLEST_M:  # of a person, or of the few labels that another set or model knows
+        extent = extent_m(context.all_markers)
     if np.isnan(extent).any():
         return
     largest = float(extent.max())
