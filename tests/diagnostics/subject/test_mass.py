@@ -13,6 +13,7 @@ from kinertia.diagnostics.runner import explained
 from kinertia.diagnostics.subject.mass import masses_of_trials, stated_mass
 from kinertia.findings.finding import Severity
 from kinertia.io.marker_set_file import choose_marker_set
+from kinertia.model.skeleton import GRAVITY_M_S2
 from kinertia.settings import Attached
 from kinertia.synthetic.walk import walk, walking_subject
 from kinertia.trial.data import FootLoads, Trial
@@ -177,6 +178,16 @@ def test_mass_in_pounds_and_forces_in_other_units(lab):
     )
     open_ = [(one.code, one.severity) for one in kilograms if one.is_open]
     assert open_ in ([], [("P202", Severity.ERROR)]), "hardly a load is left in some"
+
+
+@pytest.mark.parametrize("mass_kg", [30.0, 72.6, 160.0])
+def test_forces_in_percent_of_body_weight_are_no_wrong_mass(lab, mass_kg):
+    """All of them correspond to 10.2 kg, and "correct the mass" was the remedy."""
+    walked, _, marker_set = lab
+    share = 100.0 / (72.6 * GRAVITY_M_S2)
+    found = explained(stated_mass(person([by_plate(walked, share, share)], marker_set=marker_set, mass_kg=mass_kg)))
+    (unit,) = [one for one in found if one.is_open]
+    assert (unit.code, unit.severity, unit.evidence["unit"].value) == ("P202", Severity.ERROR, "% of body weight")
 
 
 def causes_of(found):

@@ -222,7 +222,8 @@ def _contradiction(
     where, ratio = Where(trial=one.trial), one.mass_kg / total.total_kg
     if _near(ratio, _POUND):
         yield finding("S112", where, ratio=Quantity(ratio, "1"))
-    for unit, factor in _FORCE_UNITS.items():
+    percent = {"% of body weight": 100.0 / (total.body_kg * GRAVITY_M_S2)}
+    for unit, factor in (_FORCE_UNITS | percent).items():
         if _near(ratio, factor):
             yield finding("P202", where, unit=Quantity(unit), ratio=Quantity(ratio, "1"))
     by_plate: dict[str, float] = {}
