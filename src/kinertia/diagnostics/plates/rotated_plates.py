@@ -20,6 +20,7 @@ from kinertia.trial.rms import rms
 
 _WRONG_M, _RIGHT_M, _CLEARLY_BEST = 0.1, 0.08, 0.6
 _ORDER = "a wrong order of the corners"
+_CHANNELS = "interchanged channels of the plate moments Mx and My"
 _OPERATIONS = (
     # places (x, z) from the plate's middle; from Z to X is a positive rotation about Y
     ("rotated by 180 degrees", ((-1, 0), (0, -1)), _ORDER),
@@ -27,6 +28,8 @@ _OPERATIONS = (
     ("rotated by -90 degrees", ((0, 1), (-1, 0)), _ORDER),
     ("mirrored along X", ((-1, 0), (0, 1)), "a wrong sign of the plate moment about Z"),
     ("mirrored along Z", ((1, 0), (0, -1)), "a wrong sign of the plate moment about X"),
+    ("mirrored along a diagonal", ((0, 1), (1, 0)), _CHANNELS),
+    ("mirrored along a diagonal", ((0, -1), (-1, 0)), _CHANNELS),
 )
 
 
