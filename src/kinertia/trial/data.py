@@ -127,11 +127,13 @@ class TorqueColumns(NamedTuple):
             not move, or the plate was hardly loaded.
         rms_nm: RMS torque about X, Y and Z, N m.
         belongs_to: index of the other plate whose load the torque follows; None if there is none.
+        height_m: median height of the point of application, m; NaN where the plate was hardly loaded.
     """
 
     lever_arm_m: float
     rms_nm: tuple[float, float, float]
     belongs_to: int | None
+    height_m: float = np.nan
 
 
 @dataclass(frozen=True, eq=False)

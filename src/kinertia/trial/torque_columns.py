@@ -46,7 +46,7 @@ def torque_columns(force: FloatArray, point: FloatArray, torque: FloatArray) -> 
         moves = float(np.ptp(point[rows, p][:, [0, 2]], axis=0).max()) > _MOVES_M
         arm = float(np.median(np.hypot(own[:, 0], own[:, 2]) / force[rows, p, 1])) if moves else np.nan
         x, y, z = (rms(values) for values in own.T)
-        columns.append(TorqueColumns(arm, (x, y, z), elsewhere.get(p)))
+        columns.append(TorqueColumns(arm, (x, y, z), elsewhere.get(p), float(np.median(point[rows, p, 1]))))
     return tuple(columns)
 
 

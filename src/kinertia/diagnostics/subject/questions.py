@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.person_context import PersonContext
+from kinertia.diagnostics.plates.plate_height import plate_heights
 from kinertia.diagnostics.runner import Question
 from kinertia.diagnostics.subject.body_data import absent_markers, population, stated_and_filed
 from kinertia.diagnostics.subject.camera_scale import trial_scales
@@ -24,6 +25,7 @@ PERSON_QUESTIONS: tuple[Question[PersonContext], ...] = (
     Question("M10", absent_markers),
     Question("S20", no_static),
     Question("M14", floor),
+    Question("P24", plate_heights, unless=("M143",)),
     Question("S20", static_and_trials),
     Question("S30", trials_of_one_person),
     Question("S20", trial_scales),
