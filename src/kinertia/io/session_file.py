@@ -55,11 +55,10 @@ class PersonInstruments(Table):
     @model_validator(mode="after")
     def _square(self) -> PersonInstruments:
         size, plates = 5 * len(self.plates) + 4, f"{len(self.plates)} plate{'s'[: len(self.plates) != 1]}"
-        rows = {len(self.information), len(self.rhs), *map(len, self.information)}
-        if rows == {4 * len(self.plates) + 4}:
-            raise _OutdatedError(
-                *rows, size, "an earlier version of Kinertia wrote it, without a rotation of each plate"
-            )
+        rows, earlier = {len(self.information), len(self.rhs), *map(len, self.information)}, 4 * len(self.plates) + 4
+        if rows == {earlier}:
+            problem = "an earlier version of Kinertia wrote it, without a rotation of each plate"
+            raise _OutdatedError(earlier, size, problem)
         if rows != {size}:
             raise ValueError(f"{self.name}: information and rhs must have {size} rows and columns for {plates}")
         return self
