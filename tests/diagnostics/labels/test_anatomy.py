@@ -49,6 +49,8 @@ SWAPPED = [
     (PELVIS_AND_FEET, [("asis_l", "psis_l")], "L203"),
     (FAULT_FREE, [("asis_r", "asis_l")], "L202"),
     (KNEES, [("knee_lateral_r", "knee_lateral_l")], "L202"),
+    (OUTER_AND_INNER, [("knee_medial_r", "knee_medial_l")], "L202"),
+    (OUTER_AND_INNER, [("ankle_medial_r", "ankle_medial_l")], "L202"),
     *((KNEES, [(f"ankle_lateral_{side}", f"heel_{side}")], "L207") for side in "rl"),
     *((JOINTS_TOO, [(f"ankle_lateral_{side}", f"metatarsal_{side}")], "L207") for side in "rl"),
 ]

@@ -33,6 +33,8 @@ _BEHIND, _BEYOND, _USUAL_SHARE = -0.1, 1.1, (0.22, 0.48)
 _BENT = 0.35
 """Sine of 20 degrees: beyond it, an elbow's bend is clear."""
 _PAIRS = ("asis", "psis", "knee_lateral", "ankle_lateral", "heel", "metatarsal", "acromion")
+_INNER_PAIRS = ("knee_medial", "ankle_medial")
+"""Legs that move may cross."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,7 +159,8 @@ def _rotation_from(vectors: FloatArray, others: FloatArray) -> complex:
 
 def _swapped_sides(body: _Body, right: FloatArray) -> Iterator[Finding]:
     """Report L201, or L202 of each pair whose sides are swapped."""
-    pairs = [pair for pair in _PAIRS if body.shows(f"{pair}_r", f"{pair}_l")]
+    inner = _INNER_PAIRS if body.context.travel.kind == "stands still" else ()
+    pairs = [pair for pair in (*_PAIRS, *inner) if body.shows(f"{pair}_r", f"{pair}_l")]
     across = {pair: cosine(body.places[f"{pair}_r"] - body.places[f"{pair}_l"], right) for pair in pairs}
     wrong = {pair: each for pair, each in across.items() if each < -CLEAR}
     clear = sum(abs(each) > CLEAR for each in across.values())
