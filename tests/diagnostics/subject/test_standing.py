@@ -50,10 +50,14 @@ def test_the_own_stature_and_floor(standing):
     assert list(floor(person(standing, standing))) == []
 
 
-@pytest.mark.parametrize("off_m", [-0.2, 0.2])
-def test_another_stature(standing, off_m):
+@pytest.mark.parametrize(
+    ("off_m", "severity"),
+    [(-0.2, Severity.WARNING), (0.2, Severity.WARNING), (-0.55, Severity.ERROR), (0.6, Severity.ERROR)],
+)
+def test_another_stature(standing, off_m, severity):
+    """1.083 m for 1.803 m was a warning, too, and the prior of a child, or of the obese, was used."""
     (found,) = stature(replace(standing, height_m=standing.height_m + off_m))
-    assert found.code == "S104"
+    assert (found.code, found.severity) == ("S104", severity)
     assert found.evidence["implied_m"].value == pytest.approx(standing.height_m, abs=0.08)
 
 

@@ -12,12 +12,14 @@ from collections.abc import Iterator
 import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.findings.finding import Finding, finding
+from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.model.joint_centres import find_landmarks
 
 _PARTS = (("ankle_lateral", "knee_lateral"), ("knee_lateral", "asis"), ("asis", "acromion"))
 _USUAL, _OFF = 0.815, 0.055
+_POSSIBLE = (0.65, 1.0)
+"""Nobody is shorter than from ankle to shoulder, or has a third of the stature above and below these."""
 
 
 def stature(context: RecordingContext) -> Iterator[Finding]:
@@ -38,9 +40,11 @@ def stature(context: RecordingContext) -> Iterator[Finding]:
     if abs(share - _USUAL) <= _OFF:
         return
     limit = _USUAL + _OFF * float(np.sign(share - _USUAL))
+    possible = _POSSIBLE[0] <= share <= _POSSIBLE[1]
     yield finding(
         "S104",
         context.at(),
+        Severity.WARNING if possible else Severity.ERROR,
         stated_m=Quantity(height_m, "m"),
         implied_m=Quantity(length_m / _USUAL, "m"),
         length_m=Quantity(length_m, "m"),
