@@ -105,6 +105,8 @@ BROKEN = {
         HEADER + TABLE.replace("\t1", "\tTrue").replace("\t3", "\tFalse"), 8, "F105", {"cell": "True", "column": 2}
     ),
     "no time": (HEADER + TABLE.replace("0.5", ""), 9, "F105", {"found": "without a time"}),
+    "commas": (HEADER + TABLE.replace("\t", ","), 7, "F114", {"key": "between columns", "value": ","}),
+    "semicolons": (HEADER + TABLE.replace("\t", "; "), 7, "F114", {"key": "between columns", "value": ";"}),
     "no time column": (HEADER + TABLE.replace("time", "frame"), 7, "F114", {"value": "frame"}),
     "repeated": (HEADER + TABLE.replace("a\tb", "a\ta"), 7, "F113", {"label": "a", "count": 2}),
     "no label": (HEADER + TABLE.replace("a\tb", "\tb"), 7, "F114", {"key": "column 2", "value": "missing"}),

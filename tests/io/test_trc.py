@@ -229,6 +229,15 @@ def test_lost_frame_in_the_middle(write):
         read_trc(write(HEADER.replace("\t3\t2\t", "\t100\t2\t") + rows))
 
 
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16"])
+def test_text_of_other_programs(write, encoding):
+    """Excel's "Unicode text" and PowerShell write UTF-16, with a mark at the beginning; it was called binary."""
+    path = write(HEADER + ROWS)
+    expected = read_trc(path)
+    path.write_bytes(path.read_text(encoding="utf-8").encode(encoding))
+    np.testing.assert_array_equal(read_trc(path).positions, expected.positions)
+
+
 def test_missing_empty_and_binary_files(write, tmp_path):
     path = write("")
     with refused("F104"):

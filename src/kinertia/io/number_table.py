@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import math
 import os
 import re
@@ -26,6 +27,8 @@ def read_lines(path: Path) -> list[str]:
     content = path.read_bytes()
     if not content.strip():
         raise FileError.found(path, "F104", found=Quantity("it is empty"))
+    if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        content = content.decode("utf-16", errors="replace").encode()
     if b"\0" in content[:4096]:
         kind = f"the text of a {path.suffix} file"
         raise mismatch(path, kind, "bytes of a binary file", "text")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -134,6 +135,8 @@ def _header(lines: list[str]) -> dict[str, tuple[str, int]]:
 def _labels(path: Path, line: str, number: int) -> list[str]:
     cells = line.rstrip().split("\t") if "\t" in line.strip() else line.split()
     labels = [cell.strip() for cell in cells]
+    if separated := re.match(r"time\s*([,;])", labels[0].lower()):
+        raise header_entry(path, number, "the character between columns", f"'{separated[1]}'", "a tab")
     if labels[0].lower() != "time":
         raise header_entry(path, number, "the first column", f"'{labels[0]}'", "'time'")
     if "" in labels:

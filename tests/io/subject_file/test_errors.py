@@ -58,6 +58,7 @@ CASES = [
     ('"data/walk2.c3d"', '"data"', 17, "F102", {"given": "folder", "key": "markers"}),
     ('sex = "female"', "sex = female", 2, "F103", {"kind": "TOML", "expected": "in quotes"}),
     ("height_m = 1.68", "height_m = 1,68", 4, "F103", {"expected": "decimal point, not a comma: 1.68"}),
+    ('sex = "female"', "sex = “female”", 2, "F103", {"kind": "TOML", "expected": "straight quotes"}),
     ("height_m = 1.68", "height_m = 1.68\nheight_m = 1.7", 5, "F103", {"kind": "TOML"}),
     ('"data/walk1.mot"', '"C:\\walk1.mot"', 12, "F103", {"expected": "with /"}),
     ('"data/walk1.mot"', '"C:\\Users\\a.mot"', 12, "F103", {"expected": "with /"}),
