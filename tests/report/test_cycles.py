@@ -318,3 +318,12 @@ def test_estimated_curves_are_near_opensims(next_to_opensim):
     motion = along(one.usual - one.on_their_motion)
     assert (along(one.estimate - one.theirs) < 1.96 * along(one.sd) + motion).all()
     assert (motion < 2.0 * along(one.sd)).all(), "the share of the motion is no licence"
+
+
+def test_a_report_without_clinical_angles(fit, monkeypatch):
+    """A knee axis that is not across the leg has none: the fit ended with an internal error."""
+    monkeypatch.setattr("kinertia.estimation.cycles._clinical", lambda *given: [{} for _ in given[2]])
+    figures = cycle_figures(fit)
+    assert "clinical" not in figures
+    assert "moment" in figures
+    assert 'id="cycle"' in render(fit)

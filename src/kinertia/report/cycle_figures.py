@@ -61,11 +61,15 @@ Norms = Mapping[str, Norm]
 
 
 def cycle_figures(fit: Fit, norms: Norms = MappingProxyType({})) -> dict[Kind, Figure]:
-    """Draw all figures over the gait cycle, by kind; none where no trial has a stride. Norms are grey bands below."""
+    """Draw all figures over the gait cycle, by kind; none where no trial has a stride, or no stride shows that kind.
+
+    Norms are grey bands below.
+    """
     if not any(trial.strides for trial in fit.trials):
         return {}
     drawn = _Drawn(fit, curves_of(fit, "estimate"), curves_of(fit, "literature"), norms)
-    return {kind: drawn.figure(kind) for kind in UNITS}
+    figures = {kind: drawn.figure(kind) for kind in UNITS}
+    return {kind: figure for kind, figure in figures.items() if figure is not None}
 
 
 def cycle_figure(fit: Fit, kind: Kind, norms: Norms = MappingProxyType({})) -> Figure | None:
@@ -114,12 +118,14 @@ class _Drawn:
     usual: Curves
     norms: Norms
 
-    def figure(self, kind: Kind) -> Figure:
+    def figure(self, kind: Kind) -> Figure | None:
         panels = [
             Panel(f"{title} ({UNITS[kind]})", [*self._traces(quantity, self._usual_name(kind))], self._toe_offs())
             for quantity, title in titled_quantities(self.fit.skeleton, kind)
             if any((quantity, side) in curves for side in FEET for curves in (self.estimate, self.usual))
         ]
+        if not panels:
+            return None
         axis: dict[str, Any] = {"range": [0, 100], "tickvals": [0, 20, 40, 60, 80, 100]}
         axis["title"] = {"text": "% of the gait cycle", "font": {"size": 11}, "standoff": 2}
         return small_multiples(panels, self._alt(kind), axis)

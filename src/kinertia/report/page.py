@@ -138,14 +138,14 @@ def _cycle(fit: Fit, norms: Norms) -> dict[str, Any] | None:
     figures = cycle_figures(fit, norms)
     if not figures:
         return None
-    clinical = figures.pop("clinical")
+    clinical = figures.pop("clinical", None)
     strides = [stride for trial in fit.trials for stride in trial.strides]
     return {
         "rows": stride_rows(fit),
         "most": MOST_STRIDES,
         "norms": bool(norms),
         "profile": profile_view(fit, norms),
-        "clinical": written(clinical) if set(CLINICAL_ANGLES) & set(norms) else None,
+        "clinical": _written(clinical) if set(CLINICAL_ANGLES) & set(norms) else None,
         "spread": has_spread(figures["moment"]),
         "strides": len(strides),
         "on_plates": sum(stride.on_plates for stride in strides),

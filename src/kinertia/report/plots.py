@@ -80,7 +80,7 @@ class FitFigures(Generic[T]):
         figure = cycle_figure(self.fit, kind, {} if norms is None else read_norms(norms))
         if figure is None:
             raise KinertiaError(
-                f"no trial of this fit has a stride, so nothing can be drawn over the gait cycle ({kind}); "
+                f"no trial of this fit has a stride that shows it, so no gait cycle can be drawn ({kind}); "
                 "'moments', 'angles' and 'residuals' are drawn over time"
             )
         return self.drawn(figure)
