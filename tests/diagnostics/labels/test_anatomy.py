@@ -43,6 +43,7 @@ SWAPPED = [
     (ELBOWS, [("elbow_lateral_r", "elbow_medial_r")], "L208"),
     (ELBOWS, [("elbow_lateral_l", "elbow_medial_l")], "L208"),
     (KNEES, [("knee_lateral_r", "ankle_lateral_r")], "L206"),
+    (OUTER_AND_INNER, [("knee_medial_r", "ankle_medial_r")], "L206"),
     (PELVIS_AND_FEET, [("heel_r", "metatarsal_r")], "L205"),
     (PELVIS_AND_FEET, [("asis_r", "psis_r"), ("asis_l", "psis_l")], "L203"),
     (PELVIS_AND_FEET, [("asis_r", "psis_r")], "L203"),

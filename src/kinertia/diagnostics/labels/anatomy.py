@@ -198,7 +198,11 @@ def _swapped_labels(body: _Body, right: FloatArray) -> Iterator[Finding]:
 def _order(body: _Body) -> Iterator[Finding]:
     """Report L206: knees that are below the ankles, or a pelvis below the knees."""
     for side in "rl":
-        for upper, lower in (("knee_lateral", "ankle_lateral"), ("asis", "knee_lateral")):
+        for upper, lower in (
+            ("knee_lateral", "ankle_lateral"),
+            ("knee_medial", "ankle_medial"),
+            ("asis", "knee_lateral"),
+        ):
             names = (f"{upper}_{side}", f"{lower}_{side}")
             if not body.shows(*names):
                 continue
