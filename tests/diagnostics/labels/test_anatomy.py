@@ -52,6 +52,7 @@ SWAPPED = [
     (KNEES, [("knee_lateral_r", "knee_lateral_l")], "L202"),
     (OUTER_AND_INNER, [("knee_medial_r", "knee_medial_l")], "L202"),
     (OUTER_AND_INNER, [("ankle_medial_r", "ankle_medial_l")], "L202"),
+    (OUTER_AND_INNER, [("toe_r", "toe_l")], "L202"),
     *((KNEES, [(f"ankle_lateral_{side}", f"heel_{side}")], "L207") for side in "rl"),
     *((JOINTS_TOO, [(f"ankle_lateral_{side}", f"metatarsal_{side}")], "L207") for side in "rl"),
 ]

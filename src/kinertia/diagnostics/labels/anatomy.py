@@ -33,7 +33,7 @@ _BEHIND, _BEYOND, _USUAL_SHARE = -0.1, 1.1, (0.22, 0.48)
 _BENT = 0.35
 """Sine of 20 degrees: beyond it, an elbow's bend is clear."""
 _PAIRS = ("asis", "psis", "knee_lateral", "ankle_lateral", "heel", "metatarsal", "acromion")
-_INNER_PAIRS = ("knee_medial", "ankle_medial")
+_STANDING_PAIRS = ("knee_medial", "ankle_medial", "toe")
 """Legs that move may cross."""
 
 
@@ -159,8 +159,10 @@ def _rotation_from(vectors: FloatArray, others: FloatArray) -> complex:
 
 def _swapped_sides(body: _Body, right: FloatArray) -> Iterator[Finding]:
     """Report L201, or L202 of each pair whose sides are swapped."""
-    inner = _INNER_PAIRS if body.context.travel.kind == "stands still" else ()
-    pairs = [pair for pair in (*_PAIRS, *inner) if body.shows(f"{pair}_r", f"{pair}_l")]
+    stands, labels = body.context.travel.kind == "stands still", body.marker_set.landmarks
+    of_one_marker = labels.get("toe_r") == labels.get("metatarsal_r")
+    more = [one for one in _STANDING_PAIRS if stands and not (one == "toe" and of_one_marker)]
+    pairs = [pair for pair in (*_PAIRS, *more) if body.shows(f"{pair}_r", f"{pair}_l")]
     across = {pair: cosine(body.places[f"{pair}_r"] - body.places[f"{pair}_l"], right) for pair in pairs}
     wrong = {pair: each for pair, each in across.items() if each < -CLEAR}
     clear = sum(abs(each) > CLEAR for each in across.values())
