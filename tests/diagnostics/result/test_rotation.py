@@ -8,6 +8,7 @@ import pytest
 from kinertia.diagnostics.result.rotation import plate_rotation
 from kinertia.diagnostics.result.smallest_detectable import smallest_detectable
 from kinertia.estimation.simultaneous.instruments import FLOOR_PRIOR, InstrumentInformation, InstrumentPrior
+from kinertia.findings.finding import Severity
 from results import codes, context, error
 
 TURN = 5 + 2
@@ -75,3 +76,14 @@ def test_a_rotation_that_the_other_plate_does_not_share_is_the_plates_own(other_
     assert codes(found) == ["P237"] * (2 if other.found else 1)
     assert found[0].where.plate == "left"
     assert found[0].evidence["rotation_rad"].value == 0.09
+
+
+@pytest.mark.parametrize(("degrees", "severity"), [(9.0, Severity.CORRECTED), (-32.0, Severity.WARNING)])
+def test_a_rotation_as_of_no_plate_stands_for_another_fault(degrees, severity):
+    """Interchanged horizontal channels of one plate were "corrected" by a rotation of -32 degrees."""
+    one, other = (
+        error("rotation", np.radians(value), 0.02, 0.004, "rad", plate=plate)
+        for plate, value in (("left", degrees), ("right", 0.1))
+    )
+    (found,) = plate_rotation(context(one, other, shown=shown(0.2)))
+    assert (found.code, found.severity, found.where.plate) == ("P237", severity, "left")

@@ -16,13 +16,15 @@ from kinertia.diagnostics.result.context import ResultContext
 from kinertia.diagnostics.result.corrections import corrected, equal
 from kinertia.diagnostics.result.smallest_detectable import smallest_detectable, smallest_detectable_of_one
 from kinertia.estimation.simultaneous.calibration_entry import ROTATION
-from kinertia.findings.finding import Finding, finding
+from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.quantity import Quantity
 
 _MATTERS_RAD = float(np.radians(2.0))
 """In the least informative walk of the reference recordings, 3 degrees change joint moments by twice their SDs."""
 _OF_ONE_MATTERS_RAD = float(np.radians(4.0))
 """In reference walks, 5 degrees of one plate change joint moments by one to two SDs."""
+_LARGEST_RAD = float(np.radians(10.0))
+"""Three SDs of a rotated plate. Beyond it, the rotation stands for another fault of the forces, which it cannot correct."""
 
 
 def plate_rotation(context: ResultContext) -> Iterator[Finding]:
@@ -31,9 +33,11 @@ def plate_rotation(context: ResultContext) -> Iterator[Finding]:
     usual_sd = context.ready.uncertainty.instruments.plate["turn"].sd
     if equal(rotations, usual_sd) or len(rotations) == 1:
         largest = max(rotations, key=lambda one: abs(one.value))
-        yield from corrected(context, "P234", "rotation_rad", [replace(largest, plate=None)])
+        found = corrected(context, "P234", "rotation_rad", [replace(largest, plate=None)])
     else:
-        yield from corrected(context, "P237", "rotation_rad", rotations)
+        found = corrected(context, "P237", "rotation_rad", rotations)
+    for one in found:
+        yield one.at(Severity.WARNING) if abs(one.evidence["rotation_rad"].value) > _LARGEST_RAD else one
     if context.fit.posterior is None:
         return
     known = context.fit.posterior.instruments, context.ready.uncertainty.instruments
