@@ -8,8 +8,6 @@ OpenSim's gait2354 example: a man of 72.6 kg and 1.803 m on an instrumented trea
 where FOLDER holds subject01_static.trc, subject01_walk1.trc, subject01_walk1_grf.mot and subject01_walk1_grf.xml.
 """
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

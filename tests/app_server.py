@@ -1,7 +1,5 @@
 """A server of `kinertia app` on a library in a folder, and requests to it as no browser would send them."""
 
-from __future__ import annotations
-
 import http.client
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager

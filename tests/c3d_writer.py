@@ -1,7 +1,5 @@
 """A minimal C3D writer, so that tests can make files that no laboratory would."""
 
-from __future__ import annotations
-
 import struct
 from pathlib import Path
 

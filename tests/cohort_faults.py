@@ -1,7 +1,5 @@
 """Tiny people for tests of cohorts, and what goes wrong while they are fitted."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from unittest import mock

@@ -9,8 +9,6 @@ still, so that all bytes can be compared. Prints how many kills fell before the 
 person was finished, and what a run said whose disk was full: that takes the right to mount, which `unshare` gives.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import random

@@ -5,8 +5,6 @@ what becomes of each job in turn: `ends` (SLURM takes it, and its worker never r
 line stands for all further ones.
 """
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

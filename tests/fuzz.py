@@ -4,8 +4,6 @@ Ends with status 0 when each was accepted or refused with a KinertiaError, withi
 the last line of the standard error names the case, which can be repeated on its own.
 """
 
-from __future__ import annotations
-
 import contextlib
 import faulthandler
 import io

@@ -1,7 +1,5 @@
 """A standing person made from geometry, so that models can be built without measured files."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from kinertia.io.marker_set_file import read_marker_set

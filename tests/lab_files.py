@@ -1,7 +1,5 @@
 """A walk over two plates, written as Qualisys Track Manager and Vicon Nexus document their text exports."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

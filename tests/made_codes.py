@@ -4,8 +4,6 @@ Every finding is looked at when it is made: all names in its sentences are fille
 run without a failure, the session fails if a code of the catalogue was never made by the program itself.
 """
 
-from __future__ import annotations
-
 import re
 import sys
 from pathlib import Path

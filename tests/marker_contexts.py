@@ -1,7 +1,5 @@
 """Contexts of recordings whose markers are changed, and what a question finds in them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Any

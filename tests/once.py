@@ -1,7 +1,5 @@
 """What several workers of one run of the tests need is made by the first, and read by the others."""
 
-from __future__ import annotations
-
 import os
 import pickle
 import time

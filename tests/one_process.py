@@ -1,7 +1,5 @@
 """Studies in the process of the test: starting others takes longer than short studies do."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from unittest import mock

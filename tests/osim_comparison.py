@@ -1,7 +1,5 @@
 """What our own and OpenSim's reading of a model file must agree on."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """An OpenSim model as an oracle for a `Skeleton` read from the same file."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

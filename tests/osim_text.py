@@ -1,7 +1,5 @@
 """Small OpenSim models as text, format 4: a pelvis free in ground, and one more body on the joint to be tested."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 FREE = ("FreeJoint", ("tilt", "list", "turn", "tx", "ty", "tz"), "")

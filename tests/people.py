@@ -1,7 +1,5 @@
 """Persons as questions see them, from recordings, models and what is stated."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path

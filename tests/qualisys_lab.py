@@ -5,8 +5,6 @@ rate beside them; missing places have the residual -1; events by label and conte
 measurement.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

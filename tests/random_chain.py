@@ -1,7 +1,5 @@
 """Random models with ranges, and smooth motions within them: what inverse kinematics must give back."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.spatial.transform import Rotation
 

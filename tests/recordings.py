@@ -3,8 +3,6 @@
 Files are named as in `measured_data`; those under `synthetic/` are written by `c3d_lab`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, TypeVar

@@ -5,8 +5,6 @@
 runs a command with it.
 """
 
-from __future__ import annotations
-
 import contextlib
 import os
 import shutil

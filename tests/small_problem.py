@@ -1,7 +1,5 @@
 """A simultaneous estimate small enough for a dense Jacobian by finite differences."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache

@@ -1,7 +1,5 @@
 """People with girths and lengths: drawn around the usual build, their two sides a little different."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 

@@ -2,8 +2,6 @@
 sides of knees, ankles and elbows, and two at the back of the pelvis.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -9,8 +9,6 @@ and `walk.c3d`. And without forces, with clusters of markers (`synthetic_cluster
 `clusters_walk.trc`.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 from pathlib import Path

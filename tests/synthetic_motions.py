@@ -3,8 +3,6 @@
 They complete what a walk over two plates cannot show: many contacts, flight, a trunk that bends.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cached_property
 

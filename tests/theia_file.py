@@ -1,7 +1,5 @@
 """A synthetic walk as a C3D file of poses, laid out as Theia does."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import ezc3d

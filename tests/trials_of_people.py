@@ -1,7 +1,5 @@
 """Two alike walks and squats of one person, with forces that are late or another trial's."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A model in memory, with OpenSim's names of bodies and Dumas' mass properties for the person it is built for."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from kinertia.model.anthropometry import BodyGeometry, literature_bsp, reference_lengths

@@ -5,8 +5,6 @@ the radius; forearms and upper arms turn about their long axes; frames of hips a
 parents; one marker of the trials is missing.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

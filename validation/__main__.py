@@ -1,7 +1,5 @@
 """Make a page of evidence again, with the commit and day on it; or all."""
 
-from __future__ import annotations
-
 import ast
 import subprocess
 import sys

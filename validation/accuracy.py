@@ -1,7 +1,5 @@
 """Compare estimates and error bars with synthetic truth."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -5,8 +5,6 @@ over posterior deviation (ratio), and errors against those of the literature. A 
 number only.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial

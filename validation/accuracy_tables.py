@@ -1,7 +1,5 @@
 """Tables of docs/validation/accuracy.md: error bars and joint moments in every laboratory."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """How wrong estimated body segment parameters are, beside the truth of a synthetic walk."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from kinertia.estimation.study_parameters import ParameterVector

@@ -1,7 +1,5 @@
 """Errors of calibration put into synthetic walks, what becomes of them, and their section of the accuracy page."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 

@@ -10,8 +10,6 @@ does what a worker does: one after the other, and in as many processes at once a
 command, from its start to its end. Memory is that of all its processes together, looked at twice a second.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

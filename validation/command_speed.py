@@ -9,8 +9,6 @@ modules are kept, as pip keeps them. Processor time is told beside the time on t
 steadier of the two.
 """
 
-from __future__ import annotations
-
 import os
 import resource
 import subprocess

@@ -1,7 +1,5 @@
 """The rigid-body core next to Pinocchio's bare calls in the same process, and their section of the speed page."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 

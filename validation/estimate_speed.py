@@ -1,7 +1,5 @@
 """Seconds of the simultaneous estimate beside bare Pinocchio calls, and their section of docs/validation/speed.md."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -5,8 +5,6 @@ compared with those of the fault-free files. Findings in fault-free files are co
 and of other people in laboratories without faults.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace

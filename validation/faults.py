@@ -1,7 +1,5 @@
 """Inject known faults into files: which are identified?"""
 
-from __future__ import annotations
-
 import json
 from collections import Counter
 from collections.abc import Iterable, Sequence

@@ -1,7 +1,5 @@
 """Compare fits with and without a functional trial."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Explain held-out trials by BSPs of the others."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import json

@@ -1,7 +1,5 @@
 """Joint moments and joint angles of synthetic people against the truth, joint by joint, beside the usual pipeline's."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """What goes wrong with forces between the plates and the file: axes, signs, units, zeros, places, clocks."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

@@ -6,8 +6,6 @@ Every length runs in a process of its own, which has nothing else in its memory.
 as the other synthetic walks, is repeated; skin motion comes back with every stride, the cameras' noise does not.
 """
 
-from __future__ import annotations
-
 import json
 import re
 import subprocess

@@ -1,7 +1,5 @@
 """What goes wrong with markers between the person and the file: labels, places, axes, time."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

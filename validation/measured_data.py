@@ -4,8 +4,6 @@ Looked for in three places, in this order: the folder that the environment varia
 beside the repository, and the cache of `kinertia demo --measured`, which holds the gait2354 walk only.
 """
 
-from __future__ import annotations
-
 import os
 from functools import cache
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Tell what `kinertia fit` gives on four walks."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import json

@@ -1,7 +1,5 @@
 """What the simultaneous estimate says of the measured walks, for its section of docs/validation/accuracy.md."""
 
-from __future__ import annotations
-
 import tempfile
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Mistakes that laboratories make, each a change of fault-free files and the codes that identify it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -4,8 +4,6 @@ Two passes, as its guide recommends: the first moves the centre of mass of the t
 applied to the model, the second reduces the residuals by changing the motion.
 """
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """OpenSim's inverse kinematics and inverse dynamics on files, without its chatter."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import sys

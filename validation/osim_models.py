@@ -1,7 +1,5 @@
 """Tell what fits with users' OpenSim models give."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import json

@@ -1,7 +1,5 @@
 """Where a page of evidence goes, and the line on it that says what made it, at which commit and on which day."""
 
-from __future__ import annotations
-
 import subprocess
 from datetime import UTC, datetime
 from functools import cache

@@ -1,7 +1,5 @@
 """The walks of docs/validation/peers.md, and what OpenSim and Kinertia make of each: files in one folder per walk."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import json

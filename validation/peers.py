@@ -5,8 +5,6 @@ Joint moments, residuals and seconds of Kinertia next to OpenSim's IK + ID and R
 RRA takes most of the time, a minute or two per walk; runs that are finished in FOLDER are taken from there.
 """
 
-from __future__ import annotations
-
 import tempfile
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable

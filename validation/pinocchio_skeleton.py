@@ -1,7 +1,5 @@
 """A skeleton as a Pinocchio model: the peer of the rigid-body core, built from the joints and not from our tree."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The gait2354 walk whole, cut in two and pooled again, and its section of docs/validation/accuracy.md."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -4,8 +4,6 @@ Directions are those of the literature (`kinertia.estimation.population`); sizes
 there, and are nobody's measurements. People of a population spread about its mean as adults do about theirs.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 

@@ -1,7 +1,5 @@
 """Ask what a wrong prior costs children and others."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Annotated
 

@@ -5,8 +5,6 @@ What the fits say of them must agree within their deviations, which needs no tru
 same prior, so that chi2 over its degrees of freedom is at most 1 on average where they are honest.
 """
 
-from __future__ import annotations
-
 import csv
 import json
 import statistics

@@ -1,7 +1,5 @@
 """Ask which BSPs survive noisy kinematics."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Annotated

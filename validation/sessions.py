@@ -6,8 +6,6 @@ With `--keep`, results stay in FOLDER/SESSION/TRIAL, and those that are there ar
 page is printed and not written. `repeatability.py` has what trials share, and how that is judged.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import re

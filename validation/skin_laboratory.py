@@ -4,8 +4,6 @@ People unlike the model walk the gait2354 walk (`truth_trials`); the markers of 
 donor's did (`measured_skin`). Each walk is fitted alone by `kinertia fit --model`.
 """
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

@@ -6,8 +6,6 @@ OpenSim's InverseKinematicsTool solves the same markers in the same run, with th
 with the data; its GCVSplineSet smooths the same coordinates. Both sides are the best of a few runs.
 """
 
-from __future__ import annotations
-
 import os
 import tempfile
 import time

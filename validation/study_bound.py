@@ -4,8 +4,6 @@ Nothing of the estimator's noise model is used: forces count as exact, and the c
 is that of the study's sinusoids, A sin(w t + phi) with uniform A, w and phi: A_max^2 / 6 sinc(w_max (t - t')).
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The study's noise, from starts 50 % off: draws of every method, and their section of docs/validation/accuracy.md."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

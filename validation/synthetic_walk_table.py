@@ -9,8 +9,6 @@ speed is added to the forward translation. The standing person is the model of t
 in a standing pose.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

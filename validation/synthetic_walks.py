@@ -1,7 +1,5 @@
 """Synthetic walks that the pages estimate from, and their kinematics as a laboratory would find them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

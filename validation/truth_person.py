@@ -1,7 +1,5 @@
 """An OpenSim model as a person who can be posed and asked for forces, feet and markers."""
 
-from __future__ import annotations
-
 import numpy as np
 import opensim
 

@@ -10,8 +10,6 @@ FOLDER receives what a laboratory would hand over (model.osim, walk.trc, walk_gr
 what nobody could measure (model.osim, motion.mot, forces.mot, loads.xml, moments.sto, truth.json).
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass

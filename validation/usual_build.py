@@ -6,8 +6,6 @@ Its folder is misc/samplemeasurements of the source distribution of the package 
 --no-binary :all: yeadon==2.0.1): the measurements of five people, which are not part of this repository.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

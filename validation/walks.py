@@ -1,7 +1,5 @@
 """The four measured walks that pages and tests run on, and how to ask for each on the command line."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 WALKS = {

@@ -3,8 +3,6 @@
 python docs/tools/app_picture.py
 """
 
-from __future__ import annotations
-
 import tempfile
 from pathlib import Path
 

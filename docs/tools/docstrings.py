@@ -1,7 +1,5 @@
 """Griffe extension: docstrings that describe several names at once, as `q, qd: coordinates`, describe each of them."""
 
-from __future__ import annotations
-
 import re
 from typing import Any
 

@@ -7,8 +7,6 @@ numbers of now into the pages. Words that have changed are told, and to be mende
 the same functions.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

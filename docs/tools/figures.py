@@ -7,8 +7,6 @@ of that name and its scaled model (`subject01_scaled.osim`). Without it the READ
 needs OpenSim, and the repository on PYTHONPATH.
 """
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

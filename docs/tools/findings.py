@@ -5,8 +5,6 @@
 A test compares the pages with the catalogue.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

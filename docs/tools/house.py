@@ -5,8 +5,6 @@
 A test compares picture and page with the contract and the rooms' docstrings.
 """
 
-from __future__ import annotations
-
 import ast
 import tomllib
 from html import escape

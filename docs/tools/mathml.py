@@ -1,7 +1,5 @@
 """MkDocs hook: equations become MathML while the site is built, so that a page needs neither a script nor a network."""
 
-from __future__ import annotations
-
 import html
 import re
 from typing import Any

@@ -5,8 +5,6 @@
 Needs the extra "docs" and measured data (`measured_data`).
 """
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 from tempfile import TemporaryDirectory

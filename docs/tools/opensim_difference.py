@@ -6,8 +6,6 @@ prints the table of `docs/opensim.md`: RMS differences of joint moments of the t
 models, both sides together, from OpenSim's Inverse Kinematics and Inverse Dynamics at 6 Hz. Needs OpenSim.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from tempfile import TemporaryDirectory
 

@@ -5,8 +5,6 @@
 Needs Chromium and the measured files of the tutorial.
 """
 
-from __future__ import annotations
-
 import subprocess
 from pathlib import Path
 from tempfile import TemporaryDirectory

@@ -5,8 +5,6 @@
 A generated part stands between `<!-- generated: NAME -->` and `<!-- end -->`. A test compares the pages with the code.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from pathlib import Path

@@ -5,8 +5,6 @@
 writes the file.
 """
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Lists the commands of the command line and loads the module of each when it is called."""
 
-from __future__ import annotations
-
 import signal
 import sys
 import threading

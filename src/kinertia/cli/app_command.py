@@ -1,7 +1,5 @@
 """Defines `kinertia app`: check, fit and reports in the browser, on this computer only."""
 
-from __future__ import annotations
-
 import webbrowser
 from collections.abc import Callable
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """Defines `kinertia check`: what is in the files, and whether a fit can use them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass

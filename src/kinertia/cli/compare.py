@@ -1,7 +1,5 @@
 """Defines `kinertia compare`: shows several finished fits side by side."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

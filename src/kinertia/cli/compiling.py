@@ -1,7 +1,5 @@
 """Compiles the numerical core once per machine, before the first command that computes."""
 
-from __future__ import annotations
-
 import gc
 import subprocess
 import sys

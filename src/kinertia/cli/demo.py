@@ -1,7 +1,5 @@
 """Defines `kinertia demo`: fits a synthetic person of known truth, or a measured walk that is downloaded."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated, Any
 

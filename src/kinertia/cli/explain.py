@@ -1,7 +1,5 @@
 """Defines `kinertia explain`: what a finding's code means, and what to do about it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from textwrap import fill

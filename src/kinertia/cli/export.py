@@ -1,7 +1,5 @@
 """Defines `kinertia export`: tables, C3D files with results and posterior draws, for other programs."""
 
-from __future__ import annotations
-
 from json import dumps
 from pathlib import Path
 from typing import Annotated, Any

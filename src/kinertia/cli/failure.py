@@ -1,7 +1,5 @@
 """Describes an internal error in one line, and writes a log file for the developers."""
 
-from __future__ import annotations
-
 import platform
 import tempfile
 import traceback

@@ -1,7 +1,5 @@
 """Prints findings on a terminal: the verdict, at most three findings, or all of them with `--verbose`."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 

@@ -1,7 +1,5 @@
 """Defines `kinertia fit`: from a subject file, or from options, to a folder of results."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Defines `kinertia init`: drafts a first subject file."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 from typing import Annotated

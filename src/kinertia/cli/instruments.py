@@ -1,7 +1,5 @@
 """Defines `kinertia instruments`: plate and synchronisation errors that the trials of a session share."""
 
-from __future__ import annotations
-
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated

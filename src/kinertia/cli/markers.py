@@ -1,7 +1,5 @@
 """Defines `kinertia markers`: identifies the marker set of a recording, or drafts one."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated, Any
 

@@ -1,7 +1,5 @@
 """Defines `kinertia demo --measured`: downloads OpenSim's gait2354 example once and fits it."""
 
-from __future__ import annotations
-
 import shutil
 from pathlib import Path
 

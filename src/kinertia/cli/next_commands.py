@@ -1,7 +1,5 @@
 """Suggests the next commands where a fit was refused because no marker set fits."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from kinertia.errors import KinertiaError, findings_of

@@ -1,7 +1,5 @@
 """Defines `kinertia norms`: normative bands of a laboratory from the fits of its controls."""
 
-from __future__ import annotations
-
 import csv
 import io
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Defines the options that several commands share, and what they do at once."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 from typing import Annotated

@@ -1,7 +1,5 @@
 """Ends a command: its results for scripts (`--json`), and its exit status."""
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext

@@ -1,7 +1,5 @@
 """Defines `kinertia plan` (what to record) and `kinertia crossval` (do the BSPs explain held-out trials?)."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

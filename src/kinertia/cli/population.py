@@ -1,7 +1,5 @@
 """Defines `kinertia population`: learns the mean and spread of BSPs from the fits of a group."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any

@@ -1,7 +1,5 @@
 """Draws the progress bar of a terminal, with the time left."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 

@@ -1,7 +1,5 @@
 """Keeps the names that options and commands had in the previous version working, with a notice."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from kinertia.cli.terminal import err

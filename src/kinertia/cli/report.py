@@ -1,7 +1,5 @@
 """Defines `kinertia report`: writes the report of a fit again, from its results alone."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated, Any
 

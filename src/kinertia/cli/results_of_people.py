@@ -1,7 +1,5 @@
 """Finds folders of results: of `kinertia fit`, of a cohort, or folders that contain such folders."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

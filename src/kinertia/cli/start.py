@@ -3,8 +3,6 @@
 A terminal or pipe that is not UTF-8, as on Windows, gets a question mark for every letter that it lacks.
 """
 
-from __future__ import annotations
-
 import atexit
 import gc
 import io

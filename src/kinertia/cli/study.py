@@ -1,7 +1,5 @@
 """Defines `kinertia study ...`: studies on synthetic trials of known truth."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated

@@ -4,8 +4,6 @@ The truth differs from the literature as much as people do. Only the comparison 
 the laboratory's files.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path

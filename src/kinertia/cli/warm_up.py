@@ -1,7 +1,5 @@
 """Defines `kinertia warm-up`: compiles beforehand what the first fit would compile."""
 
-from __future__ import annotations
-
 from kinertia.cli.options import Quiet
 from kinertia.cli.outcome import Outcome
 from kinertia.cli.terminal import out, shown_progress

@@ -4,8 +4,6 @@ Dask decides what runs where, and repeats the work of a process that was killed.
 time, with one thread of the linear algebra library, as Dask sets it for its workers.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from importlib.util import find_spec

@@ -6,8 +6,6 @@ which a fit leaves out its own. The second fits are a cohort of their own, whose
 cohort, a person is fitted again when they change.
 """
 
-from __future__ import annotations
-
 import datetime
 import hashlib
 import json

@@ -1,7 +1,5 @@
 """Fits a cohort on this computer, in one process per core: each works on one person at a time, with one thread."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack

@@ -1,7 +1,5 @@
 """Lists the people of a study: a folder with a folder per person, or a CSV file with a row per person."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path

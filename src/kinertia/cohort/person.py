@@ -1,7 +1,5 @@
 """Fits one person of a cohort in a worker, and writes results and rows of the cohort's tables."""
 
-from __future__ import annotations
-
 import time
 import traceback
 from dataclasses import replace

@@ -5,8 +5,6 @@ person who cannot be fitted has only the record (`failed/NAME.json`). A record i
 SHA-256: every entry of the subject file, with the content of the files in place of their names.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Iterator, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Starts workers by SLURM and dask-jobqueue: each a job with one core that fits one person at a time."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -5,8 +5,6 @@ the node, no connection to this computer, a node that fails), dask-jobqueue keep
 jobs.
 """
 
-from __future__ import annotations
-
 import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -5,8 +5,6 @@ watchdog of `faulthandler` works without them. Dask then starts another process 
 log prevents.
 """
 
-from __future__ import annotations
-
 import faulthandler
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -4,8 +4,6 @@ Each line is a `Job`; the answer is a line of JSON, what `Finished` holds. It en
 since the command that started it is then gone.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 from collections.abc import Callable

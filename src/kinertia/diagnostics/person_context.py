@@ -1,7 +1,5 @@
 """Holds one person with all recordings, for the questions about the person."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 

@@ -4,8 +4,6 @@ A question returns all findings that apply, or fits every hypothesis and returns
 `supersedes` of the catalogue hides findings: the order of evaluation does not matter.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Generic, TypeVar

@@ -5,8 +5,6 @@ forearm's markers are centimetres off, and an arm that swings overhead jumps fro
 is visible as long as the elbow is bent.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -4,8 +4,6 @@ In the prior left and right are similar but not equal (correlation 0.9). A diffe
 from the measured lengths of the two sides, and its uncertainty shows how much larger it may be.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

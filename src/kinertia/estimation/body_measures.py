@@ -17,8 +17,6 @@ It gives no information on centres of mass across the segments, products of iner
 for the pelvis, only on its mass together with the torso.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from functools import cache

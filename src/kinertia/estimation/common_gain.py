@@ -4,8 +4,6 @@ The estimate determines gains only from the stated mass. Two plates have two amp
 person has one mass: if every plate has a gain error in the same direction, the mass is doubted first.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Selects the strides of a mean curve, the same over the whole cycle: a mean of changing strides has false steps."""
 
-from __future__ import annotations
-
 import numpy as np
 
 _AS_LONG = 0.9

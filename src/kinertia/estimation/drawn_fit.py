@@ -1,7 +1,5 @@
 """Makes a `Fit` whose motion, parameters and calibration are one draw from the posterior of another."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

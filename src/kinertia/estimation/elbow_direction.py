@@ -8,8 +8,6 @@ rotation or, with an elbow that bends backwards, half a turn more. The straighte
 a frame is weighted by the square of the sine of its flexion.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

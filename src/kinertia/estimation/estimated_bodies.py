@@ -1,7 +1,5 @@
 """Selects the bodies of an OpenSim model that are estimated; the others keep the parameters of the model."""
 
-from __future__ import annotations
-
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
 

@@ -1,7 +1,5 @@
 """Describes which ground reactions the joint moments of a trial are computed from, and why."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from kinertia.motion.ground_reactions import GroundReactions

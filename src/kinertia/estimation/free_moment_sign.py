@@ -15,8 +15,6 @@ times in most faulty ones, for which the reversed sign is tried first. Then the 
 odds, mostly within 1 of those that the second estimate gives, otherwise in favour of the sign that was not tried.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 

@@ -9,8 +9,6 @@ knee, ankle and foot of both sides, and the pelvis once, over the left side's cy
 Angles are clinical angles, as in the paper, from inverse kinematics.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

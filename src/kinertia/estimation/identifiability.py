@@ -7,8 +7,6 @@ determines follow from the regressor over its frames, with columns in prior SDs 
 deviations of the noise.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Checks a person's mass, height, sex and trials before any estimate."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, TypeVar
 

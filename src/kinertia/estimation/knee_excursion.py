@@ -1,7 +1,5 @@
 """Decides whether trials show the axes of the knees, from how far the knees bend."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

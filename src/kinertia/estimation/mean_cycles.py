@@ -5,8 +5,6 @@ estimate. Coordinates of pelvis and trunk that are opposite on the two sides (ob
 mirrored on the left, so that one norm applies to both.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

@@ -8,8 +8,6 @@ first order about the literature's body, the relative parameters: distance from 
 deviations.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -18,8 +18,6 @@ de Leva's.
   2019). Standard deviations grow.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

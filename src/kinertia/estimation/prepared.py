@@ -1,7 +1,5 @@
 """Defines `Prepared`: all input of an estimator for one person."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 

@@ -1,7 +1,5 @@
 """Defines the unknowns of the study's estimator: seven parameters of every segment or pair of segments."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

@@ -1,7 +1,5 @@
 """Formats SI quantities for people (mm, ms, degrees, %), and fills them into sentences."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Mapping, Sequence
 

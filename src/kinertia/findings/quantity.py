@@ -1,7 +1,5 @@
 """Defines a measured quantity in SI units, with the limit that it exceeds."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

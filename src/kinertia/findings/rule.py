@@ -1,7 +1,5 @@
 """Reads the catalogue of rules: `catalogue/*.toml`, a file per family, when one of its codes is asked for."""
 
-from __future__ import annotations
-
 import tomllib
 from dataclasses import dataclass
 from difflib import get_close_matches

@@ -4,8 +4,6 @@ Axes are OpenSim's (x forward, y up), lengths m, forces N. Only what the laborat
 plates, but not the model, motion and corrected forces of AddBiomechanics.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

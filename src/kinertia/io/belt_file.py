@@ -1,7 +1,5 @@
 """Reads the speed of a belt over time: a CSV table, or a column of a MOT or STO file."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Reads body segment parameters of an earlier estimate: a CSV file in the form of `bsp.csv`."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

@@ -4,8 +4,6 @@ The parts of a C3D file that are only conventions are checked against the data: 
 measure the force on the person or on the plate, whether a plate lies where its corners are.
 """
 
-from __future__ import annotations
-
 import contextlib
 import re
 import tempfile

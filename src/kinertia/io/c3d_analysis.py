@@ -1,7 +1,5 @@
 """Writes measures of strides into the group ANALYSIS of a C3D file, where Vicon's programs have them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Writes gait events that a C3D file lacks into its group EVENT."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Sequence
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """Reads events of a C3D file: foot strikes, foot offs and general ones, of the group EVENT."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Collection, Iterable, Sequence
 from typing import Any

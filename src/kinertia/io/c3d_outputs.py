@@ -6,8 +6,6 @@ become files of floats, as Vicon's own do when it adds model outputs: in the mar
 would end at 3276 and powers be rounded to 0.1. Their numbers stay.
 """
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

@@ -5,8 +5,6 @@ for its head), name, distance to the next record, then type, shape and values of
 (https://www.c3d.org/HTML/Documents/theparametersection.htm).
 """
 
-from __future__ import annotations
-
 import math
 import struct
 from collections.abc import Callable, Sequence

@@ -5,8 +5,6 @@ four corners, also in lab axes, in units made of POINT:UNITS. For type 1 the fil
 and the free moment; ezc3d's moment has the opposite sign there, so the moment is made from those two.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -4,8 +4,6 @@ One wrong byte in them can crash ezc3d, hang it, or fill the memory. Unreadable 
 only contradict themselves are read in a process that may crash (`ezc3d_library`).
 """
 
-from __future__ import annotations
-
 import math
 import struct
 from dataclasses import dataclass

@@ -5,8 +5,6 @@ The format has no place for them. Vicon's Plug-in Gait writes them to PROCESSING
 with several people, since it is unknown whose data they are.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Writes a `Recording` as a C3D file, as a laboratory's software would: lab axes with Z up, mm, type-2 force plates."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

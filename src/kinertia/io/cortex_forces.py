@@ -6,8 +6,6 @@ columns `#Sample FX1 FY1 FZ1 X1 Y1 Z1 MZ1 FX2 ...`, and a row per sample. Each p
 Sample 1 is at time zero.
 """
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -4,8 +4,6 @@ Cells are separated by commas, semicolons or tabs. Where commas do not separate 
 they do, a comma in a quoted cell is a decimal mark if one or two digits follow ("1,234" might be a thousand).
 """
 
-from __future__ import annotations
-
 import csv
 import math
 import re

@@ -5,8 +5,6 @@ path in the machine's code page and does not find `C:/Users/Müller/walk.c3d`: s
 is ASCII. On some damaged files its C++ also crashes the process or never ends: those are read in a separate process.
 """
 
-from __future__ import annotations
-
 import contextlib
 import math
 import os

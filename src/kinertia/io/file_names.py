@@ -1,7 +1,5 @@
 """Makes names of files and folders valid on every system, and reads Windows paths elsewhere."""
 
-from __future__ import annotations
-
 import os
 import re
 import unicodedata

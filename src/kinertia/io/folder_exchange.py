@@ -1,7 +1,5 @@
 """Exchanges two folders, at once where the system can."""
 
-from __future__ import annotations
-
 import ctypes
 import os
 import sys

@@ -1,7 +1,5 @@
 """Reads ground reaction forces from MOT/STO files, with or without an ExternalLoads file."""
 
-from __future__ import annotations
-
 import re
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Sequence

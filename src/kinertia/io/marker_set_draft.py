@@ -4,8 +4,6 @@ Markers are placed by geometry, with their labels as hints. Where no one stands,
 or similar names in the presets (`R.Knee`, `RKNE`, `r_knee_study`); other labels are listed to be placed by hand.
 """
 
-from __future__ import annotations
-
 import difflib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -3,8 +3,6 @@
 Copy one from `src/kinertia/io/marker_sets/` and change it.
 """
 
-from __future__ import annotations
-
 import difflib
 from collections.abc import Sequence
 from functools import cache

@@ -1,7 +1,5 @@
 """Writes and reads the sheet of girths and lengths that `kinertia init --measures` drafts."""
 
-from __future__ import annotations
-
 import csv
 import io
 from collections.abc import Mapping

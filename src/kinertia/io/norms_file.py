@@ -8,8 +8,6 @@ Names and units of the quantities are those of `cycles.csv`. Percents may be coa
 of people (n), spans of age and speed, and the convention of each quantity.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path

@@ -9,8 +9,6 @@ objects.
 Numbers are restored exactly. An object used in several places is written once.
 """
 
-from __future__ import annotations
-
 import io
 import json
 import math

@@ -1,7 +1,5 @@
 """Writes result folders that appear complete or not at all, and never overwrite other files unasked."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

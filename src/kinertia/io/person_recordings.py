@@ -1,7 +1,5 @@
 """Reads the recordings that a subject file names: static trial, motions, and marker set."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from dataclasses import replace

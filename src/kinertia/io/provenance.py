@@ -1,7 +1,5 @@
 """Records where a result comes from: command, files with their hashes, and versions."""
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import os

@@ -6,8 +6,6 @@ in the plate's own, as stated in DESCRIPTION in the header, whose corners give t
 moments N m.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass

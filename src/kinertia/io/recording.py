@@ -1,7 +1,5 @@
 """Reads one trial from its files, in any format."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -4,8 +4,6 @@ The date of a file on the disk is that of its export or copy, and the dates of p
 files are those of processing: neither is taken.
 """
 
-from __future__ import annotations
-
 import re
 from datetime import date
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Resolves labels that a file of markers gives to more than one trajectory."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path

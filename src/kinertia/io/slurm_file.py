@@ -1,7 +1,5 @@
 """Reads the SLURM settings for workers: a TOML file that a laboratory adapts to its cluster once."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """Drafts a first subject file from the recordings in a folder: `kinertia init`."""
 
-from __future__ import annotations
-
 import difflib
 import json
 import os

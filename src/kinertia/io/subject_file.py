@@ -43,8 +43,6 @@
 `read_subject` checks all of it and states the line of an error; `kinertia.io.subject_draft` drafts one.
 """
 
-from __future__ import annotations
-
 import difflib
 import os
 import re

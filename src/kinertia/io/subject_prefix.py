@@ -1,7 +1,5 @@
 """Removes the subject's name that Vicon puts before labels, as in `Anna:LASI`."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Defines the tables of a subject file (`subject_file`), with the values and the meaning of each entry."""
 
-from __future__ import annotations
-
 import datetime
 from pathlib import Path, PureWindowsPath
 from typing import Any

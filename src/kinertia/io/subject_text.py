@@ -1,7 +1,5 @@
 """Writes the text of a subject file from its entries, each with its description."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Validates entries of a subject file: existing files, names of trials, windows, belt speeds."""
 
-from __future__ import annotations
-
 import json
 import os
 from pathlib import Path

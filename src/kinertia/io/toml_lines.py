@@ -1,7 +1,5 @@
 """Reads TOML with the line of every table and key, so that errors can state it."""
 
-from __future__ import annotations
-
 import json
 import re
 import tomllib

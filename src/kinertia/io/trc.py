@@ -1,7 +1,5 @@
 """Reads and writes TRC files: marker trajectories as text."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from itertools import islice

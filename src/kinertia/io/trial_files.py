@@ -1,7 +1,5 @@
 """Finds the files of a finished fit again, by their names and hashes."""
 
-from __future__ import annotations
-
 import shlex
 from collections.abc import Iterator, Sequence
 from pathlib import Path, PurePosixPath

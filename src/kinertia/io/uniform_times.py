@@ -1,7 +1,5 @@
 """Restores uniform sample times that were rounded when they were written."""
 
-from __future__ import annotations
-
 import contextlib
 from pathlib import Path
 

@@ -6,8 +6,6 @@ one with units, and then a row per frame or, of devices, per sub frame. A force 
 same axes or in the plate's, depending on which agree (`plate_moments`).
 """
 
-from __future__ import annotations
-
 import csv
 import re
 from collections.abc import Iterator, Sequence

@@ -5,8 +5,6 @@ centres, in its pose at zero, which is upright in the usual OpenSim models. Pelv
 tables; the joint between them is centimetres higher in many models.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

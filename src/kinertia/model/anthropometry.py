@@ -10,8 +10,6 @@ Two tables, both scaled by total mass and segment lengths:
 The numbers are in `data/dumas2007.csv` and `data/deleva1996.csv`, with their units and endpoints.
 """
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace

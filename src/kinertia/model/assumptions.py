@@ -1,7 +1,5 @@
 """Replaces landmarks that are missing in a static trial by assumptions of the built-in model."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Reports how far calibration moved the joint centres of a model."""
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

@@ -6,8 +6,6 @@ never runs. The folder is beside this file or, if that is not writable, in the u
 folder for temporary files.
 """
 
-from __future__ import annotations
-
 import hashlib
 import shutil
 import tempfile

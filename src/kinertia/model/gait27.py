@@ -10,8 +10,6 @@ the directions of the axes of knees, ankles and elbows, and the axial rotation o
 which this model does not move but which differ between a T-pose and walking.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """Finds head markers among the trunk's: the head moves independently, while the model joins both."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 
 import numpy as np

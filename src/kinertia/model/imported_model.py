@@ -1,7 +1,5 @@
 """Holds a model that was read from a file: its skeleton, masses, and what is needed to write it back."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Transforms the ten dynamic parameters of a body to another frame."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from kinertia.model.bsp import inertia_of, second_moments

@@ -6,8 +6,6 @@ construction without medial markers (Davis et al. 1991); talocrural and subtalar
 et al. (2007).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

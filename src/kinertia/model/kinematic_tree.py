@@ -5,8 +5,6 @@ rotates about, or slides along, a fixed direction. Parents come first. A segment
 its carrier, the last axis that moves it. Everything is computed in ground axes.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -7,8 +7,6 @@ which is equivalent to physical consistency of the pseudo-inertia. It is the log
 anthropometric prior.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from kinertia.model.bsp import BodySegmentParameters, dynamic_by_table, inertia_of, second_moments

@@ -4,8 +4,6 @@ Numba also stores what other functions, compiled later, would need to inline it:
 load than the machine code. Only Python calls the functions stored here.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from llvmlite import binding as llvm

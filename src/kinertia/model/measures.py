@@ -5,8 +5,6 @@ head, 18 of an arm, 19 of a leg. A level (T0 to T8, A0 to A7, L0 to L9) is the p
 that `kinertia init --measures` draws shows it.
 """
 
-from __future__ import annotations
-
 import csv
 from dataclasses import dataclass
 from functools import cache

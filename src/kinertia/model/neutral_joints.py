@@ -3,8 +3,6 @@
 Mirroring is across the plane between the sides: in ground axes, and in the axes of the joints' parent bodies.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

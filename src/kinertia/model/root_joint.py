@@ -5,8 +5,6 @@ the 27-DOF model, any such triple in an OpenSim model. "Residual" always means f
 about the centre of these rotations (the pelvis origin, unless the model defines another point), in ground axes.
 """
 
-from __future__ import annotations
-
 import warnings
 from dataclasses import dataclass
 

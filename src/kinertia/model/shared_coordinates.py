@@ -1,7 +1,5 @@
 """Pairs right and left coordinates, and those that both sides share."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

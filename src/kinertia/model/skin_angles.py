@@ -1,7 +1,5 @@
 """Lists the joint angles that move the skin of a segment: those of the joints at its ends."""
 
-from __future__ import annotations
-
 from kinertia.model.skeleton import Skeleton
 
 

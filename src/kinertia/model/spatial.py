@@ -6,8 +6,6 @@ all are taken at one point. Vectors are rows of arrays (k, 6), selected by their
 for each row takes longer than the computation.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from kinertia.model.compiled import inlined

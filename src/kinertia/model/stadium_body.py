@@ -15,8 +15,6 @@ levels at which girth and width were measured. The segments are:
 Axes of the package are x to the left, y backwards, z up.
 """
 
-from __future__ import annotations
-
 import contextlib
 import io
 import warnings

@@ -5,8 +5,6 @@ et al. (2007); shoulder Rab et al. (2002). What the trial does not show is repla
 `assumptions` lists it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import NamedTuple
 

@@ -6,8 +6,6 @@ Vicon's own angles, from markers frame by frame, curves have the same shape and 
 up to 13 degrees).
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

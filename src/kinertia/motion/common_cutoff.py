@@ -7,8 +7,6 @@ times the acceleration of its centre of mass: the search ends where they contain
 slow walks, 8 or 10 Hz in brisk walks, 15 Hz in runs and jumps.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

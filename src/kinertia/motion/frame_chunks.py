@@ -4,8 +4,6 @@ The intermediate results of a frame (axes, derivatives, rows of equations) are a
 coordinates, and in a long trial never fit into memory together.
 """
 
-from __future__ import annotations
-
 FRAMES_AT_ONCE = 2000
 """Few enough to take some tens of MB, and enough that the calls take no noticeable time."""
 

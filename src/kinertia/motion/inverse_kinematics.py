@@ -8,8 +8,6 @@ continues its neighbour's, outwards from the frame that fits best, and among equ
 (`angle_continuity`). All other frames start from there.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

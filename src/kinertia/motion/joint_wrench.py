@@ -1,7 +1,5 @@
 """Computes the whole load of a leg joint; generalised forces contain only its parts along the joint's own axes."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -5,8 +5,6 @@ for each coordinate, the effects of one skin motion on pelvis and hips no longer
 walk was 53 N with cutoffs of 10 to 15 Hz, 42 N with 10 for all and 48 N with 12.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Interpolates loads between samples by natural cubic splines, with rates, in compiled code."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from kinertia.model.compiled import compiled, part

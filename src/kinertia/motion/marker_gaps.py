@@ -6,8 +6,6 @@ hundreds of times those of the body. If a marker in a gap keeps its offset, in t
 on the pose, which stays continuous.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from kinertia.model.skeleton import Skeleton

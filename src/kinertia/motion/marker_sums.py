@@ -11,8 +11,6 @@ so that the motion S in the second frame causes, in the first, the generalised f
     (sum w (l + w_ x y),  sum w x x (l + w_ x y)),    with  x x (w_ x y) = w_ (x . y) - y (x . w_).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from kinertia.model.compiled import compiled, inlined, part

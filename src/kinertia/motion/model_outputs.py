@@ -10,8 +10,6 @@ are positive. Moments (N m/kg) are internal, about the axes of the angles (flexi
 the child), and have the signs of the angles; forces (N/kg) are in the distal segment's axes x, y, z.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol, get_args

@@ -4,8 +4,6 @@ They equal those of `scipy.ndimage`, with the same order of additions: importing
 and only these few functions are needed.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from kinertia.trial.data import BoolArray, FloatArray

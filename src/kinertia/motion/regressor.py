@@ -1,7 +1,5 @@
 """Computes each segment's load per unit of its ten dynamic parameters, in compiled code."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from kinertia.model.compiled import compiled, part

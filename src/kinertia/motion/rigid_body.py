@@ -21,8 +21,6 @@ The force of an axis is S_i . f_i. Its derivative by an axis j at or beyond it u
 axis before it, the sums over what it moves itself, less S x* f, which cancels as its own direction rotates.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -4,8 +4,6 @@ They equal those of `residual_terms` and `root_regressor` of `dynamics`, for coo
 not, for the bodies and for the ground reactions, but are computed in one pass and only as far as needed.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

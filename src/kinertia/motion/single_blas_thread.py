@@ -5,8 +5,6 @@ moment are decorated with `one_blas_thread`, each step separately, so that it al
 the user's setting is restored afterwards.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache, wraps
 from typing import ParamSpec, TypeVar

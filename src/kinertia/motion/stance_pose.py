@@ -5,8 +5,6 @@ upright. These two frames, one of each leg, are put on one pelvis: rotated about
 coincide. Its knees are flexed by 10 to 20 degrees, which does not matter to a model built from segment frames.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

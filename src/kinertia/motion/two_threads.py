@@ -4,8 +4,6 @@ Compiled functions, BLAS and NumPy's larger operations release the interpreter l
 work depends on the problem alone, never on the number of threads: results are equal bit for bit.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Sequence
 from contextvars import copy_context

@@ -4,8 +4,6 @@ A walking trunk leans by a few degrees and rotates against the pelvis, so this i
 trunk is represented by three virtual markers with that uncertainty, so that the ground reactions can correct it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

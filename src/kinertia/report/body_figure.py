@@ -4,8 +4,6 @@ A segment is drawn as a capsule of its length, with the volume of water that has
 sketch to identify segments, not a measurement of the person's shape.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any, Literal

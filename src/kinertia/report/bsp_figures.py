@@ -1,7 +1,5 @@
 """Draws body segment parameters: changes with intervals, and how well the data inform each."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

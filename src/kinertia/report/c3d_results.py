@@ -1,7 +1,5 @@
 """Writes results of a trial into its C3D file, as Vicon and Visual3D name and type model outputs."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Mapping
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Draws a recording before any model: forces and contacts, centres of pressure on the plates."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Writes `check.html`: what `kinertia check` found, as one self-contained page."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path

@@ -4,8 +4,6 @@ Sessions of one person, two methods or two models on one recording: rows are bod
 others are compared with the first result.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any

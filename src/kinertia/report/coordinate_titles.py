@@ -1,7 +1,5 @@
 """Titles coordinates as gait reports do, and pairs those of the two sides."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

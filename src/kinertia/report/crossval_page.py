@@ -1,7 +1,5 @@
 """Writes the results of `kinertia crossval`: rows for the terminal, `crossval.json` and a page."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from dataclasses import asdict

@@ -5,8 +5,6 @@ of one standard deviation around it; the estimate's own 95 % band is the darker 
 dotted. There are gaps where nothing was measured.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType

@@ -1,7 +1,5 @@
 """Tabulates strides: mean and standard deviation of the spatiotemporal measures, per side."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

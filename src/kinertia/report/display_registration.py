@@ -1,7 +1,5 @@
 """Registers with `kinertia.trial.display` how trials and fits are shown and saved; loaded at the first use."""
 
-from __future__ import annotations
-
 from kinertia.estimation.gait_profile import gait_profile
 from kinertia.estimation.result import Fit, TrialFit
 from kinertia.io.norms_file import read_norms

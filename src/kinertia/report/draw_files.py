@@ -1,7 +1,5 @@
 """Writes posterior draws of a `Fit` as OpenSim's files: models, motions and external loads."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from kinertia.estimation.drawn_fit import chosen_draws, drawn_fit

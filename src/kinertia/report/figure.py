@@ -4,8 +4,6 @@ Reports do not load plotly for this: its objects check every value against a sch
 here the tests check every figure once.
 """
 
-from __future__ import annotations
-
 import base64
 import json
 from collections.abc import Mapping, Sequence

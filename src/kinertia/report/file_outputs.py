@@ -1,7 +1,5 @@
 """Compares joint angles, moments and powers of the files with Kinertia's, in Plug-in Gait's convention."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -3,8 +3,6 @@
 Everything is written to a hidden folder first and moved when complete, so a run never leaves half a result.
 """
 
-from __future__ import annotations
-
 import csv
 import json
 import math

@@ -3,8 +3,6 @@
 The report, check.html and the page in the browser share one view, so that they describe a finding in the same way.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass

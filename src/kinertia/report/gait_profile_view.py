@@ -1,7 +1,5 @@
 """Shows Movement Analysis Profile and Gait Profile Score in the report."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple

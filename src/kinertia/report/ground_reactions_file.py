@@ -1,7 +1,5 @@
 """Writes ground reactions for OpenSim: `ground_reactions.mot`, and `external_loads.xml` with what they act on."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from html import escape
 from pathlib import Path

@@ -4,8 +4,6 @@ Findings state what is wrong and `suitability` the consequence for each output; 
 that people have.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Draws marker errors: the distance of each marker from the model, and when it was not visible."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Draws the labelled markers of a recording as a figure to turn, before there is any model."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Loads matplotlib, of the extra `plots`, which draws studies and figures for papers."""
 
-from __future__ import annotations
-
 from importlib.util import find_spec
 
 from kinertia.errors import KinertiaError, how_to_install

@@ -1,7 +1,5 @@
 """Draws where to measure a person: the picture beside the sheet of girths and lengths."""
 
-from __future__ import annotations
-
 from html import escape
 
 import numpy as np

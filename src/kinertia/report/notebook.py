@@ -1,7 +1,5 @@
 """Shows a `Fit`, its trials, a `Trial` and a `Recording` in a notebook."""
 
-from __future__ import annotations
-
 from kinertia.estimation.result import Fit, TrialFit
 from kinertia.findings.finding import Severity
 from kinertia.report.finding_view import lines

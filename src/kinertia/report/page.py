@@ -3,8 +3,6 @@
 plotly.js is in the page once, compressed; its policy (Content-Security-Policy) forbids every request.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Any

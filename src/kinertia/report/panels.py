@@ -4,8 +4,6 @@ The page rearranges the panels for its width: `layout.meta.arrangements` holds t
 number of columns and for "print".
 """
 
-from __future__ import annotations
-
 import html
 import math
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Writes the results of `kinertia plan`: rows for the terminal, `plan.csv`, `plan.json` and a page."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -3,8 +3,6 @@
 A report carries it, and unpacks it when it is opened, so that it stays one file that needs no network.
 """
 
-from __future__ import annotations
-
 import base64
 import gzip
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """Renders pages from the templates beside this module."""
 
-from __future__ import annotations
-
 import sys
 from contextlib import suppress
 from functools import cache

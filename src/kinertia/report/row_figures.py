@@ -1,7 +1,5 @@
 """Draws figures of the studies: a row per recording, trial or laboratory."""
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Mapping, Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """Loads a result from its folder, without the recordings that it was estimated from: `load_fit`."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path

@@ -3,8 +3,6 @@
 `templates/scene_view.js` plays it: a small drawing of lines, dots and ellipses needs no 3-D library and stays smooth.
 """
 
-from __future__ import annotations
-
 import base64
 import json
 from collections.abc import Sequence

@@ -4,8 +4,6 @@ The torso of a model without arms includes the arms; the origin of a pelvis depe
 flexion in one model and extension in another (gait2354).
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.spatial.transform import Rotation
 

@@ -1,7 +1,5 @@
 """Shows the skeleton walking, in the report's own 3-D view and as a plotly figure."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

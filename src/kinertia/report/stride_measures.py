@@ -1,7 +1,5 @@
 """Computes mean stride measures of a trial, left and right, with Vicon's names and units."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from kinertia.estimation.result import TrialFit

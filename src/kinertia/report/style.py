@@ -1,7 +1,5 @@
 """Defines colours and lines of all figures: Okabe and Ito's palette for colour-blind people, on white."""
 
-from __future__ import annotations
-
 BLACK, ORANGE, SKY, GREEN, BLUE, VERMILION = "#000000", "#E69F00", "#56B4E9", "#009E73", "#0072B2", "#D55E00"
 GREY, PALE, UNUSED = "#6B6B6B", "#C8C8C8", "#E9E9E9"
 

@@ -1,7 +1,5 @@
 """Makes all tables of a result's numbers: for Excel, MATLAB, R and scripts."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

@@ -3,8 +3,6 @@
 Frames that were not used are shaded; vertical lines are gait events, solid at foot contact, dashed at foot off.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

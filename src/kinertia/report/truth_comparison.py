@@ -1,7 +1,5 @@
 """Compares the estimate with a synthetic person's truth: what was wrong before and after."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Words starting points and numbers for the report."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

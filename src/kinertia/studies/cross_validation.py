@@ -6,8 +6,6 @@ remaining objective (half the sum of squares of markers, root residuals and cali
 is compared with that of the literature's parameters, fixed in the same way.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal

@@ -1,7 +1,5 @@
 """Runs independent work in parallel processes; results do not depend on their number."""
 
-from __future__ import annotations
-
 import os
 import signal
 import sys

@@ -6,8 +6,6 @@ information of each trial at the literature's parameters (`predicted.Information
 except for errors that recur (`error_repetition`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations

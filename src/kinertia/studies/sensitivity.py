@@ -5,8 +5,6 @@ time: amplitude and kind of the noise, number of strides, additional squats. The
 is reported as a share of the literature's on the same people.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial

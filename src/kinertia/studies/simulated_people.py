@@ -3,8 +3,6 @@
 A draw depends on seed, scenario and its number only; people of one number are the same in every scenario.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

@@ -6,8 +6,6 @@ two-level estimator never sees the truth. `Setup` holds these steps, each of whi
 (`kinertia.studies.table1_variants`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import partial

@@ -3,8 +3,6 @@
 Its text does not describe all steps, and its tools had defaults. Each function replaces one step of a `Setup`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

@@ -5,8 +5,6 @@ same seed and number give the same starts and, unless the noise is what changes,
 noise are run in the first draw: a hypothesis that does not recover the parameters there cannot be what the study did.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from functools import partial

@@ -3,8 +3,6 @@
 The plates measure one right and one left contact; the steps before and after are not measured, as in a real laboratory.
 """
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass
 from pathlib import Path

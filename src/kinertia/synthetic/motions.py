@@ -5,8 +5,6 @@ ground, each with half of the load: squats, swinging arms, and a swaying trunk. 
 unhurried adult.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 
 import numpy as np

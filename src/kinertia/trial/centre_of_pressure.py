@@ -1,7 +1,5 @@
 """Computes where on the ground a foot's load acts."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

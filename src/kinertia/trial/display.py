@@ -4,8 +4,6 @@
 that the package's top has given with `shown_by`.
 """
 
-from __future__ import annotations
-
 from functools import singledispatch
 from importlib import import_module
 from pathlib import Path

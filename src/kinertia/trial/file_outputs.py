@@ -1,7 +1,5 @@
 """Defines `FileOutputs`: joint angles, moments and powers that other software left in a trial's file."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

@@ -3,8 +3,6 @@
 On 26 recordings of nine laboratories no plate reads below zero for more than 3 ms next to a load.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from kinertia.trial.data import LOAD_THRESHOLD_N, BoolArray, FloatArray

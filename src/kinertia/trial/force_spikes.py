@@ -6,8 +6,6 @@ not come from a foot. On 71 plates, recorded at 900 to 2000 Hz, forces differed 
 at 1000 Hz, left in the forces, changed joint moments by up to ten standard deviations.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Defines `GaitEvent` and `FileEvent`: a foot strike or foot off, as measured and as a file states it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal, NamedTuple

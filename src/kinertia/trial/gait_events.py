@@ -1,7 +1,5 @@
 """Detects heel strikes and toe offs from the loads under the feet, and compares events stated in a file with them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 
 import numpy as np

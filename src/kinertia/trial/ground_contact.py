@@ -4,8 +4,6 @@ A foot without load counts as on the ground by thresholds of this trial: the hei
 load on a plate begins or ends.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

@@ -3,8 +3,6 @@
 No file reader lets them through; they come from arrays that a user passes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Checks markers before any model is used: gaps, the vertical axis, the direction of travel."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

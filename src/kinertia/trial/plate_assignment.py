@@ -7,8 +7,6 @@ the ground follows from the heights and speeds of its markers (`kinertia.trial.g
 A hand on a rail, a chair or a second person is not detected here; loads far from both feet are left out before.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

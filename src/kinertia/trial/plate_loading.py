@@ -6,8 +6,6 @@ the joint moments of the legs. So samples that join a load without a break and e
 it, and act at the centre of pressure of the nearest sample with a reliable load.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple

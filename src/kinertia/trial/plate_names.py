@@ -5,8 +5,6 @@ feet rather than plates: each trial's columns count as plates of their own, unti
 same.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Computes root mean squares of values and of vector lengths, ignoring NaN."""
 
-from __future__ import annotations
-
 import numpy as np
 
 

@@ -3,8 +3,6 @@
 Rounding errors of the times do not change results.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 

@@ -1,7 +1,5 @@
 """Decides whether anyone moves in a recording, from the speed of the markers."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from kinertia.trial.data import Markers

@@ -13,8 +13,6 @@ least 5 times. What a file holds for an unloaded plate may also be a ratio of tw
 while neither plate is loaded, or jumps from sample to sample. Where both plates are always loaded, nothing is reported.
 """
 
-from __future__ import annotations
-
 from itertools import combinations
 
 import numpy as np

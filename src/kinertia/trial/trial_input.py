@@ -1,7 +1,5 @@
 """Holds a recording of a motion, the window that the user states, and its use."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 

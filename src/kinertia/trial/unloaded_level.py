@@ -1,7 +1,5 @@
 """Defines the reading of an unloaded force plate, and subtracts it from the loads."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

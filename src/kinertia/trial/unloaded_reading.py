@@ -1,7 +1,5 @@
 """Determines the reading of an unloaded force plate from the times at which its mean force hardly changes."""
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 

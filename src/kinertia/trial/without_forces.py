@@ -1,7 +1,5 @@
 """Makes a trial of which only the markers are used."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from kinertia.trial.data import FootLoads, Recording, Trial

@@ -7,8 +7,6 @@ of the body's segments are shares of the body mass that remains on the scale, so
 weighed with the body.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Builds the built-in model of a person from landmarks of the static trial, adapted to the trials."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """Runs `kinertia check`: a person's recordings up to inverse kinematics, or OpenSim models alone."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from kinertia.diagnostics.model import questions as model_questions

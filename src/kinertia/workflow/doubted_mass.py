@@ -1,7 +1,5 @@
 """Moves the prior to the mass of the plates, where they contradict the stated one."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

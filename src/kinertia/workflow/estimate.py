@@ -1,7 +1,5 @@
 """Runs the whole way from recordings to body segment parameters: `estimate_bsp` and its steps."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Groups files into recordings and persons, for `kinertia check` without a subject file."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Finds the widths of knees, ankles and elbows: in the subject file, the static trial, or any other file."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

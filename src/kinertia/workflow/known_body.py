@@ -5,8 +5,6 @@ none. Measured parameters are then added as measurements with errors: the mean m
 precision, and correlated parameters (of the other side, or the trunk that a thigh is cut from) move with them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Gives markers of trials the labels of the static trial or the model, where these differ in spelling only."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -4,8 +4,6 @@ The model's scaling, markers and joints stay as they are unless calibration is a
 frame: the trial is not rotated. The prior is around the model's own body segment parameters, at the mass on the scale.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Defines the model of a person that both sources, the built-in model and a user's file, return."""
 
-from __future__ import annotations
-
 import difflib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace

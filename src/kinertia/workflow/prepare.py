@@ -4,8 +4,6 @@ There is one road: the usable trials, a model adapted to them, and their kinemat
 (`built_in_model`, `opensim_model`) take the same and return the same, a `PersonModel`.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Sequence
 

@@ -4,8 +4,6 @@
 out; one of the person, or of the static trial, stops everything.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property

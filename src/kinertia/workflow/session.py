@@ -1,7 +1,5 @@
 """Combines the information from several people's trials on a session's plates and synchronisation."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """Drafts, corrects and saves the entries of a person's subject file."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from pathlib import Path

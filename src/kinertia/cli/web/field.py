@@ -1,7 +1,5 @@
 """Describes one entry of a form."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal, get_args, get_origin
 

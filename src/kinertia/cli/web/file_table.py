@@ -3,8 +3,6 @@
 The table is another view of the subject file: `file_table` makes it from the entries, `with_uses` the entries from it.
 """
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass

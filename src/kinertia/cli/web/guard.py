@@ -4,8 +4,6 @@ Any web page may send requests to 127.0.0.1, and a name that leads there makes i
 So every request needs the token and the server's own name in `Host`, and must not come from another site.
 """
 
-from __future__ import annotations
-
 import secrets
 
 from starlette.datastructures import Headers, MutableHeaders

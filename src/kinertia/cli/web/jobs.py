@@ -1,7 +1,5 @@
 """Queues checks and fits, runs each in a process of its own, and reports its progress."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress

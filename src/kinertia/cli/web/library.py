@@ -9,8 +9,6 @@
 All that is known about a person is in the folder: there is no index that could contradict it.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

@@ -1,7 +1,5 @@
 """Shows where each marker is on the body, takes corrections, and saves them as a marker set."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path

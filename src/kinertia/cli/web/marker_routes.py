@@ -1,7 +1,5 @@
 """Serves the page of a person's markers: a figure to turn, what is missing, a place for every label."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

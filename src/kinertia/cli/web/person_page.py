@@ -1,7 +1,5 @@
 """Assembles the page of one person: files, subject, findings of the check, results."""
 
-from __future__ import annotations
-
 import os
 import re
 import time

@@ -1,7 +1,5 @@
 """Makes responses: pages from templates, files of results, and errors of forms."""
 
-from __future__ import annotations
-
 import mimetypes
 import tempfile
 import zipfile

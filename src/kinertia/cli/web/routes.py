@@ -1,7 +1,5 @@
 """Maps addresses to handlers. Everything is a page, a form or a file; the state is in the library's folders."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Callable, Mapping
 from pathlib import Path

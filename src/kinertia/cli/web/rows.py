@@ -3,8 +3,6 @@
 Rows are written as typed, numbers as numbers; `read_subject` reports what is wrong with them.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

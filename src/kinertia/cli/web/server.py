@@ -1,7 +1,5 @@
 """Runs the server behind `kinertia app`: on 127.0.0.1, for one browser, with a token in its address."""
 
-from __future__ import annotations
-
 import secrets
 import socket
 import sys

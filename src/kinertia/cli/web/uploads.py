@@ -1,7 +1,5 @@
 """Accepts files that are dropped on the page: with harmless names, and of limited size."""
 
-from __future__ import annotations
-
 import os
 import tempfile
 from collections.abc import AsyncIterator

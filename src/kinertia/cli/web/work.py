@@ -1,7 +1,5 @@
 """Runs work in a process of its own, with its progress, time left and outcome."""
 
-from __future__ import annotations
-
 import sys
 import threading
 import time

@@ -6,8 +6,6 @@ A crash does not affect the page, and cancelling ends the process. Progress is r
 JSON: `{"stage": ..., "share": ...}`, and at the end `{"error": ...}` if a file or entry was at fault.
 """
 
-from __future__ import annotations
-
 import json
 import sys
 import time

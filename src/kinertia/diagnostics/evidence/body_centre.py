@@ -1,7 +1,5 @@
 """Approximates the body's centre by its markers alone, without a model."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Finds the measured part of a recording: from the first load on a plate to the last, with a margin."""
 
-from __future__ import annotations
-
 from kinertia.diagnostics.evidence.plate_contacts import loads_on
 from kinertia.trial.data import PlateLoads
 from kinertia.trial.foot_motion import AROUND_LOAD_S

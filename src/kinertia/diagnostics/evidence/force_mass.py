@@ -6,8 +6,6 @@ model is fitted; the centre's velocity is wrong by about 0.1 m/s, and by less wh
 beginning: over whole strides and steps, and in standing.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple

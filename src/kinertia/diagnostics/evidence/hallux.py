@@ -1,7 +1,5 @@
 """Estimates the position of a big toe without a marker, as the last point of push-off."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

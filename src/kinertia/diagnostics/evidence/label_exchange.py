@@ -1,7 +1,5 @@
 """Finds labels that fit a static trial or a model once they are swapped."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from itertools import combinations
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Locates landmarks and the heading of feet and pelvis: a person's axes from the markers alone."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Weighs the person on the plates, and lists the samples under load."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Pairs loads on plates with the feet near them: begin, end, and distance to both feet."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import cached_property
 

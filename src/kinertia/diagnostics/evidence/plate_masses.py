@@ -1,7 +1,5 @@
 """Weighs the body on each plate alone, while one foot stands on it and nothing else is loaded."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Weighs a person who stands still on plates, on one with both feet or on several."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

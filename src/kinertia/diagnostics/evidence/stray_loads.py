@@ -1,7 +1,5 @@
 """Finds loads that are under no foot, of another person or a thing, and takes them off the plates."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

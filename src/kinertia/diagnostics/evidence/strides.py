@@ -1,7 +1,5 @@
 """Finds out whether a person takes strides while plates are loaded, and how long they last."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import combinations, pairwise
 

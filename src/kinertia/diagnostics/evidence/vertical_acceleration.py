@@ -4,8 +4,6 @@ Vertical velocities tell these apart within two steps: a delay shifts them, a wr
 first, and a wrong gain of one plate adds to them whenever that plate is stood on.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

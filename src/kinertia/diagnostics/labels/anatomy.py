@@ -5,8 +5,6 @@ right one is on the right, and every joint whether its lateral landmark is outsi
 is not examined further. Directions are medians over the frames: a few bad frames do not count.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 

@@ -1,7 +1,5 @@
 """L106 and S311: which way does the person face and walk?"""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """L105, L107: does the static trial show the landmarks that the model's joints need?"""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """L10: does a marker set fit the labels? Which of its labels a recording has, lacks, and spells otherwise."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """Lists the questions about the labels of one recording."""
 
-from __future__ import annotations
-
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.labels.anatomy import anatomy
 from kinertia.diagnostics.labels.heading import direction_of_travel, heading

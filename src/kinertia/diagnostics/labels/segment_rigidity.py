@@ -7,8 +7,6 @@ thighs the change may reach 75 mm, but their markers then move with no other seg
 pelvis and legs in eight of these trials that change a distance by more than 60 mm, all but six are found.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from itertools import combinations

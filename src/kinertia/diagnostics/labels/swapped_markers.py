@@ -4,8 +4,6 @@ Swapped markers pull the model away, so they need not have the largest errors, a
 truth (a foot turned round). They are recognised by how well everything fits once they are swapped back.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from itertools import combinations
 

@@ -6,8 +6,6 @@ another segment or on the line between two, was computed from them. It contains 
 measurement.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from itertools import combinations, permutations
 from typing import NamedTuple

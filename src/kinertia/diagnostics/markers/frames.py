@@ -4,8 +4,6 @@ On 17 measured recordings of motions and ten synthetic ones no frame repeats the
 between its neighbours, and the median marker's step (`trajectory_faults`) is at most 1.5 mm.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

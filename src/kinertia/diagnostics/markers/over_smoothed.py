@@ -7,8 +7,6 @@ Hz (0.4 % once filtered at 6 Hz, 0.02 % and less at 2 Hz), and forces move the b
 markers show.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from itertools import combinations
 

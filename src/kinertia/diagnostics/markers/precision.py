@@ -1,7 +1,5 @@
 """M131 and M132: how precise are the coordinates of the markers? Rounded or noisy ones are found."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from kinertia.diagnostics.context import RecordingContext

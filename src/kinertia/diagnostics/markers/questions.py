@@ -1,7 +1,5 @@
 """Lists the questions about the markers of one recording."""
 
-from __future__ import annotations
-
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.markers.axes_and_floor import floor_slope, unit_and_vertical
 from kinertia.diagnostics.markers.computed_markers import computed_markers

@@ -1,7 +1,5 @@
 """M11: are single trajectories intact? Spikes, jumps, frozen markers, filled gaps, and one marker with two labels."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """M10: are the markers visible? Those that never are, rarely, or not for long; and segments without any."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from kinertia.diagnostics.context import RecordingContext

@@ -1,7 +1,5 @@
 """Are the lengths of a model in metres? Reading a model in millimetres raises no error."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import numpy as np

@@ -4,8 +4,6 @@ Mass and inertia alone determine the smallest density that a body can have: that
 and the same sum of second moments. Nothing in a person is denser than bone, at 2000 kg/m3.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

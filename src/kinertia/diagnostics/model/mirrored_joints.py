@@ -5,8 +5,6 @@ counts: the axes of bodies may be chosen freely on each side, and a skewed joint
 one. Differences in position that the lengths of the two segments explain are subtracted.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 

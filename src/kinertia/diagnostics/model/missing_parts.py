@@ -1,7 +1,5 @@
 """What does a model lack for a fit: markers, bodies of the feet, markers that trials and model have in common?"""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from kinertia.diagnostics.person_context import PersonContext

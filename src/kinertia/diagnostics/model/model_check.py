@@ -1,7 +1,5 @@
 """Tabulates a model's masses and inertias, by segment next to the literature."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple

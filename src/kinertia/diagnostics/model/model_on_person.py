@@ -10,8 +10,6 @@ their difference 5 mm (RMS; 11 mm in one). The misfit of pelvis and trunk to the
 of their mirror image, and at least 3 times if left and right are interchanged (for pelvis and thighs 0.7 and 1.3).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Are a model's masses and inertias plausible: measured, like the tables, symmetrical, and this person's?"""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

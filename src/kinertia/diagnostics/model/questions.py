@@ -1,7 +1,5 @@
 """Lists the questions about OpenSim models, alone or with the trials of a person."""
 
-from __future__ import annotations
-
 from kinertia.diagnostics.model.length_unit import length_unit
 from kinertia.diagnostics.model.mass_properties import (
     degenerate_inertia,

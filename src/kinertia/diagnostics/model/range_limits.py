@@ -1,7 +1,5 @@
 """Do the model's ranges of motion keep coordinates from the values that the markers show?"""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

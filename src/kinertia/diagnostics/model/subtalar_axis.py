@@ -5,8 +5,6 @@ and 23 degrees on average (SD 9 and 11; Isman and Inman 1969), 12 degrees from i
 a mistake, most often a lost orientation.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Are axes and units of the forces right, going by the plates alone?"""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

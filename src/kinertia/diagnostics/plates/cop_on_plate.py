@@ -1,7 +1,5 @@
 """Do centres of pressure lie on their plate?"""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -8,8 +8,6 @@ In people who land on the toes, sway or hold a foot in the air, markers of the f
 than plates are loaded. But a landing changes the body's velocity by metres a second, which shows a delay.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import chain

@@ -5,8 +5,6 @@ forefoot in the walks and runs of 14 people, most of them children (in a drop ju
 on a plate that is mirrored along the walk. People who land on the toes also push off from them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

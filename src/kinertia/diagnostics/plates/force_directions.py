@@ -7,8 +7,6 @@ each horizontal axis the mean of both correlations with the force-derived veloci
 and runs, 0.2 in squats.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 

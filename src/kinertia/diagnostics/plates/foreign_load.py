@@ -1,7 +1,5 @@
 """Asks whether the plates bear another person for a while, with the participant or elsewhere."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from kinertia.diagnostics.context import RecordingContext

@@ -10,8 +10,6 @@ pressure, the horizontal forces also have a vertical moment. On 25 fault-free tr
 fifth of it. About the middle of the plate it is 0.037 to 0.086 m, and 1.9 to 11 times the residual about that point.
 """
 
-from __future__ import annotations
-
 from collections.abc import Container, Iterator
 
 import numpy as np

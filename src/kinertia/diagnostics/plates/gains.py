@@ -5,8 +5,6 @@ within 2 %, and within 6 % where the estimate finds a gain error of 6 %. Over a 
 of the body shows more: a plate that reads too much pushes the body up whenever it is loaded.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import numpy as np

@@ -1,8 +1,6 @@
 """Is ground contact complete? Covers loads sorted by foot, frames with complete contact, and feet beside plates or both
 on one."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 

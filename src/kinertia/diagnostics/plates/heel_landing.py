@@ -1,7 +1,5 @@
 """Finds out whether feet are seen from heel to forefoot and land on the heel, as loads are expected to."""
 
-from __future__ import annotations
-
 from kinertia.diagnostics.context import RecordingContext
 
 _ENDS = (("heel",), ("metatarsal", "toe"))

@@ -1,7 +1,5 @@
 """Finds loads at the position of another plate: the channels, or corners, of two plates are interchanged."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from itertools import combinations
 

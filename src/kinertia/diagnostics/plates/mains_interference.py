@@ -4,8 +4,6 @@ On 26 recordings of nine laboratories the forces have at most 0.9 N at 50 or 60 
 16 Hz away (taken as 0.2 N at least): impacts contain all frequencies equally.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Summarises each force plate before any model: who stands on it and when."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 from kinertia.diagnostics.plates.cop_on_plate import off_plate

@@ -4,8 +4,6 @@ On 26 recordings of nine laboratories forces have steps of 4.9 N at most (one pl
 plate reads negative forces for more than 3 ms next to a load.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

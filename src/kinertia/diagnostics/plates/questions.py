@@ -3,8 +3,6 @@
 Plates, rates and delays compete as explanations.
 """
 
-from __future__ import annotations
-
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.markers.over_smoothed import over_smoothed
 from kinertia.diagnostics.plates.axes_and_units import axes_and_units

@@ -4,8 +4,6 @@ A load moves from the heel to the ball of its foot. On fourteen fault-free trial
 over a whole contact); with a plate rotated or mirrored about its middle, 106 mm and more.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import numpy as np

@@ -1,8 +1,6 @@
 """Are the plates' signals intact? Covers dead channels, dropped and repeated samples, spikes and saturated
 amplifiers."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 

@@ -5,8 +5,6 @@ reactions about it. Gait is periodic, so the mean over whole strides is nearly z
 under the right and the left foot are mirror images and cancel.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Are the plates' zeros right, going by their unloaded readings?"""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -6,8 +6,6 @@ plate is loaded; an offset common to all plates is an unmeasured force, or marke
 direction.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """R11 and R40, what is the result based on? Reports filters, forces, and what the prior decides."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from kinertia.diagnostics.result.context import ResultContext

@@ -6,8 +6,6 @@ with both plates 20 mm too far forward or back, joint moments are wrong by 6 to 
 in their 95 % intervals. With a second walk in the opposite direction, 18 of 20 mm are found.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Holds the subject of questions about a result: the fit, and the person that it was made from."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property

@@ -5,8 +5,6 @@ Otherwise the model may equally be the cause: soft tissue that lags looks like a
 like a displaced plate. Such an error is called apparent and is no reason to check an instrument.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np

@@ -8,8 +8,6 @@ trunk that bends, or skin over pelvis and shoulders, can cause it. The error of 
 both in the same direction, and in the mean over whole strides.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 from kinertia.diagnostics.result.context import ResultContext

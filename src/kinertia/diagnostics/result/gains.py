@@ -5,8 +5,6 @@ tenth more. Two plates have two amplifiers and two calibrations, but a person ha
 plates is first attributed to the mass, or to something carried.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import numpy as np

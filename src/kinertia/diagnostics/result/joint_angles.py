@@ -1,7 +1,5 @@
 """R30, are the joint angles possible, going by anatomical ranges of motion or those that the user states?"""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,8 +1,6 @@
 """M16 and M17, do markers stay where they were put? Reports markers that drift or moved, and joints corrected by
 trials."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Compares estimated masses with stated ones and with the forces: S11, S40 and R10."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from kinertia.diagnostics.result.context import ResultContext

@@ -7,8 +7,6 @@ not: on OpenSim-made walks with one plate displaced by 20 mm, it lowers the SD o
 mm.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Lists the questions about an estimate, and about a result."""
 
-from __future__ import annotations
-
 from kinertia.diagnostics.result.basis import basis, filters
 from kinertia.diagnostics.result.common_offset import common_offset
 from kinertia.diagnostics.result.context import ResultContext

@@ -7,8 +7,6 @@ judged, since no motion of the model can follow faster forces. Residuals with fo
 tools find, are reported with them; if only these exceed the guideline, the finding is an INFO.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import NamedTuple
 

@@ -5,8 +5,6 @@ information on that, the prior takes the plates as fault-free, and a rotation of
 joint moments.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """S50, were all people of a session measured with the same instruments?"""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import numpy as np

@@ -6,8 +6,6 @@ mm of the lines from heel to toe. With plates displaced by 20 mm, on nine walks,
 lines, and the correction moves them back; with cameras tilted by 1.5 degrees it moves them away.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Computes how large an error of all plates, or of one, must be for trials to show it."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation, InstrumentPrior

@@ -4,8 +4,6 @@ If one side is heavier, the cause is the body or something worn on it, even if s
 If they are far without such a reason, a wrong joint, plate or marker is likelier than an unusual body.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -4,8 +4,6 @@ Findings judge the estimate as a whole; here their consequences for each output 
 means "do not use", a WARNING "use with care".
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple

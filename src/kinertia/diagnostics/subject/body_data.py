@@ -1,7 +1,5 @@
 """Do stated mass and stature agree with the files? Which population is assumed, and which markers are not there?"""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -9,8 +9,6 @@ A scale 1.5 % off is found in all of them, but for one that is larger in a run. 
 segments with a single distance are 1 to 4 % shorter, and the pelvis is not.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations

@@ -8,8 +8,6 @@ On fault-free trials two plates agree on the mass within 2 %. In walking, a cons
 differ by 10 N, less than the marker-based centre can show, so they look the same.
 """
 
-from __future__ import annotations
-
 from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations

@@ -1,7 +1,5 @@
 """Decides which of two recordings that disagree is the odd one, by all others."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import TypeVar
 

@@ -1,7 +1,5 @@
 """Lists the questions about a person: the static trial alone, and all recordings together."""
 
-from __future__ import annotations
-
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.person_context import PersonContext
 from kinertia.diagnostics.plates.plate_height import plate_heights

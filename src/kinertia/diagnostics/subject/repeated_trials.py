@@ -1,7 +1,5 @@
 """Is one recording, or its forces, given for several trials? Counted twice, errors look half as large as they are."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from itertools import combinations
 

@@ -5,8 +5,6 @@ arms. On ten fault-free pairs of a static trial and a trial, measured in five la
 RMS at most, and single ones by 17 mm; their ratio is within 1.2 %.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations

@@ -1,7 +1,5 @@
 """Does the static trial show a person who stands on the floor with both feet flat?"""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 

@@ -5,8 +5,6 @@ the reference recordings. Single distances vary by 4 to 5 % between people, thei
 legs have shorter trunks.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -5,8 +5,6 @@ of all of the upper body, in the walks of gait2354 and of Rajagopal's model: 1 t
 the lumbar joint without trunk markers, 0.1 to 5 and 1 to 8 N m without those of the arms; all within their error bars.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from kinertia.findings.finding import Finding, finding

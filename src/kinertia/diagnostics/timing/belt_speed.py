@@ -1,7 +1,5 @@
 """Does the stated belt speed fit? Feet in stance move with the belt."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Do the events of a file coincide with the forces?"""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from kinertia.diagnostics.context import RecordingContext

@@ -5,8 +5,6 @@ shows a delay and its growth. Two steps suffice, where single contacts would be 
 it enters the accelerations, and so the factor, squared.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

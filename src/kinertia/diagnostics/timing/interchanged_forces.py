@@ -8,8 +8,6 @@ Both are compared over the same time, since residuals of short windows are small
 recording, they are compared where they overlap, and there the forces are the same.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations

@@ -7,8 +7,6 @@ ms late shows 15 to 40 ms in all but two of 27. A foot over the edge of a plate 
 one end of its step, while the forces of a late plate are late from beginning to end.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import numpy as np

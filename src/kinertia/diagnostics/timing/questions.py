@@ -1,7 +1,5 @@
 """Lists the questions of timing: belt and events of one recording, forces of several."""
 
-from __future__ import annotations
-
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.person_context import PersonContext
 from kinertia.diagnostics.runner import Question

@@ -4,8 +4,6 @@ A single contact cannot distinguish a wrong rate from a delay. But files that be
 diverge, so the delay of a load grows from its beginning to its end, and from load to load.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 

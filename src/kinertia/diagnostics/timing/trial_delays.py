@@ -8,8 +8,6 @@ direction by at most 4 ms; even trials of eight people with different skin motio
 than a second differ by up to 15 ms.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Stores the arrays of a long trial, which do not fit into memory, in a temporary file."""
 
-from __future__ import annotations
-
 import tempfile
 from typing import IO
 

@@ -3,8 +3,6 @@
 A load f on a segment reduces the force of every axis S that moves the segment by S . f.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from kinertia.model.compiled import compiled

@@ -4,8 +4,6 @@ SciPy's own wrappers hold the global interpreter lock while they run; these rele
 row-major (C order) and of one precision; BLAS reads them column-major, as their transposes.
 """
 
-from __future__ import annotations
-
 import ctypes
 from collections.abc import Callable
 from functools import cache, lru_cache

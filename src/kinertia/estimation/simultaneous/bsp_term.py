@@ -1,7 +1,5 @@
 """Adds body segment parameters to the estimate: their unknowns, and their cost against the literature and the scale."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Defines `CalibrationEntry`: one calibrated quantity, as users read it in the table."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from typing import Any, Literal

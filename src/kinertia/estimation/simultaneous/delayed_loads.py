@@ -6,8 +6,6 @@ which enters like a derivative. Its residual is added as independent. Both toget
 loads, however they change.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -5,8 +5,6 @@ evaluated. At the literature's parameters it predicts what a recording will dete
 bound of the estimator's own noise model, prior included.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property

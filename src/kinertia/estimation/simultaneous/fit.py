@@ -1,7 +1,5 @@
 """Runs the simultaneous estimate on measured trials of one person: priors, observations, outcome."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 

@@ -8,8 +8,6 @@ deviations wide, and with the wrong sign as often as not. With less weight for t
 parameters that contradicted the literature in thirteen measured trials no longer do.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.interpolate import make_lsq_spline
 

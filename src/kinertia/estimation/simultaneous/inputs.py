@@ -1,7 +1,5 @@
 """Holds the input of the simultaneous estimate, and the person's model as a function of its unknowns."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property

@@ -7,8 +7,6 @@ also changes a joint moment by more than the moment's own uncertainty and no oth
 The estimate solves for corrections of positions, gains and free moments. Here all become errors, recorded minus true.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import count

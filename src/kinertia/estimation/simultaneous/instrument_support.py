@@ -5,8 +5,6 @@ lags looks like delayed forces, a bending trunk like a displaced plate. Users wh
 an error there. So an error must matter, by its effect on joint moments, and be present in every trial.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Adds errors of force plates and synchronisation: the laboratory's in all trials, and each trial's own."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

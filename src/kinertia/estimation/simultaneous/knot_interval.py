@@ -3,8 +3,6 @@
 The same six splines are active in all frames of an interval, and seven with the two frames after it.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

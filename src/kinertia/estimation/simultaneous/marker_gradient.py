@@ -1,7 +1,5 @@
 """Computes only the gradient of `marker_terms`, in a tenth of the time."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from kinertia.estimation.simultaneous.marker_errors import LATER

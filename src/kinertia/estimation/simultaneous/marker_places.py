@@ -1,7 +1,5 @@
 """Adds the positions of markers in their segments: common to all trials, with offsets in each."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -7,8 +7,6 @@ two after them. They are summed over the frames of a knot interval, in which the
 with those after it.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -8,8 +8,6 @@ handrail or one delayed plate also makes centres of mass differ by 6 and more. E
 joints make nothing differ by more than 2, except the zero offset of a plate's vertical force.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

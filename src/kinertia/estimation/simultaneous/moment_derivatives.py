@@ -1,7 +1,5 @@
 """Computes joint moments, and the derivatives of moments and ground reactions by all unknowns."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

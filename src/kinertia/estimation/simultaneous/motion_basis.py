@@ -1,7 +1,5 @@
 """Represents the coordinates of a trial by uniform quintic B-splines."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.interpolate import BSpline
 from scipy.linalg import solveh_banded

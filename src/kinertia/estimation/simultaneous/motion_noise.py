@@ -7,8 +7,6 @@ estimate hardly depends on it, but standard deviations of joint moments do. So t
 the markers at the estimate, within the band of the motion.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

@@ -3,8 +3,6 @@
 Noise is estimated by `marker_noise`. All standard deviations are inflated where errors recur (`error_repetition`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property

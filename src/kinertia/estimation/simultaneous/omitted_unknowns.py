@@ -1,7 +1,5 @@
 """Adds the variance of unknowns that are left out of the vector, because they only displace others."""
 
-from __future__ import annotations
-
 import numpy as np
 
 

@@ -5,8 +5,6 @@ plate's middle, moved to the plate's true position, corrected for crosstalk into
 the gain. The errors of a plate are a row of seven: PLATE_ERRORS, then ZERO_UNKNOWNS, of `plates`.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from kinertia.model.compiled import compiled, part

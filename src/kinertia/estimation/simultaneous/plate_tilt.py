@@ -6,8 +6,6 @@ distinguished from a zero offset; in the next, in which the plates bear other lo
 It is part of the uncertainty of zero offsets from one trial.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from kinertia.estimation.simultaneous.observed_trial import Observation

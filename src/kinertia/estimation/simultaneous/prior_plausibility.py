@@ -6,8 +6,6 @@ determine better than the prior, the squares sum to chi-square. A parameter may 
 not. The total mass is excluded as far as scale and plates may disagree, which has a warning of its own.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

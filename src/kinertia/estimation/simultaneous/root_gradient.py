@@ -6,8 +6,6 @@ contribution to an axis' position, rate and acceleration is
     L . (S x* f) + (L B) . P + (I L) . Q        (L B) . S + 2 (I L) . P        (I L) . S
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from kinertia.model.compiled import compiled, part

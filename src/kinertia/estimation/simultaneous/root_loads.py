@@ -1,7 +1,5 @@
 """Adds the root equations: the residual between ground reactions and the body's motion."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from kinertia.estimation.simultaneous.cost_term import CostTerm, InTrial

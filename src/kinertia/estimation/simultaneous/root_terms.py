@@ -1,7 +1,5 @@
 """Evaluates the root equations at some frames of a trial, linearised or as a gradient, in standard deviations."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple

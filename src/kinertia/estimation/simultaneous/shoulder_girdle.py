@@ -7,8 +7,6 @@ drop jump with arms swung overhead, when they were taken to be, four centimetres
 a trunk without any inertia about its long axis, and by a force plate displaced by 36 mm.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from kinertia.model.anatomy import segment_of

@@ -7,8 +7,6 @@ errors are derived (`motion_noise`). The error bars of hip flexion moments are l
 person's skin. Draws of the posterior are not wider.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from kinertia.estimation.simultaneous.problem import MapProblem

@@ -1,7 +1,5 @@
 """Adds skin motion that follows the joints: the coefficients of its patterns."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from kinertia.estimation.simultaneous.cost_term import CostTerm

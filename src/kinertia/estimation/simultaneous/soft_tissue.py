@@ -5,8 +5,6 @@ as a frame of a jump counted as much as a frame of standing. The error of rigid 
 that accelerates the body.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from kinertia.motion.moving_windows import even_mean

@@ -6,8 +6,6 @@ CHANGE_SD. The change itself is nearly free, AWAY_SD. Otherwise each of the thou
 would fix a constant offset of a joint angle, which misplaced markers have put into the start, and count it as known.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from kinertia.estimation.simultaneous.cost_term import CostTerm, InTrial

@@ -1,7 +1,5 @@
 """Adds joint centres and tilts of joint axes, which are the same in all trials."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

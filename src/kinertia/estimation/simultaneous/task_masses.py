@@ -6,8 +6,6 @@ neither. Trials of one person agreed on the mass of a thigh within a task but no
 uncertainty of an estimate from one task, the more the farther that task flexes the hips.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

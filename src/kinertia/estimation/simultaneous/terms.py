@@ -1,7 +1,5 @@
 """Lists the cost terms of the simultaneous estimate. A new unknown is a new term."""
 
-from __future__ import annotations
-
 from kinertia.estimation.simultaneous.bsp_term import BodySegments
 from kinertia.estimation.simultaneous.cost_term import CostTerm
 from kinertia.estimation.simultaneous.instrument_term import InstrumentErrors

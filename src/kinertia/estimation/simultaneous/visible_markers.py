@@ -1,7 +1,5 @@
 """Holds the visible markers of a trial for compiled functions, and their positions in a frame."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Finds computed points of a recording: bone axes, joint centres, projections and copies."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import combinations, permutations
 

@@ -1,7 +1,5 @@
 """Reads hints from marker labels: side, landmark, segment, and computed points."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from functools import cache

@@ -1,7 +1,5 @@
 """Finds landmarks of pelvis, legs and feet of a standing person, from the pelvis down."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 

@@ -1,7 +1,5 @@
 """Assigns markers of a standing person to landmarks and segments, with the reason for each."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any

@@ -1,7 +1,5 @@
 """Assigns the markers of a standing person to segments, by the landmarks around them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Expresses the markers of a standing person in body axes, with the hints of their labels."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

@@ -1,7 +1,5 @@
 """Finds landmarks of trunk and arms of a standing person; arms may be anywhere and rely more on labels."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from kinertia.io.marker_places.leg_search import Found

@@ -3,8 +3,6 @@
 Means and SDs were set by hand from published standing trials of adults and children, with allowance for posture.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

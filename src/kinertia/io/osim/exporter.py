@@ -5,8 +5,6 @@ constants: those at the beginning and end of a joint place its frames in parent 
 stay as axes that do not move. OpenSim 4.0 and later open it. There are no muscles and no geometry.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Sequence
 from html import escape

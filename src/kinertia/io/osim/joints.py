@@ -4,8 +4,6 @@ All OpenSim joints are such lists; a CustomJoint defines the function and the co
 others have one coordinate per axis. Constant axes become locked coordinates of their own (`<joint>/<axis>`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal

@@ -1,7 +1,5 @@
 """Reads properties of an OpenSim file's elements as Python values, with defaults; errors name the line."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path

@@ -4,8 +4,6 @@ Muscles, wrapping, geometry and controllers are not read; `kinertia.io.osim.edit
 element that cannot be represented raises an error that identifies it.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
