@@ -1,11 +1,10 @@
 """The files of a measured person, to be spoilt: read, with what idle plates read put back, and written as before."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 
@@ -48,19 +47,19 @@ class MeasuredPerson:
             raise ValueError("the walk has no force plates")
         return self.walk.plates
 
-    def in_static(self, change: Callable[[Markers], Markers]) -> MeasuredPerson:
+    def in_static(self, change: Callable[[Markers], Markers]) -> Self:
         """Change the markers of the static trial."""
         return replace(self, static=replace(self.static, markers=change(self.static.markers)))
 
-    def in_walk(self, change: Callable[[Markers], Markers]) -> MeasuredPerson:
+    def in_walk(self, change: Callable[[Markers], Markers]) -> Self:
         """Change the markers of the walk."""
         return replace(self, walk=replace(self.walk, markers=change(self.walk.markers)))
 
-    def in_both(self, change: Callable[[Markers], Markers]) -> MeasuredPerson:
+    def in_both(self, change: Callable[[Markers], Markers]) -> Self:
         """Change the markers of both trials."""
         return self.in_static(change).in_walk(change)
 
-    def with_plates(self, plates: PlateLoads) -> MeasuredPerson:
+    def with_plates(self, plates: PlateLoads) -> Self:
         """Replace the loads of the walk."""
         return replace(self, walk=replace(self.walk, plates=plates))
 

@@ -11,11 +11,10 @@ of its place by PLACE_SD_M, so that people differ. The donor's strides follow ea
 stride drawn for each leg. The left leg is the mirror image, with curves of its own.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 import pandas as pd
@@ -50,7 +49,7 @@ class MeasuredSkin:
     segments: np.ndarray
 
     @classmethod
-    def read(cls, path: Path) -> MeasuredSkin:
+    def read(cls, path: Path) -> Self:
         """Read the only donor of a file, or its first."""
         with np.load(path) as file:
             name = next(key for key in file if key.endswith("_moved")).removesuffix("_moved")

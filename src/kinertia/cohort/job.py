@@ -1,11 +1,10 @@
 """Defines a job of a cohort, one person to fit, and guesses how long jobs take."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from typing import Self
 from uuid import uuid4
 
 from kinertia.cohort.record import FAILED, Record, Standing, one_line
@@ -44,7 +43,7 @@ class Job:
     run: str = field(default_factory=lambda: uuid4().hex)
 
     @classmethod
-    def of(cls, one: Standing, cohort: Path) -> Job:
+    def of(cls, one: Standing, cohort: Path) -> Self:
         """Create the job of fitting a person who is due, into the folder of the cohort."""
         if one.person.subject is None:
             raise ValueError(f"{one.person.name} is not due")
@@ -52,7 +51,7 @@ class Job:
         return cls(one.person.name, one.person.subject.resolve(), cohort, one.inputs, one.trials, limit_s)
 
     @classmethod
-    def of_text(cls, text: str) -> Job:
+    def of_text(cls, text: str) -> Self:
         """Read `text`."""
         entries = json.loads(text)
         paths = {name: Path(entries[name]) for name in ("subject", "cohort")}

@@ -4,8 +4,6 @@ The page (`cli.web`) and cohorts on this computer work this way: a crash, or fil
 else, and cancelling ends the process.
 """
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys
@@ -13,7 +11,7 @@ import threading
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 _OF_ITS_OWN: dict[str, Any] = {"process_group": 0}
 if sys.platform == "win32":
@@ -81,7 +79,7 @@ class Process:
         self._listener.join()
         return "".join(self._log)
 
-    def __enter__(self) -> Process:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -1,7 +1,5 @@
 """Logs seconds and memory of each person's fit, to plan the next run."""
 
-from __future__ import annotations
-
 import csv
 import json
 import math
@@ -12,7 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Self, TypeVar
 
 from kinertia.cohort.record import Record
 from kinertia.io.csv_file import inert
@@ -38,7 +36,7 @@ class Finished:
     memory_mb: float = math.nan
 
     @classmethod
-    def of(cls, entries: Mapping[str, Any]) -> Finished:
+    def of(cls, entries: Mapping[str, Any]) -> Self:
         """Read `text`, parsed."""
         return cls(**{**entries, "record": Record(**entries["record"])})
 

@@ -1,9 +1,7 @@
 """Names an axis twice: as the person moves, and as the laboratory's files have it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from typing import TypedDict
+from typing import Self, TypedDict
 
 import numpy as np
 
@@ -36,7 +34,7 @@ class Axes:
     fore_aft: int = 0
 
     @classmethod
-    def of(cls, vertical: str, moves: Travel) -> Axes:
+    def of(cls, vertical: str, moves: Travel) -> Self:
         """Name the axes of a recording: fore-aft is X unless the person walks along Z."""
         along_z = moves.kind == "walks" and abs(np.sin(np.radians(moves.direction_deg))) > np.sqrt(0.5)
         return cls(vertical, 2 if along_z else 0)

@@ -20,10 +20,9 @@ The information of the recordings is linear in the dynamic parameters (`person_i
 these are used for those of masses, centres of mass and moments about them, which is correct to first order.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -79,7 +78,7 @@ class LearntPrior:
         return np.maximum(0.0, 1.0 - np.diag(self.covariance) / (BETWEEN + WITHIN))
 
     @classmethod
-    def from_file(cls, file: PopulationFile) -> LearntPrior:
+    def from_file(cls, file: PopulationFile) -> Self:
         """Read the prior from a file of `kinertia population`."""
         mean, mean_sd, covariance = (np.array(values) for values in (file.mean, file.mean_sd, file.covariance))
         return cls(file.segments, mean, mean_sd, covariance, len(file.people))
@@ -170,7 +169,7 @@ class _Means:
     blocks: tuple[np.ndarray, ...]
 
     @classmethod
-    def of(cls, root: np.ndarray, people: Sequence[PersonInformation]) -> _Means:
+    def of(cls, root: np.ndarray, people: Sequence[PersonInformation]) -> Self:
         """Build the prior from the people's literature values."""
         with_mass = np.mean([_moments_with_mass(one.literature) for one in people], axis=0)
         sides = by_side(people[0].segments)
@@ -222,7 +221,7 @@ class _Seen:
     rhs: np.ndarray
 
     @classmethod
-    def of(cls, root: np.ndarray, people: Sequence[PersonInformation]) -> _Seen:
+    def of(cls, root: np.ndarray, people: Sequence[PersonInformation]) -> Self:
         """Transform the people's information to the coordinates x of root x."""
         values, vectors = np.linalg.eigh([root.T @ one.information @ root for one in people])
         most = int((values > _NOTHING * values.max()).sum(axis=1).max())

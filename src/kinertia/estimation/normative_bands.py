@@ -1,10 +1,8 @@
 """Computes normative bands from the fits of controls: mean and SD between people."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -40,7 +38,7 @@ class Control:
     convention: str
 
     @classmethod
-    def of(cls, fit: Fit) -> Control:
+    def of(cls, fit: Fit) -> Self:
         """Extract the data from a fit.
 
         Raises:

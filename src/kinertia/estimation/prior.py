@@ -17,11 +17,10 @@ Correlations: mass cut from the thigh goes to the trunk (the hip's cut plane is 
 and right differ less from each other than from the literature: people are nearly, but not exactly, symmetric.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
+from typing import Self
 
 import numpy as np
 
@@ -119,7 +118,7 @@ class BspPrior:
         """Indicator (s,): 1 for segments included in the scale's mass, 0 for others."""
         return np.ones(len(self.mean.segments)) if self.weighed is None else np.array(self.weighed, dtype=float)
 
-    def at_mass(self, mass_kg: float, sd_kg: float) -> BspPrior:
+    def at_mass(self, mass_kg: float, sd_kg: float) -> Self:
         """Return the prior of a person of the same build with this mass, known to this standard deviation."""
         factor = mass_kg / self.mass_kg
         rows = np.where(np.isin(PARAMETERS, ("com_x", "com_y", "com_z")), 1.0, factor)

@@ -1,9 +1,8 @@
 """Computes the mass of the body alone, and the total mass that the forces support."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Self
 
 from kinertia.errors import PriorError
 from kinertia.findings.finding import with_evidence
@@ -44,7 +43,7 @@ class TotalMass:
         return f"{self.total_kg:.1f} kg" + (f", {beside:.1f} kg of it attached" if beside else "")
 
     @classmethod
-    def of(cls, stated_mass_kg: float, attached: Sequence[Attached]) -> TotalMass:
+    def of(cls, stated_mass_kg: float, attached: Sequence[Attached]) -> Self:
         """Compute the masses from the stated mass.
 
         Raises:

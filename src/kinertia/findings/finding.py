@@ -5,12 +5,10 @@ recorded minus true: positive means that it reads too much, lies too far along t
 counter-clockwise seen from above, or is delayed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import IntEnum
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
 from kinertia.findings.display import filled
 from kinertia.findings.quantity import Quantity
@@ -108,19 +106,19 @@ class Finding:
         """Whether the finding is neither explained by another nor overruled."""
         return self.status == "open" and self.muted_by is None
 
-    def muted(self, by: str) -> Finding:
+    def muted(self, by: str) -> Self:
         """Return the finding as explained by the finding of that code."""
         return replace(self, muted_by=by)
 
-    def at(self, severity: Severity) -> Finding:
+    def at(self, severity: Severity) -> Self:
         """Return the finding with another severity."""
         return replace(self, severity=severity)
 
-    def in_trial(self, trial: str | None) -> Finding:
+    def in_trial(self, trial: str | None) -> Self:
         """Return the finding as found in that trial; in no trial if None."""
         return replace(self, where=replace(self.where, trial=trial))
 
-    def in_file(self, file: str) -> Finding:
+    def in_file(self, file: str) -> Self:
         """Return the finding as found in that file."""
         return replace(self, where=replace(self.where, file=file))
 

@@ -8,9 +8,7 @@ force has no horizontal moment about the centre of pressure. So the point c is t
 has none, by least squares over the loaded samples; the rest is the free moment.
 """
 
-from __future__ import annotations
-
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -38,7 +36,7 @@ class PlateMoments(NamedTuple):
         return self.mismatch <= MOMENTS_FIT
 
     @classmethod
-    def of(cls, force: FloatArray, moment: FloatArray, point: FloatArray) -> PlateMoments:
+    def of(cls, force: FloatArray, moment: FloatArray, point: FloatArray) -> Self:
         """Compute from force (k, 3) N, moment (k, 3) N m about an unknown point, and centre of pressure (k, 3) m."""
         at = np.cross(np.nan_to_num(point), force)
         with np.errstate(over="ignore"):

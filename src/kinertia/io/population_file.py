@@ -4,12 +4,10 @@ The top lists, for readers, what was learnt about each parameter. Below are mean
 and the files that they are from, so that no recordings count twice.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Self
 
 import numpy as np
 from pydantic import Field, ValidationError, model_validator
@@ -52,7 +50,7 @@ class PopulationFile(Table):
     covariance: tuple[Numbers, ...] = Field(strict=False)
 
     @model_validator(mode="after")
-    def _complete(self) -> PopulationFile:
+    def _complete(self) -> Self:
         size = len(PARAMETERS) * len(self.segments)
         if {len(self.mean), len(self.mean_sd), len(self.covariance), *map(len, self.covariance)} != {size}:
             raise ValueError(f"mean and covariance must have {size} rows and columns for {len(self.segments)} segments")

@@ -6,11 +6,10 @@ force of a coordinate is the sum over its axes of f' times the axis' force. If e
 is computed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 
@@ -32,9 +31,7 @@ class CoordinateMap:
     count: int
 
     @classmethod
-    def of(
-        cls, coordinates: Sequence[str], followed: Sequence[str], functions: Sequence[AxisFunction | None]
-    ) -> CoordinateMap:
+    def of(cls, coordinates: Sequence[str], followed: Sequence[str], functions: Sequence[AxisFunction | None]) -> Self:
         """Make the map of axes that depend on these coordinates (one name per axis) by these functions."""
         index = {name: i for i, name in enumerate(coordinates)}
         return cls(np.array([index[name] for name in followed], dtype=int), tuple(functions), len(coordinates))

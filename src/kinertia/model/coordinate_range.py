@@ -6,11 +6,10 @@ markers nearly as well. Ranges select one of them; and where markers have errors
 motion (`range_of_motion`) is less likely than a displaced marker.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 
@@ -78,7 +77,7 @@ class Bounds:
     anatomical: np.ndarray
 
     @classmethod
-    def of(cls, coordinates: Sequence[str], ranges: Mapping[str, Range]) -> Bounds:
+    def of(cls, coordinates: Sequence[str], ranges: Mapping[str, Range]) -> Self:
         """Collect the ranges of these coordinates, in this order."""
         own = [ranges.get(name, UNKNOWN) for name in coordinates]
         known = [one.anatomical(name) for one, name in zip(own, coordinates, strict=True)]

@@ -3,13 +3,12 @@
 Only marker sets contain a laboratory's labels. They come from files (`kinertia.io.marker_set_file`).
 """
 
-from __future__ import annotations
-
 import difflib
 import re
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Self
 
 import numpy as np
 
@@ -98,7 +97,7 @@ class MarkerSet:
         """Return the labels of the markers on the right ("r") and left ("l") foot."""
         return {side: list(self.segments[f"foot_{side}"]) for side in "rl"}
 
-    def without(self, labels: Collection[str]) -> MarkerSet:
+    def without(self, labels: Collection[str]) -> Self:
         """Return the set without these labels, and without the landmarks that need one of them."""
         return replace(
             self,

@@ -10,12 +10,10 @@ In the 27-DOF model an axis is its coordinate. In an OpenSim model it may be a f
 the same one: `Skeleton.map` converts between coordinates and axes. The tree (`KinematicTree`) contains axes only.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Literal
+from typing import Literal, Self
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -174,33 +172,33 @@ class Skeleton:
             np.asarray(joint.child_translation),
         )
 
-    def lock(self, values: Mapping[str, float]) -> Skeleton:
+    def lock(self, values: Mapping[str, float]) -> Self:
         """Return the skeleton with these coordinates fixed at these values (rad or m)."""
         self._check_names(values)
         return replace(self, locked={**self.locked, **values})
 
-    def free(self, names: Iterable[str]) -> Skeleton:
+    def free(self, names: Iterable[str]) -> Self:
         """Return the skeleton with these coordinates freed again."""
         names = set(names)
         self._check_names(names)
         return replace(self, locked={k: v for k, v in self.locked.items() if k not in names})
 
-    def unbounded(self, names: Iterable[str]) -> Skeleton:
+    def unbounded(self, names: Iterable[str]) -> Self:
         """Return the skeleton with unlimited ranges of these coordinates, disregarding model and anatomy."""
         return replace(self, ranges={**self.ranges, **dict.fromkeys(names, ANYTHING)})
 
-    def with_markers(self, markers: Sequence[Marker]) -> Skeleton:
+    def with_markers(self, markers: Sequence[Marker]) -> Self:
         """Return the skeleton with other markers."""
         other = replace(self, markers=tuple(markers))
         other.__dict__.update(tree=self.tree, map=self.map)  # markers move nothing
         return other
 
-    def with_positions(self, positions: np.ndarray) -> Skeleton:
+    def with_positions(self, positions: np.ndarray) -> Self:
         """Return the skeleton with its markers at these positions (m, 3) in their segments."""
         rows = zip(self.markers, positions, strict=True)
         return self.with_markers([replace(marker, position=place) for marker, place in rows])
 
-    def carrying(self, bsp: BodySegmentParameters | None) -> Skeleton:
+    def carrying(self, bsp: BodySegmentParameters | None) -> Self:
         """Return the skeleton with these fixed parameters of segments."""
         return replace(self, carried=bsp)
 

@@ -6,10 +6,9 @@ are equal (Euler angles). Frame by frame inverse kinematics may find any of them
 not jump unless the segment does, and among these the ones within the coordinates' ranges.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
@@ -55,7 +54,7 @@ class EquivalentAngles:
     neutral: np.ndarray
 
     @classmethod
-    def of(cls, model: Skeleton) -> EquivalentAngles:
+    def of(cls, model: Skeleton) -> Self:
         """Find the equivalent angles of a skeleton."""
         joints = tuple(angles for joint in model.joints if (angles := _three_angles(model, joint)) is not None)
         taken = {column for joint in joints for column in joint.columns}

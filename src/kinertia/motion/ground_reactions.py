@@ -12,10 +12,9 @@ from the foot that causes it, where it exceeds the usual error of rigid segments
 bandwidth (the two-level estimate of the study), nothing is faster.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 
@@ -66,7 +65,7 @@ class GroundReactions:
     without_impact: bool = False
 
     @property
-    def whole(self) -> GroundReactions:
+    def whole(self) -> Self:
         """The ground reactions with the impact: the whole load on each foot, even if the motion cannot follow it."""
         if not self.without_impact:
             return self

@@ -1,9 +1,8 @@
 """Computes speed, cadence, lengths and times of strides."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
@@ -82,7 +81,7 @@ class _Ground:
     belt: Belt | None
 
     @classmethod
-    def of(cls, feet: FeetUnderPelvis, strides: Sequence[Stride], belt: Belt | None) -> _Ground:
+    def of(cls, feet: FeetUnderPelvis, strides: Sequence[Stride], belt: Belt | None) -> Self:
         """Determine the velocity of the ground from feet in stance."""
         return cls(_belt_velocities(feet, strides), belt)
 

@@ -4,11 +4,9 @@ The truth is a `SyntheticTrial`; the laboratory has noisy markers, loads measure
 skeleton. Only these three are returned, as `Kinematics`; the estimator gets only what files would contain.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Literal, Self
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -146,7 +144,7 @@ class _Instruments:
     turn_rad: np.ndarray
 
     @classmethod
-    def draw(cls, rng: np.random.Generator, prior: InstrumentPrior) -> _Instruments:
+    def draw(cls, rng: np.random.Generator, prior: InstrumentPrior) -> Self:
         """Draw the errors from a prior of `fit_simultaneous`."""
         own = {name: each for name, each in prior.plate.items() if name != "turn"}
         plates = np.array([[each.draw(rng) for each in own.values()] for _ in range(2)])
@@ -157,7 +155,7 @@ class _Instruments:
         turn_rad = prior.floor["turn"].draw(rng) + np.array([prior.plate["turn"].draw(rng) for _ in range(2)])
         return cls(delay_s, offset, 1.0 + plates[:, 2:3], plates[:, 3], np.zeros((2, 3)), turn_rad)
 
-    def in_trial(self, rng: np.random.Generator, prior: InstrumentPrior, one_of_several: bool) -> _Instruments:
+    def in_trial(self, rng: np.random.Generator, prior: InstrumentPrior, one_of_several: bool) -> Self:
         """Add the errors of a single trial: zero offsets, gains, and a delay if it is one of several or was not
         checked."""
         zero = np.array([[prior.zero_offset_n.draw(rng), 0.0, prior.zero_offset_n.draw(rng)] for _ in range(2)])
@@ -167,7 +165,7 @@ class _Instruments:
         return replace(self, zero_offset_n=zero, delay_s=self.delay_s + trial_delay_s, gain=gain)
 
     @classmethod
-    def with_faults(cls, faults: Faults) -> _Instruments | None:
+    def with_faults(cls, faults: Faults) -> Self | None:
         """Make the instruments of a laboratory without calibration errors; None if they are fault-free."""
         if not (faults.gain or faults.plate_m or faults.delay_s):
             return None

@@ -1,10 +1,9 @@
 """Varies the manner of walking: pace, and posture and swing of trunk and arms."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
+from typing import Self
 
 import numpy as np
 
@@ -36,7 +35,7 @@ class Manner:
     swing: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
 
     @classmethod
-    def draw(cls, rng: np.random.Generator) -> Manner:
+    def draw(cls, rng: np.random.Generator) -> Self:
         """Draw a manner of walking, the same on both sides."""
         pace = float(np.clip(rng.normal(1.0, _PACE_SD), _SLOWEST, _FASTEST))
         swing = {name: float(np.exp(rng.normal(0.0, _SWING_SD))) for name in _SWUNG}

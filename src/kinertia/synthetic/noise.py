@@ -5,10 +5,9 @@ Markers: the study's sinusoids (`study_noise`), a soft-tissue artefact that move
 (`plate_noise`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -73,7 +72,7 @@ class SkinMotion:
     @classmethod
     def draw(
         cls, skeleton: Skeleton, q: np.ndarray, rng: np.random.Generator, others: Sequence[np.ndarray] = ()
-    ) -> SkinMotion:
+    ) -> Self:
         """Draw random directions per joint angle, and peak-to-peak sizes over the coordinates q (n, c) of a walk.
 
         Sizes are from `ARTEFACT_RANGE_M`: 10-18 mm on the thigh, 7-17 mm on the shank, 4-9 mm elsewhere; less where the

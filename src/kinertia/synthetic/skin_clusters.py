@@ -6,10 +6,9 @@ three axes and rotations about three, each a sum of the stride's first harmonics
 markers.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -35,7 +34,7 @@ class ClusterMotion:
     waves: Mapping[str, np.ndarray]
 
     @classmethod
-    def draw(cls, skeleton: Skeleton, rng: np.random.Generator) -> ClusterMotion:
+    def draw(cls, skeleton: Skeleton, rng: np.random.Generator) -> Self:
         """Draw random phases; the amplitude of a harmonic is inversely proportional to its number."""
         waves = {}
         phase = 2.0 * np.pi * np.linspace(0.0, 1.0, 100)[:, None] * _HARMONICS

@@ -10,11 +10,10 @@ true BSPs, returns the motion itself):
   until the residual is zero.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib import resources
+from typing import Self
 
 import numpy as np
 import pandas as pd
@@ -236,7 +235,7 @@ class _WalkSeries:
     contacts: tuple[tuple[float, float], tuple[float, float]]
 
     @classmethod
-    def read(cls) -> _WalkSeries:
+    def read(cls) -> Self:
         text = (resources.files("kinertia.synthetic") / "data" / "walk.csv").read_text(encoding="utf-8")
         entries = dict(line[1:].split(" = ") for line in text.splitlines() if line.startswith("#") and " = " in line)
         numbers = {key.strip(): [float(part) for part in value.split(",")] for key, value in entries.items()}
@@ -248,7 +247,7 @@ class _WalkSeries:
             (contacts[0], contacts[1]),
         )
 
-    def walked(self, manner: Manner) -> _WalkSeries:
+    def walked(self, manner: Manner) -> Self:
         """Return the series in another manner."""
         table = self.table.copy()
         posture, swing = np.transpose([manner.of(coordinate) for coordinate in table.index])

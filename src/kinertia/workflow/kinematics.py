@@ -1,11 +1,9 @@
 """Runs inverse kinematics of all trials; one that cannot be solved is left out, unless none remains."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, Self
 
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.copied_frames import without_copied_frames
@@ -68,7 +66,7 @@ class Solved:
         return tuple(one for one in self.kinematics if not one.trial.loads.plates)
 
     @property
-    def with_forces(self) -> Solved:
+    def with_forces(self) -> Self:
         """The trials whose forces are used.
 
         Raises:

@@ -1,12 +1,10 @@
 """Holds what is given of one person: recordings, marker set or model, statements, and what is overruled."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
-from typing import TypeVar
+from typing import Self, TypeVar
 
 from kinertia.errors import BlockedError, KinertiaError, MarkerSetError, SubjectError
 from kinertia.estimation.input_checks import complete_subject, lacking
@@ -66,7 +64,7 @@ class Person:
         """Recordings of the motions."""
         return [item.recording for item in self.trials]
 
-    def with_overrule(self, overrule: Overrule) -> Person:
+    def with_overrule(self, overrule: Overrule) -> Self:
         """Return the person with more findings overruled by the user."""
         return replace(self, overrule=self.overrule + overrule)
 

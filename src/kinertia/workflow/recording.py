@@ -1,9 +1,8 @@
 """Tabulates what one recording holds: facts for the terminal, the page and scripts."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Self
 
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.labels.marker_set_match import MarkerSetMatch, match_labels
@@ -43,7 +42,7 @@ class RecordingCheck:
     findings: tuple[Finding, ...]
 
     @classmethod
-    def of(cls, context: RecordingContext, findings: Sequence[Finding]) -> RecordingCheck:
+    def of(cls, context: RecordingContext, findings: Sequence[Finding]) -> Self:
         """Collect facts and findings of a screened recording; `findings` are the whole person's."""
         recording, used = context.recording, context.marker_set
         trial = context.trial

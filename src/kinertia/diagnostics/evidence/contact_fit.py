@@ -4,11 +4,9 @@ Each explanation of a misfit (another rate, a delay, plates interchanged, rotate
 the loads fit once it is undone.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -39,7 +37,7 @@ class ContactFit:
     far_m: float
 
     @classmethod
-    def of(cls, contacts: Sequence[PlateContact], feet: Feet) -> ContactFit:
+    def of(cls, contacts: Sequence[PlateContact], feet: Feet) -> Self:
         """Compute the agreement over all contacts of a trial."""
         delays = [delay for contact in contacts for delay in _delays(contact, feet[contact.foot])]
         enough = len(delays) >= _FEWEST_EDGES

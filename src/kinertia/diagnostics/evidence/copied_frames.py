@@ -3,9 +3,8 @@
 On 17 measured recordings of motions and ten synthetic ones no frame repeats the one before it.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -38,7 +37,7 @@ class CopiedFrames:
     insertions: int
 
     @classmethod
-    def of(cls, markers: Markers) -> CopiedFrames:
+    def of(cls, markers: Markers) -> Self:
         """Find the copied frames of the markers of a motion."""
         if len(markers.time) < FEWEST_FRAMES:
             return cls(np.zeros(len(markers.time), dtype=bool), False, 0)

@@ -1,9 +1,8 @@
 """Follows feet by their markers: where they are, and when they stand."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -77,7 +76,7 @@ class FootTrajectory:
         ahead: FloatArray = ((place - back) * along).sum(axis=1) / length
         return ahead, ahead - length
 
-    def with_toes(self) -> FootTrajectory:
+    def with_toes(self) -> Self:
         """Return the foot extended by toes in front of the metatarsal heads, where no marker shows them."""
         return replace(self, front=self.front + _TOES * (self.front - self.back))
 

@@ -1,9 +1,8 @@
 """Compares the body's velocity with the force-derived one, as recorded and without a supposed fault."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
@@ -52,7 +51,7 @@ class VelocityResidual:
     scaled: tuple[Scaled, ...]
 
     @classmethod
-    def of(cls, time: FloatArray, force: FloatArray, parts: Sequence[ForceVelocity], axis: int) -> VelocityResidual:
+    def of(cls, time: FloatArray, force: FloatArray, parts: Sequence[ForceVelocity], axis: int) -> Self:
         """Compute the residuals along X (0) or Z (2), of forces (k, p, 3) N of plates or feet over (k,) s."""
         body = _centred([(part.pelvis[:, axis] + part.centre[:, axis]) / 2 for part in parts])
         by_forces = _centred([part.by_forces[:, axis] for part in parts])

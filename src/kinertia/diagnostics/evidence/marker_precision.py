@@ -4,9 +4,8 @@ On 17 measured recordings of motions and ten synthetic ones coordinates have ste
 0.25 mm at most (0.8 mm in synthetic laboratories with cameras of 1 mm).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
@@ -40,7 +39,7 @@ class MarkerPrecision:
     noise_limit_m: float
 
     @classmethod
-    def of(cls, markers: Markers) -> MarkerPrecision:
+    def of(cls, markers: Markers) -> Self:
         """Estimate the precision of all markers together."""
         limit = NOISY_M * max(1.0, USUAL_HZ / markers.rate_hz) ** 3 if len(markers.time) > 1 else np.inf
         return cls(_step_m(markers.positions), _noise_m(markers.positions), limit)

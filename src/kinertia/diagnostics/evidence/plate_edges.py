@@ -1,9 +1,7 @@
 """Measures what lies beyond the edges of the plates: centres of pressure and parts of feet."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -73,9 +71,7 @@ class FootPoints(NamedTuple):
     limit_m: FloatArray
 
     @classmethod
-    def of(
-        cls, markers: Markers, labels: Sequence[str], toes: Collection[str], hallux: FloatArray | None
-    ) -> FootPoints:
+    def of(cls, markers: Markers, labels: Sequence[str], toes: Collection[str], hallux: FloatArray | None) -> Self:
         """Collect the points of a foot: its markers, and the big toe where it has no marker."""
         known = [label for label in labels if label in markers.labels]
         place = markers.select(known).positions
@@ -86,7 +82,7 @@ class FootPoints(NamedTuple):
             toe, limit_m = [*toe, True], [*limit_m, HALLUX_M]
         return cls(place, np.array(toe), np.array(limit_m))
 
-    def at(self, rows: BoolArray) -> FootPoints:
+    def at(self, rows: BoolArray) -> Self:
         """Return the points in some of the frames."""
         return self._replace(place=self.place[rows])
 

@@ -4,10 +4,9 @@ Medians over the frames are compared for pelvis, legs and feet, but not for the 
 arms.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import combinations
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,7 +42,7 @@ class SegmentDistances:
     segments: NDArray[np.int_]
 
     @classmethod
-    def of(cls, static: Markers, trial: Markers, marker_set: MarkerSet) -> SegmentDistances:
+    def of(cls, static: Markers, trial: Markers, marker_set: MarkerSet) -> Self:
         """Compute the distances between the markers that the set has on pelvis, legs and feet."""
         both = set(static.labels) & set(trial.labels)
         segments = [[label for label in marker_set.segments.get(name, ()) if label in both] for name in LOWER_BODY]

@@ -5,10 +5,9 @@ difference, its step, is at most 12 mm on the fault-free reference trials (60 fr
 included; 28 mm where one marker was relabelled), and 1.5 mm for the median marker.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
@@ -80,7 +79,7 @@ class TrajectoryFaults:
     filled: tuple[Filled, ...] = ()
 
     @classmethod
-    def of(cls, markers: Markers, segments: Mapping[str, Sequence[str]], coarse: bool = False) -> TrajectoryFaults:
+    def of(cls, markers: Markers, segments: Mapping[str, Sequence[str]], coarse: bool = False) -> Self:
         """Find the faults of all markers.
 
         Args:

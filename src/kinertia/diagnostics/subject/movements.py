@@ -4,10 +4,9 @@ In the synthetic laboratory, adding a trial of trunk sway lowers the errors of m
 any other movement (`kinertia plan` predicts both for a person's own trials).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
@@ -39,7 +38,7 @@ class InformativeMovements:
     drop_m: float
 
     @classmethod
-    def of(cls, markers: Markers, pelvis: Sequence[str], torso: Sequence[str]) -> InformativeMovements | None:
+    def of(cls, markers: Markers, pelvis: Sequence[str], torso: Sequence[str]) -> Self | None:
         """Compute the movement from markers with these labels; None where no frame shows all that are ever visible."""
         middles = []
         for labels in (pelvis, torso):

@@ -9,11 +9,9 @@ that of a brisk walk, the accelerations of a slow one would be noise. For trials
 depend on it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, Self
 
 import numpy as np
 
@@ -47,7 +45,7 @@ class Bandwidth:
     @classmethod
     def of(
         cls, trials: Sequence[Kinematics], cutoff_hz: float | Literal["gcv"] = "gcv", force: ForceCutoff = "auto"
-    ) -> tuple[Bandwidth, ...]:
+    ) -> tuple[Self, ...]:
         """Select the bandwidth that each of these trials needs, unless the user set one for all.
 
         Args:

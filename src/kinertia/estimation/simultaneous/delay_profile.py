@@ -7,10 +7,9 @@ evaluated at three delays, and its parabola combined with the priors of the sync
 delay, each with two components.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -45,7 +44,7 @@ class CostProfile:
         instruments: GaussianPrior,
         point: Point,
         search: Callable[[GaussNewton, GaussianPrior], Point],
-    ) -> CostProfile:
+    ) -> Self:
         """Compute the profile from the point where a search has ended.
 
         Args:

@@ -10,11 +10,10 @@ precision, so that the optimum does not change; the information on unknowns that
 long as a fair share of it remains after eliminating the motion: `UNSAFE`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import Self
 
 import numpy as np
 
@@ -113,7 +112,7 @@ class Branch:
         damping: float,
         precision: type[np.floating],
         time_blocks: Sequence[TimeBlock],
-    ) -> Branch:
+    ) -> Self:
         """Eliminate time blocks in this order, backwards if the first is not the beginning of the trial."""
         backwards, end, kept = time_blocks[0].splines.start > 0, None, KeptArrays()
         for k, time_block in enumerate(time_blocks):
@@ -203,7 +202,7 @@ class Eliminated:
         done: Callable[[NormalEquations], None],
         damping: float,
         precise: bool = False,
-    ) -> Eliminated:
+    ) -> Self:
         """Eliminate the motion of a trial.
 
         Args:
@@ -221,7 +220,7 @@ class Eliminated:
         return result
 
     @classmethod
-    def _of(cls, time_blocks: Sequence[TimeBlock], branch_of: Callable[[Sequence[TimeBlock]], Branch]) -> Eliminated:
+    def _of(cls, time_blocks: Sequence[TimeBlock], branch_of: Callable[[Sequence[TimeBlock]], Branch]) -> Self:
         branches = tuple(side_by_side(branch_of, [half for half in halves(time_blocks) if half]))
         size, (_, c) = time_blocks[-1].splines.stop, branches[0].gradient.rhs.shape
         whole = Gradient.zero(size, c, len(branches[0].gradient.static_rhs))

@@ -10,10 +10,9 @@ The cameras' noise never recurs, but averages out in a few frames: repeats are r
 the next.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from scipy.fft import next_fast_len, rfft
@@ -52,7 +51,7 @@ class Repetition:
     slow: float
 
     @classmethod
-    def of(cls, errors: np.ndarray) -> Repetition:
+    def of(cls, errors: np.ndarray) -> Self:
         """Analyse errors (n, k), zero where a marker is not seen."""
         n = len(errors)
         alike, overlap = (part[n - 1 :] for part in _correlation(errors, errors))

@@ -5,10 +5,9 @@ them are summed, and later blocks need only one block of splines from them (`eli
 touch its own splines and the first block of splines of the next, which gets its other terms from its own frames.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
@@ -43,7 +42,7 @@ class TimeBlock:
     frames: slice
 
     @classmethod
-    def whole(cls, basis: MotionBasis) -> TimeBlock:
+    def whole(cls, basis: MotionBasis) -> Self:
         """Return the whole trial as one time block."""
         return cls(slice(0, basis.size), slice(0, basis.size), slice(0, len(basis.first)))
 

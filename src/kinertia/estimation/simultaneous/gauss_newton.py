@@ -1,8 +1,7 @@
 """Builds the Gauss-Newton quadratic of the cost at one point, and solves it for steps."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -33,7 +32,7 @@ class GaussNewton:
     static: StaticInformation
 
     @classmethod
-    def of(cls, problem: MapProblem, here: Linearised, held: np.ndarray | float = 0.0) -> GaussNewton:
+    def of(cls, problem: MapProblem, here: Linearised, held: np.ndarray | float = 0.0) -> Self:
         """Build it at a point, with the diagonal of the information on the static unknowns raised by `held` (S,)."""
         places, information = problem.layout.displaced, here.information.copy()
         trials = zip(here.trials, problem.displaced_sd, strict=True)
@@ -44,7 +43,7 @@ class GaussNewton:
         rest = StaticInformation.of(information, problem.layout.in_root.stop)
         return cls(problem, here, displaced, rest, rest)
 
-    def under(self, instruments: GaussianPrior) -> GaussNewton:
+    def under(self, instruments: GaussianPrior) -> Self:
         """Return the quadratic with this Gaussian for the instruments."""
         places, first = self.problem.layout.errors, self.rest.first.copy()
         first[places, places] += instruments.precision
@@ -90,12 +89,12 @@ class MotionAlone:
     trials: tuple[Eliminated, ...]
 
     @classmethod
-    def of(cls, problem: MapProblem, point: Point, damping: float) -> MotionAlone:
+    def of(cls, problem: MapProblem, point: Point, damping: float) -> Self:
         """Build it at a point, with the diagonal of the information on the motions raised by this share."""
         rows = [(k, part, problem.in_trial(k, point)) for k, part in enumerate(point.coefficients)]
         return cls(point, tuple(problem.eliminated(*row, damping, bordered=False) for row in rows))
 
-    def under(self, instruments: GaussianPrior) -> MotionAlone:
+    def under(self, instruments: GaussianPrior) -> Self:
         """Return it unchanged: the instruments' Gaussian does not concern the motion."""
         return self
 

@@ -6,10 +6,9 @@ faster than the knots. From the estimate, others are started with knots in betwe
 do not move are averaged over all of them, and their spread is part of their covariance.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -43,7 +42,7 @@ class OfPhases:
     points: tuple[Point, ...]
 
     @classmethod
-    def of(cls, problem: MapProblem, point: Point, search: Callable[[MapProblem, Point], Point]) -> OfPhases:
+    def of(cls, problem: MapProblem, point: Point, search: Callable[[MapProblem, Point], Point]) -> Self:
         """Average over knot positions, from the point where a search has ended.
 
         Args:

@@ -1,7 +1,5 @@
 """Arranges the static unknowns in the vector of the simultaneous estimate."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -69,7 +67,7 @@ class Layout:
     places: Mapping[str, slice]
 
     @classmethod
-    def of(cls, unknowns: Iterable[Unknowns]) -> Layout:
+    def of(cls, unknowns: Iterable[Unknowns]) -> Self:
         """Arrange the terms' unknowns."""
         ordered = tuple(sorted(unknowns, key=lambda one: one._order))
         ends = np.cumsum([len(one.start) for one in ordered]).tolist()

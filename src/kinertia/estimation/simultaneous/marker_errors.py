@@ -15,10 +15,8 @@ spectrum would fall below it: the estimate would follow the noise. So s is as cl
 the errors allows, the part of a frame's error that the two previous frames do not predict.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -42,7 +40,7 @@ class ErrorProcess(NamedTuple):
     smaller: float = 0.0
 
     @classmethod
-    def double_over(cls, frames: float) -> ErrorProcess:
+    def double_over(cls, frames: float) -> Self:
         """Return the process with a double pole that is correlated over so many neighbouring frames.
 
         The number of frames is the sum of its correlations over all lags: (1 + r)^3 / ((1 + r^2) (1 - r)).
@@ -55,7 +53,7 @@ class ErrorProcess(NamedTuple):
         return cls(r, r)
 
     @classmethod
-    def with_smaller(cls, smaller: float, frames: float) -> ErrorProcess:
+    def with_smaller(cls, smaller: float, frames: float) -> Self:
         """Return the process with this smaller pole s that is correlated over so many neighbouring frames.
 
         The number of frames is (1 - r s) (1 + r) (1 + s) / ((1 + r s) (1 - r) (1 - s)).
@@ -83,7 +81,7 @@ class ErrorProcess(NamedTuple):
         return self.new / (1.0 - one - two) ** 2
 
     @classmethod
-    def read(cls, frames: float, products: np.ndarray) -> tuple[ErrorProcess, float]:
+    def read(cls, frames: float, products: np.ndarray) -> tuple[Self, float]:
         """Fit the slowest process with as much innovation per frame as the errors have; return it with its variance.
 
         The errors have unit variance and are correlated over so many frames. If even a first-order process has too
@@ -121,7 +119,7 @@ class ErrorInformation:
     second: np.ndarray
 
     @classmethod
-    def of(cls, seen: np.ndarray, sd_m: np.ndarray, process: ErrorProcess) -> ErrorInformation:
+    def of(cls, seen: np.ndarray, sd_m: np.ndarray, process: ErrorProcess) -> Self:
         """Compute the information for markers seen (n, m), with standard deviations sd_m (m,)."""
         one, two = process.of_before
         n, m = seen.shape

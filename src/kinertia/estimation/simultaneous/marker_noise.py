@@ -7,10 +7,9 @@ absorbs part of the noise, and so does the regression on the joints; this is com
 average.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Self
 
 import numpy as np
 
@@ -63,7 +62,7 @@ class WithoutSkin:
     @classmethod
     def of(
         cls, varying: Sequence[np.ndarray], displaced: np.ndarray, skin: Sequence[SkinPatterns], frames: Sequence[float]
-    ) -> WithoutSkin:
+    ) -> Self:
         """Fit the skin patterns by ridge regression on all trials together, and subtract them.
 
         Args:

@@ -9,9 +9,8 @@ A trial's normal equations are for positions in the trial; its displacements are
 is the prior standard deviation, so that it may be zero.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
@@ -32,7 +31,7 @@ class Displaced:
     factor: np.ndarray | None
 
     @classmethod
-    def of(cls, information: np.ndarray, places: slice, sd_m: np.ndarray) -> Displaced:
+    def of(cls, information: np.ndarray, places: slice, sd_m: np.ndarray) -> Self:
         """Eliminate the displacements of a trial.
 
         Args:

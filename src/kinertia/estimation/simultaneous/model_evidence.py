@@ -6,11 +6,9 @@ lowest cost alone would favour the interpretation that needs a faulty instrument
 anything.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -37,7 +35,7 @@ class Evidence(NamedTuple):
     otherwise: float | None
 
     @classmethod
-    def of(cls, model: GaussNewton, gaussian: GaussianPrior, otherwise: Sequence[Observation]) -> Evidence:
+    def of(cls, model: GaussNewton, gaussian: GaussianPrior, otherwise: Sequence[Observation]) -> Self:
         """Compute the evidence of the trials of a quadratic at the optimum, as they are and interpreted differently.
 
         The Gaussian replaces the instruments' priors.

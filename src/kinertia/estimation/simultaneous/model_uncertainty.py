@@ -1,9 +1,8 @@
 """Defines what the simultaneous estimate may change besides the segments of its prior."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import Self
 
 import numpy as np
 
@@ -46,7 +45,7 @@ class ModelUncertainty:
         """All static coordinates that may change -> prior standard deviation, m or rad."""
         return {**self.centres, **self.axes}
 
-    def with_axes(self) -> ModelUncertainty:
+    def with_axes(self) -> Self:
         """Return the uncertainty with the axes of knees, ankles and elbows of the 27-DOF model free."""
         return replace(self, axes=dict.fromkeys(AXIS_TILTS, JOINT_AXIS_SD_RAD))
 

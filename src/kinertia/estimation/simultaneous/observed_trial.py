@@ -1,10 +1,9 @@
 """Holds the observations of a trial, and the prior of the calibration; `observation` makes the former."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 
@@ -68,7 +67,7 @@ class Observation:
         larger = np.broadcast_to(self.impact, len(self.time))[frames]
         return np.outer(larger, np.repeat([self.force_sd, self.moment_sd], 3))
 
-    def repeated(self, times: float) -> Observation:
+    def repeated(self, times: float) -> Self:
         """Return the observation with standard deviations for errors that recur so many times in the estimate's data.
 
         Larger standard deviations leave more room for the innovation of a frame, the cameras' noise: it does not recur.

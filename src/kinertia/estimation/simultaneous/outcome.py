@@ -1,10 +1,8 @@
 """Defines the result of the simultaneous estimate, in physical units and names."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -66,7 +64,7 @@ class SimultaneousResult:
     evidence: Evidence
     draws: PosteriorDraws
 
-    def of_first(self, count: int) -> SimultaneousResult:
+    def of_first(self, count: int) -> Self:
         """Return the result with the first `count` trials only."""
         names = ("foot_loads", "reactions", "motions", "marker_offsets_m", "curve_deviations")
         first = {name: getattr(self, name)[:count] for name in names}

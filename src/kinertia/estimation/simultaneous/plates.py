@@ -7,10 +7,9 @@ rotated together relative to the cameras; forces may be delayed, in all trials o
 laboratory: their displacements are in its axes and are shared by all trials; their zero offsets are not.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -87,7 +86,7 @@ class FootPlates:
     turn: np.ndarray
     middles: np.ndarray
 
-    def among(self, plates: Sequence[str]) -> FootPlates:
+    def among(self, plates: Sequence[str]) -> Self:
         """Return the reactions with these plates (a session's), which include its own."""
         if not self.plates:  # a trial without forces: nobody stands on the first
             return replace(self, plates=tuple(plates), middles=np.zeros((len(plates), 3)))

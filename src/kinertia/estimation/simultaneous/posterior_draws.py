@@ -11,10 +11,9 @@ Draws are made once, with a fixed seed, and stored with the result: a few hundre
 which more could be made.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -95,11 +94,11 @@ class PosteriorDraws:
         """Number of draws."""
         return len(self.bsp)
 
-    def without_places(self) -> PosteriorDraws:
+    def without_places(self) -> Self:
         """Return the draws with marker positions as estimated."""
         return replace(self, places=np.zeros_like(self.places))
 
-    def of_first(self, count: int) -> PosteriorDraws:
+    def of_first(self, count: int) -> Self:
         """Return the draws with the motions of the first `count` trials only."""
         return replace(self, trials=self.trials[:count])
 

@@ -10,9 +10,7 @@ curvature of the cost would jump, and with it the standard deviations of everyth
 meets such limits oscillates between them.
 """
 
-from __future__ import annotations
-
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 from scipy.special import expit
@@ -43,7 +41,7 @@ class RangeTerms(NamedTuple):
     cost: float
 
     @classmethod
-    def of(cls, bounds: Bounds, q: np.ndarray, frames_per_interval: float) -> RangeTerms:
+    def of(cls, bounds: Bounds, q: np.ndarray, frames_per_interval: float) -> Self:
         """Compute the penalty of coordinates q (n, c), rad and m.
 
         >>> import numpy as np

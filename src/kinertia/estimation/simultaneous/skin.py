@@ -14,11 +14,10 @@ displace a marker by `EXPECTED_SD_M` over the trials, along each axis. Markers o
 their coefficients are correlated.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 
@@ -58,7 +57,7 @@ class SkinPatterns:
     last: np.ndarray
 
     @classmethod
-    def none(cls, frames: int, markers: int) -> SkinPatterns:
+    def none(cls, frames: int, markers: int) -> Self:
         """Return skin that follows no pattern."""
         return cls(np.zeros((frames, 0)), *np.zeros((2, markers), dtype=int))
 
@@ -72,7 +71,7 @@ class SkinPatterns:
         """Number of coefficients."""
         return int(self.begin[-1])
 
-    def cut(self, frames: slice) -> SkinPatterns:
+    def cut(self, frames: slice) -> Self:
         """Return the patterns at these frames."""
         result = replace(self, values=self.values[frames])
         vars(result).update(begin=self.begin, _by_segment=self._by_segment)  # worked out once

@@ -5,10 +5,9 @@ physically possible, where the logarithm of a second moment becomes undetermined
 zero.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
@@ -46,7 +45,7 @@ class StaticInformation:
     across: np.ndarray
 
     @classmethod
-    def of(cls, information: np.ndarray, n: int) -> StaticInformation:
+    def of(cls, information: np.ndarray, n: int) -> Self:
         """Eliminate all but the first n unknowns from the information (S, S).
 
         Raises:

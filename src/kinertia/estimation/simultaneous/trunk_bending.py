@@ -10,10 +10,8 @@ the corresponding inertia, and by the moment of a displacement that always point
 specific force at the trunk (acceleration less gravity). It is taken from the ground reactions: f = F / mass.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -52,7 +50,7 @@ class BendingTrunk:
     mass_kg: float
 
     @classmethod
-    def of(cls, bsp: BodySegmentParameters, mass_kg: float) -> BendingTrunk | None:
+    def of(cls, bsp: BodySegmentParameters, mass_kg: float) -> Self | None:
         """Find the trunk of these segments, for a body of this mass; None if none extends from its origin."""
         trunk = [k for k, name in enumerate(bsp.segments) if segment_of(name) == "torso"]
         if not trunk:
