@@ -43,6 +43,7 @@ from kinertia.trial.rms import rms
 from kinertia.workflow.attached import with_attached_prior
 from kinertia.workflow.known_body import with_prosthesis
 from validation.joint_accuracy import WITHIN
+from validation.other_prior import with_prior
 from validation.population_bodies import POPULATIONS
 
 LABORATORY = Faults("artefact", calibration=True)
@@ -262,7 +263,7 @@ def _with_learnt_prior(people: Sequence[PersonOutcome]) -> list[PersonOutcome]:
 
 def _again(person: PersonOutcome, group: BspPrior) -> PersonOutcome:
     seen = known(person.information)
-    estimate, covariance = seen.with_prior(group)
+    estimate, covariance = with_prior(seen, group)
     sd = np.sqrt(np.diag(covariance)).reshape(-1, 10)
     unlike = unlikeness(group, estimate, covariance).implausible
     return _compared(person.trial, estimate, group.mean, sd, unlike, seen)

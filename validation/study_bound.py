@@ -7,13 +7,13 @@ is that of the study's sinusoids, A sin(w t + phi) with uniform A, w and phi: A_
 from dataclasses import replace
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from kinertia.estimation.calibration import marker_jacobian
 from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.simultaneous.inputs import BSP
 from kinertia.estimation.simultaneous.observed_trial import Observation
 from kinertia.estimation.simultaneous.problem import MapProblem
-from kinertia.model.bsp import block_diagonal
 from kinertia.model.log_cholesky import table_jacobian
 from kinertia.studies.simulated_people import held
 from kinertia.synthetic.noise import STUDY_AMPLITUDE_M, STUDY_RATE_RAD_S
@@ -52,7 +52,7 @@ def information_on_body(trial: SyntheticTrial, seen: Observation, prior: BspPrio
     theta = problem.layout[BSP]
     border = normal.border[..., theta].reshape(len(motion), -1)
     information = normal.static[theta, theta] - border.T @ np.linalg.solve(motion, border)
-    chain = np.linalg.inv(block_diagonal(table_jacobian(problem.layout.start[theta])))
+    chain = np.linalg.inv(block_diag(*table_jacobian(problem.layout.start[theta])))
     return chain.T @ information @ chain
 
 

@@ -14,6 +14,7 @@ from kinertia.io.provenance import Provenance, command_line, recordings
 from kinertia.io.subject_file import read_subject
 from kinertia.report.saved_fit import FIT_FILE, write_fit
 from kinertia.workflow.from_files import prepare_subject
+from validation.other_prior import with_prior
 
 
 @pytest.fixture
@@ -110,7 +111,7 @@ def test_information_is_what_the_prior_does_not_explain(fit):
     """With the prior put back it gives the estimate, but for what is too little to count."""
     person = information_of(fit)
     sd = fit.posterior.prior_sd
-    estimate, covariance = person.with_prior(person.literature)
+    estimate, covariance = with_prior(person, person.literature)
     np.testing.assert_allclose(covariance, fit.posterior.covariance, atol=2.5e-3 * sd.max() ** 2)
     np.testing.assert_allclose((estimate.table() - fit.estimate.table()) / sd, 0.0, atol=0.05)
 

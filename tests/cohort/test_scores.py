@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from kinertia.cohort.page import score_parts
 from kinertia.cohort.record import Place, Record
-from kinertia.cohort.score_parts import score_parts
 from kinertia.cohort.tables import write_person, write_tables
 from kinertia.estimation.gait_profile import gait_profile
 from kinertia.io.norms_file import Norm

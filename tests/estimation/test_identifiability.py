@@ -1,10 +1,11 @@
 import numpy as np
 import pytest
+from scipy.linalg import block_diag
 
 from kinertia.estimation import identifiability
 from kinertia.estimation.identifiability import base_parameters, evidence
 from kinertia.estimation.prior import literature_prior
-from kinertia.model.bsp import PARAMETERS, BodySegmentParameters, block_diagonal, dynamic_by_table
+from kinertia.model.bsp import PARAMETERS, BodySegmentParameters, dynamic_by_table
 from kinertia.motion.dynamics import Motion, residual, root_regressor
 from kinertia.synthetic.walk import walk, walking_subject
 
@@ -80,7 +81,7 @@ def test_a_joint_held_still_hides_all_that_moves_across_it(person, trial):
 def test_gain_is_the_prior_deviation_over_that_of_least_squares(person, trial, base):
     """One prior deviation along the combination changes the load by `gain` noise deviations, over all frames."""
     prior = literature_prior(person.literature)
-    chain = block_diagonal(dynamic_by_table(person.literature.mass_kg, person.literature.com_m)) * prior.sd.ravel()
+    chain = block_diag(*dynamic_by_table(person.literature.mass_kg, person.literature.com_m)) * prior.sd.ravel()
     rows = root_regressor(trial.skeleton, person.literature.segments, trial.motion) / ROOT_SD[:, None]
     for combination in base.best:
         weights = np.array(list(combination.weights.values()))

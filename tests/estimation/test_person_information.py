@@ -7,6 +7,7 @@ import numpy as np
 from kinertia.estimation.person_information import PersonInformation, person_information
 from kinertia.estimation.prior import literature_prior
 from kinertia.synthetic.walk import walking_subject
+from validation.other_prior import with_prior
 from validation.population_bodies import POPULATIONS
 
 PRIOR = literature_prior(walking_subject().literature)
@@ -26,16 +27,16 @@ def test_what_is_taken_out_of_an_estimate_does_not_depend_on_its_prior():
     person = seen(0)
     far = POPULATIONS["obese"].of(PRIOR)
     for prior in (PRIOR, replace(PRIOR, covariance=2.0 * PRIOR.covariance), PRIOR.at_mass(0.9 * PRIOR.mass_kg, 0.5)):
-        estimate, covariance = person.with_prior(prior)
+        estimate, covariance = with_prior(person, prior)
         out = person_information("", PRIOR, prior, estimate, covariance)
         np.testing.assert_allclose(out.information, person.information, atol=1e-4 * np.abs(person.information).max())
         np.testing.assert_allclose(out.rhs, person.rhs, atol=1e-4 * np.abs(person.rhs).max())
-        again, _ = out.with_prior(far)
-        np.testing.assert_allclose(again.table(), person.with_prior(far)[0].table(), atol=1e-3)
+        again, _ = with_prior(out, far)
+        np.testing.assert_allclose(again.table(), with_prior(person, far)[0].table(), atol=1e-3)
 
 
 def test_recordings_that_say_nothing_leave_the_prior():
     silent = PersonInformation("", PRIOR, np.zeros((SIZE, SIZE)), np.zeros(SIZE))
-    estimate, covariance = silent.with_prior(PRIOR)
+    estimate, covariance = with_prior(silent, PRIOR)
     np.testing.assert_allclose(estimate.table(), PRIOR.mean.table())
     np.testing.assert_allclose(covariance, PRIOR.covariance, atol=1e-9)

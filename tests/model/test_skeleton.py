@@ -4,9 +4,8 @@ import pytest
 from generic_static import generic_model, random_coordinates, smooth_motion
 from kinertia.estimation.calibration import marker_jacobian
 from kinertia.model.anthropometry import literature_bsp
-from kinertia.model.bsp import BodySegmentParameters
+from kinertia.model.bsp import BodySegmentParameters, transformed_parameters
 from kinertia.model.gait27 import ARM_ROTATIONS, SHOULDER_OFFSETS
-from kinertia.model.inertia_transform import transformed_parameters
 from kinertia.model.skeleton import Axis, Joint, Marker, Skeleton
 from kinertia.motion.dynamics import Motion, inverse_dynamics, root_regressor
 from kinertia.motion.rigid_body import axis_force_derivatives

@@ -15,7 +15,6 @@ import numpy as np
 from kinertia.cohort.instruments import COLUMNS, drift
 from kinertia.cohort.outcomes import FINDINGS, PEOPLE, lead, outcome_parts, report_of
 from kinertia.cohort.record import AGAINST
-from kinertia.cohort.score_parts import score_parts
 from kinertia.estimation.cycles import UNITS, Kind
 from kinertia.io.output_folder import write_then_rename
 from kinertia.model.bsp import PARAMETERS
@@ -41,6 +40,8 @@ _CURVES = {f"{name}_{kind}": UNITS[kind] for kind in _KINDS for name in _JOINTS}
 _NORMAL = 1.4826
 """Standard deviation over median distance from the median, of normal values."""
 _MOST_OUTLIERS, _FAR = 20, 6.0
+_MOST_SCORES = 50
+_SCORE_HEADINGS = ("person", "overall", "right", "left", "farthest variable", "remarks")
 _SIZES = {"force (N)": "force_rms_N", "moment (N m)": "moment_rms_Nm"}
 
 
@@ -119,6 +120,41 @@ def _outliers(bsp: pd.DataFrame) -> Part:
     ]
     text = "People in whom a parameter changed by over six spreads (by the median, or error bars) more than the median."
     return Part("Far from the others", (text if listed else f"Nobody: {text[0].lower()}{text[1:]}",), listed=listed)
+
+
+def score_parts(folder: Path) -> Iterator[Part]:
+    """Return a table of Gait Profile Scores (degrees), the largest first; nothing without norms."""
+    from pyarrow import parquet
+
+    scores: pd.DataFrame = parquet.read_table(folder / "scores.parquet").to_pandas()
+    if not len(scores):
+        return
+    rows = sorted((_score_row(str(person), own) for person, own in scores.groupby("person")), key=lambda row: -row[0])
+    known = [score for score, _ in rows if score >= 0]
+    text = "Gait Profile Score (Baker 2009) against the norms, degrees, the largest first."
+    if known:
+        text += f" Median {np.median(known):.1f}, from {min(known):.1f} to {max(known):.1f}, of {len(known)} people."
+    more = f" {len(rows) - _MOST_SCORES} more people are in scores.parquet." if len(rows) > _MOST_SCORES else ""
+    yield Part(
+        "Gait Profile Score", (text + more,), headings=_SCORE_HEADINGS, rows=[cells for _, cells in rows[:_MOST_SCORES]]
+    )
+
+
+def _score_row(person: str, own: pd.DataFrame) -> tuple[float, tuple[str, ...]]:
+    """Return the overall score, -1 where there is none, and the cells."""
+    gps = own[own["score"] == "GPS"].set_index("side")["degrees"]
+    variables = own[own["score"] == "GVS"].dropna(subset=["degrees"])
+    farthest = ""
+    if len(variables):
+        worst = variables.iloc[int(variables["degrees"].argmax())]
+        farthest = f"{worst['variable']}, {style.SIDES[worst['side']][0]}: {worst['degrees']:.1f}"
+    overall = float(gps.get("both", np.nan))
+    cells = (*(_degrees(float(gps.get(side, np.nan))) for side in ("both", "r", "l")), farthest)
+    return overall if np.isfinite(overall) else -1.0, (report_of(person), *cells, str(own["remarks"].iloc[0]))
+
+
+def _degrees(value: float) -> str:
+    return f"{value:.1f}" if np.isfinite(value) else ""
 
 
 def _mean_curves(folder: Path) -> Iterator[Part]:

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from kinertia.diagnostics.axes import Axes, AxisNames
-from kinertia.diagnostics.evidence.contact_span import contact_span_s
 from kinertia.diagnostics.evidence.copied_frames import FEWEST_FRAMES, without_copied_frames
 from kinertia.diagnostics.evidence.foot_trajectories import FootTrajectory, foot_trajectories
 from kinertia.diagnostics.evidence.force_mass import ForceMass, ForeignLoad, force_mass
@@ -19,7 +18,7 @@ from kinertia.diagnostics.evidence.horizontal_velocity import ForceVelocity, Vel
 from kinertia.diagnostics.evidence.landmarks import CLEAR, cosine, headings, landmark_positions, most_forwards
 from kinertia.diagnostics.evidence.loaded_plates import adult_share
 from kinertia.diagnostics.evidence.marker_precision import MarkerPrecision
-from kinertia.diagnostics.evidence.plate_contacts import PlateContact, contacts_of
+from kinertia.diagnostics.evidence.plate_contacts import PlateContact, contact_span_s, contacts_of
 from kinertia.diagnostics.evidence.plate_edges import LITTLE_BEYOND_M, FootPoints, Overhang, overhangs
 from kinertia.diagnostics.evidence.plate_masses import plate_masses
 from kinertia.diagnostics.evidence.standing_mass import StandingMass, standing_mass

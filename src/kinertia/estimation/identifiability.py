@@ -11,8 +11,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import block_diag
 
-from kinertia.model.bsp import MIRROR_SIGNS, PARAMETERS, BodySegmentParameters, block_diagonal, dynamic_by_table
+from kinertia.model.bsp import MIRROR_SIGNS, PARAMETERS, BodySegmentParameters, dynamic_by_table
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion, root_regressor
 from kinertia.motion.frame_chunks import pieces
@@ -98,7 +99,7 @@ def base_parameters(
         motions: frames whose ground contact is measured, one entry per trial.
         root_sd: per trial (6,) standard deviations of the root load: N, N m.
     """
-    scale = block_diagonal(dynamic_by_table(bsp.mass_kg, bsp.com_m)) * prior_sd.ravel()
+    scale = block_diag(*dynamic_by_table(bsp.mass_kg, bsp.com_m)) * prior_sd.ravel()
     anything = _scaled_regressor(skeleton, bsp, _random_motion(len(skeleton.coordinates)), np.ones(6)) @ scale
     singular = np.linalg.svd(anything, compute_uv=False)
     rounding = _ROUNDING * float(singular[0])

@@ -11,6 +11,7 @@ deviations.
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from kinertia.errors import PriorError
 from kinertia.estimation.population import population_prior
@@ -19,13 +20,12 @@ from kinertia.estimation.result import Fit
 from kinertia.findings.finding import with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
-from kinertia.model.bsp import BodySegmentParameters, block_diagonal, dynamic_by_table
+from kinertia.model.bsp import BodySegmentParameters, dynamic_by_table
 
 _OWN_PRIOR = 1e-6
 _LEAST_SHARE = 0.01
 """Least share of a combination's prior variance that the recordings remove; below it nothing is learnt from it, since
 errors of the fit's curvature exceed the information of the recordings and would add up over people."""
-_STEPS, _SETTLED = 50, 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,44 +49,15 @@ class PersonInformation:
         """Segment names, as in the tables."""
         return self.literature.mean.segments
 
-    def with_prior(self, prior: BspPrior) -> tuple[BodySegmentParameters, np.ndarray]:
-        """Combine the recordings with this prior: return the estimate and the covariance (10 s, 10 s) of its table."""
-        sd, literature = self.literature.sd.ravel(), self.literature.mean.table().ravel()
-        mean = (prior.mean.table().ravel() - literature) / sd
-        before = np.linalg.inv(prior.covariance / np.outer(sd, sd))
 
-        def body_of(relative: np.ndarray) -> BodySegmentParameters:
-            return BodySegmentParameters.from_table(self.segments, (literature + sd * relative).reshape(-1, 10))
-
-        def cost(relative: np.ndarray) -> float:
-            _, dynamic = _relative(self.literature, body_of(relative))
-            away = relative - mean
-            return float(dynamic @ (0.5 * self.information @ dynamic - self.rhs) + 0.5 * away @ before @ away)
-
-        relative = mean
-        for _ in range(_STEPS):
-            along, dynamic = _relative(self.literature, body_of(relative))
-            curvature = along.T @ self.information @ along + before
-            step = np.linalg.solve(
-                curvature, along.T @ (self.rhs - self.information @ dynamic) - before @ (relative - mean)
-            )
-            while np.abs(step).max() > _SETTLED and cost(relative + step) > cost(relative):
-                step = 0.5 * step
-            relative = relative + step
-            if np.abs(step).max() <= _SETTLED:
-                break
-        body = body_of(relative)
-        return body, np.linalg.inv(curvature) * np.outer(sd, sd)
-
-
-def _relative(literature: BspPrior, body: BodySegmentParameters) -> tuple[np.ndarray, np.ndarray]:
+def relative_parameters(literature: BspPrior, body: BodySegmentParameters) -> tuple[np.ndarray, np.ndarray]:
     """Return the relative dynamic coordinates of a body, and their derivative with respect to the relative parameters.
 
     The derivative (10 s, 10 s) comes first, then the coordinates (10 s,).
     """
     sd, at = literature.sd.ravel(), literature.mean
-    back = np.linalg.inv(block_diagonal(dynamic_by_table(at.mass_kg, at.com_m)))
-    along = back @ block_diagonal(dynamic_by_table(body.mass_kg, body.com_m))
+    back = np.linalg.inv(block_diag(*dynamic_by_table(at.mass_kg, at.com_m)))
+    along = back @ block_diag(*dynamic_by_table(body.mass_kg, body.com_m))
     moved = back @ (body.dynamic_parameters().ravel() - at.dynamic_parameters().ravel())
     return along * sd / sd[:, None], moved / sd
 
@@ -143,7 +114,7 @@ def person_information(
     information = (back * (1.0 / left[shown] - 1.0)) @ back.T
     score = back @ along[shown]
     # so far on the relative parameters at the estimate; now on the dynamic ones
-    derivative, dynamic = _relative(literature, estimate)
+    derivative, dynamic = relative_parameters(literature, estimate)
     to_dynamic = np.linalg.inv(derivative)
     information = to_dynamic.T @ information @ to_dynamic
     return PersonInformation(name, literature, information, information @ dynamic + to_dynamic.T @ score)

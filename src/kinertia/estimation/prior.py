@@ -23,13 +23,13 @@ from itertools import product
 from typing import Self
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from kinertia.errors import PriorError
 from kinertia.model.bsp import (
     MIRROR_SIGNS,
     PARAMETERS,
     BodySegmentParameters,
-    block_diagonal,
     inertia_of,
     second_moments,
 )
@@ -173,7 +173,7 @@ def literature_prior(literature: BodySegmentParameters, kinds: Sequence[str] | N
     blocks = np.zeros((len(names), 10, 10))
     blocks[:, range(4), range(4)] = np.square(sd[:, :4])
     blocks[:, 4:, 4:] = inertia_covariance(nearest_consistent(literature))
-    covariance = with_symmetry(block_diagonal(blocks), literature.segments, SIDES_CORRELATION)
+    covariance = with_symmetry(block_diag(*blocks), literature.segments, SIDES_CORRELATION)
     for i, j in product(range(len(names)), repeat=2):
         if names[i] == "thigh" and names[j] in ("pelvis", "torso"):
             shared = THIGH_TRUNK_CORRELATION * np.sqrt(covariance[10 * i, 10 * i] * covariance[10 * j, 10 * j])

@@ -293,6 +293,25 @@ def inertia_of(second: FloatArray) -> FloatArray:
     return result
 
 
+def transformed_parameters(places: FloatArray) -> FloatArray:
+    """Return linear maps (s, 10, 10) of dynamic parameters from frames to the one in which they are given (`places`).
+
+    The pseudo-inertia of a body moves as J' = T J T^T (Wensing, Kim and Slotine 2018); the parameters are linear in J.
+
+    Args:
+        places: (s, 4, 4) homogeneous transforms T.
+    """
+    units = np.zeros((10, 4, 4))  # pseudo-inertias of unit dynamic parameters
+    units[0, 3, 3] = 1.0
+    units[[1, 2, 3], [0, 1, 2], 3] = units[[1, 2, 3], 3, [0, 1, 2]] = 1.0
+    units[4:, :3, :3] = second_moments(_tensors(np.eye(6), _PIN_ROWS, _PIN_COLUMNS))
+    transform = places[:, None]
+    moved = transform @ units @ transform.transpose(0, 1, 3, 2)
+    moments = inertia_of(moved[..., :3, :3])[..., _PIN_ROWS, _PIN_COLUMNS]
+    parameters: FloatArray = np.concatenate([moved[..., 3, 3:], moved[..., :3, 3], moments], axis=-1)
+    return parameters.transpose(0, 2, 1)
+
+
 def dynamic_by_table(mass: FloatArray, com: FloatArray) -> FloatArray:
     """Return the derivative (s, 10, 10) of each segment's dynamic parameters by its row of the table.
 
@@ -309,14 +328,6 @@ def dynamic_by_table(mass: FloatArray, com: FloatArray) -> FloatArray:
         derivative[:, 4:, 1 + k] = (mass[:, None, None] * tensor)[:, _PIN_ROWS, _PIN_COLUMNS]
     derivative[:, [4, 6, 9, 5, 7, 8], range(4, 10)] = 1.0
     return derivative
-
-
-def block_diagonal(blocks: FloatArray) -> FloatArray:
-    """Return the block-diagonal matrix (s k, s k) of the blocks (s, k, k)."""
-    s, k, _ = blocks.shape
-    result = np.zeros((s, k, s, k))
-    result[np.arange(s), :, np.arange(s), :] = blocks
-    return result.reshape(s * k, s * k)
 
 
 def partners(segments: Sequence[str]) -> npt.NDArray[np.intp]:

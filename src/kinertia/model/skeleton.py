@@ -19,10 +19,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from kinertia.model.axis_functions import AxisFunction
-from kinertia.model.bsp import BodySegmentParameters
+from kinertia.model.bsp import BodySegmentParameters, transformed_parameters
 from kinertia.model.coordinate_map import CoordinateMap
 from kinertia.model.coordinate_range import ANYTHING, Bounds, Range
-from kinertia.model.inertia_transform import transformed_parameters
 from kinertia.model.kinematic_tree import KinematicTree, poses
 from kinertia.model.root_joint import Root
 

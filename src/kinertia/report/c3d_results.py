@@ -10,6 +10,7 @@ import numpy as np
 from kinertia.errors import FileError
 from kinertia.estimation.drawn_fit import drawn_fit
 from kinertia.estimation.result import Fit, TrialFit
+from kinertia.io.c3d_analysis import Measure
 from kinertia.io.c3d_event_writer import EventToWrite
 from kinertia.io.c3d_outputs import C3dFrames, OutputPoint, frames_of, too_many, unit_factor, with_outputs
 from kinertia.io.c3d_parameters import TooManyParameters, Value
@@ -19,12 +20,12 @@ from kinertia.io.recording import read_recording
 from kinertia.io.trial_files import trial_file
 from kinertia.model.bsp import PARAMETERS
 from kinertia.model.marker_set import shared_prefix, spellings
-from kinertia.motion.gait_cycle import found_events
+from kinertia.motion.gait_cycle import Stride, feet_under_pelvis, found_events
 from kinertia.motion.joint_wrench import leg_joints
 from kinertia.motion.model_outputs import CONVENTIONS, UNITS, Convention, Departures, ModelOutput, model_outputs
+from kinertia.motion.spatiotemporal import Spatiotemporal, spatiotemporal
 from kinertia.report.saved_fit import SavedFit
-from kinertia.report.stride_measures import stride_measures
-from kinertia.trial.data import Recording
+from kinertia.trial.data import FEET, Recording
 
 SUFFIX = "Kinertia"
 """Ends all labels where the file has outputs of the same names already."""
@@ -37,6 +38,7 @@ _PLUG_IN_GAIT = ({"LASI", "RASI", "LTHI", "RTHI", "LTIB", "RTIB"}, {"LASI", "RAS
 _SAME_PLACE = 1e-3
 """Largest error of markers against the fit's, as a share of their distances: a file stores single precision."""
 _SAME_TIME_FRAMES = 0.02
+_CONTEXTS = {"r": "Right", "l": "Left"}
 
 
 def write_c3d_results(
@@ -117,7 +119,7 @@ def c3d_with_results(
     known = found_events(trial.skeleton, trial.kinematics)
     events = [EventToWrite(one.event, one.source) for one in known if one.source != "file"]
     try:
-        own, measures = _own(fit, convention, files, units), stride_measures(trial)
+        own, measures = _own(fit, convention, files, units), _stride_measures(trial)
         return with_outputs(frames, points, prefix, units, own, events, measures)
     except TooManyParameters:
         raise too_many(source) from None
@@ -256,3 +258,42 @@ def _curves(trial: TrialFit) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return coordinates, moments and powers (w, c)."""
     moments = trial.joint_loads["estimate"]
     return trial.motion.q, moments, moments * trial.motion.qd
+
+
+def _stride_measures(trial: TrialFit) -> list[Measure]:
+    """Return all mean stride measures that are known, with Vicon's names and units; none without strides."""
+    if not trial.strides:
+        return []
+    feet = feet_under_pelvis(trial.skeleton, trial.kinematics)
+    found = [
+        (stride.side, _measures(stride, one))
+        for stride, one in zip(
+            trial.strides, spatiotemporal(feet, trial.strides, trial.kinematics.trial.belt), strict=True
+        )
+    ]
+    result = []
+    for side in FEET:
+        own = [measures for of, measures in found if of == side]
+        for name, unit in own[0] if own else ():
+            values = np.array([measures[name, unit] for measures in own])
+            if np.isfinite(values).any():
+                result.append(Measure(_CONTEXTS[side], name, unit, float(np.nanmean(values))))
+    return result
+
+
+def _measures(stride: Stride, one: Spatiotemporal) -> dict[tuple[str, str], float]:
+    """Return the measures by name and unit."""
+    return {
+        ("Cadence", "steps/min"): one.cadence_steps_min,
+        ("Walking Speed", "m/s"): one.speed_m_s,
+        ("Stride Time", "s"): one.stride_time_s,
+        ("Step Time", "s"): one.step_time_s,
+        ("Opposite Foot Off", "%"): stride.percent(stride.opposite_toe_off_s),
+        ("Opposite Foot Contact", "%"): stride.percent(stride.opposite_strike_s),
+        ("Foot Off", "%"): stride.percent(stride.toe_off_s),
+        ("Single Support", "s"): stride.opposite_strike_s - stride.opposite_toe_off_s,
+        ("Double Support", "s"): 0.01 * one.double_support_percent * one.stride_time_s,
+        ("Stride Length", "m"): one.stride_length_m,
+        ("Step Length", "m"): one.step_length_m,
+        ("Step Width", "m"): one.step_width_m,
+    }

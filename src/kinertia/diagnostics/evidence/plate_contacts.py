@@ -8,6 +8,7 @@ import numpy as np
 from kinertia.diagnostics.evidence.foot_trajectories import FootTrajectory
 from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads
+from kinertia.trial.foot_motion import AROUND_LOAD_S
 from kinertia.trial.ground_contact import bridged
 from kinertia.trial.sampled_time import TIME_TOLERANCE_S, runs, span_s
 
@@ -124,6 +125,18 @@ def loads_on(plates: PlateLoads, p: int) -> list[tuple[int, int]]:
     """Return the first and last sample of every load of at least `SHORTEST_S` on plate `p`."""
     loaded = runs(bridged(plates.time, plates.force[:, p, 1] > CONTACT_FORCE_N))
     return [(first, last) for first, last in loaded if span_s(plates.time, first, last) >= SHORTEST_S]
+
+
+def contact_span_s(plates: PlateLoads) -> tuple[float, float] | None:
+    """Find the first and last time (s) of the part used with loads on plates; None where no one steps on them.
+
+    Before and after it people come and go: feet leave the cameras' view or markers are lost, which does not matter.
+    """
+    loads = [load for p in range(len(plates.names)) for load in loads_on(plates, p)]
+    if not loads:
+        return None
+    first, last = min(load[0] for load in loads), max(load[1] for load in loads)
+    return float(plates.time[first]) - AROUND_LOAD_S, float(plates.time[last]) + AROUND_LOAD_S
 
 
 def cop_horizontal(plates: PlateLoads) -> FloatArray:

@@ -3,12 +3,12 @@
 from typing import Any
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from kinertia.estimation.simultaneous.cost_term import CostTerm, Solution
 from kinertia.estimation.simultaneous.inputs import BSP, FreedModel, Given
 from kinertia.estimation.simultaneous.layout import Unknowns
 from kinertia.estimation.simultaneous.static_information import LEAST_INFORMATION
-from kinertia.model.bsp import block_diagonal
 from kinertia.model.log_cholesky import nearest_consistent, table_jacobian, to_log_cholesky
 
 
@@ -35,7 +35,7 @@ class BodySegments(CostTerm):
     def add_information(self, into: np.ndarray, static: np.ndarray) -> None:
         """Add the information of the table's prior and of the total mass by the scale."""
         prior, theta = self.given.prior, self._at
-        jacobian = block_diagonal(table_jacobian(static[theta]))
+        jacobian = block_diag(*table_jacobian(static[theta]))
         mass_row = prior.on_scale @ jacobian[0::10] / prior.mass_sd_kg
         into[theta, theta] += jacobian.T @ self._information @ jacobian + np.outer(mass_row, mass_row)
         into[theta, theta] += LEAST_INFORMATION * np.eye(theta.stop - theta.start)
@@ -68,7 +68,7 @@ class BodySegments(CostTerm):
 
     def read(self, solution: Solution) -> dict[str, Any]:
         """Return physically consistent parameters, and the covariance of their table, at most the prior's."""
-        chain = block_diagonal(table_jacobian(solution.there[self._at]))
+        chain = block_diag(*table_jacobian(solution.there[self._at]))
         covariance = chain @ solution.covariance[self._at, self._at] @ chain.T
         return {
             "bsp": self.model.bsp(solution.static),

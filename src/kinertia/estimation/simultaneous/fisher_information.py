@@ -10,13 +10,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from kinertia.estimation.simultaneous.inputs import BSP
 from kinertia.estimation.simultaneous.marker_offsets import as_displaced
 from kinertia.estimation.simultaneous.mixture_prior import GaussianPrior
 from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.estimation.simultaneous.static_information import StaticInformation
-from kinertia.model.bsp import block_diagonal
 from kinertia.model.log_cholesky import table_jacobian
 
 _ROUNDS = 3
@@ -59,7 +59,7 @@ class Information:
         first = layout.in_root
         information[first, first] += self._of_instruments(StaticInformation.of(information, first.stop).first)
         theta = layout[BSP]
-        chain = block_diagonal(table_jacobian(self.problem.layout.start[theta]))
+        chain = block_diag(*table_jacobian(self.problem.layout.start[theta]))
         result: np.ndarray = chain @ StaticInformation.of(information, first.stop).root_of_covariance()[theta]
         return result
 
