@@ -85,10 +85,6 @@ def test_three_contacts_exclude_a_rate_that_is_far_off(recording_of, name):
     assert "rate_alternative" not in found.evidence
 
 
-def test_fault_free_walks_at_their_rate(walk):
-    assert found_in(walk) is None
-
-
 @pytest.mark.parametrize("noise_mm", [3.0, 5.0])
 def test_markers_that_jitter_are_no_wrong_rate(walk, noise_mm):
     """Poses and markers from video do, by some millimetres in every frame."""
