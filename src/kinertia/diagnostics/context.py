@@ -1,7 +1,5 @@
 """Holds one recording for its questions, with evidence computed once."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -57,7 +55,7 @@ class RecordingContext:
 
     recording: Recording
     marker_set: MarkerSet | None = None
-    static: RecordingContext | None = None
+    static: "RecordingContext | None" = None
     is_static: bool = False
     window_s: tuple[float, float] | None = None
     height_m: float | None = None

@@ -7,8 +7,6 @@ by Gauss-Newton; the static trial is the prior, and a coordinate beyond its rang
 are eliminated one by one (Schur complement), so the cost grows linearly with their number.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -166,7 +164,7 @@ class _Problem:
                 break
         return here.static
 
-    def _at(self, static: np.ndarray, moving: np.ndarray) -> _Point:
+    def _at(self, static: np.ndarray, moving: np.ndarray) -> "_Point":
         """Evaluate the cost at static unknowns (k,) and moving coordinates (n, c)."""
         q, count = np.empty((len(moving), len(self.skeleton.coordinates))), len(self.still_at)
         q[:, self.moving_at], q[:, self.still_at] = moving, static[:count]

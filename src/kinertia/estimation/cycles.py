@@ -5,8 +5,6 @@ measured. Clinical angles (`clinical_angles`) come from inverse kinematics, whic
 changes them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from functools import partial
@@ -147,7 +145,7 @@ def cycle_curves(
 
 
 def _clinical(
-    source: _Source, skeleton: Skeleton, strides: Sequence[Stride], paths: np.ndarray
+    source: "_Source", skeleton: Skeleton, strides: Sequence[Stride], paths: np.ndarray
 ) -> list[dict[str, np.ndarray]]:
     """Return the clinical angles (101,) of each stride, by quantity."""
     q = source.tracked(np.concatenate([stride.time for stride in strides]), 0)

@@ -1,7 +1,5 @@
 """Defines where something was found: file, trial, plate, axis, markers, part of the body, time."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 
@@ -35,7 +33,7 @@ class Where:
     part: str | None = None
     span_s: tuple[float, float] | None = None
 
-    def overlaps(self, other: Where) -> bool:
+    def overlaps(self, other: "Where") -> bool:
         """Return whether both may concern the same: equal or unstated in each respect, with common marker and time."""
         for name in ("trial", "plate", "axis", "part"):
             own, others = getattr(self, name), getattr(other, name)

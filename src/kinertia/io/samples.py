@@ -4,8 +4,6 @@ A measured static trial, a walk, its ground reactions and an ExternalLoads file,
 https://github.com/opensim-org/opensim-models (Apache License 2.0) at one commit, so that everyone has the same bytes.
 """
 
-from __future__ import annotations
-
 import hashlib
 import os
 from collections.abc import Callable, Iterable, Mapping
@@ -90,7 +88,7 @@ class _Failure(NamedTuple):
     instead: str
 
 
-def _downloaded(name: str, folder: Path, share: _Share) -> _Failure | None:
+def _downloaded(name: str, folder: Path, share: "_Share") -> _Failure | None:
     """Download a file; return the reason where that fails."""
     import pooch
     import requests

@@ -4,8 +4,6 @@ OpenSim's functions of one variable are piecewise polynomials, so one class hold
 function of a function.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
@@ -46,7 +44,7 @@ class PiecewisePolynomial:
         result: np.ndarray = self._derivatives[order](q)
         return result
 
-    def scaled(self, factor: float) -> PiecewisePolynomial:
+    def scaled(self, factor: float) -> "PiecewisePolynomial":
         """Return this function times a factor."""
         return PiecewisePolynomial(self.knots, self.coefficients * factor)
 

@@ -5,8 +5,6 @@ and extension of the trunk are positive. No ranges are given for arms and forear
 are not the goniometer's.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,12 +47,12 @@ class RangeOfMotion:
         return float(np.hypot(self.low_sd, tolerance)), float(np.hypot(self.high_sd, tolerance))
 
     @property
-    def reversed(self) -> RangeOfMotion:
+    def reversed(self) -> "RangeOfMotion":
         """The same range for a coordinate of opposite sign."""
         return RangeOfMotion(-self.high, self.high_sd, -self.low, self.low_sd)
 
     @classmethod
-    def exactly(cls, low: float, high: float) -> RangeOfMotion:
+    def exactly(cls, low: float, high: float) -> "RangeOfMotion":
         """Make the range of one person whose limits are known, rad: the tolerance is three SDs."""
         sd = float(np.radians(TOLERANCE_DEG)) / _SURE
         return cls(low, sd, high, sd)

@@ -10,8 +10,6 @@ axes, are
 The residual is P: force (N) and moment (N m). The loads of the bodies come from `kinertia.motion.rigid_body`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -40,12 +38,12 @@ class Motion:
     qd: np.ndarray
     qdd: np.ndarray
 
-    def with_root(self, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> Motion:
+    def with_root(self, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> "Motion":
         """Return the motion with other root coordinates (each (n, 6))."""
         pairs = ((q, self.q), (qd, self.qd), (qdd, self.qdd))
         return Motion(*(np.hstack([root, every[:, 6:]]) for root, every in pairs))
 
-    def cut(self, frames: slice | np.ndarray) -> Motion:
+    def cut(self, frames: slice | np.ndarray) -> "Motion":
         """Return the motion at these frames."""
         return Motion(self.q[frames], self.qd[frames], self.qdd[frames])
 

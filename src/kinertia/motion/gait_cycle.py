@@ -7,8 +7,6 @@ plates measured in the same trial. If a load begins or ends at such a time, its 
 stated in the file, unless the forces contradict one of these.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
@@ -128,7 +126,7 @@ def _heel_and_toe(skeleton: Skeleton, segment: str) -> tuple[np.ndarray, np.ndar
     return positions[int(np.argmin(along))], positions[int(np.argmax(along))]
 
 
-def found_events(skeleton: Skeleton, kinematics: Kinematics) -> list[FoundEvent]:
+def found_events(skeleton: Skeleton, kinematics: Kinematics) -> list["FoundEvent"]:
     """Detect all heel strikes and toe offs of a trial, in order of time.
 
     Events of the file before or after the frames with a motion are left out, as a file keeps when it is cropped.

@@ -7,8 +7,6 @@ angles from compensating for marker errors. Beyond other ranges it can be penali
 that fit the markers nearly equally well.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -55,7 +53,7 @@ class PoseFit:
     cost_m2: np.ndarray
     normal: np.ndarray
 
-    def put(self, rows: np.ndarray, other: PoseFit, kept: np.ndarray) -> None:
+    def put(self, rows: np.ndarray, other: "PoseFit", kept: np.ndarray) -> None:
         """Overwrite those of these rows that are `kept` (r,) by the rows of another result."""
         for own, new in zip(self._arrays, other._arrays, strict=True):
             own[rows[kept]] = new[kept]

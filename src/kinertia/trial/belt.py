@@ -4,8 +4,6 @@ Where it is not stated, one speed for the whole trial is measured from the feet 
 constant speed, and wrong for a belt that starts, stops or follows the person.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,7 +32,7 @@ class Belt:
     time: np.ndarray
     speed_m_s: np.ndarray
 
-    def under(self, foot: int) -> Belt:
+    def under(self, foot: int) -> "Belt":
         """Return the belt under the right (0) or the left foot (1)."""
         return self if self.speed_m_s.ndim == 1 else Belt(self.time, self.speed_m_s[:, foot])
 

@@ -1,7 +1,5 @@
 """Measures how foot markers move against the ground: height above it, and speed."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -54,7 +52,7 @@ class FootMotion:
                 planted[first + below[0] : last + 1] = True
         return planted | np.isnan(self.height).any(axis=1)
 
-    def over(self, first: int, last: int) -> FootMotion:
+    def over(self, first: int, last: int) -> "FootMotion":
         """Return the motion with heights relative to the markers' level in these frames, for markers seen in them."""
         seen = np.isfinite(self.height[first : last + 1]).any(axis=0)
         if not seen.any():

@@ -1,7 +1,5 @@
 """Computes the body's velocity from its markers, and from the horizontal forces."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -32,7 +30,7 @@ class ForceVelocity:
     by_forces: FloatArray
     mass_kg: float
 
-    def cut(self, start_s: float, end_s: float) -> ForceVelocity:
+    def cut(self, start_s: float, end_s: float) -> "ForceVelocity":
         """Return the part with start_s <= time <= end_s."""
         inside = within(self.time, start_s, end_s)
         pelvis, centre, by_forces = (each[inside] for each in (self.pelvis, self.centre, self.by_forces))
@@ -54,7 +52,7 @@ class VelocityChanges:
     by_forces: FloatArray
 
     @classmethod
-    def of(cls, parts: Sequence[ForceVelocity]) -> VelocityChanges:
+    def of(cls, parts: Sequence[ForceVelocity]) -> "VelocityChanges":
         """Join the velocities of these windows."""
         pelvis, centre, by_forces = (
             joined_without_trend(parts, [getattr(part, name) for part in parts])

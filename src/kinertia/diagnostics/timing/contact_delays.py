@@ -4,8 +4,6 @@ On fault-free trials, measured in six laboratories and made by OpenSim, loads be
 and foot off, and last 0.96 to 1.22 times as long.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -126,7 +124,7 @@ def contact_delays(context: RecordingContext) -> Iterator[Hypothesis]:
     yield Hypothesis(with_evidence("T211", context.at(), measured, causes=tuple(causes)), corrected)
 
 
-def _growing(context: RecordingContext, plates: PlateLoads, delays: ContactDelays) -> Hypothesis:
+def _growing(context: RecordingContext, plates: PlateLoads, delays: "ContactDelays") -> Hypothesis:
     middle_s, rate_error = float(np.median(delays.time)), delays.rate_error
     first, last = (
         delays.delay_s + rate_error * (at - middle_s) for at in (float(delays.time.min()), float(delays.time.max()))
@@ -157,7 +155,7 @@ class ContactDelays:
     rate_error_sd: float
 
     @classmethod
-    def of(cls, contacts: Sequence[PlateContact], feet: Feet) -> ContactDelays | None:
+    def of(cls, contacts: Sequence[PlateContact], feet: Feet) -> "ContactDelays | None":
         """Compute the delays of whole loads that overlap with a whole stance phase of their foot; None without any."""
         rows = []
         for contact in contacts:

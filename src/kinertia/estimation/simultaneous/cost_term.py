@@ -4,8 +4,6 @@
 unknowns' names in `Layout`, and the ground reactions (`GroundLoads`), which terms may change.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
@@ -74,7 +72,7 @@ class CostTerm:
     def __init__(self, model: FreedModel) -> None:
         self.given, self.model, self.layout = model.given, model, model.layout
 
-    def add(self, into: Gradient, here: InTrial) -> None:
+    def add(self, into: Gradient, here: "InTrial") -> None:
         """Add half the sum of squares of its residuals in a time block of a trial, and its derivatives."""
 
     def add_information(self, into: np.ndarray, static: np.ndarray) -> None:

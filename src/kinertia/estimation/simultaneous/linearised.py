@@ -1,7 +1,5 @@
 """Holds a point of the estimate, and the cost linearised there."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,7 +27,7 @@ class Point:
         """All unknowns in one vector."""
         return np.concatenate([*(each.ravel() for each in self.coefficients), self.static, *self.displaced])
 
-    def like(self, vector: np.ndarray) -> Point:
+    def like(self, vector: np.ndarray) -> "Point":
         """Return the point whose `vector` this is."""
         ends = np.cumsum([each.size for each in (*self.coefficients, self.static, *self.displaced)])
         parts = np.split(vector, ends[:-1])

@@ -1,7 +1,5 @@
 """Accumulates the normal equations of a trial's motion and of static unknowns, knot interval by knot interval."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Self
 
@@ -35,7 +33,7 @@ class Gradient:
         """Return zeros for so many splines, coordinates and static unknowns."""
         return cls(np.zeros((size, coordinates)), np.zeros(static), 0.0)
 
-    def add(self, part: Gradient, splines: slice) -> None:
+    def add(self, part: "Gradient", splines: slice) -> None:
         """Add the gradient of a time block whose frames involve these splines."""
         self.rhs[splines] += part.rhs
         self.static_rhs += part.static_rhs

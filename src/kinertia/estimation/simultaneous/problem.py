@@ -5,8 +5,6 @@ solution. All derivatives are analytic. Frames are summed knot interval by knot 
 the motion and bordered by what does not move.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import partial
 from typing import Any, TypeVar
@@ -63,7 +61,7 @@ class MapProblem:
         self._adding = [term for term in self.terms if type(term).add is not CostTerm.add]
         self._room = EquationsPool()
 
-    def of(self, trials: Sequence[Observation], phase: float = 0.0) -> MapProblem:
+    def of(self, trials: Sequence[Observation], phase: float = 0.0) -> "MapProblem":
         """Return the same problem with other observations, and with knots this share of an interval earlier."""
         kinds = [type(term) for term in self.terms]
         return MapProblem(self.skeleton, self.prior, self.calibration, trials, phase, kinds, self.precise)

@@ -14,8 +14,6 @@ Frames in which forces change faster than the motion can follow have less weight
 (`impacts`). When these are found, the motion alone is made to follow the forces there, too.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
@@ -176,7 +174,7 @@ def _searched(problem: MapProblem, progress: Callable[[float], None]) -> Ended:
         damping = max(100.0 * damping, 1e-4) if stuck else max(1e-4 * damping, _LEAST_DAMPING)
 
 
-def _ended(begin: float, at: _Place, here: Linearised, iterations: int) -> Ended:
+def _ended(begin: float, at: "_Place", here: Linearised, iterations: int) -> Ended:
     cost = begin, at.slope.under(at.adapted.gaussian)[0]
     return Ended(at.slope.point, here, at.adapted.gaussian, at.converged, iterations, cost)
 

@@ -1,7 +1,5 @@
 """Finds the sagittal plane of a standing person from the symmetry of the markers."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,7 +34,7 @@ class BodyAxes:
         """Transform points (m, 3) from ground to body axes."""
         return (points - self.origin) @ self.rotation.T
 
-    def turned(self) -> BodyAxes:
+    def turned(self) -> "BodyAxes":
         """Return the axes of the person facing the other way."""
         return BodyAxes(np.diag([-1.0, 1.0, -1.0]) @ self.rotation, self.origin, self.asymmetry_m)
 
