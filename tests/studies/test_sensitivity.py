@@ -7,14 +7,7 @@ import pytest
 import kinertia.studies.sensitivity as sensitivity_study
 import study_results
 from command_line import run
-from kinertia.studies.sensitivity import (
-    AMPLITUDES,
-    CONDITIONS,
-    SHOWN,
-    STRIDE_S,
-    WITH_SQUATS,
-    run_sensitivity,
-)
+from kinertia.studies.sensitivity import AMPLITUDES, CONDITIONS, SHOWN, STRIDE_S, WITH_SQUATS, run_sensitivity
 from one_process import in_one_process
 
 

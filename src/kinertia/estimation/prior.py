@@ -26,13 +26,7 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from kinertia.errors import PriorError
-from kinertia.model.bsp import (
-    MIRROR_SIGNS,
-    PARAMETERS,
-    BodySegmentParameters,
-    inertia_of,
-    second_moments,
-)
+from kinertia.model.bsp import MIRROR_SIGNS, PARAMETERS, BodySegmentParameters, inertia_of, second_moments
 from kinertia.model.log_cholesky import nearest_consistent
 
 MASS_SD = {

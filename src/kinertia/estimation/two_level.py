@@ -24,13 +24,7 @@ from scipy.optimize import OptimizeResult, least_squares
 from kinertia.estimation.study_parameters import ParameterVector
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
-from kinertia.motion.dynamics import (
-    Motion,
-    consistent_root_acceleration,
-    residual,
-    root_derivatives,
-    root_regressor,
-)
+from kinertia.motion.dynamics import Motion, consistent_root_acceleration, residual, root_derivatives, root_regressor
 from kinertia.motion.single_blas_thread import one_blas_thread
 from kinertia.trial.sampled_time import span_s
 

@@ -63,12 +63,7 @@ from kinertia.io.subject_tables import TABLES, StudyFile, SubjectFile
 from kinertia.io.subject_values import CodedError, shown
 from kinertia.io.toml_lines import Location, TomlFile, read_toml
 from kinertia.model.anthropometry import check_subject
-from kinertia.settings import (
-    Diagnostics,
-    Settings,
-    Table,
-    number_of,
-)
+from kinertia.settings import Diagnostics, Settings, Table, number_of
 
 T = TypeVar("T", bound=Table)
 STUDY_FILE = "kinertia.toml"

@@ -8,16 +8,7 @@ import pytest
 pytest.importorskip("starlette", reason="needs the extra app (pip install -e '.[test]')")
 
 from command_line import run
-from kinertia.cli.web.entries import (
-    USE,
-    entries,
-    fields,
-    marker_set_field,
-    recognise,
-    trouble,
-    write_form,
-    write_text,
-)
+from kinertia.cli.web.entries import USE, entries, fields, marker_set_field, recognise, trouble, write_form, write_text
 from kinertia.cli.web.file_table import file_table, uses_of, with_uses, within_folder
 from kinertia.cli.web.library import Library
 from kinertia.errors import FileError, SettingsError

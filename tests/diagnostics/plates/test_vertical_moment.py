@@ -7,11 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from gait_loads import MASS_KG, gait_loads
-from kinertia.diagnostics.plates.vertical_moment import (
-    VERTICAL_MOMENT_LEVER_M,
-    mean_vertical_moment,
-    vertical_moment,
-)
+from kinertia.diagnostics.plates.vertical_moment import VERTICAL_MOMENT_LEVER_M, mean_vertical_moment, vertical_moment
 from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.io.osim.reader import read_osim
 from kinertia.model.imported_model import markers_of_model

@@ -5,12 +5,7 @@ import pytest
 
 from kinertia.estimation.simultaneous.bandwidth import Bandwidth
 from kinertia.estimation.simultaneous.marker_noise import SMALLEST_MARKER_SD_M
-from kinertia.estimation.simultaneous.observation import (
-    AROUND_WINDOW_S,
-    FORCE_SD_OF_WEIGHT,
-    MOMENT_ARM_M,
-    observe,
-)
+from kinertia.estimation.simultaneous.observation import AROUND_WINDOW_S, FORCE_SD_OF_WEIGHT, MOMENT_ARM_M, observe
 from kinertia.estimation.simultaneous.shoulder_girdle import girdle_variance
 from kinertia.model.skeleton import GRAVITY_M_S2
 from kinertia.synthetic.noise import SkinMotion, camera_noise, study_noise

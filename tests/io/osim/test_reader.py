@@ -17,19 +17,7 @@ from osim_comparison import (
     mass_matrices,
     random_states,
 )
-from osim_text import (
-    LINEAR,
-    ZERO,
-    body,
-    coordinate,
-    coupler,
-    custom_root,
-    frame,
-    joint,
-    model,
-    old_model,
-    transform,
-)
+from osim_text import LINEAR, ZERO, body, coordinate, coupler, custom_root, frame, joint, model, old_model, transform
 
 
 @pytest.fixture

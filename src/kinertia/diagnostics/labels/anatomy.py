@@ -11,12 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.evidence.landmarks import (
-    CLEAR,
-    cosine,
-    horizontal,
-    unit,
-)
+from kinertia.diagnostics.evidence.landmarks import CLEAR, cosine, horizontal, unit
 from kinertia.findings.finding import Finding, Severity, finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.model.marker_set import MarkerSet, in_words

@@ -18,12 +18,7 @@ from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.contact_fit import Hypothesis
 from kinertia.diagnostics.evidence.plate_contacts import FAR_M, PlateContact, displaced
 from kinertia.diagnostics.evidence.vertical_acceleration import LARGEST_RESIDUAL, vertical_match_of
-from kinertia.diagnostics.plates.heel_landing import (
-    goes_forwards,
-    lands_on_heels,
-    shows_feet_equally,
-    shows_whole_feet,
-)
+from kinertia.diagnostics.plates.heel_landing import goes_forwards, lands_on_heels, shows_feet_equally, shows_whole_feet
 from kinertia.diagnostics.plates.interchanged_plates import interchanged_plates
 from kinertia.diagnostics.plates.rotated_plates import rotated_plates
 from kinertia.diagnostics.timing.contact_delays import contact_delays, stance_durations

@@ -7,13 +7,7 @@ import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.contact_fit import Feet, Hypothesis
-from kinertia.diagnostics.evidence.plate_contacts import (
-    COP_MIN_FORCE_N,
-    FAR_M,
-    contacts_of,
-    cop_horizontal,
-    displaced,
-)
+from kinertia.diagnostics.evidence.plate_contacts import COP_MIN_FORCE_N, FAR_M, contacts_of, cop_horizontal, displaced
 from kinertia.findings.finding import finding
 from kinertia.findings.quantity import Quantity
 from kinertia.trial.data import FloatArray, PlateLoads

@@ -11,13 +11,7 @@ import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.contact_fit import Feet, Hypothesis
-from kinertia.diagnostics.evidence.plate_contacts import (
-    CONTACT_FORCE_N,
-    FAR_M,
-    PlateContact,
-    contacts_of,
-    loads_on,
-)
+from kinertia.diagnostics.evidence.plate_contacts import CONTACT_FORCE_N, FAR_M, PlateContact, contacts_of, loads_on
 from kinertia.findings.finding import finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.trial.data import FloatArray, PlateLoads
