@@ -4,8 +4,6 @@ While a plate is loaded, the lowest marker of the foot on it is 7 to 51 mm above
 standing children to runs in shoes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -22,7 +22,7 @@ _MATTERS_RAD = float(np.radians(2.0))
 _OF_ONE_MATTERS_RAD = float(np.radians(4.0))
 """In reference walks, 5 degrees of one plate change joint moments by one to two SDs."""
 _LARGEST_RAD = float(np.radians(10.0))
-"""Three SDs of a rotated plate. Beyond it, the rotation stands for another fault of the forces, which it cannot correct."""
+"""Three SDs of a rotated plate. A larger rotation stands for another fault of the forces, which it cannot correct."""
 
 
 def plate_rotation(context: ResultContext) -> Iterator[Finding]:
@@ -34,8 +34,9 @@ def plate_rotation(context: ResultContext) -> Iterator[Finding]:
         found = corrected(context, "P234", "rotation_rad", [replace(largest, plate=None)])
     else:
         found = corrected(context, "P237", "rotation_rad", rotations)
+    too_large = max((abs(one.value) for one in rotations), default=0.0) > _LARGEST_RAD
     for one in found:
-        yield one.at(Severity.WARNING) if abs(one.evidence["rotation_rad"].value) > _LARGEST_RAD else one
+        yield one.at(Severity.WARNING) if too_large else one
     if context.fit.posterior is None:
         return
     known = context.fit.posterior.instruments, context.ready.uncertainty.instruments
