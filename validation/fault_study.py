@@ -134,7 +134,7 @@ def sound_laboratories(folder: Path, count: int) -> dict[str, SubjectFile]:
             for prior in (FLOOR_PRIOR["x"], FLOOR_PRIOR["z"], PLATE_PRIOR["gain"], FLOOR_PRIOR["turn"])
         )
         for change in (
-            plates.moved(x, z),
+            plates.moved(x_m=x, z_m=z),
             plates.scaled(force=1.0 + gain),
             plates.turned_about_vertical(float(np.degrees(turn))),
         ):

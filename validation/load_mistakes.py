@@ -84,12 +84,12 @@ def torques_in_n_mm(person: MeasuredPerson, rng: np.random.Generator) -> Measure
     return person.with_plates(loads_of(plates, force, point, 1000.0 * torque))
 
 
-def moved(x_m: float, z_m: float) -> Change:
+def moved(x_m: float = 0.0, y_m: float = 0.0, z_m: float = 0.0) -> Change:
     """Return a fault that displaces centres of pressure, with the corners of the plates where the file has them."""
 
     def change(plates: PlateLoads) -> PlateLoads:
         force, point, torque = acting(plates)
-        offset = np.array([x_m, 0.0, z_m])
+        offset = np.array([x_m, y_m, z_m])
         corners = None if plates.corners is None else plates.corners + offset
         return replace(loads_of(plates, force, point + offset, torque), corners=corners)
 
@@ -184,7 +184,7 @@ def _earlier(plates: PlateLoads, delay_s: float) -> npt.NDArray[np.int_]:
 def of_another_trial(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPerson | None:
     """Replace the forces by those of a walk that began 0.3 s earlier, and 120 mm further on."""
     earlier = late(-0.3)(person, rng)
-    return None if earlier is None else moved(0.12, 0.02)(earlier, rng)
+    return None if earlier is None else moved(x_m=0.12, z_m=0.02)(earlier, rng)
 
 
 def _by_time(plates: PlateLoads) -> list[int]:

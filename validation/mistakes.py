@@ -101,6 +101,11 @@ MISTAKES = (
         markers.exchanged(("knee_lateral_r", "ankle_lateral_r"), where="static"),
         _codes("L206", "L207", "L212"),
     ),
+    Mistake(
+        "medial knee markers swapped between the legs in the static trial",
+        markers.exchanged(("knee_medial_r", "knee_medial_l"), where="static"),
+        _codes("L202", "L212"),
+    ),
     Mistake("thigh and shank markers swapped in the walk", markers.wands_exchanged, _codes("L206", "L212", "L213")),
     # whose body
     Mistake("static trial of another person, 10 % taller", markers.scaled(1.10, "static"), _codes("S203")),
@@ -153,8 +158,9 @@ MISTAKES = (
     Mistake("points of application in mm", forces.scaled(point=1000.0), _codes("P204")),
     Mistake("forces in kg", forces.scaled(force=1 / 9.81), _codes("P202")),
     Mistake("forces in kN", forces.scaled(force=1e-3), _codes("P202")),
-    Mistake("centres of pressure 50 mm off along X, both plates", forces.moved(0.05, 0.0), _POSITIONS),
-    Mistake("centres of pressure 50 mm off along Z, both plates", forces.moved(0.0, 0.05), _POSITIONS),
+    Mistake("centres of pressure 50 mm off along X, both plates", forces.moved(x_m=0.05), _POSITIONS),
+    Mistake("centres of pressure 50 mm off along Z, both plates", forces.moved(z_m=0.05), _POSITIONS),
+    Mistake("surface of both plates taken for 50 mm higher", forces.moved(y_m=0.05), _codes("P249")),
     Mistake("plates exchanged", forces.plates_exchanged, _codes("P241")),
     Mistake("both feet on one plate for 0.08 s", forces.on_one_plate, _codes("P276")),
     Mistake(
