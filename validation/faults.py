@@ -55,9 +55,9 @@ made in the files of {walks} walks, one at a time, and given to `kinertia check`
   degrees may be chance and change moments by two SDs. A note of the fit then states from which angle on its trials
   show a rotation. The path of the centre of pressure under the feet shows less: on fault-free walks, right and left
   together, it is up to 4 degrees from the line between heel and toe.
-- A wrong height of the plates, if the file does not state it: P249 compares the corners in a C3D file, or the heights of
-  the points in a force file, with the feet. Where points that were computed for another height are at 0 in the file, 50
-  mm change moments by 1.4 to 1.8 SDs.
+- A wrong height of the plates, if the file does not state it: P249 compares the corners in a C3D file, or the heights
+  of the points in a force file, with the feet. Where points computed for a surface 50 mm higher are at 0 in the file,
+  moments change by 1.4 to 1.8 SDs.
 - A floor that is too low by less than the height of thick soles. It is identified if the feet's lowest marker is more
   than 50 mm above the floor; on fourteen people it is 23 to 44 mm. The forces would show it within 13 to 24 mm: too
   little.
