@@ -265,9 +265,21 @@ def test_the_table_gives_the_entries_back():
     assert with_uses(content, uses) == content
 
 
+def test_the_form_leaves_joint_ranges_as_they_are_in_the_text(person, c3d_lab):
+    """They are a table: as a field of the form they could neither be typed nor kept."""
+    put(person, c3d_lab, "static.c3d", "walk.c3d")
+    recognise(person)
+    text = person.subject.read_text(encoding="utf-8")
+    write_text(person, text.replace("[subject]", "[subject]\nranges_deg = { knee_angle_r = [-20, 150] }"))
+    form = {field.key: field.value for field in fields(entries(person))}
+    write_form(person, {**form, "sex": "female", "mass_kg": "41.5"})
+    subject = read_subject(person.subject).subject
+    assert (subject.mass_kg, tuple(subject.ranges_deg["knee_angle_r"])) == (41.5, (-20.0, 150.0))
+
+
 def test_the_form_has_every_entry_of_the_person():
     shown = {field.key: field for field in fields({"subject": {"sex": "f", "age_years": 9.0}})}
-    assert set(shown) == set(Subject.model_fields)
+    assert set(shown) == set(Subject.model_fields) - {"ranges_deg"}
     assert (shown["sex"].value, shown["sex"].choices) == ("female", ("male", "female"))
     assert shown["population"].choices == ("adult", "child", "elderly", "obese", "other")
     assert shown["age_years"].value == "9.0"

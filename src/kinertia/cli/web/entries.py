@@ -39,6 +39,8 @@ _LABELS = {
     "ankle_width_mm": "Ankle width (mm)",
     "elbow_width_mm": "Elbow width (mm)",
 }
+_IN_FORM = tuple(key for key in Subject.model_fields if key != "ranges_deg")
+"""Entries of `[subject]` with one value each; joint ranges are a table, for the text of the subject file."""
 _MARKER_SET = "marker_set"
 _ABOUT_MARKER_SET = "blank: detected from the labels if most of a preset's are there"
 USE = "use:"
@@ -51,11 +53,12 @@ def label_of(key: str) -> str:
 
 
 def fields(content: Content, typed: Mapping[str, str] | None = None) -> list[Field]:
-    """Return all entries of `[subject]` that may be in a subject file; typed values precede written ones."""
+    """Return all entries of `[subject]` with one value; typed values precede written ones."""
     written = content.get("subject")
     known = written if isinstance(written, Mapping) else {}
     shown = []
-    for key, about in Subject.model_fields.items():
+    for key in _IN_FORM:
+        about = Subject.model_fields[key]
         value = str((typed or {}).get(key, known.get(key, "")))
         choices = choices_of(about.annotation)
         label = label_of(key)
@@ -139,7 +142,7 @@ def write_form(person: Person, form: Mapping[str, str]) -> None:
     """
     content = entries(person)
     subject: dict[str, Any] = dict(content.get("subject", {}))
-    for key in Subject.model_fields:
+    for key in _IN_FORM:
         if key not in form:
             continue
         text = form[key].strip()
