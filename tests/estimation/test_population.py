@@ -91,8 +91,8 @@ def test_somebody_short_is_likely_a_child():
     ("entries", "populations"),
     [
         ("height_m = 1.803\nage_years = 7", ["child"]),
-        ("height_m = 1.382", ["obese"]),
-        ("height_m = 1.382\nage_years = 7", ["child"]),
+        ("height_m = 1.45", ["obese"]),
+        ("height_m = 1.45\nage_years = 7", ["child"]),
         ("height_m = 1.803\nage_years = 30", []),
     ],
 )

@@ -39,6 +39,7 @@ NOT_POSSIBLE = {
     "lateral and medial knee markers swapped in the static trial, one leg",
     "lateral and medial ankle markers swapped in the static trial, one leg",
     "lateral and medial elbow markers swapped in the static trial, one arm",
+    "medial knee markers swapped between the legs in the static trial",
 }
 """Plug-in Gait has no inner markers."""
 LEFT_TO_THE_FIT = {
