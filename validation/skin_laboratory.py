@@ -28,9 +28,22 @@ from validation.truth_trials import Faults, gait2354, make_trial
 
 FIRST_SEED = 100
 _FAULTY = Faults(plate_m=0.020, lag_s=0.010, hip_m=0.010)
-INSTRUMENTS = {"sound": Faults(), "faulty": _FAULTY, "calibrated": _FAULTY}
+INSTRUMENTS = {"sound": Faults(), "stated": Faults(), "faulty": _FAULTY, "calibrated": _FAULTY}
 OPTIONS = {"calibrated": ["--calibrate"]}
 """Of `kinertia fit`, by kind of laboratory."""
+_SUBJECT = """[subject]
+mass_kg = {mass_kg:.1f}
+
+[model]
+osim = "model.osim"
+
+[[trial]]
+markers = "walk.trc"
+forces = "walk_grf.mot"
+loads = "loads.xml"
+"""
+_STATED = {"stated": "\n[instruments]\nplate_sd_mm = 0.5\nclock_sd_ms = 0.5\n"}
+"""What the subject file says of the instruments, by kind of laboratory."""
 CUTOFFS_HZ = (6, 10, 12)
 MARGIN_S = 0.05
 LOADING = 0.12
@@ -72,9 +85,9 @@ def made(folder: Path, skin: Path, kind: str, seed: int) -> Walk:
         make_trial(folder, seed, INSTRUMENTS[kind], gait2354(), MeasuredSkin.read(skin))
     truth = json.loads((folder / "truth" / "truth.json").read_text())
     if not (folder / "fit" / "fit.json").exists():
-        walk, forces, loads, model = (folder / n for n in ("walk.trc", "walk_grf.mot", "loads.xml", "model.osim"))
-        words = ["fit", walk, "--forces", forces, "--loads", loads, "--model", model]
-        words += ["--mass", f"{truth['total_mass_kg']:.1f}", "-o", folder / "fit", "--quiet", *OPTIONS.get(kind, [])]
+        subject = folder / "subject.toml"
+        subject.write_text(_SUBJECT.format(mass_kg=truth["total_mass_kg"]) + _STATED.get(kind, ""), encoding="utf-8")
+        words = ["fit", subject, "-o", folder / "fit", "--quiet", *OPTIONS.get(kind, [])]
         subprocess.run([sys.executable, "-m", "kinertia", *map(str, words)], capture_output=True, check=False)
     usual = _opensim(folder, truth["total_mass_kg"])
     return _compared(folder, usual)
@@ -203,7 +216,7 @@ table (seeds from {first}) whose body segment parameters differ from the model's
 over the bone as one walking person's did against fluoroscopy (`validation/measured_skin.py`); all people have the skin
 of this one donor. The recording does not come with Kinertia: `python -m validation accuracy --skin FILE` takes it.
 
-*Estimate*: RMS error of the joint moments by `kinertia fit --model`, each walk alone. *OpenSim*: of its inverse
+*Estimate*: RMS error of the joint moments by `kinertia fit`, with the model, each walk alone. *OpenSim*: of its inverse
 kinematics and inverse dynamics at the best of 6, 10 and 12 Hz for each joint. *sd*: RMS of the deviations that the fit
 reports. *Covered*: share of frames in which the truth lies in the 95 % interval. *After heel strike*: the first 12 % of
 each side's strides.
@@ -213,6 +226,11 @@ each side's strides.
 {sound_table}
 
 Instruments: {sound}.
+
+The same walks, with a subject file that states what OpenSim takes for granted, that plates and synchronisation are
+right (`plate_sd_mm = 0.5`, `clock_sd_ms = 0.5`):
+
+{stated_table}
 
 ## Left plate 20 mm off, forces 10 ms late, hip centres 10 mm off
 
