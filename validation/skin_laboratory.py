@@ -29,21 +29,20 @@ from validation.truth_trials import Faults, gait2354, make_trial
 FIRST_SEED = 100
 _FAULTY = Faults(plate_m=0.020, lag_s=0.010, hip_m=0.010)
 INSTRUMENTS = {"sound": Faults(), "stated": Faults(), "faulty": _FAULTY, "calibrated": _FAULTY}
-OPTIONS = {"calibrated": ["--calibrate"]}
-"""Of `kinertia fit`, by kind of laboratory."""
 _SUBJECT = """[subject]
 mass_kg = {mass_kg:.1f}
 
 [model]
 osim = "model.osim"
-
+{model}
 [[trial]]
 markers = "walk.trc"
 forces = "walk_grf.mot"
 loads = "loads.xml"
-"""
+{instruments}"""
+_CALIBRATE = {"calibrated": "calibrate = true\n"}
 _STATED = {"stated": "\n[instruments]\nplate_sd_mm = 0.5\nclock_sd_ms = 0.5\n"}
-"""What the subject file says of the instruments, by kind of laboratory."""
+"""Entries of the subject file by kind of laboratory."""
 CUTOFFS_HZ = (6, 10, 12)
 MARGIN_S = 0.05
 LOADING = 0.12
@@ -86,8 +85,9 @@ def made(folder: Path, skin: Path, kind: str, seed: int) -> Walk:
     truth = json.loads((folder / "truth" / "truth.json").read_text())
     if not (folder / "fit" / "fit.json").exists():
         subject = folder / "subject.toml"
-        subject.write_text(_SUBJECT.format(mass_kg=truth["total_mass_kg"]) + _STATED.get(kind, ""), encoding="utf-8")
-        words = ["fit", subject, "-o", folder / "fit", "--quiet", *OPTIONS.get(kind, [])]
+        entries = {"model": _CALIBRATE.get(kind, ""), "instruments": _STATED.get(kind, "")}
+        subject.write_text(_SUBJECT.format(mass_kg=truth["total_mass_kg"], **entries), encoding="utf-8")
+        words = ["fit", subject, "-o", folder / "fit", "--quiet"]
         subprocess.run([sys.executable, "-m", "kinertia", *map(str, words)], capture_output=True, check=False)
     usual = _opensim(folder, truth["total_mass_kg"])
     return _compared(folder, usual)
