@@ -45,8 +45,8 @@ standard deviation), that left mirrors right, and the total mass within 0.5 %. I
 {study}
 
 **How good an estimate could be on this walk.** *At best* is the Cramér-Rao bound of an
-ideal estimate: the forces are exact, and the covariance of the noise over time is that of
-the study's sinusoids, so that only what they leave free is information, seen by cameras of 0.1 mm or even 0.01 mm. The
+ideal estimate, for which forces are exact and the noise is known to consist of the study's sinusoids. What they leave
+free is information, seen by cameras of 0.1 mm or even 0.01 mm. The
 moments of inertia are then still off by 0.05 kg m2: the trunk hardly turns at 1.14 m/s, so that one
 stride says little about its moments, which dominate the RMS, and they stay near the start. The lines after
 "simultaneous" change one thing each. How the noise is weighted changes the result by a few percent; telling the
