@@ -32,17 +32,19 @@ INSTRUMENTS = {"sound": Faults(), "stated": Faults(), "faulty": _FAULTY, "calibr
 _SUBJECT = """[subject]
 mass_kg = {mass_kg:.1f}
 
-[model]
-osim = "model.osim"
-{model}
 [[trial]]
 markers = "walk.trc"
 forces = "walk_grf.mot"
 loads = "loads.xml"
-{instruments}"""
-_CALIBRATE = {"calibrated": "calibrate = true\n"}
-_STATED = {"stated": "\n[instruments]\nplate_sd_mm = 0.5\nclock_sd_ms = 0.5\n"}
-"""Entries of the subject file by kind of laboratory."""
+
+[model]
+osim = "model.osim"
+"""
+_MORE = {
+    "stated": "\n[instruments]\nplate_sd_mm = 0.5\nclock_sd_ms = 0.5\n",
+    "calibrated": "calibrate = true\n",
+}
+"""Entries at the end of the subject file, by kind of laboratory."""
 CUTOFFS_HZ = (6, 10, 12)
 MARGIN_S = 0.05
 LOADING = 0.12
@@ -85,8 +87,8 @@ def made(folder: Path, skin: Path, kind: str, seed: int) -> Walk:
     truth = json.loads((folder / "truth" / "truth.json").read_text())
     if not (folder / "fit" / "fit.json").exists():
         subject = folder / "subject.toml"
-        entries = {"model": _CALIBRATE.get(kind, ""), "instruments": _STATED.get(kind, "")}
-        subject.write_text(_SUBJECT.format(mass_kg=truth["total_mass_kg"], **entries), encoding="utf-8")
+        text = _SUBJECT.format(mass_kg=truth["total_mass_kg"]) + _MORE.get(kind, "")
+        subject.write_text(text, encoding="utf-8")
         words = ["fit", subject, "-o", folder / "fit", "--quiet"]
         subprocess.run([sys.executable, "-m", "kinertia", *map(str, words)], capture_output=True, check=False)
     usual = _opensim(folder, truth["total_mass_kg"])

@@ -98,8 +98,8 @@ def doubts_about(path: Path, numbers_of_frames: bool = True) -> str:
     if section[3] not in _BYTE_ORDERS:
         return f"its processor is {section[3]}"
     if section[3] == _MIPS:
-        given = "A C3D file with the numbers of MIPS computers (big-endian)"
-        raise wrong_kind(path, given, "be read", "those of Intel: save it again with another C3D program")
+        given, expected = "A big-endian (MIPS) C3D file", "a little-endian (Intel) one; save it in that format"
+        raise wrong_kind(path, given, "be read", expected)
     if section[3] == 85:
         return "its numbers are DEC's"
     parameters, doubt = _parameters(path, section, order)

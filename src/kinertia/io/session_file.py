@@ -54,12 +54,14 @@ class PersonInstruments(Table):
 
     @model_validator(mode="after")
     def _square(self) -> PersonInstruments:
-        size, plates = 5 * len(self.plates) + 4, f"{len(self.plates)} plate{'s'[: len(self.plates) != 1]}"
-        rows, earlier = {len(self.information), len(self.rhs), *map(len, self.information)}, 4 * len(self.plates) + 4
+        count = len(self.plates)
+        size, earlier = 5 * count + 4, 4 * count + 4
+        rows = {len(self.information), len(self.rhs), *map(len, self.information)}
         if rows == {earlier}:
             problem = "an earlier version of Kinertia wrote it, without a rotation of each plate"
             raise _OutdatedError(earlier, size, problem)
         if rows != {size}:
+            plates = "1 plate" if count == 1 else f"{count} plates"
             raise ValueError(f"{self.name}: information and rhs must have {size} rows and columns for {plates}")
         return self
 

@@ -71,7 +71,7 @@ def parse_toml(text: str, path: Path) -> TomlFile:
         expected = next((hint for start, hint in hints.items() if what.startswith(start)), "key = value")
         wrong = text.splitlines()[line - 1] if number else ""
         if re.search("[“”„‘’«»]", wrong):
-            expected = """straight quotes ("), not those of a word processor"""
+            expected = 'straight quotes ("), not curly ones'
         if comma := re.search(r"=\s*([-+]?\d+),(\d+)\s*(#|$)", wrong):
             expected = f"a decimal point, not a comma: {comma[1]}.{comma[2]}"
         raise mismatch(path, "TOML", what[:1].lower() + what[1:], expected, line) from error

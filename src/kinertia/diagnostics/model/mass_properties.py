@@ -80,9 +80,9 @@ def mass_unit(context: PersonContext) -> Iterator[Finding]:
     if context.model is None:
         return
     model_kg = context.model.bsp.total_mass_kg
-    for limit, beyond in ((_HEAVIEST_KG, model_kg > _HEAVIEST_KG), (_LIGHTEST_KG, 0.0 < model_kg < _LIGHTEST_KG)):
-        if beyond:
-            yield finding("O206", model_kg=Quantity(model_kg, "kg", limit=limit))
+    if model_kg > _HEAVIEST_KG or 0.0 < model_kg < _LIGHTEST_KG:
+        limit_kg = _HEAVIEST_KG if model_kg > _HEAVIEST_KG else _LIGHTEST_KG
+        yield finding("O206", model_kg=Quantity(model_kg, "kg", limit=limit_kg))
 
 
 def degenerate_inertia(context: PersonContext) -> Iterator[Finding]:

@@ -1,4 +1,4 @@
-"""Are the plates at the height of the feet? A centre of pressure above the soles bends every lever arm.
+"""Are the plates at the height of the feet? A centre of pressure above the soles falsifies every lever arm.
 
 While a plate is loaded, the lowest marker of the foot on it is 7 to 51 mm above it: on 60 contacts of 20 people, from
 standing children to runs in shoes.
@@ -13,6 +13,7 @@ from kinertia.diagnostics.evidence.plate_contacts import PlateContact
 from kinertia.diagnostics.person_context import PersonContext
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
+from kinertia.trial.data import PlateLoads
 
 _LEAST_M, _USUAL_M = 0.0, (0.007, 0.051)
 _LOW = 10.0
@@ -22,27 +23,27 @@ _LOW = 10.0
 def plate_heights(context: PersonContext) -> Iterator[Finding]:
     """Report P249: plates, or centres of pressure in a file, above the lowest markers of all feet on them."""
     for trial in context.trials:
+        plates = trial.recorded_plates
+        if plates is None:
+            continue
         lowest: dict[int, float] = {}
         for contact in trial.contacts:
             height_m = _lowest_m(trial, contact)
             if height_m is not None:
                 lowest[contact.plate] = max(height_m, lowest.get(contact.plate, -np.inf))
         for plate, height_m in lowest.items():
-            surface_m = _surface_m(trial, plate)
+            surface_m = _surface_m(plates, plate)
             if height_m - surface_m < _LEAST_M:
                 yield finding(
                     "P249",
-                    trial.at(plate=trial.recorded_plates.names[plate] if trial.recorded_plates else None),
+                    trial.at(plate=plates.names[plate]),
                     depth_m=Quantity(surface_m - height_m, "m", limit=-_LEAST_M, usual=(-_USUAL_M[1], -_USUAL_M[0])),
                     surface_m=Quantity(surface_m, "m"),
                 )
 
 
-def _surface_m(trial: RecordingContext, plate: int) -> float:
+def _surface_m(plates: PlateLoads, plate: int) -> float:
     """Return the height (m) of a plate by its corners or else by its centres of pressure; NaN where it is unknown."""
-    plates = trial.recorded_plates
-    if plates is None:
-        return np.nan
     if plates.corners is not None:
         return float(plates.corners[plate, :, 1].mean())
     return np.nan if plates.torques is None else plates.torques[plate].height_m

@@ -11,7 +11,7 @@ import numpy as np
 
 from kinertia.diagnostics.result.context import ResultContext
 from kinertia.estimation.simultaneous.calibration_entry import DELAY, ZERO, CalibrationEntry
-from kinertia.findings.finding import Finding, finding, with_evidence
+from kinertia.findings.finding import Finding, Severity, finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 
@@ -20,13 +20,15 @@ _FEWEST = 2
 """Equal errors of so many plates may be the error of all: of a single plate it is its own."""
 
 
-def corrected(context: ResultContext, code: str, headline: str, errors: Iterable[CalibrationEntry]) -> list[Finding]:
-    """List a finding for each of these errors that was found."""
-    return [correction(code, headline, context.at(one), one) for one in errors if one.found]
+def corrected(
+    context: ResultContext, code: str, headline: str, errors: Iterable[CalibrationEntry], largest: float = np.inf
+) -> list[Finding]:
+    """List a finding for each of these errors that was found; arguments as in `correction`."""
+    return [correction(code, headline, context.at(one), one, largest) for one in errors if one.found]
 
 
-def correction(code: str, headline: str, where: Where, one: CalibrationEntry) -> Finding:
-    """Return an error's finding; `headline` names its main quantity."""
+def correction(code: str, headline: str, where: Where, one: CalibrationEntry, largest: float = np.inf) -> Finding:
+    """Return an error's finding; `headline` names its main quantity. An error above `largest` is a WARNING."""
     unsure = not one.supported
     evidence = {
         headline: Quantity(one.value, one.unit, _SD * one.prior_sd, (-one.prior_sd, one.prior_sd), one.sd),
@@ -36,7 +38,7 @@ def correction(code: str, headline: str, where: Where, one: CalibrationEntry) ->
     }
     since = f", since {one.contradicted_by} contradicts it" if one.contradicted_by else ""
     causes = (f"soft tissue or the model{since}", "the instrument") if unsure else ("the instrument",)
-    return with_evidence(code, where, evidence, None, causes)
+    return with_evidence(code, where, evidence, Severity.WARNING if abs(one.value) > largest else None, causes)
 
 
 def equal(errors: Sequence[CalibrationEntry], usual_sd: float = np.inf) -> bool:

@@ -14,7 +14,7 @@ from kinertia.diagnostics.result.context import ResultContext
 from kinertia.diagnostics.result.corrections import corrected, equal
 from kinertia.diagnostics.result.smallest_detectable import smallest_detectable, smallest_detectable_of_one
 from kinertia.estimation.simultaneous.calibration_entry import ROTATION
-from kinertia.findings.finding import Finding, Severity, finding
+from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 
 _MATTERS_RAD = float(np.radians(2.0))
@@ -22,7 +22,7 @@ _MATTERS_RAD = float(np.radians(2.0))
 _OF_ONE_MATTERS_RAD = float(np.radians(4.0))
 """In reference walks, 5 degrees of one plate change joint moments by one to two SDs."""
 _LARGEST_RAD = float(np.radians(10.0))
-"""Three SDs of a rotated plate. A larger rotation stands for another fault of the forces, which it cannot correct."""
+"""Three prior SDs of a rotated plate. A larger estimate points to another fault, which no rotation corrects."""
 
 
 def plate_rotation(context: ResultContext) -> Iterator[Finding]:
@@ -31,12 +31,9 @@ def plate_rotation(context: ResultContext) -> Iterator[Finding]:
     usual_sd = context.ready.uncertainty.instruments.plate["turn"].sd
     if equal(rotations, usual_sd) or len(rotations) == 1:
         largest = max(rotations, key=lambda one: abs(one.value))
-        found = corrected(context, "P234", "rotation_rad", [replace(largest, plate=None)])
+        yield from corrected(context, "P234", "rotation_rad", [replace(largest, plate=None)], _LARGEST_RAD)
     else:
-        found = corrected(context, "P237", "rotation_rad", rotations)
-    too_large = max((abs(one.value) for one in rotations), default=0.0) > _LARGEST_RAD
-    for one in found:
-        yield one.at(Severity.WARNING) if too_large else one
+        yield from corrected(context, "P237", "rotation_rad", rotations, _LARGEST_RAD)
     if context.fit.posterior is None:
         return
     known = context.fit.posterior.instruments, context.ready.uncertainty.instruments

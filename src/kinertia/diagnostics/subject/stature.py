@@ -17,7 +17,7 @@ from kinertia.model.joint_centres import find_landmarks
 _PARTS = (("ankle_lateral", "knee_lateral"), ("knee_lateral", "asis"), ("asis", "acromion"))
 _USUAL, _OFF = 0.815, 0.055
 _POSSIBLE = (0.65, 1.0)
-"""Nobody is shorter than from ankle to shoulder, or has a third of the stature above and below these."""
+"""Nobody is shorter than from ankle to shoulder, or has a third of the stature above shoulders and below ankles."""
 
 
 def stature(context: RecordingContext) -> Iterator[Finding]:

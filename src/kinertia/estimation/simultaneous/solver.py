@@ -66,7 +66,7 @@ _LEAST_DAMPING = 1e-9
 _STUCK = 1e6
 """Damping at which the search gives up: no step lowers the cost any more."""
 _MAX_ITERATIONS = 60
-"""Largest number of quadratics; most trials take 5 to 7."""
+"""Largest number of quadratics; most trials take 2 to 6."""
 _MOST_TRIES = 5
 """Largest number of ever shorter steps tried along one direction."""
 _LEAST_KEPT = 1e-3
