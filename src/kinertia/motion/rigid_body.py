@@ -78,14 +78,14 @@ def move(tree: KinematicTree, x: np.ndarray, v: np.ndarray, a: np.ndarray, frame
     axes, velocity, acceleration = frame.axes, frame.velocity, frame.acceleration
     swept, turned = frame.swept, frame.turned
     place_axes(tree, x, frame.rotation, frame.translation, axes)
-    twice = np.empty((1, 6))
+    twice = frame.spare[0]
     for j in range(len(x)):
         parent = tree.parent[j]
         motion_cross(velocity, parent, axes, j, swept, j)
         motion_cross(acceleration, parent, axes, j, turned, j)
-        motion_cross(velocity, parent, swept, j, twice, 0)
+        motion_cross(velocity, parent, swept, j, twice, j)
         for k in range(6):
-            turned[j, k] += twice[0, k]
+            turned[j, k] += twice[j, k]
             velocity[j, k] = velocity[parent, k] + axes[j, k] * v[j]
             acceleration[j, k] = acceleration[parent, k] + axes[j, k] * a[j] + swept[j, k] * v[j]
 
@@ -93,30 +93,26 @@ def move(tree: KinematicTree, x: np.ndarray, v: np.ndarray, a: np.ndarray, frame
 @inlined
 def _place_inertia(j: int, bodies: np.ndarray, frame: Frame) -> None:
     """Compute the inertia of bodies attached directly to axis j, at the ground origin, from its ten parameters."""
-    rotation, translation, inertia = frame.rotation, frame.translation, frame.inertia
-    own, half, first = np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
-    mass, x, y, z = bodies[j, 0], translation[j, 0], translation[j, 1], translation[j, 2]
-    own[0, 0], own[0, 1], own[0, 2] = bodies[j, 4], bodies[j, 5], bodies[j, 7]
-    own[1, 0], own[1, 1], own[1, 2] = bodies[j, 5], bodies[j, 6], bodies[j, 8]
-    own[2, 0], own[2, 1], own[2, 2] = bodies[j, 7], bodies[j, 8], bodies[j, 9]
-    for r in range(3):
-        first[r] = 0.0
-        for c in range(3):
-            first[r] += rotation[j, r, c] * bodies[j, 1 + c]
-            half[r, c] = 0.0
-            for k in range(3):
-                half[r, c] += rotation[j, r, k] * own[k, c]
+    rotation, at, inertia = frame.rotation, frame.translation, frame.inertia
+    mass, hx, hy, hz = bodies[j, 0], bodies[j, 1], bodies[j, 2], bodies[j, 3]
+    xx, xy, yy, xz, yz, zz = bodies[j, 4], bodies[j, 5], bodies[j, 6], bodies[j, 7], bodies[j, 8], bodies[j, 9]
     # J + 2 (t . h) - h t^T - t h^T + m (t . t - t t^T), with h the first moment about the frame and t its position
-    round_about = 2.0 * (x * first[0] + y * first[1] + z * first[2]) + mass * (x * x + y * y + z * z)
+    round_about = 0.0
+    for r in range(3):
+        first = rotation[j, r, 0] * hx + rotation[j, r, 1] * hy + rotation[j, r, 2] * hz
+        inertia[j, 1 + r] = first + mass * at[j, r]
+        round_about += at[j, r] * (first + inertia[j, 1 + r])
     inertia[j, 0] = mass
     for r in range(3):
-        inertia[j, 1 + r] = first[r] + mass * translation[j, r]
-        for c in range(3):
-            value = -first[r] * translation[j, c] - translation[j, r] * first[c]
-            value -= mass * translation[j, r] * translation[j, c]
-            for k in range(3):
-                value += half[r, k] * rotation[j, c, k]
-            inertia[j, 4 + 3 * r + c] = value + round_about if r == c else value
+        x = rotation[j, r, 0] * xx + rotation[j, r, 1] * xy + rotation[j, r, 2] * xz
+        y = rotation[j, r, 0] * xy + rotation[j, r, 1] * yy + rotation[j, r, 2] * yz
+        z = rotation[j, r, 0] * xz + rotation[j, r, 1] * yz + rotation[j, r, 2] * zz
+        for c in range(r, 3):
+            value = x * rotation[j, c, 0] + y * rotation[j, c, 1] + z * rotation[j, c, 2]
+            value += mass * at[j, r] * at[j, c] - inertia[j, 1 + r] * at[j, c] - at[j, r] * inertia[j, 1 + c]
+            inertia[j, 4 + 3 * r + c] = value
+            inertia[j, 4 + 3 * c + r] = value
+        inertia[j, 4 + 4 * r] += round_about
 
 
 @inlined
@@ -162,21 +158,21 @@ def times_bias(bias: np.ndarray, j: int, s: np.ndarray, i: int, out: np.ndarray,
 def _place_bias(j: int, velocity: np.ndarray, inertia: np.ndarray, momentum: np.ndarray, bias: np.ndarray) -> None:
     """Compute B of bodies attached directly to axis j."""
     x, y, z = velocity[j, 3], velocity[j, 4], velocity[j, 5]
-    turn = np.empty((3, 3))
-    turn[0, 0], turn[0, 1], turn[0, 2] = 0.0, -z, y
-    turn[1, 0], turn[1, 1], turn[1, 2] = z, 0.0, -x
-    turn[2, 0], turn[2, 1], turn[2, 2] = -y, x, 0.0
-    # [v] [H] + [H] [v] = v H^T + H v^T - 2 (v . H) 1
+    for c in range(3):
+        sx, sy, sz = inertia[j, 4 + c], inertia[j, 7 + c], inertia[j, 10 + c]
+        bias[j, 3 + c], bias[j, 6 + c], bias[j, 9 + c] = y * sz - z * sy, z * sx - x * sz, x * sy - y * sx
+    # [w] J - J [w] is that and its transpose, [v] [H] + [H] [v] = v H^T + H v^T - 2 (v . H) 1
     twice = 0.0
     for r in range(3):
+        bias[j, r] = momentum[j, r]
         twice += 2.0 * velocity[j, r] * inertia[j, 1 + r]
     for r in range(3):
-        bias[j, r] = momentum[j, r]
-        for c in range(3):
-            value = -inertia[j, 1 + r] * velocity[j, c] - velocity[j, r] * inertia[j, 1 + c]
-            for k in range(3):
-                value += turn[r, k] * inertia[j, 4 + 3 * k + c] - inertia[j, 4 + 3 * r + k] * turn[k, c]
-            bias[j, 3 + 3 * r + c] = value + twice if r == c else value
+        for c in range(r, 3):
+            value = bias[j, 3 + 3 * r + c] + bias[j, 3 + 3 * c + r]
+            value -= inertia[j, 1 + r] * velocity[j, c] + velocity[j, r] * inertia[j, 1 + c]
+            bias[j, 3 + 3 * r + c] = value
+            bias[j, 3 + 3 * c + r] = value
+        bias[j, 3 + 4 * r] += twice
     bias[j, 4] += momentum[j, 5]
     bias[j, 5] -= momentum[j, 4]
     bias[j, 6] -= momentum[j, 5]
@@ -203,7 +199,7 @@ def _columns(frame: Frame) -> None:
 
 
 @inlined
-def _bears(bodies: np.ndarray, j: int) -> bool:
+def bears(bodies: np.ndarray, j: int) -> bool:
     """Decide whether a body is attached directly to axis j."""
     borne = False
     for k in range(10):
@@ -218,35 +214,29 @@ def fill(tree: KinematicTree, bodies: np.ndarray, x: np.ndarray, v: np.ndarray, 
     """
     move(tree, x, v, a, frame)
     inertia, momentum, force = frame.inertia, frame.momentum, frame.force
-    second = np.empty((1, 6))
+    second = frame.spare[0]
     force[:] = 0.0
     inertia[:] = 0.0
     for j in range(len(bodies)):
-        if _bears(bodies, j):
+        if bears(bodies, j):
             _place_inertia(j, bodies, frame)
             inertia_times(inertia, j, frame.velocity, j, momentum, j)
             inertia_times(inertia, j, frame.acceleration, j, force, j)
-            force_cross(frame.velocity, j, momentum, j, second, 0)
+            force_cross(frame.velocity, j, momentum, j, second, j)
             for k in range(6):
-                force[j, k] += second[0, k]
+                force[j, k] += second[j, k]
     hand_down(tree.parent, force)
 
 
 @part
-def carry(tree: KinematicTree, bodies: np.ndarray, frame: Frame) -> None:
-    """Compute inertia and bias of all bodies that the axes move, after `fill`."""
+def differentiate(tree: KinematicTree, bodies: np.ndarray, frame: Frame) -> None:
+    """Compute inertia and bias of all bodies that the axes move, and the derivatives `column`, after `fill`."""
     frame.bias[:] = 0.0
     for j in range(len(bodies)):
-        if _bears(bodies, j):
+        if bears(bodies, j):
             _place_bias(j, frame.velocity, frame.inertia, frame.momentum, frame.bias)
     hand_down(tree.parent, frame.inertia)
     hand_down(tree.parent, frame.bias)
-
-
-@part
-def differentiate(tree: KinematicTree, bodies: np.ndarray, frame: Frame) -> None:
-    """Compute inertia and bias as `carry` does, and the derivatives `column`."""
-    carry(tree, bodies, frame)
     _columns(frame)
 
 

@@ -59,13 +59,14 @@ def found(monkeypatch, priors) -> tuple[CostProfile, np.ndarray]:
     monkeypatch.setattr(delay_profile, "GaussNewton", SimpleNamespace(of=lambda problem, here: model_of(here, n)))
     gaussian, here = GaussianPrior.of(one.layout.error_priors), Quadratic(information(n, 2.0))
 
-    def search(model, held: GaussianPrior) -> Place:
+    def search(model, slope, held: GaussianPrior) -> tuple[np.ndarray, float]:
         whole, rhs = information(n, 1.0), np.append(np.full(n, SHOWN_S / SD_S**2), 0.0)
         whole[:n, :n] += held.precision
         rhs[:n] += held.pull
-        return Place(np.linalg.solve(whole, rhs))
+        static = np.linalg.solve(whole, rhs)
+        return static, cost(static, n) + held.cost(static[:n])
 
-    profile = CostProfile.of(one, here, gaussian, search(None, gaussian), search)
+    profile = CostProfile.of(one, here, gaussian, Place(search(None, None, gaussian)[0]), search)
     root = model_of(profile.here, n).under(profile.instruments).static.root_of_covariance()
     return profile, root @ root.T
 
@@ -110,6 +111,6 @@ def test_where_nothing_is_to_be_profiled_all_is_left_as_it_is():
     known = SimpleNamespace(**{**vars(one), "profiled": list})
     gaussian, here = GaussianPrior.of(one.layout.error_priors), Quadratic(information(1, 2.0))
     place = Place(np.zeros(2))
-    profile = CostProfile.of(known, here, gaussian, place, lambda model, held: pytest.fail("searched"))
+    profile = CostProfile.of(known, here, gaussian, place, lambda model, slope, held: pytest.fail("searched"))
     assert profile.here is here
     assert profile.static is place.static

@@ -233,5 +233,6 @@ class InTrial:
     @cached_property
     def near_q(self) -> np.ndarray:
         """Coordinates (f, c) of the freed skeleton in the block with its neighbours, `TimeBlock.with_neighbours`."""
-        parts = self.model.given.bases[self.k].evaluate(self.coefficients, self.time_block.with_neighbours)
+        frames = self.time_block.with_neighbours
+        parts = self.model.given.bases[self.k].evaluate(self.coefficients, frames, derivatives=0)
         return self.model.full(parts, self.static)[0]

@@ -14,7 +14,7 @@ from typing import Self
 import numpy as np
 
 from kinertia.estimation.simultaneous.gauss_newton import GaussNewton
-from kinertia.estimation.simultaneous.linearised import Linearised, Point
+from kinertia.estimation.simultaneous.linearised import Linearised, Point, Slope
 from kinertia.estimation.simultaneous.mixture_prior import ErrorPriors, GaussianPrior
 from kinertia.estimation.simultaneous.problem import MapProblem
 
@@ -43,7 +43,7 @@ class CostProfile:
         here: Linearised,
         instruments: GaussianPrior,
         point: Point,
-        search: Callable[[GaussNewton, GaussianPrior], Point],
+        search: Callable[[GaussNewton, Slope, GaussianPrior], tuple[np.ndarray, float]],
     ) -> Self:
         """Compute the profile from the point where a search has ended.
 
@@ -52,7 +52,8 @@ class CostProfile:
             here: the last quadratic.
             instruments: the Gaussian that replaces the instruments' priors.
             point: end of the search.
-            search: finds the optimum with this quadratic and another Gaussian.
+            search: returns the static unknowns and the cost at the optimum with another Gaussian, from this quadratic
+                and the gradient at the point.
         """
         late, first = np.array(problem.profiled(), dtype=int), problem.layout.errors.start
         priors = [problem.layout.error_priors.own[k] for k in late - first]
@@ -66,7 +67,8 @@ class CostProfile:
         sd = float(np.sqrt(across[late].sum()))
         delays = np.array([-sd, 0.0, sd])
         held = [_held(instruments, own, values + away / len(own), _HELD / sd**2) for away in delays]
-        costs = [_cost(problem, search(model, each), instruments, own) for each in held]
+        slope = problem.slope(point)
+        costs = [_without(each, own, *search(model, slope, each), first) for each in held]
         curve, slope, _ = np.polyfit(delays, costs, 2)
         if not curve > 0.0:
             return unchanged
@@ -84,12 +86,10 @@ class CostProfile:
         )
 
 
-def _cost(problem: MapProblem, there: Point, instruments: GaussianPrior, own: np.ndarray) -> float:
-    """Return the cost without the Gaussian's prior of some quantities."""
-    values = there.static[problem.layout.errors]
-    nothing = GaussianPrior(np.zeros_like(instruments.precision), np.zeros_like(instruments.pull))
-    alone = _with(nothing, own, instruments.precision[np.ix_(own, own)], instruments.pull[own])
-    return problem.slope(there).cost + instruments.cost(values) - alone.cost(values)
+def _without(gaussian: GaussianPrior, own: np.ndarray, static: np.ndarray, cost: float, first: int) -> float:
+    """Return a cost under a Gaussian without its prior of some quantities, which begin at `first` in `static` (S,)."""
+    alone = GaussianPrior(gaussian.precision[np.ix_(own, own)], gaussian.pull[own])
+    return cost - alone.cost(static[first + own])
 
 
 def _held(gaussian: GaussianPrior, own: np.ndarray, values: np.ndarray, information: float) -> GaussianPrior:

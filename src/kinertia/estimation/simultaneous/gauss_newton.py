@@ -5,7 +5,6 @@ from typing import Self
 
 import numpy as np
 
-from kinertia.estimation.simultaneous.elimination import Eliminated
 from kinertia.estimation.simultaneous.linearised import Linearised, Point
 from kinertia.estimation.simultaneous.marker_offsets import Displaced
 from kinertia.estimation.simultaneous.mixture_prior import GaussianPrior
@@ -81,18 +80,10 @@ class MotionAlone:
     """The Gauss-Newton quadratic of the motions alone, with everything that does not move fixed.
 
     Attributes:
-        point: where it is built.
-        trials: with their motions eliminated, without information on anything else.
+        here: the point where it is built, without information on anything else.
     """
 
-    point: Point
-    trials: tuple[Eliminated, ...]
-
-    @classmethod
-    def of(cls, problem: MapProblem, point: Point, damping: float) -> Self:
-        """Build it at a point, with the diagonal of the information on the motions raised by this share."""
-        rows = [(k, part, problem.in_trial(k, point)) for k, part in enumerate(point.coefficients)]
-        return cls(point, tuple(problem.eliminated(*row, damping, bordered=False) for row in rows))
+    here: Linearised
 
     def under(self, instruments: GaussianPrior) -> Self:
         """Return it unchanged: the instruments' Gaussian does not concern the motion."""
@@ -100,7 +91,7 @@ class MotionAlone:
 
     def step(self, rhs: np.ndarray) -> np.ndarray:
         """Solve for the step of the motions alone; the steps of all other unknowns are zero."""
-        pull = self.point.like(rhs)
-        trials = zip(self.trials, pull.coefficients, strict=True)
+        pull = self.here.point.like(rhs)
+        trials = zip(self.here.trials, pull.coefficients, strict=True)
         motions = [trial.motion_step(trial.forward(own)[0], np.zeros(0)).ravel() for trial, own in trials]
         return np.concatenate([*motions, np.zeros(len(rhs) - sum(motion.size for motion in motions))])

@@ -149,6 +149,8 @@ def _frame(
         at = placed.places[here, i]
         add_marker(markers.own[k, i], at, at, sums[markers.carrier[i]])
         add_force(pull[i], at, forces[markers.carrier[i]])
+        for r in range(3):
+            static.cost[0] += placed.errors[here, i, r] * pull[i, r]
     if bordered:
         _by_place(markers, k, row, still, placed, pull, directions, interval, static)
     hand_down(markers.tree.parent, sums)
@@ -215,7 +217,7 @@ def _by_place(
     """Add the terms of marker positions and skin coefficients: with the coordinates, with themselves, and with r."""
     c, here = interval.gradient.shape[1], k % 5
     parent, column, slopes = markers.tree.parent, markers.column, markers.slopes
-    axes, at, turned, errors = placed.axes[here], placed.places[here], placed.turned[here], placed.errors[here]
+    axes, at, turned = placed.axes[here], placed.places[here], placed.turned[here]
     across, square, rhs = interval.across[row], static.square, static.rhs
     most = directions.shape[2]
     own, values, velocity = np.empty((3, most)), np.empty(most), np.empty(3)
@@ -225,7 +227,6 @@ def _by_place(
         skin = markers.columns[m] - 3
         count = 3 + 3 * (markers.last[m] - first)
         for i in range(3):
-            static.cost[0] += errors[m, i] * pull[m, i]
             along = turned[m, 0, i] * pull[m, 0] + turned[m, 1, i] * pull[m, 1] + turned[m, 2, i] * pull[m, 2]
             for j in range(count):
                 own[i, j] = turned[m, 0, i] * d[0, j] + turned[m, 1, i] * d[1, j] + turned[m, 2, i] * d[2, j]

@@ -44,10 +44,12 @@ class MotionBasis:
         self.active = self.first[:, None] + np.arange(_ACTIVE)
         self.knots = knots
 
-    def evaluate(self, coefficients: np.ndarray, frames: slice | np.ndarray = slice(None)) -> list[np.ndarray]:
-        """Evaluate coordinates and their first two derivatives, each (n, c), from coefficients (size, c)."""
+    def evaluate(
+        self, coefficients: np.ndarray, frames: slice | np.ndarray = slice(None), derivatives: int = 2
+    ) -> list[np.ndarray]:
+        """Evaluate coordinates and their first derivatives, each (n, c), from coefficients (size, c)."""
         active = coefficients[self.active[frames]]
-        return [np.einsum("na,nac->nc", values[frames], active) for values in self.values]
+        return [np.einsum("na,nac->nc", values[frames], active) for values in self.values[: 1 + derivatives]]
 
     def fit(self, q: np.ndarray) -> np.ndarray:
         """Fit coefficients (size, c) to q (n, c) by least squares; NaN rows of a column are left out."""

@@ -45,7 +45,7 @@ class NormalEquations(Gradient):
     """Gradient with the Gauss-Newton second derivatives: band (size, 7, c, c), border (size, c, S), static (S, S).
 
     Row i of the band has the blocks of splines i and i, i + 1, ... For the motion alone the border has no columns, and
-    only band and `rhs` count.
+    only band, `rhs` and `cost` count.
     """
 
     band: np.ndarray

@@ -131,10 +131,13 @@ class MapProblem:
         """Return what each term reads from the solution."""
         return [term.read(solution) for term in self.terms]
 
-    def at(self, point: Point, damping: float = 0.0) -> Linearised:
-        """Build normal equations at a point, and eliminate motions with their diagonal raised by this share."""
+    def at(self, point: Point, damping: float = 0.0, bordered: bool = True) -> Linearised:
+        """Build normal equations at a point, and eliminate motions with their diagonal raised by this share.
+
+        Not `bordered`: for the motions alone, with all else fixed.
+        """
         rows = enumerate(point.coefficients)
-        trials = tuple(self.eliminated(k, part, self.in_trial(k, point), damping) for k, part in rows)
+        trials = tuple(self.eliminated(k, part, self.in_trial(k, point), damping, bordered) for k, part in rows)
         slope = self._slope(point, [trial.gradient for trial in trials])
         return Linearised(slope, trials, self.prior_information(point.static))
 

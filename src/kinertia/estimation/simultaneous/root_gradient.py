@@ -1,27 +1,21 @@
 """Computes only the gradient of the root equations, without the derivatives of `root_columns`.
 
-With L the residual over its variance, as a motion at the ground origin, and I, B, f, S, P, Q of `rigid_body`, the
+With L the residual over its variance, as a motion at the ground origin, and V, I, B, f, S, P, Q of `rigid_body`, the
 contribution to an axis' position, rate and acceleration is
 
     L . (S x* f) + (L B) . P + (I L) . Q        (L B) . S + 2 (I L) . P        (I L) . S
+
+L is the same for all axes: I L and L B = V x* (I L) - I (V x L) - L x* (I V) are summed over the bodies that an axis
+moves, instead of I and B.
 """
 
 import numpy as np
 
 from kinertia.model.compiled import compiled, part
-from kinertia.model.kinematic_tree import KinematicTree, place_segments
-from kinertia.model.spatial import force_cross, inner
-from kinertia.motion.regressor import in_segment, own_regressor
-from kinertia.motion.rigid_body import (
-    Frame,
-    carry,
-    empty_frame,
-    fill,
-    inertia_times,
-    taken_about,
-    times_bias,
-    whole_load,
-)
+from kinertia.model.kinematic_tree import KinematicTree, hand_down, place_segments
+from kinertia.model.spatial import force_cross, inner, motion_cross
+from kinertia.motion.regressor import in_segment
+from kinertia.motion.rigid_body import Frame, bears, empty_frame, fill, inertia_times, taken_about, whole_load
 from kinertia.motion.root_columns import Columns
 
 
@@ -60,7 +54,6 @@ def add_root_gradient(
     rotation, translation = np.empty((len(tree.carrier), 3, 3)), np.empty((len(tree.carrier), 3))
     for k in range(n):
         fill(tree, bodies, x[k], v[k], a[k], frame)
-        carry(tree, bodies, frame)
         place_segments(tree, frame.rotation, frame.translation, rotation, translation)
         load[:] = 0.0
         whole_load(tree.parent, frame.force, load, 0)
@@ -74,6 +67,7 @@ def add_root_gradient(
         _at_origin(by_ground[k], about[k])
         _moving_centre(left, pull, slides, first[k], values[0, k], rhs)
         _by_bodies(tree, frame, rotation, translation, by_ground[k], columns.segments, by_bodies)
+        _of_bodies(tree.parent, bodies, frame, by_ground, k)
         for j in range(count):
             _by_axis(frame, by_ground, k, j, by)
             if len(bends):
@@ -110,20 +104,34 @@ def _moving_centre(
 
 
 @part
+def _of_bodies(parent: np.ndarray, bodies: np.ndarray, frame: Frame, pulls: np.ndarray, k: int) -> None:
+    """Write I L and L B, summed over the bodies that each axis moves, to the first two of `spare`; L is pulls[k]."""
+    borne, biased, force = frame.spare[0], frame.spare[1], frame.spare[2]
+    swept = np.empty((1, 6))
+    borne[:] = 0.0
+    biased[:] = 0.0
+    for j in range(len(bodies)):
+        if bears(bodies, j):
+            inertia_times(frame.inertia, j, pulls, k, borne, j)
+            force_cross(frame.velocity, j, borne, j, biased, j)
+            motion_cross(frame.velocity, j, pulls, k, swept, 0)
+            inertia_times(frame.inertia, j, swept, 0, force, j)
+            for r in range(6):
+                biased[j, r] -= force[j, r]
+            force_cross(pulls, k, frame.momentum, j, force, j)
+            for r in range(6):
+                biased[j, r] -= force[j, r]
+    hand_down(parent, borne)
+    hand_down(parent, biased)
+
+
+@part
 def _by_axis(frame: Frame, pulls: np.ndarray, k: int, j: int, by: np.ndarray) -> None:
     """Write the gradient (3,) by position, rate and acceleration of axis j, for pulls[k] on the load, into `by`."""
-    axes, swept, turned, borne, biased, force = (
-        frame.axes,
-        frame.swept,
-        frame.turned,
-        frame.spare[0],
-        frame.spare[1],
-        frame.spare[2],
-    )
-    inertia_times(frame.inertia, j, pulls, k, borne, j)
-    times_bias(frame.bias, j, pulls, k, biased, j)
+    axes, swept = frame.axes, frame.swept
+    borne, biased, force = frame.spare[0], frame.spare[1], frame.spare[2]
     force_cross(axes, j, frame.force, j, force, j)
-    by[0] = inner(force, j, pulls, k) + inner(biased, j, swept, j) + inner(borne, j, turned, j)
+    by[0] = inner(force, j, pulls, k) + inner(biased, j, swept, j) + inner(borne, j, frame.turned, j)
     by[1] = inner(biased, j, axes, j) + 2.0 * inner(borne, j, swept, j)
     by[2] = inner(borne, j, axes, j)
 
@@ -148,22 +156,52 @@ def _by_bodies(
     by_bodies: np.ndarray,
 ) -> None:
     """Add the gradient (b, 10) by the bodies' parameters, for the gradient (6,) by the load at the ground origin."""
-    w, e, b, own, at = np.empty(3), np.empty(3), np.empty(3), np.empty((6, 10)), np.empty(6)
+    w, e, b = np.empty(3), np.empty(3), np.empty(3)
     for body in range(len(segments)):
         s = segments[body]
         carrier, turn = tree.carrier[s], rotation[s]
         if carrier < 0:
             continue
         in_segment(frame.velocity[carrier], frame.acceleration[carrier], turn, translation[s], w, e, b)
-        own_regressor(w, e, b, own)
         # at the segment's origin, in its axes
         x, y, z = translation[s, 0], translation[s, 1], translation[s, 2]
         fx = pull[0] + pull[4] * z - pull[5] * y
         fy = pull[1] + pull[5] * x - pull[3] * z
         fz = pull[2] + pull[3] * y - pull[4] * x
-        for c in range(3):
-            at[c] = turn[0, c] * fx + turn[1, c] * fy + turn[2, c] * fz
-            at[3 + c] = turn[0, c] * pull[3] + turn[1, c] * pull[4] + turn[2, c] * pull[5]
-        for c in range(10):
-            for r in range(6):
-                by_bodies[body, c] += at[r] * own[r, c]
+        force = (
+            turn[0, 0] * fx + turn[1, 0] * fy + turn[2, 0] * fz,
+            turn[0, 1] * fx + turn[1, 1] * fy + turn[2, 1] * fz,
+            turn[0, 2] * fx + turn[1, 2] * fy + turn[2, 2] * fz,
+        )
+        moment = (
+            turn[0, 0] * pull[3] + turn[1, 0] * pull[4] + turn[2, 0] * pull[5],
+            turn[0, 1] * pull[3] + turn[1, 1] * pull[4] + turn[2, 1] * pull[5],
+            turn[0, 2] * pull[3] + turn[1, 2] * pull[4] + turn[2, 2] * pull[5],
+        )
+        _add_transposed(w, e, b, force, moment, by_bodies[body])
+
+
+@part
+def _add_transposed(
+    w: np.ndarray,
+    e: np.ndarray,
+    b: np.ndarray,
+    force: tuple[float, float, float],
+    moment: tuple[float, float, float],
+    out: np.ndarray,
+) -> None:
+    """Add the transposed `regressor.own_regressor` times a gradient by force and moment to `out` (10,)."""
+    (x, y, z), (mx, my, mz) = force, moment
+    along, square = w[0] * x + w[1] * y + w[2] * z, w[0] * w[0] + w[1] * w[1] + w[2] * w[2]
+    out[0] += b[0] * x + b[1] * y + b[2] * z
+    out[1] += y * e[2] - z * e[1] + w[0] * along - x * square + b[1] * mz - b[2] * my
+    out[2] += z * e[0] - x * e[2] + w[1] * along - y * square + b[2] * mx - b[0] * mz
+    out[3] += x * e[1] - y * e[0] + w[2] * along - z * square + b[0] * my - b[1] * mx
+    # the moments of inertia give (moment) . I e + (moment x w) . I w
+    ux, uy, uz = my * w[2] - mz * w[1], mz * w[0] - mx * w[2], mx * w[1] - my * w[0]
+    out[4] += mx * e[0] + ux * w[0]
+    out[5] += mx * e[1] + my * e[0] + ux * w[1] + uy * w[0]
+    out[6] += my * e[1] + uy * w[1]
+    out[7] += mx * e[2] + mz * e[0] + ux * w[2] + uz * w[0]
+    out[8] += my * e[2] + mz * e[1] + uy * w[2] + uz * w[1]
+    out[9] += mz * e[2] + uz * w[2]

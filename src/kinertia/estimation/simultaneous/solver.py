@@ -109,10 +109,9 @@ def estimate_simultaneous(
         ended, model = _optimum(problem, progress)
     evidence = Evidence.of(model, ended.instruments, otherwise)
     known = AdaptedPrior.elsewhere(ended.instruments)
-    held = partial(_held, problem, ended.point)
     phases, profile = both(
         lambda: OfPhases.of(problem, ended.point, partial(_continued, adapted=known)),
-        lambda: CostProfile.of(problem, ended.here, ended.instruments, ended.point, held),
+        lambda: CostProfile.of(problem, ended.here, ended.instruments, ended.point, partial(_held, problem)),
     )
     model = GaussNewton.of(problem, profile.here).under(profile.instruments)
     moved, more = _left_out(problem, model, ended.point.static)
@@ -152,13 +151,14 @@ def _left_out(problem: MapProblem, model: GaussNewton, static: np.ndarray) -> tu
 
 def _searched(problem: MapProblem, progress: Callable[[float], None]) -> Ended:
     """Take quasi-Newton steps with one quadratic after another until a step is short, then one with a new quadratic."""
-    at = _Place(problem.slope(problem.beginning), AdaptedPrior.at_first(problem.layout.error_priors))
-    begin, damping, scale, iterations = at.slope.cost, _FIRST_DAMPING, np.zeros(problem.layout.size), 0
+    at = _Place(problem.beginning, np.inf, AdaptedPrior.at_first(problem.layout.error_priors))
+    begin, damping, scale, iterations = np.inf, _FIRST_DAMPING, np.zeros(problem.layout.size), 0
     while True:
         iterations += 1
         last = at.converged or damping > _STUCK or iterations == _MAX_ITERATIONS
         damping = _LEAST_DAMPING if last else damping
-        here = problem.at(at.slope.point, damping)
+        here = problem.at(at.point, damping)
+        begin = here.slope.cost if iterations == 1 else begin
         scale = np.maximum(scale, np.diag(here.information) + sum(trial.static_diagonal for trial in here.trials))
         static = here.point.like(here.slope.rhs).static
         model = GaussNewton.of(problem, here, damping * scale + problem.bends(static))
@@ -167,26 +167,26 @@ def _searched(problem: MapProblem, progress: Callable[[float], None]) -> Ended:
             end = _last_step(problem, model, at)
             if end.converged or not at.converged or iterations >= _MAX_ITERATIONS:
                 return _ended(begin, end, here, iterations)
-        at = _descended(problem, model, at._replace(slope=here.slope), iterations > 1, CONVERGED)
+        at = _descended(problem, model, here.slope, at.adapted, iterations > 1, CONVERGED)
         if at.converged and at.holds and damping == _LEAST_DAMPING:
             return _ended(begin, at, here, iterations)
-        stuck = at.slope.point is here.point
+        stuck = at.point is here.point
         damping = max(100.0 * damping, 1e-4) if stuck else max(1e-4 * damping, _LEAST_DAMPING)
 
 
 def _ended(begin: float, at: "_Place", here: Linearised, iterations: int) -> Ended:
-    cost = begin, at.slope.under(at.adapted.gaussian)[0]
-    return Ended(at.slope.point, here, at.adapted.gaussian, at.converged, iterations, cost)
+    return Ended(at.point, here, at.adapted.gaussian, at.converged, iterations, (begin, at.cost))
 
 
 class _Place(NamedTuple):
     """State of the search.
 
-    The gradient, the instruments, whether the last step was short, and whether the last quadratic is about that of the
-    optimum.
+    The point, the cost there under the instruments' Gaussian, that Gaussian, whether the last step was short, and
+    whether the last quadratic is about that of the optimum.
     """
 
-    slope: Slope
+    point: Point
+    cost: float
     adapted: AdaptedPrior
     converged: bool = False
     holds: bool = False
@@ -198,27 +198,36 @@ def _continued(problem: MapProblem, point: Point, adapted: AdaptedPrior) -> Poin
     The Gaussian is updated with the data at these knots. Its precision may be negative where fault-free and faulty are
     both likely; with other data, such a Gaussian would let the error grow without limit.
     """
-    at = _Place(problem.slope(point), adapted)
+    at = _Place(point, np.inf, adapted)
     for _ in range(_MOST_CONTINUED):
-        here = problem.at(at.slope.point, _LEAST_DAMPING)
+        here = problem.at(at.point, _LEAST_DAMPING)
         model = GaussNewton.of(problem, here, problem.bends(here.point.like(here.slope.rhs).static))
-        at = _descended(problem, model, at._replace(slope=here.slope), True, _CONTINUED)
+        at = _descended(problem, model, here.slope, at.adapted, True, _CONTINUED)
         if at.converged:
             break
-    return at.slope.point
+    return at.point
 
 
-def _held(problem: MapProblem, point: Point, model: GaussNewton, instruments: GaussianPrior) -> Point:
-    """Return the optimum with this Gaussian for the instruments, starting from that with another."""
-    at = _Place(problem.slope(point), AdaptedPrior.elsewhere(instruments))
-    return _descended(problem, model, at, False, CONVERGED).slope.point
+def _held(
+    problem: MapProblem, model: GaussNewton, slope: Slope, instruments: GaussianPrior
+) -> tuple[np.ndarray, float]:
+    """Return the static unknowns (S,) and the cost at the optimum with this Gaussian for the instruments.
+
+    The search begins at the optimum with another Gaussian, of which it needs the gradient.
+    """
+    at = _descended(problem, model, slope, AdaptedPrior.elsewhere(instruments), False, CONVERGED)
+    return at.point.static, at.cost
 
 
 def _descended(
-    problem: MapProblem, model: GaussNewton | MotionAlone, at: _Place, adapting: bool, tolerance: float
+    problem: MapProblem,
+    model: GaussNewton | MotionAlone,
+    slope: Slope,
+    adapted: AdaptedPrior,
+    adapting: bool,
+    tolerance: float,
 ) -> _Place:
     """Take quasi-Newton steps with one quadratic, as long as they are worthwhile."""
-    slope, adapted = at.slope, at.adapted
     pairs, places, began, holds = SecantPairs.none(len(slope.rhs)), slope.instruments, np.inf, False
     for count in range(_MOST_GRADIENTS):
         step, promised = _answer(slope, model, pairs, adapted)
@@ -231,7 +240,7 @@ def _descended(
         began = began if count else promised
         holds = holds or promised < (_ACCURATE * began if count == 1 else _AT_OPTIMUM if count == 0 else 0.0)
         if 0.0 <= promised < tolerance:
-            return _Place(_moved(problem, slope, step), adapted, True, holds)
+            return _moved(problem, slope, step, promised, adapted, holds)
         if (count and promised > _NEAR) or not promised > 0.0:
             break
         there = _lower(problem, slope, adapted.gaussian, step, promised)
@@ -242,7 +251,7 @@ def _descended(
         change[places] += adapted.gaussian.precision @ taken[places]
         expected = 2.0 * promised * float(taken @ step) / float(step @ step)
         slope, pairs = there, pairs.with_pair(taken, change, expected)
-    return _Place(slope, adapted)
+    return _Place(slope.point, slope.under(adapted.gaussian)[0], adapted)
 
 
 def _answer(
@@ -262,20 +271,26 @@ def _adapted_again(
     return adapted.again(problem.layout.error_priors, mean, covariance, far)
 
 
-def _moved(problem: MapProblem, slope: Slope, step: np.ndarray) -> Slope:
-    """Move the point by a step that is too short to need a new cost and gradient."""
-    return replace(slope, point=slope.point.like(slope.point.vector + problem.shortened(slope.point, step)))
+def _moved(
+    problem: MapProblem, slope: Slope, step: np.ndarray, promised: float, adapted: AdaptedPrior, holds: bool = False
+) -> _Place:
+    """Move the point by a step that is too short to need a new cost and gradient: as the quadratic promised."""
+    point = slope.point.like(slope.point.vector + problem.shortened(slope.point, step))
+    return _Place(point, slope.under(adapted.gaussian)[0] - promised, adapted, True, holds)
 
 
 def _last_step(problem: MapProblem, model: GaussNewton, at: _Place) -> _Place:
     """Take a step with the last quadratic, if the search has converged and the step is short."""
     slope, adapted, pairs = model.here.slope, at.adapted, SecantPairs.none(len(model.here.slope.rhs))
+    here = _Place(slope.point, slope.under(adapted.gaussian)[0], adapted)
     if not at.converged:
-        return _Place(slope, adapted)
+        return here
     step, _ = _answer(slope, model, pairs, adapted)
     adapted = _adapted_again(problem, model, slope.point, step, adapted, 0.0)
     step, promised = _answer(slope, model, pairs, adapted)
-    return _Place(_moved(problem, slope, step), adapted, True) if 0.0 <= promised < _ENDED else _Place(slope, adapted)
+    return (
+        _moved(problem, slope, step, promised, adapted) if 0.0 <= promised < _ENDED else here._replace(adapted=adapted)
+    )
 
 
 def _lower(
@@ -306,13 +321,13 @@ def _through_impacts(problem: MapProblem, point: Point) -> tuple[np.ndarray, ...
         return point.coefficients
     sure = [replace(trial, impact=1.0) for trial in problem.trials]
     following = problem.of(sure)
-    at = _Place(following.slope(replace(point, static=rigid)), AdaptedPrior.at_first(following.layout.error_priors))
+    at = _Place(replace(point, static=rigid), np.inf, AdaptedPrior.at_first(following.layout.error_priors))
     for _ in range(_MOST_THROUGH_IMPACTS):
-        alone = MotionAlone.of(following, at.slope.point, _LEAST_DAMPING)
-        at = _descended(following, alone, at, adapting=False, tolerance=_MOTION_CONVERGED)
+        alone = MotionAlone(following.at(at.point, _LEAST_DAMPING, bordered=False))
+        at = _descended(following, alone, alone.here.slope, at.adapted, False, _MOTION_CONVERGED)
         if at.converged:
             break
-    return at.slope.point.coefficients
+    return at.point.coefficients
 
 
 def _deviations(

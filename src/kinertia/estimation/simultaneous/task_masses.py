@@ -81,7 +81,7 @@ class TaskMasses(CostTerm):
         """Return the displacement of the masses as seen by the data."""
         given, result = self.given, np.zeros(len(static))
         bent = [
-            hips_bent_rad(given.skeleton, basis.evaluate(start, _some(len(basis.first)))[0])
+            hips_bent_rad(given.skeleton, basis.evaluate(start, _some(len(basis.first)), derivatives=0)[0])
             for basis, start in zip(given.bases, given.start, strict=True)
         ]
         sd = task_sd(min(bent))

@@ -84,13 +84,14 @@ def seen_markers(
     carrier, local = skeleton.carried_markers
     turned = skeleton.tree.segment_rotation[skeleton.marker_segments]
     patterns, coefficients = skin
+    along_axes = np.repeat(turned, patterns.last - patterns.first, axis=0) @ coefficients.reshape(-1, 3, 1)
     return SeenMarkers(
         skeleton.tree,
         place[skeleton.map.owner],
         at,
         slopes,
         carrier,
-        local + (turned @ patterns.displaced(coefficients)[..., None])[..., 0],
+        local + patterns.displaced(along_axes.ravel()),
         np.ascontiguousarray(turned),
         np.ascontiguousarray(measured),
         information.own,
