@@ -1,11 +1,15 @@
 """Stores the arrays of a long trial, which do not fit into memory, in a temporary file."""
 
+import mmap
 import tempfile
 from typing import IO
 
 import numpy as np
 
 from kinertia.errors import KinertiaError
+
+_ALIGNED = mmap.ALLOCATIONGRANULARITY
+"""Groups begin at multiples of it in the file (bytes), as mapping them requires."""
 
 
 class KeptArrays:
@@ -33,6 +37,7 @@ class KeptArrays:
             begin = self._file.seek(0, 2)
             for array in arrays:
                 self._file.write(np.ascontiguousarray(array).data)
+            self._file.write(bytes(_ALIGNED - self._file.tell() % _ALIGNED))
             self._file.flush()
         except OSError as error:
             raise KinertiaError(
@@ -42,11 +47,10 @@ class KeptArrays:
         self._groups.append((begin, [(array.shape, array.dtype) for array in arrays]))
 
     def get(self, k: int) -> list[np.ndarray]:
-        """Read group k."""
+        """Return group k, which is read where it is used; what is written to it does not reach the file."""
         assert self._file is not None
         begin, kinds = self._groups[k]
-        self._file.seek(begin)
-        arrays = [np.empty(shape, dtype) for shape, dtype in kinds]
-        for array in arrays:
-            self._file.readinto(array.data)  # type: ignore[attr-defined]
-        return arrays
+        sizes = [int(np.prod(shape)) * dtype.itemsize for shape, dtype in kinds]
+        mapped = mmap.mmap(self._file.fileno(), sum(sizes), access=mmap.ACCESS_COPY, offset=begin)
+        starts = np.cumsum([0, *sizes[:-1]]).tolist()
+        return [np.ndarray(shape, dtype, mapped, start) for start, (shape, dtype) in zip(starts, kinds, strict=True)]
