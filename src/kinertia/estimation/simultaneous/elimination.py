@@ -249,6 +249,11 @@ class Eliminated:
         lost = taken(self.middle, middle) + sum(lost for _, lost, _ in halves)
         return [*(solved for solved, _, _ in halves), [middle]], lost
 
+    def following(self, static: np.ndarray) -> np.ndarray:
+        """Return the motion's step (size, c) for a step (S,) of the static unknowns, from the optimum for those."""
+        still = [[np.zeros((*part.border.shape[:2], 1)) for part in branch.inwards()] for branch in self.branches]
+        return self.motion_step([*still, [np.zeros((*self.middle.border.shape[:2], 1))]], static)
+
     def motion_step(self, solved: Sequence[Sequence[np.ndarray]], static: np.ndarray) -> np.ndarray:
         """Return the motion's step (size, c) for a step (S,) of the static unknowns; `solved` is from `forward`."""
         result = np.empty_like(self.gradient.rhs)

@@ -13,7 +13,6 @@ from typing import Self
 import numpy as np
 
 from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
-from kinertia.estimation.simultaneous.elimination import Eliminated
 from kinertia.estimation.simultaneous.gauss_newton import GaussNewton
 from kinertia.estimation.simultaneous.linearised import Linearised, Point
 from kinertia.estimation.simultaneous.problem import MapProblem
@@ -74,14 +73,9 @@ def followed(problem: MapProblem, here: Linearised, point: Point, static: np.nda
         step = static - point.static
         moved = -own.gain @ step
         step[problem.layout.displaced] += sd * moved
-        motions.append(part + _motion(trial, part, step))
+        motions.append(part + trial.following(step))
         displaced.append(place + moved)
     return Point(tuple(motions), static, tuple(displaced))
-
-
-def _motion(trial: Eliminated, part: np.ndarray, step: np.ndarray) -> np.ndarray:
-    """Return the change (size, c) of a trial's motion with a step (S,) of the static unknowns."""
-    return trial.motion_step(trial.forward(np.zeros_like(part))[0], step)
 
 
 _KNOTS = 2.0
