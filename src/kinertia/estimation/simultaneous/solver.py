@@ -55,8 +55,6 @@ _AT_OPTIMUM = 0.1
 _ACCURATE = 1e-3
 """... and so is one of which the first step left no more than this share of the predicted decrease: the optimum's would
 hardly be another."""
-_LEFT = 0.05
-"""Predicted decrease below which any other quadratic is left for a new one, which would follow in any case."""
 _NEAR = 8.0
 """Predicted decrease below which only gradients are recomputed; above it a new quadratic is worth its time."""
 _MOST_GRADIENTS = 10
@@ -169,7 +167,7 @@ def _searched(problem: MapProblem, progress: Callable[[float], None]) -> Ended:
             end = _last_step(problem, model, at)
             if end.converged or not at.converged or iterations >= _MAX_ITERATIONS:
                 return _ended(begin, end, here, iterations)
-        at = _descended(problem, model, here.slope, at.adapted, iterations > 1, CONVERGED, _LEFT)
+        at = _descended(problem, model, here.slope, at.adapted, iterations > 1, CONVERGED)
         if at.converged and at.holds and damping == _LEAST_DAMPING:
             return _ended(begin, at, here, iterations)
         stuck = at.point is here.point
@@ -228,12 +226,8 @@ def _descended(
     adapted: AdaptedPrior,
     adapting: bool,
     tolerance: float,
-    left: float = 0.0,
 ) -> _Place:
-    """Take quasi-Newton steps with one quadratic, as long as they are worthwhile.
-
-    Below the predicted decrease `left`, those with a quadratic that is not about that of the optimum are not.
-    """
+    """Take quasi-Newton steps with one quadratic, as long as they are worthwhile."""
     pairs, places, began, holds = SecantPairs.none(len(slope.rhs)), slope.instruments, np.inf, False
     for count in range(_MOST_GRADIENTS):
         step, promised = _answer(slope, model, pairs, adapted)
@@ -247,7 +241,7 @@ def _descended(
         holds = holds or promised < (_ACCURATE * began if count == 1 else _AT_OPTIMUM if count == 0 else 0.0)
         if 0.0 <= promised < tolerance:
             return _moved(problem, slope, step, promised, adapted, holds)
-        if (count and (promised > _NEAR or (promised < left and not holds))) or not promised > 0.0:
+        if (count and promised > _NEAR) or not promised > 0.0:
             break
         there = _lower(problem, slope, adapted.gaussian, step, promised)
         if there is None:
