@@ -50,7 +50,7 @@ def add_root_gradient(
     n, count = x.shape
     cost, by_bodies, by_ground = 0.0, np.zeros((len(columns.segments), 10)), np.empty((n, 6))
     frame, left, load = empty_frame(count, gravity_m_s2), np.empty(6), np.zeros((1, 6))
-    pull, by = np.empty(6), np.empty(3)
+    pull, by = np.empty(6), np.empty((count, 3))
     rotation, translation = np.empty((len(tree.carrier), 3, 3)), np.empty((len(tree.carrier), 3))
     for k in range(n):
         fill(tree, bodies, x[k], v[k], a[k], frame)
@@ -68,15 +68,15 @@ def add_root_gradient(
         _moving_centre(left, pull, slides, first[k], values[0, k], rhs)
         _by_bodies(tree, frame, rotation, translation, by_ground[k], columns.segments, by_bodies)
         _of_bodies(tree.parent, bodies, frame, by_ground, k)
+        _by_axes(frame, by_ground, k, by)
         for j in range(count):
-            _by_axis(frame, by_ground, k, j, by)
             if len(bends):
-                _bend(by, bends[k, j])
+                _bend(by[j], bends[k, j])
             if columns.still[j] >= 0:
-                static_rhs[columns.still[j]] -= by[0]
+                static_rhs[columns.still[j]] -= by[j, 0]
             if columns.moving[j] >= 0:
                 for i in range(6):
-                    along = values[0, k, i] * by[0] + values[1, k, i] * by[1] + values[2, k, i] * by[2]
+                    along = values[0, k, i] * by[j, 0] + values[1, k, i] * by[j, 1] + values[2, k, i] * by[j, 2]
                     rhs[first[k] + i, columns.moving[j]] -= along
     return cost, by_bodies, by_ground
 
@@ -106,19 +106,20 @@ def _moving_centre(
 @part
 def _of_bodies(parent: np.ndarray, bodies: np.ndarray, frame: Frame, pulls: np.ndarray, k: int) -> None:
     """Write I L and L B, summed over the bodies that each axis moves, to the first two of `spare`; L is pulls[k]."""
+    velocity, inertia, momentum = frame.velocity, frame.inertia, frame.momentum
     borne, biased, force = frame.spare[0], frame.spare[1], frame.spare[2]
     swept = np.empty((1, 6))
     borne[:] = 0.0
     biased[:] = 0.0
     for j in range(len(bodies)):
         if bears(bodies, j):
-            inertia_times(frame.inertia, j, pulls, k, borne, j)
-            force_cross(frame.velocity, j, borne, j, biased, j)
-            motion_cross(frame.velocity, j, pulls, k, swept, 0)
-            inertia_times(frame.inertia, j, swept, 0, force, j)
+            inertia_times(inertia, j, pulls, k, borne, j)
+            force_cross(velocity, j, borne, j, biased, j)
+            motion_cross(velocity, j, pulls, k, swept, 0)
+            inertia_times(inertia, j, swept, 0, force, j)
             for r in range(6):
                 biased[j, r] -= force[j, r]
-            force_cross(pulls, k, frame.momentum, j, force, j)
+            force_cross(pulls, k, momentum, j, force, j)
             for r in range(6):
                 biased[j, r] -= force[j, r]
     hand_down(parent, borne)
@@ -126,14 +127,15 @@ def _of_bodies(parent: np.ndarray, bodies: np.ndarray, frame: Frame, pulls: np.n
 
 
 @part
-def _by_axis(frame: Frame, pulls: np.ndarray, k: int, j: int, by: np.ndarray) -> None:
-    """Write the gradient (3,) by position, rate and acceleration of axis j, for pulls[k] on the load, into `by`."""
-    axes, swept = frame.axes, frame.swept
-    borne, biased, force = frame.spare[0], frame.spare[1], frame.spare[2]
-    force_cross(axes, j, frame.force, j, force, j)
-    by[0] = inner(force, j, pulls, k) + inner(biased, j, swept, j) + inner(borne, j, frame.turned, j)
-    by[1] = inner(biased, j, axes, j) + 2.0 * inner(borne, j, swept, j)
-    by[2] = inner(borne, j, axes, j)
+def _by_axes(frame: Frame, pulls: np.ndarray, k: int, by: np.ndarray) -> None:
+    """Write the gradient (a, 3) by position, rate and acceleration of the axes, for pulls[k] on the load, to `by`."""
+    axes, swept, turned, force = frame.axes, frame.swept, frame.turned, frame.force
+    borne, biased, turning = frame.spare[0], frame.spare[1], frame.spare[2]
+    for j in range(len(by)):
+        force_cross(axes, j, force, j, turning, j)
+        by[j, 0] = inner(turning, j, pulls, k) + inner(biased, j, swept, j) + inner(borne, j, turned, j)
+        by[j, 1] = inner(biased, j, axes, j) + 2.0 * inner(borne, j, swept, j)
+        by[j, 2] = inner(borne, j, axes, j)
 
 
 @part
