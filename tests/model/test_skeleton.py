@@ -6,6 +6,7 @@ from kinertia.estimation.calibration import marker_jacobian
 from kinertia.model.anthropometry import literature_bsp
 from kinertia.model.bsp import BodySegmentParameters, transformed_parameters
 from kinertia.model.gait27 import ARM_ROTATIONS, SHOULDER_OFFSETS
+from kinertia.model.kinematic_tree import in_segments
 from kinertia.model.skeleton import Axis, Joint, Marker, Skeleton
 from kinertia.motion.dynamics import Motion, inverse_dynamics, root_regressor
 from kinertia.motion.rigid_body import axis_force_derivatives
@@ -41,6 +42,14 @@ def test_marker_positions_by_hand():
     at = skeleton.marker_positions(skeleton.pose(np.array([[np.pi / 2, 0.25]])))
     np.testing.assert_allclose(at[0, 0], [0.0, 1.75, 0.0], atol=1e-12)
     assert skeleton.rotational.tolist() == [True, False]
+
+
+def test_markers_at_their_places_are_in_their_segments_as_in_the_model(model):
+    skeleton = model.skeleton
+    q = np.random.default_rng(1).uniform(-0.5, 0.5, (4, len(skeleton.coordinates)))
+    places = skeleton.marker_positions(skeleton.pose(q))
+    found = in_segments(skeleton.tree, skeleton.map.axes(q), skeleton.marker_segments, places)
+    np.testing.assert_allclose(found, np.broadcast_to(skeleton.marker_locals, found.shape), atol=1e-12)
 
 
 def test_pose_jacobian_agrees_with_finite_differences(model):

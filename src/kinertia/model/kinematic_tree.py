@@ -136,3 +136,21 @@ def poses(tree: KinematicTree, at: np.ndarray) -> tuple[np.ndarray, np.ndarray, 
         place_axes(tree, at[k], axis_rotation, axis_translation, axes[k])
         place_segments(tree, axis_rotation, axis_translation, rotation[k], translation[k])
     return rotation, translation, axes
+
+
+@compiled
+def in_segments(tree: KinematicTree, at: np.ndarray, segments: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Convert points (n, m, 3) from ground axes to the frames of their segments (m,), at axis values (n, a)."""
+    n, a = at.shape
+    s, result = len(tree.carrier), np.empty(points.shape)
+    rotation, translation = np.empty((s, 3, 3)), np.empty((s, 3))
+    axis_rotation, axis_translation, axes = np.empty((a, 3, 3)), np.empty((a, 3)), np.empty((a, 6))
+    for k in range(n):
+        place_axes(tree, at[k], axis_rotation, axis_translation, axes)
+        place_segments(tree, axis_rotation, axis_translation, rotation, translation)
+        for j in range(len(segments)):
+            turn, place = rotation[segments[j]], translation[segments[j]]
+            x, y, z = points[k, j, 0] - place[0], points[k, j, 1] - place[1], points[k, j, 2] - place[2]
+            for c in range(3):
+                result[k, j, c] = turn[0, c] * x + turn[1, c] * y + turn[2, c] * z
+    return result

@@ -13,6 +13,7 @@ import numpy as np
 
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.problem import MapProblem
+from kinertia.model.kinematic_tree import in_segments
 from kinertia.motion.moving_windows import all_around
 
 _UNSEEN = 3.0
@@ -63,12 +64,11 @@ def motion_noise(problem: MapProblem, k: int, coefficients: np.ndarray, static: 
 def _left(problem: MapProblem, k: int, coefficients: np.ndarray, static: np.ndarray, frames: slice) -> np.ndarray:
     """Return the residuals (n, m, 3) m of markers and skin, in the axes of the segments; NaN where not seen."""
     q = problem.model.full(problem.bases[k].evaluate(coefficients, frames), static)[0]
-    skeleton = problem.model.placed(static)
-    pose = skeleton.pose(q)
-    away = problem.trials[k].markers[frames] - skeleton.marker_positions(pose)
-    own = np.einsum("nmji,nmj->nmi", pose.rotation[:, skeleton.marker_segments], away)
+    skeleton, trial = problem.model.placed(static), problem.trials[k]
+    at = np.ascontiguousarray(skeleton.map.axes(q))
+    own = in_segments(skeleton.tree, at, skeleton.marker_segments, np.ascontiguousarray(trial.markers[frames]))
     patterns, along = problem.model.skin(k, static, frames)
-    result: np.ndarray = own - patterns.displaced(along)
+    result: np.ndarray = own - skeleton.marker_locals - patterns.displaced(along)
     return result
 
 
