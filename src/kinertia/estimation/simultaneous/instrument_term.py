@@ -108,12 +108,13 @@ class InstrumentErrors(LoadTerm):
         by_static[:, :, self.gains_of(k)] += by[:, :, self._own[k], GAIN]
 
     def plates_in(self, k: int, static: np.ndarray) -> np.ndarray:
-        """Return the errors (p, 7) of every plate in trial k: PLATE_ERRORS, ZERO_UNKNOWNS."""
-        zeros = np.zeros((len(self.given.plates), len(ZERO_UNKNOWNS)))
-        errors: np.ndarray = (self._to_plates @ static[self.layout[PLATES]]).reshape(-1, len(PLATE_ERRORS))
-        errors[self._own[k], GAIN] += static[self.gains_of(k)]
-        zeros[self._own[k]] = static[self.zeros_of(k)]
-        return np.hstack([errors, zeros])
+        """Return PLATE_ERRORS and ZERO_UNKNOWNS (..., p, 7) of every plate in trial k, from unknowns (..., S)."""
+        kinds, plates = static.shape[:-1], len(self.given.plates)
+        zeros = np.zeros((*kinds, plates, len(ZERO_UNKNOWNS)))
+        errors = (static[..., self.layout[PLATES]] @ self._to_plates.T).reshape(*kinds, plates, len(PLATE_ERRORS))
+        errors[..., self._own[k], GAIN] += static[..., self.gains_of(k)]
+        zeros[..., self._own[k], :] = static[..., self.zeros_of(k)]
+        return np.concatenate([errors, zeros], axis=-1)
 
     def zeros_of(self, k: int) -> np.ndarray:
         """Return the indices (q, 2) of the zero offsets of the q plates of trial k."""

@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
+from scipy.fft import dct, idct
 from scipy.optimize import least_squares
 
 from kinertia.estimation.simultaneous.elimination import Eliminated, Factored
@@ -153,7 +154,7 @@ def posterior_draws(
     static = point.static + drawn + extra @ np.array([mode.static for mode in modes])
     of_trials = []
     for k, (trial, own) in enumerate(zip(trials, roots_in_trials, strict=True)):
-        in_trial = _in_trial(drawn, normal, own, problem.layout.in_root.stop)
+        in_trial = drawn if own is root else _in_trial(drawn, normal, own, problem.layout.in_root.stop)
         motions = _motions(problem, k, point, trial, in_trial, random)
         for motion, shares in zip(motions, extra.astype(motions.dtype), strict=True):  # together they take memory
             for mode, share in zip(modes, shares, strict=True):
@@ -239,7 +240,7 @@ def _narrow(alone: np.ndarray, shares: np.ndarray) -> None:
 
     The shares apply to the power of the sums of splines, of their rates and of their accelerations. The logarithm of
     the filter's power is a parabola in the square of the frequency, the same for all columns, so that relations between
-    them are kept.
+    them are kept. Cosine transforms mirror the series at their ends, which avoids jumps.
     """
     if np.ptp(shares) < _ALIKE * shares.max():
         alone *= np.sqrt(shares.mean())
@@ -247,7 +248,7 @@ def _narrow(alone: np.ndarray, shares: np.ndarray) -> None:
     size = alone.shape[1]
     ends = min(_LOOSE_ENDS, (size - _LOOSE_ENDS) // 2)
     # one draw at a time: of long trials the spectra of all would be most of the memory
-    power = sum(np.square(np.abs(_spectrum(one[ends : size - ends]))) for one in alone)
+    power = sum(np.square(dct(one[ends : size - ends], axis=0)) for one in alone)
     squares = _squares(len(power))
     # a quintic spline's own spectrum
     power = (power / power.sum(axis=0)).mean(axis=1) * np.sinc(0.5 * np.sqrt(squares)) ** 12
@@ -260,19 +261,14 @@ def _narrow(alone: np.ndarray, shares: np.ndarray) -> None:
         return gap
 
     found = least_squares(missing, [np.log(shares.mean()), 0.0, 0.0], bounds=([-20.0] * 3, [20.0] * 3))
-    gain = np.exp(0.5 * found.x @ _squares(size + 1) ** np.arange(3)[:, None])
+    gain = np.exp(0.5 * found.x @ _squares(size) ** np.arange(3)[:, None])
     for one in alone:
-        one[:] = np.fft.irfft(_spectrum(one) * gain[:, None], 2 * size, axis=0)[:size]
-
-
-def _spectrum(series: np.ndarray) -> np.ndarray:
-    """Return the spectrum (f, c) of a series (k, c) followed by its mirror image, which avoids jumps."""
-    return np.fft.rfft(np.concatenate([series, series[::-1]]), axis=0)
+        one[:] = idct(dct(one, axis=0) * gain[:, None].astype(one.dtype), axis=0, overwrite_x=True)
 
 
 def _squares(count: int) -> np.ndarray:
-    """Return the squares (f,) of frequencies, relative to half a cycle per knot interval."""
-    return np.square(np.linspace(0.0, 1.0, count))
+    """Return the squares (f,) of the frequencies of a cosine transform, relative to half a cycle per knot interval."""
+    return np.square(np.arange(count) / count)
 
 
 def _bodies(problem: MapProblem, point: Point, departures: np.ndarray) -> np.ndarray:
@@ -304,10 +300,10 @@ def _trial_draws(
     return TrialDraws(
         problem.bases[k].knots,
         motions,
-        np.array([instruments.plates_in(k, each) for each in static]) - plates,
+        instruments.plates_in(k, static) - plates,
         plates[:, GAIN],
         ground.middles,
         ground.turn,
-        np.array([loads.delay_s(k, each) for each in static]) - loads.delay_s(k, estimate),
+        (static - estimate)[:, loads.delay_unknowns(k)].sum(axis=1),
         random.standard_normal(len(static)),
     )

@@ -84,6 +84,10 @@ class StaticInformation:
 
     def root_of_covariance(self) -> np.ndarray:
         """Return R (S, S) with covariance R R^T of all unknowns; in no direction is it larger than by priors alone."""
+        return self._root
+
+    @cached_property
+    def _root(self) -> np.ndarray:
         n, k = len(self.first), len(self.factor)
         values, least, directions = self._directions
         result = np.zeros((n + k, n + k))
