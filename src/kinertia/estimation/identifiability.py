@@ -26,6 +26,8 @@ _ROUNDING = 1e-8
 _ENOUGH_FRAMES = 6000
 """Longer motions are sampled at about this many frames, one of every few neighbours, weighted for all of them. Gains of
 synthetic walks of up to ten minutes change by less than 1 %."""
+_FRAMES_AT_ONCE = 200
+"""Number of frames whose equations are reduced at once: larger matrices exceed the processor's cache."""
 _LISTED = 6
 _NAMED_SHARE = 0.85
 _MOST_NAMES = 4
@@ -109,9 +111,9 @@ def base_parameters(
         np.linalg.qr(_scaled_regressor(skeleton, bsp, motion.cut(chosen[some]), sd / np.sqrt(every)) @ scale, mode="r")
         for motion, sd in zip(motions, root_sd, strict=True)
         for chosen in [_one_of(every, len(motion.q))]
-        for some in pieces(len(chosen))
+        for some in pieces(len(chosen), _FRAMES_AT_ONCE)
     ]
-    _, gains, vectors = np.linalg.svd(np.concatenate(parts), full_matrices=False)
+    _, gains, vectors = np.linalg.svd(np.linalg.qr(np.concatenate(parts), mode="r"), full_matrices=False)
     gains = np.pad(gains, (0, max(0, count - len(gains))))[:count]
     names = [f"{segment}.{parameter}" for segment in bsp.segments for parameter in PARAMETERS]
     best = tuple(
