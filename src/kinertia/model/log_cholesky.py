@@ -80,14 +80,3 @@ def _lower(rows: np.ndarray) -> np.ndarray:
     lower = np.zeros((len(rows), 3, 3))
     lower[:, _ROWS, _COLUMNS] = np.hstack([np.exp(rows[:, 4:7]), rows[:, 7:]])
     return lower
-
-
-def by_body(regressor: np.ndarray, chain: np.ndarray) -> np.ndarray:
-    """Convert a regressor (d, r, 10 s) to derivatives (d, r, 10 s) by the body's unknowns.
-
-    `chain` (s, 10, 10) is the derivative of each segment's parameters in it by the segment's own ten.
-    """
-    d, r, wide = regressor.shape
-    by_segment = regressor.reshape(d * r, len(chain), 10).transpose(1, 0, 2) @ chain
-    result: np.ndarray = by_segment.transpose(1, 0, 2).reshape(d, r, wide)
-    return result

@@ -21,11 +21,12 @@ def body():
 def test_bodies_are_carried_by_the_axes_that_move_them(body):
     skeleton, _, axes, slopes, rows = body
     rng = np.random.default_rng(4)
-    segments = [0, 2, 5]
-    by_body = rng.standard_normal((N, 6, 10 * len(segments)))
-    out = np.zeros((N, rows.max() + 1, STATIC))
-    add_bodies(axes, slopes, rows, skeleton.support[segments], by_body, out)
-    carried = np.repeat(skeleton.support[segments].T, 10, axis=1)
+    segments, chain = np.array([0, 2, 5]), rng.standard_normal((3, 10, 10))
+    by_parameter = rng.standard_normal((N, 6, 8, 10))
+    support, out = skeleton.support[segments], np.zeros((N, rows.max() + 1, STATIC))
+    add_bodies(axes, slopes, rows, support, by_parameter, segments, chain, out)
+    by_body = np.einsum("nrsp,spk->nrsk", by_parameter[:, :, segments], chain).reshape(N, 6, -1)
+    carried = np.repeat(support.T, 10, axis=1)
     expected = slopes[..., None] * np.where(carried, axes @ by_body, 0.0)
     np.testing.assert_allclose(out[:, :, : carried.shape[1]], expected[:, rows >= 0], atol=1e-12)
     assert not out[:, :, carried.shape[1] :].any()

@@ -11,7 +11,7 @@ from kinertia.estimation.simultaneous.inputs import BSP, PLACES, STILL
 from kinertia.estimation.simultaneous.instrument_term import CLOCK, PLATES, ZEROS
 from kinertia.estimation.simultaneous.linearised import Point
 from kinertia.estimation.simultaneous.mixture_prior import GaussianPrior
-from kinertia.estimation.simultaneous.moment_derivatives import moment_derivatives
+from kinertia.estimation.simultaneous.moment_derivatives import MomentsOfTrial
 from kinertia.estimation.simultaneous.outcome import Ended
 from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.estimation.simultaneous.skin_blocks import block_growth
@@ -83,11 +83,11 @@ def curves(problem, coefficients: np.ndarray, static: np.ndarray) -> dict[str, n
 
 
 def derivatives_at(problem, coefficients: np.ndarray, static: np.ndarray, delay_sd_s: float):
-    """The motion at the dynamic frames, and `moment_derivatives` there."""
+    """The motion at the dynamic frames, and `MomentsOfTrial.derivatives` there."""
     frames = np.flatnonzero(problem.trials[0].dynamic)
     motion = [part[frames] for part in problem.model.full(problem.bases[0].evaluate(coefficients), static)]
     reactions = problem.loads.reactions(0, static)
-    return motion, moment_derivatives(problem, 0, motion, static, reactions, frames, delay_sd_s)
+    return motion, MomentsOfTrial(problem, 0, static, reactions, delay_sd_s).derivatives(motion, frames)
 
 
 def delay_sd_s(problem, covariance: np.ndarray) -> float:
@@ -106,14 +106,15 @@ def dense_derivatives(
     motion, by = derivatives_at(problem, coefficients, static, delay_sd_s)
     d, (size, c) = len(frames), coefficients.shape
     nothing, same = np.zeros((d, c, c)), np.tile(np.eye(c), (d, 1, 1))
-    still, zero = by.static, np.zeros_like(by.static)
+    still, zero, ground = by.static, np.zeros_like(by.static), np.zeros((d, 6, by.static.shape[2]))
+    ground[..., problem.layout.errors] = by.ground
     speed, value = motion[1][:, problem.moving][..., None], by.value[..., None]
     by_place, by_rate, by_acceleration = (grown * each for each in (by.q, by.qd, by.qdd))
     orders = {
         "coordinates": (same, nothing, nothing, zero),
         "moments": (by_place, by_rate, by_acceleration, still),
         "powers": (speed * by_place, speed * by_rate + value * same, speed * by_acceleration, speed * still),
-        "ground_forces": (*(np.zeros((d, 6, c)),) * 3, by.ground),
+        "ground_forces": (*(np.zeros((d, 6, c)),) * 3, ground),
     }
     result = {}
     for name, (*moved, own) in orders.items():

@@ -25,7 +25,7 @@ def test_mean_squares_are_those_of_delays_by_chance(rise_s):
     found = delayed_loads(walk, AT, SD_S)
     by_chance = np.random.default_rng(1).normal(0.0, SD_S, 2000)
     expected = np.mean([np.square(walk.at(AT + delay) - found.loads) for delay in by_chance], axis=0)
-    squares = np.square(SD_S * found.slope) + np.square(found.residual).sum(axis=0)
+    squares = np.square(SD_S * found.slope) + np.square(found.residual).sum(axis=1)
     np.testing.assert_allclose(np.sqrt(squares), np.sqrt(expected), rtol=0.1, atol=5.0)
     rates = walk.with_rate(AT)[1]
     too_large = np.abs(SD_S * rates).max() / np.sqrt(expected).max()
@@ -36,6 +36,6 @@ def test_where_loads_change_slowly_it_is_the_derivative():
     walk = reactions(0.02)
     found, plain = delayed_loads(walk, AT, 0.001), delayed_loads(walk, AT)
     np.testing.assert_allclose(found.slope, plain.slope, atol=0.01 * np.abs(plain.slope).max())
-    assert np.sqrt(np.square(found.residual).sum(axis=0)).max() < 2.0
-    assert plain.residual.shape == (0, len(AT), 2, 6)
+    assert np.sqrt(np.square(found.residual).sum(axis=1)).max() < 2.0
+    assert plain.residual.shape == (len(AT), 0, 2, 6)
     np.testing.assert_array_equal(plain.slope, walk.with_rate(AT)[1])

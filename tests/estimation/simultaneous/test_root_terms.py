@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from scipy.linalg import block_diag
 
 from kinertia.estimation.simultaneous.inputs import BSP, STILL
 from kinertia.estimation.simultaneous.root_terms import RootFrames, columns_of
-from kinertia.model.log_cholesky import by_body, dynamic_jacobian
+from kinertia.model.log_cholesky import dynamic_jacobian
 from kinertia.motion.dynamics import Motion, residual_terms, root_regressor
 from small_problem import curved_problem, point, small_problem
 
@@ -27,7 +28,8 @@ def test_they_are_those_of_the_dynamics_over_their_deviations(problem):
 
     left, by = residual_terms(skeleton, bsp, motion, wrench)
     by_static = np.zeros_like(by_ground)
-    by_static[..., layout[BSP]] = by_body(root_regressor(skeleton, bsp.segments, motion), dynamic_jacobian(theta))
+    by_parameter = root_regressor(skeleton, bsp.segments, motion)
+    by_static[..., layout[BSP]] = by_parameter @ block_diag(*dynamic_jacobian(theta))
     by_static[..., layout[STILL]] = by.q[..., problem.given.still]
     by_static -= by_ground
     by_static[:, 3:] += np.cross(skeleton.root.centre(motion.q)[:, :, None], by_ground[:, :3], axis=1)

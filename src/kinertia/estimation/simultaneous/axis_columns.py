@@ -10,31 +10,51 @@ from kinertia.model.compiled import compiled
 
 @compiled
 def add_bodies(
-    axes: np.ndarray, slopes: np.ndarray, rows: np.ndarray, moved: np.ndarray, by_body: np.ndarray, out: np.ndarray
+    axes: np.ndarray,
+    slopes: np.ndarray,
+    rows: np.ndarray,
+    moved: np.ndarray,
+    by_parameter: np.ndarray,
+    segments: np.ndarray,
+    chain: np.ndarray,
+    out: np.ndarray,
 ) -> None:
-    """Add the derivatives of generalised forces by the bodies' parameters to the first columns of `out` (n, c, s).
+    """Add the derivatives of generalised forces by the bodies' unknowns to the first columns of `out` (n, c, s).
 
     Args:
         axes: (n, a, 6) motion axes, in ground axes at the ground origin.
         slopes: (n, a) derivative of every axis value by its coordinate.
         rows: (a,) row of `out` of each axis' coordinate; -1 for none.
         moved: (b, a) whether the axis moves the body.
-        by_body: (n, 6, 10 b) derivatives of the bodies' loads at the ground origin, ten per body.
+        by_parameter: (n, 6, s, 10) derivatives of the segments' loads at the ground origin by dynamic parameters.
+        segments: (b,) indices of the bodies.
+        chain: (b, 10, 10) derivatives of each body's dynamic parameters by its ten unknowns.
         out: written.
     """
+    load = np.empty((6, 10 * len(segments)))
     for i in range(axes.shape[0]):
-        load = by_body[i]
+        for b in range(len(segments)):
+            for r in range(6):
+                own = by_parameter[i, r, segments[b]]
+                for k in range(10):
+                    total = 0.0
+                    for p in range(10):
+                        total += own[p] * chain[b, p, k]
+                    load[r, 10 * b + k] = total
         for j in range(axes.shape[1]):
             if rows[j] < 0:
                 continue
-            row, slope = out[i, rows[j]], slopes[i, j]
+            row, slope, b = out[i, rows[j]], slopes[i, j], 0
             x, y, z = slope * axes[i, j, 0], slope * axes[i, j, 1], slope * axes[i, j, 2]
             u, v, w = slope * axes[i, j, 3], slope * axes[i, j, 4], slope * axes[i, j, 5]
-            for b in range(len(moved)):
-                if moved[b, j]:
-                    for k in range(10 * b, 10 * b + 10):
-                        force = x * load[0, k] + y * load[1, k] + z * load[2, k]
-                        row[k] += force + u * load[3, k] + v * load[4, k] + w * load[5, k]
+            while b < len(segments):
+                first = b
+                while b < len(segments) and moved[b, j]:
+                    b += 1
+                for k in range(10 * first, 10 * b):
+                    force = x * load[0, k] + y * load[1, k] + z * load[2, k]
+                    row[k] += force + u * load[3, k] + v * load[4, k] + w * load[5, k]
+                b += 1
 
 
 @compiled

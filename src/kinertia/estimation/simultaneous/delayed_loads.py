@@ -23,7 +23,7 @@ class DelayedLoads:
     Attributes:
         loads: (n, 2, 6) without delay.
         slope: (n, 2, 6) per s of delay.
-        residual: (m, n, 2, 6) residuals from the slope for m delays, times the root of their probability, so that
+        residual: (n, m, 2, 6) residuals from the slope for m delays, times the root of their probability, so that
             the sum of squares is a mean square; empty (m = 0) if the delay is known.
     """
 
@@ -35,12 +35,14 @@ class DelayedLoads:
 def delayed_loads(reactions: GroundReactions, time: np.ndarray, sd_s: float = 0.0) -> DelayedLoads:
     """Compute the loads at times (n,) s for a delay with this SD (s); with zero SD the slope is the derivative."""
     loads, rates = reactions.with_rate(time)
+    n = len(time)
     if sd_s == 0.0:
-        return DelayedLoads(loads, rates, np.empty((0, *loads.shape)))
+        return DelayedLoads(loads, rates, np.empty((n, 0, 2, 6)))
     weights = np.exp(-0.5 * np.square(_DELAYS))
     weights /= weights.sum()
     delays = sd_s * _DELAYS
-    changes = np.array([reactions.at(time + delay) for delay in delays]) - loads
-    slope = np.tensordot(weights * delays, changes, 1) / (weights @ np.square(delays))
-    along, roots = (each[:, None, None, None] for each in (delays, np.sqrt(weights)))
-    return DelayedLoads(loads, slope, roots * (changes - along * slope))
+    later = reactions.at((time[:, None] + delays).ravel())
+    changes = later.reshape(n, len(delays), 12) - loads.reshape(n, 1, 12)
+    slope = (weights * delays / (weights @ np.square(delays))) @ changes
+    residual = np.sqrt(weights)[:, None] * (changes - delays[:, None] * slope[:, None])
+    return DelayedLoads(loads, slope.reshape(n, 2, 6), residual.reshape(n, -1, 2, 6))

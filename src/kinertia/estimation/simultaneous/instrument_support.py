@@ -15,7 +15,7 @@ from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
 from kinertia.estimation.simultaneous.gauss_newton import GaussNewton
 from kinertia.estimation.simultaneous.linearised import Point
 from kinertia.estimation.simultaneous.mixture_prior import GaussianPrior
-from kinertia.estimation.simultaneous.moment_derivatives import moment_derivatives
+from kinertia.estimation.simultaneous.moment_derivatives import MomentsOfTrial
 from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.estimation.simultaneous.static_information import StaticInformation
 
@@ -70,7 +70,8 @@ def moved_moments(
     some = np.unique(np.linspace(0, len(dynamic) - 1, min(_MOST_FRAMES, len(dynamic))).astype(int))
     frames, static = dynamic[some], problem.in_trial(k, point)
     motion = problem.model.full(problem.bases[k].evaluate(point.coefficients[k], frames), static)
-    by = moment_derivatives(problem, k, motion, static, problem.loads.reactions(k, static), frames, delay_sd_s)
+    every = MomentsOfTrial(problem, k, static, problem.loads.reactions(k, static), delay_sd_s)
+    by = every.derivatives(motion, frames)
     change = np.abs(by.static[:, _ROOT:, instruments])
     result: np.ndarray = (change / (INTERVAL_SD * curves.moments[some][:, _ROOT:, None])).max(axis=(0, 1))
     return result

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -9,7 +10,8 @@ from kinertia.estimation.simultaneous.axis_columns import add_bodies, take_load
 from kinertia.estimation.simultaneous.delayed_loads import DelayedLoads, delayed_loads
 from kinertia.estimation.simultaneous.inputs import BSP, STILL
 from kinertia.estimation.simultaneous.problem import MapProblem
-from kinertia.model.log_cholesky import by_body, dynamic_jacobian
+from kinertia.model.log_cholesky import dynamic_jacobian
+from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion, axis_motion
 from kinertia.motion.ground_reactions import GroundReactions
 from kinertia.motion.regressor import regressor
@@ -25,7 +27,8 @@ class MomentDerivatives:
         q, qd, qdd: (d, c, c) derivatives by the coordinates that move and their rates.
         static: (d, c, s) derivatives by the static unknowns that root equations depend on.
         impact: (d, c) contribution of impact transients.
-        ground: (d, 6, s) derivative of the ground reactions on the right foot, then the left (N).
+        loads: (d, 2, 6) on right and left foot, N and N m.
+        ground: (d, 6, e) derivatives of the ground reactions on right foot, then left (N), by the instruments' errors.
         delay_squares, ground_delay_squares: (d, c), (d, 6) mean squares of the remaining effect of the delay of the
             forces (`DelayedLoads.residual`).
     """
@@ -36,80 +39,112 @@ class MomentDerivatives:
     qdd: np.ndarray
     static: np.ndarray
     impact: np.ndarray
+    loads: np.ndarray
     ground: np.ndarray
     delay_squares: np.ndarray
     ground_delay_squares: np.ndarray
 
 
-def moment_derivatives(
-    problem: MapProblem,
-    k: int,
-    motion: Sequence[np.ndarray],
-    static: np.ndarray,
-    reactions: GroundReactions,
-    frames: np.ndarray,
-    delay_sd_s: float = 0.0,
-) -> MomentDerivatives:
-    """Compute the derivatives of `dynamics.inverse_dynamics` at d frames of trial k.
+@dataclass(frozen=True, eq=False)
+class MomentsOfTrial:
+    """Joint moments of a trial, as a function of its motion.
 
-    Args:
+    Attributes:
         problem: of the estimate.
         k: the trial.
-        motion: all coordinates, including static ones, and their rates (d, c), as in `FreedModel.full`.
         static: the estimate.
         reactions: `GroundLoads.reactions` there.
-        frames: (d,) indices.
         delay_sd_s: standard deviation of the delay of the forces, over which derivatives by it are averaged.
     """
-    skeleton, layout = problem.model.placed(static), problem.layout
-    q, qd, qdd = motion
-    state = axis_motion(skeleton, Motion(q, qd, qdd))
-    bodies, moving, row = skeleton.bodies(problem.model.bsp(static)), problem.moving, np.full(q.shape[1], -1)
-    row[moving] = np.arange(len(moving))
-    rows = row[skeleton.map.owner]
-    tau, (dq, dv, da) = axis_force_derivatives(skeleton.tree, skeleton.gravity_m_s2, bodies, *state, rows >= 0)
-    pose, impact = skeleton.pose(q), np.zeros(tau.shape)
-    slopes = np.ones(tau.shape) if pose.slopes is None else np.ascontiguousarray(pose.slopes)
-    axes = pose.axes, slopes, rows
-    by_static = np.zeros((len(q), len(moving), layout.in_root.stop))
-    carrying = [skeleton.segments.index(segment) for segment in problem.model.segments]
-    shown = regressor(skeleton.tree, skeleton.gravity_m_s2, *state, np.zeros((len(q), 3)))[:, :, carrying]
-    shown = by_body(shown.reshape(len(q), 6, -1), dynamic_jacobian(static[layout[BSP]]))
-    add_bodies(*axes, skeleton.support[carrying], shown, by_static)
-    late = delayed_loads(reactions, problem.trials[k].time[frames], delay_sd_s)
-    loads, by_load = _loads(problem, k, static, reactions, frames, late)
-    fast = reactions.impact_at(problem.trials[k].time[frames])
-    left = np.zeros((len(late.residual), *tau.shape))
-    for foot, name in enumerate(skeleton.feet):
-        moved = np.flatnonzero(skeleton.support[skeleton.segments.index(name)])
-        take_load(*axes, moved, loads[foot], by_load[foot], layout.errors.start, tau, dq, by_static)
-        impact[:, moved] -= (pose.axes[:, moved] @ fast[:, foot, :, None])[..., 0]
-        left[..., moved] -= np.einsum("dai,mdi->mda", pose.axes[:, moved], late.residual[:, :, foot])
-    by_q, by_qd, by_qdd = (
-        skeleton.map.to_coordinates(part.transpose(0, 2, 1), pose.slopes).transpose(0, 2, 1)
-        for part in skeleton.map.derivatives_to_coordinates((dq, dv, da), q, qd, qdd)
-    )
-    each = np.arange(q.shape[1])
-    by_q[:, each, each] += skeleton.map.turned_forces(tau, q)
-    by_static[:, :, layout[STILL]] = by_q[:, moving[:, None], problem.given.still]
-    by_q, by_qd, by_qdd = (part[:, moving[:, None], moving] for part in (by_q, by_qd, by_qdd))
-    value, impact = (skeleton.map.to_coordinates(each, pose.slopes)[:, moving] for each in (tau, impact))
-    ground = by_load[:, :, :3].transpose(1, 0, 2, 3).reshape(len(q), -1, layout.in_root.stop)
-    of_delays = [np.square(skeleton.map.to_coordinates(each, pose.slopes)[:, moving]) for each in left]
-    squares = np.sum(of_delays, axis=0) if of_delays else np.zeros(value.shape)
-    of_ground = np.square(late.residual[..., :3]).sum(axis=0).reshape(len(q), -1)
-    return MomentDerivatives(value, by_q, by_qd, by_qdd, by_static, impact, ground, squares, of_ground)
 
+    problem: MapProblem
+    k: int
+    static: np.ndarray
+    reactions: GroundReactions
+    delay_sd_s: float = 0.0
 
-def _loads(
-    problem: MapProblem, k: int, static: np.ndarray, reactions: GroundReactions, frames: np.ndarray, late: DelayedLoads
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return loads on the feet (2, d, 6), and their derivatives by the static unknowns (2, d, 6, s)."""
-    time = problem.trials[k].time[frames]
-    loads = late.loads
-    by_load = np.zeros((loads.shape[1], len(time), 6, problem.layout.in_root.stop))
-    for by, add in problem.loads.by_errors(k, static, loads, reactions.loaded_at(time), frames):
-        for foot, own in enumerate(by_load):
-            add(own, by[:, foot])
-    by_load[..., problem.loads.delay_unknowns(k)] = late.slope.transpose(1, 0, 2)[..., None]
-    return np.ascontiguousarray(loads.transpose(1, 0, 2)), by_load
+    @cached_property
+    def _skeleton(self) -> Skeleton:
+        return self.problem.model.placed(self.static)
+
+    @cached_property
+    def _bodies(self) -> np.ndarray:
+        return self._skeleton.bodies(self.problem.model.bsp(self.static))
+
+    @cached_property
+    def _segments(self) -> np.ndarray:
+        return np.array([self._skeleton.segments.index(segment) for segment in self.problem.model.segments])
+
+    @cached_property
+    def _chain(self) -> np.ndarray:
+        return dynamic_jacobian(self.static[self.problem.layout[BSP]])
+
+    @cached_property
+    def _rows(self) -> np.ndarray:
+        """Row (a,) of each axis' coordinate among those that move; -1 for none."""
+        moving, row = self.problem.moving, np.full(len(self._skeleton.coordinates), -1)
+        row[moving] = np.arange(len(moving))
+        result: np.ndarray = row[self._skeleton.map.owner]
+        return result
+
+    def derivatives(self, motion: Sequence[np.ndarray], frames: np.ndarray) -> MomentDerivatives:
+        """Compute the derivatives of `dynamics.inverse_dynamics` at d frames.
+
+        Args:
+            motion: all coordinates, including static ones, and their rates (d, c), as in `FreedModel.full`.
+            frames: (d,) indices.
+        """
+        skeleton, layout, moving, rows = self._skeleton, self.problem.layout, self.problem.moving, self._rows
+        q, qd, qdd = motion
+        state, pose = axis_motion(skeleton, Motion(q, qd, qdd)), skeleton.pose(q)
+        core = skeleton.tree, skeleton.gravity_m_s2
+        tau, (dq, dv, da) = axis_force_derivatives(*core, self._bodies, *state, rows >= 0)
+        slopes = np.ones(tau.shape) if pose.slopes is None else np.ascontiguousarray(pose.slopes)
+        by_static = np.zeros((len(q), len(moving), layout.in_root.stop))
+        support = skeleton.support[self._segments]
+        by_parameter = regressor(*core, *state, np.zeros((len(q), 3)))
+        add_bodies(pose.axes, slopes, rows, support, by_parameter, self._segments, self._chain, by_static)
+        time = self.problem.trials[self.k].time[frames]
+        late = delayed_loads(self.reactions, time, self.delay_sd_s)
+        by_load, along = self._by_load(late, frames), np.zeros((len(q), 2, 6, tau.shape[1]))
+        for foot, name in enumerate(skeleton.feet):
+            moved = np.flatnonzero(skeleton.support[skeleton.segments.index(name)])
+            load = np.ascontiguousarray(late.loads[:, foot])
+            first = layout.errors.start
+            take_load(pose.axes, slopes, rows, moved, load, by_load[foot], first, tau, dq, by_static)
+            along[:, foot, :, moved] = pose.axes[:, moved].transpose(1, 0, 2)
+        by_q, by_qd, by_qdd = (
+            skeleton.map.to_coordinates(part.transpose(0, 2, 1), pose.slopes).transpose(0, 2, 1)
+            for part in skeleton.map.derivatives_to_coordinates((dq, dv, da), q, qd, qdd)
+        )
+        each = np.arange(q.shape[1])
+        by_q[:, each, each] += skeleton.map.turned_forces(tau, q)
+        by_static[:, :, layout[STILL]] = by_q[:, moving[:, None], self.problem.given.still]
+        by_q, by_qd, by_qdd = (part.take(moving, axis=1).take(moving, axis=2) for part in (by_q, by_qd, by_qdd))
+        by_forces = tau, along.reshape(len(q), 12, -1)
+        value, reach = (skeleton.map.to_coordinates(each, pose.slopes)[..., moving] for each in by_forces)
+        fast = self.reactions.impact_at(time).reshape(len(q), 1, 12)
+        ground = by_load[:, :, :3, layout.errors].transpose(1, 0, 2, 3).reshape(len(q), 6, -1)
+        return MomentDerivatives(
+            value,
+            by_q,
+            by_qd,
+            by_qdd,
+            by_static,
+            -(fast @ reach)[:, 0],
+            late.loads,
+            ground,
+            np.square(late.residual.reshape(len(q), -1, 12) @ reach).sum(axis=1),
+            np.square(late.residual[..., :3]).sum(axis=1).reshape(len(q), -1),
+        )
+
+    def _by_load(self, late: DelayedLoads, frames: np.ndarray) -> np.ndarray:
+        """Return the derivatives (2, d, 6, s) of the loads on right and left foot by the static unknowns."""
+        problem, k, time = self.problem, self.k, self.problem.trials[self.k].time[frames]
+        result = np.zeros((2, len(time), 6, problem.layout.in_root.stop))
+        loaded = self.reactions.loaded_at(time)
+        for by, add in problem.loads.by_errors(k, self.static, late.loads, loaded, frames):
+            for foot, own in enumerate(result):
+                add(own, by[:, foot])
+        result[..., problem.loads.delay_unknowns(k)] = late.slope.transpose(1, 0, 2)[..., None]
+        return result
