@@ -8,6 +8,7 @@ from kinertia.findings.finding import Severity
 from kinertia.io.osim.reader import read_osim
 from kinertia.settings import Subject
 from kinertia.trial.trial_input import TrialInput
+from kinertia.workflow.label_spelling import with_model_spelling
 from kinertia.workflow.person import Person
 from kinertia.workflow.screening import screen
 
@@ -63,3 +64,9 @@ def test_labels_of_another_set_stay_as_they_are(person):
     result = screened(static, walk)
     assert result.context.trials[0].recording.markers.labels == walk.markers.labels
     assert "L101" in [one.code for one in result.findings]
+
+
+def test_a_person_whose_labels_fit_keeps_the_marker_set_found(person):
+    static, walk = person
+    given = Person(Subject(), (TrialInput(walk),), static)
+    assert with_model_spelling(given) is given

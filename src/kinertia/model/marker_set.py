@@ -8,6 +8,7 @@ import re
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache, cached_property
 from typing import Self
 
 import numpy as np
@@ -87,7 +88,7 @@ class MarkerSet:
     respelled: Mapping[str, str] = field(default_factory=dict)
     spellings: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
-    @property
+    @cached_property
     def labels(self) -> tuple[str, ...]:
         """All labels, each once."""
         named = [label for labels in (*self.segments.values(), *self.landmarks.values()) for label in labels]
@@ -124,8 +125,8 @@ def spelled_as(marker_set: MarkerSet, labels: Sequence[str]) -> MarkerSet:
         for label, names in marker_set.spellings.items()
         if label in marker_set.labels and label not in labels and label not in spelled
     }
-    others = [label for label in labels if label not in {*marker_set.labels, *spelled.values()}]
-    spelled |= _matched(named, others, shared_prefix(labels))
+    taken = {*marker_set.labels, *spelled.values()}
+    spelled |= _matched(named, [label for label in labels if label not in taken], shared_prefix(labels))
     if not spelled:
         return marker_set
 
@@ -163,10 +164,13 @@ def _matched(names: Mapping[str, set[str]], labels: Sequence[str], prefix: str) 
     """Map each label of a set to the one of these labels that is among its names (folded, with or without the prefix)
     and not claimed twice.
     """
-    known = [(one, {folded(one), folded(one.removeprefix(prefix))}) for one in labels]
-    fitting = {label: [one for one, forms in known if forms & own] for label, own in names.items()}
+    known: dict[str, list[str]] = {}
+    for one in labels:
+        for form in {folded(one), folded(one.removeprefix(prefix))}:
+            known.setdefault(form, []).append(one)
+    fitting = {label: {one for form in own for one in known.get(form, ())} for label, own in names.items()}
     claims = Counter(one for found in fitting.values() for one in found)
-    return {label: found[0] for label, found in fitting.items() if len(found) == 1 and claims[found[0]] == 1}
+    return {label: one for label, found in fitting.items() if len(found) == 1 for one in found if claims[one] == 1}
 
 
 def with_posterior_pelvis(marker_set: MarkerSet, labels: Sequence[str]) -> MarkerSet:
@@ -283,6 +287,7 @@ def in_words(name: str) -> str:
     return f"{_SIDES[side]} {head.replace('_', ' ')}" if side in _SIDES else name
 
 
+@cache
 def folded(label: str) -> str:
     """Return the letters and digits of a label, in lower case."""
     return "".join(ch for ch in label.lower() if ch.isalnum())

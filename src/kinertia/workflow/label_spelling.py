@@ -21,14 +21,16 @@ def with_model_spelling(person: Person) -> Person:
         return person
     known = marker_set.labels if static is None or person.model is not None else static.markers.labels
     trials = [replace(one, recording=_spelled(one.recording, marker_set, known)) for one in person.trials]
-    return replace(person, trials=trials)
+    return person if trials == [*person.trials] else replace(person, trials=trials)  # which would look for a set again
 
 
 def _spelled(recording: Recording, marker_set: MarkerSet, known: Sequence[str]) -> Recording:
     labels = recording.markers.labels
+    if matches_labels(marker_set, labels):
+        return recording
     read_as = {written: label for label, written in spellings(known, labels).items()}
     alike = tuple(read_as.get(label, label) for label in labels)
-    if matches_labels(marker_set, labels) or not matches_labels(marker_set, alike):
+    if not matches_labels(marker_set, alike):
         return recording
     found = [
         finding("L103", Where(markers=(written,)), written=Quantity(written), label=Quantity(label))
