@@ -120,6 +120,39 @@ def test_a_kept_function_gives_in_another_process_what_it_gave(tmp_path):
     assert [run(site, program) for _ in range(2)] == ["[0.5, 1.0] 4 0", "[0.5, 1.0] 4 1"]
 
 
+def test_a_kept_function_raises_numbas_errors_without_loading_the_modules_they_come_from(tmp_path):
+    (tmp_path / "zeros.py").write_text(
+        "import numpy as np\n"
+        "from kinertia.model.compiled import compiled, part\n"
+        "@part\n"
+        "def so_many(n):\n"
+        "    return np.zeros(n)\n"
+        "@compiled\n"
+        "def zeros(n):\n"
+        "    return so_many(n)\n",
+        encoding="utf-8",
+    )
+    (tmp_path / "program.py").write_text(
+        "import sys\n"
+        "from pathlib import Path\n"
+        "from kinertia.model import compiled\n"
+        "compiled.cache_folder = lambda: Path(__file__).parent\n"
+        "from zeros import zeros\n"
+        "print(zeros(2).tolist(), 'numba.np.arrayobj' in sys.modules)\n"
+        "try:\n"
+        "    zeros(-1)\n"
+        "except ValueError as error:\n"
+        "    print(error)\n",
+        encoding="utf-8",
+    )
+    program = (
+        f"import runpy, sys; sys.path.insert(0, {str(tmp_path)!r}); runpy.run_path({str(tmp_path / 'program.py')!r})"
+    )
+    said = [run(PACKAGE.parent / "kinertia", program).splitlines() for _ in range(2)]
+    error = "negative dimensions not allowed"
+    assert said == [["[0.0, 0.0] True", error], ["[0.0, 0.0] False", error]]
+
+
 def test_other_packages_functions_are_kept_where_they_were():
     from numba.core import config
 

@@ -15,10 +15,13 @@ class _MachineCode(CompileResultCacheImpl):  # type: ignore[misc]
     """Serialised form of a compiled function."""
 
     def reduce(self, result: Any) -> tuple[Any, ...]:
-        """Serialise as Numba does, but with only the name by which Python calls the code."""
-        (name, kind, (code, _)), *others = super().reduce(result)
+        """Serialise as Numba does, but with only the name by which Python calls the code, and without what nobody looks
+        up: types of all variables, and modules of functions that need no constants from there.
+        """
+        (name, kind, (code, _)), *others, places = super().reduce(result._replace(type_annotation=""))
         called = llvm.parse_assembly(f'define void @"{result.fndesc.llvm_cpython_wrapper_name}"() {{ ret void }}')
-        return ((name, kind, (code, called.as_bitcode())), *others)
+        needed = tuple(place for place in places if place.consts)
+        return ((name, kind, (code, called.as_bitcode())), *others, needed)
 
 
 class MachineCodeCache(FunctionCache):  # type: ignore[misc]
