@@ -66,11 +66,12 @@ def read_content(path: Path) -> C3dContent:
     Raises:
         C3dTrouble: ezc3d cannot read it.
     """
-    file, trouble = _with_plates(path)
+    file = _readable(path)
     retyped = _retype(file["parameters"])
     shapes = _plate_shapes(file["parameters"])
     if retyped or shapes:
-        file, trouble = _with_plate_shapes(file, shapes)
+        file = _with_plate_shapes(file, shapes)
+    plates, trouble = _plates(file)
     data, header = file["data"], file["header"]
     return {
         "header": {kind: dict(header[kind]) for kind in ("points", "analogs", "rotations") if kind in header},
@@ -79,7 +80,7 @@ def read_content(path: Path) -> C3dContent:
             "points": data["points"],
             "analogs": data["analogs"][:, :0],
             "rotations": data.get("rotations", []),
-            "platform": [dict(plate) for plate in data["platform"]] if "platform" in data else [],
+            "platform": plates,
         },
         "trouble": trouble,
     }
@@ -127,31 +128,54 @@ def _plate_shapes(parameters: Any) -> dict[str, tuple[int, ...]]:
     return shapes
 
 
-def _with_plate_shapes(file: Any, shapes: dict[str, tuple[int, ...]]) -> tuple[Any, str]:
-    """Read a copy of a file with force plate lists in these shapes, as `_with_plates` does."""
+def _with_plate_shapes(file: Any, shapes: dict[str, tuple[int, ...]]) -> Any:
+    """Read a copy of a file with force plate lists in these shapes, as `_readable` does."""
     for name, shape in shapes.items():
         entry = file["parameters"]["FORCE_PLATFORM"][name]
         entry["value"] = np.reshape(np.ravel(entry["value"], order="F"), shape, order="F")
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder) / _COPY
         save_c3d(file, copy)
-        return _with_plates(copy)
+        return _readable(copy)
 
 
-def _with_plates(path: Path) -> tuple[Any, str]:
-    """Read a file as ezc3d holds it, with the loads on force plates or the reason why they could not be computed.
+def _readable(path: Path) -> Any:
+    """Read a file as ezc3d holds it.
 
     Raises:
         C3dTrouble: ezc3d cannot read it.
     """
     try:
-        return _opened(path, extract_forceplat_data=True), ""
+        return _opened(path)
     except Exception as error:  # ezc3d lets OSError, RuntimeError, IndexError and more through
-        trouble = str(error)
+        raise C3dTrouble(str(error)) from None
+
+
+def _plates(file: Any) -> tuple[list[dict[str, np.ndarray]], str]:
+    """Return the loads on force plates, or none and the reason why ezc3d cannot compute them."""
     try:
-        return _opened(path), trouble
-    except Exception as worse:
-        raise C3dTrouble(str(worse)) from None
+        return [_plate(one) for one in ezc3d.ezc3d.ForcePlatforms(file.c3d_swig).forcePlatforms()], ""
+    except Exception as error:
+        return [], str(error)
+
+
+def _plate(plate: Any) -> dict[str, np.ndarray]:
+    """Return corners (3, 4), origin (3,) and loads (3, k) of a plate: moments or, of type 1, what these are made from.
+
+    ezc3d itself would turn all of them into arrays, sample by sample, which takes longer than to read the file.
+    """
+    loads = {"force": plate.forces()}
+    if plate.type() == 1:
+        loads |= {"center_of_pressure": plate.CoP(), "Tz": plate.Tz()}
+    else:
+        loads["moment"] = plate.moments()
+    content = {name: _columns(vectors) for name, vectors in loads.items()}
+    return {"corners": _columns(plate.corners()), "origin": plate.origin().to_array()[:, 0], **content}
+
+
+def _columns(vectors: Sequence[Any]) -> np.ndarray:
+    """Return vectors of ezc3d as columns (3, n)."""
+    return np.hstack([np.empty((3, 0)), *(vector.to_array() for vector in vectors)])
 
 
 def parameter_values(parameters: Any, group: str, name: str, default: Sequence[Any] = ()) -> Sequence[Any]:
@@ -225,13 +249,13 @@ def _virtual_size() -> int:
     return 0
 
 
-def _opened(path: Path, **options: Any) -> Any:
+def _opened(path: Path) -> Any:
     """Open a C3D file as ezc3d holds it; ezc3d's own errors pass through."""
     if _found_by_ezc3d(path):
-        return ezc3d.c3d(str(path), **options)
+        return ezc3d.c3d(str(path))
     with _elsewhere(path) as original:
         shutil.copyfile(original, _COPY)
-        return ezc3d.c3d(_COPY, **options)
+        return ezc3d.c3d(_COPY)
 
 
 def new_c3d(path: Path) -> Any:
