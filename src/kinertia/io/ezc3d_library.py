@@ -175,7 +175,7 @@ def _plate(plate: Any) -> dict[str, np.ndarray]:
 
 def _columns(vectors: Sequence[Any]) -> np.ndarray:
     """Return vectors of ezc3d as columns (3, n)."""
-    return np.hstack([np.empty((3, 0)), *(vector.to_array() for vector in vectors)])
+    return np.concatenate([np.empty((3, 0)), *(vector.to_array() for vector in vectors)], axis=1)
 
 
 def parameter_values(parameters: Any, group: str, name: str, default: Sequence[Any] = ()) -> Sequence[Any]:

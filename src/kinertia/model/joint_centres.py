@@ -83,9 +83,9 @@ def find_landmarks(static: Recording, marker_set: MarkerSet) -> Landmarks:
     A landmark needs all its markers, except a wrist, which needs one of them.
     """
     markers = static.markers
-    seen = markers.seen
+    seen, medians = markers.seen, np.median(markers.positions, axis=0)
     median = {
-        label: np.median(markers.positions[seen[:, i], i], axis=0)
+        label: medians[i] if seen[:, i].all() else np.median(markers.positions[seen[:, i], i], axis=0)
         for i, label in enumerate(markers.labels)
         if seen[:, i].any()
     }

@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -79,7 +80,7 @@ class Markers:
             return float("nan")
         return round(float((len(self.time) - 1) / (self.time[-1] - self.time[0])), 9)
 
-    @property
+    @cached_property
     def seen(self) -> BoolArray:
         """Visibility (n, m) of each marker in each frame, bool."""
         return np.asarray(np.isfinite(self.positions).all(axis=2))
