@@ -14,7 +14,7 @@ from kinertia.io.sto import read_sto
 from kinertia.motion.dynamics import inverse_dynamics
 from kinertia.motion.ground_reactions import measured_reactions
 from kinertia.motion.smoothing import smooth
-from kinertia.report.cycle_figures import cycle_figure, cycle_figures, mean_curve, usual_mean
+from kinertia.report.cycle_figures import cycle_figure, cycle_figures, drawn_curves, mean_curve, usual_mean
 from kinertia.report.cycle_table import stride_rows
 from kinertia.report.files import save_fit
 from kinertia.report.page import render
@@ -322,8 +322,18 @@ def test_estimated_curves_are_near_opensims(next_to_opensim):
 
 def test_a_report_without_clinical_angles(fit, monkeypatch):
     """A knee axis that is not across the leg has none: the fit ended with an internal error."""
-    monkeypatch.setattr("kinertia.estimation.cycles._clinical", lambda *given: [{} for _ in given[2]])
+    monkeypatch.setattr("kinertia.estimation.cycles.clinical_angles", lambda *given: {})
     figures = cycle_figures(fit)
     assert "clinical" not in figures
     assert "moment" in figures
     assert 'id="cycle"' in render(fit)
+
+
+def test_curves_of_both_stages_together_are_those_of_each(fit):
+    together = drawn_curves(fit)
+    for stage, curves in together.items():
+        alone = [one for trial in fit.trials for one in cycle_curves(trial, fit.mass_kg, stage)]
+        assert {(one.quantity, one.stride) for one in alone} == {(one.quantity, one.stride) for one in curves}
+        values = {(one.quantity, one.stride): one.value for one in alone}
+        for one in curves:
+            np.testing.assert_array_equal(one.value, values[one.quantity, one.stride])

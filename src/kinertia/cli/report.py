@@ -10,14 +10,14 @@ from kinertia.cli.options import Quiet
 from kinertia.cli.outcome import Outcome
 from kinertia.cli.terminal import out
 from kinertia.errors import FileError
-from kinertia.estimation.cycles import cycle_columns
+from kinertia.estimation.cycles import columns_of
 from kinertia.estimation.gait_profile import check_convention, gait_profile
 from kinertia.estimation.gait_scores import with_norms
 from kinertia.estimation.result import Fit
 from kinertia.io.norms_file import Norm, read_norms
 from kinertia.io.output_folder import updated_files
 from kinertia.motion.clinical_angles import CLINICAL_ANGLES
-from kinertia.report.cycle_figures import MOST_STRIDES, quantities_of
+from kinertia.report.cycle_figures import CurvesByStage, drawn_curves
 from kinertia.report.files import write_columns
 from kinertia.report.page import render
 from kinertia.report.saved_fit import read_saved
@@ -43,14 +43,15 @@ def report(
     kinertia report out --norms adults.csv
     """
     saved = read_saved(results)
-    bands, without_curve = ({}, []) if norms is None else _norms_for(saved.fit, norms)
+    curves = drawn_curves(saved.fit)
+    bands, without_curve = ({}, []) if norms is None else _norms_for(saved.fit, curves, norms)
     profile = gait_profile(saved.fit, bands) if set(CLINICAL_ANGLES) <= set(bands) else None
-    page = render(saved.fit, saved.provenance, saved.versions, bands, saved.truth)
+    page = render(saved.fit, saved.provenance, saved.versions, bands, saved.truth, curves)
     with updated_files(results, "fit", ["gps.csv"]) as work:
         (work / "report.html").write_text(page, encoding="utf-8", newline="\n")
         cycles = bands or (results / "cycles.csv").is_file()
         if cycles and any(trial.strides for trial in saved.fit.trials):
-            columns = cycle_columns(saved.fit.trials, saved.fit.mass_kg, "estimate", MOST_STRIDES)
+            columns = columns_of(curves["estimate"])
             columns = with_norms(columns, bands, saved.fit.skeleton) if bands else columns
             write_columns(work / "cycles.csv", columns, "%.6g")
         if profile:
@@ -71,9 +72,9 @@ def score_text(degrees: float) -> str:
     return f"{degrees:.1f} degrees" if np.isfinite(degrees) else "not available: one side has no complete curves"
 
 
-def _norms_for(fit: Fit, path: Path) -> tuple[dict[str, Norm], list[str]]:
+def _norms_for(fit: Fit, curves: CurvesByStage, path: Path) -> tuple[dict[str, Norm], list[str]]:
     """Read the norms in a file, and list those for which this fit has no curve."""
-    norms, known = read_norms(path), quantities_of(fit)
+    norms, known = read_norms(path), {one.quantity for one in curves["estimate"]}
     check_convention(fit, norms)
     other = sorted(set(norms) - known)
     if len(other) == len(norms):

@@ -8,7 +8,7 @@ changes them.
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from functools import partial
-from typing import Any, Literal, Protocol, TypeAlias
+from typing import Any, Literal, NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
@@ -112,13 +112,38 @@ def cycle_curves(
         strides: of the trial; all if None.
     """
     chosen = trial.strides if strides is None else strides
-    if not chosen:
-        return
+    if chosen:
+        yield from _curves(trial, mass_kg, stage, _tracked_strides(trial, chosen))
+
+
+def curves_by_stage(
+    trials: Sequence[Estimated],
+    mass_kg: float,
+    most_strides: int | None = None,
+    stages: Sequence[Stage] = ("estimate", "literature"),
+) -> dict[Stage, list[CycleCurve]]:
+    """Return all curves of these stages, from at most so many strides per trial and side, evenly spread."""
+    result: dict[Stage, list[CycleCurve]] = {stage: [] for stage in stages}
+    for trial in trials:
+        if chosen := spread_evenly(trial.strides, most_strides):
+            strides = _tracked_strides(trial, chosen)
+            for stage, curves in result.items():
+                curves += _curves(trial, mass_kg, stage, strides)
+    return result
+
+
+class _TrackedStride(NamedTuple):
+    """What inverse kinematics shows of a stride: how far the person went (3,) m, and clinical angles (101,) deg."""
+
+    stride: Stride
+    path: np.ndarray
+    angles: Mapping[str, np.ndarray]
+
+
+def _curves(trial: Estimated, mass_kg: float, stage: Stage, strides: Sequence[_TrackedStride]) -> Iterator[CycleCurve]:
     source, skeleton = _Source(trial, stage), trial.skeleton
     sides = by_side(skeleton.coordinates)
-    paths = travelled(feet_under_pelvis(skeleton, trial.kinematics), chosen, trial.kinematics.trial.belt)
-    clinical = _clinical(source, skeleton, chosen, paths)
-    for stride, path, angles in zip(chosen, paths, clinical, strict=True):
+    for stride, path, angles in strides:
         time, curve = stride.time, partial(CycleCurve, trial.name, stride)
         angle, speed, moment = source.angle(time), source.speed(time), source.moment(time) / mass_kg
         sd = source.deviations(time)
@@ -144,17 +169,26 @@ def cycle_curves(
         yield from (one for one in curves if np.isfinite(one.value).any())
 
 
-def _clinical(
-    source: "_Source", skeleton: Skeleton, strides: Sequence[Stride], paths: np.ndarray
-) -> list[dict[str, np.ndarray]]:
-    """Return the clinical angles (101,) of each stride, by quantity."""
-    q = source.tracked(np.concatenate([stride.time for stride in strides]), 0)
+def _tracked_strides(trial: Estimated, strides: Sequence[Stride]) -> list[_TrackedStride]:
+    skeleton, kinematics = trial.skeleton, trial.kinematics
+    paths = travelled(feet_under_pelvis(skeleton, kinematics), strides, kinematics.trial.belt)
+    q = _tracked(kinematics, np.concatenate([stride.time for stride in strides]), 0)
     heading = np.repeat(np.arctan2(-paths[:, 2], paths[:, 0]), len(PERCENT))
-    by_side = {side: clinical_angles(skeleton, q, heading, side) for side in {stride.side for stride in strides}}
+    of_side = {side: clinical_angles(skeleton, q, heading, side) for side in {stride.side for stride in strides}}
     return [
-        {name: values.reshape(-1, len(PERCENT))[k] for name, values in by_side[stride.side].items()}
-        for k, stride in enumerate(strides)
+        _TrackedStride(
+            stride, path, {name: values.reshape(-1, len(PERCENT))[k] for name, values in of_side[stride.side].items()}
+        )
+        for k, (stride, path) in enumerate(zip(strides, paths, strict=True))
     ]
+
+
+def _tracked(kinematics: Kinematics, time: np.ndarray, derivative: int) -> np.ndarray:
+    """Return coordinates (n, c) of smoothed inverse kinematics, or their derivatives; NaN where there are none."""
+    ik, spline = kinematics.ik, kinematics.spline
+    within = (time >= spline.time[0]) & (time <= spline.time[-1])
+    known = within[:, None] & np.isfinite(ik.q[nearest_samples(ik.time, time)])
+    return np.where(known, spline(np.clip(time, spline.time[0], spline.time[-1]), derivative), np.nan)
 
 
 def _directions(path: np.ndarray, side: str) -> np.ndarray:
@@ -206,14 +240,7 @@ class _Source:
     def _coordinates(self, time: np.ndarray, derivative: int) -> np.ndarray:
         if self.stage == "estimate":
             return self._measured(time, [partial(curve, derivative=derivative) for curve in self.motion])
-        return self.tracked(time, derivative)
-
-    def tracked(self, time: np.ndarray, derivative: int) -> np.ndarray:
-        """Return coordinates (n, c) of smoothed inverse kinematics, or their derivatives."""
-        ik, spline = self.kinematics.ik, self.kinematics.spline
-        within = (time >= spline.time[0]) & (time <= spline.time[-1])
-        known = within[:, None] & np.isfinite(ik.q[nearest_samples(ik.time, time)])
-        return np.where(known, spline(np.clip(time, spline.time[0], spline.time[-1]), derivative), np.nan)
+        return _tracked(self.kinematics, time, derivative)
 
     def _measured(self, time: np.ndarray, curves: Sequence[Callable[[np.ndarray], np.ndarray]]) -> np.ndarray:
         """Return values at these times from the curve of each measured window; NaN outside."""
@@ -232,11 +259,11 @@ def cycle_columns(
     trials: Sequence[Estimated], mass_kg: float, stage: Stage = "estimate", most_strides: int | None = None
 ) -> dict[str, Any]:
     """Return the columns of `Fit.cycles`, by name, from at most so many strides per trial and side, evenly spread."""
-    curves = [
-        one
-        for trial in trials
-        for one in cycle_curves(trial, mass_kg, stage, spread_evenly(trial.strides, most_strides))
-    ]
+    return columns_of(curves_by_stage(trials, mass_kg, most_strides, [stage])[stage])
+
+
+def columns_of(curves: Sequence[CycleCurve]) -> dict[str, Any]:
+    """Return the columns of `Fit.cycles`, by name, with these curves."""
     samples = len(PERCENT)
     return {
         "trial": [one.trial for one in curves for _ in range(samples)],

@@ -16,7 +16,7 @@ from kinertia.model.bsp import PARAMETERS, UNITS
 from kinertia.report import style
 from kinertia.report.bsp_figures import NAMES, segment_name
 from kinertia.report.coordinate_titles import load_title, panels_of
-from kinertia.report.cycle_figures import curves_of, mean_curve, mean_line
+from kinertia.report.cycle_figures import estimated_curves, mean_curve, mean_line
 from kinertia.report.cycle_table import stride_rows
 from kinertia.report.figure import Figure, written
 from kinertia.report.file_outputs import outputs_summary, outputs_view
@@ -252,7 +252,7 @@ def moments_figure(fits: Mapping[str, Fit]) -> Figure | None:
     walked = {name: fit for name, fit in fits.items() if _strides(fit)}
     if not walked:
         return None
-    curves = {name: curves_of(fit, "estimate") for name, fit in walked.items()}
+    curves = {name: estimated_curves(fit) for name, fit in walked.items()}
     first = next(iter(fits.values())).skeleton
     titles = {one.name: load_title(one, "moment") for one in panels_of(first) if one.name in _MOMENTS}
     panels = []

@@ -5,7 +5,7 @@ of one standard deviation around it; the estimate's own 95 % band is the darker 
 dotted. There are gaps where nothing was measured.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from kinertia.estimation.common_strides import common_strides, mean_of, mean_of_common
-from kinertia.estimation.cycles import FORCES, UNITS, CycleCurve, Kind, Stage, cycle_curves, spread_evenly
+from kinertia.estimation.cycles import FORCES, UNITS, CycleCurve, Kind, Stage, curves_by_stage
 from kinertia.estimation.result import Fit
 from kinertia.io.norms_file import Norm
 from kinertia.model.shared_coordinates import opposite_on_left
@@ -54,18 +54,26 @@ _FORCE_TITLES = dict(zip(FORCES, ("Forward +", "Upward +", "Towards the other fo
 
 Curves = Mapping[tuple[str, str], Sequence[CycleCurve]]
 """Curves by quantity and side."""
+CurvesByStage = Mapping[Stage, Sequence[CycleCurve]]
+"""Curves of all trials, as estimated and conventional."""
 Norms = Mapping[str, Norm]
 """Norms by quantity, for both sides."""
 
 
-def cycle_figures(fit: Fit, norms: Norms = MappingProxyType({})) -> dict[Kind, Figure]:
+def cycle_figures(
+    fit: Fit, norms: Norms = MappingProxyType({}), curves: CurvesByStage | None = None
+) -> dict[Kind, Figure]:
     """Draw all figures over the gait cycle, by kind; none where no trial has a stride, or no stride shows that kind.
 
-    Norms are grey bands below.
+    Args:
+        fit: the fit.
+        norms: grey bands below.
+        curves: `drawn_curves` of the fit, where they are known.
     """
     if not any(trial.strides for trial in fit.trials):
         return {}
-    drawn = _Drawn(fit, curves_of(fit, "estimate"), curves_of(fit, "literature"), norms)
+    curves = curves or drawn_curves(fit)
+    drawn = _Drawn(fit, _by_quantity(curves["estimate"]), _by_quantity(curves["literature"]), norms)
     figures = {kind: drawn.figure(kind) for kind in UNITS}
     return {kind: figure for kind, figure in figures.items() if figure is not None}
 
@@ -75,18 +83,21 @@ def cycle_figure(fit: Fit, kind: Kind, norms: Norms = MappingProxyType({})) -> F
     return cycle_figures(fit, norms).get(kind)
 
 
-def quantities_of(fit: Fit) -> set[str]:
-    """Return the names of all curves that a fit has over the gait cycle."""
-    return {quantity for quantity, _ in curves_of(fit, "estimate")}
+def estimated_curves(fit: Fit) -> Curves:
+    """Return all curves of the estimate from which figures are drawn."""
+    return _by_quantity(curves_by_stage(fit.trials, fit.mass_kg, MOST_STRIDES, ["estimate"])["estimate"])
 
 
-def curves_of(fit: Fit, stage: Stage) -> Curves:
+def drawn_curves(fit: Fit) -> CurvesByStage:
     """Return all curves of a fit from which figures are drawn."""
-    curves: dict[tuple[str, str], list[CycleCurve]] = {}
-    for trial in fit.trials:
-        for one in cycle_curves(trial, fit.mass_kg, stage, spread_evenly(trial.strides, MOST_STRIDES)):
-            curves.setdefault((one.quantity, one.stride.side), []).append(one)
-    return curves
+    return curves_by_stage(fit.trials, fit.mass_kg, MOST_STRIDES)
+
+
+def _by_quantity(curves: Iterable[CycleCurve]) -> Curves:
+    result: dict[tuple[str, str], list[CycleCurve]] = {}
+    for one in curves:
+        result.setdefault((one.quantity, one.stride.side), []).append(one)
+    return result
 
 
 def titled_quantities(skeleton: Skeleton, kind: Kind) -> list[tuple[str, str]]:

@@ -15,7 +15,7 @@ import numpy as np
 
 from kinertia.diagnostics.result.masses import mass_from_force_kg
 from kinertia.diagnostics.result.suitability import suitability
-from kinertia.estimation.cycles import Stage, cycle_columns, spatiotemporal_columns
+from kinertia.estimation.cycles import columns_of, spatiotemporal_columns
 from kinertia.estimation.forces_used import forces_before, forces_used
 from kinertia.estimation.identifiability import BaseParameters
 from kinertia.estimation.result import Fit, TrialFit
@@ -26,7 +26,7 @@ from kinertia.io.output_folder import complete_folder, expect_own_folder
 from kinertia.io.provenance import VERSION, Provenance
 from kinertia.io.sto import TimeTable, write_table
 from kinertia.model.centre_offsets import centre_offsets
-from kinertia.report.cycle_figures import MOST_STRIDES
+from kinertia.report.cycle_figures import CurvesByStage, drawn_curves
 from kinertia.report.ground_reactions_file import write_ground_reactions
 from kinertia.report.page import render
 from kinertia.report.saved_fit import FIT_FILE, write_fit
@@ -65,9 +65,10 @@ def save_fit(
     with complete_folder(folder, "fit") as work:
         (work / "fit.json").write_text(json.dumps(summary(fit), indent=2) + "\n", encoding="utf-8")
         write_fit(fit, provenance, work / FIT_FILE, truth)
-        (work / "report.html").write_text(render(fit, provenance, truth=truth), encoding="utf-8")
+        curves = drawn_curves(fit)
+        (work / "report.html").write_text(render(fit, provenance, truth=truth, curves=curves), encoding="utf-8")
         write_columns(work / "bsp.csv", fit.bsp_columns())
-        _write_cycles(fit, work)
+        _write_cycles(fit, curves, work)
         write_model(fit, work)
         for trial in fit.trials:
             into = work if len(fit.trials) == 1 else work / trial.name
@@ -76,15 +77,13 @@ def save_fit(
     return Path(folder)
 
 
-def _write_cycles(fit: Fit, folder: Path) -> None:
+def _write_cycles(fit: Fit, curves: CurvesByStage, folder: Path) -> None:
     """Write the tables of `Fit.cycles` and `Fit.spatiotemporal`, where there are strides."""
     if not any(trial.strides for trial in fit.trials):
         return
     write_columns(folder / "spatiotemporal.csv", spatiotemporal_columns(fit.trials), _SIX_DIGITS)
-    names: dict[Stage, str] = {"estimate": "cycles.csv", "literature": "cycles_literature.csv"}
-    for stage, name in names.items():
-        columns = cycle_columns(fit.trials, fit.mass_kg, stage, MOST_STRIDES)
-        write_columns(folder / name, columns, _SIX_DIGITS)
+    write_columns(folder / "cycles.csv", columns_of(curves["estimate"]), _SIX_DIGITS)
+    write_columns(folder / "cycles_literature.csv", columns_of(curves["literature"]), _SIX_DIGITS)
 
 
 def write_columns(path: Path, columns: Mapping[str, Sequence[Any] | np.ndarray], digits: str = _ALL_DIGITS) -> None:

@@ -28,7 +28,7 @@ from kinertia.report.bsp_figures import (
     information_figure,
     segment_name,
 )
-from kinertia.report.cycle_figures import MOST_STRIDES, Norms, cycle_figures, has_spread
+from kinertia.report.cycle_figures import MOST_STRIDES, CurvesByStage, Norms, cycle_figures, has_spread
 from kinertia.report.cycle_table import stride_rows
 from kinertia.report.figure import Figure, written
 from kinertia.report.file_outputs import outputs_view
@@ -65,6 +65,7 @@ def render(
     computed_by: Mapping[str, str] | None = None,
     norms: Norms = MappingProxyType({}),
     truth: Truth | None = None,
+    curves: CurvesByStage | None = None,
 ) -> str:
     """Render the report of a fit.
 
@@ -74,6 +75,7 @@ def render(
         computed_by: versions that computed the fit, where they are not the present ones.
         norms: norms of the curves over the gait cycle, drawn as bands behind them.
         truth: truth of a synthetic person.
+        curves: `drawn_curves` of the fit, where they are known.
     """
     true_bsp = None if truth is None else truth.bsp
     shown = fit.trials[:MOST_TRIALS]
@@ -89,7 +91,7 @@ def render(
         hidden=hidden_combinations(fit),
         asymmetry=asymmetry_sentences(fit),
         total_mass=[fit.subject.mass_kg, fit.literature.total_mass_kg, fit.estimate.total_mass_kg],
-        cycle=_cycle(fit, norms),
+        cycle=_cycle(fit, norms, curves),
         beside=outputs_view(fit, shown, MOST_FRAMES // len(shown)),
         walks=any(gait_events(trial.kinematics.trial) for trial in fit.trials),
         body={
@@ -131,9 +133,9 @@ def _written(figure: Figure | None) -> dict[str, Any] | None:
     return None if figure is None else written(figure)
 
 
-def _cycle(fit: Fit, norms: Norms) -> dict[str, Any] | None:
+def _cycle(fit: Fit, norms: Norms, curves: CurvesByStage | None) -> dict[str, Any] | None:
     """Collect everything that the templates show of the gait cycle; None where there are no strides."""
-    figures = cycle_figures(fit, norms)
+    figures = cycle_figures(fit, norms, curves)
     if not figures:
         return None
     clinical = figures.pop("clinical", None)
