@@ -322,7 +322,7 @@ def test_estimated_curves_are_near_opensims(next_to_opensim):
 
 def test_a_report_without_clinical_angles(fit, monkeypatch):
     """A knee axis that is not across the leg has none: the fit ended with an internal error."""
-    monkeypatch.setattr("kinertia.estimation.cycles.clinical_angles", lambda *given: {})
+    monkeypatch.setattr("kinertia.estimation.cycles.clinical_angles", lambda *given: {"r": {}, "l": {}})
     figures = cycle_figures(fit)
     assert "clinical" not in figures
     assert "moment" in figures

@@ -288,15 +288,26 @@ class RecordingContext:
             measured &= True if one.unmeasured_s is None else ~within(trial.markers.time, *one.unmeasured_s)
         for contact in self.foreign_contacts:
             measured &= ~within(trial.markers.time, contact.time[0], contact.time[-1])
-        return replace(trial, measured=measured) if measured.sum() >= FEWEST_MEASURED else None
+        if measured.sum() < FEWEST_MEASURED:
+            return None
+        return trial if np.array_equal(measured, trial.measured) else replace(trial, measured=measured)
 
     @cached_property
     def foreign_load(self) -> ForeignLoad | None:
         """A temporary load on the plates besides the person; None without one, or if no mass is stated."""
-        if self.trial is None or self.mass_kg is None or self.is_static:
+        if self.mass_kg is None or self.is_static or self._mass_on_plates is None:
             return None
-        weighed = force_mass(self.segment_of_label, self.trial, self.travel.kind == "stands still")
-        return None if weighed is None else weighed.foreign(self.mass_kg)
+        return self._mass_on_plates.foreign(self.mass_kg)
+
+    @cached_property
+    def _mass_on_plates(self) -> ForceMass | None:
+        """Mass on the plates, which need not be the body alone."""
+        return self._weighed(self.trial)
+
+    def _weighed(self, trial: Trial | None) -> ForceMass | None:
+        if trial is None:
+            return None
+        return force_mass(self.segment_of_label, trial, self.travel.kind == "stands still")
 
     @cached_property
     def foreign_contacts(self) -> Sequence[PlateContact]:
@@ -335,9 +346,8 @@ class RecordingContext:
     @cached_property
     def force_mass(self) -> ForceMass | None:
         """Body mass from the vertical force; None where forces or markers do not show it."""
-        if self.trial_on_plates is None:
-            return None
-        return force_mass(self.segment_of_label, self.trial_on_plates, self.travel.kind == "stands still")
+        trial = self.trial_on_plates
+        return self._mass_on_plates if trial is self.trial else self._weighed(trial)
 
     @cached_property
     def standing_mass(self) -> StandingMass | None:

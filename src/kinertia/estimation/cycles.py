@@ -174,10 +174,10 @@ def _tracked_strides(trial: Estimated, strides: Sequence[Stride]) -> list[_Track
     paths = travelled(feet_under_pelvis(skeleton, kinematics), strides, kinematics.trial.belt)
     q = _tracked(kinematics, np.concatenate([stride.time for stride in strides]), 0)
     heading = np.repeat(np.arctan2(-paths[:, 2], paths[:, 0]), len(PERCENT))
-    of_side = {side: clinical_angles(skeleton, q, heading, side) for side in {stride.side for stride in strides}}
+    angles = clinical_angles(skeleton, q, heading)
     return [
         _TrackedStride(
-            stride, path, {name: values.reshape(-1, len(PERCENT))[k] for name, values in of_side[stride.side].items()}
+            stride, path, {name: values.reshape(-1, len(PERCENT))[k] for name, values in angles[stride.side].items()}
         )
         for k, (stride, path) in enumerate(zip(strides, paths, strict=True))
     ]

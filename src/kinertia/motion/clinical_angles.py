@@ -37,23 +37,23 @@ CLINICAL_ANGLES = {
 """The nine angles by their quantity in `cycles.csv` and norms."""
 
 
-def clinical_angles(skeleton: Skeleton, q: np.ndarray, heading_rad: np.ndarray, side: str) -> dict[str, np.ndarray]:
-    """Compute the clinical angles (n,) deg of a side, by quantity; NaN where coordinates from ground to foot are NaN.
+def clinical_angles(skeleton: Skeleton, q: np.ndarray, heading_rad: np.ndarray) -> dict[str, dict[str, np.ndarray]]:
+    """Compute the clinical angles (n,) deg of each side ("r", "l"), by quantity; NaN where coordinates from ground to
+    foot are NaN.
 
-    Empty for a model without legs of hip, knee and ankle in ISB's axes.
+    None for a model without legs of hip, knee and ankle in ISB's axes.
 
     Args:
         skeleton: the model.
         q: (n, c) coordinates, rad and m.
         heading_rad: (n,) direction of the strides, from ground's X axis to the left.
-        side: "r" or "l".
     """
-    foot = skeleton.segments.index(skeleton.feet[FEET.index(side)])
-    known = np.isfinite(q[:, np.unique(skeleton.map.owner[skeleton.support[foot]])]).all(axis=1)
     outputs = plug_in_gait_angles(skeleton, np.where(np.isfinite(q), q, 0.0), heading_rad)
-    if not outputs:
-        return {}
-    angles = {
-        name: outputs[f"{side.upper()}{one.joint}Angles"][:, one.component] for name, one in CLINICAL_ANGLES.items()
-    }
-    return {name: np.where(known, values, np.nan) for name, values in angles.items()}
+    result: dict[str, dict[str, np.ndarray]] = {side: {} for side in FEET}
+    for side, name in zip(FEET, skeleton.feet, strict=True) if outputs else ():
+        foot = skeleton.segments.index(name)
+        known = np.isfinite(q[:, np.unique(skeleton.map.owner[skeleton.support[foot]])]).all(axis=1)
+        for quantity, one in CLINICAL_ANGLES.items():
+            values = outputs[f"{side.upper()}{one.joint}Angles"][:, one.component]
+            result[side][quantity] = np.where(known, values, np.nan)
+    return result

@@ -159,6 +159,8 @@ def _markers_only(screened: Screened) -> tuple[RecordingContext, ...]:
         for one in context.trials
         if one.name in left_out and all(_of_forces(each) for each in against if each.where.trial == one.name)
     )
+    if not markers_only:
+        return ()
     names = {one.name for one in markers_only}
     found = [one for one in screened.findings if one.where.trial not in names]
     for trial in markers_only:
