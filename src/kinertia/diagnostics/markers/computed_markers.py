@@ -20,6 +20,9 @@ from kinertia.trial.data import FloatArray
 
 _EXACT_M, _SKIN_M = 1e-4, 3e-4
 """Skin moves by more than the latter; where pelvis markers do not, they are computed themselves, or on one plate."""
+_DISTANCE_M = 2.0 * _EXACT_M
+"""SD of a point's distance from an origin above which it is exact in no axes there: that SD is at most the square root
+of 3 times the largest of the coordinates'."""
 _NEAR_M = 0.02
 """Change of distance from the pelvis' middle below which a point is fixed in it; thighs swing by more."""
 _MOST_CORNERS = 5
@@ -67,15 +70,16 @@ def _in_pelvis(place: Mapping[str, FloatArray], marker_set: MarkerSet) -> dict[s
     if len(pelvis) < _FEWEST or apart.std(axis=1).max() < _SKIN_M:
         return {}
     points = np.concatenate([pelvis, np.stack([pelvis[:, [a, b]].mean(axis=1) for a, b in pairs], axis=1)], axis=1)
-    frames = (_frames(points), _best_fit(pelvis))
-    found = {}
+    origins = np.concatenate([points, pelvis.mean(axis=1, keepdims=True)], axis=1)
+    found, frames = {}, None
     others = {label for name, labels in marker_set.segments.items() if name != "pelvis" for label in labels}
     for label in others & set(place):
         own = place[label][shown]
         seen = np.isfinite(own).all(axis=1)
-        from_middle = np.linalg.norm(own - pelvis.mean(axis=1), axis=1)[seen]
-        if seen.sum() < _FEWEST or np.ptp(from_middle) > _NEAR_M:
+        away = np.linalg.norm(own[seen, None] - origins[seen], axis=2)
+        if seen.sum() < _FEWEST or np.ptp(away[:, -1]) > _NEAR_M or away.std(axis=0).min() > _DISTANCE_M:
             continue
+        frames = frames or (_frames(points), _best_fit(pelvis))  # few recordings need them
         for origin, axes in frames:
             local = np.einsum("ntji,ntj->nti", axes[seen], own[seen, None] - origin[seen])
             sd_m = float(local.std(axis=0).max(axis=1).min())
