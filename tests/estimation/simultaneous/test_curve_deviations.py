@@ -3,8 +3,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinertia.estimation.simultaneous import curve_deviations as module
-from kinertia.estimation.simultaneous.block_tridiagonal import BlockBand
 from kinertia.estimation.simultaneous.curve_deviations import curve_deviations
 from kinertia.estimation.simultaneous.gauss_newton import GaussNewton
 from kinertia.estimation.simultaneous.inputs import BSP, PLACES, STILL
@@ -13,9 +11,10 @@ from kinertia.estimation.simultaneous.linearised import Point
 from kinertia.estimation.simultaneous.mixture_prior import GaussianPrior
 from kinertia.estimation.simultaneous.moment_derivatives import MomentsOfTrial
 from kinertia.estimation.simultaneous.outcome import Ended
+from kinertia.estimation.simultaneous.posterior_draws import Mode
 from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.estimation.simultaneous.skin_blocks import block_growth
-from kinertia.estimation.simultaneous.solver import _deviations, _roots_in_trials
+from kinertia.estimation.simultaneous.solver import _roots_in_trials, _uncertainty
 from kinertia.estimation.simultaneous.static_information import StaticInformation
 from kinertia.motion.dynamics import Motion, inverse_dynamics
 from small_problem import SWITCH_S, curved_problem, point, small_problem
@@ -62,9 +61,8 @@ def dense(problem, coefficients: np.ndarray, static: np.ndarray) -> np.ndarray:
 
 
 @pytest.fixture(params=[(1.0, 1.0, 1.0), (0.5, 0.2, 3.0)], ids=["as expected", "unlike"])
-def noise(request, monkeypatch) -> np.ndarray:
+def noise(request) -> np.ndarray:
     """What is seen of the markers' errors, their rates and their accelerations, over what is expected."""
-    monkeypatch.setattr(module, "motion_noise", lambda *_: np.array(request.param))
     return np.array(request.param)
 
 
@@ -170,7 +168,7 @@ def test_deviations_are_those_of_the_dense_covariance(estimate, noise):
     information = prior_information(problem, static) + part.information
     root = StaticInformation.of(information, problem.layout.in_root.stop).root_of_covariance()
     np.testing.assert_allclose(root @ root.T, full[n:, n:], rtol=1e-4, atol=1e-6 * np.abs(full[n:, n:]).max())
-    sd = curve_deviations(problem, 0, coefficients, static, part, root)
+    sd = curve_deviations(problem, 0, coefficients, static, part, root, noise)
     impacts, speed = of_impacts(problem, coefficients, static), speeds(problem, coefficients)
     noise_n = problem.loads.reactions(0, static).noise_n * (
         curves(problem, coefficients, static)["ground_forces"] != 0.0
@@ -218,7 +216,8 @@ def test_deviations_of_two_trials_are_those_of_one_dense_matrix(estimate, noise)
     covariance = inverse(information)
     model = GaussNewton.of(pair, here).under(gaussian)
     ended = Ended(here.point, here, gaussian, True, 1, (0.0, 0.0))
-    static_covariance, sds = _deviations(pair, ended, model, _roots_in_trials(pair, ended, model))
+    none = Mode(np.zeros(pair.layout.size), tuple(np.zeros_like(one) for one in here.point.coefficients))
+    static_covariance, sds, _ = _uncertainty(pair, ended, model, _roots_in_trials(pair, ended, model), [none])
     s = pair.layout.size
     scale = np.sqrt(np.diag(static_covariance))
     np.testing.assert_allclose(
@@ -290,20 +289,3 @@ def of_impacts(problem, coefficients: np.ndarray, static: np.ndarray) -> np.ndar
     half = round(2.0 * len(basis.first) / (basis.size - 5))
     rows = np.clip(np.arange(len(more))[:, None] + np.arange(-half, half + 1), 0, len(more) - 1)
     return np.square(more)[rows].mean(axis=1)
-
-
-def test_blocks_of_the_inverse():
-    rng = np.random.default_rng(0)
-    b, k = 4, 3
-    factor = np.tril(rng.normal(size=(b * k, b * k)))
-    for i in range(b):
-        factor[k * (i + 2) :, k * i : k * i + k] = 0.0
-    matrix = factor @ factor.T + np.eye(b * k)
-    blocks = matrix.reshape(b, k, b, k).transpose(0, 2, 1, 3)
-    band = BlockBand.factor(
-        np.array([blocks[i, i] for i in range(b)]), np.array([blocks[i + 1, i] for i in range(b - 1)])
-    )
-    inverse = np.linalg.inv(matrix).reshape(b, k, b, k).transpose(0, 2, 1, 3)
-    diagonal, below = band.inverse_blocks()
-    np.testing.assert_allclose(diagonal, [inverse[i, i] for i in range(b)])
-    np.testing.assert_allclose(below, [inverse[i + 1, i] for i in range(b - 1)])

@@ -141,7 +141,7 @@ def test_deviations_of_curves_are_those_of_the_whole(whole, cut, here, double):
     expected, actual = (each.eliminated(0, *here) for each in (whole, cut))
     information = expected.information + np.diag(1.0 / np.maximum(np.abs(here[1]), 0.1) ** 2)
     root = StaticInformation.of(information, whole.layout.in_root.stop).root_of_covariance()
-    sd = [curve_deviations(each, 0, *here, part, root) for each, part in ((whole, expected), (cut, actual))]
+    sd = [curve_deviations(each, 0, *here, part, root, np.ones(3)) for each, part in ((whole, expected), (cut, actual))]
     for one in fields(CurveDeviations):
         close(getattr(sd[1], one.name), getattr(sd[0], one.name))
 

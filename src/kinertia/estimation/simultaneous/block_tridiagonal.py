@@ -78,22 +78,3 @@ class BlockBand:
             solve_lower(self.diagonal[i], result[i], transposed=True)
             known = result[i]
         return result
-
-    def inverse_blocks(self, after: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """Compute the blocks of the inverse on the diagonal (b, k, k) and below it, by Takahashi's recursion.
-
-        There are as many as in `below`; `after` (k, k) is the next diagonal block of the inverse if the matrix
-        continues.
-        """
-        diagonal, below, next_one = np.empty_like(self.diagonal), np.empty_like(self.below), after
-        unit = np.eye(self.diagonal.shape[1])
-        for i in range(len(diagonal) - 1, -1, -1):
-            half = unit.copy()
-            solve_lower(self.diagonal[i], half)
-            diagonal[i] = half.T @ half
-            if next_one is not None:
-                carried = self.below[i] @ half
-                below[i] = -next_one @ carried
-                diagonal[i] -= carried.T @ below[i]
-            next_one = diagonal[i]
-        return diagonal, below

@@ -20,7 +20,6 @@ import numpy as np
 from kinertia.estimation.simultaneous.curve_variances import write_rows, write_variances
 from kinertia.estimation.simultaneous.elimination import Branch, Eliminated
 from kinertia.estimation.simultaneous.moment_derivatives import MomentDerivatives, MomentsOfTrial
-from kinertia.estimation.simultaneous.motion_noise import motion_noise
 from kinertia.estimation.simultaneous.motion_spread import EndSpread, MotionSpread
 from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.estimation.simultaneous.skin_blocks import block_growth
@@ -72,6 +71,7 @@ def curve_deviations(
     static: np.ndarray,
     eliminated: Eliminated,
     root: np.ndarray,
+    noise: np.ndarray,
 ) -> CurveDeviations:
     """Compute the posterior standard deviations of the curves of trial k.
 
@@ -83,6 +83,7 @@ def curve_deviations(
         root: (S, S) root of the posterior covariance of the static unknowns, as in `StaticInformation`: the rows of
             unknowns in the root equations, which come first, have only as many nonzero columns as there are such
             unknowns.
+        noise: (3,) `motion_noise`, of errors that do not recur.
     """
     basis, frames = problem.bases[k], np.flatnonzero(problem.trials[k].dynamic)
     size = (len(frames), coefficients.shape[1])
@@ -90,8 +91,7 @@ def curve_deviations(
     curves = _Curves(
         MomentsOfTrial(problem, k, static, problem.loads.reactions(k, static), delay_sd_s),
         coefficients,
-        # errors that recur count more often only for what does not move
-        np.sqrt(motion_noise(problem, k, coefficients, static) / problem.trials[k].repeats),
+        np.sqrt(noise),
         frames,
         block_growth(problem, k, static, problem.trials[k].time[frames]),
         CurveDeviations.filled(*size, 0.0),

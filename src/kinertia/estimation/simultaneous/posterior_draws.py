@@ -25,7 +25,6 @@ from kinertia.estimation.simultaneous.inputs import BSP, PLACES, STILL
 from kinertia.estimation.simultaneous.instrument_term import InstrumentErrors
 from kinertia.estimation.simultaneous.knot_phases import OfPhases, followed
 from kinertia.estimation.simultaneous.linearised import Point
-from kinertia.estimation.simultaneous.motion_noise import motion_noise
 from kinertia.estimation.simultaneous.plate_loads import GAIN
 from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.model.bsp import BodySegmentParameters
@@ -136,7 +135,11 @@ def of_root(model: GaussNewton, point: Point, root: np.ndarray) -> list[Mode]:
 
 
 def posterior_draws(
-    model: GaussNewton, point: Point, roots_in_trials: Sequence[np.ndarray], modes: Sequence[Mode]
+    model: GaussNewton,
+    point: Point,
+    roots_in_trials: Sequence[np.ndarray],
+    noises: Sequence[np.ndarray],
+    modes: Sequence[Mode],
 ) -> PosteriorDraws:
     """Draw from the posterior around an estimate.
 
@@ -145,6 +148,7 @@ def posterior_draws(
         point: the estimate.
         roots_in_trials: per trial (S, S) root of the posterior covariance of the static unknowns as they are in it,
             block lower triangular: those that root equations depend on come first.
+        noises: per trial (3,) as in `curve_deviations`.
         modes: other uncertain quantities.
     """
     problem, trials, root = model.problem, model.here.trials, model.static.root_of_covariance()
@@ -155,7 +159,7 @@ def posterior_draws(
     of_trials = []
     for k, (trial, own) in enumerate(zip(trials, roots_in_trials, strict=True)):
         in_trial = drawn if own is root else _in_trial(drawn, normal, own, problem.layout.in_root.stop)
-        motions = _motions(problem, k, point, trial, in_trial, random)
+        motions = _motions(point.coefficients[k].shape, trial, in_trial, noises[k], random)
         for motion, shares in zip(motions, extra.astype(motions.dtype), strict=True):  # together they take memory
             for mode, share in zip(modes, shares, strict=True):
                 motion += share * mode.motions[k]
@@ -185,13 +189,13 @@ def _in_trial(drawn: np.ndarray, normal: np.ndarray, root: np.ndarray, first: in
 
 
 def _motions(
-    problem: MapProblem, k: int, point: Point, trial: Eliminated, static: np.ndarray, random: np.random.Generator
+    shape: tuple[int, ...], trial: Eliminated, static: np.ndarray, noise: np.ndarray, random: np.random.Generator
 ) -> np.ndarray:
-    """Draw differences (n, k, c) of a motion's coefficients, given these (n, S) of the static unknowns.
+    """Draw differences (n, k, c) of a motion's coefficients (k, c), given these (n, S) of the static unknowns.
 
     They are in single precision, as they are stored.
     """
-    size = (2 * len(static), *point.coefficients[k].shape)
+    size = (2 * len(static), *shape)
     steps = _Steps(static.T, random, np.empty(size, np.float32))
     after = steps.write(trial.middle)
     for branch in trial.branches:
@@ -199,8 +203,7 @@ def _motions(
         for part in branch.outwards():  # each is read once
             block = steps.write(part, block)
     follow, alone = np.split(steps.into, 2)
-    noise = motion_noise(problem, k, point.coefficients[k], problem.in_trial(k, point))
-    _narrow(alone, noise / problem.trials[k].repeats)
+    _narrow(alone, noise)
     drawn: np.ndarray = follow + alone
     return drawn
 

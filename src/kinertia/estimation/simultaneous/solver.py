@@ -33,10 +33,11 @@ from kinertia.estimation.simultaneous.linearised import Linearised, Point, Slope
 from kinertia.estimation.simultaneous.marker_offsets import as_displaced
 from kinertia.estimation.simultaneous.mixture_prior import GaussianPrior
 from kinertia.estimation.simultaneous.model_evidence import Evidence
+from kinertia.estimation.simultaneous.motion_noise import motion_noise
 from kinertia.estimation.simultaneous.observed_trial import CalibrationPrior, Observation
 from kinertia.estimation.simultaneous.omitted_unknowns import with_left_out
 from kinertia.estimation.simultaneous.outcome import Ended, SimultaneousResult, result_of
-from kinertia.estimation.simultaneous.posterior_draws import of_knots, of_root, posterior_draws
+from kinertia.estimation.simultaneous.posterior_draws import Mode, PosteriorDraws, of_knots, of_root, posterior_draws
 from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.estimation.simultaneous.quasi_newton import SecantPairs
 from kinertia.estimation.simultaneous.static_information import StaticInformation
@@ -121,14 +122,14 @@ def estimate_simultaneous(
     ended = ended._replace(here=profile.here, instruments=profile.instruments, point=point)
     roots = _roots_in_trials(problem, ended, model)
     modes = [of_knots(phases), *of_root(model, point, more)]
-    motions, ((covariance, of_curves), draws) = both(
+    motions, (covariance, of_curves, draws) = both(
         lambda: _through_impacts(problem, point),
-        lambda: (_deviations(problem, ended, model, roots), posterior_draws(model, point, roots, modes)),
+        lambda: _uncertainty(problem, ended, model, roots, modes),
     )
     covariance += phases.covariance + more @ more.T
-    of_curves = tuple(each.and_of(phases.curves_apart(k)) for k, each in enumerate(of_curves))
-    support = instrument_support(model, ended.point, ended.instruments, of_curves)
-    return result_of(problem, ended, motions, covariance, of_curves, support, evidence, draws)
+    curves = tuple(each.and_of(phases.curves_apart(k)) for k, each in enumerate(of_curves))
+    support = instrument_support(model, ended.point, ended.instruments, curves)
+    return result_of(problem, ended, motions, covariance, curves, support, evidence, draws)
 
 
 def _optimum(problem: MapProblem, progress: Callable[[float], None]) -> tuple[Ended, GaussNewton]:
@@ -330,16 +331,20 @@ def _through_impacts(problem: MapProblem, point: Point) -> tuple[np.ndarray, ...
     return at.point.coefficients
 
 
-def _deviations(
-    problem: MapProblem, ended: Ended, model: GaussNewton, roots: Sequence[np.ndarray]
-) -> tuple[np.ndarray, tuple[CurveDeviations, ...]]:
-    """Return the posterior covariance (S, S) of the static unknowns, and the SDs of the curves of every trial."""
-    root, point, rows = model.static.root_of_covariance(), ended.point, zip(ended.here.trials, roots, strict=True)
-    of_curves = [
-        curve_deviations(problem, k, point.coefficients[k], problem.in_trial(k, point), trial, in_trial)
-        for k, (trial, in_trial) in enumerate(rows)
-    ]
-    return root @ root.T, tuple(of_curves)
+def _uncertainty(
+    problem: MapProblem, ended: Ended, model: GaussNewton, roots: Sequence[np.ndarray], modes: Sequence[Mode]
+) -> tuple[np.ndarray, list[CurveDeviations], PosteriorDraws]:
+    """Return covariance (S, S) of the static unknowns, SDs of the curves of every trial, and draws.
+
+    `roots` are those of `_roots_in_trials`, `modes` other uncertain quantities.
+    """
+    root, point, of_curves, noises = model.static.root_of_covariance(), ended.point, [], []
+    for k, (trial, in_trial) in enumerate(zip(ended.here.trials, roots, strict=True)):
+        here = point.coefficients[k], problem.in_trial(k, point)
+        # errors that recur count more often only for what does not move
+        noises.append(motion_noise(problem, k, *here) / problem.trials[k].repeats)
+        of_curves.append(curve_deviations(problem, k, *here, trial, in_trial, noises[-1]))
+    return root @ root.T, of_curves, posterior_draws(model, point, roots, noises, modes)
 
 
 def _roots_in_trials(problem: MapProblem, ended: Ended, model: GaussNewton) -> list[np.ndarray]:
