@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from kinertia.estimation.simultaneous import solver
 from kinertia.estimation.simultaneous.curve_deviations import curve_deviations
 from kinertia.estimation.simultaneous.gauss_newton import GaussNewton
 from kinertia.estimation.simultaneous.inputs import BSP, PLACES, STILL
@@ -201,8 +202,9 @@ def speeds(problem, coefficients: np.ndarray) -> np.ndarray:
     return problem.bases[0].evaluate(coefficients)[1][problem.trials[0].dynamic]
 
 
-def test_deviations_of_two_trials_are_those_of_one_dense_matrix(estimate, noise):
+def test_deviations_of_two_trials_are_those_of_one_dense_matrix(estimate, noise, monkeypatch):
     """The first counts for two: what its motion leaves open is that of the errors alone."""
+    monkeypatch.setattr(solver, "motion_noise", lambda *_: noise)
     problem, coefficients, static = estimate
     (trial,) = problem.trials
     sd = np.linspace(0.0, 0.02, len(problem.skeleton.markers))
