@@ -43,7 +43,7 @@ def write_variances(
             unknowns, the motion following.
         carried: (6, c, S) the same of the active splines' coefficients.
         shaken: (n c, 6 c) derivatives of the moments by these, for the effect of the markers' errors on the motion.
-        by_errors: (n c, 6 c) `shaken` times
+        by_errors: (n c, 6 c) `shaken` times `covariance`.
         covariance: (6 c, 6 c) of these coefficients given the static unknowns.
         values: (3, n, 6) as in `write_rows`.
         shares: (3,) factors on the standard deviations of coordinates, rates and accelerations due to these errors.
