@@ -37,7 +37,7 @@ def test_all_files_with_compiled_functions_are_among_the_sources():
     users = {
         path.relative_to(PACKAGE).as_posix()
         for path in PACKAGE.rglob("*.py")
-        if re.search(r"^@(compiled|part|inlined)$", path.read_text(encoding="utf-8"), re.MULTILINE)
+        if re.search(r"^@(compiled|compiled_sums|part|inlined)$", path.read_text(encoding="utf-8"), re.MULTILINE)
     }
     assert users | {"model/compiled.py", "model/machine_code_cache.py"} == set(compiled.SOURCES)
 

@@ -17,10 +17,11 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from kinertia.estimation.simultaneous.curve_variances import write_rows, write_variances
+from kinertia.estimation.simultaneous.curve_variances import write_variances
 from kinertia.estimation.simultaneous.elimination import Branch, Eliminated
 from kinertia.estimation.simultaneous.moment_derivatives import MomentDerivatives, MomentsOfTrial
 from kinertia.estimation.simultaneous.motion_spread import EndSpread, MotionSpread
+from kinertia.estimation.simultaneous.normal_equations import write_by_splines
 from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.estimation.simultaneous.skin_blocks import block_growth
 from kinertia.motion.moving_windows import even_mean
@@ -191,7 +192,7 @@ class _Seen:
 
 
 def _write_variances(spread: MotionSpread, seen: _Seen, root: np.ndarray, into: CurveDeviations, rows: slice) -> None:
-    """Write the variances of coordinates, and those of moments and powers without a delay, into rows of `into`.
+    """Write the variances of coordinates, moments and powers into rows of `into`, as if the delay were known.
 
     `root` (n, n) belongs to the static unknowns that root equations depend on.
     """
@@ -204,9 +205,10 @@ def _write_variances(spread: MotionSpread, seen: _Seen, root: np.ndarray, into: 
         own = slice(start, stop)
         covariance, carried = spread.active(int(seen.first[start]))
         values, orders = seen.values[:, own], (by.q[own], by.qd[own], by.qdd[own])
-        plain, shaken = np.empty((2, (stop - start) * c, 6 * c), precision)
-        write_rows(values, orders, plain)
-        write_rows(seen.shares[:, None, None] * values, orders, shaken)
+        by_splines = np.empty((2, stop - start, c, 6, c), precision)
+        write_by_splines(values, *orders, by_splines[0])
+        write_by_splines(seen.shares[:, None, None] * values, *orders, by_splines[1])
+        plain, shaken = by_splines.reshape(2, -1, 6 * c)
         shaken *= seen.grown[own].reshape(-1, 1)
         moment = plain @ carried.reshape(6 * c, -1)
         moment[:, :n] -= still[start * c : stop * c]

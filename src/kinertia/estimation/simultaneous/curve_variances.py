@@ -2,27 +2,7 @@
 
 import numpy as np
 
-from kinertia.model.compiled import compiled, compiled_sums
-
-
-@compiled
-def write_rows(values: np.ndarray, orders: tuple[np.ndarray, np.ndarray, np.ndarray], out: np.ndarray) -> None:
-    """Write derivatives (n c, 6 c) of moments by the coefficients of the active splines.
-
-    Args:
-        values: (3, n, 6) of the splines and of their first two derivatives.
-        orders: (n, c, c) derivatives of the moments by coordinates, rates and accelerations.
-        out: written.
-    """
-    q, qd, qdd = orders
-    n, c, _ = q.shape
-    for k in range(n):
-        for row in range(c):
-            for i in range(6):
-                place, rate, acceleration = values[0, k, i], values[1, k, i], values[2, k, i]
-                for j in range(c):
-                    total = place * q[k, row, j] + rate * qd[k, row, j]
-                    out[k * c + row, i * c + j] = total + acceleration * qdd[k, row, j]
+from kinertia.model.compiled import compiled_sums
 
 
 @compiled_sums
@@ -45,7 +25,7 @@ def write_variances(
         shaken: (n c, 6 c) derivatives of the moments by these, for the effect of the markers' errors on the motion.
         by_errors: (n c, 6 c) `shaken` times `covariance`.
         covariance: (6 c, 6 c) of these coefficients given the static unknowns.
-        values: (3, n, 6) as in `write_rows`.
+        values: (3, n, 6) of the splines and of their first two derivatives.
         shares: (3,) factors on the standard deviations of coordinates, rates and accelerations due to these errors.
         out: (4, n, c), written.
     """

@@ -111,18 +111,16 @@ class EquationsPool:
 
 
 @compiled
-def by_splines(values: np.ndarray, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray) -> np.ndarray:
-    """Convert derivatives by q, qd, qdd (d, r, c) to those by the coefficients of the six active splines (d, r, 6, c).
+def write_by_splines(values: np.ndarray, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, out: np.ndarray) -> None:
+    """Convert derivatives by q, qd, qdd (d, r, c) to those by the coefficients of the six active splines.
 
-    `values` (3, d, 6) are those of the splines and of their first two derivatives.
+    `values` (3, d, 6) are those of the splines and of their first two derivatives; `out` (d, r, 6, c) is written.
     """
     d, r, c = q.shape
-    result = np.empty((d, r, 6, c))
     for k in range(d):
         for row in range(r):
             for i in range(6):
                 place, rate, acceleration = values[0, k, i], values[1, k, i], values[2, k, i]
                 for j in range(c):
                     total = place * q[k, row, j] + rate * qd[k, row, j]
-                    result[k, row, i, j] = total + acceleration * qdd[k, row, j]
-    return result
+                    out[k, row, i, j] = total + acceleration * qdd[k, row, j]

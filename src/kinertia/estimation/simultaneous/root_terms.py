@@ -9,7 +9,7 @@ import numpy as np
 from kinertia.estimation.simultaneous.inputs import STILL
 from kinertia.estimation.simultaneous.layout import Layout
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
-from kinertia.estimation.simultaneous.normal_equations import NO_BORDER, Gradient, NormalEquations, by_splines
+from kinertia.estimation.simultaneous.normal_equations import NO_BORDER, Gradient, NormalEquations, write_by_splines
 from kinertia.estimation.simultaneous.root_gradient import add_root_gradient
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.compiled import compiled
@@ -184,7 +184,8 @@ def add_root(into: NormalEquations, columns: slice, basis: MotionBasis, start: i
         into.rhs[intervals - start + i] -= np.add.reduceat(each, begins, axis=0)
     if into.bordered:
         into.static[columns, columns] += flat.T @ flat
-    rows = by_splines(values, root.q, root.qd, root.qdd)
+    rows = np.empty((len(left), 6, 6, c))
+    write_by_splines(values, root.q, root.qd, root.qdd, rows)
     border = into.border[..., columns] if into.bordered else NO_BORDER
     _add_intervals(
         rows.reshape(-1, 6 * c),
