@@ -32,6 +32,11 @@ class Columns(NamedTuple):
     first: int
     last: int
 
+    @property
+    def of_motion(self) -> "Columns":
+        """The columns of the coordinates that move, and no others."""
+        return self._replace(still=np.full_like(self.still, -1), segments=self.segments[:0], first=0, last=0)
+
 
 @compiled
 def root_columns(

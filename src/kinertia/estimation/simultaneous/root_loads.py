@@ -24,10 +24,12 @@ class RootLoads(CostTerm):
         dynamic = frames.start + np.flatnonzero(self.given.trials[here.k].dynamic[frames])
         for piece in pieces(len(dynamic)):
             root = self._at(here, dynamic[piece])
-            if isinstance(into, NormalEquations):
+            if not isinstance(into, NormalEquations):
+                root.add_gradient(into, self._columns, basis, start)
+            elif into.bordered:
                 add_root(into, self.layout.in_root, basis, start, root.terms(self._columns))
             else:
-                root.add_gradient(into, self._columns, basis, start)
+                add_root(into, slice(0, 0), basis, start, root.of_motion.terms(self._columns.of_motion))
 
     def _at(self, here: InTrial, frames: np.ndarray) -> RootFrames:
         """Return the equations at some frames, with the changes by other terms."""

@@ -1,7 +1,7 @@
 """Evaluates the root equations at some frames of a trial, linearised or as a gradient, in standard deviations."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -96,6 +96,11 @@ class RootFrames:
     static: int
     of_segments: tuple[OfSegment, ...] = ()
 
+    @property
+    def of_motion(self) -> "RootFrames":
+        """The equations with all that does not move known."""
+        return replace(self, by_errors=(), at=(), static=0, of_segments=())
+
     def terms(self, columns: Columns) -> RootTerms:
         """Return residuals and derivatives, each over its standard deviation; `columns` come from `columns_of`."""
         by_static = np.zeros((len(self.frames), 6, self.static))
@@ -173,7 +178,7 @@ def add_root(into: NormalEquations, columns: slice, basis: MotionBasis, start: i
     """
     left, knots = root.left, basis.first[root.frames]
     (_, _, c), wide = root.q.shape, root.static.shape[2]
-    flat = root.static.reshape(-1, wide)
+    flat = root.static.reshape(6 * len(left), wide)
     into.static_rhs[columns] -= flat.T @ left.ravel()
     into.cost += 0.5 * float(np.square(left).sum())
     intervals, begins = np.unique(knots, return_index=True)

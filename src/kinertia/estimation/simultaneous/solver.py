@@ -199,6 +199,9 @@ def _continued(problem: MapProblem, point: Point, adapted: AdaptedPrior) -> Poin
     The Gaussian is updated with the data at these knots. Its precision may be negative where fault-free and faulty are
     both likely; with other data, such a Gaussian would let the error grow without limit.
     """
+    alone = MotionAlone(problem.at(point, _LEAST_DAMPING, bordered=False))
+    slope = alone.here.slope
+    point = point.like(slope.point.vector + alone.step(slope.rhs))
     at = _Place(point, np.inf, adapted)
     for _ in range(_MOST_CONTINUED):
         here = problem.at(at.point, _LEAST_DAMPING)
