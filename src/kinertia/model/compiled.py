@@ -34,6 +34,7 @@ SOURCES = (
     "estimation/simultaneous/plate_loads.py",
     "estimation/simultaneous/axis_columns.py",
     "estimation/simultaneous/curve_variances.py",
+    "estimation/simultaneous/block_tridiagonal.py",
     "estimation/simultaneous/normal_equations.py",
     "estimation/simultaneous/elimination.py",
     "estimation/simultaneous/root_gradient.py",

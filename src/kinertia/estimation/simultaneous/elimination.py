@@ -233,9 +233,11 @@ class Eliminated:
         if border.size:
             solve_lower(band.as_precise(border.dtype).diagonal[0], border)
         middle = Factored(splines, False, band, border[None])
-        information: np.ndarray = np.sum([branch.information for branch in branches], axis=0)
+        information, known = branches[0].information.copy(), branches[0].static_diagonal.copy()
+        for branch in branches[1:]:
+            information += branch.information
+            known += branch.static_diagonal
         middle.take_off(information)
-        known: np.ndarray = np.sum([branch.static_diagonal for branch in branches], axis=0)
         return cls(whole, known, information, branches, middle)
 
     def forward(self, rhs: np.ndarray) -> tuple[list[list[np.ndarray]], np.ndarray]:

@@ -1,6 +1,7 @@
 """Builds the Gauss-Newton quadratic of the cost at one point, and solves it for steps."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -70,9 +71,11 @@ class GaussNewton:
 
     def of_instruments(self, point: Point, step: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return posterior mean (k,) and covariance (k, k) of the instruments, given the step to the optimum."""
-        places = self.problem.layout.errors
-        mean = (point.static + point.like(step).static)[places]
-        return mean, np.linalg.inv(self.static.first)[places, places]
+        return (point.static + point.like(step).static)[self.problem.layout.errors], self._covariance_of_instruments
+
+    @cached_property
+    def _covariance_of_instruments(self) -> np.ndarray:
+        return self.static.covariance_of(self.problem.layout.errors)
 
 
 @dataclass(frozen=True, eq=False)

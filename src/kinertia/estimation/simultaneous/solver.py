@@ -233,13 +233,14 @@ def _descended(
 ) -> _Place:
     """Take quasi-Newton steps with one quadratic, as long as they are worthwhile."""
     pairs, places, began, holds = SecantPairs.none(len(slope.rhs)), slope.instruments, np.inf, False
+    model = model.under(adapted.gaussian)
     for count in range(_MOST_GRADIENTS):
         step, promised = _answer(slope, model, pairs, adapted)
         if adapting and isinstance(model, GaussNewton):
             again = _adapted_again(problem, model, slope.point, step, adapted, max(promised, 0.0))
             if again is not adapted:
                 pairs = pairs.stiffer(places, again.gaussian.precision - adapted.gaussian.precision)
-                adapted = again
+                adapted, model = again, model.under(again.gaussian)
                 step, promised = _answer(slope, model, pairs, adapted)
         began = began if count else promised
         holds = holds or promised < (_ACCURATE * began if count == 1 else _AT_OPTIMUM if count == 0 else 0.0)
@@ -261,9 +262,9 @@ def _descended(
 def _answer(
     slope: Slope, model: GaussNewton | MotionAlone, pairs: SecantPairs, adapted: AdaptedPrior
 ) -> tuple[np.ndarray, float]:
-    """Return the step of all unknowns, and its predicted decrease of the cost."""
+    """Return the step of all unknowns, and its predicted decrease of the cost; both are under the same Gaussian."""
     rhs = slope.under(adapted.gaussian)[1]
-    step = pairs.step(rhs, model.under(adapted.gaussian).step)
+    step = pairs.step(rhs, model.step)
     return step, 0.5 * float(rhs @ step)
 
 
@@ -271,7 +272,7 @@ def _adapted_again(
     problem: MapProblem, model: GaussNewton, point: Point, step: np.ndarray, adapted: AdaptedPrior, far: float
 ) -> AdaptedPrior:
     """Update the instruments' Gaussian, given the step from a point to the optimum."""
-    mean, covariance = model.under(adapted.gaussian).of_instruments(point, step)
+    mean, covariance = model.of_instruments(point, step)
     return adapted.again(problem.layout.error_priors, mean, covariance, far)
 
 
@@ -289,9 +290,10 @@ def _last_step(problem: MapProblem, model: GaussNewton, at: _Place) -> _Place:
     here = _Place(slope.point, slope.under(adapted.gaussian)[0], adapted)
     if not at.converged:
         return here
+    model = model.under(adapted.gaussian)
     step, _ = _answer(slope, model, pairs, adapted)
     adapted = _adapted_again(problem, model, slope.point, step, adapted, 0.0)
-    step, promised = _answer(slope, model, pairs, adapted)
+    step, promised = _answer(slope, model.under(adapted.gaussian), pairs, adapted)
     return (
         _moved(problem, slope, step, promised, adapted) if 0.0 <= promised < _ENDED else here._replace(adapted=adapted)
     )

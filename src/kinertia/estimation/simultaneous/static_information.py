@@ -10,7 +10,7 @@ from functools import cached_property
 from typing import Self
 
 import numpy as np
-from scipy.linalg import cholesky, solve_triangular
+from scipy.linalg import cholesky, lu_factor, lu_solve, solve_triangular
 
 LEAST_INFORMATION = 0.01
 """On every unknown by its prior, so that none has a standard deviation above ten. Where the data favour a second moment
@@ -69,18 +69,22 @@ class StaticInformation:
         values, least, _ = self._directions
         return bool((values < _ROUNDED * least).any())
 
-    def first_of(self, rhs: np.ndarray) -> np.ndarray:
-        """Reduce the right-hand side (S,) of normal equations to the first n unknowns (n,)."""
-        n = len(self.first)
-        result: np.ndarray = rhs[:n] - self.across.T @ solve_triangular(self.factor, rhs[n:], lower=True)
-        return result
+    @cached_property
+    def _factored(self) -> tuple[np.ndarray, np.ndarray]:
+        return lu_factor(self.first)
 
     def solution(self, rhs: np.ndarray) -> np.ndarray:
         """Solve the normal equations for a right-hand side (S,); returns all unknowns (S,)."""
         n = len(self.first)
-        first = np.linalg.solve(self.first, self.first_of(rhs))
-        last = solve_triangular(self.factor, rhs[n:], lower=True) - self.across @ first
-        return np.concatenate([first, solve_triangular(self.factor, last, lower=True, trans="T")])
+        half = solve_triangular(self.factor, rhs[n:], lower=True)
+        first = lu_solve(self._factored, rhs[:n] - self.across.T @ half)
+        last = solve_triangular(self.factor, half - self.across @ first, lower=True, trans="T")
+        return np.concatenate([first, last])
+
+    def covariance_of(self, some: slice) -> np.ndarray:
+        """Return the covariance (m, m) of some of the first n unknowns."""
+        result: np.ndarray = lu_solve(self._factored, np.eye(len(self.first))[:, some])[some]
+        return result
 
     def root_of_covariance(self) -> np.ndarray:
         """Return R (S, S) with covariance R R^T of all unknowns; in no direction is it larger than by priors alone."""
