@@ -59,6 +59,12 @@ class CurveDeviations:
         """The standard deviations of all curves, in the order of the attributes."""
         return tuple(getattr(self, field.name) for field in fields(self))
 
+    def roots(self) -> CurveDeviations:
+        """Convert variances to standard deviations, in place."""
+        for each in self.curves:
+            np.sqrt(np.maximum(each, 0.0, out=each), out=each)
+        return self
+
     @classmethod
     def filled(cls, d: int, c: int, value: float) -> CurveDeviations:
         """Return standard deviations of so many frames and coordinates that all have this value."""
@@ -101,16 +107,11 @@ def curve_deviations(
     )
     middle = EndSpread.of_middle(eliminated.middle, root)
     side_by_side(lambda branch: curves.add(branch, root, middle), eliminated.branches)
-    variance, impact, speed = curves.variance, curves.impact, curves.speed
-    around = 1 + 2 * round(_LOST_KNOTS * len(basis.first) / (basis.size - 5))
-    lost = even_mean(np.square(impact), around)
-    parts = (
-        variance.coordinates,
-        variance.moments + lost,
-        variance.powers + lost * np.square(speed),
-        variance.ground_forces,
-    )
-    return CurveDeviations(*(np.sqrt(np.maximum(part, 0.0)) for part in parts))
+    variance, around = curves.variance, 1 + 2 * round(_LOST_KNOTS * len(basis.first) / (basis.size - 5))
+    lost = even_mean(np.square(curves.impact), around)
+    variance.moments[:] += lost
+    variance.powers[:] += lost * np.square(curves.speed)
+    return variance.roots()
 
 
 @dataclass(frozen=True)

@@ -88,14 +88,16 @@ def curves_apart(problems: Sequence[MapProblem], points: Sequence[Point], k: int
     statics = [problem.in_trial(k, point) for problem, point in zip(problems, points, strict=True)]
     reactions = [problem.loads.reactions(k, static) for problem, static in zip(problems, statics, strict=True)]
     estimates = [(each.coefficients[k], static) for each, static in zip(points, statics, strict=True)]
-    variances = CurveDeviations.filled(len(frames), len(problems[0].moving), 0.0).curves
+    variances = CurveDeviations.filled(len(frames), len(problems[0].moving), 0.0)
     for some in pieces(len(frames)):
         rows = zip(problems, estimates, reactions, strict=True)
         every = [_curves(problem, k, *estimate, loads, frames[some]) for problem, estimate, loads in rows]
-        for variance, *each in zip(variances, *every, strict=True):
+        for variance, *each in zip(variances.curves, *every, strict=True):
             variance[some] = np.var(each, axis=0, ddof=1)
     around = 1 + 2 * round(_KNOTS * len(basis.first) / (basis.size - 5))
-    return CurveDeviations(*(np.sqrt(np.maximum(even_mean(each, around), 0.0)) for each in variances))
+    for variance in variances.curves:
+        variance[:] = even_mean(variance, around)
+    return variances.roots()
 
 
 def _curves(

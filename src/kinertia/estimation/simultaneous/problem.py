@@ -48,6 +48,7 @@ class MapProblem:
         phase: float = 0.0,
         terms: Sequence[type[CostTerm]] = TERMS,
         precise: bool = False,
+        pool: EquationsPool | None = None,
     ) -> None:
         self.precise = precise
         self.skeleton, self.prior, self.calibration, self.trials = skeleton, prior, calibration, trials
@@ -59,12 +60,13 @@ class MapProblem:
         self.loads = GroundLoads(self.given, self.terms)
         self.time_blocks = time_blocks_of_trials(self.bases, len(self.moving), self.layout.size)
         self._adding = [term for term in self.terms if type(term).add is not CostTerm.add]
-        self._room = EquationsPool()
+        self._pool = pool or EquationsPool()
 
     def of(self, trials: Sequence[Observation], phase: float = 0.0) -> "MapProblem":
         """Return the same problem with other observations, and with knots this share of an interval earlier."""
         kinds = [type(term) for term in self.terms]
-        return MapProblem(self.skeleton, self.prior, self.calibration, trials, phase, kinds, self.precise)
+        same = self.skeleton, self.prior, self.calibration
+        return MapProblem(*same, trials, phase, kinds, self.precise, self._pool)
 
     def term(self, kind: type[T]) -> T:
         """Return the term of this kind."""
@@ -175,7 +177,7 @@ class MapProblem:
     ) -> Eliminated:
         """Return trial k with its motion eliminated; not `bordered`: for the motion alone, with all else fixed."""
         of = partial(self.normal, k, coefficients, static, bordered=bordered)
-        return Eliminated.of(self.time_blocks[k], of, self._room.back, damping, self.precise)
+        return Eliminated.of(self.time_blocks[k], of, self._pool.back, damping, self.precise)
 
     def normal(
         self,
@@ -187,7 +189,7 @@ class MapProblem:
     ) -> NormalEquations:
         """Build the normal equations of a time block of trial k, or of the whole trial."""
         time_block = time_block or TimeBlock.whole(self.bases[k])
-        result = self._room.zero(time_block.size, len(self.moving), self.layout.size, bordered)
+        result = self._pool.zero(time_block.size, len(self.moving), self.layout.size, bordered)
         here = self._here(k, coefficients, static, time_block)
         for term in self._adding:
             term.add(result, here)

@@ -122,12 +122,11 @@ def estimate_simultaneous(
     ended = ended._replace(here=profile.here, instruments=profile.instruments, point=point)
     roots = _roots_in_trials(problem, ended, model)
     modes = [of_knots(phases), *of_root(model, point, more)]
-    motions, (covariance, of_curves, draws) = both(
+    motions, (covariance, curves, draws) = both(
         lambda: _through_impacts(problem, point),
-        lambda: _uncertainty(problem, ended, model, roots, modes),
+        lambda: _uncertainty(problem, ended, model, roots, modes, phases),
     )
     covariance += phases.covariance + more @ more.T
-    curves = tuple(each.and_of(phases.curves_apart(k)) for k, each in enumerate(of_curves))
     support = instrument_support(model, ended.point, ended.instruments, curves)
     return result_of(problem, ended, motions, covariance, curves, support, evidence, draws)
 
@@ -337,9 +336,14 @@ def _through_impacts(problem: MapProblem, point: Point) -> tuple[np.ndarray, ...
 
 
 def _uncertainty(
-    problem: MapProblem, ended: Ended, model: GaussNewton, roots: Sequence[np.ndarray], modes: Sequence[Mode]
-) -> tuple[np.ndarray, list[CurveDeviations], PosteriorDraws]:
-    """Return covariance (S, S) of the static unknowns, SDs of the curves of every trial, and draws.
+    problem: MapProblem,
+    ended: Ended,
+    model: GaussNewton,
+    roots: Sequence[np.ndarray],
+    modes: Sequence[Mode],
+    phases: OfPhases,
+) -> tuple[np.ndarray, tuple[CurveDeviations, ...], PosteriorDraws]:
+    """Return covariance (S, S) of the static unknowns with these knots, SDs of the curves of every trial, and draws.
 
     `roots` are those of `_roots_in_trials`, `modes` other uncertain quantities.
     """
@@ -348,8 +352,9 @@ def _uncertainty(
         here = point.coefficients[k], problem.in_trial(k, point)
         # errors that recur count more often only for what does not move
         noises.append(motion_noise(problem, k, *here) / problem.trials[k].repeats)
-        of_curves.append(curve_deviations(problem, k, *here, trial, in_trial, noises[-1]))
-    return root @ root.T, of_curves, posterior_draws(model, point, roots, noises, modes)
+        deviations = curve_deviations(problem, k, *here, trial, in_trial, noises[-1])
+        of_curves.append(deviations.and_of(phases.curves_apart(k)))
+    return root @ root.T, tuple(of_curves), posterior_draws(model, point, roots, noises, modes)
 
 
 def _roots_in_trials(problem: MapProblem, ended: Ended, model: GaussNewton) -> list[np.ndarray]:
