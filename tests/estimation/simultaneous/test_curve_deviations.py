@@ -8,6 +8,7 @@ from kinertia.estimation.simultaneous.curve_deviations import curve_deviations
 from kinertia.estimation.simultaneous.gauss_newton import GaussNewton
 from kinertia.estimation.simultaneous.inputs import BSP, PLACES, STILL
 from kinertia.estimation.simultaneous.instrument_term import CLOCK, PLATES, ZEROS
+from kinertia.estimation.simultaneous.knot_phases import OfPhases
 from kinertia.estimation.simultaneous.linearised import Point
 from kinertia.estimation.simultaneous.mixture_prior import GaussianPrior
 from kinertia.estimation.simultaneous.moment_derivatives import MomentsOfTrial
@@ -219,7 +220,8 @@ def test_deviations_of_two_trials_are_those_of_one_dense_matrix(estimate, noise,
     model = GaussNewton.of(pair, here).under(gaussian)
     ended = Ended(here.point, here, gaussian, True, 1, (0.0, 0.0))
     none = Mode(np.zeros(pair.layout.size), tuple(np.zeros_like(one) for one in here.point.coefficients))
-    static_covariance, sds, _ = _uncertainty(pair, ended, model, _roots_in_trials(pair, ended, model), [none])
+    alike = OfPhases(static, np.zeros((len(static),) * 2), (pair, pair), (here.point, here.point))
+    static_covariance, sds, _ = _uncertainty(pair, ended, model, _roots_in_trials(pair, ended, model), [none], alike)
     s = pair.layout.size
     scale = np.sqrt(np.diag(static_covariance))
     np.testing.assert_allclose(

@@ -71,7 +71,8 @@ class StaticInformation:
 
     @cached_property
     def _factored(self) -> tuple[np.ndarray, np.ndarray]:
-        return lu_factor(self.first)
+        factors: tuple[np.ndarray, np.ndarray] = lu_factor(self.first)
+        return factors
 
     def solution(self, rhs: np.ndarray) -> np.ndarray:
         """Solve the normal equations for a right-hand side (S,); returns all unknowns (S,)."""
