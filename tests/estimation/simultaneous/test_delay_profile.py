@@ -6,7 +6,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from kinertia.estimation.simultaneous import delay_profile
 from kinertia.estimation.simultaneous.delay_profile import CostProfile
 from kinertia.estimation.simultaneous.mixture_prior import ErrorPriors, FaultMixture, GaussianPrior
 
@@ -43,20 +42,16 @@ def information(n: int, times: float) -> np.ndarray:
     return times * np.outer(late, late) / SD_S**2 + np.outer(body, body) / BODY_SD**2
 
 
-def model_of(here: Quadratic, n: int):
-    def under(gaussian: GaussianPrior):
-        whole = here.information.copy()
-        whole[:n, :n] += gaussian.precision
-        root = np.linalg.cholesky(np.linalg.inv(whole))
-        return SimpleNamespace(static=SimpleNamespace(root_of_covariance=lambda: root))
-
-    return SimpleNamespace(under=under)
+def model_of(problem, here: Quadratic, gaussian: GaussianPrior):
+    whole, n = here.information.copy(), len(gaussian.pull)
+    whole[:n, :n] += gaussian.precision
+    root = np.linalg.cholesky(np.linalg.inv(whole))
+    return SimpleNamespace(problem=problem, here=here, static=SimpleNamespace(root_of_covariance=lambda: root))
 
 
-def found(monkeypatch, priors) -> tuple[CostProfile, np.ndarray]:
+def found(priors) -> tuple[CostProfile, np.ndarray]:
     """And the posterior covariance of everything."""
     one, n = problem(priors), len(priors)
-    monkeypatch.setattr(delay_profile, "GaussNewton", SimpleNamespace(of=lambda problem, here: model_of(here, n)))
     gaussian, here = GaussianPrior.of(one.layout.error_priors), Quadratic(information(n, 2.0))
 
     def search(model, slope, held: GaussianPrior) -> tuple[np.ndarray, float]:
@@ -66,8 +61,9 @@ def found(monkeypatch, priors) -> tuple[CostProfile, np.ndarray]:
         static = np.linalg.solve(whole, rhs)
         return static, cost(static, n) + held.cost(static[:n])
 
-    profile = CostProfile.of(one, here, gaussian, Place(search(None, None, gaussian)[0]), search)
-    root = model_of(profile.here, n).under(profile.instruments).static.root_of_covariance()
+    place = Place(search(None, None, gaussian)[0])
+    profile = CostProfile.of(model_of(one, here, gaussian), gaussian, place, search)
+    root = model_of(one, profile.here, profile.instruments).static.root_of_covariance()
     return profile, root @ root.T
 
 
@@ -84,21 +80,21 @@ def integrated(parts) -> tuple[float, float]:
     return mean, np.average(np.square(delay - mean), weights=weight)
 
 
-def test_mean_and_deviation_are_those_of_profile_and_prior_together(monkeypatch):
-    profile, covariance = found(monkeypatch, [CLOCK])
+def test_mean_and_deviation_are_those_of_profile_and_prior_together():
+    profile, covariance = found([CLOCK])
     mean, variance = integrated(parts_of(CLOCK))
     assert profile.static[0] == pytest.approx(mean, rel=1e-4)
     assert covariance[0, 0] == pytest.approx(variance, rel=1e-3)
 
 
-def test_the_others_follow(monkeypatch):
-    profile, covariance = found(monkeypatch, [CLOCK])
+def test_the_others_follow():
+    profile, covariance = found([CLOCK])
     assert profile.static[1] == pytest.approx(FOLLOWS * profile.static[0], rel=1e-4)
     assert covariance[1, 1] == pytest.approx(BODY_SD**2 + FOLLOWS**2 * covariance[0, 0], rel=1e-3)
 
 
-def test_what_one_trial_shows_may_be_the_clock_s_or_its_own(monkeypatch):
-    profile, covariance = found(monkeypatch, [CLOCK, OWN])
+def test_what_one_trial_shows_may_be_the_clock_s_or_its_own():
+    profile, covariance = found([CLOCK, OWN])
     both = [(a * b, np.hypot(c, d)) for a, c in parts_of(CLOCK) for b, d in parts_of(OWN)]
     mean, variance = integrated(both)
     assert profile.static[:2].sum() == pytest.approx(mean, rel=1e-4)
@@ -111,6 +107,7 @@ def test_where_nothing_is_to_be_profiled_all_is_left_as_it_is():
     known = SimpleNamespace(**{**vars(one), "profiled": list})
     gaussian, here = GaussianPrior.of(one.layout.error_priors), Quadratic(information(1, 2.0))
     place = Place(np.zeros(2))
-    profile = CostProfile.of(known, here, gaussian, place, lambda model, slope, held: pytest.fail("searched"))
+    model = model_of(known, here, gaussian)
+    profile = CostProfile.of(model, gaussian, place, lambda model, slope, held: pytest.fail("searched"))
     assert profile.here is here
     assert profile.static is place.static

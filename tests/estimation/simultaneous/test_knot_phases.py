@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from kinertia.estimation.simultaneous.gauss_newton import GaussNewton
 from kinertia.estimation.simultaneous.inputs import BSP
 from kinertia.estimation.simultaneous.knot_phases import PHASES, OfPhases, followed
 from kinertia.estimation.simultaneous.linearised import Point
@@ -52,9 +53,9 @@ def test_curves_of_the_same_motion_and_body_are_not_apart(problem, here):
 
 
 def test_the_motion_follows_what_does_not_move_to_where_its_quadratic_is_lowest(problem, here):
-    linearised = problem.at(here)
+    model = GaussNewton.of(problem, problem.at(here))
     step = np.random.default_rng(100).normal(0.0, 1e-3, len(here.static))
-    moved = followed(problem, linearised, here, here.static + step)
+    moved = followed(model, here, here.static + step)
     normal = problem.normal(0, here.coefficients[0], here.static)
     motion = (moved.coefficients[0] - here.coefficients[0]).ravel()
     pulled = normal.border.reshape(len(motion), -1) @ step

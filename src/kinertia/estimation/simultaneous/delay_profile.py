@@ -16,7 +16,6 @@ import numpy as np
 from kinertia.estimation.simultaneous.gauss_newton import GaussNewton
 from kinertia.estimation.simultaneous.linearised import Linearised, Point, Slope
 from kinertia.estimation.simultaneous.mixture_prior import ErrorPriors, GaussianPrior
-from kinertia.estimation.simultaneous.problem import MapProblem
 
 _HELD = 1e6
 """Information that fixes the delay where the profile is evaluated, relative to what is known of it."""
@@ -39,8 +38,7 @@ class CostProfile:
     @classmethod
     def of(
         cls,
-        problem: MapProblem,
-        here: Linearised,
+        model: GaussNewton,
         instruments: GaussianPrior,
         point: Point,
         search: Callable[[GaussNewton, Slope, GaussianPrior], tuple[np.ndarray, float]],
@@ -48,20 +46,19 @@ class CostProfile:
         """Compute the profile from the point where a search has ended.
 
         Args:
-            problem: of the estimate.
-            here: the last quadratic.
-            instruments: the Gaussian that replaces the instruments' priors.
+            model: the last quadratic, under the Gaussian that replaces the instruments' priors.
+            instruments: that Gaussian.
             point: end of the search.
             search: returns the static unknowns and the cost at the optimum with another Gaussian, from this quadratic
                 and the gradient at the point.
         """
+        problem, here = model.problem, model.here
         late, first = np.array(problem.profiled(), dtype=int), problem.layout.errors.start
         priors = [problem.layout.error_priors.own[k] for k in late - first]
         unchanged = cls(here, instruments, point.static)
         if not len(late):
             return unchanged
-        model = GaussNewton.of(problem, here)
-        root = model.under(instruments).static.root_of_covariance()
+        root = model.static.root_of_covariance()
         across, own, values = root @ root[late].T, late - first, point.static[late]
         known = np.linalg.inv(across[late])
         sd = float(np.sqrt(across[late].sum()))

@@ -14,7 +14,7 @@ import numpy as np
 
 from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
 from kinertia.estimation.simultaneous.gauss_newton import GaussNewton
-from kinertia.estimation.simultaneous.linearised import Linearised, Point
+from kinertia.estimation.simultaneous.linearised import Point
 from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.motion.dynamics import Motion, inverse_dynamics
 from kinertia.motion.frame_chunks import pieces
@@ -65,10 +65,12 @@ class OfPhases:
         return curves_apart(self.problems, self.points, k)
 
 
-def followed(problem: MapProblem, here: Linearised, point: Point, static: np.ndarray) -> Point:
+def followed(model: GaussNewton, point: Point, static: np.ndarray) -> Point:
     """Return the optimum with the static unknowns fixed at other values, by the quadratic at a point."""
-    model, motions, displaced = GaussNewton.of(problem, here), [], []
-    rows = zip(here.trials, model.displaced, problem.displaced_sd, point.coefficients, point.displaced, strict=True)
+    problem, motions, displaced = model.problem, [], []
+    rows = zip(
+        model.here.trials, model.displaced, problem.displaced_sd, point.coefficients, point.displaced, strict=True
+    )
     for trial, own, sd, part, place in rows:
         step = static - point.static
         moved = -own.gain @ step

@@ -128,7 +128,7 @@ def of_root(model: GaussNewton, point: Point, root: np.ndarray) -> list[Mode]:
     result = []
     for column in root.T:
         static = column * np.sign(column[np.argmax(np.abs(column))])  # the root's sign is arbitrary
-        there = followed(model.problem, model.here, point, point.static + static)
+        there = followed(model, point, point.static + static)
         rows = zip(there.coefficients, point.coefficients, strict=True)
         result.append(Mode(static, tuple(after - before for after, before in rows)))
     return result

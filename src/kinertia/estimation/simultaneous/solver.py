@@ -112,13 +112,13 @@ def estimate_simultaneous(
     known = AdaptedPrior.elsewhere(ended.instruments)
     phases, profile = both(
         lambda: OfPhases.of(problem, ended.point, partial(_continued, adapted=known)),
-        lambda: CostProfile.of(problem, ended.here, ended.instruments, ended.point, partial(_held, problem)),
+        lambda: CostProfile.of(model, ended.instruments, ended.point, partial(_held, problem)),
     )
     model = GaussNewton.of(problem, profile.here).under(profile.instruments)
     moved, more = _left_out(problem, model, ended.point.static)
     static = ended.point.static
     corrected = static + problem.shortened_static(phases.static + profile.static - 2.0 * static + moved)
-    point = followed(problem, profile.here, ended.point, corrected)
+    point = followed(model, ended.point, corrected)
     ended = ended._replace(here=profile.here, instruments=profile.instruments, point=point)
     roots = _roots_in_trials(problem, ended, model)
     modes = [of_knots(phases), *of_root(model, point, more)]
