@@ -68,8 +68,9 @@ class OfPhases:
 def followed(model: GaussNewton, point: Point, static: np.ndarray) -> Point:
     """Return the optimum with the static unknowns fixed at other values, by the quadratic at a point."""
     problem, motions, displaced = model.problem, [], []
-    rows = zip(
-        model.here.trials, model.displaced, problem.displaced_sd, point.coefficients, point.displaced, strict=True
+    trials = zip(model.here.trials, model.displaced, problem.displaced_sd, strict=True)
+    rows = zip(trials, point.coefficients, point.displaced, strict=True)
+    for (trial, own, sd), part, place in rows:
     )
     for trial, own, sd, part, place in rows:
         step = static - point.static
