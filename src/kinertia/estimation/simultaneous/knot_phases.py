@@ -71,8 +71,6 @@ def followed(model: GaussNewton, point: Point, static: np.ndarray) -> Point:
     trials = zip(model.here.trials, model.displaced, problem.displaced_sd, strict=True)
     rows = zip(trials, point.coefficients, point.displaced, strict=True)
     for (trial, own, sd), part, place in rows:
-    )
-    for trial, own, sd, part, place in rows:
         step = static - point.static
         moved = -own.gain @ step
         step[problem.layout.displaced] += sd * moved
