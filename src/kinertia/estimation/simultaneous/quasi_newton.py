@@ -13,54 +13,44 @@ from dataclasses import dataclass
 
 import numpy as np
 
-_MOST_PAIRS = 12
+_MOST_PAIRS = 16
 _LEAST_CURVATURE = 0.02
 """Share of the expected curvature along a step; pairs with less are discarded."""
 
 
 @dataclass(frozen=True, eq=False)
 class SecantPairs:
-    """Pairs of steps taken and of the decrease of the gradient along each.
+    """Pairs of steps taken (n,) and of the decrease of the gradient along each (n,).
 
-    Attributes:
-        steps: (k, n).
-        changes: (k, n).
-
-    >>> pairs = SecantPairs.none(2).with_pair(np.array([1.0, 0.0]), np.array([2.0, 0.0]), expected=1.0)
+    >>> pairs = SecantPairs().with_pair(np.array([1.0, 0.0]), np.array([2.0, 0.0]), expected=1.0)
     >>> pairs.step(np.array([4.0, 3.0]), lambda rhs: rhs)
     array([2., 3.])
     """
 
-    steps: np.ndarray
-    changes: np.ndarray
-
-    @classmethod
-    def none(cls, n: int) -> SecantPairs:
-        """Return no pairs, for n unknowns, as before the first step."""
-        return cls(np.zeros((0, n)), np.zeros((0, n)))
+    steps: tuple[np.ndarray, ...] = ()
+    changes: tuple[np.ndarray, ...] = ()
 
     def with_pair(self, step: np.ndarray, change: np.ndarray, expected: float) -> SecantPairs:
         """Append a pair, in place of the oldest of many, if the step shows a fair share of the expected curvature."""
         if not step @ change > _LEAST_CURVATURE * expected:
             return self
-        return SecantPairs(
-            np.vstack([self.steps, step])[-_MOST_PAIRS:], np.vstack([self.changes, change])[-_MOST_PAIRS:]
-        )
+        return SecantPairs((*self.steps, step)[-_MOST_PAIRS:], (*self.changes, change)[-_MOST_PAIRS:])
 
     def stiffer(self, places: slice, more: np.ndarray) -> SecantPairs:
         """Return the pairs after the cost has gained this information (m, m) on some of the unknowns."""
-        changes = self.changes.copy()
-        changes[:, places] += self.steps[:, places] @ more
+        changes = tuple(change.copy() for change in self.changes)
+        for step, change in zip(self.steps, changes, strict=True):
+            change[places] += step[places] @ more
         return SecantPairs(self.steps, changes)
 
     def step(self, rhs: np.ndarray, known: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
         """Compute the step (n,) for a right-hand side, given `known`, which computes it without these pairs."""
-        left, shares = rhs.copy(), np.zeros(len(self.steps))
-        inverse = 1.0 / np.einsum("kn,kn->k", self.steps, self.changes)
-        for k in range(len(shares) - 1, -1, -1):
-            shares[k] = inverse[k] * (self.steps[k] @ left)
-            left -= shares[k] * self.changes[k]
+        pairs = [(step, change, 1.0 / (step @ change)) for step, change in zip(self.steps, self.changes, strict=True)]
+        left, shares = rhs.copy(), []
+        for step, change, inverse in reversed(pairs):
+            shares.append(inverse * (step @ left))
+            left -= shares[-1] * change
         result = known(left)
-        for k in range(len(shares)):
-            result = result + (shares[k] - inverse[k] * (self.changes[k] @ result)) * self.steps[k]
+        for (step, change, inverse), share in zip(pairs, reversed(shares), strict=True):
+            result += (share - inverse * (change @ result)) * step
         return result

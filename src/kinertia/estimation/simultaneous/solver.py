@@ -59,7 +59,9 @@ hardly be another."""
 _NEAR = 8.0
 """Predicted decrease below which only gradients are recomputed; above it a new quadratic is worth its time."""
 _MOST_GRADIENTS = 10
-"""Largest number of gradients with one quadratic."""
+"""Largest number of gradients with one quadratic ..."""
+_MOST_GRADIENTS_ALONE = 16
+"""... and for the motion alone."""
 _FIRST_DAMPING = 1e-5
 """Share of the diagonal. Directions in which motion and parameters compensate for one another have hardly more
 information: 1e-3 would limit the first steps."""
@@ -229,11 +231,12 @@ def _descended(
     adapted: AdaptedPrior,
     adapting: bool,
     tolerance: float,
+    most: int = _MOST_GRADIENTS,
 ) -> _Place:
     """Take quasi-Newton steps with one quadratic, as long as they are worthwhile."""
-    pairs, places, began, holds = SecantPairs.none(len(slope.rhs)), slope.instruments, np.inf, False
+    pairs, places, began, holds = SecantPairs(), slope.instruments, np.inf, False
     model = model.under(adapted.gaussian)
-    for count in range(_MOST_GRADIENTS):
+    for count in range(most):
         step, promised = _answer(slope, model, pairs, adapted)
         if adapting and isinstance(model, GaussNewton):
             again = _adapted_again(problem, model, slope.point, step, adapted, max(promised, 0.0))
@@ -285,7 +288,7 @@ def _moved(
 
 def _last_step(problem: MapProblem, model: GaussNewton, at: _Place) -> _Place:
     """Take a step with the last quadratic, if the search has converged and the step is short."""
-    slope, adapted, pairs = model.here.slope, at.adapted, SecantPairs.none(len(model.here.slope.rhs))
+    slope, adapted, pairs = model.here.slope, at.adapted, SecantPairs()
     here = _Place(slope.point, slope.under(adapted.gaussian)[0], adapted)
     if not at.converged:
         return here
@@ -329,7 +332,8 @@ def _through_impacts(problem: MapProblem, point: Point) -> tuple[np.ndarray, ...
     at = _Place(replace(point, static=rigid), np.inf, AdaptedPrior.at_first(following.layout.error_priors))
     for _ in range(_MOST_THROUGH_IMPACTS):
         alone = MotionAlone(following.at(at.point, _LEAST_DAMPING, bordered=False))
-        at = _descended(following, alone, alone.here.slope, at.adapted, False, _MOTION_CONVERGED)
+        slope, most = alone.here.slope, _MOST_GRADIENTS_ALONE
+        at = _descended(following, alone, slope, at.adapted, False, _MOTION_CONVERGED, most)
         if at.converged:
             break
     return at.point.coefficients
