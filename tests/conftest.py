@@ -22,6 +22,7 @@ from kinertia.estimation.result import Fit
 from kinertia.io import samples
 from kinertia.io.provenance import sha256
 from kinertia.io.recording import read_recording
+from kinertia.motion import two_threads
 from kinertia.report import matplotlib_extra
 from kinertia.settings import Settings, Subject
 from kinertia.trial.data import Recording
@@ -43,6 +44,10 @@ settings.load_profile("kinertia")
 # one BLAS thread, as long computations have it: here and, by the environment, in processes that tests start
 os.environ["OPENBLAS_NUM_THREADS"] = "1"
 threadpool_limits(1, user_api="blas")
+
+if "PYTEST_XDIST_WORKER" in os.environ:
+    # the other workers use the other cores; processes that tests start have their second thread, and give the same bits
+    two_threads._cores = lambda: 1
 
 NEEDS_MEASURED = "need measured recordings"
 LOOKED_FOR = (
