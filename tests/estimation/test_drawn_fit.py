@@ -121,6 +121,7 @@ def test_places_rates_and_accelerations_are_narrowed_by_their_own_shares(shares)
 
 
 @pytest.mark.slow
+@pytest.mark.first
 def test_opensim_finds_the_reported_deviations_on_all_draws(opensim, fit, tmp_path):
     from osim_tools import inverse_dynamics_tool
 

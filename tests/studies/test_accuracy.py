@@ -91,6 +91,7 @@ def test_people_are_the_same_in_every_scenario():
 @pytest.mark.slow
 @pytest.mark.first
 @pytest.mark.parametrize("key", ["session", *(key for key in PROOF if key not in ELSEWHERE)])
+@in_one_process()
 def test_bars_hold(key):
     """Of fewer people where each walks, squats and sways. Of more where their trunks differ by luck.
 

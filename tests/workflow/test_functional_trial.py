@@ -197,6 +197,7 @@ def test_the_example_of_the_docs(lab, tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.first
 def test_axes_and_their_deviations_hold_over_people():
     misses, pulls = [], []
     for seed in range(101, 107):
