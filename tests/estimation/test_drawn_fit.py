@@ -157,22 +157,11 @@ def test_many_draws_spread_as_reported_within_ten_percent(demo_run, tmp_path, mo
 
 
 @pytest.mark.slow
-def test_legs_spread_as_reported_where_the_delay_outlasts_a_landing(walk_b):
+def test_legs_spread_as_reported_where_the_delay_outlasts_a_landing(fit_of):
     """Their deviations were up to 2.3 times the draws' while they were linear in the delay."""
+    walk_b = load_fit(fit_of("pig_b").folder)
     (trial,) = walk_b.trials
     moments = [drawn_fit(walk_b, n).trials[0].joint_loads["estimate"] for n in range(kept_draws(walk_b).count)]
     ratio = spread_over_reported(np.array(moments), trial)[:12]
     np.testing.assert_allclose(ratio, 1.0, atol=SYSTEMATIC + sampling(len(moments)))
     assert np.median(ratio) == pytest.approx(1.0, abs=SYSTEMATIC)
-
-
-@pytest.fixture(scope="module")
-def walk_b(tmp_path_factory):
-    from command_line import fitted
-    from validation.measured_data import find
-
-    files = [find(f"pig_c3d/subject_b_{name}.c3d") for name in ("walk", "static")]
-    if None in files:
-        pytest.skip("needs the measured walks")
-    options = ["--static", files[1], "--sex", "female"]
-    return load_fit(fitted(tmp_path_factory.mktemp("b") / "out", files[0], *options).folder)
