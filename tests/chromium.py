@@ -20,6 +20,8 @@ FLAGS = [
 ]
 DESKTOP, PHONE = {"width": 1400, "height": 900}, {"width": 390, "height": 844}
 PATIENCE_MS = 120_000
+VIOLATIONS = {"resultTypes": ["violations"]}
+"""Option of axe: what is right is told with one element per rule. To tell of all takes most of the time."""
 playwright.expect.set_options(timeout=PATIENCE_MS)
 
 
@@ -35,7 +37,8 @@ class Opened:
         self.page.on("request", lambda request: self.requests.append(request.url))
         self.page.goto(path.as_uri())
         self.page.evaluate("document.querySelectorAll('details').forEach((part) => (part.open = true))")
-        playwright.expect(self.page.locator(".plot:not([data-drawn])")).to_have_count(0)
+        # looks at every frame; `expect` looks once a second
+        self.page.wait_for_function("() => !document.querySelector('.plot:not([data-drawn])')", timeout=PATIENCE_MS)
 
     def picture(self, locator):
         return picture(locator)

@@ -8,6 +8,8 @@ from html.parser import HTMLParser
 
 import numpy as np
 
+from kinertia.report.plotly_script import packed_script
+
 TRACE_TYPES = ("bar", "scatter", "scatter3d")
 """Types of traces that figures have; the last one in notebooks only."""
 
@@ -46,3 +48,13 @@ def numbers(array):
     if isinstance(array, dict):
         return np.frombuffer(base64.b64decode(array["bdata"]), array["dtype"].replace("f", "<f").replace("i", "<i"))
     return np.asarray(array, dtype=float)
+
+
+def without_plotly(path, folder):
+    """A copy of a report that draws no curves: that takes most of the time, and other tests look at them."""
+    page = path.read_text(encoding="utf-8")
+    whole = packed_script()
+    assert whole in page
+    copy, nothing = folder / path.name, gzip.compress(b"const Plotly = {newPlot() {}, relayout() {}};")
+    copy.write_text(page.replace(whole, base64.b64encode(nothing).decode()), encoding="utf-8")
+    return copy

@@ -1,8 +1,6 @@
 """Every kind of page in a browser: accessible by axe's rules, silent, within its window, alone, and on paper."""
 
-import base64
 import functools
-import gzip
 import io
 from dataclasses import replace
 
@@ -11,7 +9,7 @@ import pytest
 from matplotlib.image import imread
 
 import study_results
-from chromium import DESKTOP, Opened, colour, playwright
+from chromium import DESKTOP, VIOLATIONS, Opened, colour, playwright
 from found import FAULTY, UNUSABLE
 from kinertia.cohort.page import PAGE, write_cohort_page
 from kinertia.report.check_page import save_check_page
@@ -19,7 +17,6 @@ from kinertia.report.comparison import render_comparison
 from kinertia.report.crossval_page import render_crossval
 from kinertia.report.page import render
 from kinertia.report.plan_page import render_plan
-from kinertia.report.plotly_script import packed_script
 from kinertia.report.sensitivity import render_sensitivity
 from kinertia.report.table1 import render_table1
 from kinertia.report.table1_variants import render_variants
@@ -27,6 +24,7 @@ from kinertia.settings import Subject
 from kinertia.workflow.check import check_person
 from kinertia.workflow.files import files_by_name, read_files
 from kinertia.workflow.person import Person
+from report_page import without_plotly
 from study_results import HELD_OUT, PLAN
 
 axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="needs axe (pip install -e '.[test]')")
@@ -85,16 +83,6 @@ def pages(demo_run, fit, two_level, c3d_lab, tmp_path_factory):
     return functools.cache(lambda name: made[name]())
 
 
-def without_plotly(path, folder):
-    """A copy of a report that draws no curves: that takes most of the time, and other tests look at them."""
-    page = path.read_text(encoding="utf-8")
-    whole = packed_script()
-    assert whole in page
-    copy, nothing = folder / path.name, gzip.compress(b"const Plotly = {newPlot() {}, relayout() {}};")
-    copy.write_text(page.replace(whole, base64.b64encode(nothing).decode()), encoding="utf-8")
-    return copy
-
-
 def three_times(fit):
     """The fit as if its trial were three."""
     kinematics = fit.trials[0].kinematics
@@ -127,7 +115,7 @@ def few_rows(page):
 
 def violations(page):
     """What axe finds, in one line each."""
-    found = axe.Axe().run(page, AROUND_FIGURES).response
+    found = axe.Axe().run(page, AROUND_FIGURES, VIOLATIONS).response
     assert len(found["passes"]) > 15
     return [f"{one['id']}: {[node['target'] for node in one['nodes'][:3]]}" for one in found["violations"]]
 
@@ -193,7 +181,7 @@ def test_axe_would_find_what_is_wrong(browser, tmp_path):
         encoding="utf-8",
     )
     opened = Opened(browser, tmp_path / "bad.html")
-    found = {one["id"] for one in axe.Axe().run(opened.page).response["violations"]}
+    found = {one["id"] for one in axe.Axe().run(opened.page, None, VIOLATIONS).response["violations"]}
     assert {"html-has-lang", "image-alt", "button-name", "color-contrast"} <= found
     opened.page.close()
 

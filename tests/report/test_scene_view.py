@@ -6,8 +6,17 @@ import numpy as np
 import pytest
 
 from chromium import Opened, colour, playwright
+from report_page import without_plotly
 
 pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def demo(browser, demo_run, tmp_path_factory):
+    """The report in a tab that the tests of this file share."""
+    opened = Opened(browser, without_plotly(demo_run[1] / "report.html", tmp_path_factory.mktemp("view")))
+    yield opened
+    opened.page.close()
 
 
 @pytest.fixture
@@ -34,9 +43,9 @@ BORDER = """canvas => {
 
 
 @pytest.mark.parametrize(("width", "height"), [(900, 360), (260, 700)])
-def test_the_whole_body_is_in_view_from_every_side_that_has_a_key(browser, fit_of, width, height):
+def test_the_whole_body_is_in_view_from_every_side_that_has_a_key(browser, fit_of, tmp_path, width, height):
     """Of somebody without markers on the head, whose ellipsoid is above them all."""
-    page = Opened(browser, fit_of("rajagopal").folder / "report.html").page
+    page = Opened(browser, without_plotly(fit_of("rajagopal").folder / "report.html", tmp_path)).page
     page.add_style_tag(content=f".view canvas {{ width: {width}px !important; height: {height}px !important; }}")
     view = page.locator("#motion-view")
     view.locator("[data-show=arrows]").uncheck()
