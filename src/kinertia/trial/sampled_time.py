@@ -28,11 +28,9 @@ def span_s(time: npt.NDArray[np.float64], first: int = 0, last: int = -1) -> flo
 
 def runs(mask: npt.NDArray[np.bool_]) -> list[tuple[int, int]]:
     """Return first and last index of every contiguous run of True, in order."""
-    edges = np.diff(np.concatenate(([0], mask.astype(np.int8), [0])))
-    return [
-        (int(start), int(end) - 1)
-        for start, end in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True)
-    ]
+    padded = np.concatenate(([False], mask, [False]))
+    edges = np.flatnonzero(padded[1:] != padded[:-1])
+    return list(zip(edges[::2].tolist(), (edges[1::2] - 1).tolist(), strict=True))
 
 
 def windows(time: npt.NDArray[np.float64], mask: npt.NDArray[np.bool_]) -> list[tuple[float, float]]:
