@@ -75,11 +75,11 @@ def to_splines(
                     for column in range(c):
                         block[row, column] += products[pair, row * c + column]
             pair += 1
-    for j in range(c):
+    for j in range(c if bordered else 0):
         for run in range(reach.shape[1]):
             begin, stop = reach[j, run, 0], reach[j, run, 1]
             if begin < stop:
-                for i in range(6 if bordered else 0):
+                for i in range(6):
                     _weigh(own[0, :, i], end - start, interval.across[:, j, begin:stop], border[at + i, j, begin:stop])
                 _pass_on(end - start, interval.across[:, j, begin:stop])
 
