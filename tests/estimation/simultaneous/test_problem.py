@@ -129,6 +129,16 @@ def test_a_gradient_alone_is_that_of_the_normal_equations(any_problem):
         np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-9 * np.abs(theirs).max())
 
 
+def test_equations_of_the_motion_alone_are_those_of_everything_without_their_border(any_problem):
+    (coefficients,), static = point(any_problem)
+    whole = any_problem.normal(0, coefficients, static)
+    alone = any_problem.normal(0, coefficients, static, bordered=False)
+    assert not alone.border.size
+    assert alone.cost == pytest.approx(whole.cost, rel=1e-12)
+    np.testing.assert_allclose(alone.rhs, whole.rhs, rtol=1e-9, atol=1e-9 * np.abs(whole.rhs).max())
+    np.testing.assert_allclose(alone.band, whole.band, rtol=1e-9, atol=1e-12 * np.abs(whole.band).max())
+
+
 def test_a_slope_is_the_derivative_of_the_cost_by_everything(problem):
     """Displacements of two trials and the instruments' Gaussian among it."""
     trial = problem.trials[0]

@@ -197,13 +197,13 @@ class _Place(NamedTuple):
 def _continued(problem: MapProblem, point: Point, adapted: AdaptedPrior) -> Point:
     """Return the optimum, starting from a point near it and from the instruments' Gaussian there.
 
-    The Gaussian is updated with the data at these knots. Its precision may be negative where fault-free and faulty are
-    both likely; with other data, such a Gaussian would let the error grow without limit.
+    The first step is the motion's alone: splines with other knots have other accelerations, and what does not move
+    would be adjusted to these. The Gaussian is updated with the data at these knots. Its precision may be negative
+    where fault-free and faulty are both likely; with other data, such a Gaussian would let the error grow without
+    limit.
     """
     alone = MotionAlone(problem.at(point, _LEAST_DAMPING, bordered=False))
-    slope = alone.here.slope
-    point = point.like(slope.point.vector + alone.step(slope.rhs))
-    at = _Place(point, np.inf, adapted)
+    at = _descended(problem, alone, alone.here.slope, adapted, False, _CONTINUED, 1)
     for _ in range(_MOST_CONTINUED):
         here = problem.at(at.point, _LEAST_DAMPING)
         model = GaussNewton.of(problem, here, problem.bends(here.point.like(here.slope.rhs).static))
