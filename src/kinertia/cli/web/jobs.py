@@ -91,8 +91,8 @@ class Jobs:
         job.cancel()
         with self._changed:
             if job.stage == "" and job in self._lines[kind]:  # whoever waits just leaves
-                self._lines[kind].remove(job)
                 person.note(**{kind: {"how": "cancelled"}})
+                self._lines[kind].remove(job)
             self._changed.wait_for(lambda: job not in self._lines[kind], _PATIENCE_S)
 
     @contextmanager
@@ -138,7 +138,8 @@ class Jobs:
             except OSError as error:
                 ended = {"how": "failed", "message": f"{error.filename or kind}: {error.strerror or error}"}
             with self._changed:
-                line.remove(job)
+                # noted first: a page shows how it ended as soon as it is no longer in the queue
                 if job.person.folder.is_dir():
                     job.person.note(**{kind: ended})
+                line.remove(job)
                 self._changed.notify_all()
