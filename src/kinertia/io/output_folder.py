@@ -12,7 +12,7 @@ from pathlib import Path
 
 from kinertia.errors import FileError
 from kinertia.io.folder_exchange import put_in_place
-from kinertia.io.working_folder import BEFORE, is_unfinished, sweep, working_folder
+from kinertia.io.working_folder import BEFORE, sweep, working_folder
 
 GENERATOR = '<meta name="generator" content="kinertia'
 """Tag in the head of every HTML page that is a result of its own."""
@@ -304,14 +304,9 @@ def _uninterrupted() -> Iterator[None]:
 def write_then_rename(path: Path, text: str) -> None:
     """Write text so that `path` appears complete or not at all; remains of a killed process are removed by the next.
 
-    In a hidden folder of unfinished results, which appears as a whole, it is written at once.
-
     Raises:
         FileError: nothing can be written beside it.
     """
-    if is_unfinished(path):
-        path.write_text(text, encoding="utf-8", newline="\n")
-        return
     with working_folder(path.parent) as work:
         temporary = work / path.name
         temporary.write_text(text, encoding="utf-8", newline="\n")

@@ -38,11 +38,6 @@ def working_folder(within: Path) -> Iterator[Path]:
         _remove(folder, lock)
 
 
-def is_unfinished(path: Path) -> bool:
-    """Return whether a file is in a working folder, at whatever depth."""
-    return any(folder.name.startswith(_PREFIX) and (folder / _LOCK).exists() for folder in path.parents)
-
-
 def sweep(within: Path) -> None:
     """Remove what killed processes left, and restore what one of them had moved away."""
     for folder in within.glob(f"{_PREFIX}*"):

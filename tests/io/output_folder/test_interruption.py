@@ -6,8 +6,7 @@ import textwrap
 
 import pytest
 
-from kinertia.io import output_folder
-from kinertia.io.output_folder import check_folder, complete_folder, write_then_rename
+from kinertia.io.output_folder import check_folder, complete_folder
 from result_files import texts_of, write
 
 
@@ -145,12 +144,3 @@ def test_killed_at_random_moments_the_folder_is_one_generation(tmp_path, kills):
     done = _process(GENERATIONS, tmp_path / "out", kills)
     assert done.returncode == 0, done.stderr
     assert int(done.stdout) > kills / 4, "most kills must fall after a folder was replaced"
-
-
-def test_a_file_among_unfinished_results_needs_no_folder_of_its_own(tmp_path, monkeypatch):
-    with complete_folder(tmp_path / "out", "fit") as work:
-        (work / "walk").mkdir()
-        with monkeypatch.context() as at_once:
-            at_once.setattr(output_folder, "working_folder", None)
-            write_then_rename(work / "walk" / "table.sto", "table")
-    assert (tmp_path / "out" / "walk" / "table.sto").read_text() == "table"
