@@ -4,7 +4,6 @@ Everything is written to a hidden folder first and moved when complete, so a run
 """
 
 import csv
-import io
 import json
 import math
 from collections.abc import Mapping, Sequence
@@ -95,29 +94,25 @@ def write_columns(path: Path, columns: Mapping[str, Sequence[Any] | np.ndarray],
         columns: columns by name.
         digits: format of numbers that are not integers.
     """
-    cells = [_cells(values, digits) for values in columns.values()]
-    rows = [map(_cell, columns), *zip(*cells, strict=True)]
-    path.write_text("".join([",".join(row) + "\n" for row in rows]), encoding="utf-8", newline="")
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(columns)
+        writer.writerows(zip(*(_cells(values, digits) for values in columns.values()), strict=True))
 
 
-def _cells(values: Sequence[Any] | np.ndarray, digits: str) -> list[str]:
+def _cells(values: Sequence[Any] | np.ndarray, digits: str) -> list[Any]:
     """Return the cells of a column as written to the file."""
     cells = values.tolist() if isinstance(values, np.ndarray) else list(values)
     kinds = set(map(type, cells))
     if all(issubclass(kind, float) for kind in kinds):
         texts = (" ".join([digits] * len(cells)) % tuple(cells)).split()
-        return ["" if text == "nan" else text for text in texts] if "nan" in texts else texts
-    if kinds == {int} or all(issubclass(kind, str) for kind in kinds):  # of which long tables have few
-        words = {cell: _cell(cell) for cell in set(cells)}
+        return [None if text == "nan" else text for text in texts] if "nan" in texts else texts
+    if all(issubclass(kind, str) for kind in kinds):  # names, of which long tables have few
+        words = {cell: inert(cell) for cell in set(cells)}
         return [words[cell] for cell in cells]
-    return ["" if cell != cell else _cell(cell) for cell in cells]
-
-
-def _cell(content: object) -> str:
-    """Return one cell as written to the file: quoted where necessary."""
-    line = io.StringIO()
-    csv.writer(line, lineterminator="\n").writerow([inert(content), ""])
-    return line.getvalue().removesuffix(",\n")
+    if kinds == {int}:
+        return cells
+    return [None if cell != cell else inert(cell) for cell in cells]
 
 
 def write_model(fit: Fit, folder: Path) -> None:
