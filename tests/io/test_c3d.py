@@ -274,3 +274,14 @@ def test_a_file_cut_anywhere(file_of, tmp_path, file):
         (tmp_path / "x.c3d").write_bytes(whole[:size])
         with refused("F104", None):
             read_c3d(tmp_path / "x.c3d")
+
+
+def test_modelled_markers_are_read_and_other_outputs_are_not(tmp_path):
+    labels = ["LASI", "LKNE", "LKneeAngles"]
+    groups = {"TYPE_GROUPS": ["ANGLES", "ANGLE", "MODELED_MARKERS", "MODELED_MARKER"], "ANGLES": ["LKneeAngles"],
+              "MODELED_MARKERS": ["LKNE"]}  # fmt: skip
+    path = write_c3d(tmp_path / "static.c3d", np.full((20, 3, 3), 500.0), labels, parameters={"POINT": groups})
+    recording = read_c3d(path)
+    assert recording.markers.labels == ("LASI", "LKNE")
+    assert only(recording.findings, "F166", points="LKNE")
+    assert only(recording.findings, "F163", count=1.0)

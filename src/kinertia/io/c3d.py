@@ -42,6 +42,7 @@ from kinertia.trial.data import FloatArray, Markers, Recording
 from kinertia.trial.file_outputs import FileOutputs
 
 _OUTPUT_LISTS = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS")
+_MODELLED = "MODELED_MARKERS"
 _OUTPUT_NAME = re.compile(r"(Angles?|Forces?|Moments?|Powers?|GRF)$")
 _PERSON_M = (0.3, 2.8)
 """How far a person's markers reach in one frame."""
@@ -51,9 +52,9 @@ def read_c3d(path: str | Path, length_unit: str | None = None, standing: bool = 
     """Read markers, force plates and measurements of the subject from a C3D file, turned to ground axes.
 
     Markers: model outputs (angles, forces, moments, powers) and unnamed points (`*...`) are left out, virtual
-    points (joint centres, segment origins) are kept unless Kinertia wrote them; `subject:` prefixes are stripped; of
-    repeated labels the one in most frames is kept. Time counts from the first frame of the capture, so a cropped file
-    does not begin at zero.
+    points (joint centres, segment origins, modelled markers: F166) are kept unless Kinertia wrote them; `subject:`
+    prefixes are stripped; of repeated labels the one in most frames is kept. Time counts from the first frame of the
+    capture, so a cropped file does not begin at zero.
 
     Plates: types 1 to 4 (ezc3d reads no others); moment about the ground origin; samples with less than
     `LOAD_THRESHOLD_N` of vertical force are zero. Plates that cannot be read are left out (F151), so
@@ -233,6 +234,12 @@ def _markers(path: Path, file: Any) -> tuple[tuple[str, ...], FloatArray, list[F
         findings.append(left_out(path, len(outputs), f"model outputs ({first_few(sorted(outputs))})"))
     if unnamed:
         findings.append(left_out(path, len(unnamed), "unnamed points"))
+    modelled = [name for name in text_list(file["parameters"], "POINT", _MODELLED) if name in chosen]
+    if modelled:
+        points = Quantity(first_few(modelled))
+        findings.append(
+            finding("F166", Where(path.name), points=points, source=Quantity("modelled markers of the file"))
+        )
     findings += repeated
     of_markers = {what: where[:, list(chosen.values())] for what, where in missing.items()}
     findings += read_as_missing(path, tuple(chosen), of_markers)
@@ -248,7 +255,7 @@ def _file_outputs(file: Any, time: FloatArray) -> FileOutputs | None:
 
 def _outputs(parameters: Any, labels: list[str]) -> set[str]:
     groups = parameter_values(parameters, "POINT", "TYPE_GROUPS", [])
-    lists = {*_OUTPUT_LISTS, *(str(name).strip() for name in list(groups)[::2])}
+    lists = {*_OUTPUT_LISTS, *(str(name).strip() for name in list(groups)[::2])} - {_MODELLED}
     listed = {label for name in lists for label in text_list(parameters, "POINT", name)}
     return {label for label in labels if label in listed or _OUTPUT_NAME.search(label)}
 

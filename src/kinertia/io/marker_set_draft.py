@@ -12,6 +12,7 @@ from kinertia.errors import MarkerSetError
 from kinertia.io.marker_places.placement import Placement, place_markers
 from kinertia.io.marker_set_file import marker_set_of, nearest_preset, preset_names, read_marker_set
 from kinertia.io.toml_lines import quoted
+from kinertia.model.alignment_device import with_alignment_device
 from kinertia.model.gait27 import build_gait27
 from kinertia.model.marker_set import LANDMARKS, SEGMENTS, WIDTHS, MarkerSet, folded, label_share
 from kinertia.trial.data import Recording
@@ -46,7 +47,8 @@ def preset_of(static: Recording) -> MarkerSet | None:
     preset = nearest_preset(labels)
     widths = dict.fromkeys(preset.widths.values(), _ANY_WIDTH_M) | static.measurements
     try:
-        build_gait27(replace(static, measurements=widths), marker_set_of(static.markers), _USUAL_HEIGHT_M, "male")
+        found = with_alignment_device(marker_set_of(static.markers), labels)
+        build_gait27(replace(static, measurements=widths), found, _USUAL_HEIGHT_M, "male")
     except MarkerSetError:
         return None
     return preset

@@ -13,6 +13,7 @@ from kinertia.io.ground_forces import read_forces
 from kinertia.io.lab_axes import upright_along_z
 from kinertia.io.number_table import expect_file, wrong_kind
 from kinertia.io.trc import read_trc_recording
+from kinertia.model.alignment_device import with_knees_of_device
 from kinertia.trial.data import FloatArray, PlateLoads, Recording
 from kinertia.trial.impossible_data import impossible_load, impossible_position
 
@@ -57,6 +58,7 @@ def read_recording(
     _expect_kind(markers_path, MARKER_FILES, "markers")
     tsv = forces_path is not None and Path(forces_path).suffix.lower() == ".tsv"
     recording = _read_markers(markers_path, Path(str(forces_path)) if tsv else None, length_unit, standing)
+    recording = with_knees_of_device(recording, markers_path.name)
     turn = upright_along_z(recording.markers.positions) if markers_path.suffix.lower() == ".trc" else None
     if turn is not None:
         recording = _turned(recording, markers_path, turn)

@@ -26,6 +26,7 @@ from kinertia.diagnostics.timing import questions as timing
 from kinertia.errors import BlockedError, KinertiaError, MarkerSetError, SubjectError
 from kinertia.estimation.total_mass import TotalMass
 from kinertia.findings.finding import Finding
+from kinertia.model.alignment_device import with_alignment_device
 from kinertia.settings import Subject
 from kinertia.trial.data import Recording
 from kinertia.workflow.joint_widths import with_widths
@@ -187,6 +188,7 @@ def person_context(person: Person) -> PersonContext:
         own_set = label_set
         if own_set is not None and person.model is None:
             recording, own_set = with_widths(recording, person.recordings, own_set, person.subject)
+            own_set = with_alignment_device(own_set, recording.markers.labels)
         return RecordingContext(recording, own_set, is_static=True, height_m=stated.height_m, mass_kg=stated.mass_kg)
 
     static = None if person.static is None else standing(person.static)

@@ -14,6 +14,7 @@ from kinertia.io.marker_places.segment_members import segment_members, wands
 from kinertia.io.marker_places.standing_body import StandingBody
 from kinertia.io.marker_places.upper_search import find_upper_body
 from kinertia.io.marker_places.usual_places import WHERE
+from kinertia.model.alignment_device import device_labels
 from kinertia.trial.data import FloatArray, Markers, Recording
 from kinertia.trial.stillness import STILL_M_S, speed_m_s
 
@@ -64,6 +65,7 @@ def place_markers(recording: Recording) -> Placement:
         for label, share in zip(markers.labels, markers.seen.mean(axis=0), strict=True)
         if share <= _OFTEN
     }
+    left_out |= dict.fromkeys(device_labels(markers.labels), "of a knee alignment device")
     markers = markers.select([label for label in markers.labels if label not in left_out])
     left_out |= unusable_points(markers)
     markers = markers.select([label for label in markers.labels if label not in left_out])
