@@ -70,13 +70,7 @@ def explained(findings: Iterable[Finding], left_out: Collection[str] = ()) -> li
     for one in findings:
         unique.setdefault((one.code, one.where), one)
     result = list(unique.values())
-    causes: dict[int, list[int]] = {}
-    for k, cause in enumerate(result):
-        consequences = {code for each in cause.rule.supersedes for code in matching(each)}
-        for j, other in enumerate(result):
-            is_here = cause.where.trial not in left_out or cause.where.trial == other.where.trial
-            if j != k and other.code in consequences and is_here and cause.where.overlaps(other.where):
-                causes.setdefault(j, []).append(k)
+    causes = _causes(result, left_out)
     severities = [one.severity for one in result]
     for j in causes:
         last, first = j, causes[j][0]
@@ -85,22 +79,55 @@ def explained(findings: Iterable[Finding], left_out: Collection[str] = ()) -> li
         for k in causes[last]:
             if result[k].code == result[first].code:
                 severities[k] = max(severities[k], result[j].severity)
-    explained_ = [
-        replace(one, severity=severities[k], muted_by=result[causes[k][0]].code if k in causes else None)
-        for k, one in enumerate(result)
+    result = [one.at(severity) for one, severity in zip(result, severities, strict=True)]
+    resolved = _resolve(result, causes)
+    return [
+        replace(
+            one,
+            severity=Severity.CORRECTED if j in resolved else one.severity,
+            muted_by=result[causes[j][0]].code if j in causes else None,
+        )
+        for j, one in enumerate(result)
     ]
-    return [_resolved(one, explained_) for one in explained_]
 
 
-def _resolved(one: Finding, findings: Sequence[Finding]) -> Finding:
-    """Return the correction of a warning whose quantity the estimate has corrected, else the finding unchanged."""
-    if one.severity is not Severity.WARNING or one.muted_by is not None:
-        return one
-    for correction in findings:
-        resolves = {code for each in correction.rule.resolves for code in matching(each)}
-        if one.code in resolves and correction.severity is Severity.CORRECTED and correction.where.overlaps(one.where):
-            return replace(one, severity=Severity.CORRECTED, muted_by=correction.code)
-    return one
+def _causes(findings: Sequence[Finding], left_out: Collection[str]) -> dict[int, list[int]]:
+    """Return which findings explain each, by their places in the list; without circles, as `supersedes` has none."""
+    causes: dict[int, list[int]] = {}
+    for k, cause in enumerate(findings):
+        consequences = {code for each in cause.rule.supersedes for code in matching(each)}
+        for j, other in enumerate(findings):
+            is_here = cause.where.trial not in left_out or cause.where.trial == other.where.trial
+            if j != k and other.code in consequences and is_here and cause.where.overlaps(other.where):
+                causes.setdefault(j, []).append(k)
+    return causes
+
+
+def _resolve(findings: Sequence[Finding], causes: dict[int, list[int]]) -> set[int]:
+    """Make corrections of the estimate the causes of unexplained warnings about the same quantity; return these.
+
+    A correction that such a warning explains, directly or through others, is explained no more: no circle is possible.
+    """
+    resolved = set()
+    for j, one in enumerate(findings):
+        if one.severity is not Severity.WARNING or j in causes:
+            continue
+        for k, correction in enumerate(findings):
+            codes = {code for each in correction.rule.resolves for code in matching(each)}
+            is_correction = correction.severity is Severity.CORRECTED and correction.where.overlaps(one.where)
+            if one.code in codes and is_correction:
+                if _first_cause(k, causes) == j:
+                    del causes[k]
+                causes[j] = [k]
+                resolved.add(j)
+                break
+    return resolved
+
+
+def _first_cause(k: int, causes: Mapping[int, Sequence[int]]) -> int:
+    while k in causes:
+        k = causes[k][0]
+    return k
 
 
 def overruled(

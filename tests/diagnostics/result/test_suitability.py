@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from kinertia.diagnostics.result.suitability import informed, suitability
+from kinertia.diagnostics.runner import explained
 from kinertia.findings.finding import Severity, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
@@ -107,6 +108,15 @@ def test_of_a_person_unlike_the_prior_nothing_is_used_without_care(clear):
     assert uses(clear, finding("R204")) == care
     far = finding("R203", Where(part="com_y of shank_l"), parameter=Quantity("com_y"))
     assert uses(clear, far, finding("R204").muted("R203")) == care
+
+
+def test_findings_that_correct_and_explain_one_another_end_somewhere(clear):
+    """A zero of one plate, an unknown force of all, and corrected zeros of each plate: it recursed without end."""
+    zero, force = finding("P212", Where(trial="walk", plate="left")), finding("P214", Where(trial="walk"))
+    zeros = [finding("P215", Where(trial="walk", plate=plate)) for plate in ("right", "left")]
+    assert uses(clear, *explained([*zeros, zero, force])) == only()
+    circle = [zero.muted("P215"), force.muted("P212"), *(one.muted("P214") for one in zeros)]
+    assert uses(clear, *circle)["joint moments"] in ("use", "use with care")
 
 
 def test_nothing_is_used_that_did_not_converge(fit):

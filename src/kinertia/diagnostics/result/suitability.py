@@ -137,11 +137,24 @@ def _affects(one: Finding, output: str) -> bool:
 
 
 def _cause(one: Finding, findings: Sequence[Finding]) -> Finding:
-    """Return the finding that explains this one, directly or through others; itself if none does."""
-    for cause in findings:
-        if cause.code == one.muted_by and cause.where.overlaps(one.where):
-            return _cause(cause, findings)
-    return one
+    """Return the finding that explains this one, directly or through others; itself if none does.
+
+    A finding knows its cause by code alone: of several at its place, an unexplained one is the cause, and none twice.
+    """
+    followed = [one]
+    while followed[-1].muted_by is not None:
+        last = followed[-1]
+        causes = [
+            each
+            for each in findings
+            if each.code == last.muted_by
+            and each.where.overlaps(last.where)
+            and not any(each is other for other in followed)
+        ]
+        if not causes:
+            break
+        followed.append(min(causes, key=lambda each: each.muted_by is not None))
+    return followed[-1]
 
 
 def _level(one: Finding, cause: Finding) -> int:
