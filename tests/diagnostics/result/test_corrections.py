@@ -135,3 +135,17 @@ def test_delays_of_all_forces_and_of_one_trial():
     alone = replace(own, trial="walk", value=-0.03)  # its total: there are no other trials that it could differ from
     (found_alone,) = delays(context(late, alone, trials={"walk": walking()}))
     assert (found_alone.code, found_alone.evidence["delay_s"].value) == ("T214", -0.03)
+
+
+@pytest.mark.parametrize(
+    ("value_s", "sd_s", "moved", "reported"),
+    [
+        (0.0068, 0.0012, 2.7, True),  # within the prior, but joint moments would leave their bars
+        (0.0068, 0.0012, 0.9, False),
+        (0.0068, 0.0035, 2.7, False),
+        (-0.0030, 0.0010, 1.1, True),
+    ],
+)
+def test_a_delay_that_moves_joint_moments_beyond_their_bars_is_reported(value_s, sd_s, moved, reported):
+    late = error("delay", value_s, 0.0044, sd_s, "s", plate=None, moved=moved)
+    assert codes(delays(context(late, trials={"walk": walking(), "run": walking()}))) == ["T214"] * reported

@@ -53,13 +53,18 @@ def equal(errors: Sequence[CalibrationEntry], usual_sd: float = np.inf) -> bool:
 
 
 def delays(context: ResultContext) -> Iterator[Finding]:
-    """Report the common delay of all forces, and the additional delays of several trials; of one trial its total."""
+    """Report the common delay of all forces, and the additional delays of several trials; of one trial its total.
+
+    A delay within its prior is reported, too, if joint moments would leave their error bars without its correction.
+    """
     common = [one for one in context.errors if one.quantity == DELAY and one.trial is None]
     own = [one for one in context.errors if one.quantity == DELAY and one.trial is not None]
     if own and len(context.fit.trials) == 1:
         common, own = own, []
-    yield from corrected(context, "T214", "delay_s", common)
-    yield from corrected(context, "T215", "delay_s", own)
+    for code, errors in (("T214", common), ("T215", own)):
+        yield from (
+            correction(code, "delay_s", context.at(one), one) for one in errors if one.found or one.moves_moments
+        )
 
 
 def zero_offsets(context: ResultContext) -> Iterator[Finding]:

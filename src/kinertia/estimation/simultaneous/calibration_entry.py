@@ -89,9 +89,14 @@ class CalibrationEntry:
         return self.notable and abs(self.value) > _NOTABLE * self.sd
 
     @property
+    def moves_moments(self) -> bool:
+        """Whether the error exceeds two posterior standard deviations and affects joint moments beyond their bars."""
+        return abs(self.value) > _NOTABLE * self.sd and self.moved is not None and self.moved > 1.0
+
+    @property
     def supported(self) -> bool:
         """Whether the error also affects joint moments and is contradicted by no other estimate."""
-        return self.found and self.moved is not None and self.moved > 1.0 and not self.contradicted_by
+        return self.notable and self.moves_moments and not self.contradicted_by
 
     def __str__(self) -> str:
         of = item_text(self.kind, self.plate, self.joint)

