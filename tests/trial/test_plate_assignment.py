@@ -110,6 +110,15 @@ def test_a_foot_on_a_box_is_not_measured():
     expect_window(trial, 0.0, 1.0 - CONTACT_MARGIN_S)
 
 
+def test_a_foot_that_rolls_on_a_box_is_not_measured():
+    """Its toes stay where they are: somebody about to step down from a landing without a plate lifts the heel."""
+    recording = standing(0.3, share=0.6)
+    rolling = recording.markers.positions.copy()
+    rolling[:, 2, 1] += 0.04 * np.cos(7 * recording.markers.time)
+    trial = build_trial(replace(recording, markers=replace(recording.markers, positions=rolling)), FEET)
+    expect_window(trial, 0.0, 1.0 - CONTACT_MARGIN_S)
+
+
 def test_a_marker_that_is_hidden_on_the_box_hides_no_other_frame():
     recording = without(standing(0.3, share=0.6), "L.Toe", 1.0, 3.0)
     trial = build_trial(replace(recording, markers=recording.markers.cut(0.0, 1.95)), FEET)

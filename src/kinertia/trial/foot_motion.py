@@ -21,7 +21,8 @@ _STEP_M = 0.03
 """Contacts whose heights differ by more are on steps, boxes or a ramp; smaller differences come from how a foot lands
 and rolls."""
 _STILL_M_S, _STILL_SPAN_S, _STILL_S = 0.05, 0.1, 0.2
-"""A foot stands still if all its markers are slower than this, measured over the second, for at least the third."""
+"""A foot stands still while one of its markers is slower than this, measured over the second, for at least the third: a
+heel that is lifted leaves the toes where they are."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +30,8 @@ class FootMotion:
     """Height (n, m) m and velocity (n, m, 3) m/s of the markers of a foot; NaN where they are not seen.
 
     Attributes:
-        still: (n,) True where no marker moves, against the ground or, as beside a treadmill's belt, in the laboratory.
+        still: (n,) True where a marker stays in its place, against the ground or, as beside a treadmill's belt, in the
+            laboratory.
     """
 
     height: FloatArray
@@ -133,12 +135,11 @@ def _over(steps: Sequence[float], height: FloatArray) -> FloatArray:
 
 
 def _still(time: FloatArray, velocity: FloatArray) -> BoolArray:
-    """Return the mask (n,) of intervals in which no marker moves."""
-    speed = np.linalg.norm(velocity, axis=2)
-    slow = np.isfinite(speed).any(axis=1) & (np.where(np.isnan(speed), 0.0, speed) <= _STILL_M_S).all(axis=1)
+    """Return the mask (n,) of intervals in which one marker does not move."""
     still = np.zeros(len(time), dtype=bool)
-    for first, last in runs(slow):
-        still[first : last + 1] = span_s(time, first, last) >= _STILL_S
+    for slow in (np.linalg.norm(velocity, axis=2) <= _STILL_M_S).T:
+        for first, last in runs(slow):
+            still[first : last + 1] |= span_s(time, first, last) >= _STILL_S
     return still
 
 
