@@ -118,7 +118,9 @@ def test_a_side_without_an_inner_marker_gets_a_width_and_a_wand(tmp_path):
     assert draft.landmarks["thigh_wand_r"] == ("R.Thigh.Rear",)
 
 
-def test_computed_points_are_in_no_segment_and_listed(tmp_path):
+@pytest.mark.parametrize("hidden", [0, 2])
+def test_computed_points_are_in_no_segment_and_listed(tmp_path, hidden):
+    """Also where the marker from which bones were computed is hidden in some frames."""
     rng = np.random.default_rng(3)
     positions = standing_positions()
     static = recording(positions, frames=30)
@@ -129,6 +131,8 @@ def test_computed_points_are_in_no_segment_and_listed(tmp_path):
     at |= {f"RFE{end}": knee + offset + [0.0, 0.002, 0.0] for end, offset in axes.items()}
     at |= {"Knie": knee, "RHJC": at["R.ASIS"] - 0.05, "R.HeelGround": at["R.Heel"] * [1.0, 0.0, 1.0]}
     at |= {"RStation": np.zeros((30, 3)), "Copy": at["R.Heel"].copy()}
+    for label in ("RFEO", "RFEA", "RFEL", "RFEP", "R.ASIS"):
+        at[label][:hidden] = np.nan
     markers = type(static.markers)(static.markers.time, tuple(at), np.stack(list(at.values()), axis=1))
     draft, text = drafted(tmp_path, type(static)("static", markers))
     placed = {label for labels in draft.segments.values() for label in labels}

@@ -6,13 +6,14 @@ import tomllib
 from itertools import product
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from generic_static import recording, standing_positions
 from kinertia.errors import FileError
 from kinertia.io.marker_set_file import read_marker_set
 from kinertia.io.measures_file import measures_sheet
-from kinertia.io.subject_draft import init_files, init_subject
+from kinertia.io.subject_draft import NOT_USED, init_files, init_subject
 from kinertia.io.subject_file import read_subject
 from kinertia.io.trc import write_trc
 from kinertia.settings import Settings
@@ -384,8 +385,19 @@ def test_init_drafts_a_marker_set_from_a_walk_where_nobody_stands(tmp_path):
     assert {"heel_r", "heel_l", "asis_r"} <= set(read_marker_set(tmp_path / "markers.toml").landmarks)
 
 
+def test_init_does_not_use_a_marker_set_that_cannot_be_right(tmp_path):
+    names = {"R.Knee.Med": "R.Innen", "L.Knee.Med": "L.Innen"}
+    positions = {names.get(label, label): at for label, at in standing_positions().items()}
+    positions["R.Innen"] = positions["R.Knee.Lat"] + np.array([0.07, 0.0, -0.06])
+    standing_trc(tmp_path / "static.trc", positions)
+    files = init_files(tmp_path)
+    (line,) = [line for line in files["subject.toml"].splitlines() if NOT_USED in line]
+    assert line.startswith('# markers = "markers.toml"')
+    assert "NOTE: this cannot be right" in files["markers.toml"]
+
+
 def test_init_drafts_no_marker_set_where_a_preset_fits(tmp_path):
     standing_trc(tmp_path / "static.trc", standing_positions())
     files = init_files(tmp_path)
     assert set(files) == {"subject.toml"}
-    assert '# markers = "plug-in-gait"' in files["subject.toml"]
+    assert '# markers = "cleveland-clinic"' in files["subject.toml"]

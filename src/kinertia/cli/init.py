@@ -13,7 +13,7 @@ from kinertia.io.file_names import missing_file
 from kinertia.io.measures_file import measures_sheet
 from kinertia.io.output_folder import write_then_rename
 from kinertia.io.provenance import command_line
-from kinertia.io.subject_draft import FILL_IN, MARKER_SET, NO_FORCES, SUBJECT, init_files
+from kinertia.io.subject_draft import FILL_IN, MARKER_SET, NO_FORCES, NOT_USED, SUBJECT, init_files
 from kinertia.report.measures_picture import measures_picture
 
 
@@ -52,9 +52,9 @@ def init(
     for note in notes:
         out.print(note, soft_wrap=True)
     if MARKER_SET in files:
-        out.print(
-            f"no marker-set preset fits: wrote {own}, drafted from the marker positions; check it", soft_wrap=True
-        )
+        against = next((line.partition(NOT_USED)[2] for line in lines if NOT_USED in line), "")
+        check = f"it is not used: {against} and remove the # before markers" if against else "check it"
+        out.print(f"no marker-set preset fits: wrote {own}, drafted from the marker positions; {check}", soft_wrap=True)
     check = command_line(["kinertia", "check", str(path)])
     out.print(f"wrote {path}: fill in what it asks for, then run: {check}", soft_wrap=True)
     asked = [line.removeprefix("# ").partition(" =")[0] for line in lines if FILL_IN in line]

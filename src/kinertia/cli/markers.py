@@ -9,7 +9,7 @@ from kinertia.cli.outcome import Outcome
 from kinertia.cli.terminal import out, plain_table
 from kinertia.errors import FileError
 from kinertia.io.marker_set_draft import draft_marker_set, preset_of
-from kinertia.io.marker_set_file import nearest_preset, preset_names, read_marker_set
+from kinertia.io.marker_set_file import nearest_preset, preset_name, preset_names, read_marker_set
 from kinertia.io.output_folder import write_then_rename
 from kinertia.io.recording import read_recording
 from kinertia.model.marker_set import fits_person, label_share, spelled_as
@@ -53,8 +53,7 @@ def markers(
         presets.append({"name": name, "labels": len(wanted), "absent": absent})
     out.print(table)
     best = nearest_preset(labels)
-    named = {read_marker_set(name).name: name for name in preset_names()}
-    recognised = named[best.name] if fits_person(best, labels) else None
+    recognised = preset_name(best) if fits_person(best, labels) else None
     if recognised:
         out.print(f"{recognised} is recognised by itself", soft_wrap=True)
         if speed_m_s(recording.markers) < STILL_M_S and preset_of(recording) is None:

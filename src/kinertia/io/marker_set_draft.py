@@ -14,6 +14,8 @@ from kinertia.io.marker_set_file import marker_set_of, nearest_preset, preset_na
 from kinertia.io.toml_lines import quoted
 from kinertia.model.alignment_device import with_alignment_device
 from kinertia.model.gait27 import build_gait27
+from kinertia.model.joint_centres import find_landmarks
+from kinertia.model.leg_axes import departures
 from kinertia.model.marker_set import LANDMARKS, SEGMENTS, WIDTHS, MarkerSet, folded, label_share
 from kinertia.trial.data import Recording
 
@@ -34,11 +36,14 @@ class MarkerSetDraft:
         text: TOML; what is unknown, and why, is in comments.
         needed: landmarks that were not found, and without which no leg can be modelled.
         notes: remarks to read before using it.
+        against: why it cannot be right: axes of its legs that no person has (`leg_axes`). Such a draft is not used
+            unless the user asks for it.
     """
 
     text: str
     needed: tuple[str, ...]
     notes: tuple[str, ...]
+    against: tuple[str, ...]
 
 
 def preset_of(static: Recording) -> MarkerSet | None:
@@ -59,20 +64,34 @@ def draft_marker_set(recording: Recording, name: str) -> MarkerSetDraft:
     placed = places_of(recording)
     labels = [label for label in recording.markers.labels if label not in placed.left_out]
     landmarks, segments = placed.landmarks, placed.segments
+    widths = _widths(landmarks, recording)
+    against = _against(recording, landmarks, widths)
+    notes = [*placed.notes, *(f"this cannot be right: {one}" for one in against)]
     heading = [
         "# Drafted by kinertia markers: check every line, complete those marked FILL IN, and name the file with",
         "# --markers or under [model] markers.",
-        *(f"# NOTE: {note}." for note in placed.notes),
+        *(f"# NOTE: {note}." for note in notes),
     ]
-    text = marker_set_text(
-        name, landmarks, segments, _widths(landmarks, recording), labels, "\n".join(heading), placed.how
-    )
+    text = marker_set_text(name, landmarks, segments, widths, labels, "\n".join(heading), placed.how)
     out = [f"#   {label}: {reason}" for label, reason in placed.left_out.items()]
     text += "\n".join(["", "# Not markers on the skin:", *out, ""] if out else [])
     needed = [f"{one}_{side}" for one in _LEG for side in "rl"]
     if "sacrum" not in landmarks:
         needed += ["psis_r", "psis_l"]
-    return MarkerSetDraft(text, tuple(one for one in needed if one not in landmarks), tuple(placed.notes))
+    return MarkerSetDraft(text, tuple(one for one in needed if one not in landmarks), tuple(notes), against)
+
+
+def _against(
+    recording: Recording, landmarks: Mapping[str, Sequence[str]], widths: Mapping[str, str]
+) -> tuple[str, ...]:
+    """List what no person has in legs with these landmarks, with any joint widths; nothing where some are missing."""
+    found = MarkerSet("draft", {name: tuple(own) for name, own in landmarks.items()}, {}, dict(widths))
+    known = dict.fromkeys(widths.values(), _ANY_WIDTH_M) | recording.measurements
+    try:
+        marks = find_landmarks(replace(recording, measurements=known), found)
+        return tuple(one.sentence for one in departures(marks))
+    except MarkerSetError:
+        return ()
 
 
 def _widths(landmarks: Mapping[str, Sequence[str]], recording: Recording) -> dict[str, str]:

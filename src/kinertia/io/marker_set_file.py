@@ -55,6 +55,11 @@ def _preset(name: str) -> MarkerSet:
     return _marker_set(parse_toml(text, path), path)
 
 
+def preset_name(marker_set: MarkerSet) -> str:
+    """Return the name by which a preset is called in a subject file; empty for another set."""
+    return next((name for name in preset_names() if read_marker_set(name).name == marker_set.name), "")
+
+
 def choose_marker_set(labels: Sequence[str]) -> MarkerSet:
     """Choose the preset that fits the labels of a static trial, or of a trial of pelvis and legs only.
 

@@ -11,13 +11,14 @@ from typing import Any
 from kinertia.errors import FileError, KinertiaError, MarkerSetError
 from kinertia.findings.quantity import Quantity
 from kinertia.io.file_names import RESULT_FILES, missing_file
-from kinertia.io.marker_set_draft import draft_marker_set, preset_of
-from kinertia.io.marker_set_file import marker_set_of
+from kinertia.io.marker_set_draft import MarkerSetDraft, draft_marker_set, preset_of
+from kinertia.io.marker_set_file import marker_set_of, preset_name
 from kinertia.io.measures_file import is_measures_sheet
 from kinertia.io.qualisys import plates_beside
 from kinertia.io.recording import CORTEX, MARKER_FILES, read_recording
 from kinertia.io.subject_tables import Model, PriorFiles, TrialFiles
 from kinertia.io.subject_text import entry_line
+from kinertia.model.marker_set import MarkerSet
 from kinertia.settings import Settings, Subject, Table
 from kinertia.trial.data import Recording
 from kinertia.trial.stillness import STILL_M_S, speed_m_s
@@ -31,6 +32,8 @@ _FORCES = re.compile(r"<force_identifier>\s*(\S+?)\s*</force_identifier>")
 _LISTED = 6
 SUBJECT, MARKER_SET = "subject.toml", "markers.toml"
 _NO_STATIC = "; none was found: without one, joint centres come from a walk, less exactly"
+NOT_USED = "NOT USED: "
+"""Before the reason why a drafted marker set is not used."""
 NO_FORCES = "# No forces were found for"
 """Beginning of the line about a trial without forces."""
 
@@ -71,10 +74,12 @@ def init_files(folder: str | Path, nearby: bool = True, marker_set: bool = True)
         text += [f"# Left out (another subject's, another static trial, or also there as C3D): {', '.join(others)}."]
     text += ["", "[subject]", *_subject_lines([file for file in (static, *trials) if file in c3d])]
     wanted = marker_set and not by_model and not (folder / MARKER_SET).exists()
-    own = _drafted_set(static, trials) if wanted else ""
-    has_set = (folder / MARKER_SET).is_file() or bool(own)
+    preset, draft = _marker_set(static, trials) if wanted else ("", None)
     text += ["", "[model]"]
-    text += [_entry(Model, "osim", models[0].name)] if by_model else _static_lines(static, has_set)
+    if by_model:
+        text += [_entry(Model, "osim", models[0].name)]
+    else:
+        text += [_static_line(static), _markers_line((folder / MARKER_SET).is_file(), preset, draft)]
     if not by_model:
         offered = models or (_models_near(folder) if nearby else [])
         text += [f"# {_entry(Model, 'osim', _relative(model, folder))}" for model in offered]
@@ -85,15 +90,25 @@ def init_files(folder: str | Path, nearby: bool = True, marker_set: bool = True)
     stated = Settings().model_dump(exclude_none=True)
     text += ["", "[settings]", *(_entry(Settings, *item) for item in stated.items())]
     text += ["# " + _entry(Settings, "joint_axes", True), ""]
-    return {SUBJECT: "\n".join(text)} | ({MARKER_SET: own} if own else {})
+    return {SUBJECT: "\n".join(text)} | ({} if draft is None else {MARKER_SET: draft.text})
 
 
-def _static_lines(static: Path | None, has_set: bool) -> list[str]:
-    """Return the entries of a model made from a static trial; `has_set` is whether a marker set lies in the folder."""
+def _static_line(static: Path | None) -> str:
+    """Return the entry of the static trial."""
     guessed = static is not None and not STATIC_NAME.search(static.stem)
     note = " (the shortest in which nobody moves)" if guessed else "" if static else _NO_STATIC
-    markers = _entry(Model, "markers", MARKER_SET) if has_set else "# " + _entry(Model, "markers", "plug-in-gait")
-    return [_entry(Model, "static", static and static.name, "static.trc", note), markers]
+    return _entry(Model, "static", static and static.name, "static.trc", note)
+
+
+def _markers_line(is_here: bool, preset: str, draft: MarkerSetDraft | None) -> str:
+    """Return the entry of a marker set in the folder; in a comment for a preset, which is found without it, and for a
+    draft that cannot be right.
+    """
+    if is_here or (draft is not None and not draft.against):
+        return _entry(Model, "markers", MARKER_SET)
+    if draft is None:
+        return "# " + _entry(Model, "markers", preset or "plug-in-gait")
+    return f"# {_entry(Model, 'markers', MARKER_SET)}; {NOT_USED}{'; '.join(draft.against)}. Correct it first"
 
 
 def _trial_lines(folder: Path, files: Sequence[Path], trials: Sequence[Path], nearby: bool) -> list[str]:
@@ -117,25 +132,26 @@ def _trial_lines(folder: Path, files: Sequence[Path], trials: Sequence[Path], ne
     return text or ["", "[[trial]]", _entry(TrialFiles, "markers", None, "walk.trc")]
 
 
-def _drafted_set(static: Path | None, trials: Sequence[Path]) -> str:
-    """Draft a marker set for a static trial, or else a walk, that no preset fits; empty where one does, or nothing can
-    be read.
+def _marker_set(static: Path | None, trials: Sequence[Path]) -> tuple[str, MarkerSetDraft | None]:
+    """Return the preset that fits the static trial, or else a walk, or a draft where none does; neither where nothing
+    can be read.
     """
     file = static or next(iter(trials), None)
     recording = _recording(file) if file else None
     if file is None or recording is None:
-        return ""
+        return "", None
     recording = recording.without_empty_markers()
-    fits = preset_of(recording) if static else _is_known(recording)
-    return "" if fits else draft_marker_set(recording, file.parent.name).text
+    fits = preset_of(recording) if static else _known(recording)
+    if fits is None:
+        return "", draft_marker_set(recording, file.parent.name)
+    return preset_name(fits), None
 
 
-def _is_known(walk: Recording) -> bool:
+def _known(walk: Recording) -> MarkerSet | None:
     try:
-        marker_set_of(walk.markers)
+        return marker_set_of(walk.markers)
     except MarkerSetError:
-        return False
-    return True
+        return None
 
 
 def _expect_files(folder: Path) -> list[Path]:

@@ -24,12 +24,12 @@ _AXIS, _KNEE, _MALLEOLUS = "AX", "NE", "MED"
 
 
 def device_labels(labels: Iterable[str]) -> tuple[str, ...]:
-    """Return the labels of a device's markers, of sides of which all three are there.
+    """Return the labels of a device's markers, which are on no segment.
 
     >>> device_labels(["LKAX", "LKD1", "LKD2", "RKAX", "LKNE"])
-    ('LKAX', 'LKD1', 'LKD2')
+    ('LKAX', 'LKD1', 'LKD2', 'RKAX')
     """
-    return tuple(label for own in _devices(labels).values() for label in own)
+    return tuple(label for label in labels if _DEVICE.fullmatch(label))
 
 
 def _devices(labels: Iterable[str]) -> dict[str, tuple[str, str, str]]:

@@ -217,29 +217,23 @@ def _leg(
 ) -> list[Joint]:
     pelvis, origin = frames["pelvis"]
     hip_at = origin + pelvis @ hip
-    knee_at, knee_axis = jc.knee(marks, hip_at, side)
-    thigh = jc.frame(hip_at - knee_at, knee_axis)
-    marks.require(f"ankle_{side}", f"ankle_lateral_{side}")
-    rough = jc.frame(knee_at - marks[f"ankle_lateral_{side}"], thigh[:, 2])
-    ankle_at, _ = jc.ankle(marks, knee_at, rough, side)
-    shank = jc.frame(knee_at - ankle_at, thigh[:, 2])
-    _, ankle_axis = jc.ankle(marks, knee_at, shank, side)
-    foot, foot_length = jc.foot_frame(marks, side)
-    lengths[f"thigh_{side}"] = float(np.linalg.norm(hip_at - knee_at))
-    lengths[f"shank_{side}"] = float(np.linalg.norm(knee_at - ankle_at))
-    lengths[f"foot_{side}"] = float(np.linalg.norm(marks[f"metatarsal_{side}"] - ankle_at))
-    lengths[f"foot_total_{side}"] = foot_length
-    drop = jc.subtalar_in_talus(foot_length)
+    leg = jc.leg_frames(marks, hip_at, side)
+    thigh, shank, foot = leg.thigh, leg.shank, leg.foot
+    lengths[f"thigh_{side}"] = float(np.linalg.norm(hip_at - leg.knee_at))
+    lengths[f"shank_{side}"] = float(np.linalg.norm(leg.knee_at - leg.ankle_at))
+    lengths[f"foot_{side}"] = float(np.linalg.norm(marks[f"metatarsal_{side}"] - leg.ankle_at))
+    lengths[f"foot_total_{side}"] = leg.foot_length
+    drop = jc.subtalar_in_talus(leg.foot_length)
     frames[f"thigh_{side}"] = (thigh, hip_at)
-    frames[f"shank_{side}"] = (shank, knee_at)
-    frames[f"foot_{side}"] = (foot, ankle_at + foot @ drop)
+    frames[f"shank_{side}"] = (shank, leg.knee_at)
+    frames[f"foot_{side}"] = (foot, leg.ankle_at + foot @ drop)
 
     in_thigh = thigh.T @ shank
     flexion = np.arctan2(in_thigh[0, 1], in_thigh[1, 1])
     knee_pin = _axis(f"knee_angle_{side}", -(shank.T @ thigh[:, 2]))
     in_shank = shank.T @ foot
     dorsiflexion = np.arctan2(in_shank[1, 0], in_shank[0, 0])
-    ankle_pin = _axis(f"ankle_angle_{side}", foot.T @ ankle_axis)
+    ankle_pin = _axis(f"ankle_angle_{side}", foot.T @ leg.ankle_axis)
     subtalar_pin = _axis(f"subtalar_angle_{side}", jc.subtalar_axis(side))
     down = np.array([0.0, -1.0, 0.0])
     hip_axes = _offsets(HIP_OFFSETS, side) + _gimbal("hip_", ["flexion", "adduction", "rotation"], f"_{side}", side)

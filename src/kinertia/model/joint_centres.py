@@ -26,6 +26,9 @@ _TALOCRURAL_RIGHT = np.array([-0.105, -0.174, 0.979])
 _SUBTALAR_INCLINATION, _SUBTALAR_DEVIATION = np.radians(42.0), np.radians(23.0)
 _SUBTALAR_DROP_OF_FOOT = 0.018
 _METATARSALS_OF_FOOT = 0.73
+WAND_ROTATION_RAD, USUAL_WAND_RAD = float(np.radians(30.0)), float(np.radians(19.0))
+"""Rotation of a knee axis from the line of the ASIS beyond which a thigh wand is not believed, and the largest of ten
+people's; wands on the front of the thigh rotate it by 44 degrees."""
 _LUMBAR = {"male": np.array([-0.335, -0.032, 0.0]), "female": np.array([-0.340, 0.049, 0.0])}
 
 
@@ -145,9 +148,64 @@ def lumbar_in_pelvis(width: float, sex: str) -> np.ndarray:
     return width * _LUMBAR[sex]
 
 
+@dataclass(frozen=True)
+class LegFrames:
+    """Joint centres (3,) m, axes (unit, to the right) and segment frames (3, 3) of a leg in the static trial."""
+
+    hip_at: np.ndarray
+    knee_at: np.ndarray
+    ankle_at: np.ndarray
+    knee_axis: np.ndarray
+    ankle_axis: np.ndarray
+    thigh: np.ndarray
+    shank: np.ndarray
+    foot: np.ndarray
+    foot_length: float
+
+
+def leg_frames(marks: Landmarks, hip_at: np.ndarray, side: str) -> LegFrames:
+    """Find knee, ankle and foot of a leg below this hip centre (3,) m."""
+    knee_at, knee_axis = knee(marks, hip_at, side)
+    thigh = frame(hip_at - knee_at, knee_axis)
+    marks.require(f"ankle_{side}", f"ankle_lateral_{side}")
+    rough = frame(knee_at - marks[f"ankle_lateral_{side}"], thigh[:, 2])
+    ankle_at, _ = ankle(marks, knee_at, rough, side)
+    shank = frame(knee_at - ankle_at, thigh[:, 2])
+    _, ankle_axis = ankle(marks, knee_at, shank, side)
+    foot, foot_length = foot_frame(marks, side)
+    return LegFrames(hip_at, knee_at, ankle_at, knee_axis, ankle_axis, thigh, shank, foot, foot_length)
+
+
 def knee(marks: Landmarks, hip: np.ndarray, side: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return knee centre and flexion axis (unit, to the right)."""
-    return _hinge(marks, f"knee_{side}", hip, f"thigh_wand_{side}", side)
+    """Return knee centre and flexion axis (unit, to the right); parallel to the line of the ASIS where the thigh wand
+    rotates it by more than `WAND_ROTATION_RAD` from there.
+    """
+    found = _hinge(marks, f"knee_{side}", hip, f"thigh_wand_{side}", side)
+    turned = wand_rotation(marks, hip, side)
+    if turned is None or abs(turned) <= WAND_ROTATION_RAD:
+        return found
+    lateral = marks[f"knee_lateral_{side}"]
+    return _along_pelvis(marks, lateral, hip, float(np.linalg.norm(found[0] - lateral)), side)
+
+
+def wand_rotation(marks: Landmarks, hip: np.ndarray, side: str) -> float | None:
+    """Return how far (rad) the thigh wand rotates the knee axis outwards from the line of the ASIS, about the thigh;
+    None where no wand defines it.
+    """
+    wand = f"thigh_wand_{side}"
+    if wand not in marks or _medial(marks, "knee", wand, side) is not None or marks.width(f"knee_{side}") is None:
+        return None
+    _, axis = _hinge(marks, f"knee_{side}", hip, wand, side)
+    along = frame(hip - marks[f"knee_lateral_{side}"], marks["asis_r"] - marks["asis_l"])
+    return rotation_outwards(axis, along, side)
+
+
+def rotation_outwards(axis: np.ndarray, frame_: np.ndarray, side: str) -> float:
+    """Return the rotation (rad) of an axis to the right from the z axis of a frame (3, 3) about its y axis; positive
+    where a foot that turned with it would point outwards.
+    """
+    sign = 1.0 if side == "r" else -1.0
+    return float(np.arctan2(-sign * (axis @ frame_[:, 0]), axis @ frame_[:, 2]))
 
 
 def ankle(marks: Landmarks, knee_centre: np.ndarray, shank: np.ndarray, side: str) -> tuple[np.ndarray, np.ndarray]:
@@ -188,8 +246,7 @@ def _hinge(marks: Landmarks, joint: str, proximal: np.ndarray, wand: str, side: 
         return (marks[lateral] + inner) / 2, across / np.linalg.norm(across)
     if lateral in marks and marks.stature_m is not None and (width is None or wand not in marks):
         half = (width or _WIDTHS_OF_STATURE[name] * marks.stature_m) / 2 + MARKER_RADIUS_M
-        axis = frame(proximal - marks[lateral], marks["asis_r"] - marks["asis_l"])[:, 2]
-        return marks[lateral] - sign * half * axis, axis
+        return _along_pelvis(marks, marks[lateral], proximal, half, side)
     if width is None or wand not in marks:
         marks.require(joint, lateral, medial) if wand not in marks else marks.require(joint, lateral)
         stated = f"{name}_width_mm under [subject]"
@@ -199,6 +256,14 @@ def _hinge(marks: Landmarks, joint: str, proximal: np.ndarray, wand: str, side: 
     centre = _chord(proximal, marks[lateral], marks[wand], half)
     across = sign * (marks[lateral] - centre)
     return centre, across / np.linalg.norm(across)
+
+
+def _along_pelvis(
+    marks: Landmarks, lateral: np.ndarray, proximal: np.ndarray, half: float, side: str
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return a centre at distance `half` (m) from the lateral marker, and an axis along the line of the ASIS."""
+    axis = frame(proximal - lateral, marks["asis_r"] - marks["asis_l"])[:, 2]
+    return lateral - (1.0 if side == "r" else -1.0) * half * axis, axis
 
 
 def _medial(marks: Landmarks, joint: str, wand: str, side: str) -> np.ndarray | None:

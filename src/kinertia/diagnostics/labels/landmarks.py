@@ -1,4 +1,4 @@
-"""L105, L107: does the static trial show the landmarks that the model's joints need?"""
+"""L105, L107, L108, S209: does the static trial show the landmarks that joints need, and legs that people have?"""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -9,16 +9,25 @@ from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.model.assumptions import assumptions
 from kinertia.model.gait27 import build_gait27
-from kinertia.model.joint_centres import Landmarks, find_landmarks
-from kinertia.model.marker_set import nearest_labels, with_nearest
+from kinertia.model.joint_centres import (
+    USUAL_WAND_RAD,
+    WAND_ROTATION_RAD,
+    Landmarks,
+    find_landmarks,
+    hip_in_pelvis,
+    pelvis_frame,
+    wand_rotation,
+)
+from kinertia.model.leg_axes import departures
+from kinertia.model.marker_set import in_words, nearest_labels, with_nearest
 
 _USUAL_HEIGHT_M, _ANY_SEX = 1.7, "male"
 """Whether landmarks suffice depends on neither."""
 
 
 def landmarks(context: RecordingContext) -> Iterator[Finding]:
-    """Report L105, S206 or L107: why no model can be built from a static trial (L105, S206), and each missing part that
-    a model can do without (L107).
+    """Report why no model can be built from a static trial (L105, S206), or each missing part that a model can do
+    without (L107), wands that are not used (L108) and axes that no person has (S209).
 
     Errors that are not about markers concern stature, which other questions cover.
     """
@@ -27,7 +36,10 @@ def landmarks(context: RecordingContext) -> Iterator[Finding]:
     height_m = context.height_m or context.recording.height_m or _USUAL_HEIGHT_M
     try:
         build_gait27(context.recording, context.marker_set, height_m, _ANY_SEX)
-        yield from _assumed(context, find_landmarks(context.recording, context.marker_set))
+        marks = find_landmarks(context.recording, context.marker_set)
+        yield from _assumed(context, marks)
+        yield from _wands(context, marks)
+        yield from _legs(context, marks)
     except MarkerSetError as error:
         if error.finding is None:
             raise
@@ -47,4 +59,30 @@ def _assumed(context: RecordingContext, marks: Landmarks) -> Iterator[Finding]:
             lacking=Quantity(", ".join(one.lacking)),
             instead=Quantity(one.instead),
             labels=Quantity(with_nearest(absent) or "not in the marker set"),
+        )
+
+
+def _wands(context: RecordingContext, marks: Landmarks) -> Iterator[Finding]:
+    pelvis, origin, width, depth = pelvis_frame(marks)
+    for side in "rl":
+        hip = origin + pelvis @ hip_in_pelvis(width, depth, "bell", side)
+        turned = wand_rotation(marks, hip, side)
+        if turned is not None and abs(turned) > WAND_ROTATION_RAD:
+            yield finding(
+                "L108",
+                context.at(part=in_words(f"knee_{side}"), markers=marks.marker_set.landmarks[f"thigh_wand_{side}"]),
+                rotation_rad=Quantity(abs(turned), "rad", limit=WAND_ROTATION_RAD, usual=(0.0, USUAL_WAND_RAD)),
+                direction=Quantity("outwards" if turned > 0 else "inwards"),
+            )
+
+
+def _legs(context: RecordingContext, marks: Landmarks) -> Iterator[Finding]:
+    for one in departures(marks):
+        limit = one.limit.apart if one.between_sides else one.limit.within
+        yield finding(
+            "S209",
+            context.at(part=in_words(one.part)),
+            angle_rad=Quantity(abs(one.angle_rad), "rad", limit=limit, usual=(0.0, one.limit.usual)),
+            axis=Quantity(one.limit.name),
+            how=Quantity(one.how),
         )

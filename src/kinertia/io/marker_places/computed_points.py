@@ -15,7 +15,9 @@ _SKIN_M = 3e-4
 _RIGID_M, _RIGID_SHARE, _LONG_S = 8e-6, 0.05, 2.0
 _FEW = 0.3
 _NEIGHBOURS, _REACH_M = 8, 0.45
-_FRAMES, _FEWEST, _OFTEN = 25, 10, 0.95
+_FRAMES, _FEWEST, _OFTEN = 25, 10, (0.95, 0.75, 0.5)
+"""Most and fewest frames compared; shares of frames in which a marker is seen, of which the highest that leaves enough
+frames counts."""
 _AXES = "OALP"
 """Vicon's bones: origin, anterior, lateral and proximal end."""
 _OXFORD = ("HDF", "FOF", "TIB", "HLX", "TPF")
@@ -24,8 +26,8 @@ _OXFORD = ("HDF", "FOF", "TIB", "HLX", "TPF")
 
 def unusable_points(markers: Markers) -> dict[str, str]:
     """Return label -> reason for points that are not on the body: ends of bone axes, copies, projections, constants."""
+    found = _bone_axes(markers)
     place = _few_frames(markers)
-    found = _bone_axes(place)
     for label, own in place.items():
         if label not in found and (own == 0.0).all(axis=0).sum() >= 2:
             found[label] = "a number, no place"
@@ -71,20 +73,35 @@ def computed_points(markers: Markers) -> dict[str, str]:
 
 def _few_frames(markers: Markers) -> dict[str, FloatArray]:
     """Return label -> positions (f, 3) m in a few frames that show all markers but those with gaps."""
-    seen = markers.seen
-    often = np.flatnonzero(seen.mean(axis=0) > _OFTEN)
-    frames = np.flatnonzero(seen[:, often].all(axis=1))
+    share = markers.seen.mean(axis=0)
+    for often in _OFTEN:
+        place = _in_common(markers, [label for label, own in zip(markers.labels, share, strict=True) if own > often])
+        if len(next(iter(place.values()), ())) >= min(_FEWEST, len(markers.time)):
+            return place
+    return {}
+
+
+def _in_common(markers: Markers, labels: Sequence[str]) -> dict[str, FloatArray]:
+    """Return label -> positions (f, 3) m in at most `_FRAMES` of the frames that show all of these; empty if none."""
+    own = markers.select(labels)
+    frames = np.flatnonzero(own.seen.all(axis=1))
     frames = frames[:: -(-len(frames) // _FRAMES)] if len(frames) else frames
-    return {markers.labels[k]: markers.positions[frames, k] for k in often} if len(frames) else {}
+    return {label: own.positions[frames, k] for k, label in enumerate(own.labels)} if len(frames) else {}
 
 
-def _bone_axes(place: dict[str, FloatArray]) -> dict[str, str]:
-    """Find points whose labels end in O, A, L and P, and whose directions are perpendicular."""
+def _bone_axes(markers: Markers) -> dict[str, str]:
+    """Find points whose labels end in O, A, L and P, and whose directions are perpendicular, in the frames that show
+    them.
+    """
     found: dict[str, str] = {}
-    for stem in {label[:-1] for label in place if label[-1:] in _AXES}:
-        if not all(stem + end in place for end in _AXES):
+    labels = set(markers.labels)
+    for stem in sorted({label[:-1] for label in labels if label[-1:] in _AXES}):
+        if not all(stem + end in labels for end in _AXES):
             continue
-        origin, *tips = (place[stem + end] for end in _AXES)
+        place = _in_common(markers, [stem + end for end in _AXES])
+        if not place:
+            continue
+        origin, *tips = place.values()
         axes = np.stack(tips, axis=1) - origin[:, None]
         axes /= np.maximum(np.linalg.norm(axes, axis=2, keepdims=True), 1e-9)
         off = np.einsum("nij,nkj->nik", axes, axes) - np.eye(3)
@@ -94,12 +111,12 @@ def _bone_axes(place: dict[str, FloatArray]) -> dict[str, str]:
         f"{side}{bone}"
         for side in "RL"
         for bone in _OXFORD
-        if all(f"{side}{one}{k}" in place for one in _OXFORD[:2] for k in range(1, 4))
+        if all(f"{side}{one}{k}" in labels for one in _OXFORD[:2] for k in range(1, 4))
     ]
-    families = [(f"{stem}_", "XYZ") for stem in {label[:-2] for label in place if label.endswith(("_X", "_Y", "_Z"))}]
-    families = [(stem, ends) for stem, ends in families if all(stem + end in place for end in ends)]
+    families = [(f"{stem}_", "XYZ") for stem in {label[:-2] for label in labels if label.endswith(("_X", "_Y", "_Z"))}]
+    families = [(stem, ends) for stem, ends in families if all(stem + end in labels for end in ends)]
     for stem, ends in [*families, *((stem, "0123") for stem in numbered)]:
-        found |= {stem + end: "an axis of a bone" for end in ends if stem + end in place}
+        found |= {stem + end: "an axis of a bone" for end in ends if stem + end in labels}
     return found
 
 
