@@ -97,6 +97,26 @@ def test_whoever_may_lie_is_not_turned(tmp_path, upright, shift):
     expect_evidence(found, up="Z", expected="Y")
 
 
+def test_whoever_stands_on_a_step_along_z_is_turned_in_a_static_trial(tmp_path, upright):
+    write_trc(
+        tmp_path / "static.trc",
+        Markers(upright.time, upright.labels, z_up(upright.positions) + np.array([0.0, 0.0, 0.3])),
+    )
+    recording = read_recording(tmp_path / "static.trc", standing=True)
+    assert codes(recording.findings) == ["F133"]
+    np.testing.assert_allclose(recording.markers.positions, upright.positions + np.array([0.0, 0.3, 0.0]), atol=1e-8)
+
+
+def test_arms_that_are_stretched_out_hide_no_one(tmp_path, upright):
+    hands = np.array([[0.0, 1.4, -0.8], [0.0, 1.4, 0.9]])
+    positions = np.concatenate([upright.positions, np.tile(hands, (len(upright.time), 1, 1))], axis=1)
+    labels = (*upright.labels, "left hand", "right hand")
+    write_trc(tmp_path / "walk.trc", Markers(upright.time, labels, z_up(positions)))
+    assert codes(read_recording(tmp_path / "walk.trc").findings) == ["F133"]
+    write_trc(tmp_path / "walk.trc", Markers(upright.time, labels, positions))
+    assert read_recording(tmp_path / "walk.trc").findings == ()
+
+
 def test_statics_need_no_forces(files):
     for name in ("walk.trc", "walk.c3d"):
         recording = read_recording(files / name)

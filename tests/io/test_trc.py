@@ -304,3 +304,32 @@ def test_places_that_stand_for_missing_markers(write, number):
     assert found.where.markers == ("R.Heel",)
     alone = read_trc_recording(write(HEADER + ROWS.replace("1\t2\t3", f"{number}\t2\t3", 1)))
     assert np.isfinite(alone.markers.positions).all()
+
+
+BLANKS = (
+    "PathFileType  4\t(X/Y/Z) x.trc\n"
+    "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames\n"
+    "  100.0      100.0         3          2 mm      100.0         1      3\n"
+    "Frame#\tTime            R.Heel                       L Heel               \n"
+    "             X1         Y1         Z1         X2         Y2         Z2\n"
+    "\n"
+)
+
+
+@pytest.mark.parametrize(
+    "row", ["\t{0}\t0.0{0}\t1\t2\t3\t4\t5\t6", "  {0}   0.0{0}  1  2  3  4  5  6", "{0}\t0.0{0}\t1 2 3\t4 5 6"]
+)
+def test_a_header_separated_by_blanks(write, row):
+    """Cortex: two blanks or more between labels, a tab before each row, or blanks in it."""
+    markers = read_trc(write(BLANKS + "".join(row.format(k) + "\n" for k in (1, 2, 3))))
+    assert markers.labels == ("R.Heel", "L Heel")
+    assert np.allclose(markers.positions * 1e3, [[[1, 2, 3], [4, 5, 6]]] * 3)
+    assert np.allclose(markers.time, [0.01, 0.02, 0.03])
+
+
+def test_labels_are_separated_by_single_blanks_where_their_number_agrees(write):
+    text = BLANKS.replace("R.Heel                       L Heel               ", "R.Heel L.Heel")
+    assert read_trc(write(text + "1 0.0 1 2 3 4 5 6\n2 0.01 1 2 3 4 5 6\n3 0.02 1 2 3 4 5 6\n")).labels == (
+        "R.Heel",
+        "L.Heel",
+    )

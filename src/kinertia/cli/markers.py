@@ -38,7 +38,10 @@ def markers(
 
     kinertia markers static.c3d -o our_lab.toml
     """
-    recording = read_recording(file).without_empty_markers()
+    recording = read_recording(file)
+    if speed_m_s(recording.markers) < STILL_M_S:
+        recording = read_recording(file, standing=True)
+    recording = recording.without_empty_markers()
     labels = recording.markers.labels
     out.print(f"{len(labels)} labels: {', '.join(labels)}", soft_wrap=True)
     table = plain_table("preset", "labels present", "absent")

@@ -61,23 +61,33 @@ def to_ground(
     return _rotation(*data_up), up, findings
 
 
-def upright_along_z(positions: FloatArray) -> FloatArray | None:
+def upright_along_z(positions: FloatArray, standing: bool = False) -> FloatArray | None:
     """Return the rotation (3, 3) to ground axes where a person stands upright on the floor z = 0; None if uncertain.
 
     For files that cannot state which axis is up. In half of the frames or more, markers reach from the floor to above a
-    child's hip along Z, and much less far along Y.
+    child's hip along Z, and much less far along Y, or, with arms stretched out along Y, not from the floor.
 
     Args:
         positions: (n, m, 3) m in the laboratory's axes; NaN where not seen.
+        standing: whether the person is known to stand: on whatever height, then.
     """
     seen = positions[_seen(positions).sum(axis=1) >= _FEWEST_SEEN]
     if not len(seen):
         return None
     low, high = (np.median(reach(seen, axis=1), axis=0) for reach in (np.nanmin, np.nanmax))
     extent = high - low
-    upright = extent[2] == extent.max() and extent[1] < UPRIGHT_SHARE * extent[2]
-    on_floor = abs(low[2]) < _ABOVE_FLOOR_M and _LOWEST_TOP_M < high[2] < _HIGHEST_TOP_M
-    return _rotation(2, 1) if upright and on_floor else None
+    on_floor = (np.abs(low) < _ABOVE_FLOOR_M) & (high > _LOWEST_TOP_M) & (high < _HIGHEST_TOP_M)
+    slender = extent[2] == extent.max() and extent[1] < UPRIGHT_SHARE * extent[2]
+    arms_out = extent[2] >= UPRIGHT_SHARE * extent.max() and not on_floor[1]
+    upright = (slender and standing) or (on_floor[2] and (slender or arms_out))
+    return _rotation(2, 1) if upright else None
+
+
+def rotation_of_line(upwards: FloatArray) -> tuple[FloatArray, str]:
+    """Return the rotation (3, 3) that brings the axis nearest to a line from feet to pelvis (3,) up, and its name."""
+    axis = int(np.argmax(np.abs(upwards)))
+    sign = 1 if upwards[axis] > 0 else -1
+    return _rotation(axis, sign), f"{'+-'[sign < 0]}{'XYZ'[axis]}"
 
 
 def ground_rotation(vertical: str) -> FloatArray:

@@ -109,6 +109,8 @@ def _complete(lines: list[str], columns: int) -> FloatArray | None:
 
 def _row(path: Path, number: int, line: str, columns: int, may_be_short: bool) -> list[float]:
     cells = line.split("\t") if "\t" in line else line.split()
+    if len(cells) < columns == len(line.split()):  # blanks beside tabs
+        cells = line.split()
     if len(cells) > columns or (len(cells) < columns and not may_be_short):
         raise wrong_cells(path, number, len(cells), columns)
     if 1 < len(cells) < columns and "\t" not in line:

@@ -43,7 +43,8 @@ def read_recording(
         loads_path: an OpenSim ExternalLoads .xml file that identifies the force columns. Without
             `forces_path` its own datafile is read.
         length_unit: of a .c3d file's lengths, "mm", "cm" or "m", overriding the file.
-        standing: of a .c3d file of poses (Theia), the same person standing upright, as a static trial.
+        standing: the person stands, as in a static trial: poses of a .c3d file (Theia) are read as one frame of the
+            person standing upright, and markers of a .trc file as upright along Z where they reach farthest along it.
 
     Returns:
         the recording; its `plates` is None where no file holds usable force plates. A person who stands along Z in a
@@ -59,7 +60,8 @@ def read_recording(
     tsv = forces_path is not None and Path(forces_path).suffix.lower() == ".tsv"
     recording = _read_markers(markers_path, Path(str(forces_path)) if tsv else None, length_unit, standing)
     recording = with_knees_of_device(recording, markers_path.name)
-    turn = upright_along_z(recording.markers.positions) if markers_path.suffix.lower() == ".trc" else None
+    is_trc = markers_path.suffix.lower() == ".trc"
+    turn = upright_along_z(recording.markers.positions, standing) if is_trc else None
     if turn is not None:
         recording = _turned(recording, markers_path, turn)
     if tsv:

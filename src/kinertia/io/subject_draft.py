@@ -137,7 +137,7 @@ def _marker_set(static: Path | None, trials: Sequence[Path]) -> tuple[str, Marke
     can be read.
     """
     file = static or next(iter(trials), None)
-    recording = _recording(file) if file else None
+    recording = _recording(file, standing=static is not None) if file else None
     if file is None or recording is None:
         return "", None
     recording = recording.without_empty_markers()
@@ -222,10 +222,10 @@ def _common_start(a: str, b: str) -> int:
     return next((k for k, (x, y) in enumerate(zip(a, b, strict=False)) if x != y), min(len(a), len(b)))
 
 
-def _recording(file: Path) -> Any:
+def _recording(file: Path, standing: bool = False) -> Any:
     """Read a capture, or return None where it cannot be read: reading the trial itself will report why."""
     try:
-        return read_recording(file)
+        return read_recording(file, standing=standing)
     except KinertiaError:
         return None
 

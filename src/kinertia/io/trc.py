@@ -1,6 +1,7 @@
 """Reads and writes TRC files: marker trajectories as text."""
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from itertools import islice
 from pathlib import Path
@@ -47,8 +48,10 @@ def read_trc_recording(path: str | Path) -> Recording:
     path = Path(path)
     lines = read_lines(path)
     header = _header(path, lines)
-    labels = _labels(path, lines)
-    findings = _other_markers(path, lines, labels, _count(path, header, "NumMarkers"))
+    count = _count(path, header, "NumMarkers")
+    labels = _labels(path, lines, count)
+    lines = _without_leading_tab(lines, 2 + 3 * len(labels))
+    findings = _other_markers(path, lines, labels, count)
     values, line_numbers = read_rows(path, lines, _first_row(lines), 2 + 3 * len(labels), may_be_short=True)
     frames = _count(path, header, "NumFrames")
     _expect_whole(path, lines, len(values), frames, line_numbers[-1] if line_numbers else 3, 2 + 3 * len(labels))
@@ -157,11 +160,26 @@ def _cells(line: str) -> list[str]:
     return [cell.strip() for cell in (line.split("\t") if "\t" in line else line.split())]
 
 
-def _labels(path: Path, lines: list[str]) -> tuple[str, ...]:
-    labels = tuple(cell for cell in _cells(lines[3]) if cell)[2:]
+def _labels(path: Path, lines: list[str], count: int) -> tuple[str, ...]:
+    """Return the labels; where no tabs separate them, two or more blanks do, or single ones if that makes as many as
+    the header announces.
+    """
+    line = lines[3].strip()
+    ways = (line.split("\t"), re.split(r"\t|\s{2,}", line), line.split())
+    by_tab, *by_blanks = (tuple(cell.strip() for cell in cells if cell.strip())[2:] for cells in ways)
+    labels = by_tab or next((own for own in by_blanks if len(own) == count), by_blanks[-1])
     if not labels:
         raise FileError.found(path, "F164", 4, found=Quantity("the row of labels is empty"))
     return labels
+
+
+def _without_leading_tab(lines: list[str], columns: int) -> list[str]:
+    """Return the lines without the tab before each row that some programs write, which makes a cell too many."""
+    first = _first_row(lines) - 1
+    rows = [line.rstrip() for line in lines[first:] if line.strip()]
+    if not all(row.startswith("\t") for row in rows) or not any(row.count("\t") == columns for row in rows):
+        return lines
+    return [*lines[:first], *(line.removeprefix("\t") for line in lines[first:])]
 
 
 def _expect_whole(path: Path, lines: list[str], rows: int, frames: int, line: int, columns: int) -> None:

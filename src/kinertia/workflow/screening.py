@@ -32,6 +32,7 @@ from kinertia.trial.data import Recording
 from kinertia.workflow.joint_widths import with_widths
 from kinertia.workflow.label_spelling import with_model_spelling
 from kinertia.workflow.person import Person
+from kinertia.workflow.upright_static import with_upright_static
 
 STATIC_QUESTIONS: tuple[Question[RecordingContext], ...] = (
     *markers.STATIC_QUESTIONS,
@@ -127,7 +128,7 @@ class Screened:
 
 def screen(person: Person) -> Screened:
     """Check everything that can be checked before inverse kinematics."""
-    person = with_model_spelling(person)
+    person = with_upright_static(with_model_spelling(person))
     context = person_context(person)
     found = [*person.unread]
     if isinstance(person.completed, SubjectError) and person.completed.finding is not None:

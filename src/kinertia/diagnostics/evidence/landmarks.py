@@ -23,6 +23,16 @@ def landmark_positions(markers: Markers, marker_set: MarkerSet) -> dict[str, Flo
     }
 
 
+def feet_to_pelvis_m(places: Mapping[str, FloatArray]) -> FloatArray | None:
+    """Return the vector (3,) m from the feet to the pelvis, median over the frames; None where it is not visible."""
+    feet = [place for name, place in places.items() if name.startswith(("heel", "ankle_lateral", "metatarsal"))]
+    if not feet or not {"asis_r", "asis_l"} <= set(places):
+        return None
+    lines = (places["asis_r"] + places["asis_l"]) / 2 - np.mean(feet, axis=0)
+    lines = lines[np.isfinite(lines).all(axis=1)]
+    return np.asarray(np.median(lines, axis=0)) if len(lines) else None
+
+
 def headings(places: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
     """Compute unit headings (n, 3) of "foot_r", "foot_l" and "pelvis", each from its own back to its front, independent
     of side; NaN while a foot is steep: behind a runner it points down and backwards.

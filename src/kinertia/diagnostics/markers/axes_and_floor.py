@@ -9,6 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
+from kinertia.diagnostics.evidence.landmarks import feet_to_pelvis_m
 from kinertia.findings.finding import Finding, finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.trial.data import FloatArray
@@ -39,7 +40,7 @@ def unit_and_vertical(context: RecordingContext) -> Iterator[Finding]:
         limit = _SMALLEST_M if largest < _SMALLEST_M else _LARGEST_M
         yield finding("M141", context.at(), extent_m=Quantity(size, "m", limit=limit, usual=(_SMALLEST_M, _LARGEST_M)))
         return
-    line = _feet_to_pelvis_m(context)
+    line = feet_to_pelvis_m(context.landmark_positions)
     lies = line is not None and line[1] <= _UPRIGHT * np.linalg.norm(line)
     if not lies and extent[1] >= UPRIGHT_SHARE * largest:
         return
@@ -53,17 +54,6 @@ def unit_and_vertical(context: RecordingContext) -> Iterator[Finding]:
     expected = context.recording.vertical.lstrip("+")
     evidence |= {"up": Quantity(f"-{name}" if negative else name), "expected": Quantity(expected)}
     yield with_evidence("M142", context.at(), evidence)
-
-
-def _feet_to_pelvis_m(context: RecordingContext) -> FloatArray | None:
-    """Return the vector (3,) m from the feet to the pelvis, median over the frames; None where it is not visible."""
-    places = context.landmark_positions
-    feet = [place for name, place in places.items() if name.startswith(("heel", "ankle_lateral", "metatarsal"))]
-    if not feet or not {"asis_r", "asis_l"} <= set(places):
-        return None
-    lines = (places["asis_r"] + places["asis_l"]) / 2 - np.mean(feet, axis=0)
-    lines = lines[np.isfinite(lines).all(axis=1)]
-    return np.asarray(np.median(lines, axis=0)) if len(lines) else None
 
 
 def floor_slope(context: RecordingContext) -> Iterator[Finding]:
