@@ -167,7 +167,7 @@ def options(lab: Path, **more: object) -> list[object]:
 
 
 BAD = {
-    "no model": ({"model": "nowhere.osim"}, "F101 There is no file nowhere.osim"),
+    "no model": ({"model": "nowhere.osim"}, "F101 There is no nowhere.osim"),
     "a model that is none": ({"model": "walk_grf.xml"}, "no Model in it"),
     "a model without markers": ({"model": "bare.osim"}, "bare.osim: O106 "),
     "the study's method": ({"method": "two-level"}, "works on the built-in model only"),

@@ -20,8 +20,10 @@ def codes(data):
 
 
 @pytest.mark.parametrize("group", ["PROCESSING", "SUBJECT", "SUBJECTS"])
-@pytest.mark.parametrize("mass", ["Bodymass", "BodyMass", "BODY_MASS", "Mass", "Weight", "Mass_kg", "Body weight (kg)"])
-@pytest.mark.parametrize("height", ["Height", "HEIGHT", "BodyHeight", "Stature", "Subject_Height"])
+@pytest.mark.parametrize(
+    "mass", ["Bodymass", "BodyMass", "BODY_MASS", "Mass", "Weight", "Mass_kg", "Body weight (kg)", "A_BodyMass_kg"]
+)
+@pytest.mark.parametrize("height", ["Height", "HEIGHT", "BodyHeight", "Stature", "Subject_Height", "A_Height_mm"])
 def test_mass_and_stature_by_any_name(group, mass, height):
     data = read(group, **{mass: 41.5, height: 1610.0})
     assert (data.mass_kg, data.height_m) == (41.5, pytest.approx(1.61))

@@ -63,7 +63,7 @@ CASES = [
         "subject.toml",
         'forces = "walk.mot"',
         'forces = "wakl.mot"',
-        "{file}, line 13: F101 There is no file wakl.mot in {folder}. Correct the path: the nearest names there: "
+        "{file}, line 13: F101 There is no wakl.mot in {folder}. Correct the path: the nearest names there: "
         "walk.mot, walk.tsv, walk.trc.",
     ),
 ]

@@ -8,6 +8,7 @@ from kinertia.findings.finding import finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.trial.data import FootLoads, Markers, PlateLoads, Recording
+from kinertia.trial.gait_event import StatedContact
 from kinertia.trial.ground_contact import CONTACT_MARGIN_S, CONTACT_SLACK_S, ground_contact
 from kinertia.trial.plate_assignment import assign_plates, build_trial
 from kinertia.trial.sampled_time import runs
@@ -376,3 +377,26 @@ def test_markers_find_contacts_whose_force_is_hidden(real, name):
             limit = CONTACT_SLACK_S + CONTACT_MARGIN_S + 1e-6
             assert abs(time[contact[0]] - time[first]) <= limit
             assert abs(time[contact[1]] - time[last]) <= limit
+
+
+def test_a_stated_foot_goes_before_the_nearest_one():
+    recording = walk([("r", 0), ("l", 0), ("r", 1)])
+    plate = recording.plates.names[0]
+    plain, _ = assign_plates(recording, FEET)
+    stated = replace(recording, stated_contacts=(StatedContact(plate, 1, (0.1, 0.9)),))
+    loads, findings = assign_plates(stated, FEET)
+    first = (loads.time > 0.2) & (loads.time < 0.68)
+    assert not loads.force[first, 0].any()
+    np.testing.assert_allclose(loads.force[first, 1], plain.force[first, 0])
+    later = loads.time > 1.3
+    np.testing.assert_allclose(loads.force[later], plain.force[later])
+    assert [(one.code, one.where.plate, one.where.span_s) for one in findings] == [("P286", plate, (0.1, 0.9))]
+
+
+def test_a_load_that_is_stated_to_be_of_no_foot_is_not_used():
+    recording = walk([("r", 0), ("l", 0)])
+    loads, _ = assign_plates(
+        replace(recording, stated_contacts=(StatedContact(recording.plates.names[1], None),)), FEET
+    )
+    assert loads.force[:, 0].any()
+    assert not loads.force[:, 1].any()

@@ -32,6 +32,7 @@ from kinertia.cli.terminal import out, plain_table, shown_progress
 from kinertia.errors import FileError
 from kinertia.findings.overview import Overview
 from kinertia.io.marker_set_file import read_marker_set
+from kinertia.io.number_table import expect_path
 from kinertia.io.osim.reader import read_osim
 from kinertia.io.subject_file import expect_one_model, read_subject, subject_file_in
 from kinertia.model.anthropometry import check_subject
@@ -119,6 +120,9 @@ def check(
     if output is not None:
         results_folder(output, overwrite)
     check_subject(70.0 if mass is None else mass, 1.7 if height is None else height, sex or "male")
+    for path in files:
+        if not path.suffix:  # a folder
+            expect_path(path)
     files = [subject_file_in(path) if _holds_subject_file(path) else path for path in files]
     subjects = [path for path in files if path.suffix.lower() == ".toml"]
     given = (static, forces, loads, mass, height, sex, markers, model, calibrate or None)

@@ -34,6 +34,7 @@ from kinertia.cli.terminal import out, show_problem, shown_progress
 from kinertia.errors import FileError, KinertiaError
 from kinertia.estimation.result import Fit
 from kinertia.io.file_names import same_folder
+from kinertia.io.number_table import expect_path
 from kinertia.io.provenance import command_line, provenance_of
 from kinertia.io.recording import expect_recording
 from kinertia.io.subject_file import read_subject, subject_file_in, subject_from_options, with_settings
@@ -228,6 +229,8 @@ def _words(name: str, value: Any) -> list[Any]:
 
 def _wanted(trial: Path, options: dict[str, Any], method: str | None) -> SubjectFile:
     """Return what to estimate, from the subject file or from options."""
+    if not trial.suffix:
+        expect_path(trial)
     if trial.is_dir():
         trial = subject_file_in(trial)
     if trial.suffix.lower() == ".toml":

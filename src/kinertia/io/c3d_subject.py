@@ -27,6 +27,7 @@ _SIDES = {"r": "R", "right": "R", "l": "L", "left": "L"}
 _SIDE = "|".join(_SIDES)
 _MEASURE = re.compile(rf"({_SIDE})?(knee|ankle|elbow|wrist|leg)(width|diameter|breadth|length)({_SIDE})?")
 _OTHER_LENGTH = re.compile(r"(Width|Length|Distance|Thickness|ShoulderOffset|SoleDelta)$", re.IGNORECASE)
+_SUBJECT = re.compile(r"^[A-Z]_")
 _UNIT = re.compile(r"[\s_([]+(kg|mm|cm|m)[])]?\s*$", re.IGNORECASE)
 _NUMBER = re.compile(r"\s*(\d+(?:[.,]\d+)?)\s*(kg|mm|cm|m)?\s*", re.IGNORECASE)
 _PER_METRE = {"mm": 1000.0, "cm": 100.0, "m": 1.0}
@@ -61,8 +62,8 @@ def subject_data(path: Path, parameters: Any) -> SubjectData:
         parameters: parameters of the file, as ezc3d has them.
     """
     given = dict(_numbers(parameters))
-    masses = {key: value for key, value in given.items() if _named(_MASS, key)}
-    heights = {key: value for key, value in given.items() if _named(_HEIGHT, key)}
+    masses = {key: value for key, value in given.items() if _of_subject(_MASS, key)}
+    heights = {key: value for key, value in given.items() if _of_subject(_HEIGHT, key)}
     mass, _ = next(iter(masses.values()), (None, None))
     height, unit = next(iter(heights.values()), (None, None))
     if height is not None:
@@ -107,6 +108,11 @@ def _number(value: Any) -> tuple[float, str | None] | None:
 
 def _named(pattern: re.Pattern[str], key: str) -> re.Match[str] | None:
     return pattern.fullmatch(folded(_UNIT.sub("", key)))
+
+
+def _of_subject(pattern: re.Pattern[str], key: str) -> bool:
+    """Decide whether a key is this quantity; some programs write a subject's letter before it (`A_BodyMass_kg`)."""
+    return bool(_named(pattern, key) or _named(pattern, _SUBJECT.sub("", key)))
 
 
 def _lengths(

@@ -45,6 +45,12 @@ def expect_file(path: Path, expected: str = "a file") -> None:
     raise FileError.found(path, "F101", **missing_file(path, str(path), expected))
 
 
+def expect_path(path: Path) -> None:
+    """Raise a FileError unless a file or folder has this path."""
+    if not os.path.exists(path):
+        raise FileError.found(path, "F101", **missing_file(path, str(path), "a recording, a subject file or a folder"))
+
+
 def wrong_kind(path: Path, given: str, what: str, expected: str) -> FileError:
     """Return the error that `given` "cannot {what}; expected {expected}"."""
     return FileError.found(path, "F102", given=Quantity(given), what=Quantity(what), expected=Quantity(expected))

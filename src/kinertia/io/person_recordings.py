@@ -1,7 +1,7 @@
 """Reads the recordings that a subject file names: static trial, motions, and marker set."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from kinertia.errors import SettingsError
@@ -12,7 +12,7 @@ from kinertia.io.subject_tables import SubjectFile, TrialFiles
 from kinertia.model.marker_set import MarkerSet
 from kinertia.trial.data import Recording
 from kinertia.trial.plate_loading import with_unloaded_levels
-from kinertia.trial.plate_names import with_plates_of_trial
+from kinertia.trial.plate_names import selected, with_plates_of_trial
 from kinertia.trial.trial_input import TrialInput
 
 Progress = Callable[[str, float], None]
@@ -43,7 +43,25 @@ def read_static(wanted: SubjectFile) -> Recording:
     """
     if wanted.model.static is None:
         raise SettingsError.of_entry("[model]", "expected a static trial (static = ...), and no OpenSim model")
-    return _as_zeroed(wanted, read_recording(wanted.model.static, length_unit=wanted.model.length_unit, standing=True))
+    static = read_recording(wanted.model.static, length_unit=wanted.model.length_unit, standing=True)
+    return _cut(_as_used(wanted, static), wanted.model.window_s)
+
+
+def _cut(static: Recording, window_s: tuple[float, float] | None) -> Recording:
+    """Return the part of the static trial in which the person stands.
+
+    Raises:
+        SettingsError: no frame is in it.
+    """
+    if window_s is None:
+        return static
+    markers = static.markers.cut(*window_s)
+    if not len(markers.time):
+        time = static.markers.time
+        problem = f"the static trial has no frame in it: it goes from {time[0]:.2f} to {time[-1]:.2f} s"
+        raise SettingsError.of_entry("[model] window_s", problem)
+    plates = None if static.plates is None else static.plates.cut(*window_s)
+    return replace(static, markers=markers, plates=plates if plates is not None and len(plates.time) else None)
 
 
 def read_trial(wanted: SubjectFile, files: TrialFiles) -> TrialInput:
@@ -57,15 +75,34 @@ def read_trial(wanted: SubjectFile, files: TrialFiles) -> TrialInput:
         KinertiaError: a file is missing or broken.
     """
     started = time.perf_counter()
-    recording = _as_zeroed(wanted, read_recording(files.markers, files.forces, files.loads, files.length_unit))
+    read = read_recording(files.markers, files.forces, files.loads, files.length_unit)
     seconds = time.perf_counter() - started
-    recording = replace(recording, name=files.name, belt=read_belt(files.belt_speed_m_s))
+    _expect_plates(read, wanted.instruments.plates or (), "[instruments] plates")
+    recording = _as_used(wanted, read)
+    _expect_plates(recording, [one.plate for one in files.feet], "[[trial]] feet")
+    recording = replace(
+        recording, name=files.name, belt=read_belt(files.belt_speed_m_s), stated_contacts=tuple(files.feet)
+    )
     apart = files.forces is not None and len(wanted.trials) > 1 and not wanted.instruments.same_plates
     return TrialInput(with_plates_of_trial(recording) if apart else recording, files.window_s, seconds, files.use)
 
 
-def _as_zeroed(wanted: SubjectFile, recording: Recording) -> Recording:
-    """Restore the unloaded readings of plates in their loads, where the laboratory states that they were zeroed."""
-    if not wanted.instruments.zeroed or recording.plates is None:
+def _as_used(wanted: SubjectFile, recording: Recording) -> Recording:
+    """Return the recording with the plates that the laboratory uses, and their unloaded readings restored where it
+    states that they were zeroed.
+    """
+    plates = recording.plates
+    if plates is None:
         return recording
-    return replace(recording, plates=with_unloaded_levels(recording.plates))
+    if wanted.instruments.plates is not None and set(wanted.instruments.plates) & set(plates.names):
+        plates = selected(plates, wanted.instruments.plates)
+    return replace(recording, plates=with_unloaded_levels(plates) if wanted.instruments.zeroed else plates)
+
+
+def _expect_plates(recording: Recording, names: Sequence[str], entry: str) -> None:
+    """Raise a SettingsError about a plate that the recording does not have."""
+    known = () if recording.plates is None else recording.plates.names
+    missing = [name for name in names if name not in known]
+    if missing and (known or entry.startswith("[[trial]]")):
+        problem = f"{recording.name} has no '{missing[0]}'; its plates are {', '.join(known) or 'none'}"
+        raise SettingsError.of_entry(entry, problem)

@@ -6,7 +6,7 @@ from typing import Any
 
 from pydantic import Field, model_validator
 
-from kinertia.io.subject_values import BeltSpeed, File, LengthUnit, MarkerSetName, TrialName, Window
+from kinertia.io.subject_values import BeltSpeed, File, LengthUnit, MarkerSetName, StatedContacts, TrialName, Window
 from kinertia.settings import Attached, Diagnostics, Instruments, KnownSegment, PriorSettings, Settings, Subject, Table
 from kinertia.trial.trial_input import TrialUse
 
@@ -18,6 +18,9 @@ class Model(Table):
     """
 
     static: File | None = Field(default=None, description="static trial, .c3d, .trc, .tsv or .csv")
+    window_s: Window | None = Field(
+        default=None, description="[start, end] of the static trial, s, while the person stands; left out: all of it"
+    )
     length_unit: LengthUnit | None = Field(
         default=None, description="unit of a static C3D file that states none, or a wrong one: mm, cm or m"
     )
@@ -39,6 +42,12 @@ class TrialFiles(Table):
         default=None, description="unit of a C3D file that states none, or a wrong one: mm, cm or m"
     )
     window_s: Window | None = Field(default=None, description="[start, end], s; left out: measured part")
+    feet: StatedContacts = Field(
+        default=(),
+        strict=False,
+        description='whose foot is on a plate, where the nearest is wrong: `[{ plate = "plate 1", foot = "right", '
+        'window_s = [0.4, 1.1] }]`; foot "right", "left" or "none", window_s may be left out',
+    )
     use: TrialUse = Field(
         default="all",
         description='"kinematics": only its markers are used, for joint centres, joint axes and marker positions',
@@ -64,6 +73,9 @@ class InstrumentsFiles(Instruments):
     """Statements of the laboratory about its instruments, and the file of its session."""
 
     session: File | None = Field(default=None, description="file of kinertia instruments for the same session")
+    plates: tuple[str, ...] | None = Field(
+        default=None, strict=False, description='plates that are used: `["plate 1", "plate 2"]`; left out: all'
+    )
     date: datetime.date | None = Field(
         default=None, description="day of the recording, 2026-05-03; left out: as stated in the recordings"
     )

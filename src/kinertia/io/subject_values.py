@@ -5,6 +5,7 @@ import os
 from pathlib import Path
 from typing import Annotated, Literal
 
+import numpy as np
 from pydantic import BeforeValidator, ValidationInfo
 
 from kinertia.findings.finding import Severity, with_evidence
@@ -13,6 +14,7 @@ from kinertia.findings.where import Where
 from kinertia.io.file_names import missing_file, path_from
 from kinertia.io.marker_set_file import preset_names
 from kinertia.settings import folder_of
+from kinertia.trial.gait_event import StatedContact
 
 
 class CodedError(ValueError):
@@ -74,10 +76,27 @@ def _one_belt_speed(value: object) -> float:
     raise ValueError("must be a belt's speed in m/s (up to 15), of two belts {right=1.2, left=0.6}, or a file")
 
 
+def _stated_contacts(value: object) -> tuple[StatedContact, ...]:
+    if not isinstance(value, list | tuple) or not value:
+        raise ValueError(_CONTACT)
+    return tuple(one if isinstance(one, StatedContact) else _stated_contact(one) for one in value)
+
+
+def _stated_contact(value: object) -> StatedContact:
+    match value:
+        case {"plate": str(plate), "foot": "right" | "left" | "none" as foot, **others}:
+            span = _window(others.pop("window_s", (-np.inf, np.inf)))
+            if not others:
+                return StatedContact(plate, {"right": 0, "left": 1}.get(foot), span)
+    raise ValueError(_CONTACT)
+
+
+_CONTACT = 'must be like [{plate="plate 1",foot="right",window_s=[0.4,1.1]}]; foot "right", "left" or "none"'
 File = Annotated[Path, BeforeValidator(_file)]
 MarkerSetName = Annotated[str | Path, BeforeValidator(_marker_set)]
 TrialName = Annotated[str, BeforeValidator(_trial_name)]
 Window = Annotated[tuple[float, float], BeforeValidator(_window)]
+StatedContacts = Annotated[tuple[StatedContact, ...], BeforeValidator(_stated_contacts)]
 LengthUnit = Literal["mm", "cm", "m"]
 BeltSpeed = Annotated[float | tuple[float, float] | Path, BeforeValidator(_belt_speed)]
 

@@ -27,7 +27,7 @@ from kinertia.trial import display
 from kinertia.trial.belt import Belt
 from kinertia.trial.file_outputs import FileOutputs
 from kinertia.trial.force_spikes import ForceSpike
-from kinertia.trial.gait_event import FileEvent
+from kinertia.trial.gait_event import FileEvent, StatedContact
 from kinertia.trial.impossible_data import impossible_markers, impossible_plates
 from kinertia.trial.sampled_time import nearest_samples, windows, within
 from kinertia.trial.unloaded_level import UnloadedReading
@@ -189,6 +189,11 @@ class PlateLoads:
         """Force and moment of each plate (k, p, 6), N and N m."""
         return np.concatenate([self.force, self.moment], axis=-1)
 
+    def cut(self, start_s: float, end_s: float) -> PlateLoads:
+        """Return the samples with start_s <= time <= end_s."""
+        keep = within(self.time, start_s, end_s)
+        return replace(self, time=self.time[keep], force=self.force[keep], moment=self.moment[keep])
+
 
 @dataclass(frozen=True, eq=False)
 class Recording:
@@ -208,6 +213,7 @@ class Recording:
         belt: the treadmill's, where its speed is stated.
         events: gait events stated in the file, in order of time.
         outputs: angles, moments and powers that other software left in the file, if any.
+        stated_contacts: whose foot loads are, where the user states it.
 
     Raises:
         TrialError: times do not increase evenly, marker positions are infinite, forces are not numbers, or two plates
@@ -232,6 +238,7 @@ class Recording:
     belt: Belt | None = None
     events: tuple[FileEvent, ...] = ()
     outputs: FileOutputs | None = None
+    stated_contacts: tuple[StatedContact, ...] = ()
 
     def __post_init__(self) -> None:
         markers, plates = self.markers, self.plates

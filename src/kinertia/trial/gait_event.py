@@ -1,8 +1,10 @@
-"""Defines `GaitEvent` and `FileEvent`: a foot strike or foot off, as measured and as a file states it."""
+"""Defines `GaitEvent`, `FileEvent` and `StatedContact`: ground contact as measured, in a file, and stated."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
+
+import numpy as np
 
 EventKind = Literal["heel strike", "toe off"]
 
@@ -51,3 +53,17 @@ class FileEvent:
     def of_gait(self) -> GaitEvent | None:
         """The event as a `GaitEvent`; None for a general one."""
         return None if self.kind is None or not self.side else GaitEvent(self.time_s, self.side, self.kind)
+
+
+class StatedContact(NamedTuple):
+    """Statement of the user whose foot a load is.
+
+    Attributes:
+        plate: name of the plate.
+        foot: 0 right, 1 left; None: no foot of this person's, so that the load is not used.
+        span_s: first and last time (s).
+    """
+
+    plate: str
+    foot: int | None
+    span_s: tuple[float, float] = (-np.inf, np.inf)

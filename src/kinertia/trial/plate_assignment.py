@@ -92,9 +92,11 @@ def assign_plates(recording: Recording, feet: FootMarkers) -> tuple[FootLoads, t
     sample; while both feet stand on one plate, as in double support on a treadmill with one belt, the
     whole load counts for the nearer one, since only the sum is known: these samples are `on_shared_plate`.
 
+    What the user states (`Recording.stated_contacts`) takes precedence, sample by sample.
+
     Returns:
         the loads by foot, on the plates' time base, and findings: P273 short loads, P275 feet in turn, P277 declared
-        for the other foot.
+        for the other foot, P286 stated by the user.
 
     Raises:
         TrialError: P271, the recording has no force plates.
@@ -126,6 +128,7 @@ def assign_plates(recording: Recording, feet: FootMarkers) -> tuple[FootLoads, t
                 covered[piece],
                 height_m,
             )
+            nearer = _as_stated(recording, name, plates.time[piece], nearer)
             feet_of.append(nearer)
             on_shared_plate[piece] |= _changing(plates.time[piece], nearer)
             for foot in range(2):
@@ -135,10 +138,34 @@ def assign_plates(recording: Recording, feet: FootMarkers) -> tuple[FootLoads, t
                 on_plate[piece, foot] = np.where(vertical > most[piece, foot], p, on_plate[piece, foot])
                 most[piece, foot] = np.maximum(most[piece, foot], vertical)
         findings += _sorted_otherwise(where, plates.time, contacts, feet_of, plates.declared_feet[p])
+    findings += _stated(recording)
     noise_n = max(plates.noise_n or (0.0,))
     held = _held(plates.time, on_plate)
     both = on_shared_plate if on_shared_plate.any() else None
     return FootLoads(plates.time, force, moment, plates.names, held, noise_n, both, plates.corners), tuple(findings)
+
+
+def _as_stated(
+    recording: Recording, plate: str, time: FloatArray, nearer: npt.NDArray[np.int_]
+) -> npt.NDArray[np.int_]:
+    """Return the feet (k,) with those that the user states for this plate; -1 for no foot."""
+    result = nearer.copy()
+    for one in recording.stated_contacts:
+        if one.plate == plate:
+            result[within(time, *one.span_s)] = -1 if one.foot is None else one.foot
+    return result
+
+
+def _stated(recording: Recording) -> list[Finding]:
+    """Make P286 for each load whose foot the user states."""
+    time = recording.markers.time
+    found = []
+    for one in recording.stated_contacts:
+        span = (max(one.span_s[0], float(time[0])), min(one.span_s[1], float(time[-1])))
+        foot = "no foot" if one.foot is None else f"the {FOOT_NAMES[one.foot]} foot"
+        where = Where(trial=recording.name, plate=one.plate, span_s=span)
+        found.append(finding("P286", where, foot=Quantity(foot)))
+    return found
 
 
 def _changing(time: FloatArray, nearer: npt.NDArray[np.int_]) -> BoolArray:

@@ -1,4 +1,4 @@
-"""Makes plate names unique to a trial when there are several trials.
+"""Selects plates by name, and makes plate names unique to a trial when there are several trials.
 
 Plates of C3D files are the laboratory's and have the same names in all trials. Columns of force files may stand for
 feet rather than plates: each trial's columns count as plates of their own, until the user states that they are the
@@ -7,13 +7,39 @@ same.
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
-from kinertia.trial.data import Recording
+from kinertia.trial.data import PlateLoads, Recording
 
 
 def plate_of_trial(column: str, trial: str) -> str:
     """Return the name of a force file's column, made unique by the name of its trial."""
     return f"{column} ({trial})"
+
+
+def selected(plates: PlateLoads, names: Sequence[str]) -> PlateLoads:
+    """Return the plates of these names alone, in the order of the recording."""
+    kept = [p for p, name in enumerate(plates.names) if name in names]
+
+    def own(values: Sequence[Any] | None) -> Any:
+        return None if values is None else tuple(values[p] for p in kept)
+
+    torques = plates.torques and [
+        one._replace(belongs_to=kept.index(one.belongs_to) if one.belongs_to in kept else None)
+        for one in plates.torques
+    ]
+    return PlateLoads(
+        plates.time,
+        own(plates.names),
+        plates.force[:, kept],
+        plates.moment[:, kept],
+        own(plates.declared_feet),
+        None if plates.corners is None else plates.corners[kept],
+        own(plates.noise_n),
+        own(plates.unloaded),
+        own(plates.spikes),
+        None if torques is None else tuple(torques[p] for p in kept),
+    )
 
 
 def with_plates_of_trial(recording: Recording) -> Recording:
@@ -27,7 +53,8 @@ def with_plates_of_trial(recording: Recording) -> Recording:
     plates = recording.plates
     if plates is not None:
         plates = replace(plates, names=tuple(plate_of_trial(name, recording.name) for name in plates.names))
-    return replace(recording, plates=plates, findings=findings)
+    stated = tuple(one._replace(plate=plate_of_trial(one.plate, recording.name)) for one in recording.stated_contacts)
+    return replace(recording, plates=plates, findings=findings, stated_contacts=stated)
 
 
 def columns_of_several_trials(plates: Sequence[str]) -> tuple[tuple[int, ...], ...]:

@@ -53,7 +53,7 @@ def prepare_subject(
     measures = _measures(wanted)
     screened = screen(read_person(wanted, progress).with_overrule(overrule or Overrule()))
     ready = with_attached(_with_known_body(prepared(screened, wanted.settings, progress), wanted, measures))
-    if known.model_copy(update={"date": None, "zeroed": False}) == InstrumentsFiles():
+    if known.model_copy(update={"date": None, "zeroed": False, "plates": None}) == InstrumentsFiles():
         return ready
     if wanted.settings.method == "two-level":
         return _with_unused(ready, "[instruments]")

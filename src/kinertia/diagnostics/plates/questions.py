@@ -16,6 +16,7 @@ from kinertia.diagnostics.plates.gains import gains
 from kinertia.diagnostics.plates.ground_contact import both_feet, complete_contact, plate_edges
 from kinertia.diagnostics.plates.mains_interference import mains_interference
 from kinertia.diagnostics.plates.quantisation import quantisation
+from kinertia.diagnostics.plates.repeated_plates import repeated_plates
 from kinertia.diagnostics.plates.signals import signals, spikes
 from kinertia.diagnostics.plates.vertical_moment import vertical_moment
 from kinertia.diagnostics.plates.zeros import unloaded_levels, zeros
@@ -44,6 +45,7 @@ _NO_VELOCITY = ("L20", "M12", "M14", "P10", "P20", "P24", "T201", "T211", "T212"
 
 SIGNAL_QUESTIONS: tuple[Question[RecordingContext], ...] = (
     Question("P20", axes_and_units),
+    Question("P28", repeated_plates),
     Question("P10", signals, unless=_OTHER_AXES),
     Question("P10", quantisation, unless=_OTHER_AXES),
     Question("P10", mains_interference, unless=_OTHER_AXES),

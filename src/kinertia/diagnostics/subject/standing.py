@@ -11,6 +11,7 @@ from kinertia.estimation.simultaneous.model_uncertainty import JOINT_CENTRE_SD_M
 from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.motion.stance_pose import hidden_landmarks
+from kinertia.trial.stillness import still_span_s
 
 _LOWEST_M = (0.008, 0.050)
 """A marker's own radius is 5 mm and more; soles are under both feet, and markers on the side of a foot are low.
@@ -27,10 +28,15 @@ _WHILE_STANDING, _IN_MOTION = 50.0, 10.0
 
 
 def standing(context: RecordingContext) -> Iterator[Finding]:
-    """Report S201: a person who walks in the static trial."""
-    if context.travel.kind == "walks":
-        distance = Quantity(context.travel.distance_m, "m", limit=_WALK_M, usual=(0.0, 0.03))
-        yield finding("S201", context.at(), distance_m=distance)
+    """Report S201: a person who walks in the static trial, with the part in which they stand."""
+    if context.travel.kind != "walks":
+        return
+    distance = Quantity(context.travel.distance_m, "m", limit=_WALK_M, usual=(0.0, 0.03))
+    span = still_span_s(context.markers)
+    action = "Give the standing trial, or none"
+    if span is not None:
+        action = f"Use the part in which the person stands: window_s = [{span[0]:.2f}, {span[1]:.2f}] under [model]"
+    yield finding("S201", context.at(span_s=span), distance_m=distance, action=Quantity(action))
 
 
 def no_static(context: PersonContext) -> Iterator[Finding]:
