@@ -283,14 +283,16 @@ class RecordingContext:
         trial = self.trial
         if trial is None or self.window_s is not None:
             return trial
-        measured = trial.measured.copy()
+        time, legs = trial.markers.time, trial.known_legs.copy()
         for one in self.overhangs:
-            measured &= True if one.unmeasured_s is None else ~within(trial.markers.time, *one.unmeasured_s)
+            if one.unmeasured_s is not None:
+                legs[:, one.foot] &= ~within(time, *one.unmeasured_s)
         for contact in self.foreign_contacts:
-            measured &= ~within(trial.markers.time, contact.time[0], contact.time[-1])
+            legs[:, contact.foot] &= ~within(time, contact.time[0], contact.time[-1])
+        measured = trial.measured & legs.all(axis=1)
         if measured.sum() < FEWEST_MEASURED:
             return None
-        return trial if np.array_equal(measured, trial.measured) else replace(trial, measured=measured)
+        return trial if np.array_equal(legs, trial.known_legs) else replace(trial, measured=measured, leg_known=legs)
 
     @cached_property
     def foreign_load(self) -> ForeignLoad | None:

@@ -208,7 +208,7 @@ class _Source:
         self.motion = [interpolate(own[part], trial.motion.q[part]) for part in parts]
         self.loads = self._by_interval(partial(make_interp_spline, k=3), trial.joint_loads[stage])
         spread, linear = trial.deviations if stage == "estimate" else None, partial(make_interp_spline, k=1)
-        self.spread = None if spread is None else [self._by_interval(linear, each) for each in vars(spread).values()]
+        self.spread = None if spread is None else [self._by_interval(linear, each) for each in spread.curves]
 
     def angle(self, time: np.ndarray) -> np.ndarray:
         """Return coordinates (n, c); those of IK + ID wherever inverse kinematics determined them."""
@@ -225,7 +225,7 @@ class _Source:
     def deviations(self, time: np.ndarray) -> CurveDeviations:
         """Return standard deviations of all curves; NaN if there are none."""
         if self.spread is None:
-            return CurveDeviations.filled(len(time), len(self.kinematics.ik.coordinates), np.nan)
+            return CurveDeviations.filled(len(time), len(self.kinematics.ik.coordinates), 0, np.nan)
         return CurveDeviations(*(self._measured(time, each) for each in self.spread))
 
     def force(self, time: np.ndarray) -> np.ndarray:

@@ -17,6 +17,7 @@ from kinertia.estimation.figure_names import FitPictures
 from kinertia.estimation.gait_scores import GaitProfile, with_norms
 from kinertia.estimation.identifiability import evidence
 from kinertia.estimation.input_checks import known
+from kinertia.estimation.joint_curves import JointCurves
 from kinertia.estimation.simultaneous.calibration_entry import calibration_columns
 from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
 from kinertia.estimation.simultaneous.fit import Posterior
@@ -49,8 +50,9 @@ class TrialFit:
         motion: estimated coordinates (rad, m), and their derivatives as OpenSim's tools compute them from
             `kinematics.mot`, by natural quintic splines through the frames. They differ from the estimate's own in the
             first and last frames only.
-        course: (f, c) coordinates of all frames from the first to the last of these (`kinematics.course_time`),
-            including those between measured windows; None after two-level, which has none there.
+        course: (f, c) coordinates of all frames in which any joint's load is known, and between them
+            (`kinematics.course_time`),
+            including those between measured windows and around them; None after two-level, which has none there.
         motion_hz: bandwidth of the motion.
         reactions: the corresponding ground reactions at the plates' rate, corrected for instrument errors.
         residuals: root residual (w, 6: force N, moment N m about the pelvis origin, ground axes) per stage:
@@ -65,6 +67,8 @@ class TrialFit:
             `moment_sd` return them as tables.
         marker_errors_m: distances (w, m) between measured and model markers per stage: "ik", "final".
         seconds: computing time per stage.
+        joint_curves: joint loads in three dimensions at the frames of `course`, wherever they are known; None after
+            two-level and in older files.
 
     Examples:
         >>> trial = fit.trials[0]  # fit = kinertia.fit_subject("subject.toml")
@@ -84,6 +88,7 @@ class TrialFit:
     marker_errors_m: Mapping[str, np.ndarray]
     seconds: Mapping[str, float]
     course: np.ndarray | None = None
+    joint_curves: JointCurves | None = None
 
     @property
     def name(self) -> str:

@@ -1,22 +1,26 @@
-"""Computes the whole load of a leg joint; generalised forces contain only its parts along the joint's own axes."""
+"""Computes the whole load of a joint; generalised forces contain only its parts along the joint's own axes."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Joint, Pose, Skeleton
 from kinertia.motion.dynamics import Motion, root_regressor
 from kinertia.trial.data import FEET
 
+_APART_DEG = 45.0
+
 
 @dataclass(frozen=True, eq=False)
-class LegJoint:
-    """Hip, knee or ankle of one leg.
+class BodyJoint:
+    """Hip, knee or ankle of one leg, or the lumbar joint.
 
     Attributes:
-        name: "Hip", "Knee" or "Ankle".
-        side: "r" or "l".
+        name: "Hip", "Knee", "Ankle" or "Lumbar".
+        side: "r", "l", or "" for the lumbar joint.
         parent, child: segments that it connects; for the ankle shank and foot, with any bodies between them.
         joints: its joints in the skeleton, in order: for the ankle talocrural and subtalar.
     """
@@ -26,6 +30,11 @@ class LegJoint:
     parent: str
     child: str
     joints: tuple[Joint, ...]
+
+    @property
+    def label(self) -> str:
+        """Name in tables: "knee_r", "lumbar"."""
+        return f"{self.name.lower()}_{self.side}".rstrip("_")
 
     def columns(self, skeleton: Skeleton) -> list[int]:
         """Return the columns of its coordinates in q."""
@@ -40,7 +49,7 @@ class LegJoint:
         return result
 
 
-def leg_joints(skeleton: Skeleton) -> tuple[LegJoint, ...]:
+def leg_joints(skeleton: Skeleton) -> tuple[BodyJoint, ...]:
     """Return hip, knee and ankle of both legs, right first; empty if a leg lacks three joints in a row."""
     by_child = {joint.child: joint for joint in skeleton.joints}
     found = []
@@ -53,18 +62,49 @@ def leg_joints(skeleton: Skeleton) -> tuple[LegJoint, ...]:
         if len(path) < 3:
             return ()
         for name, joints in (("Hip", path[:1]), ("Knee", path[1:2]), ("Ankle", path[2:])):
-            found.append(LegJoint(name, side, joints[0].parent, joints[-1].child, tuple(joints)))
+            found.append(BodyJoint(name, side, joints[0].parent, joints[-1].child, tuple(joints)))
     return tuple(found)
 
 
+def lumbar_joint(skeleton: Skeleton) -> BodyJoint | None:
+    """Return the joint between pelvis and trunk: of those that carry no foot, the one with most beyond it."""
+    pelvis, found = skeleton.segments[0], []
+    for joint in skeleton.joints:
+        own = BodyJoint("Lumbar", "", joint.parent, joint.child, (joint,))
+        beyond = {skeleton.segments[row] for row in _beyond(skeleton, own)}
+        if joint.parent == pelvis and not beyond & set(skeleton.feet):
+            found.append((len(beyond), own))
+    return max(found, key=lambda each: each[0])[1] if found else None
+
+
+def body_joints(skeleton: Skeleton) -> tuple[BodyJoint, ...]:
+    """Return `leg_joints` and the lumbar joint whose segments have axes forward, up and right (as ISB's) in neutral."""
+    lumbar, legs = lumbar_joint(skeleton), leg_joints(skeleton)
+    upright = legs if legs and axes_alike(skeleton, legs) else ()
+    return upright + ((lumbar,) if lumbar is not None and axes_alike(skeleton, [lumbar]) else ())
+
+
+def axes_alike(skeleton: Skeleton, joints: Sequence[BodyJoint]) -> bool:
+    """Decide whether the joints' segments have axes forward, up and right where all coordinates are zero."""
+    rotation = skeleton.pose(np.zeros((1, len(skeleton.coordinates)))).rotation[0]
+    rows = [[skeleton.segments.index(name) for name in (joint.parent, joint.child)] for joint in joints]
+    turns = np.stack([rotation[parent].T @ rotation[child] for parent, child in rows])
+    return bool(np.degrees(Rotation.from_matrix(turns).magnitude()).max() < _APART_DEG)
+
+
 def joint_wrenches(
-    skeleton: Skeleton, bsp: BodySegmentParameters, motion: Motion, foot_loads: np.ndarray
-) -> dict[LegJoint, np.ndarray]:
+    skeleton: Skeleton,
+    bsp: BodySegmentParameters,
+    motion: Motion,
+    foot_loads: np.ndarray,
+    joints: Sequence[BodyJoint] | None = None,
+) -> dict[BodyJoint, np.ndarray]:
     """Compute force (N) of the proximal on the distal segment and moment (N m) about joint centres (n, 6), ground axes.
 
     Args:
         skeleton, bsp, motion: as in `residual`.
         foot_loads: (n, 2, 6) on right and left foot: force (N), moment about the ground origin (N m).
+        joints: those to compute; `leg_joints` if None.
     """
     pose, about = skeleton.pose(motion.q), skeleton.root.centre(motion.q)
     needed = np.zeros((len(skeleton.segments), len(motion.q), 6))
@@ -76,14 +116,15 @@ def joint_wrenches(
     ground = np.concatenate([foot_loads[..., :3], foot_loads[..., 3:]], axis=-1).copy()
     ground[..., 3:] -= np.cross(about[:, None], ground[..., :3])
     result = {}
-    for joint in leg_joints(skeleton):
-        load = needed[_beyond(skeleton, joint)].sum(axis=0) - ground[:, FEET.index(joint.side)]
+    for joint in leg_joints(skeleton) if joints is None else joints:
+        load = needed[_beyond(skeleton, joint)].sum(axis=0)
+        load -= ground[:, FEET.index(joint.side)] if joint.side else 0.0
         load[:, 3:] -= np.cross(joint.centre(skeleton, pose) - about, load[:, :3])
         result[joint] = load
     return result
 
 
-def _beyond(skeleton: Skeleton, joint: LegJoint) -> list[int]:
+def _beyond(skeleton: Skeleton, joint: BodyJoint) -> list[int]:
     """Return the rows of the segments distal to a joint."""
     carried = {joint.joints[0].child}
     for each in skeleton.joints:  # parents before children

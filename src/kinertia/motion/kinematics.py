@@ -24,9 +24,9 @@ from kinertia.motion.dynamics import Motion
 from kinertia.motion.inverse_kinematics import InverseKinematics, solve_ik
 from kinertia.motion.single_blas_thread import one_blas_thread
 from kinertia.motion.smoothing import SmoothedSpline, SmoothingError, smooth
-from kinertia.trial.data import Markers, Trial
+from kinertia.trial.data import LOAD_THRESHOLD_N, Markers, Trial
 from kinertia.trial.foot_motion import AROUND_LOAD_S
-from kinertia.trial.sampled_time import TIME_TOLERANCE_S, runs, span_s, within
+from kinertia.trial.sampled_time import TIME_TOLERANCE_S, nearest_samples, runs, span_s, within
 
 LONGEST_BRIDGE_S = 0.1
 """The spline may bridge a coordinate that the visible markers do not determine for at most this long."""
@@ -34,6 +34,8 @@ FEWEST_FRAMES = 11
 """Fewest frames of a window."""
 AROUND_WINDOW_S = AROUND_LOAD_S
 """Samples this near the measured window help to determine the motion at its ends."""
+AROUND_CONTACT_S = 0.5
+"""Joint moments are reported up to this long before and after a contact with a plate: most of a swing phase."""
 END_PERIODS = 0.5
 """The window is this share of the cutoff's period away from the ends of the record, where accelerations are poor.
 
@@ -53,6 +55,8 @@ class Kinematics:
         cutoff_hz: of the coordinates and the ground reactions.
         windows_s: first and last time of every window in which all ground contact is measured and all coordinates are
             known, with accelerations; in order.
+        known: (n, c) marker frames in which the generalised force of each coordinate can be known (`known_forces`);
+            None in older files: as `windows_s`.
         notes: assumptions made so far.
         findings: which frames are used, and where inverse kinematics did not converge; the trial has its own findings.
     """
@@ -65,6 +69,7 @@ class Kinematics:
     windows_s: tuple[tuple[float, float], ...]
     notes: tuple[str, ...]
     findings: tuple[Finding, ...] = ()
+    known: np.ndarray | None = None
 
     @property
     def window_s(self) -> tuple[float, float]:
@@ -86,10 +91,38 @@ class Kinematics:
         result: np.ndarray = self.trial.markers.time[self.frames]
         return result
 
+    @cached_property
+    def known_frames(self) -> np.ndarray:
+        """Mask (n,) of the marker frames in which the generalised force of any coordinate is known."""
+        inside = self.inside(self.trial.markers.time)
+        return inside if self.known is None else inside | self.known.any(axis=1)
+
+    @cached_property
+    def course_frames(self) -> slice:
+        """The f marker frames from the first to the last one in `known_frames`."""
+        frames = np.flatnonzero(self.known_frames)
+        return slice(int(frames[0]), int(frames[-1]) + 1)
+
     @property
     def course_time(self) -> np.ndarray:
-        """Times (f,) s of all frames from the first to the last one inside the measured windows."""
-        return self.trial.markers.time[self.frames[0] : self.frames[-1] + 1]
+        """Times (f,) s of `course_frames`."""
+        return self.trial.markers.time[self.course_frames]
+
+    @property
+    def course_known(self) -> np.ndarray:
+        """Mask (f, c) of `course_frames` in which the generalised force of each coordinate is known."""
+        inside = self.inside(self.course_time)[:, None]
+        if self.known is None:
+            return np.repeat(inside, len(self.ik.coordinates), axis=1)
+        return self.known[self.course_frames] | inside
+
+    @cached_property
+    def span_s(self) -> tuple[float, float]:
+        """First and last time of the samples that determine the motion: of `course_frames` and somewhat around them."""
+        (start, end), own = self.window_s, self.course_time
+        ends_s = END_PERIODS / self.cutoff_hz
+        first, last = min(start - AROUND_WINDOW_S, own[0] - ends_s), max(end + AROUND_WINDOW_S, own[-1] + ends_s)
+        return float(first), float(last)
 
     @cached_property
     def intervals(self) -> tuple[slice, ...]:
@@ -110,17 +143,16 @@ class Kinematics:
     def smoothed_loads(self, cutoff_hz: float) -> SmoothedSpline:
         """Return ground reactions (12: right force and moment, left force and moment) as functions of time.
 
-        Samples between the windows, and up to AROUND_WINDOW_S outside them, are used: a plate may not have measured all
-        ground contact there, but its load still continues.
+        Samples between the windows and around them are used: a plate may not have measured all ground contact there,
+        but its load still continues.
         """
         loads, near = self.trial.loads, self.near_window
         return smooth(loads.time[near], loads.wrench[near].reshape(-1, 12), cutoff_hz)
 
     @cached_property
     def near_window(self) -> np.ndarray:
-        """Mask (k,) of samples of the ground reactions at most AROUND_WINDOW_S before or after the windows."""
-        time, (start, end) = self.trial.loads.time, self.window_s
-        return within(time, start - AROUND_WINDOW_S, end + AROUND_WINDOW_S)
+        """Mask (k,) of samples of the ground reactions in `span_s`."""
+        return within(self.trial.loads.time, *self.span_s)
 
 
 def inside(time: np.ndarray, windows_s: Sequence[tuple[float, float]]) -> np.ndarray:
@@ -173,17 +205,54 @@ def solve_kinematics(
         part = Where(part=ik.coordinates[error.column])
         code = "R102" if error.n_visible else "R103"
         raise TrialError.found(trial.name, code, part, frames=Quantity(error.n_visible, "1")) from error
-    known = np.all(_bridged(np.isfinite(ik.q), ik.time), axis=1)
-    known &= (
+    seen = _bridged(np.isfinite(ik.q), ik.time)
+    seen[
         np.abs(ik.time - ik.time[shown].mean())
-        <= np.ptp(ik.time[shown]) / 2 - END_PERIODS / cutoff.hz + TIME_TOLERANCE_S
-    )
-    windows, findings = _long_enough(trial, known & trial.measured, known)
+        > np.ptp(ik.time[shown]) / 2 - END_PERIODS / cutoff.hz + TIME_TOLERANCE_S
+    ] = False
+    whole = seen.all(axis=1)
+    windows, findings = _long_enough(trial, whole & trial.measured, whole)
     stuck = int((~ik.converged[solved]).sum())
     if stuck:
         findings.append(finding("R105", Where(trial=trial.name), frames=Quantity(stuck, "1")))
     remarks = [f"{trial.name}: {cutoff.sentence}"] if cutoff.sentence else []
-    return Kinematics(trial, turned_deg, ik, spline, cutoff.hz, windows, (*trial.notes, *remarks), tuple(findings))
+    notes = (*trial.notes, *remarks)
+    known = known_forces(skeleton, trial, seen)
+    return Kinematics(trial, turned_deg, ik, spline, cutoff.hz, windows, notes, tuple(findings), known)
+
+
+def known_forces(skeleton: Skeleton, trial: Trial, seen: np.ndarray) -> np.ndarray:
+    """Return the mask (n, c) of marker frames in which the generalised force of each coordinate can be known.
+
+    It needs only what is distal to the coordinate: the motion of these segments, and the loads on the feet among them.
+    A leg on its plate, or in the air, is enough for the joints of this leg; trunk and arms need no plate. The pelvis'
+    own coordinates need everything and are known in the measured windows only, which this mask does not include.
+    Frames more than AROUND_CONTACT_S from any contact with a plate are left out.
+
+    Args:
+        skeleton: the model.
+        trial: with the frames in which the load on each leg is known.
+        seen: (n, c) whether markers show each coordinate, with accelerations.
+    """
+    moves = np.zeros((len(skeleton.segments), len(skeleton.coordinates)), dtype=bool)
+    np.logical_or.at(moves, (slice(None), skeleton.map.owner), skeleton.support)
+    needed = moves.T.astype(int) @ moves.astype(int) > 0  # coordinates that move any segment that this one moves
+    known = np.stack([seen[:, own].all(axis=1) for own in needed], axis=1)
+    for foot, segment in enumerate(skeleton.feet):
+        known[:, moves[skeleton.segments.index(segment)]] &= trial.known_legs[:, foot, None]
+    known[:, : len(skeleton.joints[0].axes)] = False  # the measured windows are added to it
+    return known & _near_contacts(trial)[:, None]
+
+
+def _near_contacts(trial: Trial) -> np.ndarray:
+    """Return the mask (n,) of marker frames at most AROUND_CONTACT_S from a foot's contact with a plate."""
+    time, loaded = trial.loads.time, (trial.loads.force[:, :, 1] >= LOAD_THRESHOLD_N).any(axis=1)
+    if not loaded.any():
+        return np.zeros(len(trial.markers.time), dtype=bool)
+    contact = time[loaded]
+    nearest = contact[nearest_samples(contact, trial.markers.time)] if len(contact) > 1 else contact
+    result: np.ndarray = np.abs(nearest - trial.markers.time) <= AROUND_CONTACT_S + TIME_TOLERANCE_S
+    return result
 
 
 def _bridged(known: np.ndarray, time: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ are positive. Moments (N m/kg) are internal, about the axes of the angles (flexi
 the child), and have the signs of the angles; forces (N/kg) are in the distal segment's axes x, y, z.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol, get_args
 
@@ -20,7 +20,7 @@ from scipy.spatial.transform import Rotation
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Pose, Skeleton
 from kinertia.motion.dynamics import Motion
-from kinertia.motion.joint_wrench import LegJoint, joint_wrenches, leg_joints
+from kinertia.motion.joint_wrench import BodyJoint, axes_alike, joint_wrenches, leg_joints
 from kinertia.trial.data import FEET
 
 Convention = Literal["plug-in-gait", "isb"]
@@ -35,7 +35,6 @@ UNITS: dict[Convention, dict[str, str]] = {
 _BENDS = {"Hip": 1.0, "Knee": -1.0, "Ankle": 1.0}
 """Sign of flexion (dorsiflexion) about the axis to the right."""
 _STEP_RAD = 1e-5
-_APART_DEG = 45.0
 _UNMOVED = 0.2
 """An angle that no coordinate changes by more has no standard deviation: the model fixes it."""
 _OUT_OF_REACH = 0.5
@@ -116,7 +115,7 @@ def model_outputs(
         departures: show correlations of a joint's axes; if None, their errors are assumed independent.
     """
     joints = leg_joints(skeleton)
-    if not joints or not _alike(skeleton, joints):
+    if not joints or not axes_alike(skeleton, joints):
         return []
     wrenches = joint_wrenches(skeleton, bsp, motion, foot_loads)
     pose, clinical = skeleton.pose(motion.q), convention == "plug-in-gait"
@@ -158,7 +157,7 @@ def plug_in_gait_angles(skeleton: Skeleton, q: np.ndarray, heading_rad: np.ndarr
         heading_rad: (n,) direction of gait, from ground's X axis to the left.
     """
     joints = leg_joints(skeleton)
-    if not joints or not _alike(skeleton, joints):
+    if not joints or not axes_alike(skeleton, joints):
         return {}
     pose = skeleton.pose(q)
     found = _of_pelvis_and_feet(skeleton, pose, True, Rotation.from_euler("Y", heading_rad[:, None]).as_matrix())
@@ -176,20 +175,11 @@ class _NoDeviations:
         self.coordinates = self.moments = self.powers = np.full(q.shape, np.nan)
 
 
-def _alike(skeleton: Skeleton, joints: Iterable[LegJoint]) -> bool:
-    """Decide whether the leg's segments have axes forward, up and right where all coordinates are zero."""
-    pose = skeleton.pose(np.zeros((1, len(skeleton.coordinates))))
-    turns = [
-        _rotation(skeleton, pose, one.parent).swapaxes(1, 2) @ _rotation(skeleton, pose, one.child) for one in joints
-    ]
-    return bool(np.degrees(Rotation.from_matrix(np.concatenate(turns)).magnitude()).max() < _APART_DEG)
-
-
 def _rotation(skeleton: Skeleton, pose: Pose, segment: str) -> np.ndarray:
     return pose.rotation[:, skeleton.segments.index(segment)]
 
 
-def _signs(joint: LegJoint) -> np.ndarray:
+def _signs(joint: BodyJoint) -> np.ndarray:
     """Return the signs (3,) of rotations about axes right, forward and up: flexion, adduction, internal rotation."""
     mirrored = 1.0 if joint.side == "r" else -1.0
     return np.array([_BENDS[joint.name], mirrored, mirrored])
@@ -208,7 +198,9 @@ def _joint_axes(parent: np.ndarray, child: np.ndarray) -> np.ndarray:
     return np.stack([first, floating / np.linalg.norm(floating, axis=1, keepdims=True), last], axis=1)
 
 
-def _moved(skeleton: Skeleton, q: np.ndarray, joint: LegJoint, columns: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
+def _moved(
+    skeleton: Skeleton, q: np.ndarray, joint: BodyJoint, columns: Sequence[int]
+) -> tuple[np.ndarray, np.ndarray]:
     """Return the change of the joint's angles (n, 3, k) and the rotation of the child in ground (n, 3, k).
 
     Both are per unit of the joint's own coordinates.
@@ -263,7 +255,7 @@ def _along(axes: np.ndarray, turning: np.ndarray, covariance: np.ndarray) -> np.
     return np.where(rest.max(axis=0) < _OUT_OF_REACH, _root(variance), np.nan)
 
 
-def _as_vicon(joint: LegJoint, force: np.ndarray) -> np.ndarray:
+def _as_vicon(joint: BodyJoint, force: np.ndarray) -> np.ndarray:
     """Return components (n, 3) along x, y, z of a segment in Vicon's order and signs; its foot points along z."""
     x, y, z = force.T
     return np.column_stack([-y, -z, x] if joint.name == "Ankle" else [x, -z, y])

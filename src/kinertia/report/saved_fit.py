@@ -6,6 +6,7 @@ from pathlib import Path
 
 from kinertia.errors import FileError
 from kinertia.estimation.identifiability import BaseParameters, Combination
+from kinertia.estimation.joint_curves import JointCurves
 from kinertia.estimation.result import Fit, TrialFit
 from kinertia.estimation.simultaneous.calibration_entry import CalibrationEntry
 from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
@@ -29,6 +30,7 @@ from kinertia.model.skeleton import Axis, Joint, Marker, Skeleton
 from kinertia.motion.dynamics import Motion
 from kinertia.motion.ground_reactions import GroundReactions
 from kinertia.motion.inverse_kinematics import InverseKinematics
+from kinertia.motion.joint_moments import JointMoments
 from kinertia.motion.kinematics import Kinematics
 from kinertia.motion.smoothing import SmoothedSpline
 from kinertia.report.truth_comparison import Truth
@@ -59,7 +61,7 @@ class SavedFit:
 
 
 _KINDS = (
-    SavedFit, Provenance, Truth, Fit, TrialFit, CurveDeviations, Subject, Settings,
+    SavedFit, Provenance, Truth, Fit, TrialFit, JointCurves, JointMoments, CurveDeviations, Subject, Settings,
     Posterior, InstrumentInformation, MarkerNoise, BaseParameters, Combination, Unlikeness, OneSided,
     CalibrationEntry, FreeMomentSign, PosteriorDraws, TrialDraws,
     Skeleton, Joint, Axis, Marker, Range, PiecewisePolynomial, Composed, BodySegmentParameters,

@@ -69,6 +69,12 @@ class GroundContact:
                 measured[first : last + 1] = False
         return measured
 
+    @property
+    def leg_known(self) -> BoolArray:
+        """Mask (n, 2): the whole load on the right, left foot is known, since it is in the air or alone on plates."""
+        result: BoolArray = (self.inside & ~self.on_shared_plate)[:, None] & (self.loaded | ~self.ground)
+        return result
+
 
 def ground_contact(markers: Markers, loads: FootLoads, feet: FootMarkers, belt: Belt | None = None) -> GroundContact:
     """Determine which foot is on the ground, and which on a loaded plate.

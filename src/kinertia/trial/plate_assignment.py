@@ -74,6 +74,8 @@ def build_trial(recording: Recording, feet: FootMarkers, window_s: tuple[float, 
         recording.vertical,
         recording.events,
         recording.outputs,
+        contact.leg_known if window_s is None else None,
+        contact.ground,
     )
 
 

@@ -10,6 +10,7 @@ from kinertia.diagnostics.result.context import ResultContext
 from kinertia.diagnostics.result.questions import ESTIMATE_QUESTIONS, RESULT_QUESTIONS, judged
 from kinertia.diagnostics.runner import explained, overruled, rules_of
 from kinertia.estimation.free_moment_sign import Signed, with_likelier_sign
+from kinertia.estimation.joint_curves import JointCurves
 from kinertia.estimation.prepared import Prepared, Progress
 from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.result import Fit, TrialFit
@@ -174,7 +175,7 @@ def _simultaneous(ready: Prepared, settings: Settings, started: float, progress:
         bandwidths,
         fitted.foot_loads,
         result.reactions,
-        result.curve_deviations,
+        fitted.deviations,
     )
     estimates = [
         _Estimated(skeleton, motion, course, bandwidth.motion_hz, loads, reactions, measured_reactions(k), sd)
@@ -191,11 +192,11 @@ class _Estimated:
     Attributes:
         skeleton: skeleton with the markers at their positions in this trial.
         motion: motion in the measured frames.
-        course: (f, c) coordinates, as in `TrialFit`.
+        course: (f, c) coordinates, as in `TrialFit`; None after two-level.
         motion_hz: bandwidth of the motion.
         foot_loads: (w, 2, 6) at the motion's bandwidth.
         reactions, before: ground reactions for the joint moments after and before the estimate.
-        deviations: SDs of the curves, or None.
+        deviations: SDs of the curves at the frames of `course`, or None.
     """
 
     skeleton: Skeleton
@@ -237,7 +238,10 @@ def _trial_fit(
         "corrected": (before, literature, corrected),
     }
     measured, delivered = (loads.at(k.time) for loads in (after.before, after.reactions))
-    motion = _as_opensim(k, after)
+    course = None if after.course is None else _interpolated(k.course_time, after.course)
+    inner = k.frames - k.course_frames.start
+    motion = _by_windows(k, after.motion) if course is None else course.cut(inner)
+    curves = None if course is None else _joint_curves(before, literature, k, bsp, after, course)
     narrow = {name: residual(*stage, wrench) for name, stage in stages.items()}
     narrow["estimate"] = residual(after.skeleton, bsp, after.motion, after.foot_loads.sum(axis=1))
     full = {name: residual(*stage, measured.sum(axis=1)) for name, stage in stages.items()}
@@ -255,23 +259,40 @@ def _trial_fit(
             "literature": inverse_dynamics(before, literature, k.motion, measured),
             "estimate": inverse_dynamics(after.skeleton, bsp, motion, delivered),
         },
-        deviations=after.deviations,
+        deviations=None if after.deviations is None else after.deviations.at(inner),
         marker_errors_m={
             "ik": _of_worn(k, k.ik.errors_m[k.frames]),
             "final": _marker_errors(after.skeleton, k, after.motion),
         },
         seconds=seconds,
+        joint_curves=curves,
     )
 
 
-def _as_opensim(k: Kinematics, estimated: _Estimated) -> Motion:
-    """Return the motion that OpenSim's tools read from a file of the estimated coordinates, in the measured frames."""
-    if estimated.course is None:
-        return joined([_interpolated(k.time[part], estimated.motion.q[part]) for part in k.intervals])
-    return _interpolated(k.course_time, estimated.course).cut(k.frames - k.frames[0])
+def _joint_curves(
+    before: Skeleton,
+    literature: BodySegmentParameters,
+    k: Kinematics,
+    bsp: BodySegmentParameters,
+    after: _Estimated,
+    course: Motion,
+) -> JointCurves:
+    """Return the joint loads wherever they are known, before and after the estimate."""
+    smoothed = Motion(*(k.spline(k.course_time, order) for order in range(3)))
+    stages = {
+        "literature": (before, literature, smoothed, after.before),
+        "estimate": (after.skeleton, bsp, course, after.reactions),
+    }
+    return JointCurves.of(k, course, stages, after.deviations)
+
+
+def _by_windows(k: Kinematics, motion: Motion) -> Motion:
+    """Return the motion that OpenSim's tools read from a file of the coordinates of the measured windows alone."""
+    return joined([_interpolated(k.time[part], motion.q[part]) for part in k.intervals])
 
 
 def _interpolated(time: np.ndarray, q: np.ndarray) -> Motion:
+    """Return the motion that OpenSim's tools read from a file of coordinates."""
     spline = interpolate(time, q)
     return Motion(*(spline(time, order) for order in range(3)))
 

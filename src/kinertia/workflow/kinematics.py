@@ -46,8 +46,8 @@ def usable_trial(context: RecordingContext) -> Trial:
     assert trial is not None
     seen = trial.markers.seen
     labels = [label for column, label in enumerate(trial.markers.labels) if seen[:, column].any()]
-    measured = (context.trial_on_plates or trial).measured
-    return replace(trial, markers=without_copied_frames(trial.markers.select(labels)), measured=measured)
+    usable = context.trial_on_plates or trial
+    return replace(usable, markers=without_copied_frames(trial.markers.select(labels)))
 
 
 @dataclass(frozen=True, eq=False)

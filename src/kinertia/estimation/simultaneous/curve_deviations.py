@@ -13,12 +13,13 @@ decelerates segments is unknown.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
 from kinertia.estimation.simultaneous.curve_variances import write_variances
 from kinertia.estimation.simultaneous.elimination import Branch, Eliminated
+from kinertia.estimation.simultaneous.knee_geometry import knee_geometry
 from kinertia.estimation.simultaneous.moment_derivatives import MomentDerivatives, MomentsOfTrial
 from kinertia.estimation.simultaneous.motion_spread import EndSpread, MotionSpread
 from kinertia.estimation.simultaneous.normal_equations import write_by_splines
@@ -35,7 +36,7 @@ _LOST_KNOTS = 2.0
 
 @dataclass(frozen=True, eq=False)
 class CurveDeviations:
-    """Posterior standard deviations of a trial's curves at its d dynamic frames.
+    """Posterior standard deviations of a trial's curves at its d reported frames.
 
     Attributes:
         coordinates: (d, c) rad, m.
@@ -43,12 +44,14 @@ class CurveDeviations:
         powers: (d, c) of joint moment times speed, W.
         ground_forces: (d, 2, 3) of the ground reactions on right and left foot, N: from the instrument corrections and
             the plates' own noise.
+        joints: (d, j, 2, 3) of the moments (N m) and forces (N) of `joint_moments`; None in older files.
     """
 
     coordinates: np.ndarray
     moments: np.ndarray
     powers: np.ndarray
     ground_forces: np.ndarray
+    joints: np.ndarray | None = None
 
     def and_of(self, other: CurveDeviations) -> CurveDeviations:
         """Combine with other, independent standard deviations."""
@@ -57,7 +60,8 @@ class CurveDeviations:
     @property
     def curves(self) -> tuple[np.ndarray, ...]:
         """The standard deviations of all curves, in the order of the attributes."""
-        return tuple(getattr(self, field.name) for field in fields(self))
+        every = (getattr(self, field.name) for field in fields(self))
+        return tuple(each for each in every if each is not None)
 
     def roots(self) -> CurveDeviations:
         """Convert variances to standard deviations, in place."""
@@ -66,9 +70,20 @@ class CurveDeviations:
         return self
 
     @classmethod
-    def filled(cls, d: int, c: int, value: float) -> CurveDeviations:
-        """Return standard deviations of so many frames and coordinates that all have this value."""
-        return cls(*(np.full(shape, value) for shape in ((d, c), (d, c), (d, c), (d, 2, 3))))
+    def filled(cls, d: int, c: int, j: int, value: float) -> CurveDeviations:
+        """Return standard deviations of so many frames, coordinates and joints that all have this value."""
+        return cls(*(np.full(shape, value) for shape in ((d, c), (d, c), (d, c), (d, 2, 3), (d, j, 2, 3))))
+
+    def at(self, frames: slice | np.ndarray) -> CurveDeviations:
+        """Return the standard deviations of these frames."""
+        return CurveDeviations(*(each[frames] for each in self.curves))
+
+    def spread_over(self, rows: np.ndarray, count: int) -> CurveDeviations:
+        """Return the standard deviations of `count` frames, of which these (d,) are known; NaN in the others."""
+        result = [np.full((count, *each.shape[1:]), np.nan) for each in self.curves]
+        for into, each in zip(result, self.curves, strict=True):
+            into[rows] = each
+        return CurveDeviations(*result)
 
 
 def curve_deviations(
@@ -92,25 +107,27 @@ def curve_deviations(
             unknowns.
         noise: (3,) `motion_noise`, of errors that do not recur.
     """
-    basis, frames = problem.bases[k], np.flatnonzero(problem.trials[k].dynamic)
-    size = (len(frames), coefficients.shape[1])
+    basis, frames = problem.bases[k], problem.trials[k].curve_frames
     delay_sd_s = float(np.linalg.norm(root[problem.loads.delay_unknowns(k)].sum(axis=0)))
+    moments = MomentsOfTrial(problem, k, static, problem.loads.reactions(k, static), delay_sd_s)
+    joints, (d, c) = moments.virtual.joints, (len(frames), coefficients.shape[1])
     curves = _Curves(
-        MomentsOfTrial(problem, k, static, problem.loads.reactions(k, static), delay_sd_s),
+        moments,
         coefficients,
         np.sqrt(noise),
         frames,
-        block_growth(problem, k, static, problem.trials[k].time[frames]),
-        CurveDeviations.filled(*size, 0.0),
-        np.empty(size),
-        np.empty(size),
+        block_growth(problem, k, static, problem.trials[k].time[frames], joints),
+        CurveDeviations.filled(d, c, len(joints), 0.0),
+        np.empty((d, c + 6 * len(joints))),
+        np.empty((d, c)),
     )
     middle = EndSpread.of_middle(eliminated.middle, root)
     side_by_side(lambda branch: curves.add(branch, root, middle), eliminated.branches)
     variance, around = curves.variance, 1 + 2 * round(_LOST_KNOTS * len(basis.first) / (basis.size - 5))
     lost = even_mean(np.square(curves.impact), around)
-    variance.moments[:] += lost
-    variance.powers[:] += lost * np.square(curves.speed)
+    variance.moments[:] += lost[:, :c]
+    variance.powers[:] += lost[:, :c] * np.square(curves.speed)
+    curves.of_joints[:] += lost[:, c:].reshape(curves.of_joints.shape)
     return variance.roots()
 
 
@@ -122,10 +139,10 @@ class _Curves:
         moments: the joint moments.
         coefficients: as in `curve_deviations`.
         shares: as in `_Seen`.
-        frames: (d,) indices of the dynamic frames.
-        grown: (d, c) factors on the corresponding standard deviations of the moments (`skin_blocks.block_growth`).
+        frames: (d,) indices of the reported frames.
+        grown: (d, r) factors on the corresponding standard deviations of the moments (`skin_blocks.block_growth`).
         variance: of the curves.
-        impact: (d, c) as in `MomentDerivatives`.
+        impact: (d, r) as in `MomentDerivatives`.
         speed: (d, c) of the coordinates.
     """
 
@@ -137,6 +154,12 @@ class _Curves:
     variance: CurveDeviations
     impact: np.ndarray
     speed: np.ndarray
+
+    @property
+    def of_joints(self) -> np.ndarray:
+        """Variances (d, j, 2, 3) of the joints' moments and forces."""
+        assert self.variance.joints is not None
+        return self.variance.joints
 
     def add(self, branch: Branch, root: np.ndarray, end: EndSpread) -> None:
         """Write the variances in the frames of a branch, given the uncertainty of the block in which it ends."""
@@ -157,12 +180,15 @@ class _Curves:
         moments, problem, chosen = self.moments, self.moments.problem, self.frames[rows]
         basis, variance = problem.bases[moments.k], self.variance
         motion = problem.model.full(basis.evaluate(self.coefficients, chosen), moments.static)
-        by = moments.derivatives(motion, chosen)
-        self.impact[rows], self.speed[rows] = by.impact, motion[1][:, problem.moving]
-        values = basis.values[:, chosen]
-        seen = _Seen(by, self.speed[rows], basis.first[chosen], values, self.shares, self.grown[rows])
-        in_root = problem.layout.in_root
+        every, c = moments.derivatives(motion, chosen), len(problem.moving)
+        self.impact[rows], self.speed[rows] = every.impact, motion[1][:, problem.moving]
+        by, values, in_root = every.rows(slice(0, c)), basis.values[:, chosen], problem.layout.in_root
+        seen = _Seen(by, self.speed[rows], basis.first[chosen], values, self.shares, self.grown[rows, :c])
         _write_variances(spread, seen, root[in_root, in_root], variance, rows)
+        joints = replace(seen, by=every.rows(slice(c, None)), grown=self.grown[rows, c:])
+        own = _joint_variances(spread, joints, root[in_root, in_root])
+        own += knee_geometry(moments.virtual.joints, joints.by.value)
+        self.of_joints[rows] = own.reshape(-1, *self.of_joints.shape[1:])
         ground = np.square(by.ground @ root[problem.layout.errors, in_root]).sum(axis=-1) + by.ground_delay_squares
         noise_n = moments.reactions.noise_n * (by.loads[..., :3] != 0.0)
         variance.ground_forces[rows] = ground.reshape(-1, 2, 3) + np.square(noise_n)
@@ -175,13 +201,13 @@ class _Seen:
     """Dependence of the curves on the unknowns in some frames.
 
     Attributes:
-        by: derivatives of the moments (d, c).
+        by: derivatives of the moments (d, r).
         speed: (d, c) of the coordinates.
         first: (d,) the first active spline.
         values: (3, d, 6) of the active splines and their first two derivatives.
         shares: (3,) standard deviations of positions, rates and accelerations due to the markers' errors alone,
             relative to those that the estimate expects.
-        grown: (d, c) as in `_Curves`.
+        grown: (d, r) as in `_Curves`.
     """
 
     by: MomentDerivatives
@@ -218,3 +244,29 @@ def _write_variances(spread: MotionSpread, seen: _Seen, root: np.ndarray, into: 
     place, rate, force, both = sums
     into.coordinates[rows], into.moments[rows] = place, force
     into.powers[rows] = seen.speed**2 * force + by.value**2 * rate + 2.0 * seen.speed * by.value * both
+
+
+def _joint_variances(spread: MotionSpread, seen: _Seen, root: np.ndarray) -> np.ndarray:
+    """Return the variances (d, r) of rows of joints, as `_write_variances` does of those of coordinates."""
+    by, precision = seen.by, spread.carried.dtype
+    (d, r, n), c = by.static.shape, by.q.shape[2]
+    result = by.delay_squares.copy()
+    if not r:
+        return result
+    still = by.static.reshape(-1, n).astype(precision) @ root.astype(precision)
+    starts = np.flatnonzero(np.diff(seen.first, prepend=-1))
+    for start, stop in zip(starts, np.append(starts[1:], d), strict=True):
+        own = slice(start, stop)
+        covariance, carried = spread.active(int(seen.first[start]))
+        values, orders = seen.values[:, own], (by.q[own], by.qd[own], by.qdd[own])
+        by_splines = np.empty((2, stop - start, r, 6, c), precision)
+        write_by_splines(values, *orders, by_splines[0])
+        write_by_splines(seen.shares[:, None, None] * values, *orders, by_splines[1])
+        plain, shaken = by_splines.reshape(2, -1, 6 * c)
+        shaken *= seen.grown[own].reshape(-1, 1)
+        moment = plain @ carried.reshape(6 * c, -1)
+        moment[:, :n] -= still[start * r : stop * r]
+        by_errors = shaken @ covariance.astype(precision)
+        variance = np.einsum("ij,ij->i", moment, moment) + np.einsum("ij,ij->i", by_errors, shaken)
+        result[own] += variance.reshape(-1, r)
+    return result

@@ -10,6 +10,7 @@ from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.simultaneous.bandwidth import Bandwidth
 from kinertia.estimation.simultaneous.calibration_entry import CalibrationEntry
 from kinertia.estimation.simultaneous.cost_term import CostTerm
+from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
 from kinertia.estimation.simultaneous.impacts import down_weighted
 from kinertia.estimation.simultaneous.instrument_errors import OTHER_SIGN
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation
@@ -17,7 +18,7 @@ from kinertia.estimation.simultaneous.marker_noise import MarkerNoise
 from kinertia.estimation.simultaneous.model_evidence import FreeMomentSign
 from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINTY, ModelUncertainty
 from kinertia.estimation.simultaneous.observation import Observations, observe, reading
-from kinertia.estimation.simultaneous.observed_trial import CalibrationPrior
+from kinertia.estimation.simultaneous.observed_trial import CalibrationPrior, Observation
 from kinertia.estimation.simultaneous.outcome import SimultaneousResult
 from kinertia.estimation.simultaneous.posterior_draws import PosteriorDraws
 from kinertia.estimation.simultaneous.prior_plausibility import Unlikeness, unlikeness
@@ -100,8 +101,9 @@ class SimultaneousFit:
         skeletons: the same per trial, with the trial's marker positions.
         posterior: standard deviations and calibration.
         motions: per trial, at the frames of its measured windows.
-        courses: per trial, (f, c) coordinates of all frames from the first to the last of these, since markers also
-            show the motion between measured windows.
+        courses: per trial, (f, c) coordinates of the frames of `Kinematics.course_time`, since markers also show the
+            motion between measured windows and around them.
+        deviations: per trial, standard deviations of the curves in these frames; NaN in those that are not reported.
         foot_loads: per trial (w, 2, 6), corrected in position and time, at the motion's bandwidth.
     """
 
@@ -112,6 +114,7 @@ class SimultaneousFit:
     posterior: Posterior
     motions: tuple[Motion, ...]
     courses: tuple[np.ndarray, ...]
+    deviations: tuple[CurveDeviations, ...]
     foot_loads: tuple[np.ndarray, ...]
 
 
@@ -157,6 +160,8 @@ def fit_simultaneous(
     offsets_m = [0.0 if staying else moved for moved in result.marker_offsets_m]
     dynamic = [np.flatnonzero(o.dynamic) for o in pooled[:count]]
     motions = tuple(m.cut(frames) for m, frames in zip(result.motions, dynamic, strict=True))
+    spans = [_course(one, k) for one, k in zip(pooled, trials, strict=False)]
+    curves = zip(result.curve_deviations, pooled, spans, strict=False)
     return SimultaneousFit(
         result=result,
         bsp=uncertainty.whole(result.bsp),
@@ -164,9 +169,21 @@ def fit_simultaneous(
         skeletons=tuple(calibrated.with_positions(calibrated.marker_locals + moved) for moved in offsets_m),
         posterior=_posterior(result, prior, seen, trials, motions, uncertainty),
         motions=motions,
-        courses=tuple(m.q[at[0] : at[-1] + 1] for m, at in zip(result.motions, dynamic, strict=True)),
+        courses=tuple(m.q[span] for m, span in zip(result.motions, spans, strict=True)),
+        deviations=tuple(sd.spread_over(o.curve_frames - span.start, _size(span)) for sd, o, span in curves),
         foot_loads=tuple(loads[frames] for loads, frames in zip(result.foot_loads, dynamic, strict=True)),
     )
+
+
+def _course(observation: Observation, kinematics: Kinematics) -> slice:
+    """Return the frames of an observation that are those of `Kinematics.course_time`."""
+    time = kinematics.course_time
+    first = int(np.argmin(np.abs(observation.time - time[0])))
+    return slice(first, first + len(time))
+
+
+def _size(span: slice) -> int:
+    return int(span.stop - span.start)
 
 
 def _posterior(

@@ -72,8 +72,9 @@ def moved_moments(
     motion = problem.model.full(problem.bases[k].evaluate(point.coefficients[k], frames), static)
     every = MomentsOfTrial(problem, k, static, problem.loads.reactions(k, static), delay_sd_s)
     by = every.derivatives(motion, frames)
-    change = np.abs(by.static[:, _ROOT:, instruments])
-    result: np.ndarray = (change / (INTERVAL_SD * curves.moments[some][:, _ROOT:, None])).max(axis=(0, 1))
+    change = np.abs(by.static[:, _ROOT : len(problem.moving), instruments])
+    rows = np.searchsorted(problem.trials[k].curve_frames, frames)
+    result: np.ndarray = (change / (INTERVAL_SD * curves.moments[rows][:, _ROOT:, None])).max(axis=(0, 1))
     return result
 
 

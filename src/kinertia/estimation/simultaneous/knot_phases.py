@@ -19,6 +19,8 @@ from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.motion.dynamics import Motion, inverse_dynamics
 from kinertia.motion.frame_chunks import pieces
 from kinertia.motion.ground_reactions import GroundReactions
+from kinertia.motion.joint_moments import joint_moments
+from kinertia.motion.joint_wrench import body_joints
 from kinertia.motion.moving_windows import even_mean
 
 PHASES = (0.5,)
@@ -85,11 +87,12 @@ _KNOTS = 2.0
 
 def curves_apart(problems: Sequence[MapProblem], points: Sequence[Point], k: int) -> CurveDeviations:
     """Return the standard deviations between estimates of the curves of trial k."""
-    frames, basis = np.flatnonzero(problems[0].trials[k].dynamic), problems[0].bases[k]
+    frames, basis = problems[0].trials[k].curve_frames, problems[0].bases[k]
     statics = [problem.in_trial(k, point) for problem, point in zip(problems, points, strict=True)]
     reactions = [problem.loads.reactions(k, static) for problem, static in zip(problems, statics, strict=True)]
     estimates = [(each.coefficients[k], static) for each, static in zip(points, statics, strict=True)]
-    variances = CurveDeviations.filled(len(frames), len(problems[0].moving), 0.0)
+    joints = len(body_joints(problems[0].skeleton))
+    variances = CurveDeviations.filled(len(frames), len(problems[0].moving), joints, 0.0)
     for some in pieces(len(frames)):
         rows = zip(problems, estimates, reactions, strict=True)
         every = [_curves(problem, k, *estimate, loads, frames[some]) for problem, estimate, loads in rows]
@@ -109,11 +112,11 @@ def _curves(
     reactions: GroundReactions,
     frames: np.ndarray,
 ) -> tuple[np.ndarray, ...]:
-    """Return coordinates, moments, powers and ground reactions at these frames of trial k."""
+    """Return coordinates, moments, powers, ground reactions and loads of joints at these frames of trial k."""
     motion = Motion(*problem.model.full(problem.bases[k].evaluate(coefficients, frames), static))
     loads = reactions.at(problem.trials[k].time[frames])
-    moments = inverse_dynamics(problem.model.placed(static), problem.model.bsp(static), motion, loads)[
-        :, problem.moving
-    ]
+    skeleton, bsp = problem.model.placed(static), problem.model.bsp(static)
+    moments = inverse_dynamics(skeleton, bsp, motion, loads)[:, problem.moving]
     q, speed = motion.q[:, problem.moving], motion.qd[:, problem.moving]
-    return q, moments, moments * speed, loads[..., :3]
+    joints = joint_moments(skeleton, bsp, motion, loads)
+    return q, moments, moments * speed, loads[..., :3], np.stack([joints.moments, joints.forces], axis=2)

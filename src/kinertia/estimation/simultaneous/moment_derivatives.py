@@ -1,35 +1,46 @@
-"""Computes joint moments, and the derivatives of moments and ground reactions by all unknowns."""
+"""Computes joint moments, and the derivatives of moments and ground reactions by all unknowns.
+
+Besides the generalised forces these are the three-dimensional moments and forces of `body_joints`, which virtual axes
+give (`virtual_axes`), projected on the axes of the joint coordinate system (`joint_rows`).
+"""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 
 from kinertia.estimation.simultaneous.axis_columns import add_bodies, take_load
 from kinertia.estimation.simultaneous.delayed_loads import DelayedLoads, delayed_loads
 from kinertia.estimation.simultaneous.inputs import BSP, STILL
+from kinertia.estimation.simultaneous.joint_rows import JointRows
 from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.model.log_cholesky import dynamic_jacobian
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion, axis_motion
 from kinertia.motion.ground_reactions import GroundReactions
+from kinertia.motion.joint_wrench import body_joints
 from kinertia.motion.regressor import regressor
 from kinertia.motion.rigid_body import axis_force_derivatives
+from kinertia.motion.virtual_axes import VirtualAxes
 
 
 @dataclass(frozen=True)
 class MomentDerivatives:
-    """Generalised forces at d frames, and their derivatives.
+    """Generalised forces of c coordinates and six components of each of j joints at d frames, and their derivatives.
+
+    The r = c + 6 j rows are those of the coordinates, then of each joint the moments of `joint_moments` about its axes
+    (without their signs) and the forces along them.
 
     Attributes:
-        value: (d, c) the forces themselves, N m and N.
-        q, qd, qdd: (d, c, c) derivatives by the coordinates that move and their rates.
-        static: (d, c, s) derivatives by the static unknowns that root equations depend on.
-        impact: (d, c) contribution of impact transients.
+        value: (d, r) the forces themselves, N m and N.
+        q, qd, qdd: (d, r, c) derivatives by the coordinates that move and their rates.
+        static: (d, r, s) derivatives by the static unknowns that root equations depend on.
+        impact: (d, r) contribution of impact transients.
         loads: (d, 2, 6) on right and left foot, N and N m.
         ground: (d, 6, e) derivatives of the ground reactions on right foot, then left (N), by the instruments' errors.
-        delay_squares, ground_delay_squares: (d, c), (d, 6) mean squares of the remaining effect of the delay of the
+        delay_squares, ground_delay_squares: (d, r), (d, 6) mean squares of the remaining effect of the delay of the
             forces (`DelayedLoads.residual`).
     """
 
@@ -43,6 +54,11 @@ class MomentDerivatives:
     ground: np.ndarray
     delay_squares: np.ndarray
     ground_delay_squares: np.ndarray
+
+    def rows(self, some: slice) -> Self:
+        """Return these rows."""
+        names = ("value", "q", "qd", "qdd", "static", "impact", "delay_squares")
+        return replace(self, **{name: np.ascontiguousarray(getattr(self, name)[:, some]) for name in names})
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,8 +80,20 @@ class MomentsOfTrial:
     delay_sd_s: float = 0.0
 
     @cached_property
+    def virtual(self) -> VirtualAxes:
+        """The freed skeleton with virtual axes of its joints."""
+        free = self.problem.model.placed(self.static)
+        return VirtualAxes.of(free, body_joints(self.problem.skeleton))
+
+    @property
     def _skeleton(self) -> Skeleton:
-        return self.problem.model.placed(self.static)
+        return self.virtual.skeleton
+
+    @cached_property
+    def _columns(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Coordinates of the skeleton with virtual axes that move, that do not, and of all rows."""
+        moving, still = (self.virtual.former[own] for own in (self.problem.moving, self.problem.given.still))
+        return moving, still, np.concatenate([moving, self.virtual.added.ravel()])
 
     @cached_property
     def _bodies(self) -> np.ndarray:
@@ -81,9 +109,9 @@ class MomentsOfTrial:
 
     @cached_property
     def _rows(self) -> np.ndarray:
-        """Row (a,) of each axis' coordinate among those that move; -1 for none."""
-        moving, row = self.problem.moving, np.full(len(self._skeleton.coordinates), -1)
-        row[moving] = np.arange(len(moving))
+        """Row (a,) of each axis' coordinate; -1 for none."""
+        every, row = self._columns[2], np.full(len(self._skeleton.coordinates), -1)
+        row[every] = np.arange(len(every))
         result: np.ndarray = row[self._skeleton.map.owner]
         return result
 
@@ -94,13 +122,14 @@ class MomentsOfTrial:
             motion: all coordinates, including static ones, and their rates (d, c), as in `FreedModel.full`.
             frames: (d,) indices.
         """
-        skeleton, layout, moving, rows = self._skeleton, self.problem.layout, self.problem.moving, self._rows
-        q, qd, qdd = motion
+        skeleton, layout, rows = self._skeleton, self.problem.layout, self._rows
+        moving, still, every = self._columns
+        q, qd, qdd = map(self.virtual.embedded, motion)
         state, pose = axis_motion(skeleton, Motion(q, qd, qdd)), skeleton.pose(q)
         core = skeleton.tree, skeleton.gravity_m_s2
         tau, (dq, dv, da) = axis_force_derivatives(*core, self._bodies, *state, rows >= 0)
         slopes = np.ones(tau.shape) if pose.slopes is None else np.ascontiguousarray(pose.slopes)
-        by_static = np.zeros((len(q), len(moving), layout.in_root.stop))
+        by_static = np.zeros((len(q), len(every), layout.in_root.stop))
         support = skeleton.support[self._segments]
         by_parameter = regressor(*core, *state, np.zeros((len(q), 3)))
         add_bodies(pose.axes, slopes, rows, support, by_parameter, self._segments, self._chain, by_static)
@@ -119,10 +148,15 @@ class MomentsOfTrial:
         )
         each = np.arange(q.shape[1])
         by_q[:, each, each] += skeleton.map.turned_forces(tau, q)
-        by_static[:, :, layout[STILL]] = by_q[:, moving[:, None], self.problem.given.still]
-        by_q, by_qd, by_qdd = (part.take(moving, axis=1).take(moving, axis=2) for part in (by_q, by_qd, by_qdd))
         by_forces = tau, along.reshape(len(q), 12, -1)
-        value, reach = (skeleton.map.to_coordinates(each, pose.slopes)[..., moving] for each in by_forces)
+        value, reach = (skeleton.map.to_coordinates(each, pose.slopes)[..., every] for each in by_forces)
+        joints = JointRows.of(self.virtual, pose, len(moving))
+        by_q, by_qd, by_qdd = (joints.turned(part.take(every, axis=1)) for part in (by_q, by_qd, by_qdd))
+        by_q += joints.by_axes(value)
+        by_static = joints.turned(by_static)
+        by_static[:, :, layout[STILL]] = by_q[:, :, still]
+        by_q, by_qd, by_qdd = (part.take(moving, axis=2) for part in (by_q, by_qd, by_qdd))
+        value, reach = joints.turned(value[..., None])[..., 0], joints.turned(reach.swapaxes(1, 2)).swapaxes(1, 2)
         fast = self.reactions.impact_at(time).reshape(len(q), 1, 12)
         ground = by_load[:, :, :3, layout.errors].transpose(1, 0, 2, 3).reshape(len(q), 6, -1)
         return MomentDerivatives(

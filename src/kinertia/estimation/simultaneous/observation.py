@@ -31,7 +31,7 @@ from kinertia.estimation.simultaneous.soft_tissue import swing_factors
 from kinertia.model.skeleton import GRAVITY_M_S2, Skeleton
 from kinertia.motion.frame_chunks import pieces
 from kinertia.motion.ground_reactions import ground_reactions
-from kinertia.motion.kinematics import AROUND_WINDOW_S, Kinematics
+from kinertia.motion.kinematics import Kinematics
 from kinertia.motion.smoothing import smooth
 from kinertia.settings import ForceCutoff
 from kinertia.trial.sampled_time import nearest_samples, within
@@ -146,7 +146,8 @@ class _Errors:
     """Residuals of inverse kinematics in one trial.
 
     Attributes:
-        time: (n,) s, uniform: the measured windows, what is between them, and their surroundings.
+        time: (n,) s, uniform: `Kinematics.span_s`.
+        frames: (n,) their indices among the marker frames.
         q: (n, c) coordinates; bridged where the root was not seen.
         measured: (n, m, 3) markers, m; NaN where not seen.
         displaced: (m, 3) mean of measured minus model, in the axes of each marker's segment.
@@ -155,6 +156,7 @@ class _Errors:
     """
 
     time: np.ndarray
+    frames: np.ndarray
     q: np.ndarray
     measured: np.ndarray
     displaced: np.ndarray
@@ -164,8 +166,7 @@ class _Errors:
 
 def _errors(skeleton: Skeleton, kinematics: Kinematics) -> _Errors:
     time = kinematics.trial.markers.time
-    start, end = kinematics.window_s
-    near = within(time, start - AROUND_WINDOW_S, end + AROUND_WINDOW_S)
+    near = within(time, *kinematics.span_s)
     solved = np.isfinite(kinematics.ik.q).any(axis=1)
     frames = np.flatnonzero(near & np.logical_or.accumulate(solved) & np.logical_or.accumulate(solved[::-1])[::-1])
     # frames between must stay, so that neighbouring frames remain neighbours; their markers show no pose
@@ -185,7 +186,7 @@ def _errors(skeleton: Skeleton, kinematics: Kinematics) -> _Errors:
     # the mean offset of a marker from its position in the segment is calibration, not noise
     displaced = total / np.where(count > 0, count, np.nan)
     local -= displaced
-    return _Errors(time[frames], q, measured, displaced, local, bridged)
+    return _Errors(time[frames], frames, q, measured, displaced, local, bridged)
 
 
 def _observed(
@@ -199,17 +200,17 @@ def _observed(
     mass_kg: float,
 ) -> tuple[Observation, MarkerNoise]:
     """Extract the observation of one trial on its own, and its marker noise."""
-    time = errors.time
+    time, trial = errors.time, kinematics.trial
     taken = taken_by_chance(np.isfinite(rest[..., 0]).sum(axis=0), skin.last - skin.first, frames)
-    noise, effective, alike, products = marker_noise(skeleton, rest, taken, kinematics.trial.markers.rate_hz)
+    noise, effective, alike, products = marker_noise(skeleton, rest, taken, trial.markers.rate_hz)
     shown = np.isfinite(errors.displaced).all(axis=1)
-    virtual = np.array([kinematics.trial.virtual_sd_m.get(label, 0.0) for label in skeleton.labels])
+    virtual = np.array([trial.virtual_sd_m.get(label, 0.0) for label in skeleton.labels])
     effective = np.sqrt(np.square(effective) + girdle_variance(skeleton, errors.smooth, shown) + np.square(virtual))
     # within the band, neighbouring frames are redundant
-    repeated = np.sqrt(max(1.0, kinematics.trial.markers.rate_hz / (2.0 * bandwidth.motion_hz)))
+    repeated = np.sqrt(max(1.0, trial.markers.rate_hz / (2.0 * bandwidth.motion_hz)))
     force_sd = repeated * FORCE_SD_OF_WEIGHT * mass_kg * GRAVITY_M_S2
     ground = _ground(kinematics, time, bandwidth.motion_hz, bandwidth.force)
-    dynamic = kinematics.inside(time) & bool(kinematics.trial.loads.plates)
+    dynamic = kinematics.inside(time) & bool(trial.loads.plates)
     force = ground.loads(time).reshape(-1, 2, 6)[..., :3].sum(axis=1)
     weight_n = mass_kg * GRAVITY_M_S2
     impact = impact_factors(time, force, dynamic, bandwidth.spacing_s, force_sd)
@@ -229,7 +230,9 @@ def _observed(
             impact=np.sqrt(np.square(impact) + np.square(swing) - 1.0),
             skin=skin,
             frame_products=products,
-            name=kinematics.trial.name,
+            name=trial.name,
+            reported=kinematics.known_frames[errors.frames] & bool(trial.loads.plates),
+            on_ground=None if trial.on_ground is None else trial.on_ground[errors.frames],
         ),
         noise,
     )

@@ -35,6 +35,8 @@ class Observation:
         frame_products: (k, 3, 3) mean products of the errors of a frame and of the two before it, over their standard
             deviations, for several kinds of errors; None: those of a process with a double pole.
         name: of the trial.
+        reported: (n,) frames whose curves are reported, the dynamic ones among them; None: these alone.
+        on_ground: (n, 2) whether right and left foot are on the ground, on a plate or not; None: while loaded.
     """
 
     time: np.ndarray
@@ -53,6 +55,13 @@ class Observation:
     skin: SkinPatterns | None = None
     frame_products: np.ndarray | None = None
     name: str = ""
+    reported: np.ndarray | None = None
+    on_ground: np.ndarray | None = None
+
+    @cached_property
+    def curve_frames(self) -> np.ndarray:
+        """Indices (d,) of the frames whose curves are reported."""
+        return np.flatnonzero(self.dynamic if self.reported is None else self.dynamic | self.reported)
 
     @cached_property
     def marker_process(self) -> tuple[np.ndarray, ErrorProcess]:

@@ -35,7 +35,7 @@ class SimultaneousResult:
         reactions: per trial the loads for the joint moments, corrected for instrument errors.
         motions: per trial q, qd, qdd at its frames.
         marker_offsets_m: per trial (m, 3) displacements of its markers from their positions in the segments.
-        curve_deviations: per trial the posterior standard deviations of its curves at its dynamic frames.
+        curve_deviations: per trial the posterior standard deviations of its curves at its reported frames.
         calibration: entries of all quantities that terms calibrate.
         instruments: information of these trials on plates and synchronisation, which can be added to that of others.
         converged: whether the last step was short: CONVERGED_SD, CONVERGED.
