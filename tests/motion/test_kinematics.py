@@ -9,7 +9,7 @@ from generic_static import generic_model, smooth_motion
 from kinertia.errors import MarkerSetError, TrialError
 from kinertia.io.marker_set_file import read_marker_set
 from kinertia.motion.inverse_kinematics import solve_ik
-from kinertia.motion.kinematics import _bridged, facing, solve_kinematics
+from kinertia.motion.kinematics import AROUND_CONTACT_S, _bridged, facing, known_forces, solve_kinematics
 from kinertia.trial.data import FootLoads, Markers, Trial
 
 CLEVELAND = read_marker_set("cleveland-clinic")
@@ -204,3 +204,51 @@ def test_bridges_are_between_known_frames_and_at_most_a_tenth_of_a_second():
     assert filled[10:12].all()
     assert not filled[[0, 1, 38, 39]].any()
     assert not filled[20:30].any()
+
+
+def columns(skeleton, *parts):
+    """Mask (c,) of the coordinates whose names contain one of these."""
+    return np.array([any(part in name for part in parts) for name in skeleton.coordinates])
+
+
+def test_a_leg_needs_its_own_load_only(skeleton, trial):
+    """The left foot is beside the plates in the second half: left leg and pelvis are not known there."""
+    legs = np.ones((201, 2), dtype=bool)
+    legs[100:, 1] = False
+    partly = replace(trial, measured=legs.all(axis=1), leg_known=legs)
+    known = known_forces(skeleton, partly, np.ones((201, len(skeleton.coordinates)), dtype=bool))
+    left = columns(skeleton, "hip_flexion_l", "hip_adduction_l", "hip_rotation_l", "knee_angle_l", "ankle_angle_l")
+    assert not known[:, columns(skeleton, "pelvis")].any()
+    assert known[:100, left].all()
+    assert not known[100:, left].any()
+    rest = ~left & ~columns(skeleton, "pelvis", "subtalar_angle_l")
+    assert known[:, rest].all()
+    assert rest.sum() > 10
+    solved = solve_kinematics(skeleton, partly, 0.0, "gcv")
+    assert len(solved.time) < 100 < len(solved.course_time) == np.ptp(np.flatnonzero(solved.known_frames)) + 1
+    pelvis = columns(skeleton, "pelvis")
+    np.testing.assert_array_equal(solved.course_known[:, pelvis].all(axis=1), solved.inside(solved.course_time))
+
+
+def test_a_joint_needs_markers_of_what_is_distal_and_of_what_carries_it(skeleton, trial):
+    seen = np.ones((201, len(skeleton.coordinates)), dtype=bool)
+    seen[:50, columns(skeleton, "ankle_angle_r")] = False
+    seen[50:90, columns(skeleton, "elbow_flex_l")] = False
+    seen[90:100, columns(skeleton, "pelvis_tilt")] = False
+    known = known_forces(skeleton, trial, seen)
+    right = columns(skeleton, "hip_flexion_r", "knee_angle_r", "ankle_angle_r")
+    assert not known[:50, right].any()
+    assert known[50:90, right].all()
+    assert known[:50, columns(skeleton, "knee_angle_l")].all()
+    assert not known[50:90, columns(skeleton, "lumbar")].any()
+    assert known[:50, columns(skeleton, "lumbar")].all()
+    assert not known[90:100].any()
+
+
+def test_nothing_is_known_long_before_a_contact(skeleton, trial):
+    late = trial.loads.time >= 1.2
+    loads = replace(trial.loads, force=trial.loads.force * late[:, None, None])
+    known = known_forces(skeleton, replace(trial, loads=loads), np.ones((201, len(skeleton.coordinates)), dtype=bool))
+    frames = np.flatnonzero(known.any(axis=1))
+    assert trial.markers.time[frames[0]] == pytest.approx(1.2 - AROUND_CONTACT_S, abs=0.011)
+    assert frames[-1] == 200

@@ -11,7 +11,7 @@ from kinertia.trial.data import FootLoads, Markers, PlateLoads, Recording
 from kinertia.trial.gait_event import StatedContact
 from kinertia.trial.ground_contact import CONTACT_MARGIN_S, CONTACT_SLACK_S, ground_contact
 from kinertia.trial.plate_assignment import assign_plates, build_trial
-from kinertia.trial.sampled_time import runs
+from kinertia.trial.sampled_time import runs, within
 from recordings import is_here
 from walk_on_plates import ALL_STEPS, FEET, walk
 
@@ -75,6 +75,20 @@ def test_window_ends_where_a_foot_is_off_the_plates(belt_m_s):
     assert trial.measured.all()
     trial = build_trial(walk([("r", 0), ("l", 0), ("r", 1)], belt_m_s=belt_m_s), FEET)
     expect_window(trial, 0.3 + CONTACT_MARGIN_S, 1.7 - CONTACT_MARGIN_S)
+
+
+def test_a_leg_in_the_air_or_on_its_plate_is_known_whatever_the_other_does():
+    """Right steps at 0.2 and 1.2 s for 0.6 s, left ones half a second later; one of each is on a plate."""
+    trial = build_trial(walk([("r", 0), ("l", 0)]), FEET)
+    time = trial.markers.time
+    for foot, (landed_s, beside_s) in enumerate((((0.2, 0.8), (1.2, 1.8)), ((0.7, 1.3), (1.7, 2.3)))):
+        assert trial.leg_known[within(time, landed_s[0], landed_s[1] + 0.35), foot].all(), "stance and swing"
+        assert not trial.leg_known[within(time, beside_s[0] + 0.03, beside_s[1] - 0.05), foot].any()
+        assert trial.on_ground[within(time, beside_s[0] + 0.03, beside_s[1] - 0.05), foot].all()
+    np.testing.assert_array_equal(trial.measured & ~trial.leg_known.all(axis=1), False)
+    assert (trial.leg_known.any(axis=1) & ~trial.measured).sum() > 50
+    stated = build_trial(walk([("r", 0), ("l", 0)]), FEET, (0.5, 0.9))
+    np.testing.assert_array_equal(stated.known_legs, np.repeat(stated.measured[:, None], 2, axis=1))
 
 
 @pytest.mark.parametrize("step_m", [0.0, 0.1, 0.17, 0.25])

@@ -16,6 +16,8 @@ from kinertia.motion.ground_reactions import GroundReactions
 from kinertia.motion.smoothing import interpolate
 
 _DEGREE = 5
+_GEOMETRY_SEED = 5040
+"""Of the knees' centres and axes, which are not among the estimate's unknowns: the same in all trials of a draw."""
 
 
 def kept_draws(fit: Fit) -> PosteriorDraws:
@@ -50,7 +52,7 @@ def drawn_fit(fit: Fit, number: int) -> Fit:
 
     Body segment parameters, joint centres, marker positions, coordinates, ground reactions and the joint moments that
     follow from them all belong to one draw. Of `Fit` and `TrialFit` only these differ: `estimate`, `skeleton`, and
-    each trial's `skeleton`, `motion`, `course`, `reactions` and `joint_loads["estimate"]`.
+    each trial's `skeleton`, `motion`, `course`, `reactions`, `joint_loads["estimate"]` and `joint_curves`.
 
     Raises:
         KinertiaError: no draws are stored.
@@ -83,9 +85,13 @@ def _trial(
     time, course = (k.time, trial.motion.q) if trial.course is None else (k.course_time, trial.course)
     course = course + BSpline(draws.knots, draws.coefficients[number].astype(float), _DEGREE)(time)
     spline = interpolate(time, course)
-    motion = Motion(*(spline(time, order) for order in range(3))).cut(k.frames - k.frames[0])
+    moved = Motion(*(spline(time, order) for order in range(3)))
+    motion = moved if trial.course is None else moved.cut(k.frames - k.course_frames.start)
     reactions = _reactions(trial.reactions, draws, number)
     own = skeleton.with_positions(skeleton.marker_locals + in_trial)
+    curves = trial.joint_curves
+    if curves is not None:
+        curves = curves.drawn(k, (own, bsp, moved, reactions), np.random.default_rng([_GEOMETRY_SEED, number]))
     loads = inverse_dynamics(own, bsp, motion, reactions.at(k.time))
     return replace(
         trial,
@@ -95,6 +101,7 @@ def _trial(
         reactions=reactions,
         joint_loads={**trial.joint_loads, "estimate": loads},
         deviations=None,
+        joint_curves=curves,
     )
 
 

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import Self, TypeAlias
 
 import numpy as np
 
 from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
+from kinertia.estimation.simultaneous.knee_geometry import with_drawn_knees
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion, inverse_dynamics
@@ -20,6 +21,9 @@ from kinertia.motion.ground_reactions import GroundReactions
 from kinertia.motion.joint_moments import JointMoments, joint_moments
 from kinertia.motion.joint_wrench import BodyJoint, body_joints
 from kinertia.motion.kinematics import Kinematics
+
+Stage: TypeAlias = tuple[Skeleton, BodySegmentParameters, Motion, GroundReactions]
+"""What joint loads are computed from: motion at the frames of `Kinematics.course_time`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +68,7 @@ class JointCurves:
         cls,
         kinematics: Kinematics,
         motion: Motion,
-        stages: Mapping[str, tuple[Skeleton, BodySegmentParameters, Motion, GroundReactions]],
+        stages: Mapping[str, Stage],
         deviations: CurveDeviations | None,
     ) -> Self:
         """Compute the loads of every stage.
@@ -87,6 +91,12 @@ class JointCurves:
             deviations = replace(deviations, **masked, joints=three)
         return cls(time, known, motion, forces, joints, deviations)
 
+    def drawn(self, kinematics: Kinematics, stage: Stage, random: np.random.Generator) -> JointCurves:
+        """Return the curves of a draw of the estimate, with drawn knee geometry and without standard deviations."""
+        own = type(self).of(kinematics, stage[2], {"estimate": stage}, None)
+        loads = with_drawn_knees(own.joints["estimate"], random)
+        return replace(own, forces={**self.forces, **own.forces}, joints={**self.joints, "estimate": loads})
+
 
 def known_joints(skeleton: Skeleton, known: np.ndarray) -> np.ndarray:
     """Return the mask (f, j) of frames in which the loads of `body_joints` are known, from that of coordinates (f, c).
@@ -106,7 +116,7 @@ def _beyond(skeleton: Skeleton, joint: BodyJoint) -> list[int]:
     child = skeleton.support[skeleton.segments.index(joint.child)]
     after = [own for own in skeleton.support if (own & child).sum() == child.sum()]
     axes = np.logical_or.reduce(after) & ~child
-    return np.unique(skeleton.map.owner[axes]).tolist()
+    return [int(column) for column in np.unique(skeleton.map.owner[axes])]
 
 
 def _only(loads: JointMoments, known: np.ndarray) -> JointMoments:

@@ -95,7 +95,8 @@ class Kinematics:
     def known_frames(self) -> np.ndarray:
         """Mask (n,) of the marker frames in which the generalised force of any coordinate is known."""
         inside = self.inside(self.trial.markers.time)
-        return inside if self.known is None else inside | self.known.any(axis=1)
+        result: np.ndarray = inside if self.known is None else inside | self.known.any(axis=1)
+        return result
 
     @cached_property
     def course_frames(self) -> slice:
@@ -114,7 +115,8 @@ class Kinematics:
         inside = self.inside(self.course_time)[:, None]
         if self.known is None:
             return np.repeat(inside, len(self.ik.coordinates), axis=1)
-        return self.known[self.course_frames] | inside
+        result: np.ndarray = self.known[self.course_frames] | inside
+        return result
 
     @cached_property
     def span_s(self) -> tuple[float, float]:
@@ -210,7 +212,7 @@ def solve_kinematics(
         np.abs(ik.time - ik.time[shown].mean())
         > np.ptp(ik.time[shown]) / 2 - END_PERIODS / cutoff.hz + TIME_TOLERANCE_S
     ] = False
-    whole = seen.all(axis=1)
+    whole = np.logical_and.reduce(seen, axis=1)
     windows, findings = _long_enough(trial, whole & trial.measured, whole)
     stuck = int((~ik.converged[solved]).sum())
     if stuck:
@@ -234,14 +236,15 @@ def known_forces(skeleton: Skeleton, trial: Trial, seen: np.ndarray) -> np.ndarr
         trial: with the frames in which the load on each leg is known.
         seen: (n, c) whether markers show each coordinate, with accelerations.
     """
-    moves = np.zeros((len(skeleton.segments), len(skeleton.coordinates)), dtype=bool)
-    np.logical_or.at(moves, (slice(None), skeleton.map.owner), skeleton.support)
-    needed = moves.T.astype(int) @ moves.astype(int) > 0  # coordinates that move any segment that this one moves
+    of_axes = np.equal.outer(skeleton.map.owner, np.arange(len(skeleton.coordinates)))
+    moves = skeleton.support.astype(int) @ of_axes > 0
+    needed = moves.T.astype(int) @ moves > 0  # coordinates that move any segment that this one moves
     known = np.stack([seen[:, own].all(axis=1) for own in needed], axis=1)
     for foot, segment in enumerate(skeleton.feet):
         known[:, moves[skeleton.segments.index(segment)]] &= trial.known_legs[:, foot, None]
     known[:, : len(skeleton.joints[0].axes)] = False  # the measured windows are added to it
-    return known & _near_contacts(trial)[:, None]
+    result: np.ndarray = known & _near_contacts(trial)[:, None]
+    return result
 
 
 def _near_contacts(trial: Trial) -> np.ndarray:

@@ -18,6 +18,7 @@ from kinertia.diagnostics.result.suitability import suitability
 from kinertia.estimation.cycles import columns_of, spatiotemporal_columns
 from kinertia.estimation.forces_used import forces_before, forces_used
 from kinertia.estimation.identifiability import BaseParameters
+from kinertia.estimation.joint_curves import JointCurves
 from kinertia.estimation.result import Fit, TrialFit
 from kinertia.findings.finding import Severity
 from kinertia.io.csv_file import inert
@@ -132,29 +133,57 @@ def write_model(fit: Fit, folder: Path) -> None:
 
 def _write_trial(fit: Fit, trial: TrialFit, folder: Path) -> None:
     names, rotational = fit.skeleton.coordinates, fit.skeleton.rotational
-    motion = f"Motion: {trial.motion_hz:.3g} Hz"
-    if trial.deviations is not None:
-        sd = trial.deviations.coordinates
-        table = TimeTable(trial.time, tuple(names), np.where(rotational, np.degrees(sd), sd), in_degrees=True)
+    motion, curves = f"Motion: {trial.motion_hz:.3g} Hz", trial.joint_curves
+    time, stages, deviations = trial.time, trial.joint_loads, trial.deviations
+    if curves is not None:
+        rows = np.flatnonzero(curves.known.any(axis=1))
+        time, stages = curves.time[rows], {stage: each[rows] for stage, each in curves.forces.items()}
+        deviations = None if curves.deviations is None else curves.deviations.at(rows)
+    if deviations is not None:
+        sd = deviations.coordinates
+        table = TimeTable(time, tuple(names), np.where(rotational, np.degrees(sd), sd), in_degrees=True)
         write_table(folder / "kinematics_sd.sto", table, "kinematics_sd", motion)
     forces = f"Ground reactions: {forces_used(trial.reactions, fit.settings, trial.motion_hz).which}. {motion}"
     write_table(folder / "kinematics.mot", coordinates_table(fit, trial), "kinematics", motion)
-    window_s, feet = trial.kinematics.window_s, fit.skeleton.feet
-    write_ground_reactions(folder, trial.reactions, window_s, feet, forces)
+    write_ground_reactions(folder, trial.reactions, (time[0], time[-1]), fit.skeleton.feet, forces)
     loads = [f"{name}_{'moment' if turn else 'force'}" for name, turn in zip(names, rotational, strict=True)]
     before = forces_before(trial.reactions, fit.settings)
     before = f"Ground reactions: {before}, instruments not corrected. Motion: {trial.kinematics.cutoff_hz:.3g} Hz"
     files = {
-        "inverse_dynamics": (trial.joint_loads["estimate"], forces),
-        "inverse_dynamics_literature": (trial.joint_loads["literature"], before),
+        "inverse_dynamics": (stages["estimate"], forces),
+        "inverse_dynamics_literature": (stages["literature"], before),
     }
-    if trial.deviations is not None:
-        files["inverse_dynamics_sd"] = (trial.deviations.moments, forces)
+    if deviations is not None:
+        files["inverse_dynamics_sd"] = (deviations.moments, forces)
     for file, (values, remark) in files.items():
-        write_table(folder / f"{file}.sto", _table(trial, loads, values), file, remark)
+        write_table(folder / f"{file}.sto", TimeTable(time, tuple(loads), values, in_degrees=False), file, remark)
+    if curves is not None:
+        _write_joint_moments(curves, folder, forces)
+    _write_residuals(trial, folder, forces)
+
+
+def _write_joint_moments(curves: JointCurves, folder: Path, forces: str) -> None:
+    """Write moments (N m) and reaction forces (N) of the joints in three dimensions, with standard deviations.
+
+    What is not known is "nan"; frames in which no joint is known are left out.
+    """
+    joints = curves.joints["estimate"]
+    rows = np.isfinite(joints.moments).any(axis=(1, 2))
+    remark = f"Internal, about Grood and Suntay's axes; towards flexion, adduction, internal rotation. {forces}"
+    files = {"joint_moments": (joints.names, joints.moments), "joint_forces": (joints.force_names, joints.forces)}
+    if curves.moment_sd is not None and curves.force_sd is not None:
+        files["joint_moments_sd"] = joints.names, curves.moment_sd
+        files["joint_forces_sd"] = joints.force_names, curves.force_sd
+    for file, (names, values) in files.items() if rows.any() else ():
+        table = TimeTable(curves.time[rows], names, values[rows].reshape(rows.sum(), -1), in_degrees=False)
+        write_table(folder / f"{file}.sto", table, file, remark)
+
+
+def _write_residuals(trial: TrialFit, folder: Path, forces: str) -> None:
+    """Write the root residuals of the measured frames."""
     stages = {**trial.residuals, "estimate_full": trial.full_residuals["estimate"]}
     columns = [f"{stage}_{name}" for stage in stages for name in _RESIDUALS]
-    residuals = _table(trial, columns, np.hstack(list(stages.values())))
+    residuals = TimeTable(trial.time, tuple(columns), np.hstack(list(stages.values())), in_degrees=False)
     remark = f"Ground reactions: of the motion's bandwidth; estimate_full: {forces.partition(': ')[2]}"
     write_table(folder / "residuals.sto", residuals, "residuals", remark)
 
@@ -169,10 +198,6 @@ def coordinates_table(fit: Fit, trial: TrialFit) -> TimeTable:
         angles = np.array([coordinate.angle for coordinate in fit.file.coordinates])
         q = fit.file.all_coordinates(fit.skeleton, q)
     return TimeTable(time, tuple(names), np.where(angles, np.degrees(q), q), in_degrees=True)
-
-
-def _table(trial: TrialFit, labels: Sequence[str], values: np.ndarray) -> TimeTable:
-    return TimeTable(trial.time, tuple(labels), values, in_degrees=False)
 
 
 def summary(fit: Fit) -> dict[str, Any]:

@@ -68,7 +68,11 @@ def test_a_foot_that_lands_or_leaves_beside_its_plate(lost_s, lands_or_leaves_s)
     (one,) = context.overhangs
     assert one.unmeasured_s[0] <= lands_or_leaves_s <= one.unmeasured_s[1]
     measured = context.trial_on_plates.measured
-    assert not measured[np.abs(context.recording.markers.time - lands_or_leaves_s) < 0.01].any()
+    there = np.abs(context.recording.markers.time - lands_or_leaves_s) < 0.01
+    assert not measured[there].any()
+    legs, before = context.trial_on_plates.known_legs, context.trial.known_legs
+    assert not legs[there, one.foot].any()
+    np.testing.assert_array_equal(legs[:, 1 - one.foot], before[:, 1 - one.foot])
     assert one.plate not in {whole.plate for whole in context.whole_contacts}
 
 

@@ -8,6 +8,7 @@ from kinertia.estimation.simultaneous.curve_deviations import curve_deviations
 from kinertia.estimation.simultaneous.gauss_newton import GaussNewton
 from kinertia.estimation.simultaneous.inputs import BSP, PLACES, STILL
 from kinertia.estimation.simultaneous.instrument_term import CLOCK, PLATES, ZEROS
+from kinertia.estimation.simultaneous.knee_geometry import knee_geometry
 from kinertia.estimation.simultaneous.knot_phases import OfPhases
 from kinertia.estimation.simultaneous.linearised import Point
 from kinertia.estimation.simultaneous.mixture_prior import GaussianPrior
@@ -19,6 +20,8 @@ from kinertia.estimation.simultaneous.skin_blocks import block_growth
 from kinertia.estimation.simultaneous.solver import _roots_in_trials, _uncertainty
 from kinertia.estimation.simultaneous.static_information import StaticInformation
 from kinertia.motion.dynamics import Motion, inverse_dynamics
+from kinertia.motion.joint_moments import component_signs, joint_moments
+from kinertia.motion.joint_wrench import body_joints
 from small_problem import SWITCH_S, curved_problem, point, small_problem
 from validation.study_bound import dense_band
 
@@ -34,13 +37,18 @@ def estimate(request, tmp_path_factory):
 
 def moments(problem, coefficients: np.ndarray, static: np.ndarray, with_impact: bool = False) -> np.ndarray:
     """(d, c) joint moments at a point, by `inverse_dynamics`; with the impacts added to the loads on the feet."""
+    return inverse_dynamics(*state(problem, coefficients, static, with_impact))
+
+
+def state(problem, coefficients: np.ndarray, static: np.ndarray, with_impact: bool):
+    """Skeleton, parameters, motion at the dynamic frames, and loads on the feet, at a point."""
     names = problem.calibration.coordinates
     values = dict(zip(names, static[problem.layout[STILL]].tolist(), strict=True))
     dynamic = np.flatnonzero(problem.trials[0].dynamic)
     motion = Motion(*problem.bases[0].evaluate(coefficients)).cut(dynamic)
     reactions, time = problem.loads.reactions(0, static), problem.trials[0].time[dynamic]
     loads = reactions.at(time) + (reactions.impact_at(time) if with_impact else 0.0)
-    return inverse_dynamics(problem.skeleton.lock(values), problem.model.bsp(static), motion, loads)
+    return problem.skeleton.lock(values), problem.model.bsp(static), motion, loads
 
 
 def prior_information(problem, static: np.ndarray) -> np.ndarray:
@@ -79,7 +87,16 @@ def curves(problem, coefficients: np.ndarray, static: np.ndarray) -> dict[str, n
         "moments": moment,
         "powers": qd * moment,
         "ground_forces": ground.reshape(len(q), 6),
+        "joints": joints(problem, coefficients, static),
     }
+
+
+def joints(problem, coefficients: np.ndarray, static: np.ndarray, with_impact: bool = False) -> np.ndarray:
+    """(d, 6 j) moments and forces of joints, as `moments`; without signs for sides."""
+    skeleton, bsp, motion, loads = state(problem, coefficients, static, with_impact)
+    found = joint_moments(skeleton, bsp, motion, loads)
+    signs = np.array([component_signs(joint) for joint in body_joints(skeleton)]).reshape(-1, 3)
+    return np.stack([found.moments * signs, found.forces], axis=2).reshape(len(motion.q), 6 * len(signs))
 
 
 def derivatives_at(problem, coefficients: np.ndarray, static: np.ndarray, delay_sd_s: float):
@@ -100,21 +117,24 @@ def dense_derivatives(
     problem, coefficients: np.ndarray, static: np.ndarray, shares=(1.0, 1.0, 1.0), delay_sd_s=0.0, grown=1.0
 ) -> dict[str, np.ndarray]:
     """(d, ..., unknowns) derivatives of `curves` by all coefficients and static unknowns; with these shares of what
-    places, rates and accelerations do, and times `grown` (d, c, 1) what they do to moments.
+    places, rates and accelerations do, and times `grown` (d, r, 1) what they do to moments.
     """
     basis, frames = problem.bases[0], np.flatnonzero(problem.trials[0].dynamic)
-    motion, by = derivatives_at(problem, coefficients, static, delay_sd_s)
+    motion, every = derivatives_at(problem, coefficients, static, delay_sd_s)
     d, (size, c) = len(frames), coefficients.shape
+    by, three = every.rows(slice(0, c)), every.rows(slice(c, None))
     nothing, same = np.zeros((d, c, c)), np.tile(np.eye(c), (d, 1, 1))
     still, zero, ground = by.static, np.zeros_like(by.static), np.zeros((d, 6, by.static.shape[2]))
     ground[..., problem.layout.errors] = by.ground
     speed, value = motion[1][:, problem.moving][..., None], by.value[..., None]
-    by_place, by_rate, by_acceleration = (grown * each for each in (by.q, by.qd, by.qdd))
+    more = np.broadcast_to(grown, (d, every.q.shape[1], 1))
+    by_place, by_rate, by_acceleration = (more[:, :c] * each for each in (by.q, by.qd, by.qdd))
     orders = {
         "coordinates": (same, nothing, nothing, zero),
         "moments": (by_place, by_rate, by_acceleration, still),
         "powers": (speed * by_place, speed * by_rate + value * same, speed * by_acceleration, speed * still),
         "ground_forces": (*(np.zeros((d, 6, c)),) * 3, ground),
+        "joints": (*(more[:, c:] * each for each in (three.q, three.qd, three.qdd)), three.static),
     }
     result = {}
     for name, (*moved, own) in orders.items():
@@ -125,7 +145,7 @@ def dense_derivatives(
                 parts = zip(basis.values[:, t, a] * shares, moved, strict=True)
                 through[row, :, spline] = sum(each * part[row] for each, part in parts)
         rest = np.zeros((d, wide, problem.layout.size - own.shape[2]))
-        result[name] = np.concatenate([through.reshape(d, wide, -1), own, rest], axis=2)
+        result[name] = np.concatenate([through.reshape(d, wide, size * c), own, rest], axis=2)
     return result
 
 
@@ -155,7 +175,7 @@ def test_derivatives_agree_with_finite_differences(estimate):
             )
             for name, derivative in derivatives.items():
                 change, expected = derivative @ h, (ahead[name] - behind[name]) / 2.0
-                size = max(np.abs(change).max(), 1e-9 * np.abs(ahead[name]).max())
+                size = max(np.abs(change).max(initial=0.0), 1e-9 * np.abs(ahead[name]).max(initial=0.0))
                 np.testing.assert_allclose(change[away], expected[away], atol=1e-6 * size, err_msg=name)
 
 
@@ -171,15 +191,17 @@ def test_deviations_are_those_of_the_dense_covariance(estimate, noise):
     root = StaticInformation.of(information, problem.layout.in_root.stop).root_of_covariance()
     np.testing.assert_allclose(root @ root.T, full[n:, n:], rtol=1e-4, atol=1e-6 * np.abs(full[n:, n:]).max())
     sd = curve_deviations(problem, 0, coefficients, static, part, root, noise)
-    impacts, speed = of_impacts(problem, coefficients, static), speeds(problem, coefficients)
+    impacts, speed = of_impacts(problem, coefficients, static, moments), speeds(problem, coefficients)
     noise_n = problem.loads.reactions(0, static).noise_n * (
         curves(problem, coefficients, static)["ground_forces"] != 0.0
     )
     late = delay_sd_s(problem, full[n:, n:])
-    left = derivatives_at(problem, coefficients, static, late)[1]
+    left, c = derivatives_at(problem, coefficients, static, late)[1], coefficients.shape[1]
+    of_joints = of_impacts(problem, coefficients, static, joints) + left.delay_squares[:, c:]
     more = {
-        "moments": impacts + left.delay_squares,
-        "powers": (impacts + left.delay_squares) * speed**2,
+        "joints": of_joints + knee_geometry(body_joints(problem.skeleton), left.value[:, c:]),
+        "moments": impacts + left.delay_squares[:, :c],
+        "powers": (impacts + left.delay_squares[:, :c]) * speed**2,
         "ground_forces": noise_n**2 + left.ground_delay_squares,
     }
     by = dense_derivatives(problem, coefficients, static, delay_sd_s=late)
@@ -193,9 +215,9 @@ def test_deviations_are_those_of_the_dense_covariance(estimate, noise):
 
 
 def grown(problem, static: np.ndarray) -> np.ndarray:
-    """(d, c, 1) by how much more the markers' errors make of moments where skin moves unseen."""
+    """(d, r, 1) by how much more the markers' errors make of moments where skin moves unseen."""
     time = problem.trials[0].time[problem.trials[0].dynamic]
-    return block_growth(problem, 0, static, time)[..., None]
+    return block_growth(problem, 0, static, time, body_joints(problem.skeleton))[..., None]
 
 
 def speeds(problem, coefficients: np.ndarray) -> np.ndarray:
@@ -243,8 +265,8 @@ def test_deviations_of_two_trials_are_those_of_one_dense_matrix(estimate, noise,
     expected = np.einsum("dri,ij,drj->dr", shaken, motion / 2.0, shaken, optimize=True)
     of_static = chains[0] @ covariance @ chains[0].T
     expected += np.einsum("dri,ij,drj->dr", through, of_static, through, optimize=True)
-    left = derivatives_at(pair, coefficients, in_trial, late)[1].delay_squares
-    expected = np.sqrt(expected + of_impacts(pair, coefficients, in_trial) + left)
+    left = derivatives_at(pair, coefficients, in_trial, late)[1].delay_squares[:, : coefficients.shape[1]]
+    expected = np.sqrt(expected + of_impacts(pair, coefficients, in_trial, moments) + left)
     np.testing.assert_allclose(sds[0].moments, expected, rtol=1e-3)
 
 
@@ -286,9 +308,9 @@ def dense_pair(pair, here, gaussian) -> tuple[list[np.ndarray], np.ndarray, np.n
     return chains, information, rhs
 
 
-def of_impacts(problem, coefficients: np.ndarray, static: np.ndarray) -> np.ndarray:
-    """(d, c) moving mean square of what impacts would add to the joint moments."""
-    more = moments(problem, coefficients, static, True) - moments(problem, coefficients, static)
+def of_impacts(problem, coefficients: np.ndarray, static: np.ndarray, kind) -> np.ndarray:
+    """(d, ...) moving mean square of what impacts would add to `moments` or `joints`."""
+    more = kind(problem, coefficients, static, True) - kind(problem, coefficients, static)
     basis = problem.bases[0]
     half = round(2.0 * len(basis.first) / (basis.size - 5))
     rows = np.clip(np.arange(len(more))[:, None] + np.arange(-half, half + 1), 0, len(more) - 1)

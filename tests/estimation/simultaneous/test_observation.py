@@ -5,9 +5,10 @@ import pytest
 
 from kinertia.estimation.simultaneous.bandwidth import Bandwidth
 from kinertia.estimation.simultaneous.marker_noise import SMALLEST_MARKER_SD_M
-from kinertia.estimation.simultaneous.observation import AROUND_WINDOW_S, FORCE_SD_OF_WEIGHT, MOMENT_ARM_M, observe
+from kinertia.estimation.simultaneous.observation import FORCE_SD_OF_WEIGHT, MOMENT_ARM_M, observe
 from kinertia.estimation.simultaneous.shoulder_girdle import girdle_variance
 from kinertia.model.skeleton import GRAVITY_M_S2
+from kinertia.motion.kinematics import AROUND_WINDOW_S
 from kinertia.synthetic.noise import SkinMotion, camera_noise, study_noise
 from validation.synthetic_walks import kinematics_of, study_walk
 
@@ -102,11 +103,25 @@ def test_frames_stay_uniform_where_the_pelvis_is_not_seen(trial):
 
 
 def test_only_the_window_is_dynamic_and_its_surroundings_are_markers(trial):
-    kinematics = replace(kinematics_of(trial, trial.markers), windows_s=((0.4, 0.6),))
+    kinematics = replace(kinematics_of(trial, trial.markers), windows_s=((0.4, 0.6),), known=None)
     seen, _ = separate(trial.skeleton, kinematics)
     assert seen.time[seen.dynamic][[0, -1]] == pytest.approx([0.4, 0.6])
     assert seen.time[[0, -1]] == pytest.approx([0.4 - AROUND_WINDOW_S, 0.6 + AROUND_WINDOW_S])
     assert seen.ground.loads.time[[0, -1]] == pytest.approx([0.4 - AROUND_WINDOW_S, 0.6 + AROUND_WINDOW_S])
+    np.testing.assert_array_equal(seen.curve_frames, np.flatnonzero(seen.dynamic))
+
+
+def test_curves_are_reported_wherever_any_load_is_known(trial):
+    """Here of the trunk and of a leg in the air or on its plate, before and after the window."""
+    whole = kinematics_of(trial, trial.markers)
+    known = whole.known.copy()
+    known[whole.trial.markers.time < 0.2] = False
+    seen, _ = separate(trial.skeleton, replace(whole, windows_s=((0.4, 0.6),), known=known))
+    assert seen.time[seen.dynamic][[0, -1]] == pytest.approx([0.4, 0.6])
+    expected = trial.time[known.any(axis=1)]
+    np.testing.assert_allclose(seen.time[seen.curve_frames], expected)
+    assert seen.time[0] <= 0.4 - AROUND_WINDOW_S
+    assert seen.time[-1] > expected[-1]
 
 
 def test_deviation_of_forces_grows_with_weight_and_with_repeated_frames(trial, white):

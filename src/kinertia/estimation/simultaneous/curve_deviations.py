@@ -188,7 +188,7 @@ class _Curves:
         joints = replace(seen, by=every.rows(slice(c, None)), grown=self.grown[rows, c:])
         own = _joint_variances(spread, joints, root[in_root, in_root])
         own += knee_geometry(moments.virtual.joints, joints.by.value)
-        self.of_joints[rows] = own.reshape(-1, *self.of_joints.shape[1:])
+        self.of_joints[rows] = own.reshape(len(own), *self.of_joints.shape[1:])
         ground = np.square(by.ground @ root[problem.layout.errors, in_root]).sum(axis=-1) + by.ground_delay_squares
         noise_n = moments.reactions.noise_n * (by.loads[..., :3] != 0.0)
         variance.ground_forces[rows] = ground.reshape(-1, 2, 3) + np.square(noise_n)

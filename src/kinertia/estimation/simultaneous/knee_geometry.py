@@ -7,9 +7,11 @@ too far forward takes 7 % of the flexion moment for adduction.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
+from kinertia.motion.joint_moments import JointMoments
 from kinertia.motion.joint_wrench import BodyJoint
 
 CENTRE_SD_M = 0.005
@@ -32,3 +34,14 @@ def knee_geometry(joints: Sequence[BodyJoint], loads: np.ndarray) -> np.ndarray:
             result[:, 6 * k + 1] = np.square(CENTRE_SD_M * up) + np.square(AXIS_SD_RAD * flexion)
             result[:, 6 * k + 2] = np.square(CENTRE_SD_M * forward)
     return result
+
+
+def with_drawn_knees(loads: JointMoments, random: np.random.Generator) -> JointMoments:
+    """Return the loads with centre and axis of each knee displaced at random, once for all frames."""
+    moments = loads.moments.copy()
+    for k, joint in enumerate(loads.joints):
+        if joint.startswith("knee_"):
+            centre_m, axis_rad = random.normal(0.0, (CENTRE_SD_M, AXIS_SD_RAD))
+            moments[:, k, 1] += centre_m * loads.forces[:, k, 1] + axis_rad * loads.moments[:, k, 0]
+            moments[:, k, 2] += centre_m * loads.forces[:, k, 0]
+    return replace(loads, moments=moments)
