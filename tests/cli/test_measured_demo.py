@@ -23,6 +23,7 @@ RESULTS = {
     *("report.html", "fit.json", "bsp.csv", "model.osim", "kinematics.mot", "residuals.sto"),
     *("inverse_dynamics.sto", "inverse_dynamics_literature.sto", "inverse_dynamics_sd.sto"),
     "kinematics_sd.sto",
+    *(f"joint_{kind}{sd}.sto" for kind in ("moments", "forces") for sd in ("", "_sd")),
     *("ground_reactions.mot", "external_loads.xml", "fit.npz"),
     *("cycles.csv", "cycles_literature.csv", "spatiotemporal.csv"),
 }
