@@ -50,9 +50,8 @@ class TrialFit:
         motion: estimated coordinates (rad, m), and their derivatives as OpenSim's tools compute them from
             `kinematics.mot`, by natural quintic splines through the frames. They differ from the estimate's own in the
             first and last frames only.
-        course: (f, c) coordinates of all frames in which any joint's load is known, and between them
-            (`kinematics.course_time`),
-            including those between measured windows and around them; None after two-level, which has none there.
+        course: (f, c) coordinates of `kinematics.course_time`: all frames in which any joint's load is known, and
+            those between; None after two-level, which has none there.
         motion_hz: bandwidth of the motion.
         reactions: the corresponding ground reactions at the plates' rate, corrected for instrument errors.
         residuals: root residual (w, 6: force N, moment N m about the pelvis origin, ground axes) per stage:

@@ -2,9 +2,7 @@
 
 `Recording` holds what was read: markers, force plates and the subject's measurements, before anything is known about
 feet or models. `Trial` holds what the estimators use: the same markers, the loads assigned to feet, and for every
-marker frame whether all ground contact was measured. `kinertia.trial.plate_assignment` makes a `Trial` from a
-`Recording`.
-
+marker frame whether ground contact was measured. `kinertia.trial.plate_assignment` makes it from a `Recording`.
 Everything is in SI units and in the ground frame: X forward, Y up, Z right.
 """
 
@@ -340,9 +338,8 @@ class Trial:
         markers: the marker trajectories, n frames.
         loads: the loads of the two feet, in their own (usually faster) time base.
         measured: (n,) True where every foot on the ground stood on a loaded plate.
-        leg_known: (n, 2) True where the load on the right, left foot is known, whatever the other foot does; None: as
-            `measured`.
-        on_ground: (n, 2) True where the foot is on the ground, on a plate or not; None if unknown.
+        leg_known, on_ground: (n, 2) whether the load on the right, left foot is known (None: as `measured`), and
+            whether the foot is on the ground, on a plate or not (None if unknown).
         notes: one sentence for each assumption made so far.
         virtual_sd_m, belt, vertical, events, outputs: as the recording's.
         findings: about the assignment of loads to feet.
@@ -372,16 +369,11 @@ class Trial:
 
     def __post_init__(self) -> None:
         _expect_shape("measured", self.measured, (len(self.markers.time),))
-        for name in ("leg_known", "on_ground"):
-            mask = getattr(self, name)
-            if mask is not None:
-                _expect_shape(name, mask, (len(self.markers.time), 2))
 
     @property
     def known_legs(self) -> BoolArray:
-        """Mask (n, 2) of frames in which the load on the right, left foot is known."""
-        every = np.repeat(self.measured[:, None], 2, axis=1)
-        return every if self.leg_known is None else self.leg_known | every
+        """`leg_known` of any trial: where all contact is measured, both legs are known."""
+        return np.asarray(self.measured[:, None] | (np.zeros(2, bool) if self.leg_known is None else self.leg_known))
 
     def windows(self) -> list[tuple[float, float]]:
         """Return first and last time (s) of every contiguous run of measured frames, longest run first."""
