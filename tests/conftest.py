@@ -29,9 +29,10 @@ from kinertia.trial.data import Recording
 from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow.estimate import estimate_bsp
 from made_codes import MadeCodes
+from measured_tests import EMPTY, MeasuredTests
 from once import once
 from quick_two_level import given_back
-from recordings import SYNTHETIC
+from recordings import NEEDS_MEASURED, SYNTHETIC
 from synthetic_lab import WITH_MODEL, synthetic_arguments, write_synthetic_lab
 from validation import osim_models
 from validation.measured_data import data_folder, find
@@ -49,10 +50,9 @@ if "PYTEST_XDIST_WORKER" in os.environ:
     # the other workers use the other cores; processes that tests start have their second thread, and give the same bits
     two_threads._cores = lambda: 1
 
-NEEDS_MEASURED = "need measured recordings"
 LOOKED_FOR = (
-    f"measured recordings are looked for in the folder that {samples.VARIABLE} names, in shared/data beside the "
-    "repository and in the cache of kinertia demo --measured; other tests ran on synthetic ones"
+    f"measured recordings are looked for in the folder that {samples.VARIABLE} names or, if it names none, in shared/data "
+    "beside the repository and in the cache of kinertia demo --measured; other tests ran on synthetic ones"
 )
 SUBJECT = """# A synthetic person, with the markers of Plug-in Gait.
 [subject]
@@ -73,6 +73,7 @@ LIMITS = ("kinertia.estimation.two_level._MAX_EVALUATIONS", "kinertia.estimation
 
 def pytest_configure(config):
     config.pluginmanager.register(MadeCodes(config))
+    config.pluginmanager.register(MeasuredTests())
 
 
 def pytest_sessionstart(session):
@@ -87,9 +88,8 @@ def pytest_collection_modifyitems(items):
 
 def pytest_terminal_summary(terminalreporter):
     """One line on what was skipped, in place of one for each."""
-    reasons = Counter(
-        report.longrepr[2].removeprefix("Skipped: ") for report in terminalreporter.stats.get("skipped", [])
-    )
+    skipped = [report.longrepr[2].removeprefix("Skipped: ") for report in terminalreporter.stats.get("skipped", [])]
+    reasons = Counter(NEEDS_MEASURED if reason.startswith(EMPTY) else reason for reason in skipped)
     told = [f"{count} {reason}" for reason, count in reasons.most_common()]
     if NEEDS_MEASURED in reasons:
         told.append(LOOKED_FOR)

@@ -3,6 +3,7 @@
 Files are named as in `measured_data`; those under `synthetic/` are written by `c3d_lab`.
 """
 
+import os
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
@@ -10,6 +11,7 @@ from typing import Any, TypeVar
 import pytest
 
 from kinertia.io.marker_set_file import choose_marker_set, read_marker_set
+from kinertia.io.samples import VARIABLE
 from kinertia.model.marker_set import MarkerSet
 from validation.measured_data import find
 
@@ -17,12 +19,18 @@ K = TypeVar("K")
 V = TypeVar("V", str, tuple[str | None, ...])
 
 SYNTHETIC = "synthetic/"
+NEEDS_MEASURED = "need measured recordings"
+REQUIRED = bool(os.environ.get("CI") and os.environ.get(VARIABLE))
+"""Whether every recording that tests name has to be here: `.ci/run` states where they are."""
 
 
 def is_here(names: str | Iterable[str | None]) -> bool:
     """Whether tests can read these files on this machine."""
     wanted = [names] if isinstance(names, str) else [name for name in names if name is not None]
-    return all(name.startswith(SYNTHETIC) or find(name) is not None for name in wanted)
+    missing = [name for name in wanted if not name.startswith(SYNTHETIC) and find(name) is None]
+    if missing and REQUIRED:
+        raise FileNotFoundError(f"{missing[0]} is not in {os.environ[VARIABLE]}, where {VARIABLE} states that all are")
+    return not missing
 
 
 def here(recordings: Iterable[V]) -> list[V]:

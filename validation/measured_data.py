@@ -1,7 +1,8 @@
 """Where measured recordings are: none are part of the repository.
 
-Looked for in three places, in this order: the folder that the environment variable KINERTIA_DATA names, `shared/data`
-beside the repository, and the cache of `kinertia demo --measured`, which holds the gait2354 walk only.
+They are looked for in the folder that the environment variable KINERTIA_DATA names. If it names none, they are looked
+for in `shared/data` beside the repository and in the cache of `kinertia demo --measured`, which holds the gait2354 walk
+only.
 """
 
 import os
@@ -19,7 +20,7 @@ BESIDE = Path(__file__).resolve().parents[2] / "shared" / "data"
 def places() -> tuple[Path, ...]:
     """Return the folders that exist, best first; cached, since tests change the environment."""
     stated = os.environ.get(VARIABLE)
-    folders = [*([Path(stated)] if stated else []), BESIDE, samples_folder()]
+    folders = [Path(stated)] if stated else [BESIDE, samples_folder()]
     return tuple(folder for folder in folders if folder.is_dir())
 
 

@@ -65,6 +65,7 @@ def test_simultaneous_fit(measured_demo):
     assert rms["final"] < np.hypot(rms["ik"], np.sqrt(3.0) * OTHER_EXPECTED_SD_M)
 
 
+@pytest.mark.measured
 def test_ankles_push_off(measured_demo, file_of):
     """Plantarflexion moments late in stance are the largest of the ankle: about 1 N m per kg of the person.
 

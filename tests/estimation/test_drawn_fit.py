@@ -157,6 +157,7 @@ def test_many_draws_spread_as_reported_within_ten_percent(demo_run, tmp_path, mo
 
 
 @pytest.mark.slow
+@pytest.mark.measured
 def test_legs_spread_as_reported_where_the_delay_outlasts_a_landing(fit_of):
     """Their deviations were up to 2.3 times the draws' while they were linear in the delay."""
     walk_b = load_fit(fit_of("pig_b").folder)

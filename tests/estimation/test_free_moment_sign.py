@@ -37,7 +37,7 @@ def left_by(trial):
     return residual_moments_nm(trial.residuals["literature"][:, VERTICAL], trial.kinematics.foot_loads)
 
 
-@pytest.fixture(params=["demo", "measured"])
+@pytest.fixture(params=["demo", pytest.param("measured", marks=pytest.mark.measured)])
 def of_walk(request, fit):
     """The fits of the package's walks."""
     return fit if request.param == "demo" else request.getfixturevalue("measured_demo").fit

@@ -133,6 +133,7 @@ def test_walks_and_squats_pooled(measured_folder, tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.measured
 def test_page_of_models(fit_with_model):
     runs = {}
     for calibrate in (False, True):
@@ -151,6 +152,7 @@ def test_page_of_models(fit_with_model):
 
 
 @pytest.mark.slow
+@pytest.mark.measured
 def test_the_built_in_model_is_written_as_a_model_too(opensim, fit_of):
     fit = fit_of("pig_a")
     loaded = opensim.Model(str(fit.folder / "model.osim"))

@@ -75,7 +75,8 @@ def test_the_file_is_what_is_written_of_its_figures():
     assert written(usual_build()) == text
 
 
-@pytest.mark.skipif(find(SAMPLES) is None, reason="need measured recordings")
+@pytest.mark.measured
+@pytest.mark.skipif(find(SAMPLES) is None, reason="need the five people of yeadon's source")
 def test_the_file_is_of_the_five_people():
     of_people = fitted(*read_people(find(SAMPLES)))
     for name, values in vars(usual_build()).items():

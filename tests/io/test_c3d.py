@@ -104,6 +104,7 @@ def test_force_on_the_person_brakes_then_drives(file_of, file):
 
 
 @pytest.mark.parametrize(("subject", "mass_kg", "height_m"), [("a", 41.5, 1.61), ("b", 47.5, 1.505)])
+@pytest.mark.measured
 def test_static_trials_weigh_the_subject(file_of, subject, mass_kg, height_m):
     recording = read_c3d(file_of(f"pig_c3d/subject_{subject}_static.c3d"))
     mean = recording.plates.force[:, :, 1].sum(axis=1).mean() / GRAVITY
@@ -114,6 +115,7 @@ def test_static_trials_weigh_the_subject(file_of, subject, mass_kg, height_m):
     assert all(0.01 < value < 1.2 for value in recording.measurements.values())
 
 
+@pytest.mark.measured
 def test_plug_in_gait_outputs_go_and_virtual_markers_stay(file_of):
     recording = read_c3d(file_of("pig_c3d/subject_a_walk.c3d"))
     labels = recording.markers.labels

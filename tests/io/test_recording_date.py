@@ -9,6 +9,7 @@ from kinertia.io.recording_date import recording_date, session_date
 from kinertia.io.subject_file import read_subject
 
 
+@pytest.mark.measured
 def test_a_c3d_file_that_says_it(file_of):
     assert recording_date(file_of("c3d_variety/bts.c3d")) == date(2019, 5, 24)
 

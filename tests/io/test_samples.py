@@ -311,6 +311,7 @@ def test_a_proxy_that_is_not_there(cache, monkeypatch):
     assert refusal() == f"{problem}; correct HTTPS_PROXY, {by_hand(cache)}"
 
 
+@pytest.mark.measured
 def test_the_files_are_those_of_the_address(monkeypatch, file_of):
     """The example that tests were written with has the bytes that are asked for."""
     monkeypatch.undo()

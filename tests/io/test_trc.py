@@ -67,6 +67,7 @@ def test_whole_files_as_opensim_reads_them(file_of, opensim, name):
         np.testing.assert_allclose(scale * markers.positions[frame], theirs, atol=1e-6, equal_nan=True)
 
 
+@pytest.mark.measured
 def test_rounded_times_are_put_back_on_their_grid(file_of):
     recording = read_trc_recording(file_of("gait2354/subject01_walk1.trc"))
     markers = recording.markers

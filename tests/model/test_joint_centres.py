@@ -32,10 +32,10 @@ def standing(path, height_m):
 
 
 @pytest.fixture(scope="module", params=[("a", 1.61), ("b", 1.505)], ids=["A", "B"])
-def vicon(request, file_of):
+def vicon(request, measured_folder):
     """Our static model and its angles (deg), and Plug-in Gait's own outputs in ground axes (m, deg)."""
     subject, height = request.param
-    path = file_of(f"pig_c3d/subject_{subject}_static.c3d")
+    path = measured_folder / "pig_c3d" / f"subject_{subject}_static.c3d"
     static, origins, angles = standing(path, height)
     file = ezc3d.c3d(str(path))
     labels = file["parameters"]["POINT"]["LABELS"]["value"]

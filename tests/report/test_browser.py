@@ -29,7 +29,7 @@ POINTS_PER_PX = 0.75
 pytestmark = pytest.mark.slow
 
 
-@pytest.fixture(scope="module", params=["demo", "gait2354"])
+@pytest.fixture(scope="module", params=["demo", pytest.param("gait2354", marks=pytest.mark.measured)])
 def opened(request, browser, demo_run):
     """The reports that every check of drawing and silence goes over."""
     folder = demo_run[1] if request.param == "demo" else request.getfixturevalue("fit_of")("gait2354").folder

@@ -14,6 +14,7 @@ from kinertia.motion.joint_wrench import joint_wrenches
 from kinertia.motion.smoothing import smooth
 from kinertia.report.c3d_results import c3d_with_results, outputs_of, prefix_of, to_file, usual_convention
 from kinertia.report.saved_fit import load_fit
+from recordings import is_here
 from validation import walks
 from validation.measured_data import find
 
@@ -201,7 +202,7 @@ def extension_about(fit, joint, side, path, centre, more):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [name for name, files in WALKS.items() if find(files[0])])
+@pytest.mark.parametrize("name", [name for name, files in WALKS.items() if is_here(files[:2])])
 def test_measured_files_come_back_with_vicons_signs(fit_of, tmp_path, name):
     walk, static, more = WALKS[name]
     options = ["--static", find(static), *more.split()]

@@ -65,6 +65,7 @@ def test_a_fit_has_the_verdict_that_its_report_has(fit, findings):
 
 
 @pytest.mark.slow
+@pytest.mark.measured
 def test_two_persons_and_two_models_are_pointed_out(fit, fit_with_model):
     from kinertia.report.saved_fit import load_fit
 

@@ -49,6 +49,7 @@ def test_sides_with_other_signs_keep_the_models_names(fit, coordinates):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("model", "title"), [("gait2354", "Knee extension +"), ("rajagopal", "Knee flexion +")])
+@pytest.mark.measured
 def test_the_knee_bends_in_swing_as_its_title_says(fit_with_model, model, title):
     from kinertia.report.saved_fit import load_fit
 

@@ -48,8 +48,9 @@ CASES = {
     "rajagopal, own model calibrated": Case("rajagopal", True, residual=0.03, peak=0.025),
 }
 
+ON_MEASURED = (pytest.mark.slow, pytest.mark.measured)
 EVERY_CASE = pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name != "demo")) for name in CASES]
+    "name", ["demo", *(pytest.param(name, marks=ON_MEASURED) for name in CASES if name != "demo")]
 )
 
 
@@ -96,6 +97,7 @@ def test_opensim_finds_our_residuals_and_joint_moments(opensim, folder_of, tmp_p
 
 
 @pytest.mark.slow
+@pytest.mark.measured
 def test_moments_over_the_gait_cycle_are_those_of_opensim(opensim, folder_of, tmp_path):
     """OpenSim's Inverse Dynamics, cut at the heel strikes and divided by body mass, against `cycles.csv`."""
     folder = folder_of(CASES["gait2354"])
@@ -168,7 +170,7 @@ def test_our_reader_takes_the_ground_reactions_as_they_are(folder_of, name):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("walk", ["demo", "gait2354"])
+@pytest.mark.parametrize("walk", ["demo", pytest.param("gait2354", marks=pytest.mark.measured)])
 def test_a_second_fit_finds_the_instruments_put_right(request, folder_of, tmp_path, walk):
     """On the delivered forces plates and clock are at zero within their deviations, and residuals are no larger."""
     folder = folder_of(Case(walk))

@@ -51,6 +51,7 @@ def test_tables_figures_and_findings(fit, loaded):
 
 
 @pytest.mark.slow
+@pytest.mark.measured
 def test_a_fit_with_an_own_model(fit_with_model, tmp_path):
     """Its file comes along: the model with the estimate is written without it."""
     folder = fit_with_model("gait2354", True)

@@ -43,6 +43,7 @@ BORDER = """canvas => {
 
 
 @pytest.mark.parametrize(("width", "height"), [(900, 360), (260, 700)])
+@pytest.mark.measured
 def test_the_whole_body_is_in_view_from_every_side_that_has_a_key(browser, fit_of, tmp_path, width, height):
     """Of somebody without markers on the head, whose ellipsoid is above them all."""
     page = Opened(browser, without_plotly(fit_of("rajagopal").folder / "report.html", tmp_path)).page

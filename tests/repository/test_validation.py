@@ -12,7 +12,6 @@ import pytest
 
 from validation import cohort_speed, command_speed, field_trials, measured_trials
 from validation.long_trials import document, in_own_process
-from validation.measured_data import data_folder
 
 
 def test_there_and_back_does_not_jump():
@@ -34,6 +33,7 @@ def test_farthest_from_the_literature():
 
 
 @pytest.mark.slow
+@pytest.mark.measured
 def test_page_of_measured_trials(fit_of):
     runs = {
         name: {**fit_of(name).summary, "bsp": pd.read_csv(fit_of(name).folder / "bsp.csv")}
@@ -145,8 +145,8 @@ def test_page_of_field_trials():
     assert "- lab: jump: T101 T101 said." in page
 
 
-def test_every_field_case_has_its_files():
-    every = list(field_trials.cases(data_folder()))
+def test_every_field_case_has_its_files(measured_folder):
+    every = list(field_trials.cases(measured_folder))
     assert len({case.title for case in every}) == len(every) >= 48
     for case in every:
         files = [Path(word) for word in case.arguments if word.endswith(field_trials.FILES)]

@@ -30,7 +30,6 @@ from validation.fault_study import (
     synthetic_walk,
 )
 from validation.faults import code_rows, counts, faults_markdown, faults_summary
-from validation.measured_data import data_folder
 from validation.measured_person import read_person, write_person
 from validation.mistakes import MISTAKES, Mistake
 from validation.walks import subject_files
@@ -195,8 +194,8 @@ def test_own_walks_are_printed_and_leave_the_page_alone(outcomes, c3d_lab, tmp_p
     assert json.loads((tmp_path / "details.json").read_text())["outcomes"][2]["outcome"] == "unnoticed"
 
 
-def test_measured_walks_have_subject_files(tmp_path):
-    people = faults.named(map(read_subject, subject_files(data_folder(), tmp_path)))
+def test_measured_walks_have_subject_files(measured_folder, tmp_path):
+    people = faults.named(map(read_subject, subject_files(measured_folder, tmp_path)))
     assert len(people) == 5
     for wanted in people.values():
         assert all(path.is_file() for path in (wanted.model.static, wanted.trials[0].markers))

@@ -49,6 +49,7 @@ def test_another_spelling_is_read_as_the_static_trials(person, of_static, of_wal
 
 
 @pytest.mark.parametrize("of_walk", [str.lower, "Walk_{}".format, lambda label: label.replace(".", " ")])
+@pytest.mark.measured
 def test_another_spelling_is_read_as_the_models(recording_of, file_of, of_walk):
     walk = recording_of("gait2354/subject01_walk1.trc", "gait2354/subject01_walk1_grf.mot")
     model = read_osim(file_of("gait2354/subject01_scaled.osim"))

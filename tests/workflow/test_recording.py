@@ -299,10 +299,12 @@ def test_a_file_of_another_laboratory(of_another_laboratory, recording_of, unit,
         ("plates_type1", "m", "+Y"),
     ],
 )
+@pytest.mark.measured
 def test_measured_files_of_other_laboratories(file_of, name, unit, vertical):
     assert_foreign(read_recording(file_of(f"c3d_variety/{name}.c3d")), unit, vertical)
 
 
+@pytest.mark.measured
 def test_a_measured_walk_with_helen_hayes_markers_in_four_letters(recording_of):
     """VSAC is on the sacrum, 0.2 m behind the ASIS; joint centres are computed from it."""
     check = check_recording(recording_of("c3d_variety/motion_analysis_walk.c3d"))

@@ -90,6 +90,7 @@ def test_hip_centres_by_a_rigid_fit_of_the_pelvis(noise_m, recording_of):
 
 
 @pytest.mark.parametrize("trial", ["walking1", "squats1"])
+@pytest.mark.measured
 def test_hip_centres_that_another_laboratory_computed(trial, recording_of):
     """By a rigid fit of all pelvis markers; regressions of the same study go with knees and hips, and are not seen."""
     markers = recording_of(f"subject4/{trial}.trc").markers

@@ -15,7 +15,7 @@ from kinertia.model.marker_set import MarkerSet
 from kinertia.model.skeleton import GRAVITY_M_S2
 from kinertia.trial.data import FootLoads, Markers, Trial
 from loads_and_feet import context_of, error_of
-from recordings import here, is_here
+from recordings import here
 
 SIDES = {
     "thigh": ("THAP", "THAD", "LEPI", "MEPI"),
@@ -52,8 +52,8 @@ def test_drop_landings_of_another_laboratory(recording_of, name):
     assert context.velocities[0].mass_kg == pytest.approx(58.8, rel=0.08)
 
 
+@pytest.mark.measured
 @pytest.mark.parametrize("delay_s", [0.0, 0.08])
-@pytest.mark.skipif(not is_here(DROP_JUMP), reason="measured")
 def test_forces_of_a_drop_jump_that_are_late(recording_of, delay_s):
     recording = recording_of(*DROP_JUMP)
     late = replace(recording, plates=replace(recording.plates, time=recording.plates.time + delay_s))

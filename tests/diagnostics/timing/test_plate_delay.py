@@ -13,7 +13,7 @@ CLEAR = ("synthetic", "synthetic c3d", "gait2354", "rajagopal")
 """Walks in which two plates share the load for long enough."""
 
 
-@pytest.fixture(params=CLEAR)
+@pytest.fixture(params=[name for name in CLEAR if name in WALKS])
 def walk(request, recording_of):
     return recording_of(*WALKS[request.param])
 
