@@ -51,8 +51,8 @@ if "PYTEST_XDIST_WORKER" in os.environ:
     two_threads._cores = lambda: 1
 
 LOOKED_FOR = (
-    f"measured recordings are looked for in the folder that {samples.VARIABLE} names or, if it names none, in shared/data "
-    "beside the repository and in the cache of kinertia demo --measured; other tests ran on synthetic ones"
+    f"measured recordings are looked for in the folder that {samples.VARIABLE} names or, if it names none, in "
+    "shared/data beside the repository and in the cache of kinertia demo --measured; other tests ran on synthetic ones"
 )
 SUBJECT = """# A synthetic person, with the markers of Plug-in Gait.
 [subject]

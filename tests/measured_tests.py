@@ -1,8 +1,9 @@
 """The mark `measured`: tests that need recordings which are no part of the repository.
 
-Three kinds have it: those that ask for a fixture of them, those marked by hand, and, where they are chosen by it
-(`-m measured`), all that are collected only where the recordings are. A test that is skipped for want of them fails
-unless it has the mark, so that what runs for everybody and what runs on measured recordings are all tests together.
+Four kinds have it: those that ask for a fixture of them, those with the name of such a file as a parameter, those
+marked by hand, and, where tests are chosen by it (`-m measured`), all that are collected only where the recordings are.
+A test that is skipped for want of them fails unless it has the mark, so that what runs everywhere and what runs on
+measured recordings are all tests together.
 """
 
 import os
@@ -19,6 +20,7 @@ from validation.measured_data import find
 MARK = "measured"
 OF_ANY_WALK = "sample_walk"
 """The fixture that is the measured walk where there is one, and a synthetic one elsewhere."""
+READ = (".c3d", ".mot", ".osim", ".trc")
 EMPTY = "got empty parameter set"
 """What pytest calls a test on recordings of which none is here."""
 _EVERYWHERE = "collected_everywhere"
@@ -52,7 +54,8 @@ class MeasuredTests:
     def pytest_collection_modifyitems(self, items):
         for item in items:
             only_here = self.everywhere is not None and item.nodeid not in self.everywhere
-            if only_here or not self.fixtures.isdisjoint(item.fixturenames):
+            by_parameters = hasattr(item, "callspec") and any(map(of_recordings, item.callspec.params.values()))
+            if only_here or by_parameters or not self.fixtures.isdisjoint(item.fixturenames):
                 item.add_marker(MARK)
 
     @pytest.hookimpl(wrapper=True)
@@ -66,6 +69,13 @@ class MeasuredTests:
                 report.outcome = "failed"
                 report.longrepr = f"needs measured recordings, and is not marked `{MARK}`"
         return report
+
+
+def of_recordings(parameter: object) -> bool:
+    """Whether a parameter of a test is, or contains, the name of a measured file that is here."""
+    if isinstance(parameter, tuple | list):
+        return any(map(of_recordings, parameter))
+    return isinstance(parameter, str) and parameter.endswith(READ) and find(parameter) is not None
 
 
 def collected_without(root: Path) -> frozenset[str]:

@@ -13,6 +13,7 @@ from refusals import only, refused
 
 @pytest.mark.parametrize("name", ["pig_c3d/subject_a_walk.c3d"])
 @pytest.mark.parametrize("kind", ["tsv", pytest.param("csv", marks=pytest.mark.slow)])
+@pytest.mark.measured
 def test_a_walk_comes_back(recording_of, tmp_path, monkeypatch, kind, name):
     walk = recording_of(name)
     corners = np.stack([plate @ lab_files.LAB for plate in walk.plates.corners])

@@ -28,9 +28,18 @@ def _examples():
             if block.language in ("console", "python") or block.file:
                 groups.setdefault((page, block.folder), []).append(block)
     return [
-        pytest.param(group, folder, id=f"{page.stem}-{folder}", marks=[pytest.mark.slow] * group[0].slow)
+        pytest.param(group, folder, id=f"{page.stem}-{folder}", marks=_marks(group))
         for (page, folder), group in groups.items()
     ]
+
+
+def _marks(group):
+    measured = group[0].folder in MEASURED or _of_the_measured_demo(group)
+    return [pytest.mark.slow] * group[0].slow + [pytest.mark.measured] * measured
+
+
+def _of_the_measured_demo(group):
+    return any("demo --measured" in block.text for block in group)
 
 
 @pytest.fixture
@@ -51,7 +60,7 @@ def workshop(tmp_path, monkeypatch, request):
 
 @pytest.mark.parametrize(("group", "folder"), _examples())
 def test_examples_run(group, folder, workshop, request):
-    if any("demo --measured" in block.text for block in group):
+    if _of_the_measured_demo(group):
         request.getfixturevalue("file_of")("gait2354/subject01_walk1.trc")
         request.getfixturevalue("sample_walk")
     workshop(folder)
