@@ -12,6 +12,7 @@ import kinertia
 from examples import PAGES, ROOT
 
 
+@pytest.mark.slow
 def test_site_is_whole_and_needs_no_network(tmp_path):
     for module in ("material", "mkdocstrings_handlers.python", "latex2mathml"):
         pytest.importorskip(module, reason='needs the documentation tools: pip install -e ".[docs]"')
