@@ -13,7 +13,7 @@ from cohort_faults import write_study
 from command_line import PROGRAM, run
 from kinertia.cohort.cluster import run_jobs
 from kinertia.cohort.job import Job
-from kinertia.cohort.slurm import KEPT_MEMORY, slurm_cluster
+from kinertia.cohort.slurm import ENVIRONMENT, slurm_cluster
 from kinertia.errors import FileError, KinertiaError
 from kinertia.io.slurm_file import SlurmFile, read_slurm
 
@@ -96,7 +96,7 @@ def test_a_job_that_ends_before_its_worker_reports_is_asked_for_again(slurm_that
     folder = slurm_that("ends", "ends", "runs")
     with slurm_cluster(SlurmFile(workers=1, memory_gb=1.0), 5) as client:
         found = client.submit(os.getenv, "MALLOC_TRIM_THRESHOLD_").result(timeout=120)
-    assert found == str(KEPT_MEMORY["MALLOC_TRIM_THRESHOLD_"])
+    assert found == str(ENVIRONMENT["MALLOC_TRIM_THRESHOLD_"])
     assert len(list(folder.glob("*.job"))) == 3
 
 

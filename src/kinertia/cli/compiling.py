@@ -2,10 +2,10 @@
 
 import gc
 import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from kinertia.cohort.process import PYTHON
 from kinertia.model.compiled import is_compiled, set_compiled
 
 _STAGE = "compiling, once"
@@ -67,7 +67,7 @@ def _markers_beside() -> Iterator[None]:
     """Run `compile_markers` in a separate process, until the end of the block at the earliest; what it leaves undone,
     as where no process can be started, the estimate compiles itself.
     """
-    command = [sys.executable, "-c", f"from {__name__} import compile_markers; compile_markers()"]
+    command = [*PYTHON, "-c", f"from {__name__} import compile_markers; compile_markers()"]
     try:
         beside = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     except OSError:

@@ -1,6 +1,5 @@
 """Fits a cohort on this computer, in one process per core: each works on one person at a time, with one thread."""
 
-import sys
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -8,10 +7,10 @@ from queue import Empty, SimpleQueue
 from threading import Event, Thread
 
 from kinertia.cohort.job import RETRIES, Job
-from kinertia.cohort.process import Process
+from kinertia.cohort.process import PYTHON, Process
 from kinertia.cohort.resources import Finished
 
-WORKER = (sys.executable, "-m", "kinertia.cohort.worker")
+WORKER = (*PYTHON, "-m", "kinertia.cohort.worker")
 PERSON_MEMORY_BYTES = 2 * 1024**3
 """Smallest memory of a fit: ten minutes of gait with plates at 1000 Hz need two thirds of it."""
 _LOOK_S = 0.2

@@ -14,9 +14,9 @@ from kinertia.cohort.slurm_jobs import replaced_jobs
 from kinertia.errors import KinertiaError
 from kinertia.io.slurm_file import SlurmFile
 
-KEPT_MEMORY = MappingProxyType({"MALLOC_TRIM_THRESHOLD_": 2**28, "MALLOC_MMAP_THRESHOLD_": 2**25})
-"""Bytes that a worker keeps on Linux, by its environment. Dask's workers give memory back at once, and a fit asks for
-it again, page by page: it took a third longer."""
+ENVIRONMENT = MappingProxyType({"MALLOC_TRIM_THRESHOLD_": 2**28, "MALLOC_MMAP_THRESHOLD_": 2**25, "PYTHONSAFEPATH": 1})
+"""Environment of a worker: bytes that it keeps on Linux, and that it imports nothing from the folder it is started in.
+Dask's workers give memory back at once, and a fit asks for it again, page by page: it took a third longer."""
 _SCHEDULING = MappingProxyType(
     {
         "distributed.scheduler.allowed-failures": RETRIES,
@@ -60,7 +60,7 @@ def slurm_cluster(wanted: SlurmFile, people: int) -> Iterator[Any]:
             queue=wanted.partition,
             account=wanted.account,
             job_extra_directives=[*wanted.directives, *([] if wanted.logs else _NO_LOGS)],
-            job_script_prologue=[*(f"export {name}={size}" for name, size in KEPT_MEMORY.items()), *wanted.before],
+            job_script_prologue=[*(f"export {name}={value}" for name, value in ENVIRONMENT.items()), *wanted.before],
             interface=wanted.interface,
             log_directory=wanted.logs,
             scheduler_options=dict(_NO_DASHBOARD),

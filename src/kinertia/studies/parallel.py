@@ -15,6 +15,7 @@ from threadpoolctl import threadpool_limits
 
 from kinertia.motion.two_threads import in_one_thread
 
+_SAFE_PATH = "PYTHONSAFEPATH"
 _MOST_ON_WINDOWS = 61
 """Largest number of handles that Windows can wait for: `ProcessPoolExecutor` raises ValueError above it."""
 
@@ -39,9 +40,10 @@ def in_parallel(
     workers = process_count(workers, len(cases))
     progress(0.0)
     # spawned, because a forked copy of a process that has threads (a progress bar, linear algebra) may hang
-    pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=one_thread)
+    with _safe_path():
+        pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=one_thread)
     try:
-        with interrupted_later():
+        with _safe_path(), interrupted_later():
             futures = [pool.submit(task, case) for case in cases]
         for done, future in enumerate(as_completed(futures), start=1):
             future.result()
@@ -49,6 +51,20 @@ def in_parallel(
         return [future.result() for future in futures]
     finally:
         pool.shutdown(cancel_futures=True)
+
+
+@contextmanager
+def _safe_path() -> Iterator[None]:
+    """Start processes that import nothing from the current folder."""
+    before = os.environ.get(_SAFE_PATH)
+    os.environ[_SAFE_PATH] = "1"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[_SAFE_PATH]
+        else:
+            os.environ[_SAFE_PATH] = before
 
 
 @contextmanager

@@ -1,13 +1,12 @@
 """Runs work in a process of its own, with its progress, time left and outcome."""
 
-import sys
 import threading
 import time
 from dataclasses import dataclass
 
-from kinertia.cohort.process import Process
+from kinertia.cohort.process import PYTHON, Process
 
-WORKER = (sys.executable, "-m", "kinertia.cli.web.worker")
+WORKER = (*PYTHON, "-m", "kinertia.cli.web.worker")
 
 
 @dataclass(frozen=True)
