@@ -85,5 +85,6 @@ def collected_without(root: Path) -> frozenset[str]:
     nowhere = os.environ | {VARIABLE: os.devnull, "CI": ""}
     done = subprocess.run(command, cwd=root, env=nowhere, capture_output=True, text=True, check=False)
     if done.returncode != 0:
-        raise pytest.UsageError(f"without measured recordings tests are not collected:\n{(done.stdout + done.stderr)[-2000:]}")
+        last = (done.stdout + done.stderr)[-2000:]
+        raise pytest.UsageError(f"without measured recordings tests are not collected:\n{last}")
     return frozenset(line for line in done.stdout.splitlines() if "::" in line)
