@@ -1,6 +1,6 @@
 """Runs the command as `python -m kinertia`: in new processes, and where Python's scripts folder is not on the path.
 
-Nothing is imported from the current folder, which Python puts first: a `coverage.py` there is somebody's data.
+Nothing is imported from the current folder, which Python puts first: a file coverage.py there is somebody's data.
 """
 
 import sys

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, Self
 
 PYTHON = (sys.executable, "-P")
-"""Python which imports nothing from the folder that it is started in: a `coverage.py` there is somebody's data."""
+"""Python which imports nothing from the folder that it is started in: a file coverage.py there is somebody's data."""
 _OF_ITS_OWN: dict[str, Any] = {"process_group": 0}
 if sys.platform == "win32":
     _OF_ITS_OWN = {"creationflags": subprocess.CREATE_NO_WINDOW | subprocess.CREATE_NEW_PROCESS_GROUP}
