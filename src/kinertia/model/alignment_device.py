@@ -33,7 +33,7 @@ def device_labels(labels: Iterable[str]) -> tuple[str, ...]:
 
 
 def _devices(labels: Iterable[str]) -> dict[str, tuple[str, str, str]]:
-    """Return the device's labels (axis first) by what comes before `KAX`: "L", or "subject_L"."""
+    """Return the device's labels (axis first) by what comes before KAX: "L", or "subject_L"."""
     found: dict[str, dict[str, str]] = {}
     for label in labels:
         if match := _DEVICE.fullmatch(label):
