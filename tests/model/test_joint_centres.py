@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import ezc3d
 import numpy as np
 import pytest
@@ -169,3 +171,21 @@ def test_cervical_joint_lies_above_the_line_from_c7_to_the_sternal_notch(sex, ra
     np.testing.assert_allclose(lumbar + length * rotation[:, 1], top, atol=1e-12)
     np.testing.assert_allclose(rotation[:, 2], [0.0, 0.0, 1.0], atol=1e-12)
     np.testing.assert_allclose(shoulders["l"], points["acromion_l"] - 0.17 * 0.36 * rotation[:, 1])
+
+
+@pytest.mark.parametrize("turned_deg", [-20.0, 0.0, 25.0])
+def test_an_ankle_without_medial_marker_and_width_follows_the_foot(turned_deg):
+    """Not the pelvis, which a leg is rotated against in a frame of a walk."""
+    positions = standing_positions()
+    true = (positions["R.Ankle.Lat"] + positions["R.Ankle.Med"]) / 2
+    c, s = np.cos(np.radians(turned_deg)), np.sin(np.radians(turned_deg))
+    rotation = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
+    for label in ("Ankle.Lat", "Heel", "Toe.Lat", "Toe.Med", "Toe.Tip"):
+        positions[f"R.{label}"] = true + rotation @ (positions[f"R.{label}"] - true)
+    own = {label: at for label, at in positions.items() if "Ankle.Med" not in label}
+    marks = replace(jc.find_landmarks(recording(own), read_marker_set("cleveland-clinic")), stature_m=1.75)
+    knee_at = (marks["knee_lateral_r"] + marks["knee_medial_r"]) / 2
+    shank = jc.frame(knee_at - marks["ankle_lateral_r"], np.array([0.0, 0.0, 1.0]))
+    centre, axis = jc.ankle(marks, knee_at, shank, "r")
+    assert np.linalg.norm((centre - true)[[0, 2]]) < 0.008
+    assert jc.rotation_outwards(axis, rotation, "r") == pytest.approx(np.radians(9.0), abs=np.radians(6.0))

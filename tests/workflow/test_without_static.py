@@ -8,6 +8,7 @@ import pytest
 from kinertia.errors import BlockedError
 from kinertia.estimation.simultaneous.model_uncertainty import WITHOUT_STATIC
 from kinertia.io.recording import read_recording
+from kinertia.model.gait27 import LEG_AXIS_TILTS
 from kinertia.settings import Settings, Subject
 from kinertia.synthetic.walk import HEIGHT_M
 from kinertia.trial.trial_input import TrialInput
@@ -47,7 +48,10 @@ def test_a_walk_stands_for_its_static_trial(synthetic_lab):
     assert "S207" not in {one.code for one in usual.findings}
     for name, sd_m in usual.uncertainty.centres.items():
         assert without.uncertainty.centres[name] == pytest.approx(WITHOUT_STATIC * sd_m)
-    assert without.uncertainty.axes
+    assert without.uncertainty.marker_sd_m == pytest.approx(WITHOUT_STATIC * usual.uncertainty.marker_sd_m)
+    assert without.uncertainty.axes == usual.uncertainty.axes  # one walk does not show them
+    tilts = {name: without.skeleton.locked[name] for name in LEG_AXIS_TILTS}
+    assert max(map(abs, tilts.values())) < np.radians(15.0), tilts
     for mine, expected in zip(without.skeleton.joints, usual.skeleton.joints, strict=True):
         if mine.child.startswith(("thigh", "shank", "talus")):
             assert np.linalg.norm(np.subtract(mine.translation, expected.translation)) < 0.02, mine.child

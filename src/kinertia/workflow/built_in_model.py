@@ -205,7 +205,7 @@ def built_in_model(screened: Screened, trials: Sequence[RotatedTrial], settings:
     )
     model, facing_x = _with_trunk(model, facing_x)
     model = replace(model, skeleton=with_stated_ranges(model.skeleton, subject))
-    stated_axes = _free_axes(facing_x, landmarks, settings)
+    stated_axes = _free_axes(facing_x, settings)
     calibrated = calibrate(model, [one.trial for one in facing_x], landmarks.acromia, stated_axes)
     found = calibrated.findings
     left = _unblocked(facing_x, screened, [*screened.findings, *found])
@@ -244,11 +244,14 @@ def _stance_of(person: Person, trials: Sequence[RotatedTrial], marker_set: Marke
     return _Landmarks(static, named, of_walk=True)
 
 
-def _free_axes(trials: Sequence[RotatedTrial], landmarks: _Landmarks, settings: Settings) -> bool | None:
-    """Return whether joint axes are to be estimated; None where the trials decide, by whether they show them."""
+def _free_axes(trials: Sequence[RotatedTrial], settings: Settings) -> bool | None:
+    """Return whether joint axes are to be estimated; None where the trials decide, by whether they show them.
+
+    That there is no static trial does not free them: one walk would tilt the ankle axes by up to 64 degrees.
+    """
     if settings.joint_axes is not None:
         return settings.joint_axes
-    if landmarks.of_walk or any(not one.trial.loads.plates for one in trials):
+    if any(not one.trial.loads.plates for one in trials):
         return True
     return None if settings.method == "simultaneous" else False
 
