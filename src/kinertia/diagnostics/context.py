@@ -1,6 +1,6 @@
 """Holds one recording for its questions, with evidence computed once."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -19,6 +19,7 @@ from kinertia.diagnostics.evidence.marker_precision import MarkerPrecision
 from kinertia.diagnostics.evidence.plate_contacts import PlateContact, contact_span_s, contacts_of
 from kinertia.diagnostics.evidence.plate_edges import LITTLE_BEYOND_M, FootPoints, Overhang, overhangs
 from kinertia.diagnostics.evidence.plate_masses import plate_masses
+from kinertia.diagnostics.evidence.shared_plates import SharedLoad, shared_loads, shows_whole_feet
 from kinertia.diagnostics.evidence.standing_mass import StandingMass, standing_mass
 from kinertia.diagnostics.evidence.stray_loads import stray_contacts, without_loads
 from kinertia.diagnostics.evidence.strides import periods, swing_in_turn
@@ -202,6 +203,17 @@ class RecordingContext:
         return [one for one in self._all_contacts if id(one) not in strays]
 
     @cached_property
+    def shows_whole_feet(self) -> bool:
+        """Whether heel and forefoot of both feet are visible."""
+        return shows_whole_feet(self.foot_trajectories, self.marker_set, self.seen_labels)
+
+    @cached_property
+    def shared_loads(self) -> Sequence[SharedLoad]:
+        """Loads that both feet bear on one plate for a while."""
+        feet, known = self.foot_trajectories, self.shows_whole_feet and not self.walks_backwards
+        return [*shared_loads(self.contacts, feet, self.marker_set)] if feet is not None and known else []
+
+    @cached_property
     def overhangs(self) -> Sequence[Overhang]:
         """Feet that extend beyond the edge of the plate that they stand on; none where its corners are unknown."""
         if self.plates is None or self.feet is None:
@@ -277,18 +289,20 @@ class RecordingContext:
 
     @cached_property
     def trial_on_plates(self) -> Trial | None:
-        """The trial without frames in which a foot bears load beyond its plate, or another person stands on one, unless
-        the user vouches for a window; None where it is impossible, or hardly any frames are left.
+        """The trial without frames in which a foot bears load beyond its plate, or both feet or another person share
+        one, unless the user vouches for a window; None where it is impossible, or hardly any frames are left.
         """
+        beyond = [(one.unmeasured_s, one.foot) for one in self.overhangs if one.unmeasured_s is not None]
+        foreign = [((one.time[0], one.time[-1]), one.foot) for one in self.foreign_contacts]
+        return self._without([*beyond, *foreign, *((one.unknown_s, slice(None)) for one in self.shared_loads)])
+
+    def _without(self, spans: Iterable[tuple[tuple[float, float], int | slice]]) -> Trial | None:
         trial = self.trial
         if trial is None or self.window_s is not None:
             return trial
-        time, legs = trial.markers.time, trial.known_legs.copy()
-        for one in self.overhangs:
-            if one.unmeasured_s is not None:
-                legs[:, one.foot] &= ~within(time, *one.unmeasured_s)
-        for contact in self.foreign_contacts:
-            legs[:, contact.foot] &= ~within(time, contact.time[0], contact.time[-1])
+        legs = trial.known_legs.copy()
+        for (start_s, end_s), feet in spans:
+            legs[within(trial.markers.time, start_s, end_s), feet] = False
         measured = trial.measured & legs.all(axis=1)
         if measured.sum() < FEWEST_MEASURED:
             return None
@@ -361,9 +375,10 @@ class RecordingContext:
     @cached_property
     def plate_masses(self) -> Mapping[str, float]:
         """Body mass (kg) from each plate that supports all of it for a while; empty if loads are not sorted by foot."""
-        if self.plates is None or self.trial is None:
+        trial = self._without((one.unknown_s, slice(None)) for one in self.shared_loads)
+        if self.plates is None or trial is None:
             return {}
-        return plate_masses(self.plates, self.trial, self.all_markers, self.segment_of_label)
+        return plate_masses(self.plates, trial, self.all_markers, self.segment_of_label)
 
     @property
     def plates_reached_beyond(self) -> frozenset[str]:

@@ -61,7 +61,9 @@ def foot(*spans, lasts_s=3.0):
     time = np.arange(0.0, lasts_s, 0.01)
     place = np.zeros((len(time), 2))
     whole = tuple((start, end, True) for start, end in spans)
-    return FootTrajectory(time, place, place + np.array([0.2, 0.0]), np.ones(len(time), dtype=bool), whole)
+    return FootTrajectory(
+        time, place, place + np.array([0.2, 0.0]), np.ones(len(time), dtype=bool), whole, np.zeros(len(time))
+    )
 
 
 TURNS = {

@@ -11,7 +11,7 @@ from kinertia.findings.finding import Severity
 from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.data import Markers
 from kinertia.trial.sampled_time import runs
-from loads_and_feet import doubted, error_of, feet_of, on_one_plate, place_findings
+from loads_and_feet import context_of, doubted, error_of, feet_of, on_one_plate, place_findings
 from recordings import QUICK_WALKS, RUNS, SQUATS, WALKS, slow_beside
 from walk_on_plates import ALL_STEPS
 from walk_on_plates import FEET as SIMPLE_FEET
@@ -202,17 +202,46 @@ def test_belts_that_are_interchanged(recording_of, name, apart_m):
 def test_both_feet_on_a_plate():
     """The left foot lands on the right foot's plate, and comes to its own later."""
     recording = simple_walk([("r", 0), ("l", 0)])
-    plates = recording.plates
-    time = plates.time
-    force, moment = plates.force.copy(), plates.moment.copy()
-    rows = (time >= 0.7) & (time < 0.78)  # both are down from 0.7 to 0.8 s
-    for part in (force, moment):
-        part[rows, 0] += part[rows, 1]
-        part[rows, 1] = 0.0
-    wrong = replace(recording, plates=replace(plates, force=force, moment=moment))
+    wrong = with_left_foot_on_first_plate(recording, 0.7, 0.78)  # both are down from 0.7 to 0.8 s
     (found,) = [one for one in place_findings(wrong, SIMPLE_FEET) if one.severity > Severity.CORRECTED]
     assert (found.code, found.where.plate) == ("P276", "plate 1")
     assert found.where.span_s == pytest.approx((0.7, 0.78), abs=0.01)
+
+
+def with_left_foot_on_first_plate(recording, from_s, to_s):
+    """The recording with the load of the second plate on the first for a while."""
+    plates = recording.plates
+    force, moment = plates.force.copy(), plates.moment.copy()
+    rows = (plates.time >= from_s) & (plates.time < to_s)
+    for part in (force, moment):
+        part[rows, 0] += part[rows, 1]
+        part[rows, 1] = 0.0
+    return replace(recording, plates=replace(plates, force=force, moment=moment))
+
+
+def test_a_load_of_both_feet_is_no_measure_of_where_a_plate_is():
+    """A child's second foot on the plate displaced it by 42 mm, and mirrored its centre of pressure."""
+    shared = with_left_foot_on_first_plate(simple_walk([("r", 0), ("l", 0)]), 0.7, 0.85)
+    context = context_of(shared, SIMPLE_FEET)
+    assert not {"P243", "P252"} & {one.code for one in place_findings(shared, SIMPLE_FEET)}
+    before, after = context.trial.windows(), context.trial_on_plates.windows()
+    assert max(end for _, end in before) > 0.75
+    assert max(end for _, end in after if end < 0.85) <= 0.71
+
+
+def on_the_toes(recording, rise_m):
+    """The walk of somebody whose heels stay in the air by so much, and whose loads are under the toes."""
+    places = recording.markers.positions.copy()
+    places[:, [0, 2], 1] += rise_m
+    return replace(moved(recording, (0.12, 0.0, 0.0)), markers=replace(recording.markers, positions=places))
+
+
+def test_loads_under_the_toes_of_somebody_who_walks_on_them():
+    """Loads that begin 170 mm in front of the heel were those of displaced plates."""
+    walk = simple_walk([("r", 0), ("l", 0)])
+    assert doubted(on_the_toes(walk, 0.0), SIMPLE_FEET) == ["P243"]
+    assert doubted(on_the_toes(walk, 0.08), SIMPLE_FEET) == []
+    assert "P243" in doubted(moved(on_the_toes(walk, 0.08), (0.0, 0.0, 0.05)), SIMPLE_FEET)
 
 
 def test_both_feet_explain_feet_in_turn():
@@ -263,13 +292,7 @@ def test_a_mirrored_plate_under_short_feet():
 def test_a_mirrored_plate_does_not_hide_both_feet_on_another():
     """Chain F of the precedence."""
     recording = along(simple_walk([("r", 0), ("l", 0), ("r", 1)]), 2, -1.5)
-    plates = recording.plates
-    force, moment = plates.force.copy(), plates.moment.copy()
-    rows = (plates.time >= 0.7) & (plates.time < 0.78)
-    for part in (force, moment):
-        part[rows, 0] += part[rows, 1]
-        part[rows, 1] = 0.0
-    wrong = replace(recording, plates=replace(plates, force=force, moment=moment))
+    wrong = with_left_foot_on_first_plate(recording, 0.7, 0.78)
     assert sorted(doubted(wrong, SIMPLE_FEET)) == ["P252", "P276"]
 
 

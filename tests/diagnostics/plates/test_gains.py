@@ -115,3 +115,12 @@ def test_an_axis_that_reads_half(recording_of, plate, name):
     assert (found.code, found.where.axis) == ("P222", context.along(0)["axis"])
     assert found.where.plate == (None if plate is None else recording.plates.names[plate])
     assert found.evidence["factor"].value == pytest.approx(0.5, abs=0.15)
+
+
+@pytest.mark.parametrize("plate", [0, 1])
+def test_zeros_of_both_plates_are_no_gain_of_one(recording_of, plate):
+    """Plates that read -10 and -7 N too much, and feet that brake and push off alike: one plate "read 0.55 times"."""
+    walk = recording_of(*LONG_WALKS["synthetic"])
+    zeros_n = np.array([[-16.0, 0.0, 0.0], [-9.0, 0.0, 0.0]])[:: 1 - 2 * plate]
+    wrong = with_force(walk, lambda force: force + zeros_n * (force[..., 1:2] > 20.0))
+    assert [one for one in gains(context_of(wrong)) if one.code == "P222"] == []

@@ -15,6 +15,8 @@ HORIZONTAL = (0, 2)
 DISTINGUISHABLE = 0.5
 """Across the walk a foot pushes to one side all the time: with the wrong sign it looks like another zero. On nine
 trials what is true leaves 0.1 to 0.66 of what the other would, in one walk 0.7 to 1.7."""
+MOST_ZERO_N = 25.0
+"""Plates whose zeros are wrong by more show it while they are unloaded."""
 CLEARLY_BEST = 0.85
 """A fault is identified where undoing it leaves less than this share of what undoing any other leaves."""
 
@@ -38,7 +40,8 @@ class VelocityResidual:
         all_reversed: residual if all plates have the wrong sign.
         without_trend: residual if all plates have the same zero offset.
         plate_reversed, plate_zeroed: (p,) residuals if one plate has the wrong sign, or a zero offset.
-        zero_n: (p,) N, that zero offset.
+        zero_offset_n: (p,) N, that zero offset.
+        all_zeroed: residual if every plate has a zero offset of its own; as read where one would exceed `MOST_ZERO_N`.
         scaled: residuals if all plates, or one, have a gain error.
     """
 
@@ -48,6 +51,7 @@ class VelocityResidual:
     plate_reversed: FloatArray
     plate_zeroed: FloatArray
     zero_offset_n: FloatArray
+    all_zeroed: float
     scaled: tuple[Scaled, ...]
 
     @classmethod
@@ -57,11 +61,13 @@ class VelocityResidual:
         by_forces = _centred([part.by_forces[:, axis] for part in parts])
         off = by_forces - body
         reversed_, zeroed, zero_offset_n, scaled = [], [], [], [_scaled(None, off, by_forces)]
+        newtons = []
         for p, own_force in enumerate(np.moveaxis(force, 1, 0)):
             own, one_newton = (
                 _centred([part.by(time, each) for part in parts])
                 for each in (own_force[:, axis], (own_force[:, 1] > 0.0).astype(float))
             )
+            newtons.append(one_newton)
             zero_offset_n.append(float(one_newton @ off) / max(float(one_newton @ one_newton), 1e-12))
             scaled.append(_scaled(p, off, own))
             reversed_.append(np.std(off - 2.0 * own))
@@ -74,6 +80,7 @@ class VelocityResidual:
             np.array(reversed_),
             np.array(zeroed),
             np.array(zero_offset_n),
+            _all_zeroed(off, np.column_stack(newtons)),
             tuple(scaled),
         )
 
@@ -127,6 +134,14 @@ def misread_plate_residuals(time: FloatArray, force: FloatArray, parts: Sequence
         true = (1j * own.conj(), -1j * own.conj(), 1j * own, -1j * own)
         residuals.append([np.sqrt(np.mean(np.square(np.abs(by_forces - body - own + each)))) for each in true])
     return np.array(residuals)
+
+
+def _all_zeroed(off: FloatArray, newtons: FloatArray) -> float:
+    """Return the residual (m/s) of velocities (n,) without zero offsets of the plates, by what one newton of each does
+    (n, p)."""
+    zeros_n = np.linalg.lstsq(newtons, off, rcond=None)[0]
+    possible = np.abs(zeros_n).max(initial=0.0) <= MOST_ZERO_N
+    return float(np.std(off - newtons @ zeros_n if possible else off))
 
 
 def _scaled(plate: int | None, off: FloatArray, own: FloatArray) -> Scaled:

@@ -18,7 +18,7 @@ from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.contact_fit import Hypothesis
 from kinertia.diagnostics.evidence.plate_contacts import FAR_M, PlateContact, displaced
 from kinertia.diagnostics.evidence.vertical_acceleration import LARGEST_RESIDUAL, vertical_match_of
-from kinertia.diagnostics.plates.heel_landing import goes_forwards, lands_on_heels, shows_feet_equally, shows_whole_feet
+from kinertia.diagnostics.plates.heel_landing import goes_forwards, heel_steps, one_foot_loads, shows_feet_equally
 from kinertia.diagnostics.plates.interchanged_plates import interchanged_plates
 from kinertia.diagnostics.plates.rotated_plates import rotated_plates
 from kinertia.diagnostics.timing.contact_delays import contact_delays, stance_durations
@@ -26,6 +26,7 @@ from kinertia.diagnostics.timing.rate_and_delay import fitted_rate_or_delay
 from kinertia.findings.finding import Finding, Severity, finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.rule import rule
+from kinertia.trial.data import FloatArray
 
 _OTHER_UNIT_M = 5.0
 _OFFSET_M = 0.03
@@ -48,7 +49,7 @@ def loads_and_feet(context: RecordingContext) -> Iterator[Finding]:
     if unit := list(_other_unit(context)):
         yield from unit
         return
-    if not shows_whole_feet(context):
+    if not context.shows_whole_feet:
         return
     feet = context.foot_trajectories
     timely = forces_keep_time(context)
@@ -120,8 +121,8 @@ def _displaced(context: RecordingContext) -> Iterator[Hypothesis]:
 
 def _offset(context: RecordingContext) -> Iterator[Finding]:
     """Report P243: the loads of right and left are displaced in the same direction of the laboratory."""
-    contacts = context.contacts
-    means = [[one.own_offset_m for one in contacts if one.foot == foot] for foot in range(2)]
+    contacts = one_foot_loads(context)
+    means = [[_foot_offset_m(one) for one in contacts if one.foot == foot] for foot in range(2)]
     if not all(means):
         return
     mean = (np.mean(means[0], axis=0) + np.mean(means[1], axis=0)) / 2
@@ -129,8 +130,17 @@ def _offset(context: RecordingContext) -> Iterator[Finding]:
         offset = Quantity((float(mean[0]), float(mean[1])), "m", limit=_OFFSET_M, usual=(-0.008, 0.008))
         yield _origin(context, offset, len(contacts), "loads of both feet displaced from the line between heel and toe")
         return
-    if lands_on_heels(context):
-        yield from _ends(context, contacts)
+    if steps := heel_steps(context):
+        yield from _ends(context, steps)
+
+
+def _foot_offset_m(contact: PlateContact) -> FloatArray:
+    """Return the mean offset (2,) m of a load from its foot; of one that lands on the forefoot with the toes, which
+    bear part of it for longer."""
+    if not contact.trajectory.lands_on_forefoot(contact.start_s, contact.end_s):
+        return contact.own_offset_m
+    offset_m = contact.trajectory.with_toes().offset_m(contact.time, contact.place)
+    return np.average(offset_m, axis=0, weights=contact.weight)
 
 
 def _ends(context: RecordingContext, contacts: Sequence[PlateContact]) -> Iterator[Finding]:

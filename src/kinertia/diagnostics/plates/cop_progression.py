@@ -2,7 +2,8 @@
 
 From the first third of a step to the last it moves forwards on the foot by 0.06 to 0.82 of the distance from heel to
 forefoot in the walks and runs of 14 people, most of them children (in a drop jump by 16 to 20 mm), and by -0.37 or less
-on a plate that is mirrored along the walk. People who land on the toes also push off from them.
+on a plate that is mirrored along the walk. People who land on the toes also push off from them, and a load that both
+feet bear moves from foot to foot: neither counts.
 """
 
 from collections.abc import Iterator
@@ -12,7 +13,7 @@ import numpy as np
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.foot_trajectories import FootTrajectory
 from kinertia.diagnostics.evidence.plate_contacts import PlateContact
-from kinertia.diagnostics.plates.heel_landing import lands_on_heels
+from kinertia.diagnostics.plates.heel_landing import heel_steps
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 
@@ -26,9 +27,9 @@ def cop_progression(context: RecordingContext) -> Iterator[Finding]:
     while on another plate it moves from heel to toe (P252).
     """
     plates, feet = context.plates, context.foot_trajectories
-    if plates is None or feet is None or context.is_static or not lands_on_heels(context):
+    if plates is None or feet is None or context.is_static:
         return
-    steps = [one for one in context.contacts if one.is_step]
+    steps = [one for one in heel_steps(context) if one.is_step]
     progression: dict[int, float] = {}
     for p in sorted({one.plate for one in steps}):
         own = [one for one in steps if one.plate == p]

@@ -77,23 +77,30 @@ def _about_fixed_point(
     context: RecordingContext, plates: PlateLoads, explained: Container[str | None]
 ) -> Iterator[Finding]:
     """Report P261: vertical moments about a fixed point, the plate's middle or the origin (Mz for Tz), not free
-    moments."""
+    moments. Beside one plate whose moments are too large, smaller ones that a point explains are of the same kind.
+    """
+    found, too_large = [], False
     for name, wrench in loaded_wrenches(plates, _FEWEST):
         if name in explained:
             continue
         torque = free_moment(wrench)
         lever_arm_m = float(np.percentile(np.abs(torque) / wrench[:, 1], _USUAL_PERCENT))
         point, left = _fixed_point(wrench, torque)
-        if lever_arm_m > _LONG_ARM_M and rms(torque) > _ACCOUNTED * rms(left):
-            yield finding(
-                "P261",
-                context.at(plate=name),
-                lever_arm_m=Quantity(lever_arm_m, "m", limit=_LONG_ARM_M, usual=(0.0, 0.023)),
-                rms_nm=Quantity(rms(torque), "N m"),
-                left_rms_nm=Quantity(rms(left), "N m", limit=rms(torque) / _ACCOUNTED),
-                point_m=Quantity((float(point[0]), float(point[1])), "m"),
-                method=Quantity("fixed point"),
+        if rms(torque) > _ACCOUNTED * rms(left):
+            too_large |= lever_arm_m > _LONG_ARM_M
+            found.append(
+                finding(
+                    "P261",
+                    context.at(plate=name),
+                    lever_arm_m=Quantity(lever_arm_m, "m", limit=_LONG_ARM_M, usual=(0.0, 0.023)),
+                    rms_nm=Quantity(rms(torque), "N m"),
+                    left_rms_nm=Quantity(rms(left), "N m", limit=rms(torque) / _ACCOUNTED),
+                    point_m=Quantity((float(point[0]), float(point[1])), "m"),
+                    method=Quantity("fixed point"),
+                )
             )
+    if too_large:
+        yield from found
 
 
 def _fixed_point(wrench: FloatArray, torque: FloatArray) -> tuple[FloatArray, FloatArray]:

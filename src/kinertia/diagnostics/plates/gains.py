@@ -22,7 +22,7 @@ from kinertia.diagnostics.evidence.vertical_acceleration import vertical_match_o
 from kinertia.findings.finding import Finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.trial.data import PlateLoads
-from kinertia.trial.sampled_time import span_s
+from kinertia.trial.sampled_time import span_s, within
 
 _DIFFERENCE = 0.075
 _LEAST_WINDOW_S, _LEAST_GAIN, _RESIDUAL_SHARE = 1.0, 0.025, 0.9
@@ -121,10 +121,28 @@ def _scaled_axis(
     steady = steady_scaled(plates.time, plates.force, long, axis)
     for as_read, scaled in ((residual.as_read, residual.scaled), steady):
         best = min(scaled, key=lambda one: one.residual)
-        limit = min(_SCALED * as_read, CLEARLY_BEST * float(residual.plate_zeroed.min()))
-        if as_read >= _LEAST_RESIDUAL_M_S and best.residual <= limit and _is_gain(best):
+        zeroed = min(float(residual.plate_zeroed.min()), residual.all_zeroed)
+        limit = min(_SCALED * as_read, CLEARLY_BEST * zeroed)
+        explains = as_read >= _LEAST_RESIDUAL_M_S and best.residual <= limit and _is_gain(best)
+        if explains and _more_alike(context, plates, axis, best):
             return _multiple(context, plates, axis, best, scaled, Quantity((as_read, best.residual), "m/s", limit))
     return None
+
+
+def _more_alike(context: RecordingContext, plates: PlateLoads, axis: int, best: Scaled) -> bool:
+    """Return whether the force of a plate that reads a multiple resembles that of other plates' steps once corrected:
+    braking and pushing off differ less from foot to foot than gains that are found here. True where only it has steps.
+    """
+    ranges: dict[int, list[float]] = {}
+    for one in context.whole_contacts:
+        if one.is_step:
+            own = plates.force[within(plates.time, one.start_s, one.end_s), one.plate, axis]
+            ranges.setdefault(one.plate, []).append(float(np.ptp(own)))
+    usual = [float(np.mean(each)) for plate, each in ranges.items() if plate != best.plate]
+    if best.plate not in ranges or not usual:
+        return True
+    larger = float(np.log(np.mean(ranges[best.plate]) / np.mean(usual)))
+    return abs(larger - float(np.log(best.factor))) < abs(larger)
 
 
 def _multiple(

@@ -2,29 +2,16 @@
 on one."""
 
 from collections.abc import Iterator
-from dataclasses import replace
-
-import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.evidence.foot_trajectories import FootTrajectory
-from kinertia.diagnostics.evidence.plate_contacts import BETWEEN_M, ONE_STEP_S, PlateContact
 from kinertia.diagnostics.evidence.plate_edges import OVERHANG_M
-from kinertia.diagnostics.plates.heel_landing import goes_forwards
 from kinertia.errors import KinertiaError
 from kinertia.findings.finding import Finding, finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.motion.common_cutoff import LOWEST_HZ
 from kinertia.motion.kinematics import END_PERIODS, FEWEST_FRAMES
-from kinertia.trial.data import FEET, BoolArray
 from kinertia.trial.plate_assignment import FOOT_NAMES, no_forces
-from kinertia.trial.sampled_time import span_s, within
-
-_OUTSIDE_M, _OUTSIDE_SHARE = 0.14, 0.01
-_MOSTLY = 0.5
-_OTHERS_SHARE = 0.25
-"""The centre of pressure divides the line between both feet as they share the load. At foot off of feet without a toe
-marker it is up to 0.19 of the way to the other foot, which stands on the floor."""
+from kinertia.trial.sampled_time import within
 
 
 def complete_contact(context: RecordingContext) -> Iterator[Finding]:
@@ -80,44 +67,13 @@ def _too_few_frames(context: RecordingContext) -> Finding | None:
 
 
 def both_feet(context: RecordingContext) -> Iterator[Finding]:
-    """Report P276: a load between the feet; both are on the plate, and only their total load is known. A foot that
-    swings by its markers is on none.
-    """
-    plates, feet = context.plates, context.foot_trajectories
-    if plates is None or feet is None or context.is_static or not goes_forwards(context):
+    """Report P276: a load between the feet; both are on the plate, and only their total load is known."""
+    plates = context.plates
+    if plates is None or context.is_static:
         return
-    for contact in context.contacts:
-        away = _under_both(_to_toes(context, contact, feet)) & feet[1 - contact.foot].standing(contact.time)
-        share = float(contact.weight[away].sum() / contact.weight.sum())
-        limit = _MOSTLY if span_s(contact.time) > ONE_STEP_S else _OUTSIDE_SHARE
-        if share > limit:
-            when = contact.time[away]
-            span = (float(when[0]), float(when[-1]))
-            where = context.at(plate=plates.names[contact.plate], span_s=span)
-            yield finding("P276", where, share=Quantity(share, "1", limit=limit))
-
-
-def _to_toes(
-    context: RecordingContext, contact: PlateContact, feet: tuple[FootTrajectory, FootTrajectory]
-) -> PlateContact:
-    """Return the load with its distance to the end of the toes, for feet that have no marker there."""
-    named = {} if context.marker_set is None else context.marker_set.landmarks
-    whole = [foot if f"toe_{side}" in named else foot.with_toes() for side, foot in zip(FEET, feet, strict=True)]
-    return replace(contact, offset_m=np.stack([foot.offset_m(contact.time, contact.place) for foot in whole]))
-
-
-def _under_both(contact: PlateContact) -> BoolArray:
-    """Return (k,) where the load is between the feet, or away from its own foot while the other bears a good part of
-    it."""
-    own, other = np.linalg.norm(contact.offset_m, axis=2)[[contact.foot, 1 - contact.foot]]
-    opposite = np.prod(contact.offset_m, axis=0).sum(axis=1) < 0
-    away: BoolArray = np.minimum(own, other) > BETWEEN_M
-    away &= opposite
-    # on a treadmill's single belt the feet come in turn, and each sample is sorted (`plate_assignment`)
-    if span_s(contact.time) <= ONE_STEP_S:
-        away |= own > _OUTSIDE_M
-    away &= own > _OTHERS_SHARE * (own + other)
-    return away
+    for one in context.shared_loads:
+        where = context.at(plate=plates.names[one.contact.plate], span_s=one.span_s)
+        yield finding("P276", where, share=Quantity(one.share, "1", limit=one.limit))
 
 
 def plate_edges(context: RecordingContext) -> Iterator[Finding]:

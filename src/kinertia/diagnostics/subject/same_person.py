@@ -27,9 +27,10 @@ from kinertia.trial.rms import rms
 
 _OTHER_PERSON = 0.05
 """Median share by which the distances may differ."""
-_BEYOND_REAPPLIED_M, _TYPICAL_BEYOND_M = 0.020, 0.012
-"""RMS and median difference that re-applied markers do not reach: these give 7 to 14 mm RMS, and with only nine
-distances 19 mm at most."""
+_REAPPLIED_M, _TYPICAL_BEYOND_M, _CERTAIN, _OF_MEDIAN = 0.0141, 0.012, 4.0, 1.25
+"""RMS and median difference, standard errors, and the error of a median over that of a mean. Markers re-applied 10 mm
+away along each axis change a distance by the first; the RMS over the distances of a dozen markers is then up to 24 mm,
+and their median share up to 10 %."""
 _OTHER_MASS, _OTHER_STATURE = 0.05, 0.03
 """Shares by which mass and stature of two recordings differ for them not to be of one person in one session."""
 _MOVED_M, _MOVED_BETWEEN_M, _MOVED_SHARE = 0.03, 0.04, 0.15
@@ -137,8 +138,12 @@ def _other_person(
     """
     off, ratio = distances.differences(), distances.ratio()
     rms_m, typical_m = rms(off), float(np.median(np.abs(off)))
-    scaled = abs(ratio - 1.0) > _OTHER_PERSON
-    far = whole and rms_m > _BEYOND_REAPPLIED_M and typical_m > _TYPICAL_BEYOND_M
+    markers, (before, after) = min(len(np.unique(distances.pairs)), len(distances.pairs)), distances.lengths()
+    by_chance = _CERTAIN * _OF_MEDIAN * float(np.median(_REAPPLIED_M / before)) / np.sqrt(markers)
+    certain = abs(ratio - 1.0) > by_chance or rms(after / ratio - before) <= SAME_SESSION_M
+    scaled = abs(ratio - 1.0) > _OTHER_PERSON and certain
+    beyond_m = _REAPPLIED_M * (1.0 + _CERTAIN / np.sqrt(2.0 * markers))
+    far = whole and rms_m > beyond_m and typical_m > _TYPICAL_BEYOND_M
     data = _other_body_data(reference, trial) if whole and rms_m > SAME_SESSION_M else ""
     if not (scaled or far or data):
         return
@@ -147,7 +152,7 @@ def _other_person(
         "S203",
         Where(trial=at),
         ratio=Quantity(ratio, "1", limit=1.0 + _OTHER_PERSON * float(np.sign(ratio - 1.0)), usual=(0.988, 1.012)),
-        rms_m=Quantity(rms_m, "m", limit=SAME_SESSION_M if data else _BEYOND_REAPPLIED_M, usual=(0.0, 0.0046)),
+        rms_m=Quantity(rms_m, "m", limit=SAME_SESSION_M if data else beyond_m, usual=(0.0, 0.0046)),
         pairs=Quantity(len(distances.pairs), "1"),
         worst_m=Quantity(float(off[np.argmax(np.abs(off))]), "m"),
         reference=Quantity(called),

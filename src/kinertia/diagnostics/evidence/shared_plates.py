@@ -1,0 +1,92 @@
+"""Finds loads that both feet bear on one plate: only their total is known, and where it acts says nothing of a foot."""
+
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from kinertia.diagnostics.evidence.foot_trajectories import FootTrajectory
+from kinertia.diagnostics.evidence.plate_contacts import BETWEEN_M, ONE_STEP_S, PlateContact
+from kinertia.model.marker_set import MarkerSet
+from kinertia.trial.data import FEET, BoolArray
+from kinertia.trial.sampled_time import span_s
+
+_OUTSIDE_M, _OUTSIDE_SHARE = 0.14, 0.01
+_MOSTLY = 0.5
+_OTHERS_SHARE = 0.25
+"""The centre of pressure divides the line between both feet as they share the load. At foot off of feet without a toe
+marker it is up to 0.19 of the way to the other foot, which stands on the floor."""
+_ENDS = (("heel",), ("metatarsal", "toe"))
+_LEAST_LENGTH_M = 0.08
+"""Less than from heel to forefoot of a child of four years."""
+
+Feet = tuple[FootTrajectory, FootTrajectory]
+
+
+class SharedLoad(NamedTuple):
+    """A load that both feet bear on one plate for a while.
+
+    Attributes:
+        contact: the load.
+        span_s: first and last time (s) at which both bear it.
+        share, limit: share of the load at which they do, and the largest usual one.
+    """
+
+    contact: PlateContact
+    span_s: tuple[float, float]
+    share: float
+    limit: float
+
+    @property
+    def unknown_s(self) -> tuple[float, float]:
+        """Span (s) in which the load of each foot is unknown: until the load ends, since the second foot need not be
+        wholly on the plate. Empty of a load longer than a step, which is sorted by foot sample by sample."""
+        if span_s(self.contact.time) > ONE_STEP_S:
+            return np.inf, -np.inf
+        return self.span_s[0], float(np.nanmax([self.contact.end_s, self.contact.time[-1]]))
+
+
+def shared_loads(contacts: Sequence[PlateContact], feet: Feet, marker_set: MarkerSet | None) -> Iterator[SharedLoad]:
+    """Yield loads between the feet while both are on the ground; a foot that swings by its markers bears none."""
+    for contact in contacts:
+        away = _under_both(_to_toes(contact, feet, marker_set)) & feet[1 - contact.foot].standing(contact.time)
+        share = float(contact.weight[away].sum() / contact.weight.sum())
+        limit = _MOSTLY if span_s(contact.time) > ONE_STEP_S else _OUTSIDE_SHARE
+        if share > limit:
+            when = contact.time[away]
+            yield SharedLoad(contact, (float(when[0]), float(when[-1])), share, limit)
+
+
+def _to_toes(contact: PlateContact, feet: Feet, marker_set: MarkerSet | None) -> PlateContact:
+    """Return the load with its distance to the end of the toes, for feet that have no marker there."""
+    named = {} if marker_set is None else marker_set.landmarks
+    whole = [foot if f"toe_{side}" in named else foot.with_toes() for side, foot in zip(FEET, feet, strict=True)]
+    return replace(contact, offset_m=np.stack([foot.offset_m(contact.time, contact.place) for foot in whole]))
+
+
+def _under_both(contact: PlateContact) -> BoolArray:
+    """Return (k,) where the load is between the feet, or away from its own foot while the other bears a good part of
+    it."""
+    own, other = np.linalg.norm(contact.offset_m, axis=2)[[contact.foot, 1 - contact.foot]]
+    opposite = np.prod(contact.offset_m, axis=0).sum(axis=1) < 0
+    away: BoolArray = np.minimum(own, other) > BETWEEN_M
+    away &= opposite
+    # on a treadmill's single belt the feet come in turn, and each sample is sorted (`plate_assignment`)
+    if span_s(contact.time) <= ONE_STEP_S:
+        away |= own > _OUTSIDE_M
+    away &= own > _OTHERS_SHARE * (own + other)
+    return away
+
+
+def shows_whole_feet(feet: Feet | None, marker_set: MarkerSet | None, seen: Collection[str]) -> bool:
+    """Return whether heel and forefoot of both feet are among the visible labels: loads are between them, and foot off
+    is not heel off."""
+    if feet is None or marker_set is None:
+        return False
+    for side in FEET:
+        for names in _ENDS:
+            labels = {label for name in names for label in marker_set.landmarks.get(f"{name}_{side}", ())}
+            if labels and not labels & set(seen):
+                return False
+    return min(one.length_m for one in feet) > _LEAST_LENGTH_M
