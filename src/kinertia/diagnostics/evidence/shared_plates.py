@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kinertia.diagnostics.evidence.foot_trajectories import FootTrajectory
+from kinertia.diagnostics.evidence.contact_fit import Feet
 from kinertia.diagnostics.evidence.plate_contacts import BETWEEN_M, ONE_STEP_S, PlateContact
 from kinertia.model.marker_set import MarkerSet
 from kinertia.trial.data import FEET, BoolArray
@@ -17,11 +17,9 @@ _MOSTLY = 0.5
 _OTHERS_SHARE = 0.25
 """The centre of pressure divides the line between both feet as they share the load. At foot off of feet without a toe
 marker it is up to 0.19 of the way to the other foot, which stands on the floor."""
-_ENDS = (("heel",), ("metatarsal", "toe"))
+FOOT_ENDS = (("heel",), ("metatarsal", "toe"))
 _LEAST_LENGTH_M = 0.08
 """Less than from heel to forefoot of a child of four years."""
-
-Feet = tuple[FootTrajectory, FootTrajectory]
 
 
 class SharedLoad(NamedTuple):
@@ -85,7 +83,7 @@ def shows_whole_feet(feet: Feet | None, marker_set: MarkerSet | None, seen: Coll
     if feet is None or marker_set is None:
         return False
     for side in FEET:
-        for names in _ENDS:
+        for names in FOOT_ENDS:
             labels = {label for name in names for label in marker_set.landmarks.get(f"{name}_{side}", ())}
             if labels and not labels & set(seen):
                 return False

@@ -2,8 +2,7 @@
 
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.plate_contacts import PlateContact
-
-_ENDS = (("heel",), ("metatarsal", "toe"))
+from kinertia.diagnostics.evidence.shared_plates import FOOT_ENDS
 
 
 def goes_forwards(context: RecordingContext) -> bool:
@@ -34,6 +33,7 @@ def shows_feet_equally(context: RecordingContext) -> bool:
         return False
     landmarks, seen = context.marker_set.landmarks, context.seen_labels
     right, left = (
-        [len(seen.intersection(landmarks.get(f"{name}_{side}", ()))) for end in _ENDS for name in end] for side in "rl"
+        [len(seen.intersection(landmarks.get(f"{name}_{side}", ()))) for end in FOOT_ENDS for name in end]
+        for side in "rl"
     )
     return right == left
