@@ -19,7 +19,7 @@ from kinertia.diagnostics.evidence.marker_precision import MarkerPrecision
 from kinertia.diagnostics.evidence.plate_contacts import PlateContact, contact_span_s, contacts_of
 from kinertia.diagnostics.evidence.plate_edges import LITTLE_BEYOND_M, FootPoints, Overhang, overhangs
 from kinertia.diagnostics.evidence.plate_masses import plate_masses
-from kinertia.diagnostics.evidence.shared_plates import SharedLoad, shared_loads, shows_whole_feet
+from kinertia.diagnostics.evidence.shared_plates import SharedLoad, shared_loads, shows_whole_feet, without_legs
 from kinertia.diagnostics.evidence.standing_mass import StandingMass, standing_mass
 from kinertia.diagnostics.evidence.stray_loads import stray_contacts, without_loads
 from kinertia.diagnostics.evidence.strides import periods, swing_in_turn
@@ -27,7 +27,6 @@ from kinertia.diagnostics.evidence.trajectory_faults import TrajectoryFaults
 from kinertia.errors import KinertiaError
 from kinertia.findings.where import Where
 from kinertia.model.marker_set import MarkerSet
-from kinertia.motion.kinematics import FEWEST_FRAMES as FEWEST_MEASURED
 from kinertia.trial.data import FEET, FloatArray, Markers, PlateLoads, Recording, Trial
 from kinertia.trial.ground_contact import FootMarkers
 from kinertia.trial.marker_quality import Travel, travel
@@ -298,15 +297,7 @@ class RecordingContext:
 
     def _without(self, spans: Iterable[tuple[tuple[float, float], int | slice]]) -> Trial | None:
         trial = self.trial
-        if trial is None or self.window_s is not None:
-            return trial
-        legs = trial.known_legs.copy()
-        for (start_s, end_s), feet in spans:
-            legs[within(trial.markers.time, start_s, end_s), feet] = False
-        measured = trial.measured & legs.all(axis=1)
-        if measured.sum() < FEWEST_MEASURED:
-            return None
-        return trial if np.array_equal(legs, trial.known_legs) else replace(trial, measured=measured, leg_known=legs)
+        return trial if trial is None or self.window_s is not None else without_legs(trial, spans)
 
     @cached_property
     def foreign_load(self) -> ForeignLoad | None:

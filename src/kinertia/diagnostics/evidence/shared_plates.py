@@ -1,6 +1,6 @@
 """Finds loads that both feet bear on one plate: only their total is known, and where it acts says nothing of a foot."""
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -9,8 +9,9 @@ import numpy as np
 from kinertia.diagnostics.evidence.contact_fit import Feet
 from kinertia.diagnostics.evidence.plate_contacts import BETWEEN_M, ONE_STEP_S, PlateContact
 from kinertia.model.marker_set import MarkerSet
-from kinertia.trial.data import FEET, BoolArray
-from kinertia.trial.sampled_time import span_s
+from kinertia.motion.kinematics import FEWEST_FRAMES
+from kinertia.trial.data import FEET, BoolArray, Trial
+from kinertia.trial.sampled_time import span_s, within
 
 _OUTSIDE_M, _OUTSIDE_SHARE = 0.14, 0.01
 _MOSTLY = 0.5
@@ -54,6 +55,18 @@ def shared_loads(contacts: Sequence[PlateContact], feet: Feet, marker_set: Marke
         if share > limit:
             when = contact.time[away]
             yield SharedLoad(contact, (float(when[0]), float(when[-1])), share, limit)
+
+
+def without_legs(trial: Trial, spans: Iterable[tuple[tuple[float, float], int | slice]]) -> Trial | None:
+    """Return the trial without these feet in these spans (s), in which their loads are unknown; None where hardly any
+    measured frames are left."""
+    legs = trial.known_legs.copy()
+    for (start_s, end_s), feet in spans:
+        legs[within(trial.markers.time, start_s, end_s), feet] = False
+    measured = trial.measured & legs.all(axis=1)
+    if measured.sum() < FEWEST_FRAMES:
+        return None
+    return trial if np.array_equal(legs, trial.known_legs) else replace(trial, measured=measured, leg_known=legs)
 
 
 def _to_toes(contact: PlateContact, feet: Feet, marker_set: MarkerSet | None) -> PlateContact:
