@@ -2,7 +2,7 @@
 
 import pytest
 
-from kinertia.cohort.people import Person, people_of
+from kinertia.cohort.people import Participant, people_of
 from kinertia.errors import FileError
 from kinertia.io.provenance import command_line
 
@@ -21,7 +21,7 @@ def test_every_folder_with_a_subject_file_is_a_person(tmp_path):
     person(tmp_path / ".git", "subject.toml")
     person(tmp_path / "out", "subject.toml")
     people = people_of(tmp_path, tmp_path / "out")
-    assert people == [Person("Anna", anna / "subject.toml"), Person("Ben", ben / "ben.toml")]
+    assert people == [Participant("Anna", anna / "subject.toml"), Participant("Ben", ben / "ben.toml")]
 
 
 def test_who_lacks_a_subject_file_is_named_with_what_to_do(tmp_path):
@@ -31,8 +31,8 @@ def test_who_lacks_a_subject_file_is_named_with_what_to_do(tmp_path):
     (emil / "walk.csv").write_text("Trajectories\n100\nFrame,Sub Frame,X,Y,Z\n", encoding="utf-8")
     person(tmp_path / "lists", "people.csv")
     one, two, three = people_of(tmp_path, tmp_path / "out")
-    assert three == Person("Emil", None, f"no subject file; kinertia init {emil} drafts one")
-    assert one == Person(
+    assert three == Participant("Emil", None, f"no subject file; kinertia init {emil} drafts one")
+    assert one == Participant(
         "Clara Z", None, f"no subject file; {command_line(['kinertia', 'init', str(clara)])} drafts one"
     )
     assert two.subject is None
@@ -85,8 +85,8 @@ def test_rows_name_subject_files_from_where_the_table_is(separator, tmp_path):
     person(tmp_path / "c", "subject.toml")
     table = tmp_path / "people.csv"
     table.write_text("\n".join(separator.join(row) for row in rows), encoding="utf-8-sig")
-    expected = [Person("a", tmp_path / "a" / "subject.toml"), Person("S02", tmp_path / "b" / "S02.toml")]
-    assert people_of(table, tmp_path / "out") == [*expected, Person("Zoë", tmp_path / "c" / "subject.toml")]
+    expected = [Participant("a", tmp_path / "a" / "subject.toml"), Participant("S02", tmp_path / "b" / "S02.toml")]
+    assert people_of(table, tmp_path / "out") == [*expected, Participant("Zoë", tmp_path / "c" / "subject.toml")]
 
 
 @pytest.mark.parametrize(

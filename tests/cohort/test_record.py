@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from kinertia.cohort.people import Person
+from kinertia.cohort.people import Participant
 from kinertia.cohort.record import RECORD, Place, Record, keep, prepare_folder, standings
 from kinertia.io.provenance import VERSION
 
@@ -18,7 +18,7 @@ def subject(c3d_lab, tmp_path):
 
 
 def standing(subject, cohort):
-    (only,) = standings([Person("Anna", subject)], cohort)
+    (only,) = standings([Participant("Anna", subject)], cohort)
     return only
 
 
@@ -102,7 +102,7 @@ def test_who_is_there_twice_is_fitted_once(subject, tmp_path):
     copy = tmp_path / "Anna - Copy" / "subject.toml"
     shutil.copytree(subject.parent, copy.parent)
     changed(copy, 'name = "', 'name = "Copy of ')
-    people = [Person("Anna", subject), Person("Anna - Copy", copy), Person("B", subject)]
+    people = [Participant("Anna", subject), Participant("Anna - Copy", copy), Participant("B", subject)]
     first, *twins = standings(people, tmp_path / "out")
     assert first.due
     assert [one.due for one in twins] == [False, False]

@@ -38,3 +38,11 @@ def test_a_name_in_other_letters_is_the_nearest(tmp_path):
     for name in ("WALK.TRC", "static.trc"):
         (tmp_path / name).touch()
     assert missing_file(tmp_path / "walk.trc", "walk.trc")["nearest"].value.startswith("WALK.TRC")
+
+
+def test_a_folder_that_is_missing_is_near_to_no_file(tmp_path):
+    (tmp_path / "exp_csv").write_text("")
+    assert "nearest" not in missing_file(tmp_path / "exp", "exp", "a folder", is_folder=True)
+    assert missing_file(tmp_path / "exp", "exp")["nearest"].value == "exp_csv"
+    (tmp_path / "export").mkdir()
+    assert missing_file(tmp_path / "exp", "exp", "a folder", is_folder=True)["nearest"].value == "export"

@@ -15,6 +15,7 @@ import reference
 from command_line import run
 from examples import MEASURED, PAGES, ROOT, SYNTHETIC, blocks, difference, link_measured, renewed
 from kinertia.cli.app import application
+from kinertia.estimation.simultaneous.cost_term import CostTerm, LoadTerm
 from kinertia.io.marker_set_file import read_marker_set
 from kinertia.io.samples import NAME, SHA256
 from kinertia.io.subject_file import read_subject
@@ -155,11 +156,11 @@ def test_links_and_files_named_exist(page):
         assert (ROOT / path).exists(), path
 
 
-def _column(page, heading):
-    """Words in code marks in the first column of the table that follows a text of the page."""
+def _column(page, heading, column=1):
+    """Words in code marks in a column of the table that follows a text of the page."""
     text = (ROOT / "docs" / page).read_text(encoding="utf-8")
     table = re.search(r"(?:^\|.*\n)+", text[text.index(heading) :], re.MULTILINE)
-    return [name for row in table[0].splitlines()[2:] for name in re.findall(r"`([^`]+)`", row.split("|")[1])]
+    return [name for row in table[0].splitlines()[2:] for name in re.findall(r"`([^`]+)`", row.split("|")[column])]
 
 
 def test_results_page_names_every_file_and_column(fit_of):
@@ -182,3 +183,20 @@ def test_modules_named_on_the_page_about_architecture_exist():
     rooms = "|".join(room for floor in house.layers() for room in floor)
     for name in re.findall(rf"`((?:{rooms})/[\w/]+)`", house.PAGE.read_text(encoding="utf-8")):
         assert (package / name).is_dir() or (package / f"{name}.py").is_file(), name
+
+
+def test_the_page_about_architecture_names_every_hook_of_a_cost_term():
+    """Those of `LoadTerm`, too, and none that is not there."""
+    hooks = {name for kind in (CostTerm, LoadTerm) for name in vars(kind) if not name.startswith("_")} - {"unknowns"}
+    where = {"LoadTerm", "calibration", "SimultaneousResult"}
+    assert set(_column(house.PAGE.name, "| a term that ... |", column=2)) == hooks | where
+
+
+def test_the_readme_counts_the_faults_of_their_page():
+    page = (ROOT / "docs" / "validation" / "faults.md").read_text(encoding="utf-8")
+    known = int(re.search(r"Each of (\d+) known ones was", page)[1])
+    rows = re.search(r"(?:^\|.*\n)+", page[page.index("| fault |") :], re.MULTILINE)[0].splitlines()[3:-1]
+    assert len(rows) == known
+    assert f"[{known} faults, one at a time](docs/validation/faults.md)" in (ROOT / "README.md").read_text(
+        encoding="utf-8"
+    )

@@ -78,7 +78,10 @@ def test_facts_say_what_is_in_it(lab, marker_set):
     assert facts["frames"] == f"{len(markers.time)} at 100 Hz, {markers.time[0]:.3f} to {markers.time[-1]:.3f} s"
     assert facts["in the file"] == "lengths in m, +Y up; read as m, Y up"
     assert "2 plates at 1000 Hz" in facts["forces"]
-    assert dict(check_recording(lab.static, marker_set, is_static=True).facts())["forces"] == "none"
+    standing = dict(check_recording(lab.static, marker_set, is_static=True).facts())
+    assert standing["forces"] == "none"
+    assert "movement" in facts
+    assert "movement" not in standing, "nobody is expected to move in it"
 
 
 def test_windows_are_shown_in_order_of_time(lab, marker_set):

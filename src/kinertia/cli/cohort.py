@@ -23,7 +23,7 @@ from kinertia.cohort.learning import FOLDER as LEARNT
 from kinertia.cohort.learning import write_second_study
 from kinertia.cohort.local import fit_here, local_size
 from kinertia.cohort.page import write_cohort_page
-from kinertia.cohort.people import Person, people_of
+from kinertia.cohort.people import Participant, people_of
 from kinertia.cohort.person import fit_person
 from kinertia.cohort.record import Record, Standing, keep, prepare_folder, standings
 from kinertia.cohort.resources import Finished, note_resources
@@ -130,7 +130,7 @@ def cohort(
     return Outcome({"folder": str(output), "people": fitted}, int(any(record.status for record in outcomes)))
 
 
-def _plan(people: Sequence[Person], output: Path, where: _Where, lines: JsonLines) -> Outcome:
+def _plan(people: Sequence[Participant], output: Path, where: _Where, lines: JsonLines) -> Outcome:
     """Show who would be fitted, without fitting anyone; status 1 if anyone's inputs are incomplete."""
     everybody = _standing(people, output, lines)
     _report_plan(everybody, where)
@@ -201,7 +201,7 @@ class _Wanted:
     norms: Mapping[str, Norm]
 
 
-def _run(people: Sequence[Person], output: Path, where: _Where, wanted: _Wanted, lines: JsonLines) -> list[Record]:
+def _run(people: Sequence[Participant], output: Path, where: _Where, wanted: _Wanted, lines: JsonLines) -> list[Record]:
     """Fit the people who are due, and write everyone's tables and page."""
     prepare_folder(output)
     everybody = _standing(people, output, lines)
@@ -220,7 +220,12 @@ def _run(people: Sequence[Person], output: Path, where: _Where, wanted: _Wanted,
 
 
 def _run_again(
-    people: Sequence[Person], outcomes: Sequence[Record], output: Path, where: _Where, wanted: _Wanted, lines: JsonLines
+    people: Sequence[Participant],
+    outcomes: Sequence[Record],
+    output: Path,
+    where: _Where,
+    wanted: _Wanted,
+    lines: JsonLines,
 ) -> list[Record]:
     """Refit everyone with group body data and session calibration from the first fits."""
     there = {record.person for record in outcomes if record.fitted}
@@ -243,7 +248,7 @@ def _each(records: Sequence[Record], stage: str, progress: Callable[[str, float]
         yield record
 
 
-def _standing(people: Sequence[Person], output: Path, lines: JsonLines) -> list[Standing]:
+def _standing(people: Sequence[Participant], output: Path, lines: JsonLines) -> list[Standing]:
     everybody = []
     with shown_progress() as shown:
         progress = lines.with_progress(shown)

@@ -65,7 +65,7 @@ def init(
 def _measures(folder: Path) -> Outcome:
     sheet, picture = folder / "measures.csv", folder / "measures.svg"
     if not folder.is_dir():
-        raise FileError.found(folder, "F101", **missing_file(folder, str(folder), "the folder of the person's files"))
+        raise FileError.found(folder, "F101", **missing_file(folder, str(folder), "the person's folder", True))
     if sheet.exists():
         raise FileError(sheet, "already exists and was not changed; remove it to write a new one")
     write_then_rename(picture, measures_picture())

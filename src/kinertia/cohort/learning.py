@@ -15,7 +15,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from kinertia.cohort.people import Person
+from kinertia.cohort.people import Participant
 from kinertia.cohort.record import RECORD, Place
 from kinertia.errors import KinertiaError, PriorError
 from kinertia.estimation.input_checks import known
@@ -67,8 +67,8 @@ class _Known:
 
 
 def write_second_study(
-    cohort: Path, people: Sequence[Person], progress: Callable[[str, float], None]
-) -> tuple[list[Person], list[str]]:
+    cohort: Path, people: Sequence[Participant], progress: Callable[[str, float], None]
+) -> tuple[list[Participant], list[str]]:
     """Learn from the results of these people, and write the subject files of their second fits.
 
     Args:
@@ -85,7 +85,7 @@ def write_second_study(
     folder = cohort / FOLDER
     cause = _cause(cohort, people)
     if (before := _learnt_before(folder, cause)) is not None:
-        return [Person(person.name, _subject_of(folder, person.name)) for person in people], before
+        return [Participant(person.name, _subject_of(folder, person.name)) for person in people], before
     notes: list[str] = []
     everybody = []
     for k, person in enumerate(people):
@@ -111,7 +111,7 @@ def write_second_study(
     return second, notes
 
 
-def _cause(cohort: Path, people: Sequence[Person]) -> str:
+def _cause(cohort: Path, people: Sequence[Participant]) -> str:
     """Return the SHA-256 of everything that is learnt from: records of first fits, subject files by path and text."""
     parts = []
     for person in people:
@@ -134,7 +134,7 @@ def _subject_of(folder: Path, name: str) -> Path:
     return folder / "subjects" / f"{name}.toml"
 
 
-def _read(cohort: Path, person: Person, notes: list[str]) -> _Known:
+def _read(cohort: Path, person: Participant, notes: list[str]) -> _Known:
     subject = known(person.subject)
     wanted = read_subject(subject)
     fit = read_saved(Place(cohort, person.name).results).fit
@@ -233,7 +233,7 @@ def _plates(people: Sequence[_Known]) -> set[str]:
     return {plate for one in people if one.instruments is not None for plate in one.instruments.plates}
 
 
-def _second(folder: Path, one: _Known) -> Person:
+def _second(folder: Path, one: _Known) -> Participant:
     """Write the person's subject file with what was learnt, and with absolute paths."""
     content = read_toml(one.subject, "a subject file").content
     tables = {name: _from_everywhere(value, one.subject.parent) for name, value in content.items()}
@@ -243,7 +243,7 @@ def _second(folder: Path, one: _Known) -> Person:
     path = _subject_of(folder, one.name)
     heading = f"{one.name}, refitted with group data; written by kinertia cohort --learn"
     write_then_rename(path, subject_text(tables, heading))
-    return Person(one.name, path)
+    return Participant(one.name, path)
 
 
 def _from_everywhere(value: Any, folder: Path) -> Any:

@@ -16,7 +16,7 @@ _LONGEST_NAME = 200
 
 
 @dataclass(frozen=True)
-class Person:
+class Participant:
     """One person of a study.
 
     Attributes:
@@ -30,7 +30,7 @@ class Person:
     problem: str = ""
 
 
-def people_of(study: Path, output: Path) -> list[Person]:
+def people_of(study: Path, output: Path) -> list[Participant]:
     """List all people in a study, by name (folders) or in the order of the rows (CSV).
 
     Args:
@@ -58,7 +58,7 @@ def people_of(study: Path, output: Path) -> list[Person]:
     return people
 
 
-def _of_folders(study: Path, output: Path) -> Iterator[Person]:
+def _of_folders(study: Path, output: Path) -> Iterator[Participant]:
     """Yield folders with a subject file, or with recordings that need one, also in their own folders; ignore others."""
     for folder in sorted(study.iterdir()):
         if not folder.is_dir() or folder.name.startswith(".") or folder.resolve() == output:
@@ -67,20 +67,20 @@ def _of_folders(study: Path, output: Path) -> Iterator[Person]:
             yield _with_subject_in(folder, folder.name)
         elif _holds_recordings(folder):
             init = command_line(["kinertia", "init", str(folder)])
-            yield Person(folder.name, None, f"no subject file; {init} drafts one")
+            yield Participant(folder.name, None, f"no subject file; {init} drafts one")
         elif deeper := [each.name for each in _shown(folder) if each.is_dir() and _is_session(each, output)]:
             problem = (
                 f"no subject file, but there are files in its folder{'s' if deeper[1:] else ''} {', '.join(deeper)}; "
                 f"write one in {folder} that names them, or list people in a CSV file"
             )
-            yield Person(folder.name, None, problem)
+            yield Participant(folder.name, None, problem)
 
 
-def _with_subject_in(folder: Path, name: str) -> Person:
+def _with_subject_in(folder: Path, name: str) -> Participant:
     try:
-        return Person(name, subject_file_in(folder))
+        return Participant(name, subject_file_in(folder))
     except FileError as error:
-        return Person(name, None, str(error))
+        return Participant(name, None, str(error))
 
 
 def _is_session(folder: Path, output: Path) -> bool:
@@ -106,7 +106,7 @@ def _shown(folder: Path) -> list[Path]:
     return sorted(path for path in folder.iterdir() if not path.name.startswith("."))
 
 
-def _of_rows(path: Path) -> Iterator[tuple[int, Person]]:
+def _of_rows(path: Path) -> Iterator[tuple[int, Participant]]:
     """Yield line number and person of every row."""
     for row in read_csv(path, ["subject"], "a row per person, with the path of the person's subject file"):
         written = row.cells["subject"]
@@ -116,7 +116,7 @@ def _of_rows(path: Path) -> Iterator[tuple[int, Person]]:
         if subject.is_dir():
             yield row.line, _with_subject_in(subject, row.cells.get("name") or subject.resolve().name)
         else:
-            yield row.line, Person(row.cells.get("name") or _name_of(subject), subject)
+            yield row.line, Participant(row.cells.get("name") or _name_of(subject), subject)
 
 
 def _name_of(subject: Path) -> str:

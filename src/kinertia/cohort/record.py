@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from kinertia.cohort.people import Person
+from kinertia.cohort.people import Participant
 from kinertia.errors import KinertiaError
 from kinertia.io.output_folder import write_then_rename
 from kinertia.io.provenance import VERSION, sha256
@@ -113,7 +113,7 @@ class Standing:
         problem: why the person cannot be fitted, in one line; empty otherwise.
     """
 
-    person: Person
+    person: Participant
     trials: int
     frames: int
     inputs: str
@@ -156,7 +156,7 @@ def keep(cohort: Path, record: Record) -> None:
         path.unlink(missing_ok=True)
 
 
-def standings(people: Sequence[Person], cohort: Path) -> Iterator[Standing]:
+def standings(people: Sequence[Participant], cohort: Path) -> Iterator[Standing]:
     """Yield each person's state in turn: all files are read for their hashes.
 
     A person listed a second time, by all inputs of a fit but the name, would count twice in every table and is not

@@ -1,7 +1,8 @@
 """Asks questions, lets causes explain their consequences, and applies what the user overrules.
 
 A question returns all findings that apply, or fits every hypothesis and returns the best. Only the relation
-`supersedes` of the catalogue hides findings: the order of evaluation does not matter.
+`supersedes` of the catalogue hides findings, whatever their order. The order of questions matters to `unless` only: a
+question is left out where earlier ones found that it is meaningless, so it comes after those that it names.
 """
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
@@ -23,7 +24,8 @@ class Question(Generic[Context]):
     Attributes:
         code: first three characters of its codes, "P21".
         ask: function that answers it.
-        unless: codes, questions or families whose ERROR makes it meaningless: then it is not asked.
+        unless: codes, questions or families, of earlier questions, whose ERROR makes it meaningless: then it is not
+            asked.
     """
 
     code: str

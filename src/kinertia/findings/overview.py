@@ -34,7 +34,7 @@ class Overview:
     Examples:
         >>> from kinertia.findings.overview import Overview
         >>> Overview((), 61, 2).line
-        'use: nothing found; 61 rules, 2 of 2 trials'
+        'use: nothing found; 2 of 2 trials'
     """
 
     findings: Sequence[Finding]
@@ -100,8 +100,8 @@ class Overview:
         found = ", ".join(f"{count} {one if count == 1 else many}" for count, one, many in counts if count)
         used, by_markers = self.trials - len(self.left_out), len(self.markers_only)
         more = f", and the markers of {by_markers} more" if by_markers else ""
-        trials = f", {used} of {self.trials} trials" if self.trials else ""
-        return f"{self.verdict}: {found or 'nothing found'}; {self.rules} rules{trials}{more}"
+        trials = f"; {used} of {self.trials} trials" if self.trials else ""
+        return f"{self.verdict}: {found or 'nothing found'}{trials}{more}"
 
     @property
     def markers_only(self) -> set[str | None]:

@@ -111,7 +111,7 @@ def _named(pattern: re.Pattern[str], key: str) -> re.Match[str] | None:
 
 
 def _of_subject(pattern: re.Pattern[str], key: str) -> bool:
-    """Decide whether a key is this quantity; some programs write a subject's letter before it (`A_BodyMass_kg`)."""
+    """Decide whether a key is this quantity; some programs write a subject's letter before it, A_BodyMass_kg."""
     return bool(_named(pattern, key) or _named(pattern, _SUBJECT.sub("", key)))
 
 

@@ -68,17 +68,19 @@ def _at_home(written: str) -> Path:
         return Path(written)
 
 
-def missing_file(path: Path, written: str, expected: str = "") -> dict[str, Quantity]:
+def missing_file(path: Path, written: str, expected: str = "", is_folder: bool = False) -> dict[str, Quantity]:
     """Return evidence of F101: the file, the folder that was searched, and similar names in it.
 
     Args:
         path: path that leads to no file.
         written: the path as the user wrote it.
         expected: what it should be, in words.
+        is_folder: whether it should be a folder: then names of files are no help.
     """
     folder = path.parent.absolute()
     exists = os.path.isdir(folder)
-    names = {one.name.lower(): one.name for one in folder.iterdir() if one.name[0] != "."} if exists else {}
+    beside = [one for one in folder.iterdir() if one.is_dir() or not is_folder] if exists else []
+    names = {one.name.lower(): one.name for one in beside if one.name[0] != "."}
     nearest = [names[near] for near in get_close_matches(path.name.lower(), sorted(names), n=3, cutoff=0.4)]
     hint = "nothing there has a similar name" if exists else "that folder does not exist"
     if nearest:

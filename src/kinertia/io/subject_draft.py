@@ -60,7 +60,7 @@ def init_files(folder: str | Path, nearby: bool = True, marker_set: bool = True)
     """
     folder = Path(folder).resolve()
     if not folder.is_dir():
-        raise FileError.found(folder, "F101", **missing_file(folder, str(folder), "the folder of the recordings"))
+        raise FileError.found(folder, "F101", **missing_file(folder, str(folder), "the folder of the recordings", True))
     files = _expect_files(folder)
     c3d = [file for file in files if file.suffix.lower() == ".c3d"]
     trc = [file for file in files if file.suffix.lower() != ".c3d" and _holds_markers(file)]

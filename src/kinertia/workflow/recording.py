@@ -90,7 +90,7 @@ class RecordingCheck:
             ("labels", f"{len(markers.labels)}, {len(match.others)} not in the marker set"),
             ("marker set", named if had else "none known"),
         ]
-        if self.movements is not None:
+        if self.movements is not None and not self.context.is_static:
             facts.append(("movement", self.movements.sentence()))
         if missing and had:
             facts.append(("missing labels", ", ".join(missing)))

@@ -12,7 +12,7 @@ pytest.importorskip("starlette", reason="needs the extra app (pip install -e '.[
 from kinertia.cli.web import jobs as jobs_module
 from kinertia.cli.web import work as module
 from kinertia.cli.web.jobs import Jobs
-from kinertia.cli.web.library import Library, Person
+from kinertia.cli.web.library import Library, PersonFolder
 from kinertia.cli.web.person_page import progress
 from kinertia.errors import internal_error
 
@@ -58,7 +58,7 @@ def fitting(library, *names):
 def test_how_a_fit_ended_is_noted_before_it_leaves_the_queue(library, worker, monkeypatch):
     """A page made in between would show neither progress nor an error, and would never look again."""
     worker("os.abort()")
-    jobs, person, queued, note = Jobs(), library.add("A"), [], Person.note
+    jobs, person, queued, note = Jobs(), library.add("A"), [], PersonFolder.note
 
     def noting(own, **values):
         queued.append(jobs.busy(own))
@@ -66,7 +66,7 @@ def test_how_a_fit_ended_is_noted_before_it_leaves_the_queue(library, worker, mo
 
     with jobs.at_work():
         jobs.add(person, "fit")
-        monkeypatch.setattr(Person, "note", noting)
+        monkeypatch.setattr(PersonFolder, "note", noting)
         until(lambda: not jobs.busy(person))
     assert queued == [True]
     assert person.notes()["fit"]["how"] == "failed"

@@ -16,7 +16,7 @@ from kinertia.cli.web.file_table import (
     with_uses,
     within_folder,
 )
-from kinertia.cli.web.library import SUBJECT, Person
+from kinertia.cli.web.library import SUBJECT, PersonFolder
 from kinertia.cli.web.rows import with_rows
 from kinertia.errors import KinertiaError, SettingsError
 from kinertia.io.marker_set_file import preset_names
@@ -84,7 +84,7 @@ def _model(content: Content) -> Mapping[str, Any]:
     return model if isinstance(model, Mapping) else {}
 
 
-def entries(person: Person) -> Content:
+def entries(person: PersonFolder) -> Content:
     """Read the entries of the person's subject file; none without a file.
 
     Raises:
@@ -93,7 +93,7 @@ def entries(person: Person) -> Content:
     return read_toml(person.subject, "a subject file").content if person.subject.is_file() else {}
 
 
-def recognise(person: Person) -> None:
+def recognise(person: PersonFolder) -> None:
     """Make or complete the subject file after files were added or removed; earlier corrections stay.
 
     Raises:
@@ -107,7 +107,7 @@ def recognise(person: Person) -> None:
     write(person, with_new_files(within_folder(content), draft, present, seen) if content else draft)
 
 
-def _adopt(person: Person) -> None:
+def _adopt(person: PersonFolder) -> None:
     """Adopt a subject file under another name if it is the only one."""
     dropped = [path for path in person.files() if is_subject_file(path)]
     if len(dropped) == 1 and not person.subject.exists():
@@ -116,12 +116,12 @@ def _adopt(person: Person) -> None:
         person.note(seen=[path.name for path in person.files()])
 
 
-def write(person: Person, content: Content) -> None:
+def write(person: PersonFolder, content: Content) -> None:
     """Write the subject file with these entries."""
     write_then_rename(person.subject, subject_text(within_folder(content), _HEADING))
 
 
-def write_text(person: Person, text: str) -> None:
+def write_text(person: PersonFolder, text: str) -> None:
     """Write the subject file as a user typed it; files are stated without folders.
 
     Raises:
@@ -134,7 +134,7 @@ def write_text(person: Person, text: str) -> None:
         write(person, content)
 
 
-def write_form(person: Person, form: Mapping[str, str]) -> None:
+def write_form(person: PersonFolder, form: Mapping[str, str]) -> None:
     """Write the subject file with the form's entries, everything else as it was.
 
     Raises:
@@ -161,7 +161,7 @@ def write_form(person: Person, form: Mapping[str, str]) -> None:
     _write_uses(person, content, changed, known)
 
 
-def _write_uses(person: Person, before: Content, changed: Content, uses: Mapping[str, str]) -> None:
+def _write_uses(person: PersonFolder, before: Content, changed: Content, uses: Mapping[str, str]) -> None:
     """Write the entries with these uses of files; a trial that is used again gets back its forces and other entries."""
     aside = person.notes().get("aside", [])
     after = with_uses(*taken_up(changed, uses, aside))
@@ -181,7 +181,7 @@ def _number(key: str, text: str) -> float:
     return number
 
 
-def trouble(person: Person) -> str:
+def trouble(person: PersonFolder) -> str:
     """Return what is wrong with the subject file, as the command line reports it; empty if nothing is."""
     try:
         read_subject(person.subject)

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
 
-from kinertia.cli.web.library import LOG, Person, started
+from kinertia.cli.web.library import LOG, PersonFolder, started
 from kinertia.cli.web.work import Work
 from kinertia.errors import internal_error
 from kinertia.model.compiled import is_compiled
@@ -25,7 +25,7 @@ class Job(Work):
         kind: "check" or "fit".
     """
 
-    def __init__(self, person: Person, kind: str) -> None:
+    def __init__(self, person: PersonFolder, kind: str) -> None:
         super().__init__()
         self.person = person
         self.kind = kind
@@ -62,7 +62,7 @@ class Jobs:
         self._changed = threading.Condition()
         self._closed = False
 
-    def add(self, person: Person, kind: str) -> None:
+    def add(self, person: PersonFolder, kind: str) -> None:
         """Queue a check or a fit of a person, unless one is queued already."""
         with self._changed:
             if self.of(person, kind) is None:
@@ -70,11 +70,11 @@ class Jobs:
                 self._lines[kind].append(Job(person, kind))
                 self._changed.notify_all()
 
-    def of(self, person: Person, kind: str) -> Job | None:
+    def of(self, person: PersonFolder, kind: str) -> Job | None:
         """Return the person's check or fit that waits or is running."""
         return next((job for job in self._lines[kind] if job.person == person), None)
 
-    def busy(self, person: Person) -> bool:
+    def busy(self, person: PersonFolder) -> bool:
         """Return whether any job of the person waits or is running."""
         return any(self.of(person, kind) is not None for kind in KINDS)
 
@@ -83,7 +83,7 @@ class Jobs:
         line = self._lines[job.kind]
         return line.index(job) if job in line else 0
 
-    def cancel(self, person: Person, kind: str) -> None:
+    def cancel(self, person: PersonFolder, kind: str) -> None:
         """Cancel a person's check or fit, and wait until it has ended."""
         job = self.of(person, kind)
         if job is None:

@@ -40,7 +40,7 @@ _NOTING = threading.Lock()
 
 
 @dataclass(frozen=True)
-class Person:
+class PersonFolder:
     """Folder of one person, named after the person."""
 
     folder: Path
@@ -139,23 +139,25 @@ class Library:
                     person.note(**{kind: {"how": _INTERRUPTED} for kind in ended})
             yield
 
-    def people(self) -> list[Person]:
+    def people(self) -> list[PersonFolder]:
         """List all people, most recently changed first."""
-        found = [Person(path) for path in self.folder.iterdir() if (path / _RECORD).is_file() and not path.is_symlink()]
-        return sorted(found, key=Person.changed, reverse=True)
+        found = [
+            PersonFolder(path) for path in self.folder.iterdir() if (path / _RECORD).is_file() and not path.is_symlink()
+        ]
+        return sorted(found, key=PersonFolder.changed, reverse=True)
 
-    def person(self, name: str) -> Person | None:
+    def person(self, name: str) -> PersonFolder | None:
         """Find the person of this name; names are compared, so that none leads out of the library."""
         return next((person for person in self.people() if person.name == name), None)
 
-    def add(self, wanted: str) -> Person:
+    def add(self, wanted: str) -> PersonFolder:
         """Add a new person with this name, or a similar one that is free."""
-        person = Person(self.folder / self._free(_folder_name(wanted) or "Person"))
+        person = PersonFolder(self.folder / self._free(_folder_name(wanted) or "Person"))
         person.folder.mkdir()
         person.note()
         return person
 
-    def rename(self, person: Person, wanted: str) -> Person:
+    def rename(self, person: PersonFolder, wanted: str) -> PersonFolder:
         """Rename a person to this name, or a similar one that is free; unchanged if nothing valid is left of it.
 
         Raises:
@@ -167,7 +169,7 @@ class Library:
         except OSError as error:
             problem = f"cannot be renamed ({error.strerror}); close the program that has one of its files open"
             raise FileError(person.folder, problem) from error
-        return Person(self.folder / name)
+        return PersonFolder(self.folder / name)
 
     def _free(self, base: str, but: str = "") -> str:
         """Return this name, with a number where it is taken by another folder than `but`."""
@@ -178,7 +180,7 @@ class Library:
             name = f"{base} {number}"
         return name
 
-    def delete(self, person: Person) -> None:
+    def delete(self, person: PersonFolder) -> None:
         """Delete a person's files and results, all at once.
 
         Raises:

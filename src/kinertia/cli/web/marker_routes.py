@@ -12,8 +12,8 @@ from starlette.routing import BaseRoute, Route
 
 from kinertia.cli.web.entries import trouble
 from kinertia.cli.web.jobs import Jobs
-from kinertia.cli.web.library import Library, Person
-from kinertia.cli.web.marker_places import MarkerPlaces, marker_places, save_places
+from kinertia.cli.web.library import Library, PersonFolder
+from kinertia.cli.web.marker_assignment import MarkerPlaces, marker_places, save_places
 from kinertia.cli.web.responses import expect, form, page, to
 from kinertia.errors import KinertiaError
 from kinertia.model.marker_set import LANDMARKS, SEGMENTS
@@ -48,7 +48,9 @@ def marker_routes(library: Library, jobs: Jobs) -> list[BaseRoute]:
     return [Route(address, show), Route(address, save, methods=["POST"])]
 
 
-def _page(request: Request, person: Person, problem: str = "", given: Mapping[str, str] | None = None) -> Response:
+def _page(
+    request: Request, person: PersonFolder, problem: str = "", given: Mapping[str, str] | None = None
+) -> Response:
     places: MarkerPlaces | None = None
     try:
         places = marker_places(person)

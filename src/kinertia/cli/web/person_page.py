@@ -13,7 +13,7 @@ from starlette.responses import HTMLResponse
 from kinertia.cli.web.entries import USE, entries, fields, label_of, marker_set_field, trouble
 from kinertia.cli.web.file_table import file_table
 from kinertia.cli.web.jobs import KINDS, Job, Jobs
-from kinertia.cli.web.library import Person
+from kinertia.cli.web.library import PersonFolder
 from kinertia.cli.web.responses import page, time_left
 from kinertia.cli.web.rows import rows as rows_of
 from kinertia.cli.web.uploads import LIMITS
@@ -47,7 +47,7 @@ class Standing:
     fitted: bool
 
 
-def standing(person: Person, jobs: Jobs) -> Standing:
+def standing(person: PersonFolder, jobs: Jobs) -> Standing:
     """Return the state of a person's check and fit."""
     outcome = person.outcome("results") if person.fitted else {}
     sentence, notes = outcome.get("line", ""), person.notes()
@@ -64,7 +64,7 @@ def standing(person: Person, jobs: Jobs) -> Standing:
     return Standing(person.name, LOOKS.get(outcome.get("verdict", ""), ""), sentence, when, person.fitted)
 
 
-def progress(person: Person, jobs: Jobs) -> dict[str, Any]:
+def progress(person: PersonFolder, jobs: Jobs) -> dict[str, Any]:
     """Return the progress of the person's check and fit; null for those neither waiting nor running."""
     far: dict[str, Any] = {}
     preparing = jobs.preparing
@@ -87,7 +87,7 @@ def _stage(job: Job, jobs: Jobs) -> str:
 
 def person_page(
     request: Request,
-    person: Person,
+    person: PersonFolder,
     jobs: Jobs,
     problem: str = "",
     typed: Mapping[str, str] | None = None,
@@ -144,7 +144,7 @@ def person_page(
     )
 
 
-def _outcomes(person: Person) -> dict[str, Any]:
+def _outcomes(person: PersonFolder) -> dict[str, Any]:
     """Collect everything that the template shows of the last check and the last fit; old: of other files."""
     checked, results = (_known(person.outcome(kind)) for kind in ("check", "results"))
     fitted = results if person.fitted else {}
@@ -176,7 +176,7 @@ def _known(outcome: Mapping[str, Any]) -> Mapping[str, Any]:
     return outcome if "verdict" in outcome else {}
 
 
-def _result_files(person: Person) -> list[str]:
+def _result_files(person: PersonFolder) -> list[str]:
     if not person.fitted:
         return []
     paths = (path.relative_to(person.results) for path in person.results.rglob("*") if path.is_file())
@@ -200,7 +200,7 @@ class Explanation(NamedTuple):
     exact: str
 
 
-def explained(person: Person, trouble: str) -> Explanation:
+def explained(person: PersonFolder, trouble: str) -> Explanation:
     """Explain the problem with a person's subject file, which is stated without its folder."""
     exact = trouble.replace(f"{person.folder}{os.sep}", "")
     if missing := _MISSING.search(exact):

@@ -15,7 +15,7 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, HTMLResponse, RedirectResponse, Response, StreamingResponse
 
 from kinertia.cli.web.guard import RESULT_POLICY
-from kinertia.cli.web.library import Person
+from kinertia.cli.web.library import PersonFolder
 from kinertia.cli.web.work import Work
 from kinertia.errors import FileError
 from kinertia.io.provenance import VERSION
@@ -88,7 +88,7 @@ def result_file(folder: Path, name: str) -> Response:
     return FileResponse(path, media_type=kind, filename=path.name, headers=headers)
 
 
-def archive(person: Person) -> Response:
+def archive(person: PersonFolder) -> Response:
     """Serve results and subject file as a zip archive."""
     file = cast(BinaryIO, tempfile.SpooledTemporaryFile(50_000_000))  # noqa: SIM115 - closed when it was sent
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as packed:
@@ -108,7 +108,7 @@ def archive(person: Person) -> Response:
     return StreamingResponse(pieces(), media_type="application/zip", headers=headers)
 
 
-def expect(person: Person | None) -> Person:
+def expect(person: PersonFolder | None) -> PersonFolder:
     """Return the person, who must exist.
 
     Raises:

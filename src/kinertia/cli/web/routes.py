@@ -17,7 +17,7 @@ from starlette.staticfiles import StaticFiles
 from kinertia.cli.web.entries import recognise, trouble, write_form, write_text
 from kinertia.cli.web.guard import RESULT_POLICY
 from kinertia.cli.web.jobs import KINDS, Jobs
-from kinertia.cli.web.library import Library, Person
+from kinertia.cli.web.library import Library, PersonFolder
 from kinertia.cli.web.marker_routes import marker_routes
 from kinertia.cli.web.person_page import person_page, progress, standing
 from kinertia.cli.web.responses import archive, chosen_folder, expect, form, page, result_file, time_left, to
@@ -293,10 +293,10 @@ class _Actions:
         self._stop()
         return page(request, "ended.html.j2")
 
-    def _person(self, request: Request) -> Person:
+    def _person(self, request: Request) -> PersonFolder:
         return expect(self._library.person(request.path_params["name"]))
 
-    def _idle(self, request: Request) -> Person:
+    def _idle(self, request: Request) -> PersonFolder:
         person = self._person(request)
         if self._jobs.busy(person):
             raise HTTPException(409, "wait for the check or fit of this person, or cancel it, before changing anything")
@@ -308,12 +308,12 @@ class _Actions:
             raise HTTPException(404, "no such action")
         return kind
 
-    def _chosen(self, request: Request) -> list[Person]:
+    def _chosen(self, request: Request) -> list[PersonFolder]:
         names = dict.fromkeys(request.query_params.getlist("person"))
         people = [self._library.person(name) for name in names]
         return [person for person in people if person is not None and person.fitted]
 
-    def _checked(self, request: Request, person: Person) -> Response:
+    def _checked(self, request: Request, person: PersonFolder) -> Response:
         person.note(saved=True)
         if trouble(person):
             return to(request, "people", person.name)
@@ -321,7 +321,7 @@ class _Actions:
         return to(request, "people", person.name, section=_SECTIONS["check"])
 
 
-def _recognised(person: Person) -> None:
+def _recognised(person: PersonFolder) -> None:
     """Draft the subject file as far as possible; the person's page shows what is wrong."""
     try:
         recognise(person)
@@ -330,7 +330,7 @@ def _recognised(person: Person) -> None:
         person.note(draft=str(error))
 
 
-def _copied(person: Person, folder: Path) -> None:
+def _copied(person: PersonFolder, folder: Path) -> None:
     """Copy the results to another folder, completely or not at all."""
     expect_own_folder(folder)
     with complete_folder(folder, "fit") as work:

@@ -5,7 +5,7 @@ import tempfile
 from collections.abc import AsyncIterator
 from pathlib import Path
 
-from kinertia.cli.web.library import Person
+from kinertia.cli.web.library import PersonFolder
 from kinertia.errors import FileError
 from kinertia.io.file_names import fits_everywhere, last_part, same_folder
 from kinertia.io.recording import FORCE_FILES, MARKER_FILES
@@ -42,7 +42,7 @@ def harmless_name(given: str) -> str:
     return name
 
 
-async def receive(person: Person, given: str, chunks: AsyncIterator[bytes]) -> Path:
+async def receive(person: PersonFolder, given: str, chunks: AsyncIterator[bytes]) -> Path:
     """Write a dropped file to the person's folder, complete or not at all; one of the same name is replaced.
 
     Raises:

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from kinertia.cli.compiling import compile_once
-from kinertia.cli.web.library import OUTCOME, SUBJECT, SUMMARY, Person
+from kinertia.cli.web.library import OUTCOME, SUBJECT, SUMMARY, PersonFolder
 from kinertia.errors import KinertiaError
 from kinertia.io.output_folder import complete_folder
 from kinertia.io.provenance import command_line, sha256
@@ -23,7 +23,7 @@ from kinertia.io.subject_file import read_subject
 Progress = Callable[[str, float], None]
 
 
-def check(person: Person, progress: Progress) -> None:
+def check(person: PersonFolder, progress: Progress) -> None:
     """Run `kinertia check` on the subject file: check.html, and its findings for the page."""
     from kinertia.report.check_page import save_check_page
     from kinertia.report.finding_view import digest
@@ -36,7 +36,7 @@ def check(person: Person, progress: Progress) -> None:
         _write(work, {"inputs": person.inputs, **digest(checked.overview)})
 
 
-def fit(person: Person, progress: Progress) -> None:
+def fit(person: PersonFolder, progress: Progress) -> None:
     """Run `kinertia fit` on the subject file: the results, and the subject file that they are of."""
     from kinertia.io.provenance import provenance_of
     from kinertia.report.files import save_fit
@@ -86,7 +86,7 @@ def main(kind: str, folder: str = "") -> int:
         if kind == "prepare":
             compile_once(progress)
         else:
-            {"check": check, "fit": fit}[kind](Person(Path(folder)), progress)
+            {"check": check, "fit": fit}[kind](PersonFolder(Path(folder)), progress)
     except KinertiaError as error:
         _said(page, error=str(error))
         return 2

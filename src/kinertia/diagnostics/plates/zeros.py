@@ -12,7 +12,7 @@ from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray
 from kinertia.trial.unloaded_level import ZEROED_N, ZEROED_NM, UnloadedReading
 
 _ZERO_N, _FAR_FROM_ZERO_N, _DRIFT_N = 15.0, 40.0, 15.0
-"""Zeroed plates read a few newtons; 40 N are 5 % of an adult's weight on every plate."""
+"""For 70 kg, of whose weight 40 N are 6 %; zeroed plates read a few newtons."""
 _LEAST_N = 6.0
 """Lowest limit, twice what zeroed plates read, however light the person."""
 _MOST_UNLOADED_N, _STEADY_N = 150.0, 15.0

@@ -33,7 +33,7 @@ def free_moments(context: ResultContext) -> Iterator[Finding]:
             yield from reversed_sign(trial)
         return
     if sign := posterior.free_moment_sign:
-        evidence = {"log_odds": Quantity(sign.log_odds, "1"), "rms_nm": Quantity(sign.rms_nm, "N m")}
+        evidence = {"rms_nm": Quantity(sign.rms_nm, "N m"), "log_odds": Quantity(sign.log_odds, "1")}
         if sign.wrong:
             yield with_evidence("P269", Where(), evidence)
         elif sign.open:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from kinertia.cli.web.entries import entries, write
-from kinertia.cli.web.library import Person
+from kinertia.cli.web.library import PersonFolder
 from kinertia.diagnostics.labels.marker_set_match import match_labels
 from kinertia.errors import FileError, KinertiaError, SettingsError
 from kinertia.io.marker_set_draft import marker_set_text, places_of
@@ -56,7 +56,7 @@ class MarkerPlaces:
         return tuple(label for label in self.labels if label not in self.segments)
 
 
-def marker_places(person: Person) -> MarkerPlaces:
+def marker_places(person: PersonFolder) -> MarkerPlaces:
     """Read the markers of the static trial, or of the first other recording.
 
     Raises:
@@ -88,7 +88,7 @@ def marker_places(person: Person) -> MarkerPlaces:
     )
 
 
-def save_places(person: Person, segments: Mapping[str, str], landmarks: Mapping[str, str]) -> None:
+def save_places(person: PersonFolder, segments: Mapping[str, str], landmarks: Mapping[str, str]) -> None:
     """Write the person's own marker set, and enter it in the subject file.
 
     Args:
@@ -141,7 +141,7 @@ def _owners(places: Mapping[str, Sequence[str]]) -> list[tuple[str, str]]:
     return [(label, place) for place, labels in places.items() for label in labels]
 
 
-def _named_set(person: Person, model: Mapping[str, Any]) -> MarkerSet | None:
+def _named_set(person: PersonFolder, model: Mapping[str, Any]) -> MarkerSet | None:
     """Return the set that the subject file states, or that its model has."""
     if "osim" in model:
         return markers_of_model(read_osim(person.folder / model["osim"]))
@@ -151,7 +151,7 @@ def _named_set(person: Person, model: Mapping[str, Any]) -> MarkerSet | None:
     return read_marker_set(named if named in preset_names() else person.folder / named)
 
 
-def _recording(person: Person, content: Mapping[str, Any]) -> tuple[Path, str | None]:
+def _recording(person: PersonFolder, content: Mapping[str, Any]) -> tuple[Path, str | None]:
     model, trials = _table(content.get("model")), content.get("trial")
     if "static" in model:
         return person.folder / model["static"], model.get("length_unit")

@@ -12,7 +12,7 @@ pytest.importorskip("uvicorn", reason="needs the extra app (pip install -e '.[te
 from app_server import running
 from kinertia.cli.web.entries import entries, write
 from kinertia.cli.web.library import Library
-from kinertia.cli.web.marker_places import FILE, marker_places, save_places
+from kinertia.cli.web.marker_assignment import FILE, marker_places, save_places
 from kinertia.cli.web.marker_routes import in_words
 from kinertia.errors import KinertiaError, SettingsError
 from kinertia.io.marker_set_file import read_marker_set
