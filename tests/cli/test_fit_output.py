@@ -24,7 +24,7 @@ def test_final_print_is_verdict_three_findings_and_where_the_results_are(fit_of)
         one["severity"] for one in fit.summary["findings"] if (one["status"], one["muted_by"]) == ("open", None)
     ]
     assert first.startswith(f"{fit.summary['verdict']}: ")
-    assert f"{fit.summary['rules_run']} rules, 1 of 1 trials" in first
+    assert "; 1 of 1 trials" in first
     assert len([line for line in found if line.startswith(("ERROR", "WARNING", "CORRECTED"))]) <= 3
     assert all(not line.startswith("INFO") for line in found)
     assert f"{severities.count('INFO')} assumption" in " ".join(found)

@@ -22,7 +22,7 @@ def text(outcome):
 def test_the_verdict_is_one_line_and_verbose_says_all(lab):
     outcome = run("check", lab / "subject.toml")
     assert outcome.status == 0
-    assert re.match(r"use: nothing found; \d+ rules, 1 of 1 trials\n", outcome.out)
+    assert re.match(r"use: nothing found; 1 of 1 trials\n", outcome.out)
     assert outcome.err.splitlines() == ["reading"]
     loud = run("check", lab / "subject.toml", "-v")
     findings = told(lab / "subject.toml")["findings"]
