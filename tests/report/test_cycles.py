@@ -59,8 +59,42 @@ def test_values_are_those_over_time(fit, cycles):
         sd = over_time(trial.moment_sd) / fit.subject.mass_kg
         np.testing.assert_allclose(moment.sd[inside], sd, rtol=1e-9)
         np.testing.assert_allclose(angle.sd[inside], np.degrees(over_time(trial.coordinate_sd)), rtol=1e-9)
-        assert np.array_equal(moment.value.notna(), inside)
-        assert np.array_equal(angle.value.notna(), inside)
+        curves, column = trial.joint_curves, trial.skeleton.coordinates.index(f"knee_angle_{side}")
+        assert np.array_equal(moment.value.notna(), between(curves, at, curves.known[:, column]))
+        assert np.array_equal(angle.value.notna(), between(curves, at, curves.known.any(axis=1)))
+        assert moment.value.notna().sum() > inside.sum() + 5, "a leg is known longer than both are"
+
+
+def between(curves, time, known):
+    """Mask (n,) of times between neighbouring frames that are known."""
+    after = np.searchsorted(curves.time, time - 1e-9)
+    within = (after > 0) & (after < len(known))
+    after = np.clip(after, 1, len(known) - 1)
+    exact = np.isclose(curves.time[after], time, atol=1e-9) & known[after]
+    return (within & known[after] & known[after - 1]) | exact
+
+
+def test_three_dimensional_moments_are_those_over_time(fit, cycles):
+    """The knee's adduction moment, of either side in its own strides, and the trunk's in all."""
+    (trial,) = fit.trials
+    curves = trial.joint_curves
+    joints = curves.joints["estimate"]
+    for stride in trial.strides:
+        for name, axis in ((f"knee_{stride.side}", 1), (f"hip_{stride.side}", 0), ("lumbar", 1)):
+            base, component = name.removesuffix(f"_{stride.side}"), ("flexion", "adduction", "rotation")[axis]
+            component = "bending" if name == "lumbar" else component
+            found = of(cycles, f"{base}_{component}_joint_moment", stride.side, stride.number)
+            row = joints.joints.index(name)
+            values, sd = joints.moments[:, row, axis], curves.moment_sd[:, row, axis]
+            known = np.isfinite(values)
+            assert np.array_equal(found.value.notna(), between(curves, stride.time, known))
+            here = found.value.notna().to_numpy()
+            expected = np.interp(stride.time[here], curves.time[known], values[known]) / fit.subject.mass_kg
+            assert np.abs(found.value[here] - expected).max() < 0.05 * np.abs(expected).max()
+            expected = np.interp(stride.time[here], curves.time[known], sd[known]) / fit.subject.mass_kg
+            np.testing.assert_allclose(found.sd[here], expected, rtol=1e-6)
+    usual = fit.cycles("literature")
+    assert usual.quantity.eq("knee_adduction_joint_moment").any()
 
 
 def test_power_is_moment_times_velocity(fit, cycles):

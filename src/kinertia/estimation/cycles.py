@@ -1,81 +1,37 @@
 """Resamples angles, moments, powers and ground reactions to 0 to 100 % of each gait cycle.
 
-A curve belongs to the side whose heel strikes begin and end its stride. It has a gap where ground contact was not
-measured. Clinical angles (`clinical_angles`) come from inverse kinematics, which covers whole strides: no estimate
-changes them.
+A curve belongs to the side whose heel strikes begin and end its stride. It has a gap where it is not known
+(`joint_curves`). Clinical angles (`clinical_angles`) come from inverse kinematics, which covers whole strides: no
+estimate changes them.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from functools import partial
-from typing import Any, Literal, NamedTuple, Protocol, TypeAlias
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
 
-from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
+from kinertia.estimation.curve_source import CurveSource, Estimated, Stage, tracked
 from kinertia.model.shared_coordinates import by_side
-from kinertia.model.skeleton import GRAVITY_M_S2, Skeleton
+from kinertia.model.skeleton import GRAVITY_M_S2
 from kinertia.motion.clinical_angles import clinical_angles
-from kinertia.motion.dynamics import Motion
 from kinertia.motion.gait_cycle import PERCENT, Stride, feet_under_pelvis
-from kinertia.motion.ground_reactions import GroundReactions, measured_reactions
-from kinertia.motion.kinematics import Kinematics, inside
-from kinertia.motion.smoothing import interpolate
+from kinertia.motion.joint_moments import component_names, joint_and_side
 from kinertia.motion.spatiotemporal import Spatiotemporal, spatiotemporal, travelled
 from kinertia.trial.data import FEET
-from kinertia.trial.sampled_time import nearest_samples
 
-Stage = Literal["estimate", "literature"]
-"""As estimated; or conventional: smoothed inverse kinematics, and inverse dynamics with the parameters before the
-estimate."""
-Kind = Literal["angle", "moment", "power", "force", "clinical"]
+Kind = Literal["angle", "moment", "joint_moment", "power", "force", "clinical"]
 UNITS: Mapping[Kind, str] = {
     "angle": "deg",
     "moment": "N m/kg",
+    "joint_moment": "N m/kg",
     "power": "W/kg",
     "force": "% body weight",
     "clinical": "deg",
 }
 FORCES = ("ground_force_forward", "ground_force_upward", "ground_force_medial")
 _ROOT_COORDINATES = 6
-_Interpolation: TypeAlias = Callable[[np.ndarray, np.ndarray], Callable[[np.ndarray], np.ndarray]]
-
-
-class Estimated(Protocol):
-    """Interface of a fitted trial that the curves need; its attributes are those of `TrialFit`."""
-
-    @property
-    def name(self) -> str:
-        """Name of the trial."""
-
-    @property
-    def kinematics(self) -> Kinematics:
-        """Kinematics before the estimate."""
-
-    @property
-    def skeleton(self) -> Skeleton:
-        """The calibrated model."""
-
-    @property
-    def motion(self) -> Motion:
-        """Estimated motion at the frames of the measured windows."""
-
-    @property
-    def reactions(self) -> GroundReactions:
-        """Ground reactions that belong to the estimate."""
-
-    @property
-    def joint_loads(self) -> Mapping[str, np.ndarray]:
-        """Joint loads (w, c) N m, per stage."""
-
-    @property
-    def deviations(self) -> CurveDeviations | None:
-        """Standard deviations of the trial's curves, or None."""
-
-    @property
-    def strides(self) -> tuple[Stride, ...]:
-        """Strides of the whole trial."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,9 +41,11 @@ class CycleCurve:
     Attributes:
         trial: its name.
         stride: its side, number and times.
-        kind: "angle" (deg), "moment" (N m/kg, internal), "power" (W/kg), "force" (ground reaction, % body weight) or
-            "clinical" (deg).
-        quantity: "hip_flexion_angle", "knee_angle_moment", ..., "ground_force_upward", "knee_flexion_clinical".
+        kind: "angle" (deg), "moment" (of a coordinate, N m/kg, internal), "joint_moment" (about the axes of
+            `joint_moments`, N m/kg, internal), "power" (W/kg), "force" (ground reaction, % body weight) or "clinical"
+            (deg).
+        quantity: "hip_flexion_angle", "knee_angle_moment", "knee_adduction_joint_moment", ..., "ground_force_upward",
+            "knee_flexion_clinical".
         value: (101,) at 0, 1, ..., 100 %; NaN where nothing was measured.
         sd: (101,) standard deviation of the estimate; NaN where there is none.
     """
@@ -141,7 +99,7 @@ class _TrackedStride(NamedTuple):
 
 
 def _curves(trial: Estimated, mass_kg: float, stage: Stage, strides: Sequence[_TrackedStride]) -> Iterator[CycleCurve]:
-    source, skeleton = _Source(trial, stage), trial.skeleton
+    source, skeleton = CurveSource(trial, stage), trial.skeleton
     sides = by_side(skeleton.coordinates)
     for stride, path, angles in strides:
         time, curve = stride.time, partial(CycleCurve, trial.name, stride)
@@ -160,6 +118,15 @@ def _curves(trial: Estimated, mass_kg: float, stage: Stage, strides: Sequence[_T
             for kind, (values, own_sd) in by_kind.items():
                 if kind == "angle" or column >= _ROOT_COORDINATES:
                     curves.append(curve(kind, f"{base}_{kind}", values[:, column], own_sd[:, column]))
+        joints = () if trial.joint_curves is None else trial.joint_curves.joints["estimate"].joints
+        three = source.joint_moment(time) / mass_kg
+        for k, joint in enumerate(joints if three.shape[1] else ()):
+            base, side = joint_and_side(joint)
+            if side in ("", stride.side):
+                names = [f"{name}_joint_moment" for name in component_names(base)]
+                own_sd = sd.joints[:, k, 0] / mass_kg if sd.joints is not None else np.full((len(time), 3), np.nan)
+                rows = zip(names, three[:, k].T, own_sd.T, strict=True)
+                curves += [curve("joint_moment", *each) for each in rows]
         foot, directions = FEET.index(stride.side), _directions(path, stride.side)
         share = 100.0 / (mass_kg * GRAVITY_M_S2)
         ground = share * source.force(time)[:, foot] @ directions.T
@@ -172,7 +139,7 @@ def _curves(trial: Estimated, mass_kg: float, stage: Stage, strides: Sequence[_T
 def _tracked_strides(trial: Estimated, strides: Sequence[Stride]) -> list[_TrackedStride]:
     skeleton, kinematics = trial.skeleton, trial.kinematics
     paths = travelled(feet_under_pelvis(skeleton, kinematics), strides, kinematics.trial.belt)
-    q = _tracked(kinematics, np.concatenate([stride.time for stride in strides]), 0)
+    q = tracked(kinematics, np.concatenate([stride.time for stride in strides]), 0)
     heading = np.repeat(np.arctan2(-paths[:, 2], paths[:, 0]), len(PERCENT))
     angles = clinical_angles(skeleton, q, heading)
     return [
@@ -183,76 +150,11 @@ def _tracked_strides(trial: Estimated, strides: Sequence[Stride]) -> list[_Track
     ]
 
 
-def _tracked(kinematics: Kinematics, time: np.ndarray, derivative: int) -> np.ndarray:
-    """Return coordinates (n, c) of smoothed inverse kinematics, or their derivatives; NaN where there are none."""
-    ik, spline = kinematics.ik, kinematics.spline
-    within = (time >= spline.time[0]) & (time <= spline.time[-1])
-    known = within[:, None] & np.isfinite(ik.q[nearest_samples(ik.time, time)])
-    return np.where(known, spline(np.clip(time, spline.time[0], spline.time[-1]), derivative), np.nan)
-
-
 def _directions(path: np.ndarray, side: str) -> np.ndarray:
     """Return unit vectors (3, 3) in rows: along the stride, upward, towards the other foot."""
     forward = path / max(float(np.linalg.norm(path)), 1e-9)
     medial = np.array([forward[2], 0.0, -forward[0]]) * (1.0 if side == "r" else -1.0)
     return np.array([forward, [0.0, 1.0, 0.0], medial])
-
-
-class _Source:
-    """Quantities of a trial at any time; NaN where they were not measured."""
-
-    def __init__(self, trial: Estimated, stage: Stage) -> None:
-        self.kinematics, self.stage = trial.kinematics, stage
-        self.reactions = trial.reactions.whole if stage == "estimate" else measured_reactions(trial.kinematics)
-        own, parts = trial.kinematics.time, trial.kinematics.intervals
-        self.motion = [interpolate(own[part], trial.motion.q[part]) for part in parts]
-        self.loads = self._by_interval(partial(make_interp_spline, k=3), trial.joint_loads[stage])
-        spread, linear = trial.deviations if stage == "estimate" else None, partial(make_interp_spline, k=1)
-        self.spread = None if spread is None else [self._by_interval(linear, each) for each in spread.curves]
-
-    def angle(self, time: np.ndarray) -> np.ndarray:
-        """Return coordinates (n, c); those of IK + ID wherever inverse kinematics determined them."""
-        return self._coordinates(time, 0)
-
-    def speed(self, time: np.ndarray) -> np.ndarray:
-        """Return derivatives (n, c) of the coordinates."""
-        return self._coordinates(time, 1)
-
-    def moment(self, time: np.ndarray) -> np.ndarray:
-        """Return joint loads (n, c)."""
-        return self._measured(time, self.loads)
-
-    def deviations(self, time: np.ndarray) -> CurveDeviations:
-        """Return standard deviations of all curves; NaN if there are none."""
-        if self.spread is None:
-            return CurveDeviations.filled(len(time), len(self.kinematics.ik.coordinates), 0, np.nan)
-        return CurveDeviations(*(self._measured(time, each) for each in self.spread))
-
-    def force(self, time: np.ndarray) -> np.ndarray:
-        """Return the ground reaction force (n, 2, 3) N on right and left foot."""
-        return self._measured(time, [lambda at: self.reactions.at(at)[..., :3]] * len(self.kinematics.windows_s))
-
-    def _by_interval(self, through: _Interpolation, values: np.ndarray) -> list[Callable[[np.ndarray], np.ndarray]]:
-        """Make a curve through the values (w, ...) of each measured window."""
-        time = self.kinematics.time
-        return [through(time[part], values[part]) for part in self.kinematics.intervals]
-
-    def _coordinates(self, time: np.ndarray, derivative: int) -> np.ndarray:
-        if self.stage == "estimate":
-            return self._measured(time, [partial(curve, derivative=derivative) for curve in self.motion])
-        return _tracked(self.kinematics, time, derivative)
-
-    def _measured(self, time: np.ndarray, curves: Sequence[Callable[[np.ndarray], np.ndarray]]) -> np.ndarray:
-        """Return values at these times from the curve of each measured window; NaN outside."""
-        windows = self.kinematics.windows_s
-        places = [inside(time, [window]) for window in windows]
-        values = [
-            curve(np.clip(time[here], *window)) for here, window, curve in zip(places, windows, curves, strict=True)
-        ]
-        result = np.full((len(time), *values[0].shape[1:]), np.nan)
-        for here, own in zip(places, values, strict=True):
-            result[here] = own
-        return result
 
 
 def cycle_columns(

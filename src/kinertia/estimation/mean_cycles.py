@@ -10,7 +10,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from kinertia.estimation.common_strides import mean_of_common
-from kinertia.estimation.cycles import Stage, cycle_curves
+from kinertia.estimation.curve_source import Stage
+from kinertia.estimation.cycles import cycle_curves
 from kinertia.estimation.result import Fit
 from kinertia.model.shared_coordinates import by_side, opposite_on_left
 

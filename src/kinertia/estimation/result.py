@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from kinertia.estimation.asymmetry import asymmetries, asymmetry_columns
-from kinertia.estimation.cycles import Kind, Stage, cycle_columns, spatiotemporal_columns
+from kinertia.estimation.curve_source import Stage
+from kinertia.estimation.cycles import Kind, cycle_columns, spatiotemporal_columns
 from kinertia.estimation.figure_names import FitPictures
 from kinertia.estimation.gait_scores import GaitProfile, with_norms
 from kinertia.estimation.identifiability import evidence
@@ -222,9 +223,9 @@ class Fit:
 
         Columns: trial, side ("r", "l": whose heel strikes begin and end the stride), stride (from 1), percent,
         quantity, value, sd. Quantities: "..._angle" (deg), "..._moment" (N m/kg, internal, signed like the angle),
-        "..._power" (W/kg), each of a coordinate without its side; "ground_force_forward", "..._upward", "..._medial" (%
-        body weight; along the stride, up, towards the other foot); "..._clinical": Plug-in Gait's nine angles (deg).
-        Where nothing was measured `value` is NaN. `sd` is the posterior standard deviation.
+        "..._power" (W/kg), each of a coordinate without its side; "knee_adduction_joint_moment", ... (N m/kg, of
+        `joint_moments`); "ground_force_forward", "..._upward", "..._medial" (% body weight; along the stride, up,
+        towards the other foot); "..._clinical": Plug-in Gait's nine angles (deg). What is not known is NaN.
 
         Args:
             stage: "estimate", or "literature": what inverse kinematics and inverse dynamics give without the estimate.
@@ -310,7 +311,7 @@ class Fit:
         were not measured are NaN. `to_netcdf` writes the Dataset.
 
         Args:
-            kind: "angle", "clinical" (deg), "moment" (N m/kg; over time N m), "power" (W/kg), "force" (% body weight).
+            kind: "angle", "clinical" (deg), "moment", "joint_moment" (N m/kg; over time N m), "power", "force".
             over: "percent" of the gait cycle, or "time" (s; angles and moments).
 
         Raises:

@@ -21,6 +21,7 @@ from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion
 from kinertia.motion.frame_chunks import pieces
 from kinertia.motion.joint_wrench import BodyJoint, body_joints, joint_wrenches
+from kinertia.trial.data import FEET
 
 Frame = Literal["joint", "distal", "proximal"]
 """Axes of moments: the joint coordinate system (default), or the axes right, forward and up of either segment."""
@@ -68,6 +69,16 @@ def component_names(joint: str) -> tuple[str, str, str]:
     """
     first, second, third = LUMBAR_COMPONENTS if joint == "lumbar" else COMPONENTS
     return f"{joint}_{first}", f"{joint}_{second}", f"{joint}_{third}"
+
+
+def joint_and_side(name: str) -> tuple[str, str]:
+    """Return a joint's name without its side, and the side.
+
+    >>> joint_and_side("knee_r"), joint_and_side("lumbar")
+    (('knee', 'r'), ('lumbar', ''))
+    """
+    base, _, side = name.rpartition("_")
+    return (base, side) if side in FEET else (name, "")
 
 
 def component_signs(joint: BodyJoint) -> np.ndarray:

@@ -31,6 +31,13 @@ _GAIT27 = {
     "elbow_flex": "Elbow flexion +",
 }
 """Signs as in `kinertia.model.gait27`; other models may have others."""
+_COMPONENTS = {
+    "ankle_flexion": "dorsiflexion",
+    "ankle_adduction": "inversion",
+    "lumbar_bending": "bending right",
+    "lumbar_rotation": "rotation left",
+}
+"""Directions of three-dimensional moments that have names of their own."""
 _MIRRORED = np.array([-1.0, -1.0, 1.0])
 _OF_LEGS = {
     "hip_flexion": ((0.0, 0.0, 1.0), "Hip extension +"),
@@ -106,6 +113,17 @@ def load_title(one: Coordinate, what: str) -> str:
         return f"{one.title} {what}"
     joint, _, direction = one.title.partition(" ")
     return f"{joint} {what}, {direction.replace(', to the', '').replace(',', '')}"
+
+
+def joint_moment_title(name: str) -> str:
+    """Title a three-dimensional joint moment with its direction.
+
+    >>> joint_moment_title("knee_adduction"), joint_moment_title("lumbar_bending")
+    ('Knee moment, adduction +', 'Trunk moment, bending right +')
+    """
+    joint, component = name.split("_")
+    words = _COMPONENTS.get(name, {"rotation": "internal rotation"}.get(component, component))
+    return f"{'Trunk' if joint == 'lumbar' else joint.capitalize()} moment, {words} +"
 
 
 def power_title(one: Coordinate, others: Sequence[Coordinate]) -> str:

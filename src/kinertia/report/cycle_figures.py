@@ -13,15 +13,18 @@ from typing import Any
 import numpy as np
 
 from kinertia.estimation.common_strides import common_strides, mean_of, mean_of_common
-from kinertia.estimation.cycles import FORCES, UNITS, CycleCurve, Kind, Stage, curves_by_stage
+from kinertia.estimation.curve_source import Stage
+from kinertia.estimation.cycles import FORCES, UNITS, CycleCurve, Kind, curves_by_stage
 from kinertia.estimation.result import Fit
 from kinertia.io.norms_file import Norm
 from kinertia.model.shared_coordinates import opposite_on_left
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.clinical_angles import CLINICAL_ANGLES
 from kinertia.motion.gait_cycle import PERCENT
+from kinertia.motion.joint_moments import component_names, joint_and_side
+from kinertia.motion.joint_wrench import body_joints
 from kinertia.report import style
-from kinertia.report.coordinate_titles import load_title, panels_of, power_title
+from kinertia.report.coordinate_titles import joint_moment_title, load_title, panels_of, power_title
 from kinertia.report.figure import Figure, compact
 from kinertia.report.panels import Panel, plain, small_multiples
 from kinertia.report.wording import INTERVAL_SD, USUAL, start_of
@@ -108,6 +111,10 @@ def titled_quantities(skeleton: Skeleton, kind: Kind) -> list[tuple[str, str]]:
         return list(_FORCE_TITLES.items())
     if kind == "clinical":
         return list(_CLINICAL_TITLES.items())
+    if kind == "joint_moment":
+        bases = dict.fromkeys(joint_and_side(joint.label)[0] for joint in body_joints(skeleton))
+        names = [name for base in bases for name in component_names(base)]
+        return [(f"{name}_joint_moment", joint_moment_title(name)) for name in names]
     coordinates = [one for one in panels_of(skeleton) if one.rotational]
     if kind == "angle":
         return [(f"{one.name}_angle", one.title) for one in coordinates]
@@ -175,7 +182,8 @@ class _Drawn:
     def _alt(self, kind: Kind) -> str:
         names = {
             "angle": "Joint angles",
-            "moment": "Joint moments",
+            "moment": "Moments of coordinates",
+            "joint_moment": "Joint moments in three dimensions",
             "power": "Joint powers",
             "force": "Ground reactions",
             "clinical": "Clinical angles",
