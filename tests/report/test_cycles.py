@@ -44,6 +44,7 @@ def test_values_are_those_over_time(fit, cycles):
     (trial,) = fit.trials
     times = {(stride.side, stride.number): stride.time for stride in trial.strides}
     assert len(times) >= 2
+    more = 0
     for (side, number), at in times.items():
         inside = (at >= trial.time[0]) & (at <= trial.time[-1])
 
@@ -62,7 +63,8 @@ def test_values_are_those_over_time(fit, cycles):
         curves, column = trial.joint_curves, trial.skeleton.coordinates.index(f"knee_angle_{side}")
         assert np.array_equal(moment.value.notna(), between(curves, at, curves.known[:, column]))
         assert np.array_equal(angle.value.notna(), between(curves, at, curves.known.any(axis=1)))
-        assert moment.value.notna().sum() > inside.sum() + 5, "a leg is known longer than both are"
+        more += int(moment.value.notna().sum() - inside.sum())
+    assert more > 10, "a leg is known longer than both are"
 
 
 def between(curves, time, known):

@@ -9,6 +9,7 @@ import numpy as np
 
 from kinertia.errors import FileError
 from kinertia.estimation.drawn_fit import drawn_fit
+from kinertia.estimation.joint_curves import JointCurves
 from kinertia.estimation.result import Fit, TrialFit
 from kinertia.io.c3d_analysis import Measure
 from kinertia.io.c3d_event_writer import EventToWrite
@@ -74,9 +75,32 @@ def usual_convention(fit: Fit) -> Convention:
 
 
 def outputs_of(fit: Fit, trial: TrialFit, convention: Convention) -> list[ModelOutput]:
-    """Return model outputs over the trial's measured frames, with SDs from the posterior draws."""
-    loads, body, drawn = trial.reactions.at(trial.time), fit.estimate, _departures(fit, trial)
-    return model_outputs(trial.skeleton, body, trial.motion, loads, fit.mass_kg, convention, trial.deviations, drawn)
+    """Return model outputs at `_times`, with SDs from the posterior draws; NaN where they are not known."""
+    loads, body, drawn = trial.reactions.at(_times(trial)), fit.estimate, _departures(fit, trial)
+    curves = trial.joint_curves
+    motion, sd = (trial.motion, trial.deviations) if curves is None else (curves.motion, curves.deviations)
+    found = model_outputs(trial.skeleton, body, motion, loads, fit.mass_kg, convention, sd, drawn)
+    return found if curves is None else [_where_known(one, curves, convention, fit.mass_kg) for one in found]
+
+
+def _times(trial: TrialFit) -> np.ndarray:
+    """Return the times (w,) s of the outputs: of all frames in which any joint's load is known."""
+    return trial.time if trial.joint_curves is None else trial.joint_curves.time
+
+
+def _where_known(one: ModelOutput, curves: JointCurves, convention: Convention, mass_kg: float) -> ModelOutput:
+    """Return an output with NaN where it is not known; what a hinge transmits gets the SD of `JointCurves`."""
+    label, joints = f"{one.joint.lower()}_{one.side}", curves.joints["estimate"]
+    if one.kind == "ANGLES" or label not in joints.joints:
+        known = np.logical_or.reduce(curves.known, axis=1)
+    else:
+        row = joints.joints.index(label)
+        known = np.isfinite(joints.moments[:, row, 0])
+        if one.kind == "MOMENTS" and curves.moment_sd is not None:
+            factor = (1000.0 if convention == "plug-in-gait" else 1.0) / mass_kg
+            one = replace(one, sd=np.where(np.isfinite(one.sd), one.sd, factor * curves.moment_sd[:, row]))
+    shown = known[:, None]
+    return replace(one, values=np.where(shown, one.values, np.nan), sd=np.where(shown, one.sd, np.nan))
 
 
 def new_file(recording: Recording, folder: Path) -> Path:
@@ -143,7 +167,7 @@ def prefix_of(frames: C3dFrames, trial: TrialFit) -> str:
 
 def _frames_at(source: Path, frames: C3dFrames, trial: TrialFit) -> np.ndarray:
     """Return the indices (w,) in the file of the frames of the fit."""
-    exact = trial.time * frames.rate_hz - (frames.first - 1)
+    exact = _times(trial) * frames.rate_hz - (frames.first - 1)
     at = exact.round().astype(int)
     if np.abs(exact - at).max() > _SAME_TIME_FRAMES or at[0] < 0 or at[-1] >= len(frames.points):
         raise _another(source, trial)
@@ -181,7 +205,7 @@ def _spread(values: np.ndarray, at: np.ndarray, count: int) -> np.ndarray:
 def _centres(source: Path, frames: C3dFrames, trial: TrialFit, prefix: str, at: np.ndarray) -> list[OutputPoint]:
     """Return joint centres in the axes and units of the file."""
     lab, origin = to_file(source, frames, trial, prefix)
-    pose = trial.skeleton.pose(trial.motion.q)
+    pose = trial.skeleton.pose(trial.motion.q if trial.joint_curves is None else trial.joint_curves.motion.q)
     return [
         OutputPoint(
             f"{joint.side.upper()}{joint.name[0]}JC",
@@ -243,7 +267,7 @@ def _own(
 
 
 def _departures(fit: Fit, trial: TrialFit) -> Departures | None:
-    """Return the departures of the draws in a trial, at its measured frames; None if the fit has no draws."""
+    """Return the departures of the draws in a trial, at `_times`; None if the fit has no draws."""
     if fit.posterior is None or fit.posterior.draws is None:
         return None
     k, kept = [one.name for one in fit.trials].index(trial.name), fit.posterior.draws
@@ -255,7 +279,11 @@ def _departures(fit: Fit, trial: TrialFit) -> Departures | None:
 
 
 def _curves(trial: TrialFit) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return coordinates, moments and powers (w, c)."""
+    """Return coordinates, moments and powers (w, c) at `_times`."""
+    curves = trial.joint_curves
+    if curves is not None:
+        forces = curves.forces["estimate"]
+        return curves.motion.q, forces, forces * curves.motion.qd
     moments = trial.joint_loads["estimate"]
     return trial.motion.q, moments, moments * trial.motion.qd
 

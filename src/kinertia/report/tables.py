@@ -48,10 +48,27 @@ def trial_tables(fit: Fit, trial: TrialFit) -> dict[str, Table]:
         of_coordinates = trial.deviations.coordinates
         tables["coordinates_sd"] = over_time(np.where(turns, np.degrees(of_coordinates), of_coordinates))
         tables["moments_sd"] = over_time(trial.deviations.moments)
+    tables |= _joint_tables(trial)
     axes = [f"{kind}_{axis}" for kind in ("force", "moment") for axis in "xyz"]
     residual = trial.residuals["estimate"]
     tables["residuals"] = {"time_s": trial.time, **dict(zip(axes, residual.T, strict=True))}
     return tables
+
+
+def _joint_tables(trial: TrialFit) -> dict[str, Table]:
+    """Return moments (N m) and forces (N) of the joints in three dimensions, wherever they are known; else NaN."""
+    curves = trial.joint_curves
+    if curves is None:
+        return {}
+    joints = curves.joints["estimate"]
+    values = {"joint_moments": (joints.names, joints.moments), "joint_forces": (joints.force_names, joints.forces)}
+    if curves.moment_sd is not None and curves.force_sd is not None:
+        values["joint_moments_sd"] = joints.names, curves.moment_sd
+        values["joint_forces_sd"] = joints.force_names, curves.force_sd
+    return {
+        table: {"time_s": curves.time, **dict(zip(names, each.reshape(len(each), -1).T, strict=True))}
+        for table, (names, each) in values.items()
+    }
 
 
 def write_csv(fit: Fit, folder: Path) -> None:
