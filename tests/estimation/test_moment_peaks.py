@@ -1,0 +1,70 @@
+"""Peaks, impulses and the extent of joint moments: whole, or not at all."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from kinertia.estimation.cycles import CycleCurve
+from kinertia.estimation.moment_extent import moment_extents
+from kinertia.estimation.moment_peaks import PEAKS, peak_columns
+from kinertia.motion.gait_cycle import PERCENT, Stride
+
+STRIDE = Stride("r", 1, 0.0, 1.0, 0.6, 0.1, 0.5, True)
+FIRST, SECOND, IMPULSE = (one.name for one in PEAKS[:3])
+
+
+def adduction(known=PERCENT >= 0):
+    """Internal moment with two humps in stance: externally 0.5 at 15 % and 0.3 N m/kg at 45 %."""
+    humps = [0.5 * np.exp(-(((PERCENT - 15) / 6) ** 2)), 0.3 * np.exp(-(((PERCENT - 45) / 6) ** 2))]
+    value = np.where(known, -sum(humps), np.nan)
+    return CycleCurve(
+        "walk", STRIDE, "joint_moment", "knee_adduction_joint_moment", value, np.where(known, 0.05, np.nan)
+    )
+
+
+def found(curve):
+    columns = peak_columns([curve])
+    rows = zip(columns["peak"], columns["value"], columns["sd"], columns["percent"], strict=True)
+    return {name: tuple(row) for name, *row in rows}
+
+
+def test_both_peaks_of_the_external_moment_and_its_impulse():
+    peaks = found(adduction())
+    assert peaks[FIRST] == pytest.approx((0.5, 0.05, 15.0), abs=1e-3)
+    assert peaks[SECOND] == pytest.approx((0.3, 0.05, 45.0), abs=1e-3)
+    value, sd, _ = peaks[IMPULSE]
+    assert value == pytest.approx(0.8 * 6 * np.sqrt(np.pi) / 100, rel=0.02)  # a stride lasts a second
+    assert sd == pytest.approx(0.05 * 0.61, rel=0.01)
+    assert set(peaks) == {FIRST, SECOND, IMPULSE}, "nothing of curves that are not there"
+
+
+@pytest.mark.parametrize(("first", "last", "missing"), [(25, 100, {FIRST, IMPULSE}), (0, 50, {SECOND, IMPULSE})])
+def test_the_largest_value_of_a_part_is_no_peak(first, last, missing):
+    peaks = found(adduction((first <= PERCENT) & (last >= PERCENT)))
+    assert {name for name, (value, _, _) in peaks.items() if np.isnan(value)} == missing
+
+
+def trial(known):
+    """One whose right knee is known at these percents of a stride of one second."""
+    moments = np.where(known, 1.0, np.nan)[:, None, None] * np.ones(3)
+    joints = SimpleNamespace(joints=("knee_r",), moments=moments)
+    curves = SimpleNamespace(time=PERCENT / 100.0, joints={"estimate": joints})
+    return SimpleNamespace(strides=(STRIDE,), joint_curves=curves)
+
+
+def test_what_is_known_of_stride_and_stance():
+    (whole,) = moment_extents([trial(PERCENT <= 90)])
+    assert whole.text == "right: 0 to 90 % of the stride, all of stance"
+    (early,) = moment_extents([trial(PERCENT <= 40)])
+    assert (early.stride_percent, early.push_off, early.strides) == (((0, 40),), False, 0)
+    assert early.stance_share == pytest.approx(41 / 61)
+    assert early.text.endswith("67 % of stance, no push-off")
+    (late,) = moment_extents([trial(PERCENT >= 20)])
+    assert late.push_off
+    assert "push-off" not in late.text
+    (best,) = moment_extents([trial(PERCENT <= 40), trial(PERCENT <= 90)])
+    assert (best.stride_percent, best.strides) == (((0, 90),), 1)
+    (none,) = moment_extents([trial(PERCENT < 0)])
+    assert none.text == "right: none"
+    assert moment_extents([SimpleNamespace(strides=(STRIDE,), joint_curves=None)]) == ()
