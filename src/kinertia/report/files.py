@@ -85,7 +85,8 @@ def _write_cycles(fit: Fit, curves: CurvesByStage, folder: Path) -> None:
     if not any(trial.strides for trial in fit.trials):
         return
     write_columns(folder / "spatiotemporal.csv", spatiotemporal_columns(fit.trials), _SIX_DIGITS)
-    write_columns(folder / "moment_peaks.csv", peak_columns(curves["estimate"]), _SIX_DIGITS)
+    if moment_extents(fit.trials):
+        write_columns(folder / "moment_peaks.csv", peak_columns(curves["estimate"]), _SIX_DIGITS)
     write_columns(folder / "cycles.csv", columns_of(curves["estimate"]), _SIX_DIGITS)
     write_columns(folder / "cycles_literature.csv", columns_of(curves["literature"]), _SIX_DIGITS)
 
