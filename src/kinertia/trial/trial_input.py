@@ -6,6 +6,10 @@ from typing import Literal
 from kinertia.trial.data import Recording
 
 TrialUse = Literal["all", "kinematics"]
+Task = Literal["walk", "turn", "run", "landing", "squat", "other"]
+"""What a person does in a trial; results of different tasks are not averaged."""
+GAIT: tuple[Task, ...] = ("walk", "turn", "run")
+"""Tasks that consist of strides."""
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from typing import Literal, Self
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.copied_frames import without_copied_frames
 from kinertia.diagnostics.model.range_limits import range_findings
+from kinertia.diagnostics.subject.task import task_of
 from kinertia.errors import SettingsError, TrialError
 from kinertia.estimation.prepared import Progress
 from kinertia.findings.finding import Finding
@@ -47,7 +48,7 @@ def usable_trial(context: RecordingContext) -> Trial:
     seen = trial.markers.seen
     labels = [label for column, label in enumerate(trial.markers.labels) if seen[:, column].any()]
     usable = context.trial_on_plates or trial
-    return replace(usable, markers=without_copied_frames(trial.markers.select(labels)))
+    return replace(usable, markers=without_copied_frames(trial.markers.select(labels)), task=task_of(context))
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,6 +3,7 @@
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.person_context import PersonContext
 from kinertia.diagnostics.plates.plate_height import plate_heights
+from kinertia.diagnostics.subject.stance_coverage import stance_coverage
 from kinertia.diagnostics.runner import Question
 from kinertia.diagnostics.subject.body_data import absent_markers, population, stated_and_filed
 from kinertia.diagnostics.subject.camera_scale import trial_scales
@@ -32,4 +33,5 @@ PERSON_QUESTIONS: tuple[Question[PersonContext], ...] = (
     Question("S30", masses_of_trials),
     Question("S31", informative_movements),
     Question("S40", population),
+    Question("P27", stance_coverage),
 )

@@ -1,0 +1,181 @@
+"""Finds which part of the stances and strides of each leg has known loads, from the contacts of its own foot."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any, Self
+
+import numpy as np
+
+from kinertia.trial.data import FEET, BoolArray, Trial
+from kinertia.trial.plate_assignment import FOOT_NAMES
+from kinertia.trial.sampled_time import TIME_TOLERANCE_S, nearest_samples, runs
+
+STANCE_PHASES = {"loading response": (0, 15), "mid-stance": (15, 65), "push-off": (65, 100)}
+"""Parts of stance, in percent of the time from foot contact to foot off."""
+_PERCENT = np.arange(101)
+_SAMPLING = 3
+"""Percent of a stance that a frame or two take: gaps as short are none."""
+_OF_PHASE, _OF_STANCE = 0.9, 0.1
+"""A phase is known if so much of it is; a stance has moments at all if so much of it has."""
+_STANCE_S, _STRIDE_S = (0.1, 3.0), (0.4, 3.0)
+
+
+@dataclass(frozen=True)
+class Stance:
+    """One contact of a foot with the ground, on a plate or not; times in s.
+
+    Attributes:
+        side: "r" or "l".
+        number: counted from 1, per trial and side.
+        start_s, end_s: foot contact and foot off; the one that the record lacks is a usual stance away from the other.
+        whole: whether the record has both.
+    """
+
+    side: str
+    number: int
+    start_s: float
+    end_s: float
+    whole: bool
+
+
+def stances_of(trial: Trial) -> tuple[Stance, ...]:
+    """Return the stances of the right, then the left foot; none where it is unknown when the feet are on the ground.
+
+    A contact at the beginning or end of the record takes as long as the others do. Those shorter than 0.1 s or longer
+    than 3 s are no stances.
+    """
+    if trial.on_ground is None:
+        return ()
+    time, last = trial.markers.time, len(trial.markers.time) - 1
+    found: list[tuple[int, float, float, bool, bool]] = []
+    for foot in range(len(FEET)):
+        for a, b in runs(trial.on_ground[:, foot]):
+            found.append((foot, float(time[a]), float(time[b]), a > 0, b < last))
+    whole = [end - start for _, start, end, begins, ends in found if begins and ends]
+    whole = [span for span in whole if _STANCE_S[0] <= span <= _STANCE_S[1]]
+    usual = float(np.median(whole)) if whole else np.nan
+    result: list[Stance] = []
+    for foot, side in enumerate(FEET):
+        number = 0
+        for start, end, begins, ends in (one[1:] for one in found if one[0] == foot):
+            if begins and ends and not _STANCE_S[0] <= end - start <= _STANCE_S[1]:
+                continue
+            if not (begins or ends) or not ((begins and ends) or end - start <= _STANCE_S[1]) or not whole:
+                continue
+            number += 1
+            first = start if begins else min(start, end - usual)
+            final = end if ends else max(end, start + usual)
+            result.append(Stance(side, number, first, final, begins and ends))
+    return tuple(result)
+
+
+@dataclass(frozen=True, eq=False)
+class LegCoverage:
+    """Part of stance and stride in which the loads of one leg are known, in any of its stances and strides.
+
+    Attributes:
+        side: "r" or "l".
+        stance: (101,) from foot contact (0 %) to foot off (100 %).
+        stride: (101,) from foot contact to the next one of the same foot; None where no stride is seen.
+    """
+
+    side: str
+    stance: BoolArray
+    stride: BoolArray | None
+
+    @property
+    def word(self) -> str:
+        """The side in words: "right" or "left"."""
+        return FOOT_NAMES[FEET.index(self.side)]
+
+    @property
+    def none(self) -> bool:
+        """Whether hardly anything of stance is known."""
+        return bool(self.stance.mean() < _OF_STANCE)
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """Names of the phases of stance that are not known."""
+        return tuple(
+            name for name, (start, end) in STANCE_PHASES.items() if self.stance[start : end + 1].mean() < _OF_PHASE
+        )
+
+    @property
+    def ranges(self) -> str:
+        """What is known of the stride, or of stance without one: "0 to 48 % of the stride"."""
+        return _ranges(self.stance, "stance") if self.stride is None else _ranges(self.stride, "the stride")
+
+    @property
+    def sentence(self) -> str:
+        """Describe the leg: "left: 0 to 48 % of the stride, no push-off"."""
+        if self.none:
+            return f"{self.word}: none in stance"
+        if not self.missing:
+            return f"{self.word}: whole {'stride' if self.stride is not None and self.stride.all() else 'stance'}"
+        return f"{self.word}: {self.ranges}, no {listed(self.missing, 'or')}"
+
+    def joined(self, other: Self) -> Self:
+        """Return what is known in either."""
+        strides = [one for one in (self.stride, other.stride) if one is not None]
+        stride = np.logical_or.reduce(strides) if strides else None
+        return type(self)(self.side, self.stance | other.stance, stride)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Convert to JSON content: percentages, and the phases of stance that are missing."""
+        stride = None if self.stride is None else _parts(self.stride)
+        return {"stride_percent": stride, "stance_percent": _parts(self.stance), "missing": list(self.missing)}
+
+
+def leg_coverage(trial: Trial, known: BoolArray) -> tuple[LegCoverage, ...]:
+    """Return the coverage of the right and the left leg; of none if the trial shows no stances.
+
+    Args:
+        trial: with the frames in which each foot is on the ground.
+        known: (n, 2) marker frames in which the loads of the right, left leg are known.
+    """
+    stances, time = stances_of(trial), trial.markers.time
+    if not stances:
+        return ()
+    result = []
+    for foot, side in enumerate(FEET):
+        own = [one for one in stances if one.side == side]
+        starts = [one.start_s for one in own]
+        strides = [(a, b) for a, b in pairwise(starts) if _STRIDE_S[0] <= b - a <= _STRIDE_S[1]]
+        stance = _union(time, known[:, foot], [(one.start_s, one.end_s) for one in own])
+        result.append(LegCoverage(side, stance, _union(time, known[:, foot], strides) if strides else None))
+    return tuple(result)
+
+
+def joined_coverage(trials: Iterable[Sequence[LegCoverage]]) -> tuple[LegCoverage, ...]:
+    """Return what is known of each leg in any of several trials."""
+    result: dict[str, LegCoverage] = {}
+    for one in (leg for legs in trials for leg in legs):
+        result[one.side] = result[one.side].joined(one) if one.side in result else one
+    return tuple(result.values())
+
+
+def listed(names: Sequence[str], last: str = "and") -> str:
+    """Join names: "loading response, mid-stance and push-off"."""
+    return f" {last} ".join(filter(None, [", ".join(names[:-1]), *names[-1:]]))
+
+
+def _union(time: np.ndarray, known: BoolArray, spans: Sequence[tuple[float, float]]) -> BoolArray:
+    """Return the percentages (101,) of the spans (s) that are known in any of them, short gaps closed."""
+    result = np.zeros(len(_PERCENT), dtype=bool)
+    for start, end in spans:
+        at = start + _PERCENT / 100.0 * (end - start)
+        inside = (at >= time[0] - TIME_TOLERANCE_S) & (at <= time[-1] + TIME_TOLERANCE_S)
+        result |= known[nearest_samples(time, at)] & inside
+    for first, last in runs(~result):
+        if last - first < _SAMPLING and result.any():
+            result[first : last + 1] = True
+    return result
+
+
+def _parts(mask: BoolArray) -> list[list[int]]:
+    return [[int(first), int(last)] for first, last in runs(mask)]
+
+
+def _ranges(mask: BoolArray, of: str) -> str:
+    return f"{' and '.join(f'{first} to {last} %' for first, last in _parts(mask)) or 'nothing'} of {of}"
