@@ -8,6 +8,8 @@ from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.labels.marker_set_match import MarkerSetMatch, match_labels
 from kinertia.diagnostics.plates.plate_summary import PlateCheck, check_plates
 from kinertia.diagnostics.subject.movements import InformativeMovements
+from kinertia.diagnostics.subject.stance_coverage import coverage_of
+from kinertia.diagnostics.subject.task import task_of
 from kinertia.findings.finding import Finding
 from kinertia.model.marker_set import MarkerSet
 from kinertia.trial.data import Recording
@@ -87,6 +89,7 @@ class RecordingCheck:
             ("frames", f"{len(markers.time)}{rate}{markers.time[-1]:.3f} s" if rate else "1"),
             ("in the file", axes),
             ("the person", self.travel.sentence()),
+            *([] if self.context.is_static else [("task", task_of(self.context))]),
             ("labels", f"{len(markers.labels)}, {len(match.others)} not in the marker set"),
             ("marker set", named if had else "none known"),
         ]
@@ -97,9 +100,11 @@ class RecordingCheck:
         if plates is None:
             return [*facts, ("forces", "none")]
         rate_hz = (len(plates.time) - 1) / (plates.time[-1] - plates.time[0])
+        legs = coverage_of(self.context)
         spans = [f"{start:.3f} to {end:.3f} s" for start, end in sorted(self.windows)]
         return [
             *facts,
             ("forces", f"{len(plates.names)} plates at {rate_hz:.6g} Hz"),
             ("complete contact", ", ".join(spans) or "nowhere, or unknown"),
+            *([("joint moments", "; ".join(leg.sentence for leg in legs))] if legs else []),
         ]

@@ -21,7 +21,7 @@ def coverage_of(context: RecordingContext) -> tuple[LegCoverage, ...]:
 
 
 def stance_coverage(context: PersonContext) -> Iterator[Finding]:
-    """Report P272: a phase of a leg's stance is on plates in no trial of a task; P288: hardly anything of it is."""
+    """Report P272: a phase of a leg's stance is on plates in no trial of a task; P289: hardly anything of it is."""
     by_task: dict[Task, list[RecordingContext]] = {}
     for one in context.trials:
         by_task.setdefault(task_of(one), []).append(one)
@@ -36,4 +36,4 @@ def _finding(task: Task, trials: Sequence[RecordingContext], leg: LegCoverage) -
     evidence = {"side": Quantity(leg.word), "task": Quantity(task)}
     if not leg.none:
         evidence |= {"phase": Quantity(listed(leg.missing)), "known": Quantity(leg.ranges)}
-    return with_evidence("P288" if leg.none else "P272", where, evidence)
+    return with_evidence("P289" if leg.none else "P272", where, evidence)
