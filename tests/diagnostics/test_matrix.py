@@ -32,8 +32,8 @@ PEOPLE = {
     "plug-in gait b": (46.1, 1.505),
 }
 """Masses by the plates (kg), and statures (m)."""
-TRUE = {"gait2354": {"P266"}, "plug-in gait b": {"P282"}}
-"""What is true of a walk: a vertical moment that the fit corrects, a foot over the edge of a plate."""
+TRUE = {"gait2354": {"P266"}, "plug-in gait b": {"P272", "P282"}}
+"""What is true of a walk: a vertical moment that the fit corrects; a foot over the edge of a plate, and its stance."""
 
 
 def codes_in(path):

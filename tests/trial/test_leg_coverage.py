@@ -76,3 +76,13 @@ def test_a_record_that_ends_within_stance_lacks_push_off():
     cut = trial([(0.5, 1.1), (2.7, 3.0)], [(0.2, 0.8)])
     right, _ = leg_coverage(cut, known([(2.7, 3.0)]))
     assert right.to_dict()["stance_percent"] == [[0, 50]]
+
+
+def test_a_frame_too_many_at_foot_contact_is_no_missing_phase():
+    """A repeated frame makes a swinging foot seem to stand just before its load begins."""
+    force = np.zeros((len(TIME), 2, 3))
+    force[50:111, 0, 1] = 700.0
+    early = trial([(0.46, 1.1), (1.5, 2.1)], [(1.0, 1.6)])
+    early = replace(early, loads=FootLoads(TIME, force, np.zeros_like(force)))
+    assert stances_of(early)[0].start_s == pytest.approx(0.5)
+    assert leg_coverage(early, known([(0.5, 1.1)]))[0].missing == ()

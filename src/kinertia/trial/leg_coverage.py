@@ -7,9 +7,10 @@ from typing import Any, Self
 
 import numpy as np
 
-from kinertia.trial.data import FEET, BoolArray, Trial
+from kinertia.trial.data import FEET, LOAD_THRESHOLD_N, BoolArray, Trial
+from kinertia.trial.ground_contact import CONTACT_SLACK_S
 from kinertia.trial.plate_assignment import FOOT_NAMES
-from kinertia.trial.sampled_time import TIME_TOLERANCE_S, nearest_samples, runs
+from kinertia.trial.sampled_time import TIME_TOLERANCE_S, nearest_samples, runs, within
 
 STANCE_PHASES = {"loading response": (0, 15), "mid-stance": (15, 65), "push-off": (65, 100)}
 """Parts of stance, in percent of the time from foot contact to foot off."""
@@ -19,6 +20,7 @@ _SAMPLING = 3
 _OF_PHASE, _OF_STANCE = 0.9, 0.1
 """A phase is known if so much of it is; a stance has moments at all if so much of it has."""
 _STANCE_S, _STRIDE_S = (0.1, 3.0), (0.4, 3.0)
+_SAME_CONTACT_S = 2 * CONTACT_SLACK_S
 
 
 @dataclass(frozen=True)
@@ -42,16 +44,17 @@ class Stance:
 def stances_of(trial: Trial) -> tuple[Stance, ...]:
     """Return the stances of the right, then the left foot; none where it is unknown when the feet are on the ground.
 
-    A contact at the beginning or end of the record takes as long as the others do. Those shorter than 0.1 s or longer
-    than 3 s are no stances.
+    Foot contact and foot off are those of the plates where a load begins or ends with the contact. A contact at the
+    beginning or end of the record takes as long as the others do. Those shorter than 0.1 s or longer than 3 s are no
+    stances.
     """
     if trial.on_ground is None:
         return ()
-    time, last = trial.markers.time, len(trial.markers.time) - 1
+    last = len(trial.markers.time) - 1
     found: list[tuple[int, float, float, bool, bool]] = []
     for foot in range(len(FEET)):
         for a, b in runs(trial.on_ground[:, foot]):
-            found.append((foot, float(time[a]), float(time[b]), a > 0, b < last))
+            found.append((foot, *_by_plates(trial, foot, a, b), a > 0, b < last))
     whole = [end - start for _, start, end, begins, ends in found if begins and ends]
     whole = [span for span in whole if _STANCE_S[0] <= span <= _STANCE_S[1]]
     usual = float(np.median(whole)) if whole else np.nan
@@ -68,6 +71,17 @@ def stances_of(trial: Trial) -> tuple[Stance, ...]:
             final = end if ends else max(end, start + usual)
             result.append(Stance(side, number, first, final, begins and ends))
     return tuple(result)
+
+
+def _by_plates(trial: Trial, foot: int, first: int, last: int) -> tuple[float, float]:
+    """Return the times (s) of foot contact and foot off: of the load, if these frames differ from it by little."""
+    start, end = (float(trial.markers.time[k]) for k in (first, last))
+    own = trial.loads.time[within(trial.loads.time, start, end)]
+    loaded = own[trial.loads.force[within(trial.loads.time, start, end), foot, 1] >= LOAD_THRESHOLD_N]
+    if len(loaded):
+        start = float(loaded[0]) if loaded[0] - start <= _SAME_CONTACT_S else start
+        end = float(loaded[-1]) if end - loaded[-1] <= _SAME_CONTACT_S else end
+    return start, end
 
 
 @dataclass(frozen=True, eq=False)
