@@ -49,6 +49,12 @@ def test_another_walk_has_it():
     assert found(CUT, replace(walk([("l", 1)]), name="walk 2")) == []
 
 
+def test_a_window_that_the_user_states_is_meant():
+    windowed = context_of(CUT, FEET, window_s=(1.2, 1.9))
+    assert list(stance_coverage(replace(person(), trials=[windowed]))) == []
+    assert found(CUT) != []
+
+
 def test_a_leg_that_no_plate_measures_is_no_warning():
     assert found(walk([("r", 1)])) == [("P289", Severity.INFO, "left", "")]
 

@@ -21,11 +21,16 @@ def coverage_of(context: RecordingContext) -> tuple[LegCoverage, ...]:
 
 
 def stance_coverage(context: PersonContext) -> Iterator[Finding]:
-    """Report P272: a phase of a leg's stance is on plates in no trial of a task; P289: hardly anything of it is."""
+    """Report P272: a phase of a leg's stance is on plates in no trial of a task; P289: hardly anything of it is.
+
+    Not where the user states the window of every trial.
+    """
     by_task: dict[Task, list[RecordingContext]] = {}
     for one in context.trials:
         by_task.setdefault(task_of(one), []).append(one)
     for task, trials in by_task.items():
+        if all(one.window_s is not None for one in trials):
+            continue
         for leg in joined_coverage(map(coverage_of, trials)):
             if leg.missing:
                 yield _finding(task, trials, leg)
