@@ -1,12 +1,9 @@
-"""Peaks, impulses and the extent of joint moments: whole, or not at all."""
-
-from types import SimpleNamespace
+"""Peaks and impulses of joint moments: whole, or not at all."""
 
 import numpy as np
 import pytest
 
 from kinertia.estimation.cycles import CycleCurve
-from kinertia.estimation.moment_extent import moment_extents
 from kinertia.estimation.moment_peaks import PEAKS, peak_columns
 from kinertia.motion.gait_cycle import PERCENT, Stride
 
@@ -43,28 +40,3 @@ def test_both_peaks_of_the_external_moment_and_its_impulse():
 def test_the_largest_value_of_a_part_is_no_peak(first, last, missing):
     peaks = found(adduction((first <= PERCENT) & (last >= PERCENT)))
     assert {name for name, (value, _, _) in peaks.items() if np.isnan(value)} == missing
-
-
-def trial(known):
-    """One whose right knee is known at these percents of a stride of one second."""
-    moments = np.where(known, 1.0, np.nan)[:, None, None] * np.ones(3)
-    joints = SimpleNamespace(joints=("knee_r",), moments=moments)
-    curves = SimpleNamespace(time=PERCENT / 100.0, joints={"estimate": joints})
-    return SimpleNamespace(strides=(STRIDE,), joint_curves=curves)
-
-
-def test_what_is_known_of_stride_and_stance():
-    (whole,) = moment_extents([trial(PERCENT <= 90)])
-    assert whole.text == "right: 0 to 90 % of the stride, all of stance"
-    (early,) = moment_extents([trial(PERCENT <= 40)])
-    assert (early.stride_percent, early.push_off, early.strides) == (((0, 40),), False, 0)
-    assert early.stance_share == pytest.approx(41 / 61)
-    assert early.text.endswith("67 % of stance, no push-off")
-    (late,) = moment_extents([trial(PERCENT >= 20)])
-    assert late.push_off
-    assert "push-off" not in late.text
-    (best,) = moment_extents([trial(PERCENT <= 40), trial(PERCENT <= 90)])
-    assert (best.stride_percent, best.strides) == (((0, 90),), 1)
-    (none,) = moment_extents([trial(PERCENT < 0)])
-    assert none.text == "right: none"
-    assert moment_extents([SimpleNamespace(strides=(STRIDE,), joint_curves=None)]) == ()

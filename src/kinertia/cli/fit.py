@@ -32,6 +32,7 @@ from kinertia.cli.options import (
 from kinertia.cli.outcome import Outcome, of_error
 from kinertia.cli.terminal import out, show_problem, shown_progress
 from kinertia.errors import FileError, KinertiaError
+from kinertia.estimation.leg_moments import coverage_sentence
 from kinertia.estimation.result import Fit
 from kinertia.io.file_names import same_folder
 from kinertia.io.number_table import expect_path
@@ -192,6 +193,8 @@ def _show(fit: Fit, run: _Run, verbose: bool, tables: bool) -> None:
         report_tables(fit)
     show_overview(fit.overview, verbose)
     show_idle_waivers(run.overrule.waive, fit.overview.findings)
+    if covered := coverage_sentence(fit.trials):
+        out.print(f"joint moments {covered}", soft_wrap=True)
     out.print(f"results in {run.folder}", soft_wrap=True)
 
 

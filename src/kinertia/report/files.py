@@ -19,7 +19,7 @@ from kinertia.estimation.cycles import columns_of, spatiotemporal_columns
 from kinertia.estimation.forces_used import forces_before, forces_used
 from kinertia.estimation.identifiability import BaseParameters
 from kinertia.estimation.joint_curves import JointCurves
-from kinertia.estimation.moment_extent import moment_extents
+from kinertia.estimation.leg_moments import moment_coverage
 from kinertia.estimation.moment_peaks import peak_columns
 from kinertia.estimation.result import Fit, TrialFit
 from kinertia.findings.finding import Severity
@@ -85,7 +85,7 @@ def _write_cycles(fit: Fit, curves: CurvesByStage, folder: Path) -> None:
     if not any(trial.strides for trial in fit.trials):
         return
     write_columns(folder / "spatiotemporal.csv", spatiotemporal_columns(fit.trials), _SIX_DIGITS)
-    if moment_extents(fit.trials):
+    if any(trial.joint_curves is not None for trial in fit.trials):
         write_columns(folder / "moment_peaks.csv", peak_columns(curves["estimate"]), _SIX_DIGITS)
     write_columns(folder / "cycles.csv", columns_of(curves["estimate"]), _SIX_DIGITS)
     write_columns(folder / "cycles_literature.csv", columns_of(curves["literature"]), _SIX_DIGITS)
@@ -220,7 +220,6 @@ def summary(fit: Fit) -> dict[str, Any]:
         **_posterior_summary(fit),
         "asymmetry": asymmetry_sentences(fit),
         "trials": [_trial_summary(fit, trial) for trial in fit.trials],
-        "moment_extent": [asdict(one) for one in moment_extents(fit.trials)],
         "verdict": fit.overview.verdict,
         "rules_run": fit.rules,
         "trials_left_out": list(fit.left_out),
@@ -273,6 +272,8 @@ def _trial_summary(fit: Fit, trial: TrialFit) -> dict[str, Any]:
         "n_dynamic_frames": len(trial.time),
         "window_s": list(trial.kinematics.window_s),
         "windows_s": [list(window) for window in trial.kinematics.windows_s],
+        "task": trial.kinematics.trial.task,
+        "joint_moments": {leg.word: leg.to_dict() for leg in moment_coverage(trial)},
         "turned_deg": trial.kinematics.turned_deg,
         "cutoff_hz": trial.kinematics.cutoff_hz,
         "motion_hz": trial.motion_hz,

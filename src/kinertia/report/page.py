@@ -11,6 +11,7 @@ import numpy as np
 
 from kinertia.estimation.forces_used import forces_used, full_bandwidth
 from kinertia.estimation.identifiability import evidence
+from kinertia.estimation.leg_moments import coverage_sentence
 from kinertia.estimation.result import Fit, TrialFit
 from kinertia.estimation.simultaneous.calibration_entry import SHOWN_UNIT, item_text, quantity_text
 from kinertia.io.provenance import Provenance, versions
@@ -92,6 +93,7 @@ def render(
         asymmetry=asymmetry_sentences(fit),
         total_mass=[fit.subject.mass_kg, fit.literature.total_mass_kg, fit.estimate.total_mass_kg],
         cycle=_cycle(fit, norms, curves),
+        covered=coverage_sentence(fit.trials),
         beside=outputs_view(fit, shown, MOST_FRAMES // len(shown)),
         walks=any(gait_events(trial.kinematics.trial) for trial in fit.trials),
         body={

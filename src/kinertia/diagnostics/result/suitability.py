@@ -12,7 +12,7 @@ import numpy as np
 
 from kinertia.diagnostics.result.soundness import expected_source
 from kinertia.estimation.identifiability import INFORMED, MEASURED
-from kinertia.estimation.moment_extent import moment_extents
+from kinertia.estimation.leg_moments import coverage_sentence
 from kinertia.estimation.result import Fit
 from kinertia.findings.finding import Finding, Severity
 from kinertia.trial.rms import rms, rms_length
@@ -205,9 +205,8 @@ def _moments(fit: Fit) -> str:
         for part in (slice(0, 3), slice(3, 6))
     )
     reason = f"residual at most {force:.1f} N and {moment:.1f} N m (RMS)"
-    extents = moment_extents(fit.trials)
-    if extents:
-        reason += f"; known of the {'; '.join(one.text for one in extents)}"
+    if covered := coverage_sentence(fit.trials):
+        reason = f"{covered}; {reason}"
     half = _half_interval(fit, "moments")
     if half is None:
         return reason
