@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 
 from kinertia.errors import KinertiaError
-from kinertia.estimation.drawn_fit import chosen_draws, drawn_fit, kept_draws
+from kinertia.estimation.drawn_fit import _reactions, chosen_draws, drawn_fit, kept_draws
 from kinertia.estimation.simultaneous import posterior_draws
+from kinertia.estimation.simultaneous.plate_loads import GAIN, corrected_loads
+from kinertia.estimation.simultaneous.posterior_draws import TrialDraws
 from kinertia.motion.dynamics import inverse_dynamics
+from kinertia.motion.ground_reactions import GroundReactions
 from kinertia.report.draw_files import write_draws
 from kinertia.report.saved_fit import load_fit, write_fit
 
@@ -166,3 +169,28 @@ def test_legs_spread_as_reported_where_the_delay_outlasts_a_landing(fit_of):
     ratio = spread_over_reported(np.array(moments), trial)[:12]
     np.testing.assert_allclose(ratio, 1.0, atol=SYSTEMATIC + sampling(len(moments)))
     assert np.median(ratio) == pytest.approx(1.0, abs=SYSTEMATIC)
+
+
+def test_drawn_errors_of_plates_are_added_to_the_estimated_ones():
+    """Loads that are corrected for both errors at once are those of the estimate, corrected for the drawn rest."""
+    rng = np.random.default_rng(3)
+    recorded, standing = rng.normal(0.0, 300.0, (20, 2, 6)), np.ones((20, 2))
+    recorded[..., 1] = 700.0
+    carrier = np.tile([0, 1], (20, 1))
+    shared = np.array([[0.2, 0.0, 0.3], [0.9, 0.0, 0.3]]), np.eye(3)
+    gain, departure = np.array([0.08, -0.05]), np.array([0.03, 0.02])
+
+    def corrected(gains):
+        errors = np.zeros((2, 7))
+        errors[:, GAIN] = gains
+        return corrected_loads(recorded, standing, carrier, errors, *shared)
+
+    plates = np.zeros((1, 2, 7))
+    plates[0, :, GAIN] = departure
+    nothing = np.zeros(0), np.zeros((1, 0, 0))
+    draws = TrialDraws(*nothing, plates, gain, *shared, np.array([0.004]), np.zeros(1))
+    estimate = GroundReactions(np.arange(20) / 100, corrected(gain), carrier, np.zeros((20, 2, 6)), None)
+    drawn = _reactions(estimate, draws, 0)
+    np.testing.assert_allclose(drawn.wrench, corrected(gain + departure), rtol=1e-12)
+    assert np.abs(drawn.wrench - estimate.wrench).max() > 10.0
+    np.testing.assert_allclose(estimate.time - drawn.time, 0.004)

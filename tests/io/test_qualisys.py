@@ -8,6 +8,8 @@ import pytest
 
 from kinertia.findings.finding import Severity
 from kinertia.io.recording import read_recording
+from kinertia.trial.centre_of_pressure import centre_of_pressure
+from kinertia.trial.data import LOAD_THRESHOLD_N
 from lab_files import CORNERS_M, LAB, lab_walk, write_qtm
 from refusals import codes, only, refused
 
@@ -65,6 +67,12 @@ def test_moments_that_contradict_the_centre_of_pressure_are_not_used(tmp_path, w
     assert found.where.plate == recording.plates.names[0]
     assert found.evidence["misses"].value > 0.05
     np.testing.assert_allclose(recording.plates.moment[..., [0, 2]], walk.plates.moment[..., [0, 2]], atol=1e-3)
+    np.testing.assert_allclose(recording.plates.moment[:, 1], walk.plates.moment[:, 1], atol=1e-3)
+    loaded = walk.plates.force[:, 0, 1] > LOAD_THRESHOLD_N
+    force, point = walk.plates.force[loaded, 0], centre_of_pressure(walk.plates.wrench)[loaded, 0]
+    without_free_moment = np.cross(point, force)[:, 1]
+    assert np.abs(walk.plates.moment[loaded, 0, 1] - without_free_moment).max() > 0.5, "there is one to leave out"
+    np.testing.assert_allclose(recording.plates.moment[loaded, 0, 1], without_free_moment, atol=1e-3)
 
 
 def swapped(line):

@@ -14,7 +14,7 @@ from kinertia.motion.gait_cycle import (
     turning_points,
 )
 from kinertia.motion.kinematics import Kinematics, solve_kinematics
-from kinertia.motion.spatiotemporal import spatiotemporal
+from kinertia.motion.spatiotemporal import _double_support, spatiotemporal
 from kinertia.synthetic.walk import walk, walking_subject
 from kinertia.trial.belt import Belt
 from kinertia.trial.data import FEET, LOAD_THRESHOLD_N, FootLoads, Trial
@@ -301,3 +301,10 @@ def test_one_event_of_the_wrong_side_costs_no_stride(walked, trial):
         wrong = replace(event, side="l" if event.side == "r" else "r")
         one_off = replace(half, events=(*events[:k], wrong, *events[k + 1 :]))
         assert strides_of(walked.skeleton, kinematics_of(walked, one_off)) == expected
+
+
+def test_both_feet_are_on_the_ground_at_the_beginning_and_before_toe_off():
+    """The other foot leaves at 0.12 s and lands at 0.55 s; the own foot leaves at 0.74 s, of 1.2 s."""
+    stride = Stride("r", 1, 0.0, 1.2, 0.74, 0.12, 0.55, True)
+    assert _double_support(stride) == pytest.approx(100.0 * (0.12 + 0.19) / 1.2)
+    assert _double_support(replace(stride, toe_off_s=0.5)) == 0.0, "one who runs"
