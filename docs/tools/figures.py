@@ -183,20 +183,16 @@ def _opensim_moments(data: Path, work: Path) -> pd.DataFrame:
 
 
 def _verdict_strip(figure: plt.Figure, fitted: dict) -> None:
-    """What the fit says of its joint moments and of the left plate, below the curves."""
+    """What the fit says of its joint moments, and its finding about the left plate, below the curves."""
     use = next(one["use"] for one in fitted["suitability"] if one["output"] == "joint moments")
-    left = {"plate": "left", "quantity": "free moment"}
-    crosstalk = next(one for one in fitted["calibration"] if one.items() >= left.items())
-    found, usual = (1e3 * crosstalk[name] for name in ("value", "prior_sd"))
+    message = next(one["message"] for one in fitted["findings"] if one["code"] == "P267")
     fill, edge = _USE_COLORS[use]
     strip = figure.add_axes((0.015, 0.03, 0.97, 0.125))
     strip.set(xlim=(0, 1), ylim=(0, 1), xticks=[], yticks=[], facecolor=fill)
     strip.spines[:].set_visible(False)
     strip.axvspan(0, 0.008, color=edge, linewidth=0)
     strip.text(0.025, 0.7, f"Joint moments: {use}.", va="center", fontsize=10.5, weight="bold")
-    number = f"{found:.1f}".replace("-", "\N{MINUS SIGN}")
-    text = f"Left plate: apparent vertical-moment error of {number} N m per kN (usual: within {usual:.1f}), corrected."
-    strip.text(0.025, 0.28, text, va="center", fontsize=10.5)
+    strip.text(0.025, 0.28, message, va="center", fontsize=10.5)
 
 
 def _place(trial: SyntheticTrial, pose: Pose, frame: int, segment: int) -> np.ndarray:
