@@ -19,6 +19,7 @@ EVIDENCE = (
     "peers",
     "measured-trials",
     "field-trials",
+    "vicon-moments",
     "functional-trials",
     "held-out",
     "sessions",

@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import io
 import json
+import shlex
 import tempfile
 import time
 import tomllib
@@ -27,7 +28,7 @@ from validation.page import write_page
 from validation.walks import fit_arguments
 
 CASES = Path(__file__).with_name("field_cases.toml")
-FILES = (".trc", ".c3d", ".mot", ".xml", ".osim")
+FILES = (".trc", ".c3d", ".mot", ".forces", ".xml", ".osim", ".toml")
 _OF_RESULT = "R"
 """Codes of a result describe it; those of other families accuse a recording, a person or an instrument."""
 _IMPOSSIBLE_POSE = "R305"
@@ -100,7 +101,7 @@ def cases(data: Path) -> Iterator[Case]:
             if "walk" in recording:
                 arguments = fit_arguments(data, recording["walk"])
             else:
-                words = f"{recording['files']} {laboratory['with']}".split()
+                words = shlex.split(f"{recording['files']} {laboratory.get('with', '')}")
                 arguments = [str(folder / word) if word.endswith(FILES) else word for word in words]
             yield Case(
                 title=f"{laboratory['title']}: {recording['title']}",
