@@ -1,4 +1,4 @@
-"""Compare peak moments of ankle, knee and hip with those that Vicon left in the files."""
+"""Compare peak joint moments with Vicon's own."""
 
 import contextlib
 import io
@@ -30,6 +30,8 @@ _CLEAR_SD = 2.0
 _PERCENT, _MS = 100.0, 1000.0
 _FEWEST = 20
 """Frames that both have."""
+_BESIDE = 3
+"""Frames on both sides of a peak that are needed: at the end of a window there is none."""
 _LEAST_NM_KG = 0.1
 """Smaller peaks are of legs that are not on a plate."""
 
@@ -52,7 +54,7 @@ def fitted(arguments: list[str], out: Path) -> Fit:
 def corrections(fit: Fit) -> str:
     """List the clear gains and delays that the fit has corrected, which Vicon has not."""
     found = []
-    for one in fit.calibration:
+    for one in () if fit.posterior is None else fit.posterior.calibration:
         if one.sd and abs(one.value) > _CLEAR_SD * one.sd:
             if one.quantity == "gain":
                 found.append(f"{one.plate} {_PERCENT * one.value:+.1f} %")
@@ -66,8 +68,15 @@ def rows(title: str, fit: Fit) -> Iterator[tuple[list[str], float]]:
     for trial in fit.trials:
         for one in compared_outputs(fit, trial):
             both = np.isfinite(one.theirs) & np.isfinite(one.ours)
-            if one.kind == "MOMENTS" and both.sum() >= _FEWEST and np.max(one.theirs[both]) >= _LEAST_NM_KG:
+            if one.kind == "MOMENTS" and both.sum() >= _FEWEST and _has_peak(one.theirs, both):
                 yield _row(title, fit, one, both)
+
+
+def _has_peak(theirs: np.ndarray, both: np.ndarray) -> bool:
+    """Decide whether a curve reaches its largest value within the frames, not at an end of them."""
+    at = int(np.argmax(np.where(both, theirs, -np.inf)))
+    around = both[max(at - _BESIDE, 0) : at + _BESIDE + 1]
+    return bool(theirs[at] >= _LEAST_NM_KG and len(around) == 2 * _BESIDE + 1 and around.all())
 
 
 def _row(title: str, fit: Fit, one: OutputComparison, both: np.ndarray) -> tuple[list[str], float]:
@@ -93,16 +102,16 @@ def document(compared: list[tuple[list[str], float]]) -> str:
 
 TEXT = """# Moments of Vicon
 
-Peak extension moments (ankle: plantarflexion), N m/kg, in the frames of the fit: Plug-in Gait's in the files, and
+Peak extension moments (ankle: plantarflexion), N m/kg, within the frames of the fit: Plug-in Gait's in the files, and
 Kinertia's in the same axes. Differences are Kinertia's minus Vicon's.
 
 {summary}
 
 Why they differ: Plug-in Gait's ankle moments equal those of the recorded forces about its ankle centre within
-0.02 N m/kg (FMC, Sydney, CGM2.4). Kinertia's ankle centres are within 4 mm of these along the foot (FMC; CGM2.4: 6 mm), but
-it corrects gains and delays of plates, which Vicon takes as they are (*corrected*, by more than two standard
-deviations). A gain of -3.7 % adds 0.05 N m/kg at the ankle, a delay of 11 ms as much, when the ankle moves over the foot.
-Hip moments depend on segment masses, hip centres and smoothing besides.
+0.02 N m/kg (FMC, Sydney, CGM2.4). Kinertia's ankle centres are within 4 mm of these along the foot (FMC; CGM2.4: 6 mm),
+but it corrects gains and delays of plates, which Vicon takes as they are (*corrected*, by more than two standard
+deviations). A gain of -3.7 % adds 0.05 N m/kg at the ankle, and a delay of 11 ms about as much. Hip moments depend on
+segment masses, hip centres and smoothing besides.
 
 {results}
 """

@@ -49,7 +49,8 @@ def test_a_walk_stands_for_its_static_trial(synthetic_lab):
     for name, sd_m in usual.uncertainty.centres.items():
         assert without.uncertainty.centres[name] == pytest.approx(WITHOUT_STATIC * sd_m)
     assert without.uncertainty.marker_sd_m == pytest.approx(WITHOUT_STATIC * usual.uncertainty.marker_sd_m)
-    assert without.uncertainty.axes == usual.uncertainty.axes  # one walk does not show them
+    free = {name.split("_")[0] for name in without.uncertainty.axes}
+    assert free == {"knee", "elbow"}, "one walk does not show the axes of ankles"
     tilts = {name: without.skeleton.locked[name] for name in LEG_AXIS_TILTS}
     assert max(map(abs, tilts.values())) < np.radians(15.0), tilts
     for mine, expected in zip(without.skeleton.joints, usual.skeleton.joints, strict=True):

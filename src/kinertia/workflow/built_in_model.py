@@ -205,7 +205,7 @@ def built_in_model(screened: Screened, trials: Sequence[RotatedTrial], settings:
     )
     model, facing_x = _with_trunk(model, facing_x)
     model = replace(model, skeleton=with_stated_ranges(model.skeleton, subject))
-    stated_axes = _free_axes(facing_x, settings)
+    stated_axes = _free_axes(facing_x, landmarks, settings)
     calibrated = calibrate(model, [one.trial for one in facing_x], landmarks.acromia, stated_axes)
     found = calibrated.findings
     left = _unblocked(facing_x, screened, [*screened.findings, *found])
@@ -219,7 +219,7 @@ def built_in_model(screened: Screened, trials: Sequence[RotatedTrial], settings:
         trials=left,
         skeleton=calibrated.skeleton,
         prior=population_prior(literature_prior(literature), subject, body_kg).prior,
-        uncertainty=_uncertainty(calibrated.free_axes, landmarks.of_walk),
+        uncertainty=_uncertainty(calibrated, landmarks, settings.joint_axes or _show_axes(landmarks, left, calibrated)),
         findings=(*found, *_adapted(calibrated), *unobserved_segments(calibrated.skeleton)),
         elbow_rotations_rad=calibrated.elbow_rotations_rad,
         torso_rotation_rad=calibrated.torso_rotation_rad,
@@ -244,25 +244,37 @@ def _stance_of(person: Person, trials: Sequence[RotatedTrial], marker_set: Marke
     return _Landmarks(static, named, of_walk=True)
 
 
-def _free_axes(trials: Sequence[RotatedTrial], settings: Settings) -> bool | None:
-    """Return whether joint axes are to be estimated; None where the trials decide, by whether they show them.
-
-    That there is no static trial does not free them: one walk would tilt the ankle axes by up to 64 degrees.
-    """
+def _free_axes(trials: Sequence[RotatedTrial], landmarks: _Landmarks, settings: Settings) -> bool | None:
+    """Return whether joint axes are to be estimated; None where the trials decide, by whether they show them."""
     if settings.joint_axes is not None:
         return settings.joint_axes
-    if any(not one.trial.loads.plates for one in trials):
+    if landmarks.of_walk or any(not one.trial.loads.plates for one in trials):
         return True
     return None if settings.method == "simultaneous" else False
 
 
-def _uncertainty(free_axes: bool, without_static: bool) -> ModelUncertainty:
-    """Return the uncertainty of joint centres, axes and markers of the built-in model."""
+def _show_axes(landmarks: _Landmarks, trials: Sequence[RotatedTrial], calibrated: Calibrated) -> bool:
+    """Decide whether the trials show joint axes, if that is not decided by a static trial and them."""
+    return not landmarks.of_walk or show_knee_axes(first_poses(calibrated.skeleton, [one.trial for one in trials]))
+
+
+def _uncertainty(calibrated: Calibrated, landmarks: _Landmarks, shown: bool) -> ModelUncertainty:
+    """Return the uncertainty of joint centres, axes and markers of the built-in model.
+
+    Args:
+        calibrated: the adapted skeleton.
+        landmarks: where its landmarks are from.
+        shown: whether the trials show joint axes. Where they do not, and there is no static trial, the axes of ankles
+            stay as adapted: the estimate would tilt them by up to 64 degrees.
+    """
     known_by = GAIT27_UNCERTAINTY
-    if without_static:
+    if landmarks.of_walk:
         centres = {name: WITHOUT_STATIC * sd for name, sd in known_by.centres.items()}
         known_by = replace(known_by, centres=centres, marker_sd_m=WITHOUT_STATIC * MARKER_SD_M)
-    return replace(known_by.with_axes(), before=dict.fromkeys(LEG_AXIS_TILTS, 0.0)) if free_axes else known_by
+    if not calibrated.free_axes:
+        return known_by
+    axes = {name: sd for name, sd in known_by.with_axes().axes.items() if shown or not name.startswith("ankle")}
+    return replace(known_by, axes=axes, before={name: 0.0 for name in LEG_AXIS_TILTS if name in axes})
 
 
 def _with_trunk(model: Gait27, trials: Sequence[RotatedTrial]) -> tuple[Gait27, list[RotatedTrial]]:
