@@ -4,9 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from kinertia.motion.dynamics import Motion, inverse_dynamics
-from kinertia.motion.joint_moments import component_names, joint_moments
+from kinertia.motion.joint_moments import component_names, joint_axes, joint_moments
 from kinertia.motion.joint_wrench import body_joints, joint_wrenches, lumbar_joint
 from kinertia.motion.virtual_axes import VirtualAxes
 from kinertia.synthetic.walk import walk, walking_subject
@@ -80,8 +81,24 @@ def test_the_same_moment_in_other_axes(walked, found):
     distal, proximal = (joint_moments(*state, frame=frame) for frame in ("distal", "proximal"))
     for other in (distal, proximal):
         np.testing.assert_allclose(np.linalg.norm(other.moments, axis=2), sizes, rtol=1e-9)
-    np.testing.assert_allclose(distal.moments[..., 2], found.moments[..., 2], atol=1e-9)
+    for k, joint in enumerate(joints):
+        about_long_axis = 1 if joint.name == "Ankle" else 2
+        np.testing.assert_allclose(
+            distal.moments[:, k, about_long_axis], found.moments[:, k, about_long_axis], atol=1e-9, err_msg=joint.label
+        )
     np.testing.assert_allclose(proximal.moments[..., 0], found.moments[..., 0], atol=1e-9)
+
+
+def test_the_roll_of_a_foot_does_not_change_the_rotation_moment_of_the_ankle():
+    """Markers on heel and toes show a foot's long axis, and hardly its roll about it."""
+    rng = np.random.default_rng(0)
+    shank, foot = Rotation.random(2, rng=rng).as_matrix()
+    rolled = foot @ Rotation.from_euler("X", 25.0, degrees=True).as_matrix()
+    axes = [joint_axes(shank[None], one[None], long_axis=0) for one in (foot, rolled)]
+    np.testing.assert_allclose(axes[0], axes[1], atol=1e-12)
+    flexion, inversion, rotation = axes[0][0]
+    np.testing.assert_allclose(np.cross(flexion, inversion) @ rotation, np.linalg.norm(np.cross(flexion, inversion)))
+    np.testing.assert_allclose([inversion @ foot[:, 0], flexion @ shank[:, 2]], 1.0)
 
 
 def test_virtual_axes_give_the_whole_load_and_change_nothing_else(walked):

@@ -1,13 +1,15 @@
 """Computes three-dimensional moments of hips, knees, ankles and lumbar joint in joint coordinate systems.
 
 The axes are those of Grood and Suntay (1983, J Biomech Eng 105:136): flexion about the proximal segment's axis to the
-right, rotation about the distal segment's long axis, adduction about the floating axis perpendicular to both. They need
-not be perpendicular: each component is the whole moment's projection on its axis, as the generalised force of a joint
-with these three rotations would be. Moments are internal (of muscles, ligaments and contact, on the distal segment),
-about the joint's centre, and have equal signs on both sides: positive towards flexion (ankle: dorsiflexion), adduction
-(ankle: inversion) and internal rotation; of the lumbar joint towards flexion, bending to the right and turning to the
-left. External moments are the negative ones. Reaction forces are those of the proximal on the distal segment, in the
-distal segment's axes forward, up and right.
+right, rotation about the distal segment's long axis, adduction about the floating axis perpendicular to both. A foot's
+long axis points forward: there inversion is about the long axis and rotation about the floating one. (The foot's axis
+upward depends on how far the foot is rolled inward, which markers on heel and toes hardly show: 25 degrees of roll made
+a rotation moment of 55 % of the plantarflexion moment.) The axes need not be perpendicular: each component is the whole
+moment's projection on its axis, as the generalised force of a joint with these three rotations would be. Moments are
+internal (of muscles, ligaments and contact, on the distal segment), about the joint's centre, and have equal signs on
+both sides: positive towards flexion (ankle: dorsiflexion), adduction (ankle: inversion) and internal rotation; of the
+lumbar joint towards flexion, bending to the right and turning to the left. External moments are the negative ones.
+Reaction forces are those of the proximal on the distal segment, in the distal segment's axes forward, up and right.
 """
 
 from collections.abc import Sequence
@@ -87,18 +89,20 @@ def component_signs(joint: BodyJoint) -> np.ndarray:
     return np.array([_BENDS[joint.name], mirrored, mirrored])
 
 
-def joint_axes(parent: np.ndarray, child: np.ndarray, frame: Frame = "joint") -> np.ndarray:
+def joint_axes(parent: np.ndarray, child: np.ndarray, frame: Frame = "joint", long_axis: int = 1) -> np.ndarray:
     """Return unit axes (n, 3, 3) of flexion, adduction and rotation, in rows, in ground.
 
     Args:
         parent, child: (n, 3, 3) axes of the joint's segments in ground, in columns: forward, up, right.
         frame: of which axes.
+        long_axis: of the child, `BodyJoint.long_axis`.
     """
     if frame != "joint":
         return (child if frame == "distal" else parent).swapaxes(1, 2)[:, list(_RIGHT_FORWARD_UP)]
-    first, last = parent[:, :, 2], child[:, :, 1]
-    floating = np.cross(last, first)
-    return np.stack([first, floating / np.linalg.norm(floating, axis=1, keepdims=True), last], axis=1)
+    first, last = parent[:, :, 2], child[:, :, long_axis]
+    floating = np.cross(last, first) if long_axis else np.cross(first, last)
+    floating /= np.linalg.norm(floating, axis=1, keepdims=True)
+    return np.stack([first, floating, last] if long_axis else [first, last, floating], axis=1)
 
 
 def joint_moments(
@@ -122,7 +126,7 @@ def joint_moments(
         wrenches = joint_wrenches(skeleton, bsp, own, foot_loads[some], joints)
         for k, joint in enumerate(joints):
             parent, child = (pose.rotation[:, skeleton.segments.index(one)] for one in (joint.parent, joint.child))
-            axes, wrench = joint_axes(parent, child, frame), wrenches[joint]
+            axes, wrench = joint_axes(parent, child, frame, joint.long_axis), wrenches[joint]
             moments[some, k] = component_signs(joint) * np.einsum("nak,nk->na", axes, wrench[:, 3:])
             forces[some, k] = np.einsum("nka,nk->na", child, wrench[:, :3])
     return JointMoments(tuple(one.label for one in joints), moments, forces, constraints(skeleton, joints))
@@ -139,7 +143,7 @@ def constraints(skeleton: Skeleton, joints: Sequence[BodyJoint]) -> np.ndarray:
         turning = pose.axes[0, :, 3:] * (slopes * between)[:, None]
         turns = np.zeros((3, len(skeleton.coordinates)))
         np.add.at(turns.T, skeleton.map.owner, turning)
-        axes = joint_axes(pose.rotation[:, parent], pose.rotation[:, child])[0].T
+        axes = joint_axes(pose.rotation[:, parent], pose.rotation[:, child], long_axis=joint.long_axis)[0].T
         within = turns @ np.linalg.pinv(turns, rcond=1e-6) @ axes
         result[row] = np.linalg.norm(within, axis=0) < _FREE
     return result

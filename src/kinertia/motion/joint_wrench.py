@@ -36,6 +36,11 @@ class BodyJoint:
         """Name in tables: "knee_r", "lumbar"."""
         return f"{self.name.lower()}_{self.side}".rstrip("_")
 
+    @property
+    def long_axis(self) -> int:
+        """Axis of the child along which it is longest: up (1), of feet forward (0)."""
+        return 0 if self.name == "Ankle" else 1
+
     def columns(self, skeleton: Skeleton) -> list[int]:
         """Return the columns of its coordinates in q."""
         own = {axis.coordinate for joint in self.joints for axis in joint.axes}

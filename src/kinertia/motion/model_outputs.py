@@ -20,6 +20,7 @@ from scipy.spatial.transform import Rotation
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Pose, Skeleton
 from kinertia.motion.dynamics import Motion
+from kinertia.motion.joint_moments import component_signs, joint_axes
 from kinertia.motion.joint_wrench import BodyJoint, axes_alike, joint_wrenches, leg_joints
 from kinertia.trial.data import FEET
 
@@ -32,8 +33,6 @@ UNITS: dict[Convention, dict[str, str]] = {
     "isb": {"ANGLES": "deg", "FORCES": "N", "MOMENTS": "Nm", "POWERS": "W"},
 }
 """Units as Vicon writes them; forces, moments and powers are per kg of body mass."""
-_BENDS = {"Hip": 1.0, "Knee": -1.0, "Ankle": 1.0}
-"""Sign of flexion (dorsiflexion) about the axis to the right."""
 _STEP_RAD = 1e-5
 _UNMOVED = 0.2
 """An angle that no coordinate changes by more has no standard deviation: the model fixes it."""
@@ -123,12 +122,12 @@ def model_outputs(
     found = _of_pelvis_and_feet(skeleton, pose, clinical, np.eye(3))
     for joint, wrench in wrenches.items():
         child, parent = _rotation(skeleton, pose, joint.child), _rotation(skeleton, pose, joint.parent)
-        columns, signs = joint.columns(skeleton), _signs(joint)
+        columns, signs = joint.columns(skeleton), component_signs(joint)
         by_angle, turning = _moved(skeleton, motion.q, joint, columns)
         together = None if departures is None else departures.coordinates[..., columns]
         sd = np.degrees(_reached(by_angle, _covariance(spread.coordinates[:, columns], together)))
         found.append(ModelOutput(joint.name, joint.side, "ANGLES", np.degrees(signs * _cardan(parent, child)), sd))
-        axes = child.swapaxes(1, 2)[:, [2, 0, 1]] if clinical else _joint_axes(parent, child)
+        axes = child.swapaxes(1, 2)[:, [2, 0, 1]] if clinical else joint_axes(parent, child)
         factor = (-1000.0 if clinical else 1.0) / mass_kg
         together = None if departures is None else departures.moments[..., columns]
         sd = abs(factor) * _along(axes, turning, _covariance(spread.moments[:, columns], together))
@@ -164,7 +163,7 @@ def plug_in_gait_angles(skeleton: Skeleton, q: np.ndarray, heading_rad: np.ndarr
     angles = {one.name: one.values for one in found}
     for joint in joints:
         parent, child = (_rotation(skeleton, pose, segment) for segment in (joint.parent, joint.child))
-        angles[f"{joint.side.upper()}{joint.name}Angles"] = np.degrees(_signs(joint) * _cardan(parent, child))
+        angles[f"{joint.side.upper()}{joint.name}Angles"] = np.degrees(component_signs(joint) * _cardan(parent, child))
     return angles
 
 
@@ -179,23 +178,10 @@ def _rotation(skeleton: Skeleton, pose: Pose, segment: str) -> np.ndarray:
     return pose.rotation[:, skeleton.segments.index(segment)]
 
 
-def _signs(joint: BodyJoint) -> np.ndarray:
-    """Return the signs (3,) of rotations about axes right, forward and up: flexion, adduction, internal rotation."""
-    mirrored = 1.0 if joint.side == "r" else -1.0
-    return np.array([_BENDS[joint.name], mirrored, mirrored])
-
-
 def _cardan(parent: np.ndarray, child: np.ndarray) -> np.ndarray:
     """Return rotations (n, 3) rad about z of the parent, the floating axis x, and y of the child (n, 3, 3)."""
     result: np.ndarray = Rotation.from_matrix(parent.swapaxes(-1, -2) @ child).as_euler("ZXY")
     return result
-
-
-def _joint_axes(parent: np.ndarray, child: np.ndarray) -> np.ndarray:
-    """Return the axes (n, 3, 3) of the rotations of `_cardan`, in rows, in ground."""
-    first, last = parent[:, :, 2], child[:, :, 1]
-    floating = np.cross(last, first)
-    return np.stack([first, floating / np.linalg.norm(floating, axis=1, keepdims=True), last], axis=1)
 
 
 def _moved(

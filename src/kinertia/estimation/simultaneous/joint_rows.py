@@ -39,8 +39,11 @@ class JointRows:
         """Make the axes at these poses."""
         turned = pose.rotation
         parent, child = turned[:, virtual.parents], turned[:, virtual.children]
-        flat = parent.reshape(-1, 3, 3), child.reshape(-1, 3, 3)
-        axes = np.stack([joint_axes(*flat).reshape(parent.shape), child.swapaxes(2, 3)], axis=2)
+        own = [joint_axes(parent[:, k], child[:, k], long_axis=each.long_axis) for k, each in enumerate(virtual.joints)]
+        axes = np.stack(
+            [np.reshape(own, (len(own), *parent[:, 0].shape)).swapaxes(0, 1) if own else parent, child.swapaxes(2, 3)],
+            axis=2,
+        )
         return cls(virtual, pose, first, axes, turned[:, virtual.bases])
 
     def turned(self, rows: np.ndarray) -> np.ndarray:
@@ -70,10 +73,13 @@ class JointRows:
         by = np.empty((d, j, 2, 3, len(skeleton.tree.parent)))
         for k in range(j):
             from_parent, from_child = _relative(skeleton, self.virtual, k)
-            parent_axis, _, child_axis = self.axes[:, k, 0].transpose(1, 0, 2)
-            by[:, k, 0, 0] = self._turning(parent_axis, load[:, k, 0]) * from_parent
-            by[:, k, 0, 2] = self._turning(child_axis, load[:, k, 0]) * from_child
-            by[:, k, 0, 1] = self._of_floating(k, load[:, k, 0], from_parent, from_child)
+            long, floating = (2, 1) if self.virtual.joints[k].long_axis else (1, 2)
+            axes = self.axes[:, k, 0]
+            by[:, k, 0, 0] = self._turning(axes[:, 0], load[:, k, 0]) * from_parent
+            by[:, k, 0, long] = self._turning(axes[:, long], load[:, k, 0]) * from_child
+            by[:, k, 0, floating] = self._of_floating(
+                axes[:, floating], axes[:, 0], axes[:, long], load[:, k, 0], from_parent, from_child
+            )
             for axis in range(3):
                 by[:, k, 1, axis] = self._turning(self.axes[:, k, 1, axis], load[:, k, 1]) * from_child
         result[:, self.first :] = skeleton.map.to_coordinates(by.reshape(d, 6 * j, -1), self.pose.slopes)
@@ -84,11 +90,19 @@ class JointRows:
         result: np.ndarray = (self.pose.axes[:, :, 3:] @ np.cross(axis, load)[..., None])[..., 0]
         return result
 
-    def _of_floating(self, k: int, load: np.ndarray, from_parent: np.ndarray, from_child: np.ndarray) -> np.ndarray:
-        """Return the same for the floating axis, the normalised product of child's and parent's."""
-        first, floating, last = self.axes[:, k, 0].transpose(1, 0, 2)
+    def _of_floating(
+        self, floating: np.ndarray, first: np.ndarray, last: np.ndarray, load: np.ndarray, *turned: np.ndarray
+    ) -> np.ndarray:
+        """Return the same for the floating axis, the normalised product of the parent's (first) and child's (last).
+
+        Args:
+            floating, first, last, load: (d, 3) axes, and the load.
+            turned: how (a,) each axis turns parent and child.
+        """
+        from_parent, from_child = turned
+        product = np.cross(last, first)
         across = load - floating * np.einsum("dk,dk->d", load, floating)[:, None]
-        across /= np.linalg.norm(np.cross(last, first), axis=1)[:, None]
+        across /= np.einsum("dk,dk->d", product, floating)[:, None]
         # across . (da x first + last x db) with da = a x last, db = a x first
         of_last = self._turning(last, np.cross(first, across)) * from_child
         result: np.ndarray = of_last + self._turning(first, np.cross(across, last)) * from_parent
