@@ -32,6 +32,7 @@ from kinertia.trial.ground_contact import FootMarkers
 from kinertia.trial.marker_quality import Travel, travel
 from kinertia.trial.plate_assignment import build_trial
 from kinertia.trial.sampled_time import within
+from kinertia.trial.trial_input import Task
 
 _STRAIGHT = 0.87
 """Cosine of 30 degrees: in 33 walks and runs the pelvis turns by up to 20 degrees, in turns of children by 68 to 91."""
@@ -48,6 +49,7 @@ class RecordingContext:
         is_static: it is given as the static trial, or the only one in which the person stands.
         without_forces: only its markers are used.
         forces_refused: because its forces cannot be.
+        stated_task: what the person does, if the user states it.
         window_s: the window that the user vouches for.
         height_m: stature, where it is known.
         mass_kg: stated mass, where it is known.
@@ -62,6 +64,7 @@ class RecordingContext:
     mass_kg: float | None = None
     without_forces: bool = False
     forces_refused: bool = False
+    stated_task: Task | None = None
 
     @property
     def name(self) -> str:

@@ -13,6 +13,7 @@ from kinertia.estimation.common_strides import mean_of_common
 from kinertia.estimation.curve_source import Stage
 from kinertia.estimation.cycles import cycle_curves
 from kinertia.estimation.result import Fit
+from kinertia.estimation.tasks import main_task
 from kinertia.model.shared_coordinates import by_side, opposite_on_left
 
 _BUILT_IN = "gait27"
@@ -33,11 +34,11 @@ def convention_of(fit: Fit) -> str:
 
 
 def mean_curves(fit: Fit) -> MeanCurves:
-    """Average the curves of a fit over its strides; empty without strides."""
+    """Average the curves of a fit over the strides of its main task (`main_task`); empty without strides."""
     found: dict[tuple[str, str], list[np.ndarray]] = {}
     flipped = {f"{name}_{kind}" for name in opposite_on_left(fit.skeleton) for kind in ("angle", "moment")}
     for stage, kinds in _KINDS.items():
-        for one in (curve for trial in fit.trials for curve in cycle_curves(trial, fit.mass_kg, stage)):
+        for one in (curve for trial in main_task(fit).trials for curve in cycle_curves(trial, fit.mass_kg, stage)):
             if one.kind in kinds:
                 sign = -1.0 if one.quantity in flipped and one.stride.side == "l" else 1.0
                 found.setdefault((one.quantity, one.stride.side), []).append(sign * one.value)

@@ -35,6 +35,7 @@ from kinertia.motion.ground_reactions import GroundReactions
 from kinertia.motion.kinematics import Kinematics
 from kinertia.settings import Settings, Subject
 from kinertia.trial import display
+from kinertia.trial.trial_input import WITHOUT_STRIDES
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -112,8 +113,9 @@ class TrialFit:
 
     @cached_property
     def strides(self) -> tuple[Stride, ...]:
-        """Strides of the whole trial, by plates where these measured foot contact, else by motion; none in squats."""
-        return strides_of(self.skeleton, self.kinematics)
+        """Strides of the whole trial, by plates or else motion; none in squats and landings, found or stated."""
+        task = self.kinematics.trial.task
+        return () if task in WITHOUT_STRIDES else strides_of(self.skeleton, self.kinematics)
 
     @cached_property
     def moments(self) -> Mapping[str, pd.DataFrame]:
@@ -228,7 +230,7 @@ class Fit:
         towards the other foot); "..._clinical": Plug-in Gait's nine angles (deg). What is not known is NaN.
 
         Args:
-            stage: "estimate", or "literature": what inverse kinematics and inverse dynamics give without the estimate.
+            stage: "estimate", or "literature": inverse kinematics and inverse dynamics without the estimate.
             norms: CSV file of norms; adds the columns norm, norm_sd, gvs and gps, the stride's scores (deg; see `gps`).
 
         Examples:

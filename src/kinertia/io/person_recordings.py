@@ -84,7 +84,8 @@ def read_trial(wanted: SubjectFile, files: TrialFiles) -> TrialInput:
         recording, name=files.name, belt=read_belt(files.belt_speed_m_s), stated_contacts=tuple(files.feet)
     )
     apart = files.forces is not None and len(wanted.trials) > 1 and not wanted.instruments.same_plates
-    return TrialInput(with_plates_of_trial(recording) if apart else recording, files.window_s, seconds, files.use)
+    used = with_plates_of_trial(recording) if apart else recording
+    return TrialInput(used, files.window_s, seconds, files.use, files.task)
 
 
 def _as_used(wanted: SubjectFile, recording: Recording) -> Recording:

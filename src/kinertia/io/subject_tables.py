@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from kinertia.io.subject_values import BeltSpeed, File, LengthUnit, MarkerSetName, StatedContacts, TrialName, Window
 from kinertia.settings import Attached, Diagnostics, Instruments, KnownSegment, PriorSettings, Settings, Subject, Table
-from kinertia.trial.trial_input import TrialUse
+from kinertia.trial.trial_input import Task, TrialUse
 
 
 class Model(Table):
@@ -51,6 +51,11 @@ class TrialFiles(Table):
     use: TrialUse = Field(
         default="all",
         description='"kinematics": only its markers are used, for joint centres, joint axes and marker positions',
+    )
+    task: Task | None = Field(
+        default=None,
+        description='"walk", "turn", "run", "landing", "squat" or "other"; left out: found; curves of different tasks '
+        "are not averaged",
     )
     belt_speed_m_s: BeltSpeed | None = Field(
         default=None,

@@ -16,6 +16,7 @@ from kinertia.estimation.common_strides import common_strides, mean_of, mean_of_
 from kinertia.estimation.curve_source import Stage
 from kinertia.estimation.cycles import FORCES, UNITS, CycleCurve, Kind, curves_by_stage
 from kinertia.estimation.result import Fit
+from kinertia.estimation.tasks import main_task
 from kinertia.io.norms_file import Norm
 from kinertia.model.shared_coordinates import opposite_on_left
 from kinertia.model.skeleton import Skeleton
@@ -68,15 +69,22 @@ def cycle_figures(
 ) -> dict[Kind, Figure]:
     """Draw all figures over the gait cycle, by kind; none where no trial has a stride, or no stride shows that kind.
 
+    Only trials of the main task (`main_task`) are drawn: a mean of walks and turns is neither.
+
     Args:
         fit: the fit.
         norms: grey bands below.
         curves: `drawn_curves` of the fit, where they are known.
     """
+    fit = main_task(fit)
     if not any(trial.strides for trial in fit.trials):
         return {}
-    curves = curves or drawn_curves(fit)
-    drawn = _Drawn(fit, _by_quantity(curves["estimate"]), _by_quantity(curves["literature"]), norms)
+    names = {trial.name for trial in fit.trials}
+    known = curves or drawn_curves(fit)
+    estimate, literature = (
+        _by_quantity(one for one in known[stage] if one.trial in names) for stage in ("estimate", "literature")
+    )
+    drawn = _Drawn(fit, estimate, literature, norms)
     figures = {kind: drawn.figure(kind) for kind in UNITS}
     return {kind: figure for kind, figure in figures.items() if figure is not None}
 
@@ -87,8 +95,8 @@ def cycle_figure(fit: Fit, kind: Kind, norms: Norms = MappingProxyType({})) -> F
 
 
 def estimated_curves(fit: Fit) -> Curves:
-    """Return all curves of the estimate from which figures are drawn."""
-    return _by_quantity(curves_by_stage(fit.trials, fit.mass_kg, MOST_STRIDES, ["estimate"])["estimate"])
+    """Return the curves of the estimate from which figures are drawn."""
+    return _by_quantity(curves_by_stage(main_task(fit).trials, fit.mass_kg, MOST_STRIDES, ["estimate"])["estimate"])
 
 
 def drawn_curves(fit: Fit) -> CurvesByStage:

@@ -14,6 +14,7 @@ from kinertia.estimation.identifiability import evidence
 from kinertia.estimation.leg_moments import coverage_sentence
 from kinertia.estimation.result import Fit, TrialFit
 from kinertia.estimation.simultaneous.calibration_entry import SHOWN_UNIT, item_text, quantity_text
+from kinertia.estimation.tasks import fits_by_task, main_task
 from kinertia.io.provenance import Provenance, versions
 from kinertia.model.bsp import PARAMETERS, BodySegmentParameters
 from kinertia.motion.clinical_angles import CLINICAL_ANGLES
@@ -93,6 +94,7 @@ def render(
         asymmetry=asymmetry_sentences(fit),
         total_mass=[fit.subject.mass_kg, fit.literature.total_mass_kg, fit.estimate.total_mass_kg],
         cycle=_cycle(fit, norms, curves),
+        more_cycles=[(task, _cycle(own, norms, curves)) for task, own in list(fits_by_task(fit).items())[1:]],
         covered=coverage_sentence(fit.trials),
         beside=outputs_view(fit, shown, MOST_FRAMES // len(shown)),
         walks=any(gait_events(trial.kinematics.trial) for trial in fit.trials),
@@ -141,9 +143,11 @@ def _cycle(fit: Fit, norms: Norms, curves: CurvesByStage | None) -> dict[str, An
     if not figures:
         return None
     clinical = figures.pop("clinical", None)
-    strides = [stride for trial in fit.trials for stride in trial.strides]
+    own = main_task(fit)
+    strides = [stride for trial in own.trials for stride in trial.strides]
     return {
-        "rows": stride_rows(fit),
+        "rows": stride_rows(own),
+        "trials": [trial.name for trial in own.trials],
         "most": MOST_STRIDES,
         "norms": bool(norms),
         "profile": profile_view(fit, norms),

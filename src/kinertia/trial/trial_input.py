@@ -10,6 +10,8 @@ Task = Literal["walk", "turn", "run", "landing", "squat", "other"]
 """What a person does in a trial; results of different tasks are not averaged."""
 GAIT: tuple[Task, ...] = ("walk", "turn", "run")
 """Tasks that consist of strides."""
+WITHOUT_STRIDES: tuple[Task, ...] = ("landing", "squat")
+"""Tasks in which no strides are looked for."""
 
 
 @dataclass(frozen=True)
@@ -20,6 +22,7 @@ class TrialInput:
         recording: as read.
         window_s: first and last time; None: as detected.
         read_seconds: time that reading it took.
+        task: what the person does; None: as found.
         use: "all", or "kinematics" to use its markers alone, for joint centres, joint axes and marker positions.
 
     Examples:
@@ -32,3 +35,4 @@ class TrialInput:
     window_s: tuple[float, float] | None = None
     read_seconds: float = 0.0
     use: TrialUse = "all"
+    task: Task | None = None

@@ -203,6 +203,7 @@ def person_context(person: Person) -> PersonContext:
             stated.height_m,
             stated.mass_kg,
             item.use == "kinematics",
+            stated_task=item.task,
         )
         for item in person.trials
     ]

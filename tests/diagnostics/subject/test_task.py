@@ -34,3 +34,7 @@ def test_one_step_on_a_plate_is_a_walk():
 
 def test_without_knowledge_of_the_feet_no_task_but_walking_is_assumed():
     assert task_of(RecordingContext(walk([("r", 1)]))) == "walk"
+
+
+def test_a_stated_task_counts():
+    assert task_of(context_of(walk([("r", 1)]), FEET, stated_task="turn")) == "turn"

@@ -36,6 +36,13 @@ def test_reads_everything(folder):
     }
 
 
+def test_the_task_of_a_trial(folder):
+    result = read(folder, changed('name = "second"', 'name = "second"\ntask = "turn"'))
+    assert [one.task for one in result.trials] == [None, "turn"]
+    with pytest.raises(FileError, match="task"):
+        read(folder, changed('name = "second"', 'task = "dance"'))
+
+
 def test_least_file_gets_defaults(folder):
     result = read(
         folder,

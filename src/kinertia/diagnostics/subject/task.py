@@ -21,6 +21,8 @@ def task_of(context: RecordingContext) -> Task:
     where the pelvis turns by more than 30 degrees, else a walk. Without strides it is a landing where both feet land
     after 0.1 s in the air, and a squat where both stay on the ground while the pelvis moves up and down by 0.15 m.
     """
+    if context.stated_task is not None:
+        return context.stated_task
     trial = context.trial
     ground = None if trial is None or trial.on_ground is None else trial.on_ground
     if context.has_strides:

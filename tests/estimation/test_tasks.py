@@ -1,0 +1,69 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kinertia.estimation.mean_cycles import mean_curves
+from kinertia.estimation.tasks import fits_by_task, main_task
+from kinertia.report.cycle_figures import cycle_figures
+from kinertia.report.page import render
+
+
+def of_task(trial, task, name=None):
+    k = trial.kinematics
+    return replace(trial, kinematics=replace(k, trial=replace(k.trial, name=name or trial.name, task=task)))
+
+
+@pytest.fixture
+def both(fit):
+    """A walk, and a turn with twice the angles."""
+    (walk,) = fit.trials
+    motion = replace(walk.motion, q=2.0 * walk.motion.q)
+    curves = replace(walk.joint_curves, motion=replace(walk.joint_curves.motion, q=2.0 * walk.joint_curves.motion.q))
+    turn = replace(of_task(walk, "turn", "turn"), motion=motion, joint_curves=curves)
+    posterior = replace(fit.posterior, marker_noise=fit.posterior.marker_noise * 2)
+    return replace(fit, trials=(turn, of_task(walk, "walk")), posterior=posterior)
+
+
+def test_walks_come_first(both):
+    tasks = fits_by_task(both)
+    assert {task: [trial.name for trial in own.trials] for task, own in tasks.items()} == {
+        "walk": ["walk"],
+        "turn": ["turn"],
+    }
+    assert list(tasks) == ["walk", "turn"]
+    assert [trial.name for trial in main_task(both).trials] == ["walk"]
+
+
+def test_results_of_earlier_versions_have_one_task(fit):
+    (walk,) = fit.trials
+    old = replace(fit, trials=(of_task(walk, ""),))
+    assert list(fits_by_task(old)) == [""]
+
+
+def test_a_landing_and_a_squat_have_no_strides(fit):
+    (walk,) = fit.trials
+    assert walk.strides
+    for task in ("landing", "squat"):
+        assert of_task(walk, task).strides == ()
+        alone = replace(fit, trials=(of_task(walk, task),))
+        assert fits_by_task(alone) == {}
+        assert main_task(alone) is alone
+        assert cycle_figures(alone) == {}
+
+
+def test_means_are_of_one_task(fit, both):
+    walks, alone = mean_curves(both), mean_curves(fit)
+    assert walks.keys() == alone.keys()
+    for name, curve in alone.items():
+        np.testing.assert_array_equal(walks[name], curve)
+
+
+def test_figures_and_report_show_each_task_by_itself(fit, both):
+    drawn, alone = cycle_figures(both), cycle_figures(fit)
+    assert [figure.alt for figure in drawn.values()] == [figure.alt for figure in alone.values()]
+    assert [len(figure.data) for figure in drawn.values()] == [len(figure.data) for figure in alone.values()]
+    page = render(both)
+    assert 'id="cycle-turn"' in page
+    assert page.count('href="#cycle-turn"') == 1
+    assert 'id="cycle-turn"' not in render(fit)
