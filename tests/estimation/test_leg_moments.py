@@ -37,8 +37,8 @@ def test_tasks_are_named_where_there_are_several(fit):
     (walk,) = fit.trials
     k = walk.kinematics
     turn = replace(walk, kinematics=replace(k, trial=replace(k.trial, name="turn", task="turn")))
-    assert coverage_sentence([walk, turn]).split(", ")[0] == "walk"
-    assert "; turn, right: whole st" in coverage_sentence([walk, turn])
+    assert coverage_sentence([walk, turn]).startswith("walk (right: whole st")
+    assert "); turn (right: whole st" in coverage_sentence([walk, turn])
 
 
 def test_without_strides_there_is_nothing(fit):

@@ -36,8 +36,8 @@ def coverage_by_task(trials: Sequence[Estimated]) -> Mapping[str, tuple[LegCover
 def coverage_sentence(trials: Sequence[Estimated]) -> str:
     """Describe what is known: "right: whole stride; left: 0 to 48 % of the stride, no push-off"; empty without strides.
 
-    With several tasks each part begins with its task.
+    With several tasks: "walk (right: ...; left: ...); turn (...)".
     """
     parts = coverage_by_task(trials)
     texts = {task: "; ".join(leg.sentence for leg in legs) for task, legs in parts.items()}
-    return "; ".join(f"{task}, {text}" if len(texts) > 1 and task else text for task, text in texts.items())
+    return "; ".join(f"{task} ({text})" if len(texts) > 1 and task else text for task, text in texts.items())
