@@ -6,6 +6,8 @@ import pytest
 from kinertia.estimation.cycles import CycleCurve
 from kinertia.estimation.moment_peaks import PEAKS, peak_columns
 from kinertia.motion.gait_cycle import PERCENT, Stride
+from kinertia.report.cycle_figures import drawn_curves
+from kinertia.report.cycle_table import peak_rows
 
 STRIDE = Stride("r", 1, 0.0, 1.0, 0.6, 0.1, 0.5, True)
 FIRST, SECOND, IMPULSE = (one.name for one in PEAKS[:3])
@@ -40,3 +42,15 @@ def test_both_peaks_of_the_external_moment_and_its_impulse():
 def test_the_largest_value_of_a_part_is_no_peak(first, last, missing):
     peaks = found(adduction((first <= PERCENT) & (last >= PERCENT)))
     assert {name for name, (value, _, _) in peaks.items() if np.isnan(value)} == missing
+
+
+def test_peaks_of_a_fit(fit, two_level):
+    first = fit.peaks[fit.peaks.peak == FIRST]
+    known = first[first.value.notna()]
+    assert set(known.side) == {"r"}, "no heel strike follows the left stance on a plate"
+    assert (known.value.between(0.0, 1.0) & (known.sd > 0.0)).all()
+    assert two_level.peaks.empty
+    rows = {row.measure: row for row in peak_rows(drawn_curves(fit)["estimate"])}
+    right = known[known.side == "r"]
+    assert rows[f"{FIRST} (N m/kg)"].right.split(" ± ")[0] == f"{right.value.mean():.2f}"
+    assert len(rows) == len(PEAKS)

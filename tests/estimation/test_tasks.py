@@ -67,3 +67,8 @@ def test_figures_and_report_show_each_task_by_itself(fit, both):
     assert 'id="cycle-turn"' in page
     assert page.count('href="#cycle-turn"') == 1
     assert 'id="cycle-turn"' not in render(fit)
+
+
+def test_the_report_has_a_table_of_peaks_per_task(fit, both):
+    assert render(fit).count("knee adduction impulse, external (N m s/kg)") == 1
+    assert render(both).count("knee adduction impulse, external (N m s/kg)") == 2

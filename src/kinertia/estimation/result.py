@@ -13,12 +13,13 @@ import numpy as np
 
 from kinertia.estimation.asymmetry import asymmetries, asymmetry_columns
 from kinertia.estimation.curve_source import Stage
-from kinertia.estimation.cycles import Kind, cycle_columns, spatiotemporal_columns
+from kinertia.estimation.cycles import Kind, curves_by_stage, cycle_columns, spatiotemporal_columns
 from kinertia.estimation.figure_names import FitPictures
 from kinertia.estimation.gait_scores import GaitProfile, with_norms
 from kinertia.estimation.identifiability import evidence
 from kinertia.estimation.input_checks import known
 from kinertia.estimation.joint_curves import JointCurves
+from kinertia.estimation.moment_peaks import peak_columns
 from kinertia.estimation.simultaneous.calibration_entry import calibration_columns
 from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
 from kinertia.estimation.simultaneous.fit import Posterior
@@ -244,6 +245,23 @@ class Fit:
 
         columns = cycle_columns(self.trials, self.mass_kg, stage)
         return pd.DataFrame(columns if norms is None else with_norms(columns, read_norms(norms), self.skeleton))
+
+    @cached_property
+    def peaks(self) -> pd.DataFrame:
+        """Peaks and impulses of joint moments and powers, one row per trial, side, stride and peak.
+
+        Columns: trial, side, stride, peak, unit, value, sd, percent (of the stride). Values are positive in the
+        direction that `peak` states, NaN unless the whole phase is known. Empty without strides, and after two-level.
+
+        Examples:
+            >>> first = fit.peaks[fit.peaks.peak == "knee adduction moment, external, first peak"]
+            >>> list(first.unit.unique()), list(first.columns)[-3:]
+            (['N m/kg'], ['value', 'sd', 'percent'])
+        """
+        import pandas as pd
+
+        trials = [trial for trial in self.trials if trial.joint_curves is not None]
+        return pd.DataFrame(peak_columns(curves_by_stage(trials, self.mass_kg, None, ("estimate",))["estimate"]))
 
     @property
     def spatiotemporal(self) -> pd.DataFrame:

@@ -1,11 +1,14 @@
-"""Tabulates strides: mean and standard deviation of the spatiotemporal measures, per side."""
+"""Tabulates strides: spatiotemporal measures, and peaks of joint moments, per side."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from kinertia.estimation.cycles import spatiotemporal_columns
+from kinertia.estimation.cycles import CycleCurve, spatiotemporal_columns
+from kinertia.estimation.moment_peaks import peak_columns
 from kinertia.estimation.result import Fit
+from kinertia.report.wording import INTERVAL_SD
 from kinertia.trial.data import FEET
 
 _ROWS = (
@@ -40,6 +43,29 @@ def stride_rows(fit: Fit) -> list[MeasureRow]:
         for name, title, digits in _ROWS
     ]
     return [MeasureRow("strides", *(str(int((sides == side).sum())) for side in FEET)), *rows]
+
+
+def peak_rows(curves: Sequence[CycleCurve]) -> list[MeasureRow]:
+    """Return the table's rows of peaks and impulses: mean over the strides that contain them ± its 95 % interval.
+
+    The errors of the strides of a trial are mostly equal, so that their mean is taken to be as uncertain as each.
+    """
+    columns = peak_columns(curves)
+    values, sds = (np.array(columns[name], dtype=float) for name in ("value", "sd"))
+    rows = []
+    for peak, unit in dict.fromkeys(zip(columns["peak"], columns["unit"], strict=True)):
+        own = np.array(columns["peak"]) == peak
+        sides = [own & (np.array(columns["side"]) == side) for side in FEET]
+        rows.append(MeasureRow(f"{peak} ({unit})", *(_with_interval(values[some], sds[some]) for some in sides)))
+    return rows
+
+
+def _with_interval(values: np.ndarray, sd: np.ndarray) -> str:
+    known = np.isfinite(values)
+    if not known.any():
+        return "–"
+    bar = INTERVAL_SD * float(np.sqrt(np.mean(np.square(sd[known]))))
+    return f"{values[known].mean():.2f}" + (f" ± {bar:.2f}" if np.isfinite(bar) else "")
 
 
 def _mean_and_sd(values: np.ndarray, digits: int) -> str:

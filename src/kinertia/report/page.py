@@ -30,8 +30,8 @@ from kinertia.report.bsp_figures import (
     information_figure,
     segment_name,
 )
-from kinertia.report.cycle_figures import MOST_STRIDES, CurvesByStage, Norms, cycle_figures, has_spread
-from kinertia.report.cycle_table import stride_rows
+from kinertia.report.cycle_figures import MOST_STRIDES, CurvesByStage, Norms, cycle_figures, drawn_curves, has_spread
+from kinertia.report.cycle_table import peak_rows, stride_rows
 from kinertia.report.figure import Figure, written
 from kinertia.report.file_outputs import outputs_view
 from kinertia.report.finding_view import FindingView
@@ -144,9 +144,12 @@ def _cycle(fit: Fit, norms: Norms, curves: CurvesByStage | None) -> dict[str, An
         return None
     clinical = figures.pop("clinical", None)
     own = main_task(fit)
+    names = {trial.name for trial in own.trials if trial.joint_curves is not None}
+    estimate = (curves or drawn_curves(own))["estimate"]
     strides = [stride for trial in own.trials for stride in trial.strides]
     return {
         "rows": stride_rows(own),
+        "peaks": peak_rows([one for one in estimate if one.trial in names]),
         "trials": [trial.name for trial in own.trials],
         "most": MOST_STRIDES,
         "norms": bool(norms),
