@@ -224,6 +224,24 @@ def test_an_unfinished_run_says_so_and_keeps_the_best_iterate(trial, prior, cali
     assert result.cost[1] < result.cost[0]
 
 
+def test_what_lies_between_two_optima_is_no_estimate(trial, prior, calibration, exact, monkeypatch):
+    """With other knots all masses are three times as large; half of the way there nothing fits. The distance is in the
+    deviations.
+    """
+
+    def elsewhere(problem, point, adapted):
+        static = point.static.copy()
+        static[problem.layout["bsp"]][::10] += np.log(3.0)
+        return replace(point, static=static)
+
+    monkeypatch.setattr(simultaneous, "_continued", elsewhere)
+    result = estimate_simultaneous(trial.skeleton, prior, calibration, [observation(trial)])
+    sd_kg = np.sqrt(np.diag(exact.bsp_covariance))[::10]
+    assert np.abs((result.bsp.mass_kg - exact.bsp.mass_kg) / sd_kg).max() < 0.5
+    assert np.abs(result.motions[0].q - exact.motions[0].q).max() < 0.01
+    assert result.bsp_covariance[0, 0] > exact.bsp_covariance[0, 0]
+
+
 def test_deviations_of_every_size_have_a_covariance(trial, prior, calibration):
     """Products of inertia known to 1e-7 kg m2 beside masses known to 1 kg: data only ever lower a deviation."""
     sd = prior.sd.copy()

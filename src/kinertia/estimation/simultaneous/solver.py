@@ -85,6 +85,9 @@ _CONTINUED = 0.01
 averaged."""
 _MOST_CONTINUED = 3
 """Largest number of quadratics from an optimum to that with other knots; one is usual."""
+_AVERAGED = 20.0
+"""What the average over knot positions may add to the cost, in half the square of standard deviations: usual are 0.1 to
+2. Where it adds more, there are several optima, and what lies between them is none."""
 _USUAL_ITERATIONS = 5
 _LEFT_ITERATIONS = 2
 """Numbers used for progress: usual iterations, and further ones that always follow."""
@@ -116,12 +119,16 @@ def estimate_simultaneous(
         lambda: OfPhases.of(problem, ended.point, partial(_continued, adapted=known)),
         lambda: CostProfile.of(model, ended.instruments, ended.point, partial(_held, problem)),
     )
-    model = GaussNewton.of(problem, profile.here).under(profile.instruments)
+    there = ended._replace(here=profile.here, instruments=profile.instruments)
+    model = GaussNewton.of(problem, there.here).under(there.instruments)
     moved, more = _left_out(problem, model, ended.point.static)
     static = ended.point.static
     corrected = static + problem.shortened_static(phases.static + profile.static - 2.0 * static + moved)
     point = followed(model, ended.point, corrected)
-    ended = ended._replace(here=profile.here, instruments=profile.instruments, point=point)
+    if problem.slope(point).under(ended.instruments)[0] < ended.cost[1] + _AVERAGED:
+        ended = there._replace(point=point)
+    else:
+        point, model = ended.point, GaussNewton.of(problem, ended.here).under(ended.instruments)
     roots = _roots_in_trials(problem, ended, model)
     modes = [of_knots(phases), *of_root(model, point, more)]
     motions, (covariance, curves, draws) = both(
