@@ -14,6 +14,7 @@ from kinertia.estimation.simultaneous.fit import Posterior
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation
 from kinertia.estimation.simultaneous.marker_noise import MarkerNoise
 from kinertia.estimation.simultaneous.mass_asymmetry import OneSided
+from kinertia.estimation.simultaneous.missing_load_evidence import MissingLoad
 from kinertia.estimation.simultaneous.model_evidence import FreeMomentSign
 from kinertia.estimation.simultaneous.posterior_draws import PosteriorDraws, TrialDraws
 from kinertia.estimation.simultaneous.prior_plausibility import Unlikeness
@@ -63,7 +64,7 @@ class SavedFit:
 _KINDS = (
     SavedFit, Provenance, Truth, Fit, TrialFit, JointCurves, JointMoments, CurveDeviations, Subject, Settings,
     Posterior, InstrumentInformation, MarkerNoise, BaseParameters, Combination, Unlikeness, OneSided,
-    CalibrationEntry, FreeMomentSign, PosteriorDraws, TrialDraws,
+    CalibrationEntry, FreeMomentSign, MissingLoad, PosteriorDraws, TrialDraws,
     Skeleton, Joint, Axis, Marker, Range, PiecewisePolynomial, Composed, BodySegmentParameters,
     OsimModel, OsimJoint, OsimCoordinate, Coupling,
     Finding, Where, Quantity, Overrule,

@@ -34,6 +34,7 @@ from kinertia.trial.data import Recording
 from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow.attached import with_attached
 from kinertia.workflow.doubted_mass import at_mass_of_plates
+from kinertia.workflow.missing_loads import without_gains_of_missing_loads
 from kinertia.workflow.prepare import prepare
 
 
@@ -163,6 +164,11 @@ def _simultaneous(ready: Prepared, settings: Settings, started: float, progress:
         )
 
     signed = with_likelier_sign(ready, fit)
+    incomplete = without_gains_of_missing_loads(signed.ready, signed.fitted)
+    if incomplete is not None:
+        again, first = fit(incomplete, ()), signed.fitted.posterior
+        kept = {"missing_loads": first.missing_loads, "free_moment_sign": first.free_moment_sign}
+        signed = Signed(replace(again, posterior=replace(again.posterior, **kept)), incomplete)
     reweighed = at_mass_of_plates(signed.ready, signed.fitted)
     if reweighed is not None:
         signed = Signed(fit(reweighed, ()), reweighed)

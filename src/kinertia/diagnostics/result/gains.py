@@ -1,4 +1,4 @@
-"""P22, are the plates' gains right? Reports what the estimate found relative to the stated mass.
+"""P22, are the plates' gains right, and P28, is all of the load on them? Reports what the estimate found.
 
 The estimate determines gains only from the stated mass: plates that read a tenth more may read too much, or carry a
 tenth more. Two plates have two amplifiers and two calibrations, but a person has one mass, so an error common to both
@@ -12,7 +12,8 @@ import numpy as np
 from kinertia.diagnostics.result.context import ResultContext
 from kinertia.diagnostics.result.corrections import corrected, equal
 from kinertia.estimation.simultaneous.calibration_entry import GAIN, CalibrationEntry
-from kinertia.findings.finding import Finding, with_evidence
+from kinertia.estimation.simultaneous.missing_load_evidence import SURE
+from kinertia.findings.finding import Finding, finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 
@@ -34,6 +35,17 @@ def gains(context: ResultContext) -> Iterator[Finding]:
         own = [one for one in errors if one.trial == trial]
         if equal(own, usual):
             yield _of_all(context, own)
+
+
+def missing_loads(context: ResultContext) -> Iterator[Finding]:
+    """Report P288: plates of whose loads a part is missing, which is no error of their gain."""
+    posterior = context.fit.posterior
+    for one in () if posterior is None else posterior.missing_loads:
+        missing = Quantity(one.missing, "1", sd=one.sd)
+        log_odds = Quantity(one.log_odds, "1", limit=SURE)
+        yield finding(
+            "P288", Where(trial=one.trial, plate=one.plate, span_s=one.span_s), missing=missing, log_odds=log_odds
+        )
 
 
 def _of_all(context: ResultContext, gains: Sequence[CalibrationEntry]) -> Finding:

@@ -5,7 +5,7 @@ from kinertia.diagnostics.result.common_offset import common_offset
 from kinertia.diagnostics.result.context import ResultContext
 from kinertia.diagnostics.result.corrections import delays, zero_offsets
 from kinertia.diagnostics.result.free_moments import free_moments
-from kinertia.diagnostics.result.gains import gains
+from kinertia.diagnostics.result.gains import gains, missing_loads
 from kinertia.diagnostics.result.joint_angles import joint_angles
 from kinertia.diagnostics.result.marker_errors import corrected_joints, moved_markers
 from kinertia.diagnostics.result.masses import attached_items, forces_of_the_motion, total_mass
@@ -22,6 +22,7 @@ ESTIMATE_QUESTIONS: tuple[Question[ResultContext], ...] = (
     Question("R20", soundness),
     Question("P21", zero_offsets),
     Question("P22", gains),
+    Question("P28", missing_loads),
     Question("P23", plate_rotation),
     Question("P24", plate_positions),
     Question("P24", common_offset),

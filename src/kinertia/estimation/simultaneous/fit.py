@@ -15,6 +15,7 @@ from kinertia.estimation.simultaneous.impacts import down_weighted
 from kinertia.estimation.simultaneous.instrument_errors import OTHER_SIGN
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation
 from kinertia.estimation.simultaneous.marker_noise import MarkerNoise
+from kinertia.estimation.simultaneous.missing_load_evidence import MissingLoad
 from kinertia.estimation.simultaneous.model_evidence import FreeMomentSign
 from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINTY, ModelUncertainty
 from kinertia.estimation.simultaneous.observation import Observations, observe, reading
@@ -57,6 +58,7 @@ class Posterior:
             markers that other trials have.
         down_weighted: per trial, the share of its measured frames that have less weight because of impact transients.
         draws: of motion, parameters and calibration together; None in older files.
+        missing_loads: loads of which a part is missing; gains of these plates stay nominal.
 
     Examples:
         >>> fit.posterior.sd.shape, bool((fit.posterior.sd <= fit.posterior.prior_sd * 1.0001).all())
@@ -77,6 +79,7 @@ class Posterior:
     marker_distances_m: tuple[Mapping[str, float], ...] = field(default=())
     down_weighted: tuple[float, ...] = ()
     draws: PosteriorDraws | None = None
+    missing_loads: tuple[MissingLoad, ...] = ()
 
     @property
     def instrument_errors(self) -> tuple[CalibrationEntry, ...]:
@@ -213,6 +216,7 @@ def _posterior(
         marker_distances_m=_marker_distances(result, trials),
         down_weighted=tuple(map(down_weighted, reduced)),
         draws=result.draws.without_places() if uncertainty.marker_sd_m is None else result.draws,
+        missing_loads=result.missing_loads,
     )
 
 

@@ -34,6 +34,7 @@ class InstrumentErrors(LoadTerm):
         count = sum(bool(trial.ground.plates) for trial in trials)
         delay_unknowns = count > 1 or known.session or known.delay_s.fault_probability > 0.0
         plates = sum(len(trial.ground.plates) for trial in trials)
+        gains = tuple(known.trial_gain_of(name) for trial in trials for name in trial.ground.plates)
 
         def of_trials(prior: FaultMixture, count: int) -> ErrorPriors:
             return ErrorPriors((prior,) * count)
@@ -45,7 +46,7 @@ class InstrumentErrors(LoadTerm):
             Unknowns.errors(CLOCK, "s", ErrorPriors(shared.own[-1:]), of_laboratory=True),
             Unknowns.errors(TRIAL_DELAYS, "s", of_trials(known.trial_delay_s, count if delay_unknowns else 0)),
             Unknowns.errors(ZEROS, "N", of_trials(known.zero_offset_n, len(ZERO_UNKNOWNS) * plates)),
-            Unknowns.errors(GAINS, "1", of_trials(known.trial_gain, plates)),
+            Unknowns.errors(GAINS, "1", ErrorPriors(gains)),
         )
 
     def __init__(self, model: FreedModel) -> None:

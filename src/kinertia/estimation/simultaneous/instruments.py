@@ -146,6 +146,7 @@ class InstrumentPrior:
         zero_offset_n: prior of the zero offsets of each plate's horizontal forces in each trial.
         trial_gain: prior of each plate's additional gain error in each trial.
         session: information from other people measured with the same instruments.
+        incomplete: plates of whose loads a part is missing: these trials do not show their gains, which stay nominal.
 
     >>> stated = InstrumentPrior.stated(Instruments(plate_sd_mm=1.0))
     >>> stated.plate["x"].sd, stated.delay_s == InstrumentPrior().delay_s
@@ -159,6 +160,7 @@ class InstrumentPrior:
     zero_offset_n: FaultMixture = ZERO_PRIOR_N
     trial_gain: FaultMixture = TRIAL_GAIN_PRIOR
     session: tuple[InstrumentInformation, ...] = ()
+    incomplete: frozenset[str] = frozenset()
 
     @classmethod
     def stated(cls, instruments: Instruments, session: Sequence[InstrumentInformation] = ()) -> InstrumentPrior:
@@ -191,7 +193,7 @@ class InstrumentPrior:
         same one: the common part of their faults has a prior, too.
         """
         names = list(PLATE_UNKNOWNS)
-        own = [self.plate[name] for _ in plates for name in names]
+        own = [self._nominal(self.plate[name], plate, name) for plate in plates for name in names]
         common = [
             (FaultMixture(_HARDLY * prior.nominal_sd, prior.faulty_sd, prior.fault_probability), tuple(places))
             for column in columns_of_several_trials(plates)
@@ -200,6 +202,14 @@ class InstrumentPrior:
         ]
         floor = [self.floor[name] for name in FLOOR_UNKNOWNS]
         return ErrorPriors((*own, *floor, self.delay_s), tuple(common))
+
+    def trial_gain_of(self, plate: str) -> FaultMixture:
+        """Return the prior of a plate's additional gain error in each trial."""
+        return self._nominal(self.trial_gain, plate, "gain")
+
+    def _nominal(self, prior: FaultMixture, plate: str, name: str) -> FaultMixture:
+        """Return the prior of an error of a plate, without a fault if incomplete loads would seem to be one."""
+        return FaultMixture.certain(prior.nominal_sd) if name == "gain" and plate in self.incomplete else prior
 
     def of_session(self, plates: Sequence[str]) -> InstrumentInformation:
         """Return the information of the session's other people on these plates, combined."""

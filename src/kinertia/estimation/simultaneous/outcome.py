@@ -12,6 +12,7 @@ from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
 from kinertia.estimation.simultaneous.instrument_support import InstrumentSupport
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation
 from kinertia.estimation.simultaneous.linearised import Linearised, Point
+from kinertia.estimation.simultaneous.missing_load_evidence import MissingLoad
 from kinertia.estimation.simultaneous.mixture_prior import GaussianPrior
 from kinertia.estimation.simultaneous.model_evidence import Evidence
 from kinertia.estimation.simultaneous.posterior_draws import PosteriorDraws
@@ -44,6 +45,7 @@ class SimultaneousResult:
         support: whether each instrument error is credible.
         evidence: of the trials, and of the same trials interpreted differently.
         draws: from the posterior.
+        missing_loads: loads of which a part is missing, which seem to be errors of plates.
     """
 
     bsp: BodySegmentParameters
@@ -63,6 +65,7 @@ class SimultaneousResult:
     support: InstrumentSupport
     evidence: Evidence
     draws: PosteriorDraws
+    missing_loads: tuple[MissingLoad, ...] = ()
 
     def of_first(self, count: int) -> Self:
         """Return the result with the first `count` trials only."""

@@ -31,6 +31,7 @@ from kinertia.estimation.simultaneous.instrument_support import instrument_suppo
 from kinertia.estimation.simultaneous.knot_phases import OfPhases, followed
 from kinertia.estimation.simultaneous.linearised import Linearised, Point, Slope
 from kinertia.estimation.simultaneous.marker_offsets import as_displaced
+from kinertia.estimation.simultaneous.missing_load_evidence import missing_loads, suspected_plates
 from kinertia.estimation.simultaneous.mixture_prior import GaussianPrior
 from kinertia.estimation.simultaneous.model_evidence import Evidence
 from kinertia.estimation.simultaneous.motion_noise import motion_noise
@@ -137,7 +138,8 @@ def estimate_simultaneous(
     )
     covariance += phases.covariance + more @ more.T
     support = instrument_support(model, ended.point, ended.instruments, curves)
-    return result_of(problem, ended, motions, covariance, curves, support, evidence, draws)
+    result = result_of(problem, ended, motions, covariance, curves, support, evidence, draws)
+    return replace(result, missing_loads=missing_loads(problem, ended.point, suspected_plates(result.calibration)))
 
 
 def _optimum(problem: MapProblem, progress: Callable[[float], None]) -> tuple[Ended, GaussNewton]:

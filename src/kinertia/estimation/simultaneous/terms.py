@@ -5,6 +5,7 @@ from kinertia.estimation.simultaneous.cost_term import CostTerm
 from kinertia.estimation.simultaneous.instrument_term import InstrumentErrors
 from kinertia.estimation.simultaneous.marker_positions import MarkerPlaces
 from kinertia.estimation.simultaneous.marker_terms import Markers
+from kinertia.estimation.simultaneous.missing_loads import MissingLoads
 from kinertia.estimation.simultaneous.range_terms import JointRanges
 from kinertia.estimation.simultaneous.root_loads import RootLoads
 from kinertia.estimation.simultaneous.skin_term import Skin
@@ -16,6 +17,7 @@ from kinertia.estimation.simultaneous.trunk_bending import TrunkBending
 TERMS: tuple[type[CostTerm], ...] = (
     StaticCoordinates,
     InstrumentErrors,
+    MissingLoads,
     TrunkBending,
     MarkerPlaces,
     Skin,

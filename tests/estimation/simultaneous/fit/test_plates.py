@@ -9,6 +9,7 @@ from kinertia.estimation.simultaneous.instruments import DELAY_PRIOR_S, FLOOR_PR
 from kinertia.estimation.simultaneous.model_uncertainty import JOINT_CENTRE_SD_M
 from kinertia.synthetic.walk import walking_subject
 from kinertia.trial.centre_of_pressure import centre_of_pressure
+from kinertia.trial.sampled_time import runs
 from results import entry_of, of_estimate
 from short_walk_fit import estimated, fitted, seen
 
@@ -39,6 +40,11 @@ def test_a_displaced_plate_is_named(trial):
     assert found.evidence["offset_m"].value > 0.0
 
 
+def longest_load(vertical):
+    """First and last frame of the longest contact."""
+    return max(runs(vertical > 20.0), key=lambda span: span[1] - span[0])
+
+
 def test_a_wrong_gain_is_named(trial, plain):
     def weaken(positions, loads):
         loads[:, 0] *= 0.9
@@ -51,6 +57,7 @@ def test_a_wrong_gain_is_named(trial, plain):
     entry = entry_of(outcome, "gain", **where)
     assert entry.value == found.evidence["gain_error"].value == pytest.approx(-0.1, abs=3.0 * entry.sd)
     assert entry.sd < 0.012
+    assert outcome.posterior.missing_loads == ()
 
     assert held_against(outcome, outcome).posterior.calibration == outcome.posterior.calibration
     alone = held_against(outcome, plain)
@@ -59,6 +66,18 @@ def test_a_wrong_gain_is_named(trial, plain):
     assert entry_of(alone, "gain", **where).contradicted_by
     assert not entry.contradicted_by
     assert outcome.result.bsp.total_mass_kg == pytest.approx(walking_subject().literature.total_mass_kg, rel=0.02)
+
+
+def test_a_load_that_is_missing_late_in_stance_is_not_a_gain(trial):
+    """As under a forefoot beyond the plate's edge: up to half of the load, from half of the stance on."""
+
+    def beyond_edge(positions, loads):
+        first, last = longest_load(loads[:, 0, 1])
+        loads[first : last + 1, 0] *= 1.0 - np.clip(np.linspace(-1.0, 1.0, last + 1 - first), 0.0, 0.5)[:, None]
+
+    (found,) = [one for one in of_estimate(fitted(trial, disturb=beyond_edge)) if one.code == "P288"]
+    assert (found.where.plate, found.where.trial) == ("right foot", "walk")
+    assert found.evidence["missing"].value > 0.1
 
 
 @pytest.mark.parametrize("axis", [0, 2])
