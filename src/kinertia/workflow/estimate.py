@@ -167,8 +167,8 @@ def _simultaneous(ready: Prepared, settings: Settings, started: float, progress:
     incomplete = without_gains_of_missing_loads(signed.ready, signed.fitted)
     if incomplete is not None:
         again, first = fit(incomplete, ()), signed.fitted.posterior
-        kept = {"missing_loads": first.missing_loads, "free_moment_sign": first.free_moment_sign}
-        signed = Signed(replace(again, posterior=replace(again.posterior, **kept)), incomplete)
+        posterior = replace(again.posterior, missing_loads=first.missing_loads, free_moment_sign=first.free_moment_sign)
+        signed = Signed(replace(again, posterior=posterior), incomplete)
     reweighed = at_mass_of_plates(signed.ready, signed.fitted)
     if reweighed is not None:
         signed = Signed(fit(reweighed, ()), reweighed)

@@ -86,9 +86,10 @@ _CONTINUED = 0.01
 averaged."""
 _MOST_CONTINUED = 3
 """Largest number of quadratics from an optimum to that with other knots; one is usual."""
-_AVERAGED = 20.0
-"""What the average over knot positions may add to the cost, in half the square of standard deviations: usual are 0.1 to
-2. Where it adds more, there are several optima, and what lies between them is none."""
+_AVERAGED, _AVERAGED_SHARE = 20.0, 0.01
+"""What the average over knot positions may add to the cost, in half the square of standard deviations, or as a share of
+what the search has taken off: usual are 0.1 to 5, and in drop jumps 33, a thousandth. Where it adds more, there are
+several optima, and what lies between them is none: on stairs with an unmeasured step it undid all of the search."""
 _USUAL_ITERATIONS = 5
 _LEFT_ITERATIONS = 2
 """Numbers used for progress: usual iterations, and further ones that always follow."""
@@ -126,7 +127,9 @@ def estimate_simultaneous(
     static = ended.point.static
     corrected = static + problem.shortened_static(phases.static + profile.static - 2.0 * static + moved)
     point = followed(model, ended.point, corrected)
-    if problem.slope(point).under(ended.instruments)[0] < ended.cost[1] + _AVERAGED:
+    begin, end = ended.cost
+    more_cost = max(_AVERAGED, _AVERAGED_SHARE * (begin - end))
+    if problem.slope(point).under(ended.instruments)[0] < end + more_cost:
         ended = there._replace(point=point)
     else:
         point, model = ended.point, GaussNewton.of(problem, ended.here).under(ended.instruments)
