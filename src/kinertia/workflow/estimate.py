@@ -164,14 +164,14 @@ def _simultaneous(ready: Prepared, settings: Settings, started: float, progress:
         )
 
     signed = with_likelier_sign(ready, fit)
+    reweighed = at_mass_of_plates(signed.ready, signed.fitted)
+    if reweighed is not None:
+        signed = Signed(fit(reweighed, ()), reweighed)
     incomplete = without_gains_of_missing_loads(signed.ready, signed.fitted)
     if incomplete is not None:
         again, first = fit(incomplete, ()), signed.fitted.posterior
         posterior = replace(again.posterior, missing_loads=first.missing_loads, free_moment_sign=first.free_moment_sign)
         signed = Signed(replace(again, posterior=posterior), incomplete)
-    reweighed = at_mass_of_plates(signed.ready, signed.fitted)
-    if reweighed is not None:
-        signed = Signed(fit(reweighed, ()), reweighed)
     fitted, ready = signed.fitted, signed.ready
     result = fitted.result
     parts = (
