@@ -54,6 +54,9 @@ def _report_trial(trial: dict[str, Any], before: str) -> None:
         f"{trial['n_frames']} frames; RMS distance of the markers {markers['ik']} (inverse kinematics), "
         f"{markers['final']} (estimate)"
     )
+    if trial["residual_force_rms_N"]["estimate"] is None:
+        out.print(" no residual at the pelvis: all ground contact is never measured together")
+        return
     hz = {**dict.fromkeys(_STAGES, trial["cutoff_hz"]), "estimate": trial["motion_hz"]}
     title = "residual at the pelvis, RMS (max),\nforces at the motion's bandwidth"
     names = {stage: before if stage == "literature" else stage for stage in _STAGES}

@@ -106,6 +106,8 @@ def base_parameters(
     singular = np.linalg.svd(anything, compute_uv=False)
     rounding = _ROUNDING * float(singular[0])
     count = int((singular > rounding).sum())
+    if not any(len(motion.q) for motion in motions):
+        return BaseParameters(count, 0, float("inf"), (), _never(skeleton, bsp.segments, anything, count, rounding))
     every = -(-sum(len(motion.q) for motion in motions) // _ENOUGH_FRAMES)
     parts = [
         np.linalg.qr(_scaled_regressor(skeleton, bsp, motion.cut(chosen[some]), sd / np.sqrt(every)) @ scale, mode="r")

@@ -59,9 +59,15 @@ def common_cutoff(time: np.ndarray, pelvis: np.ndarray, trial: Trial) -> Cutoff:
     )
 
 
+def _loaded_s(trial: Trial) -> tuple[float, float]:
+    """Return the first and last time (s) of any load."""
+    time = trial.loads.time[(trial.loads.force[:, :, 1] > 0.0).any(axis=1)]
+    return float(time[0]), float(time[-1])
+
+
 def _motion_ends_hz(trial: Trial) -> float:
     """Return the lowest of ENDS_HZ that leaves little of the ground reactions in the longest measured window."""
-    loads, (start, end) = trial.loads, trial.windows()[0]
+    loads, (start, end) = trial.loads, (trial.windows() or [_loaded_s(trial)])[0]
     inside = within(loads.time, start, end)
     time, force = loads.time[inside], loads.force[inside].sum(axis=1)
     if len(time) < _FEWEST:

@@ -55,6 +55,8 @@ class Kinematics:
         cutoff_hz: of the coordinates and the ground reactions.
         windows_s: first and last time of every window in which all ground contact is measured and all coordinates are
             known, with accelerations; in order.
+        complete: whether all ground contact is measured in `windows_s`; if not, these are the stances of a leg that is
+            on a plate, there are no residuals, and only what `known` says is known.
         known: (n, c) marker frames in which the generalised force of each coordinate can be known (`known_forces`);
             None in older files: as `windows_s`.
         notes: assumptions made so far.
@@ -70,6 +72,7 @@ class Kinematics:
     notes: tuple[str, ...]
     findings: tuple[Finding, ...] = ()
     known: np.ndarray | None = None
+    complete: bool = True
 
     @property
     def window_s(self) -> tuple[float, float]:
@@ -94,7 +97,7 @@ class Kinematics:
     @cached_property
     def known_frames(self) -> np.ndarray:
         """Mask (n,) of the marker frames in which the generalised force of any coordinate is known."""
-        inside = self.inside(self.trial.markers.time)
+        inside = self.inside(self.trial.markers.time) & self.complete
         result: np.ndarray = inside if self.known is None else inside | self.known.any(axis=1)
         return result
 
@@ -112,7 +115,7 @@ class Kinematics:
     @property
     def course_known(self) -> np.ndarray:
         """Mask (f, c) of `course_frames` in which the generalised force of each coordinate is known."""
-        inside = self.inside(self.course_time)[:, None]
+        inside = self.inside(self.course_time)[:, None] & self.complete
         if self.known is None:
             return np.repeat(inside, len(self.ik.coordinates), axis=1)
         result: np.ndarray = self.known[self.course_frames] | inside
@@ -213,14 +216,40 @@ def solve_kinematics(
         > np.ptp(ik.time[shown]) / 2 - END_PERIODS / cutoff.hz + TIME_TOLERANCE_S
     ] = False
     whole = np.logical_and.reduce(seen, axis=1)
-    windows, findings = _long_enough(trial, whole & trial.measured, whole)
+    known, usable = known_forces(skeleton, trial, seen), whole & trial.measured
+    complete = _longest(usable) >= FEWEST_FRAMES or not _longest(legs_on_plates(trial)) >= FEWEST_FRAMES
+    if not complete:
+        usable = legs_on_plates(trial) & _of_a_leg(skeleton, known)
+    windows, findings = _long_enough(trial, usable, whole)
     stuck = int((~ik.converged[solved]).sum())
     if stuck:
         findings.append(finding("R105", Where(trial=trial.name), frames=Quantity(stuck, "1")))
     remarks = [f"{trial.name}: {cutoff.sentence}"] if cutoff.sentence else []
     notes = (*trial.notes, *remarks)
-    known = known_forces(skeleton, trial, seen)
-    return Kinematics(trial, turned_deg, ik, spline, cutoff.hz, windows, notes, tuple(findings), known)
+    return Kinematics(trial, turned_deg, ik, spline, cutoff.hz, windows, notes, tuple(findings), known, complete)
+
+
+def _of_a_leg(skeleton: Skeleton, known: np.ndarray) -> np.ndarray:
+    """Return the mask (n,) of frames in which all forces (n, c) of either leg are known."""
+    result = np.zeros(len(known), dtype=bool)
+    for foot in skeleton.feet:
+        owners = np.unique(skeleton.map.owner[skeleton.support[skeleton.segments.index(foot)]])
+        result |= np.logical_and.reduce(known[:, owners[owners >= len(skeleton.joints[0].axes)]], axis=1)
+    return result
+
+
+def legs_on_plates(trial: Trial) -> np.ndarray:
+    """Return the mask (n,) of marker frames in which a leg stands on a plate that measures all its load."""
+    if trial.leg_known is None:
+        return np.zeros(len(trial.markers.time), dtype=bool)
+    nearest = nearest_samples(trial.loads.time, trial.markers.time)
+    loaded = trial.loads.force[nearest, :, 1] >= LOAD_THRESHOLD_N
+    result: np.ndarray = np.logical_or.reduce(trial.leg_known & loaded, axis=1)
+    return result
+
+
+def _longest(mask: np.ndarray) -> int:
+    return max((last - first + 1 for first, last in runs(mask)), default=0)
 
 
 def known_forces(skeleton: Skeleton, trial: Trial, seen: np.ndarray) -> np.ndarray:

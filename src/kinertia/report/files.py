@@ -279,7 +279,7 @@ def _trial_summary(fit: Fit, trial: TrialFit) -> dict[str, Any]:
         "motion_hz": trial.motion_hz,
         "force_cutoff_hz": trial.reactions.cutoff_hz,
         "impact_force_rms_N": trial.reactions.impact_n,
-        "mass_from_force_kg": mass_from_force_kg(fit.literature, trial),
+        "mass_from_force_kg": mass_from_force_kg(fit.literature, trial) if trial.kinematics.complete else None,
         "seconds": {stage: round(value, 4) for stage, value in trial.seconds.items()},
         "marker_rms_m": {stage: rms(values) for stage, values in trial.marker_errors_m.items()},
         "marker_displacements_m": _displacements(fit, trial),
@@ -300,8 +300,9 @@ def _displacements(fit: Fit, trial: TrialFit) -> dict[str, list[float]]:
     return {label: row.tolist() for label, row in zip(fit.skeleton.labels, moved, strict=True) if row.any()}
 
 
-def _each(vectors: Mapping[str, np.ndarray], statistic: Any) -> dict[str, float]:
-    return {stage: statistic(values) for stage, values in vectors.items()}
+def _each(vectors: Mapping[str, np.ndarray], statistic: Any) -> dict[str, float | None]:
+    """Return a statistic of every stage; None where it is not known."""
+    return {stage: statistic(values) if np.isfinite(values).all() else None for stage, values in vectors.items()}
 
 
 def _max(vectors: np.ndarray) -> float:

@@ -15,6 +15,7 @@ from kinertia.estimation.identifiability import INFORMED, MEASURED, evidence
 from kinertia.estimation.result import Fit, TrialFit
 from kinertia.findings.finding import Severity
 from kinertia.findings.overview import DO_NOT_USE, USES, WITH_CARE
+from kinertia.model.bsp import PARAMETERS
 from kinertia.report.bsp_figures import DEPARTURE_SD, NAMES, departures, estimated_rows, segment_name
 from kinertia.report.coordinate_titles import title_of
 from kinertia.report.time_figures import motion_change
@@ -149,7 +150,7 @@ def hidden_combinations(fit: Fit) -> int:
     if fit.posterior is None:
         return 0
     base = fit.posterior.base
-    return len(base.best[0].weights) - base.count
+    return len(PARAMETERS) * len(estimated_rows(fit)) - base.count
 
 
 def _segments(names: list[str]) -> str:

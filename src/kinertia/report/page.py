@@ -201,6 +201,8 @@ def residual_rows(trials: Sequence[TrialFit]) -> list[dict[str, Any]]:
     """Return RMS and peak of force and moment, per trial, bandwidth of the forces and stage."""
     rows = []
     for trial in trials:
+        if not trial.kinematics.complete:
+            continue
         narrow = f"motion's bandwidth ({bandwidths(trial)})"
         full = full_bandwidth(trial.reactions).removeprefix("forces ").removeprefix("at ")
         for k, (bandwidth, residuals) in enumerate(((narrow, trial.residuals), (full, trial.full_residuals))):

@@ -46,7 +46,8 @@ def build_trial(recording: Recording, feet: FootMarkers, window_s: tuple[float, 
         window_s: first and last time (s) stated by the user, in place of the detected frames.
 
     Raises:
-        TrialError: T104, fewer than two frames; P271, no force plates; P278, no frame with complete contact.
+        TrialError: T104, fewer than two frames; P271, no force plates; P278, no frame with complete contact, nor any
+            with one foot whose load is known.
         MarkerSetError: a foot label is not among the markers.
     """
     time = recording.markers.time
@@ -56,7 +57,7 @@ def build_trial(recording: Recording, feet: FootMarkers, window_s: tuple[float, 
     contact = ground_contact(recording.markers, loads, feet, recording.belt)
     complete = contact.measured(time)
     measured = complete if window_s is None else contact.inside & within(time, *window_s)
-    if not measured.any():
+    if not measured.any() and (window_s is not None or not (contact.leg_known & contact.loaded).any()):
         raise TrialError.of(recording.name, _nothing_measured(recording, loads, contact, window_s))
     if window_s is not None:
         stated = Quantity(f"{window_s[0]:.3f} to {window_s[1]:.3f} s")

@@ -1,16 +1,20 @@
-"""Computes root mean squares of values and of vector lengths, ignoring NaN."""
+"""Computes root mean squares of values and of vector lengths, ignoring NaN; NaN of nothing else."""
 
 import numpy as np
 
 
 def rms(values: np.ndarray) -> float:
     """Return the root mean square over everything that is not NaN."""
-    return float(np.sqrt(np.nanmean(np.square(values))))
+    return _root_mean(np.square(values))
 
 
 def rms_length(vectors: np.ndarray) -> float:
     """Return the root mean square length of vectors (..., k) over everything that is not NaN."""
-    return float(np.sqrt(np.nanmean(np.square(vectors).sum(axis=-1))))
+    return _root_mean(np.square(vectors).sum(axis=-1))
+
+
+def _root_mean(squares: np.ndarray) -> float:
+    return float(np.sqrt(np.nanmean(squares))) if np.isfinite(squares).any() else float("nan")
 
 
 def rms_by_marker(errors_m: np.ndarray) -> np.ndarray:

@@ -9,6 +9,7 @@ import numpy as np
 from kinertia.diagnostics.result.context import ResultContext
 from kinertia.diagnostics.result.questions import ESTIMATE_QUESTIONS, RESULT_QUESTIONS, judged
 from kinertia.diagnostics.runner import explained, overruled, rules_of
+from kinertia.errors import SettingsError
 from kinertia.estimation.free_moment_sign import Signed, with_likelier_sign
 from kinertia.estimation.joint_curves import JointCurves
 from kinertia.estimation.prepared import Prepared, Progress
@@ -122,6 +123,10 @@ class _Outcome:
 
 
 def _two_level(ready: Prepared, settings: Settings, started: float, progress: Progress) -> _Outcome:
+    for k in ready.kinematics:
+        if not k.complete:
+            problem = f'expected "simultaneous": in {k.trial.name}, all ground contact is never measured together'
+            raise SettingsError.of_entry("method", problem)
     cut = [_windows(k) for k in ready.kinematics]
     result = estimate_two_level(
         ready.skeleton,
@@ -238,7 +243,7 @@ def _trial_fit(
     seconds: Mapping[str, float],
 ) -> TrialFit:
     wrench = k.foot_loads.sum(axis=1)
-    corrected = joined([correct_pelvis(before, literature, part) for part in _windows(k)])
+    corrected = joined([correct_pelvis(before, literature, part) for part in _windows(k)]) if k.complete else k.motion
     stages = {
         "literature": (before, literature, k.motion),
         "corrected": (before, literature, corrected),
@@ -252,6 +257,14 @@ def _trial_fit(
     narrow["estimate"] = residual(after.skeleton, bsp, after.motion, after.foot_loads.sum(axis=1))
     full = {name: residual(*stage, measured.sum(axis=1)) for name, stage in stages.items()}
     full["estimate"] = residual(after.skeleton, bsp, motion, delivered.sum(axis=1))
+    loads = {
+        "literature": inverse_dynamics(before, literature, k.motion, measured),
+        "estimate": inverse_dynamics(after.skeleton, bsp, motion, delivered),
+    }
+    if not k.complete and curves is not None:
+        narrow, full = ({name: np.full_like(each, np.nan) for name, each in of.items()} for of in (narrow, full))
+        loads = {stage: each[inner] for stage, each in curves.forces.items()}
+    deviations = after.deviations if curves is None else curves.deviations
     return TrialFit(
         kinematics=k,
         skeleton=after.skeleton,
@@ -261,11 +274,8 @@ def _trial_fit(
         reactions=after.reactions,
         residuals=narrow,
         full_residuals=full,
-        joint_loads={
-            "literature": inverse_dynamics(before, literature, k.motion, measured),
-            "estimate": inverse_dynamics(after.skeleton, bsp, motion, delivered),
-        },
-        deviations=None if after.deviations is None else after.deviations.at(inner),
+        joint_loads=loads,
+        deviations=None if deviations is None else deviations.at(inner),
         marker_errors_m={
             "ik": _of_worn(k, k.ik.errors_m[k.frames]),
             "final": _marker_errors(after.skeleton, k, after.motion),

@@ -64,7 +64,7 @@ def without_legs(trial: Trial, spans: Iterable[tuple[tuple[float, float], int | 
     for (start_s, end_s), feet in spans:
         legs[within(trial.markers.time, start_s, end_s), feet] = False
     measured = trial.measured & legs.all(axis=1)
-    if measured.sum() < FEWEST_FRAMES:
+    if measured.sum() < FEWEST_FRAMES <= trial.measured.sum():
         return None
     return trial if np.array_equal(legs, trial.known_legs) else replace(trial, measured=measured, leg_known=legs)
 

@@ -9,16 +9,16 @@ from kinertia.errors import KinertiaError
 from kinertia.findings.finding import Finding, finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.motion.common_cutoff import LOWEST_HZ
-from kinertia.motion.kinematics import END_PERIODS, FEWEST_FRAMES
+from kinertia.motion.kinematics import END_PERIODS, FEWEST_FRAMES, legs_on_plates
 from kinertia.trial.plate_assignment import FOOT_NAMES, no_forces
 from kinertia.trial.sampled_time import within
 
 
 def complete_contact(context: RecordingContext) -> Iterator[Finding]:
     """Report T104, P271, P278: no trial can be made of the recording; P279: it has too few frames with complete
-    contact; P273, P274, P275, P277: how its loads were sorted by foot; P280, P283: only its markers are used, as
-    requested or because its forces are unusable; F191, T104: hardly any frames are in the window stated for these, or
-    in the trial.
+    contact; P288: it has these of single legs only; P273, P274, P275, P277: how its loads were sorted by foot; P280,
+    P283: only its markers are used, as requested or because its forces are unusable; F191, T104: hardly any frames are
+    in the window stated for these, or in the trial.
     """
     if context.is_static:
         return
@@ -36,11 +36,17 @@ def complete_contact(context: RecordingContext) -> Iterator[Finding]:
     if context.trial is None:
         return
     yield from context.trial.findings
-    start, end = context.trial.windows()[0]
-    frames = len(context.trial.markers.cut(start, end).time)
-    if frames < FEWEST_FRAMES:
+    windows = context.trial.windows()
+    frames = len(context.trial.markers.cut(*windows[0]).time) if windows else 0
+    if frames >= FEWEST_FRAMES:
+        return
+    legs = context.trial.known_legs[legs_on_plates(context.trial)]
+    if len(legs) >= FEWEST_FRAMES:
+        feet = [name for name, known in zip(FOOT_NAMES, legs.T, strict=True) if known.sum() >= FEWEST_FRAMES]
+        yield finding("P288", context.at(), foot=Quantity(" and ".join(feet)), frames=Quantity(len(legs), "1"))
+    else:
         measured = Quantity(frames, "1", limit=FEWEST_FRAMES)
-        yield finding("P279", context.at(span_s=(start, end)), frames=measured)
+        yield finding("P279", context.at(span_s=windows[0] if windows else None), frames=measured)
 
 
 def _too_few_in_window(context: RecordingContext) -> Finding | None:

@@ -58,6 +58,8 @@ def reversed_sign(trial: TrialFit) -> Iterator[Finding]:
     """Report P265: a trial whose free moments follow the measured motion once their sign is reversed, for an estimate
     without evidence of its own.
     """
+    if not trial.kinematics.complete:
+        return
     left, loads = trial.residuals["literature"][:, VERTICAL], trial.kinematics.foot_loads
     as_is, reversed_nm = residual_moments_nm(left, loads)
     without, reversed_without = residual_moments_without_offsets_nm(left, loads)

@@ -52,6 +52,8 @@ def residuals(context: ResultContext) -> Iterator[Finding]:
 
 def residuals_of(trial: TrialFit) -> Iterator[Finding]:
     """Report R301, R302 and R303: residual forces and moments of one trial."""
+    if not trial.kinematics.complete:
+        return
     narrow, full = (_lengths(each["estimate"]) for each in (trial.residuals, trial.full_residuals))
     for guideline, judged, whole in zip((FORCE, MOMENT), narrow, full, strict=True):
         yield from _by_guideline(trial, guideline, judged, whole)

@@ -7,7 +7,7 @@ from kinertia.estimation.simultaneous.plates import FLOOR_UNKNOWNS, PLATE_UNKNOW
 
 
 def smallest_detectable(shown: InstrumentInformation, prior: InstrumentPrior, unknown: str) -> float:
-    """Return the smallest error of all plates that the trials make likelier than fault-free plates.
+    """Return the smallest error of all plates that the trials make likelier than fault-free ones; infinite if none is.
 
     Args:
         shown: information of the trials on plates and synchronisation, without any prior.
@@ -27,5 +27,7 @@ def _smallest(shown: InstrumentInformation, prior: InstrumentPrior, place: int) 
     unknowns = prior.of_unknowns(shown.plates).own
     precision = np.array([0.0 if k == place else 1.0 / one.sd**2 for k, one in enumerate(unknowns)])
     information = shown.information + prior.of_session(shown.plates).information + np.diag(precision)
+    if not information[place, place] > 0.0:
+        return np.inf
     deviation = float(np.sqrt(np.linalg.inv(information)[place, place]))
     return unknowns[place].smallest_detectable(deviation)

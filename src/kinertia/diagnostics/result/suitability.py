@@ -200,11 +200,12 @@ def prior_values(fit: Fit) -> str:
 
 
 def _moments(fit: Fit) -> str:
+    complete = [trial for trial in fit.trials if trial.kinematics.complete]
     force, moment = (
-        max(rms_length(trial.residuals["estimate"][:, part]) for trial in fit.trials)
+        max((rms_length(trial.residuals["estimate"][:, part]) for trial in complete), default=float("nan"))
         for part in (slice(0, 3), slice(3, 6))
     )
-    reason = f"residual at most {force:.1f} N and {moment:.1f} N m (RMS)"
+    reason = f"residual at most {force:.1f} N and {moment:.1f} N m (RMS)" if complete else "residual unknown"
     if covered := coverage_sentence(fit.trials):
         reason = f"{covered}; {reason}"
     half = _half_interval(fit, "moments")
@@ -226,7 +227,8 @@ def _half_interval(fit: Fit, of: Literal["moments", "coordinates"]) -> float | N
     """Return half a typical 95 % interval of the rotations after the pelvis; None without their SDs."""
     sds = [getattr(trial.deviations, of)[:, 6:] for trial in fit.trials if trial.deviations is not None]
     turns = fit.skeleton.rotational[6:]
-    return _BAND_SD * rms(np.concatenate(sds)[:, turns]) if sds and turns.any() else None
+    every = np.concatenate(sds)[:, turns] if sds else np.zeros(0)
+    return _BAND_SD * rms(every) if np.isfinite(every).any() else None
 
 
 _REASONS: Mapping[str, Callable[[Fit], str]] = {"moments": _moments, "motion": _motion}

@@ -78,6 +78,11 @@ class CurveDeviations:
         """Return the standard deviations of these frames."""
         return CurveDeviations(*(each[frames] for each in self.curves))
 
+    def of_motion_alone(self) -> CurveDeviations:
+        """Return them without loads: errors of instruments that no root equation shows are not known to be small."""
+        unknown = [np.full(each.shape, np.nan) for each in self.curves[1:]]
+        return CurveDeviations(self.coordinates, *unknown)
+
     def spread_over(self, rows: np.ndarray, count: int) -> CurveDeviations:
         """Return the standard deviations of `count` frames, of which these (d,) are known; NaN in the others."""
         result = [np.full((count, *each.shape[1:]), np.nan) for each in self.curves]

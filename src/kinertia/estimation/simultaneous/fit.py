@@ -161,10 +161,12 @@ def fit_simultaneous(
     calibrated = result.skeleton.carrying(None)
     calibrated = calibrated.with_markers(used.markers) if staying else calibrated
     offsets_m = [0.0 if staying else moved for moved in result.marker_offsets_m]
-    dynamic = [np.flatnonzero(o.dynamic) for o in pooled[:count]]
-    motions = tuple(m.cut(frames) for m, frames in zip(result.motions, dynamic, strict=True))
+    inside = [np.flatnonzero(k.inside(o.time)) for k, o in zip(trials, pooled, strict=False)]
+    motions = tuple(m.cut(frames) for m, frames in zip(result.motions, inside, strict=True))
     spans = [_course(one, k) for one, k in zip(pooled, trials, strict=False)]
-    curves = zip(result.curve_deviations, pooled, spans, strict=False)
+    informed = any(o.dynamic.any() for o in pooled) or bool(uncertainty.instruments.session)
+    known = result.curve_deviations if informed else [sd.of_motion_alone() for sd in result.curve_deviations]
+    curves = zip(known, pooled, spans, strict=False)
     return SimultaneousFit(
         result=result,
         bsp=uncertainty.whole(result.bsp),
@@ -174,7 +176,7 @@ def fit_simultaneous(
         motions=motions,
         courses=tuple(m.q[span] for m, span in zip(result.motions, spans, strict=True)),
         deviations=tuple(sd.spread_over(o.curve_frames - span.start, _size(span)) for sd, o, span in curves),
-        foot_loads=tuple(loads[frames] for loads, frames in zip(result.foot_loads, dynamic, strict=True)),
+        foot_loads=tuple(loads[frames] for loads, frames in zip(result.foot_loads, inside, strict=True)),
     )
 
 
@@ -200,6 +202,7 @@ def _posterior(
     """Return the uncertainty of a result from the first observations, those of these trials."""
     observations = seen.pooled[: len(trials)]
     covariance, before = (uncertainty.whole_covariance(c) for c in (result.bsp_covariance, prior.covariance))
+    complete = [m if k.complete else m.cut(slice(0, 0)) for m, k in zip(motions, trials, strict=True)]
     load_sd = [np.repeat([one.force_sd, one.moment_sd], 3) for one in observations]
     reduced = (np.broadcast_to(one.impact, one.dynamic.shape)[one.dynamic] for one in observations)
     return Posterior(
@@ -209,7 +212,7 @@ def _posterior(
         calibration=result.calibration,
         marker_noise=seen.noise[: len(trials)],
         iterations=result.iterations,
-        base=base_parameters(result.skeleton, result.bsp, prior.sd, motions, load_sd),
+        base=base_parameters(result.skeleton, result.bsp, prior.sd, complete, load_sd),
         instruments=result.instruments,
         prior_mean=uncertainty.whole(prior.mean),
         unlikeness=unlikeness(prior, result.bsp, result.bsp_covariance),

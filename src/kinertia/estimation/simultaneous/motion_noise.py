@@ -41,6 +41,7 @@ def motion_noise(problem: MapProblem, k: int, coefficients: np.ndarray, static: 
     trial, basis = problem.trials[k], problem.bases[k]
     spacing_s = float(basis.knots[1] - basis.knots[0])
     squares, counts = np.zeros((3, len(trial.marker_sd))), np.zeros(len(trial.marker_sd))
+    counted = trial.dynamic if trial.dynamic.any() or trial.reported is None else trial.reported
     parts = np.linspace(0, len(trial.time), 1 + -(-len(trial.time) // _MOST_FRAMES)).astype(int)
     for frames in (slice(start, stop) for start, stop in pairwise(parts)):
         left = _left(problem, k, coefficients, static, frames)
@@ -48,7 +49,7 @@ def motion_noise(problem: MapProblem, k: int, coefficients: np.ndarray, static: 
         own = MotionBasis(trial.time[frames], spacing_s)
         around = 1 + 2 * int(np.ceil(_ENDS * n / (own.first[-1] + 1)))
         inside = all_around(np.isfinite(left).all(axis=-1), around)
-        rows = inside & trial.dynamic[frames][:, None]
+        rows = inside & counted[frames][:, None]
         for square, part in zip(squares, own.evaluate(own.fit(left.reshape(n, -1))), strict=True):
             square += np.where(rows, np.square(part).reshape(n, m, 3).sum(axis=-1), 0.0).sum(axis=0)
         counts += 3 * rows.sum(axis=0)

@@ -210,7 +210,7 @@ def _observed(
     repeated = np.sqrt(max(1.0, trial.markers.rate_hz / (2.0 * bandwidth.motion_hz)))
     force_sd = repeated * FORCE_SD_OF_WEIGHT * mass_kg * GRAVITY_M_S2
     ground = _ground(kinematics, time, bandwidth.motion_hz, bandwidth.force)
-    dynamic = kinematics.inside(time) & bool(trial.loads.plates)
+    dynamic = kinematics.inside(time) & (bool(trial.loads.plates) and kinematics.complete)
     force = ground.loads(time).reshape(-1, 2, 6)[..., :3].sum(axis=1)
     weight_n = mass_kg * GRAVITY_M_S2
     impact = impact_factors(time, force, dynamic, bandwidth.spacing_s, force_sd)
