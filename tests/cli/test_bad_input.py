@@ -288,3 +288,12 @@ def test_a_folder_that_cannot_be_written_to_gets_no_draft(tmp_path, monkeypatch)
     outcome = run("init", tmp_path)
     assert outcome.status == 2
     assert "copy the files into a folder of your own" in " ".join(outcome.err.split())
+
+
+@pytest.mark.parametrize("command", ["check", "fit"])
+def test_a_folder_that_is_not_there_is_named_with_similar_ones(tmp_path, command):
+    (tmp_path / "person01").mkdir()
+    outcome = run(command, tmp_path / "persn01")
+    assert outcome.status == 2
+    assert "F101" in outcome.err
+    assert "person01" in outcome.err
