@@ -252,3 +252,21 @@ def test_nothing_is_known_long_before_a_contact(skeleton, trial):
     frames = np.flatnonzero(known.any(axis=1))
     assert trial.markers.time[frames[0]] == pytest.approx(1.2 - AROUND_CONTACT_S, abs=0.011)
     assert frames[-1] == 200
+
+
+def test_windows_of_a_single_leg_where_contact_is_never_complete(skeleton, trial):
+    """The left foot is on the ground beside the plates throughout: nothing is measured, the right leg is known."""
+    legs = np.zeros((201, 2), dtype=bool)
+    legs[40:160, 0] = True
+    force = trial.loads.force.copy()
+    force[:, 1] = 0.0
+    alone = replace(trial, measured=np.zeros(201, dtype=bool), leg_known=legs, loads=replace(trial.loads, force=force))
+    solved = solve_kinematics(skeleton, alone, 0.0, "gcv")
+    assert not solved.complete
+    assert solved.time[[0, -1]] == pytest.approx([0.40, 1.59])
+    known = solved.course_known
+    assert not known[:, columns(skeleton, "pelvis")].any()
+    assert not known[:, columns(skeleton, "knee_angle_l")].any()
+    inside = solved.inside(solved.course_time)
+    np.testing.assert_array_equal(known[:, columns(skeleton, "knee_angle_r")][:, 0], inside)
+    assert solve_kinematics(skeleton, trial, 0.0, "gcv").complete

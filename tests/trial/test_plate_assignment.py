@@ -270,15 +270,39 @@ def test_users_window():
 
 
 def test_nothing_measured_tells_when_feet_were_where():
-    slow = walk([("r", 0)], stance_s=0.95)
-    found = refused(replace(slow, markers=slow.markers.cut(0.25, 0.60)))
-    assert found.code == "P278"
-    assert found.evidence["right_plate"].value == "0.250 to 0.600 s"
-    assert {"right_ground", "left_ground", "left_plate"} < set(found.evidence)
     idle = walk([("r", 0)])
     idle = replace(idle, plates=replace(idle.plates, force=0 * idle.plates.force, moment=0 * idle.plates.moment))
     idle = replace(idle, findings=(finding("F151", Where(plate="plate 2"), reason=Quantity("it has no samples")),))
-    assert "it has no samples" in refused(idle).evidence["left_out"].value
+    found = refused(idle)
+    assert found.code == "P278"
+    assert found.evidence["right_plate"].value == "no frame"
+    assert {"right_ground", "left_ground", "left_plate"} < set(found.evidence)
+    assert "it has no samples" in found.evidence["left_out"].value
+
+
+def test_a_leg_is_known_though_contact_is_never_complete():
+    """The other foot stands beside the plate all the time."""
+    slow = walk([("r", 0)], stance_s=0.95)
+    trial = build_trial(replace(slow, markers=slow.markers.cut(0.25, 0.60)), FEET)
+    assert not trial.measured.any()
+    assert trial.leg_known[:, 0].all()
+    assert not trial.leg_known[:, 1].any()
+    assert trial.on_ground.all()
+
+
+@pytest.mark.parametrize(("share", "known"), [(0.0, True), (0.2, True), (0.5, False)])
+def test_not_if_the_centre_of_pressure_is_between_the_feet(share, known):
+    """Then the plate may carry both; a foot that pushes off presses some way in front of its foremost marker."""
+    slow = walk([("r", 0)], stance_s=0.95)
+    markers, plates = slow.markers.cut(0.25, 0.60), slow.plates
+    toe, heel = (markers.positions[:, markers.labels.index(label)].mean(axis=0) for label in ("R.Toe", "L.Heel"))
+    place = toe + share * (heel - toe)
+    moment = np.where(plates.force.any(axis=2, keepdims=True), np.cross(place * [1, 0, 1], plates.force), 0.0)
+    moved = replace(slow, markers=markers, plates=replace(plates, moment=moment))
+    if known:
+        assert build_trial(moved, FEET).leg_known[:, 0].all()
+    else:
+        assert refused(moved).code == "P278"
 
 
 def test_measured_frames_of_loads_that_are_sorted_already():

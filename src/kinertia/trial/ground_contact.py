@@ -39,6 +39,10 @@ if it is at most so many times as fast as the landings."""
 _ALL_CARRIED = 0.85
 """While plates carry this share of their usual load, a foot that does not move is in the air."""
 
+_BETWEEN, _BETWEEN_FRAMES = 0.3, 0.2
+"""Share of the gap between the feet beyond which a centre of pressure may be of both, and of the frames in which it
+is."""
+
 FootMarkers = Mapping[str, Sequence[str]]
 """Labels of the markers on each foot (heel, toes, ankle), by "r" and "l"."""
 
@@ -52,12 +56,15 @@ class GroundContact:
         ground: (n, 2) True where the foot is on the ground, loaded or not.
         inside: (n,) True within the recorded forces.
         on_shared_plate: (n,) True where one plate carries both feet, so that only the sum of their loads is known.
+        between: (n, 2) True where the other foot is on the ground without load, and the centre of pressure lies between
+            the feet: the plate may carry both.
     """
 
     loaded: BoolArray
     ground: BoolArray
     inside: BoolArray
     on_shared_plate: BoolArray
+    between: BoolArray
 
     def measured(self, time: FloatArray) -> BoolArray:
         """Return the mask (n,) of frames with complete contact: every foot on the ground stands on a loaded plate."""
@@ -72,7 +79,8 @@ class GroundContact:
     @property
     def leg_known(self) -> BoolArray:
         """Mask (n, 2): the whole load on the right, left foot is known, since it is in the air or alone on plates."""
-        result: BoolArray = (self.inside & ~self.on_shared_plate)[:, None] & (self.loaded | ~self.ground)
+        whole = self.loaded & ~self.between
+        result: BoolArray = (self.inside & ~self.on_shared_plate)[:, None] & (whole | ~self.ground)
         return result
 
 
@@ -116,7 +124,45 @@ def ground_contact(markers: Markers, loads: FootLoads, feet: FootMarkers, belt: 
     on_shared_plate = (
         np.zeros(len(inside), dtype=bool) if loads.on_shared_plate is None else loads.on_shared_plate[nearest] & inside
     )
-    return GroundContact(loaded, ground, inside, on_shared_plate)
+    between = _between(markers, loads, feet, nearest, loaded, ground)
+    return GroundContact(loaded, ground, inside, on_shared_plate, between)
+
+
+def _between(
+    markers: Markers,
+    loads: FootLoads,
+    feet: FootMarkers,
+    nearest: npt.NDArray[np.int_],
+    loaded: BoolArray,
+    ground: BoolArray,
+) -> BoolArray:
+    """Return `GroundContact.between` (n, 2): whole spans in which both feet are on the ground and one is loaded.
+
+    The centre of pressure of a foot that pushes off is beyond its foremost marker by a small share of the gap to the
+    other foot, whose load is elsewhere.
+    """
+    result, points = np.zeros_like(loaded), [markers.select(feet[foot]).positions[:, :, [0, 2]] for foot in FEET]
+    for foot in range(2):
+        both = loaded[:, foot] & ground[:, 1 - foot] & ~loaded[:, 1 - foot]
+        for first, last in runs(both):
+            own = slice(first, last + 1)
+            wrench = loads.wrench[nearest[own], foot]
+            pressure = np.column_stack([wrench[:, 5], -wrench[:, 3]]) / np.maximum(wrench[:, 1:2], LOAD_THRESHOLD_N)
+            share = _share_of_gap(pressure, points[foot][own], points[1 - foot][own])
+            result[own, foot] = (share > _BETWEEN).mean() > _BETWEEN_FRAMES
+    return result
+
+
+def _share_of_gap(pressure: FloatArray, own: FloatArray, other: FloatArray) -> FloatArray:
+    """Return how far (n,) of the way from one foot's nearest marker to the other's a centre of pressure (n, 2) is."""
+    apart = np.linalg.norm(own[:, :, None] - other[:, None], axis=-1)
+    pair = np.where(np.isfinite(apart), apart, np.inf).reshape(len(own), -1).argmin(axis=1)
+    each = np.arange(len(own))
+    start, end = own[each, pair // other.shape[1]], other[each, pair % other.shape[1]]
+    gap = end - start
+    along = np.einsum("ni,ni->n", pressure - start, gap) / np.maximum(np.square(gap).sum(axis=1), 1e-6)
+    result: FloatArray = np.nan_to_num(along)
+    return result
 
 
 def _learned(moves: Sequence[FootMotion], loaded: BoolArray) -> tuple[float, float, float]:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kinertia.diagnostics.plates.cop_on_plate import cop_on_plate
-from kinertia.diagnostics.plates.ground_contact import plate_edges
+from kinertia.diagnostics.plates.ground_contact import complete_contact, plate_edges
 from kinertia.findings.finding import Severity
 from kinertia.model.marker_set import MarkerSet
 from kinertia.trial.centre_of_pressure import centre_of_pressure
@@ -251,3 +251,13 @@ def test_toes_without_a_marker_are_still_the_foot():
     end = foot.front[60] + 0.3 * (foot.front[60] - foot.back[60])
     assert np.linalg.norm(foot.offset_m(time, end[None])) == pytest.approx(0.06, abs=1e-3)
     assert np.linalg.norm(foot.with_toes().offset_m(time, end[None])) == pytest.approx(0.0, abs=1e-6)
+
+
+def test_single_legs_are_known_where_contact_is_never_complete():
+    """P288, a WARNING; without enough frames of a leg P279."""
+    slow = walk([("r", 0)], stance_s=0.95)
+    found = list(complete_contact(context_of(replace(slow, markers=slow.markers.cut(0.25, 0.60)), FEET)))
+    (one,) = [each for each in found if each.code == "P288"]
+    assert (one.severity.name, one.evidence["foot"].value, one.evidence["frames"].value) == ("WARNING", "right", 36)
+    few = list(complete_contact(context_of(replace(slow, markers=slow.markers.cut(0.25, 0.33)), FEET)))
+    assert [each.code for each in few] == ["P279"]

@@ -30,7 +30,7 @@ def found(force_n=0.0, moment_nm=0.0, external_n=800.0, markers_m=0.008, full=1.
         motion_hz=12.0,
         residuals={"estimate": residual},
         full_residuals={"estimate": full * residual},
-        kinematics=SimpleNamespace(foot_loads=loads, ik=SimpleNamespace(labels=tuple(SEGMENTS))),
+        kinematics=SimpleNamespace(complete=True, foot_loads=loads, ik=SimpleNamespace(labels=tuple(SEGMENTS))),
         marker_errors_m={"final": np.tile(np.broadcast_to(markers_m, 3), (FRAMES, 1))},
         skeleton=SimpleNamespace(markers=MARKERS),
     )
