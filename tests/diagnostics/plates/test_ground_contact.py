@@ -254,10 +254,10 @@ def test_toes_without_a_marker_are_still_the_foot():
 
 
 def test_single_legs_are_known_where_contact_is_never_complete():
-    """P288, a WARNING; without enough frames of a leg P279."""
+    """P290, a WARNING; without enough frames of a leg P279."""
     slow = walk([("r", 0)], stance_s=0.95)
     found = list(complete_contact(context_of(replace(slow, markers=slow.markers.cut(0.25, 0.60)), FEET)))
-    (one,) = [each for each in found if each.code == "P288"]
+    (one,) = [each for each in found if each.code == "P290"]
     assert (one.severity.name, one.evidence["foot"].value, one.evidence["frames"].value) == ("WARNING", "right", 36)
     few = list(complete_contact(context_of(replace(slow, markers=slow.markers.cut(0.25, 0.33)), FEET)))
     assert [each.code for each in few] == ["P279"]

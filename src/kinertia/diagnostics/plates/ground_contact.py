@@ -16,7 +16,7 @@ from kinertia.trial.sampled_time import within
 
 def complete_contact(context: RecordingContext) -> Iterator[Finding]:
     """Report T104, P271, P278: no trial can be made of the recording; P279: it has too few frames with complete
-    contact; P288: it has these of single legs only; P273, P274, P275, P277: how its loads were sorted by foot; P280,
+    contact; P290: it has these of single legs only; P273, P274, P275, P277: how its loads were sorted by foot; P280,
     P283: only its markers are used, as requested or because its forces are unusable; F191, T104: hardly any frames are
     in the window stated for these, or in the trial.
     """
@@ -43,7 +43,7 @@ def complete_contact(context: RecordingContext) -> Iterator[Finding]:
     legs = context.trial.known_legs[legs_on_plates(context.trial)]
     if len(legs) >= FEWEST_FRAMES:
         feet = [name for name, known in zip(FOOT_NAMES, legs.T, strict=True) if known.sum() >= FEWEST_FRAMES]
-        yield finding("P288", context.at(), foot=Quantity(" and ".join(feet)), frames=Quantity(len(legs), "1"))
+        yield finding("P290", context.at(), foot=Quantity(" and ".join(feet)), frames=Quantity(len(legs), "1"))
     else:
         measured = Quantity(frames, "1", limit=FEWEST_FRAMES)
         yield finding("P279", context.at(span_s=windows[0] if windows else None), frames=measured)
