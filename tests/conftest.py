@@ -25,6 +25,7 @@ from kinertia.io.recording import read_recording
 from kinertia.motion import two_threads
 from kinertia.report import matplotlib_extra
 from kinertia.settings import Settings, Subject
+from kinertia.synthetic.laboratory import LabNoise
 from kinertia.trial.data import Recording
 from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow.estimate import estimate_bsp
@@ -48,7 +49,7 @@ threadpool_limits(1, user_api="blas")
 
 if "PYTEST_XDIST_WORKER" in os.environ:
     # the other workers use the other cores; processes that tests start have their second thread, and give the same bits
-    two_threads._cores = lambda: 1
+    two_threads.cores = lambda: 1
 
 LOOKED_FOR = (
     f"measured recordings are looked for in the folder that {samples.VARIABLE} names or, if it names none, in "
@@ -188,17 +189,16 @@ def fit_with_model(request, synthetic_lab, tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def demo_command(tmp_path_factory) -> tuple[Demo, Path, Outcome]:
-    """Outcome of `run_demo`, its folder, and of the command; with a two-level estimate that stays at its start."""
+    """Outcome of `run_demo`, its folder, and of the command; the laboratory has noise, and no other errors."""
 
     def make(made: Path) -> tuple[Demo, Path, Outcome]:
         folder, kept = made / "demo" / "out", []
 
         def keep(*arguments, **options):
-            kept.append(run_demo(*arguments, **options))
+            kept.append(run_demo(*arguments, noise=LabNoise(), **options))
             return kept[-1]
 
-        two_level = mock.patch("kinertia.workflow.estimate.estimate_two_level", given_back)
-        with two_level, mock.patch("kinertia.cli.demo.run_demo", keep):
+        with mock.patch("kinertia.cli.demo.run_demo", keep):
             outcome = run("demo", "-o", folder)
         assert outcome.status == 0, outcome.err
         return kept[0], folder, outcome
@@ -319,9 +319,20 @@ def fit(demo_run):
 
 
 @pytest.fixture(scope="session")
-def two_level(demo_run):
-    """The demo's two-level fit, without error bars."""
-    return demo_run[0].two_level
+def two_level_run(tmp_path_factory) -> tuple[Demo, Path]:
+    """The demo by two-level, without error bars, and its folder; its estimate stays at its start."""
+
+    def make(made: Path) -> tuple[Demo, Path]:
+        with mock.patch("kinertia.workflow.estimate.estimate_two_level", given_back):
+            return run_demo(made / "two-level", noise=LabNoise(), method="two-level"), made / "two-level"
+
+    return once(tmp_path_factory, "two_level", make)
+
+
+@pytest.fixture(scope="session")
+def two_level(two_level_run):
+    """The demo's two-level fit."""
+    return two_level_run[0].fit
 
 
 @pytest.fixture

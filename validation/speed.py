@@ -41,6 +41,7 @@ from kinertia.workflow.built_in_model import calibrate
 from validation.command_speed import command_section
 from validation.core_speed import core_section
 from validation.estimate_speed import speed_section, timed
+from validation.first_run import first_run_section
 from validation.measured_data import data_folder
 from validation.measured_trials import table
 from validation.page import write_page
@@ -269,6 +270,12 @@ motion, error bars of joint moments.
 Whole processes with compiled functions in the cache, next to importing what they stand on.
 
 {command_section(runs)}
+
+## The first run on a machine
+
+Kinertia's calculations are compiled once, by as many processes as there are cores.
+
+{first_run_section()}
 """
 
 

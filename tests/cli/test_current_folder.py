@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from command_line import PROGRAM
-from kinertia.cli.compiling import _markers_beside
+from kinertia.cli.compiling import _beside
 from kinertia.cli.web.work import WORKER as PAGE_WORKER
 from kinertia.cohort.job import Job
 from kinertia.cohort.local import WORKER as COHORT_WORKER
@@ -59,7 +59,7 @@ def test_commands(traps, c3d_lab, command):
 
 
 def test_what_compiles_beside(traps):
-    with _markers_beside():
+    with _beside(2):
         pass
     assert not (traps / TRACE).exists(), (traps / TRACE).read_text()
 

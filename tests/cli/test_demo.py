@@ -20,40 +20,64 @@ from report_page import figures_of, numbers
 
 def check_outcome(outcome, folder):
     assert outcome.status == 0, outcome.err
-    for words in ("truth", "literature", "estimate", "kinertia init", "kinertia fit"):
+    for words in ("truth", "95 % interval", "kinertia init", "kinertia fit"):
         assert words in outcome.out
     for stage in ("measuring", "reading", "calibration", "inverse kinematics"):
         assert stage in outcome.err
+    # with the stage of compiling, which a first run adds
+    assert len(outcome.out.splitlines()) + len({"compiling, once", *outcome.err.splitlines()}) <= 30
     names = {"static.trc", "walk.trc", "walk_grf.mot", "subject.toml"}
     assert {path.name for path in (folder / "lab").glob("[!.]*")} == names
     table = pd.read_csv(folder / "bsp_truth.csv")
-    columns = ["segment", "parameter", "unit", "truth", "literature", "estimate", "sd", "two_level"]
-    assert list(table.columns) == columns
+    assert list(table.columns) == ["segment", "parameter", "unit", "truth", "literature", "estimate", "sd"]
     assert len(table) == 120
     mass = table[table["parameter"] == "mass"]
     assert mass["truth"].sum() == pytest.approx(72.6)
     assert np.abs(mass["truth"] / mass["literature"] - 1).max() > 0.03
     assert json.loads((folder / "fit.json").read_text())["trials"][0]["n_dynamic_frames"] > 90
-    for results in (folder, folder / "two-level"):
-        assert {"report.html", "bsp.csv", "kinematics.mot", "residuals.sto"} <= {
-            path.name for path in results.glob("[!.]*")
-        }
+    results = {path.name for path in folder.glob("[!.]*")}
+    assert {"report.html", "bsp.csv", "kinematics.mot", "residuals.sto"} <= results
     off = {name: np.sqrt(np.mean((mass[name] - mass["truth"]) ** 2)) for name in ("literature", "estimate")}
     assert off["estimate"] < off["literature"]
-    assert "joint moments, RMS error against the truth (N m)" in outcome.out
 
 
-def test_demo_without_the_iterations(demo_command):
+def test_demo_without_instrument_errors(demo_command):
     _, folder, outcome = demo_command
     check_outcome(outcome, folder)
+    assert "nothing but noise" in outcome.out
 
 
 @pytest.mark.slow
-def test_demo_from_end_to_end(tmp_path):
+@pytest.mark.parametrize("width", ["80", "100"])
+def test_demo_from_end_to_end(tmp_path, width, monkeypatch):
+    """What the laboratory did wrong is found, and most joint moments are within their intervals."""
+    monkeypatch.setenv("COLUMNS", width)
     folder = tmp_path / "out"
-    check_outcome(run("demo", "-o", folder), folder)
-    residuals = json.loads((folder / "two-level" / "fit.json").read_text())["trials"][0]["residual_force_rms_N"]
+    outcome = run("demo", "-o", folder)
+    check_outcome(outcome, folder)
+    assert sum(-(-len(line) // int(width)) or 1 for line in outcome.out.splitlines()) <= 30
+    result = json.loads((folder / "fit.json").read_text())
+    found = {one["code"]: one["evidence"] for one in result["findings"] if one["severity"] == "CORRECTED"}
+    assert found["P223"]["gain_error"]["value"] == pytest.approx(demo_module.LABORATORY.gain, abs=0.012)
+    assert found["T214"]["delay_s"]["value"] == pytest.approx(demo_module.LABORATORY.delay_s, abs=0.0035)
+    assert result["verdict"] == "use"
+
+
+@pytest.mark.slow
+def test_demo_of_two_level(tmp_path):
+    folder = tmp_path / "out"
+    outcome = run("demo", "--method", "two-level", "-o", folder)
+    assert outcome.status == 0, outcome.err
+    assert "95 % interval" not in outcome.out
+    assert "Two-level corrects no instruments" in outcome.out
+    residuals = json.loads((folder / "fit.json").read_text())["trials"][0]["residual_force_rms_N"]
     assert residuals["estimate"] < residuals["corrected"] < residuals["literature"]
+
+
+def test_a_measured_walk_has_one_method(tmp_path):
+    outcome = run("demo", "--measured", "--method", "two-level", "-o", tmp_path / "out")
+    assert outcome.status == 2
+    assert "--measured" in outcome.err
 
 
 def test_same_seed_same_files(tmp_path, demo_run, monkeypatch):
@@ -85,7 +109,7 @@ def test_files_hold_nothing_of_the_truth(demo_run):
 def test_errors_against_the_truth():
     subject = walking_subject()
     truth = unlike_literature(subject, np.random.default_rng(0)).bsp
-    demo = demo_module.Demo(fit=None, two_level=None, walk=SimpleNamespace(bsp=truth), subject_file=None)
+    demo = demo_module.Demo(fit=None, walk=SimpleNamespace(bsp=truth), noise=None, subject_file=None)
     assert demo.rms_errors(truth) == (0.0, 0.0, 0.0)
     mass, com, inertia = demo.rms_errors(subject.literature)
     assert mass == pytest.approx(np.sqrt(np.mean((subject.literature.mass_kg - truth.mass_kg) ** 2)))
@@ -120,6 +144,20 @@ def test_joint_moments_against_the_truth(demo_run):
     exact = replace(fit.trials[0], joint_loads={"literature": true, "estimate": true})
     again = replace(result, fit=replace(fit, trials=(exact,)))
     assert set(again.moment_errors.values()) == {(0.0, 0.0)}
+
+
+def test_intervals_of_moments_against_the_truth(demo_run):
+    """A hundredth of the width hardly holds the truth."""
+    result, _ = demo_run
+    intervals = result.moment_intervals
+    assert set(intervals) == set(result.moment_errors)
+    assert all(0.85 <= inside <= 1.0 for _, inside in intervals.values())
+    (trial,) = result.fit.trials
+    narrow = replace(trial.deviations, moments=trial.deviations.moments / 100.0)
+    again = replace(result, fit=replace(result.fit, trials=(replace(trial, deviations=narrow),)))
+    for joint, (half, inside) in again.moment_intervals.items():
+        assert half == pytest.approx(intervals[joint][0] / 100.0)
+        assert inside < 0.25
 
 
 def test_the_report_shows_the_truth(demo_run):

@@ -94,8 +94,8 @@ def test_a_folder_without_results_is_told(tmp_path, monkeypatch, command):
     assert not list((tmp_path / "here").iterdir())
 
 
-def test_compare_prints_json_for_scripts(demo_run, tmp_path):
-    outcome = run("compare", demo_run[1], demo_run[1] / "two-level", "-o", tmp_path / "out", "--json")
+def test_compare_prints_json_for_scripts(demo_run, two_level_run, tmp_path):
+    outcome = run("compare", demo_run[1], two_level_run[1], "-o", tmp_path / "out", "--json")
     assert outcome.status == 0, outcome.err
     content = json.loads(outcome.out)
     ((name, rows),) = content["against_first"].items()
@@ -104,8 +104,8 @@ def test_compare_prints_json_for_scripts(demo_run, tmp_path):
     assert [row["segment"] for row in rows] == table.segment.tolist()[-len(rows) :]
     assert rows[0]["change"] == pytest.approx(rows[0]["other"] - rows[0]["first"])
     assert {row["sd"] for row in rows} == {None}, "two-level has no error bars"
-    told = run("compare", demo_run[1], demo_run[1] / "two-level", "-o", tmp_path / "out").out
-    assert "two-level against out: no error bars, differences only" in " ".join(told.split())
+    told = run("compare", demo_run[1], two_level_run[1], "-o", tmp_path / "out").out
+    assert "out: no error bars, differences only" in " ".join(told.split())
 
 
 def test_export_writes_posterior_draws(results):

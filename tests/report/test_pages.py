@@ -46,7 +46,7 @@ ON_PAPER_PX = 1100
 
 
 @pytest.fixture(scope="module")
-def pages(demo_run, fit, two_level, c3d_lab, tmp_path_factory):
+def pages(demo_run, two_level_run, fit, two_level, c3d_lab, tmp_path_factory):
     """A page of every kind, made when it is first asked for."""
     folder = tmp_path_factory.mktemp("pages")
 
@@ -70,7 +70,7 @@ def pages(demo_run, fit, two_level, c3d_lab, tmp_path_factory):
         "report": lambda: demo_run[1] / "report.html",
         "findings": lambda: written("findings.html", render(replace(fit, findings=UNUSABLE, rules=61))),
         "three trials": lambda: written("three.html", render(three_times(fit))),
-        "two-level": lambda: demo_run[1] / "two-level" / "report.html",
+        "two-level": lambda: two_level_run[1] / "report.html",
         "comparison": lambda: written("compare.html", render_comparison({"one": fit, "two": two_level})),
         "check": check,
         "cohort": cohort,

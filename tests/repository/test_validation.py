@@ -57,6 +57,7 @@ def test_page_of_speed(measured_folder, tmp_path, monkeypatch):
     monkeypatch.setattr(speed, "WINDOW_S", {"gait2354": (0.0, 0.6)})
     monkeypatch.setattr(speed, "ESTIMATED_S", (0.8,))
     monkeypatch.setattr(speed, "command_section", lambda runs: "")
+    monkeypatch.setattr(speed, "first_run_section", lambda: "")
     page = speed.document(runs=1, lengths=(1, 2), names=("gait2354",))
     for stage in speed.STAGES:
         (once, twice, growth) = re.search(

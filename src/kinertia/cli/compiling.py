@@ -1,114 +1,103 @@
-"""Compiles the numerical core once per machine, before the first command that computes."""
+"""Compiles the numerical core once per machine, before the first command that computes.
+
+As many processes as there are cores share its functions, by length. LLVM's first level of optimisation is enough for
+them and takes less time than the third.
+"""
 
 import gc
+import os
 import subprocess
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from importlib import import_module
+from typing import Any
 
 from kinertia.cohort.process import PYTHON
-from kinertia.model.compiled import is_compiled, set_compiled
+from kinertia.model.compiled import SOURCES, is_compiled, is_stored, set_compiled
 
 _STAGE = "compiling, once"
-_POSE_SHARE, _MOTION_SHARE, _KINEMATICS_SHARE, _DYNAMICS_SHARE = 0.15, 0.4, 0.5, 0.8
-"""Shares of the time after which pose, synthetic walk, inverse kinematics and all before the estimate are done."""
 
 
 def compile_once(progress: Callable[[str, float], None]) -> None:
-    """Compile everything not yet compiled on this machine, by running it on a short synthetic walk."""
+    """Compile everything not yet compiled on this machine."""
     if is_compiled():
         return
     progress(_STAGE, 0.0)
-    with _without_looking_for_garbage(), _markers_beside():
-        import numpy as np
+    from kinertia.motion.two_threads import cores
 
-        from kinertia.estimation.prior import literature_prior
-        from kinertia.estimation.simultaneous.fit import fit_simultaneous
-        from kinertia.motion.dynamics import axis_motion, consistent_root_acceleration, residual_terms, root_regressor
-        from kinertia.motion.kinematics import solve_kinematics
-        from kinertia.motion.rigid_body import axis_force_derivatives
-        from kinertia.synthetic.walk import walk, walking_subject
-        from kinertia.trial.data import FootLoads, Trial
-
-        subject = walking_subject()
-        subject.skeleton.pose(np.zeros((1, len(subject.skeleton.coordinates))))
-        progress(_STAGE, _POSE_SHARE)
-        short = walk(subject, 0.8)
-        progress(_STAGE, _MOTION_SHARE)
-        feet = FootLoads(short.time, short.foot_loads[..., :3], short.foot_loads[..., 3:])
-        measured = Trial("walk", short.markers, feet, short.foot_loads[:, 0, 1] > -1.0)
-        kinematics = solve_kinematics(short.skeleton, measured, 0.0, 10.0)
-        progress(_STAGE, _KINEMATICS_SHARE)
-        skeleton, bsp, motion = short.skeleton, short.bsp, short.motion
-        for balance in (residual_terms, consistent_root_acceleration):
-            balance(skeleton, bsp, motion, short.foot_loads.sum(axis=1))
-        root_regressor(skeleton, bsp.segments, motion)
-        state = axis_motion(skeleton, motion)
-        every = np.ones(len(skeleton.tree.parent), dtype=bool)
-        axis_force_derivatives(skeleton.tree, skeleton.gravity_m_s2, skeleton.bodies(bsp), *state, every)
-        progress(_STAGE, _DYNAMICS_SHARE)
-    with _without_looking_for_garbage():
-        fit_simultaneous(short.skeleton, literature_prior(subject.literature), [kinematics])
+    # Numba reads it when it compiles, here and in the processes beside
+    os.environ.setdefault("NUMBA_OPT", "1")
+    count = cores()
+    with _beside(count):
+        for done in _compiled(shares(stored_functions(), count)[0]):
+            progress(_STAGE, done)
+    # loads what the others compiled, and compiles what they left, as where no process can be started
+    for _ in _compiled(stored_functions()):
+        pass
     progress(_STAGE, 1.0)
     set_compiled()
 
 
+def stored_functions() -> list[Any]:
+    """Return all functions whose machine code is stored, the longest first."""
+    modules = [import_module("kinertia." + name.removesuffix(".py").replace("/", ".")) for name in SOURCES]
+    functions = [value for module in modules for value in vars(module).values() if is_stored(value, module.__name__)]
+    return sorted(functions, key=_length, reverse=True)
+
+
 @contextmanager
-def _without_looking_for_garbage() -> Iterator[None]:
-    """Disable garbage collection: compiling makes millions of lasting objects, whose scanning takes a tenth of it."""
-    gc.disable()
+def _beside(count: int) -> Iterator[None]:
+    """Compile all shares but the first in processes beside this one, until the end of the block at the earliest."""
+    beside: list[subprocess.Popen[bytes]] = []
     try:
+        with suppress(OSError):
+            for k in range(1, count):
+                command = [*PYTHON, "-c", f"from {__name__} import compile_share as c; c({k}, {count})"]
+                beside.append(subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL))
         yield
+        for process in beside:
+            process.wait()
+    finally:
+        for process in beside:
+            process.kill()
+            process.wait()
+
+
+def compile_share(k: int, count: int) -> None:
+    """Compile share k of `count`."""
+    for _ in _compiled(shares(stored_functions(), count)[k]):
+        pass
+
+
+def shares(functions: Sequence[Any], count: int) -> list[list[Any]]:
+    """Share functions among so many processes: each to the one that has least to compile with it."""
+    result: list[list[Any]] = [[] for _ in range(count)]
+    for function in functions:
+        min(result, key=lambda share: _length(*share, function)).append(function)
+    return result
+
+
+def _compiled(functions: Sequence[Any]) -> Iterator[float]:
+    """Compile functions, or load what is stored of them; yield the share done after each."""
+    from kinertia.model.array_types import argument_types
+
+    gc.disable()  # compiling makes millions of lasting objects, and looking for garbage there takes a tenth of its time
+    try:
+        for done, function in enumerate(functions, start=1):
+            for types in argument_types(function.py_func):
+                function.compile(types)
+            yield done / (len(functions) + 1)
     finally:
         gc.enable()
 
 
-@contextmanager
-def _markers_beside() -> Iterator[None]:
-    """Run `compile_markers` in a separate process, until the end of the block at the earliest; what it leaves undone,
-    as where no process can be started, the estimate compiles itself.
-    """
-    command = [*PYTHON, "-c", f"from {__name__} import compile_markers; compile_markers()"]
-    try:
-        beside = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    except OSError:
-        yield
-        return
-    try:
-        yield
-        beside.wait()
-    finally:
-        beside.kill()
-        beside.wait()
-
-
-def compile_markers() -> None:
-    """Compile the marker terms on a body at rest; they take as long as everything before the estimate."""
-    import numpy as np
-
-    from kinertia.estimation.simultaneous.frame_blocks import TimeBlock
-    from kinertia.estimation.simultaneous.marker_errors import ErrorProcess
-    from kinertia.estimation.simultaneous.marker_terms import add_markers
-    from kinertia.estimation.simultaneous.motion_basis import MotionBasis
-    from kinertia.estimation.simultaneous.normal_equations import Gradient, NormalEquations
-    from kinertia.estimation.simultaneous.skin import SkinPatterns
-    from kinertia.estimation.simultaneous.visible_markers import seen_markers
-    from kinertia.synthetic.walk import walking_subject
-
-    gc.disable()
-    skeleton = walking_subject().skeleton
-    coordinates, markers = len(skeleton.coordinates), len(skeleton.markers)
-    basis = MotionBasis(0.01 * np.arange(20), 0.05)
-    frames, time_block = len(basis.first), TimeBlock.whole(basis)
-    # the body's parameters stand before the unknowns of the markers
-    columns = slice(10, 10 + 3 * markers)
-    seen = seen_markers(
-        skeleton,
-        np.zeros((frames, markers, 3)),
-        np.zeros((frames, coordinates)),
-        (np.ones(markers), ErrorProcess.double_over(3.0)),
-        (SkinPatterns.none(frames, markers), np.zeros(0)),
-        np.arange(coordinates),
-        np.arange(0),
-    )
-    for kind in (Gradient, NormalEquations):
-        add_markers(kind.zero(time_block.size, coordinates, columns.stop), columns, basis, time_block, seen, 0)
+def _length(*functions: Any) -> int:
+    """Return the length of the bytecode of functions and of all that they call, each counted once."""
+    parts = {function.py_func for function in functions}
+    waiting = list(parts)
+    while waiting:
+        python = waiting.pop()
+        called = {getattr(python.__globals__.get(name), "py_func", None) for name in python.__code__.co_names}
+        waiting += (new := called - parts - {None})
+        parts |= new
+    return sum(len(python.__code__.co_code) for python in parts)

@@ -1,12 +1,13 @@
 """Runs the demo: a synthetic person is measured, estimated and compared with the truth.
 
-The truth differs from the literature as much as people do. Only the comparison at the end uses it; the estimator reads
-the laboratory's files.
+The truth differs from the literature as much as people do, and the laboratory's instruments have errors. Only the
+comparison at the end uses either; the estimator reads the laboratory's files.
 """
 
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pandas as pd
@@ -30,22 +31,24 @@ PLATE_RATE_HZ, SAMPLES_PER_FRAME = 1000.0, 10
 """Force plates at 1000 Hz, cameras at 100 Hz."""
 DURATION_S, START = 2.7, 0.75
 """A bit over two strides, begun so that one right and one left contact are whole."""
+LABORATORY = LabNoise(delay_s=0.008, gain=0.05)
+"""The demo's laboratory: forces are late, and one plate reads too much."""
 
 
 @dataclass(frozen=True, eq=False)
 class Demo:
-    """Fits of synthetic files by both estimators, and the truth behind them.
+    """A fit of synthetic files, and the truth behind them.
 
     Attributes:
-        fit: the simultaneous estimate.
-        two_level: the two-level estimate from the same files.
+        fit: the estimate.
         walk: the person's motion and BSPs, from which the files were made.
+        noise: the laboratory's errors.
         subject_file: subject file of the synthetic laboratory.
     """
 
     fit: Fit
-    two_level: Fit
     walk: SyntheticTrial
+    noise: LabNoise
     subject_file: Path
 
     @property
@@ -55,15 +58,20 @@ class Demo:
 
     @cached_property
     def moment_errors(self) -> dict[str, tuple[float, float]]:
-        """RMS error (N m) of joint moments per joint, by IK + ID and by the simultaneous estimate."""
+        """RMS error (N m) of joint moments per joint, by IK + ID and by the estimate."""
         return truth_of(self.walk, self.fit).moment_errors(self.fit)
+
+    @property
+    def moment_intervals(self) -> dict[str, tuple[float, float]]:
+        """Half-width (N m) of the 95 % intervals of joint moments, and the share that holds the truth, per joint."""
+        return truth_of(self.walk, self.fit).moment_intervals(self.fit)
 
     @cached_property
     def table(self) -> pd.DataFrame:
-        """Table with columns segment, parameter, unit, truth, literature, estimate, sd, two_level."""
-        table = self.fit.bsp[["segment", "parameter", "unit", "literature", "estimate", "sd"]].copy()
+        """Table with columns segment, parameter, unit, truth, literature, estimate, and sd unless after two-level."""
+        table = self.fit.bsp.filter(["segment", "parameter", "unit", "literature", "estimate", "sd"])
         table.insert(3, "truth", self.truth.to_frame()["value"])
-        return table.assign(two_level=self.two_level.bsp["estimate"])
+        return table
 
     def rms_errors(self, source: BodySegmentParameters) -> tuple[float, float, float]:
         """Return the RMS errors over the segments of mass (kg), CoM distance (m), moments of inertia (kg m2)."""
@@ -93,17 +101,17 @@ def write_synthetic_lab(
 def run_demo(
     folder: str | Path,
     seed: int = 1,
-    noise: LabNoise | None = None,
+    noise: LabNoise = LABORATORY,
     progress: Progress = lambda stage, share: None,
+    method: Literal["simultaneous", "two-level"] = "simultaneous",
 ) -> Demo:
     """Make the laboratory's files in `folder`/lab, estimate from them, write results and `bsp_truth.csv` into `folder`.
-
-    The results of the simultaneous estimate are in `folder` itself, those of two-level in `folder`/two-level.
 
     Args:
         folder: folder to write to, made if necessary.
         seed: seed of truth and noise.
-        noise: the default `LabNoise` if None.
+        noise: the laboratory's errors.
+        method: the estimator.
         progress: called as the work progresses.
 
     Raises:
@@ -114,12 +122,11 @@ def run_demo(
         progress("measuring", 0.0)
         wanted, trial = write_synthetic_lab(work / "lab", seed, noise)
         static, inputs, marker_set = read_inputs(wanted, progress)
-        provenance = provenance_of(wanted, command_line(["kinertia", "demo", "-o", str(folder)]))
-        fits = []
-        for method, results in (("simultaneous", work), ("two-level", work / "two-level")):
-            settings = with_settings(wanted, method=method).settings
-            fits.append(estimate_bsp(wanted.subject, static, inputs, settings, marker_set, progress))
-            save_fit(fits[-1], results, provenance, truth_of(trial, fits[-1]), force=True)
-        demo = Demo(fits[0], fits[1], trial, folder / "lab" / "subject.toml")
+        of_method = [] if method == "simultaneous" else ["--method", method]
+        provenance = provenance_of(wanted, command_line(["kinertia", "demo", *of_method, "-o", str(folder)]))
+        settings = with_settings(wanted, method=method).settings
+        fit = estimate_bsp(wanted.subject, static, inputs, settings, marker_set, progress)
+        save_fit(fit, work, provenance, truth_of(trial, fit), force=True)
+        demo = Demo(fit, trial, noise, folder / "lab" / "subject.toml")
         demo.table.to_csv(work / "bsp_truth.csv", index=False, lineterminator="\n")
     return demo

@@ -82,6 +82,14 @@ def inlined(function: F) -> F:
     return _compiled(function, no_cpython_wrapper=True, forceinline=True)
 
 
+def is_stored(value: Any, module: str) -> bool:
+    """Return whether a value is a function of this module whose machine code is stored."""
+    from numba.core.registry import CPUDispatcher
+
+    own = isinstance(value, CPUDispatcher) and value.__module__ == module
+    return own and not value.targetoptions.get("no_cpython_wrapper")
+
+
 def _compiled(function: F, **options: Any) -> F:
     import numba  # imported here so that commands which compute nothing do not load it
 

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kinertia.model.array_types import Bool1, Float2, Float3, Int1
 from kinertia.model.compiled import compiled, inlined, part
 
 
@@ -24,14 +25,14 @@ class KinematicTree(NamedTuple):
         segment_rotation, segment_translation: (s, 3, 3) and (s, 3) m, the segment's frame in its carrier's.
     """
 
-    parent: np.ndarray
-    slides: np.ndarray
-    direction: np.ndarray
-    rotation: np.ndarray
-    translation: np.ndarray
-    carrier: np.ndarray
-    segment_rotation: np.ndarray
-    segment_translation: np.ndarray
+    parent: Int1
+    slides: Bool1
+    direction: Float2
+    rotation: Float3
+    translation: Float2
+    carrier: Int1
+    segment_rotation: Float3
+    segment_translation: Float2
 
 
 @part
@@ -126,7 +127,7 @@ def place_segments(
 
 
 @compiled
-def poses(tree: KinematicTree, at: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def poses(tree: KinematicTree, at: Float2) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Compute segment frames (n, s, 3, 3) and (n, s, 3), and axis motions (n, a, 6), at axis values (n, a)."""
     n, a = at.shape
     s = len(tree.carrier)
@@ -139,7 +140,7 @@ def poses(tree: KinematicTree, at: np.ndarray) -> tuple[np.ndarray, np.ndarray, 
 
 
 @compiled
-def in_segments(tree: KinematicTree, at: np.ndarray, segments: np.ndarray, points: np.ndarray) -> np.ndarray:
+def in_segments(tree: KinematicTree, at: Float2, segments: Int1, points: Float3) -> np.ndarray:
     """Convert points (n, m, 3) from ground axes to the frames of their segments (m,), at axis values (n, a)."""
     n, a = at.shape
     s, result = len(tree.carrier), np.empty(points.shape)

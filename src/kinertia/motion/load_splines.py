@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from kinertia.model.array_types import Float1, Float3, Int1
 from kinertia.model.compiled import compiled, part
 
 _EACH = 9
@@ -10,7 +11,7 @@ _EACH = 9
 
 @compiled
 def loads_and_rates(
-    time: np.ndarray, wrench: np.ndarray, point: np.ndarray, at: np.ndarray, interval: np.ndarray
+    time: Float1, wrench: Float3, point: Float3, at: Float1, interval: Int1
 ) -> tuple[np.ndarray, np.ndarray]:
     """Interpolate loads (n, 2, 6) between samples, N and N m about the ground origin, with their time derivatives.
 

@@ -13,6 +13,7 @@ so that the motion S in the second frame causes, in the first, the generalised f
 
 import numpy as np
 
+from kinertia.model.array_types import Float1, Float2, Float3, Int1
 from kinertia.model.compiled import compiled, inlined, part
 from kinertia.model.kinematic_tree import KinematicTree, hand_down, place_axes
 from kinertia.model.spatial import inner
@@ -79,12 +80,12 @@ def place_marker(rotation: np.ndarray, translation: np.ndarray, local: np.ndarra
 @compiled
 def normal_equations(
     tree: KinematicTree,
-    owner: np.ndarray,
-    slopes: np.ndarray,
-    at: np.ndarray,
-    carrier: np.ndarray,
-    local: np.ndarray,
-    measured: np.ndarray,
+    owner: Int1,
+    slopes: Float2,
+    at: Float2,
+    carrier: Int1,
+    local: Float2,
+    measured: Float3,
     count: int,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Compute J^T J (n, c, c), J^T r (n, c) and r^T r (n,) of the visible markers; r = measured - model.
@@ -148,7 +149,9 @@ def add_force(force: np.ndarray, at: np.ndarray, total: np.ndarray) -> None:
 @part
 def _factors(matrix: np.ndarray, added: float, least: float, upper: np.ndarray, diagonal: np.ndarray) -> None:
     """Factorise matrix + added 1 = U^T D U: unit upper U, and diagonal D of at least `least` despite rounding."""
-    upper[:] = matrix
+    for j in range(len(matrix)):
+        for i in range(j, len(matrix)):
+            upper[j, i] = matrix[j, i]
     for j in range(len(matrix)):
         diagonal[j] = max(upper[j, j] + added, least)
         for i in range(j + 1, len(matrix)):
@@ -160,12 +163,14 @@ def _factors(matrix: np.ndarray, added: float, least: float, upper: np.ndarray, 
 
 
 @compiled
-def damped_steps(normal: np.ndarray, gradient: np.ndarray, damping: np.ndarray) -> np.ndarray:
+def damped_steps(normal: Float3, gradient: Float2, damping: Float1) -> np.ndarray:
     """Solve (normal + damping mean(diag) 1) step = gradient for steps (n, c), frame by frame."""
     n, c = gradient.shape
     step, upper, diagonal = gradient.copy(), np.empty((c, c)), np.empty(c)
     for k in range(n):
-        scale = np.trace(normal[k]) / c
+        scale = 0.0
+        for i in range(c):
+            scale += normal[k, i, i] / c
         _factors(normal[k], damping[k] * scale, 1e-16 * scale, upper, diagonal)
         for m in range(c):
             for i in range(m + 1, c):
@@ -178,7 +183,7 @@ def damped_steps(normal: np.ndarray, gradient: np.ndarray, damping: np.ndarray) 
 
 
 @compiled
-def variances(normal: np.ndarray, added: float) -> np.ndarray:
+def variances(normal: Float3, added: float) -> np.ndarray:
     """Return the diagonals (n, c) of the inverses of normal + added 1, frame by frame."""
     n, c = normal.shape[:2]
     result, upper, diagonal, column = np.zeros((n, c)), np.empty((c, c)), np.empty(c), np.empty(c)

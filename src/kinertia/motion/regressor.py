@@ -2,15 +2,14 @@
 
 import numpy as np
 
+from kinertia.model.array_types import Float2
 from kinertia.model.compiled import compiled, part
 from kinertia.model.kinematic_tree import KinematicTree, place_segments
 from kinertia.motion.rigid_body import empty_frame, move
 
 
 @compiled
-def regressor(
-    tree: KinematicTree, gravity_m_s2: float, x: np.ndarray, v: np.ndarray, a: np.ndarray, about: np.ndarray
-) -> np.ndarray:
+def regressor(tree: KinematicTree, gravity_m_s2: float, x: Float2, v: Float2, a: Float2, about: Float2) -> np.ndarray:
     """Compute the load (n, 6, s, 10) of every segment per unit of its ten parameters, in its own frame.
 
     Moments are about `about`; the other arguments are those of `root_load`. With w, e and b the angular velocity,

@@ -25,6 +25,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kinertia.model.array_types import Bool1, Float2
 from kinertia.model.compiled import compiled, inlined, part
 from kinertia.model.kinematic_tree import KinematicTree, hand_down, place_axes
 from kinertia.model.spatial import force_cross, inner, motion_cross
@@ -244,11 +245,11 @@ def differentiate(tree: KinematicTree, bodies: np.ndarray, frame: Frame) -> None
 def root_load(
     tree: KinematicTree,
     gravity_m_s2: float,
-    bodies: np.ndarray,
-    x: np.ndarray,
-    v: np.ndarray,
-    a: np.ndarray,
-    about: np.ndarray,
+    bodies: Float2,
+    x: Float2,
+    v: Float2,
+    a: Float2,
+    about: Float2,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Compute the load of the whole body, and its derivatives.
 
@@ -281,11 +282,11 @@ def root_load(
 def root_balance(
     tree: KinematicTree,
     gravity_m_s2: float,
-    bodies: np.ndarray,
-    x: np.ndarray,
-    v: np.ndarray,
-    a: np.ndarray,
-    about: np.ndarray,
+    bodies: Float2,
+    x: Float2,
+    v: Float2,
+    a: Float2,
+    about: Float2,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Compute the load (n, 6) as `root_load`, and its derivatives (n, 6, 6) by a of the first six axes, the root's."""
     n, count = x.shape
@@ -321,7 +322,7 @@ def whole_load(parent: np.ndarray, force: np.ndarray, out: np.ndarray, k: int) -
 
 @compiled
 def axis_forces(
-    tree: KinematicTree, gravity_m_s2: float, bodies: np.ndarray, x: np.ndarray, v: np.ndarray, a: np.ndarray
+    tree: KinematicTree, gravity_m_s2: float, bodies: Float2, x: Float2, v: Float2, a: Float2
 ) -> tuple[np.ndarray, np.ndarray]:
     """Compute forces (n, a) of all axes, and the bodies' load (n, 6) at the ground origin; inputs as in `root_load`."""
     n, count = x.shape
@@ -339,11 +340,11 @@ def axis_forces(
 def axis_force_derivatives(
     tree: KinematicTree,
     gravity_m_s2: float,
-    bodies: np.ndarray,
-    x: np.ndarray,
-    v: np.ndarray,
-    a: np.ndarray,
-    moving: np.ndarray,
+    bodies: Float2,
+    x: Float2,
+    v: Float2,
+    a: Float2,
+    moving: Bool1,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Compute forces (n, a) as `axis_forces`, and their derivatives (3, n, a, a) by x, v and a (columns).
 

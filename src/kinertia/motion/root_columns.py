@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from kinertia.model.array_types import Float2, Float3, Int1
 from kinertia.model.compiled import compiled, part
 from kinertia.model.kinematic_tree import KinematicTree, place_segments
 from kinertia.motion.regressor import in_segment, own_regressor
@@ -25,9 +26,9 @@ class Columns(NamedTuple):
         first, last: columns of the unknowns that the ground reactions depend on, last not included.
     """
 
-    moving: np.ndarray
-    still: np.ndarray
-    segments: np.ndarray
+    moving: Int1
+    still: Int1
+    segments: Int1
     wide: int
     first: int
     last: int
@@ -42,15 +43,15 @@ class Columns(NamedTuple):
 def root_columns(
     tree: KinematicTree,
     gravity_m_s2: float,
-    bodies: np.ndarray,
-    motion: tuple[np.ndarray, np.ndarray, np.ndarray],
-    bends: np.ndarray,
-    root: tuple[np.ndarray, np.ndarray],
-    wrench: np.ndarray,
-    chain: np.ndarray,
-    sd: np.ndarray,
+    bodies: Float2,
+    motion: tuple[Float2, Float2, Float2],
+    bends: Float3,
+    root: tuple[Float2, Float2],
+    wrench: Float2,
+    chain: Float3,
+    sd: Float2,
     columns: Columns,
-    static: np.ndarray,
+    static: Float3,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Compute residuals (n, 6) of the root equations over their SDs, and derivatives (3, n, 6, c) by the coordinates.
 

@@ -42,7 +42,7 @@ def both(first: Callable[[], T], second: Callable[[], R]) -> tuple[T, R]:
     >>> both(lambda: 1, lambda: "a")
     (1, 'a')
     """
-    if _cores() < 2 or not _second.acquire(blocking=False):
+    if cores() < 2 or not _second.acquire(blocking=False):
         return first(), second()
     there: list[R] = []
     failed: list[BaseException] = []
@@ -79,7 +79,7 @@ def in_one_thread() -> None:
 
 
 @cache
-def _cores() -> int:
+def cores() -> int:
     """Return the number of cores that this process may use; one in a child process, which shares the machine."""
     if parent_process() is not None:
         return 1

@@ -8,6 +8,7 @@ import numpy as np
 
 from kinertia.estimation.result import Fit
 from kinertia.model.bsp import BodySegmentParameters
+from kinertia.report.wording import INTERVAL_SD
 from kinertia.trial.rms import rms
 
 JOINTS = {
@@ -49,19 +50,32 @@ class Truth:
 
         IK + ID uses measured motion, literature BSPs, and forces as measured.
         """
-        errors = {}
-        for joint, begins in JOINTS.items():
-            columns = [k for k, name in enumerate(fit.skeleton.coordinates) if name.startswith(begins)]
-            before, after = (
-                rms(
-                    np.concatenate([trial.joint_loads[stage] - self.joint_loads[trial.name] for trial in fit.trials])[
-                        :, columns
-                    ]
-                )
-                for stage in ("literature", "estimate")
-            )
-            errors[joint] = (before, after)
-        return errors
+        before, after = (self._moments_off(fit, stage) for stage in ("literature", "estimate"))
+        return {joint: (rms(before[:, own]), rms(after[:, own])) for joint, own in _columns(fit).items()}
+
+    def moment_intervals(self, fit: Fit) -> dict[str, tuple[float, float]]:
+        """Return per joint the median half-width (N m) of the 95 % intervals, and the share that holds the truth.
+
+        Empty after two-level, which has no intervals.
+        """
+        deviations = [trial.deviations.moments for trial in fit.trials if trial.deviations is not None]
+        if not deviations:
+            return {}
+        half, off = INTERVAL_SD * np.concatenate(deviations), np.abs(self._moments_off(fit, "estimate"))
+        return {
+            joint: (float(np.median(half[:, own])), float(np.mean(off[:, own] <= half[:, own])))
+            for joint, own in _columns(fit).items()
+        }
+
+    def _moments_off(self, fit: Fit, stage: str) -> np.ndarray:
+        """Return the errors (w, c) of a stage's joint loads in all trials."""
+        return np.concatenate([trial.joint_loads[stage] - self.joint_loads[trial.name] for trial in fit.trials])
+
+
+def _columns(fit: Fit) -> dict[str, list[int]]:
+    """Return the columns of each joint's coordinates."""
+    names = list(enumerate(fit.skeleton.coordinates))
+    return {joint: [k for k, name in names if name.startswith(begins)] for joint, begins in JOINTS.items()}
 
 
 def truth_rows(fit: Fit, truth: Truth) -> dict[str, list[tuple[str, str, str]]]:

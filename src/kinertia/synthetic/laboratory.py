@@ -4,7 +4,7 @@ The plates measure one right and one left contact; the steps before and after ar
 """
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -37,6 +37,8 @@ class LabNoise:
         force_sd_n: white noise of every force component, N.
         force_offset_sd_n: standard deviation of each plate's constant force offset, N.
         moment_sd_nm: white noise of every moment component, N m.
+        delay_s: delay of the forces relative to the markers.
+        gain: the second plate reads too much, by this share.
     """
 
     skin: Literal["artefact", "study", "none"] = "artefact"
@@ -44,6 +46,8 @@ class LabNoise:
     force_sd_n: float = 1.0
     force_offset_sd_n: float = 1.0
     moment_sd_nm: float = 0.2
+    delay_s: float = 0.0
+    gain: float = 0.0
 
 
 PERFECT = LabNoise("none", 0.0, 0.0, 0.0, 0.0)
@@ -86,7 +90,8 @@ def record(
         moved = SkinMotion.draw(trial.skeleton, q, rng).moved(exact, trial.skeleton, q)
     elif noise.skin == "study":
         moved = study_noise(exact, rng)
-    plates = plate_noise(_plates(trial, samples), noise.force_sd_n, noise.force_offset_sd_n, noise.moment_sd_nm, rng)
+    loads = _misread(_plates(trial, samples), noise.delay_s, noise.gain)
+    plates = plate_noise(loads, noise.force_sd_n, noise.force_offset_sd_n, noise.moment_sd_nm, rng)
     standing = camera_noise(subject.static.markers, noise.camera_sd_m, rng)
     return LabRecordings(
         Recording("static", standing, None, MASS_KG, HEIGHT_M),
@@ -108,6 +113,14 @@ def _plates(trial: SyntheticTrial, samples: int) -> PlateLoads:
         corners.append(middle + signs * [half[0], 0.0, half[1]])
     names = tuple(f"{p}_ground_force" for p in (1, 2))
     return PlateLoads(trial.time[:samples], names, force, moment, (None, None), np.array(corners))
+
+
+def _misread(plates: PlateLoads, delay_s: float, gain: float) -> PlateLoads:
+    """Delay all loads by whole samples; let the second plate read too much."""
+    late = round(delay_s / float(plates.time[1] - plates.time[0]))
+    factor = np.array([[1.0], [1.0 + gain]])
+    force, moment = (factor * np.roll(values, late, axis=0) for values in (plates.force, plates.moment))
+    return replace(plates, force=force, moment=moment)
 
 
 def _contacts(trial: SyntheticTrial, samples: int) -> list[tuple[int, int, int]]:

@@ -93,10 +93,10 @@ def test_a_crash_of_one_fit_is_said_and_the_next_one_is_done(browser, app, monke
     tab.quiet()
 
 
-def test_results_are_listed_opened_again_compared_and_deleted(browser, demo_run, tmp_path):
+def test_results_are_listed_opened_again_compared_and_deleted(browser, demo_run, two_level_run, tmp_path):
     library = tmp_path / "library"
     with running(library) as own:
-        for name, results in (("Spring", demo_run[1]), ("Autumn", demo_run[1] / "two-level")):
+        for name, results in (("Spring", demo_run[1]), ("Autumn", two_level_run[1])):
             folder = own.library.add(name).results
             folder.mkdir()
             for file in ("fit.npz", "fit.json", "report.html"):

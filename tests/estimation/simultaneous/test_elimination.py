@@ -175,7 +175,7 @@ def test_two_threads_give_what_one_gives_bit_for_bit(monkeypatch):
     given = problem.skeleton, problem.prior, problem.calibration, problem.trials
     results = []
     for cores in (1, 2):
-        monkeypatch.setattr(two_threads, "_cores", lambda cores=cores: cores)
+        monkeypatch.setattr(two_threads, "cores", lambda cores=cores: cores)
         results.append(estimate_simultaneous(*given))
     one, two = results
     assert len(problem.time_blocks[0]) > 1

@@ -5,19 +5,20 @@ A load f on a segment reduces the force of every axis S that moves the segment b
 
 import numpy as np
 
+from kinertia.model.array_types import Bool2, Float2, Float3, Float4, Int1
 from kinertia.model.compiled import compiled
 
 
 @compiled
 def add_bodies(
-    axes: np.ndarray,
-    slopes: np.ndarray,
-    rows: np.ndarray,
-    moved: np.ndarray,
-    by_parameter: np.ndarray,
-    segments: np.ndarray,
-    chain: np.ndarray,
-    out: np.ndarray,
+    axes: Float3,
+    slopes: Float2,
+    rows: Int1,
+    moved: Bool2,
+    by_parameter: Float4,
+    segments: Int1,
+    chain: Float3,
+    out: Float3,
 ) -> None:
     """Add the derivatives of generalised forces by the bodies' unknowns to the first columns of `out` (n, c, s).
 
@@ -59,16 +60,16 @@ def add_bodies(
 
 @compiled
 def take_load(
-    axes: np.ndarray,
-    slopes: np.ndarray,
-    rows: np.ndarray,
-    moved: np.ndarray,
-    loads: np.ndarray,
-    by_load: np.ndarray,
+    axes: Float3,
+    slopes: Float2,
+    rows: Int1,
+    moved: Int1,
+    loads: Float2,
+    by_load: Float3,
     first: int,
-    tau: np.ndarray,
-    by_place: np.ndarray,
-    out: np.ndarray,
+    tau: Float2,
+    by_place: Float3,
+    out: Float3,
 ) -> None:
     """Subtract a load on a segment from the forces of the axes that move the segment.
 

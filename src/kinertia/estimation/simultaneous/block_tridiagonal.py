@@ -19,6 +19,7 @@ from kinertia.estimation.simultaneous.blas import (
     subtract_product,
     subtract_square,
 )
+from kinertia.model.array_types import Float2, Float3
 from kinertia.model.compiled import compiled_sums
 
 
@@ -90,7 +91,7 @@ class BlockBand:
 
 
 @compiled_sums
-def _forward(diagonal: np.ndarray, below: np.ndarray, x: np.ndarray) -> None:
+def _forward(diagonal: Float3, below: Float3, x: Float2) -> None:
     """Replace x (b, k) by L^-1 x. For a single column, calling BLAS would take six times as long."""
     for n in range(len(x)):
         own, before = x[n], x[n - 1]
@@ -105,7 +106,7 @@ def _forward(diagonal: np.ndarray, below: np.ndarray, x: np.ndarray) -> None:
 
 
 @compiled_sums
-def _backward(diagonal: np.ndarray, below: np.ndarray, x: np.ndarray) -> None:
+def _backward(diagonal: Float3, below: Float3, x: Float2) -> None:
     """Replace x (b, k) by L^-T x."""
     for n in range(len(x) - 1, -1, -1):
         own = x[n]

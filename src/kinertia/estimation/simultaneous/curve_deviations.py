@@ -236,7 +236,7 @@ def _write_variances(spread: MotionSpread, seen: _Seen, root: np.ndarray, into: 
     for start, stop in zip(starts, np.append(starts[1:], d), strict=True):
         own = slice(start, stop)
         covariance, carried = spread.active(int(seen.first[start]))
-        values, orders = seen.values[:, own], (by.q[own], by.qd[own], by.qdd[own])
+        values, orders = np.ascontiguousarray(seen.values[:, own]), (by.q[own], by.qd[own], by.qdd[own])
         by_splines = np.empty((2, stop - start, c, 6, c), precision)
         write_by_splines(values, *orders, by_splines[0])
         write_by_splines(seen.shares[:, None, None] * values, *orders, by_splines[1])
@@ -263,7 +263,7 @@ def _joint_variances(spread: MotionSpread, seen: _Seen, root: np.ndarray) -> np.
     for start, stop in zip(starts, np.append(starts[1:], d), strict=True):
         own = slice(start, stop)
         covariance, carried = spread.active(int(seen.first[start]))
-        values, orders = seen.values[:, own], (by.q[own], by.qd[own], by.qdd[own])
+        values, orders = np.ascontiguousarray(seen.values[:, own]), (by.q[own], by.qd[own], by.qdd[own])
         by_splines = np.empty((2, stop - start, r, 6, c), precision)
         write_by_splines(values, *orders, by_splines[0])
         write_by_splines(seen.shares[:, None, None] * values, *orders, by_splines[1])

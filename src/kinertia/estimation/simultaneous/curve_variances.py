@@ -2,19 +2,20 @@
 
 import numpy as np
 
+from kinertia.model.array_types import Float1, Float3, Single2, Single3, StridedFloat2, StridedFloat3
 from kinertia.model.compiled import compiled_sums
 
 
 @compiled_sums
 def write_variances(
-    moment: np.ndarray,
-    carried: np.ndarray,
-    shaken: np.ndarray,
-    by_errors: np.ndarray,
-    covariance: np.ndarray,
-    values: np.ndarray,
-    shares: np.ndarray,
-    out: np.ndarray,
+    moment: Single2,
+    carried: Single3,
+    shaken: Single2,
+    by_errors: Single2,
+    covariance: StridedFloat2,
+    values: Float3,
+    shares: Float1,
+    out: StridedFloat3,
 ) -> None:
     """Write variances of coordinates, rates and moments, and the covariances of moments with rates.
 

@@ -22,6 +22,7 @@ from kinertia.estimation.simultaneous.blas import solve_lower
 from kinertia.estimation.simultaneous.block_tridiagonal import BlockBand
 from kinertia.estimation.simultaneous.frame_blocks import TimeBlock, halves
 from kinertia.estimation.simultaneous.normal_equations import SPLINES_PER_BLOCK, Gradient, NormalEquations
+from kinertia.model.array_types import Float4
 from kinertia.model.compiled import compiled
 from kinertia.motion.two_threads import side_by_side
 
@@ -333,7 +334,7 @@ def _eliminated(time_block: TimeBlock, backwards: bool) -> slice:
 
 
 @compiled
-def _blocks(band: np.ndarray, count: int, damping: float, backwards: bool) -> tuple[np.ndarray, np.ndarray]:
+def _blocks(band: Float4, count: int, damping: float, backwards: bool) -> tuple[np.ndarray, np.ndarray]:
     """Return diagonal blocks (b, k, k), k = c SPLINES_PER_BLOCK, and the blocks below them (b - 1, k, k).
 
     They run from the first to the last or backwards; diagonal elements are one beyond the end of the band.

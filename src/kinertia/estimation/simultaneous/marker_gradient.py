@@ -4,6 +4,7 @@ import numpy as np
 
 from kinertia.estimation.simultaneous.marker_errors import LATER
 from kinertia.estimation.simultaneous.visible_markers import PlacedMarkers, SeenMarkers, place_markers
+from kinertia.model.array_types import Float1, Float2, Int1
 from kinertia.model.compiled import compiled, part
 from kinertia.model.kinematic_tree import hand_down
 from kinertia.model.spatial import inner
@@ -13,12 +14,12 @@ from kinertia.motion.marker_sums import add_force
 @compiled
 def add_gradient(
     markers: SeenMarkers,
-    first: np.ndarray,
-    values: np.ndarray,
+    first: Int1,
+    values: Float2,
     own: tuple[int, int],
     still: int,
-    rhs: np.ndarray,
-    static_rhs: np.ndarray,
+    rhs: Float2,
+    static_rhs: Float1,
 ) -> float:
     """Add J^T W r (size, c) and S^T W r (s,) of frames own[0] to own[1] - 1, and return r^T W r.
 

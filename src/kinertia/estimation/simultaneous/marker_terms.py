@@ -19,6 +19,7 @@ from kinertia.estimation.simultaneous.marker_gradient import add_gradient
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.normal_equations import NO_BORDER, Gradient, NormalEquations
 from kinertia.estimation.simultaneous.visible_markers import PlacedMarkers, SeenMarkers, place_markers, seen_markers
+from kinertia.model.array_types import Float1, Float2, Float4, Int1, StridedFloat2, StridedFloat3
 from kinertia.model.compiled import compiled, inlined, part
 from kinertia.model.kinematic_tree import hand_down
 from kinertia.model.spatial import inner
@@ -28,9 +29,9 @@ from kinertia.motion.marker_sums import add_force, add_marker, met_force, swappe
 class _Static(NamedTuple):
     """The static terms S^T W S (s, s), S^T W r (s,) and r^T W r (1,)."""
 
-    square: np.ndarray
-    rhs: np.ndarray
-    cost: np.ndarray
+    square: StridedFloat2
+    rhs: Float1
+    cost: Float1
 
 
 class Markers(CostTerm):
@@ -79,13 +80,13 @@ def add_markers(
 @compiled
 def _add(
     markers: SeenMarkers,
-    first: np.ndarray,
-    values: np.ndarray,
+    first: Int1,
+    values: Float2,
     own: tuple[int, int],
     still: int,
-    band: np.ndarray,
-    border: np.ndarray,
-    rhs: np.ndarray,
+    band: Float4,
+    border: StridedFloat3,
+    rhs: Float2,
     static: _Static,
     bordered: bool,
 ) -> None:

@@ -5,6 +5,7 @@ from typing import Self
 
 import numpy as np
 
+from kinertia.model.array_types import Float3, Float4, Single4
 from kinertia.model.compiled import compiled
 
 SPLINES_PER_BLOCK = 6
@@ -111,7 +112,7 @@ class EquationsPool:
 
 
 @compiled
-def write_by_splines(values: np.ndarray, q: np.ndarray, qd: np.ndarray, qdd: np.ndarray, out: np.ndarray) -> None:
+def write_by_splines(values: Float3, q: Float3, qd: Float3, qdd: Float3, out: Float4 | Single4) -> None:
     """Convert derivatives by q, qd, qdd (d, r, c) to those by the coefficients of the six active splines.
 
     `values` (3, d, 6) are those of the splines and of their first two derivatives; `out` (d, r, 6, c) is written.

@@ -7,6 +7,7 @@ the gain. The errors of a plate are a row of seven: PLATE_ERRORS, then ZERO_UNKN
 
 import numpy as np
 
+from kinertia.model.array_types import Float2, Float3, Int2
 from kinertia.model.compiled import compiled, part
 
 X, Z, GAIN, FREE_MOMENT, TURN, ZERO_X, ZERO_Z = range(7)
@@ -15,12 +16,12 @@ X, Z, GAIN, FREE_MOMENT, TURN, ZERO_X, ZERO_Z = range(7)
 
 @compiled
 def corrected_loads(
-    loads: np.ndarray,
-    loaded: np.ndarray,
-    carrier: np.ndarray,
-    plates: np.ndarray,
-    middles: np.ndarray,
-    turn: np.ndarray,
+    loads: Float3,
+    loaded: Float2,
+    carrier: Int2,
+    plates: Float2,
+    middles: Float2,
+    turn: Float2,
 ) -> np.ndarray:
     """Correct loads on the feet (n, 2, 6) for the plates' errors.
 
@@ -48,12 +49,12 @@ def corrected_loads(
 
 @compiled
 def by_plate(
-    loads: np.ndarray,
-    loaded: np.ndarray,
-    carrier: np.ndarray,
-    plates: np.ndarray,
-    middles: np.ndarray,
-    turn: np.ndarray,
+    loads: Float3,
+    loaded: Float2,
+    carrier: Int2,
+    plates: Float2,
+    middles: Float2,
+    turn: Float2,
 ) -> np.ndarray:
     """Compute the derivatives (n, 2, 6, p, 7) of the output of `corrected_loads` by the plates' errors.
 

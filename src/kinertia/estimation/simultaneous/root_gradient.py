@@ -11,6 +11,7 @@ moves, instead of I and B.
 
 import numpy as np
 
+from kinertia.model.array_types import Float1, Float2, Float3, Int1
 from kinertia.model.compiled import compiled, part
 from kinertia.model.kinematic_tree import KinematicTree, hand_down, place_segments
 from kinertia.model.spatial import force_cross, inner, motion_cross
@@ -23,16 +24,16 @@ from kinertia.motion.root_columns import Columns
 def add_root_gradient(
     tree: KinematicTree,
     gravity_m_s2: float,
-    bodies: np.ndarray,
-    motion: tuple[np.ndarray, np.ndarray, np.ndarray],
-    bends: np.ndarray,
-    root: tuple[np.ndarray, np.ndarray],
-    wrench: np.ndarray,
-    sd: np.ndarray,
+    bodies: Float2,
+    motion: tuple[Float2, Float2, Float2],
+    bends: Float3,
+    root: tuple[Float2, Float2],
+    wrench: Float2,
+    sd: Float2,
     columns: Columns,
-    basis: tuple[np.ndarray, np.ndarray],
-    rhs: np.ndarray,
-    static_rhs: np.ndarray,
+    basis: tuple[Int1, Float3],
+    rhs: Float2,
+    static_rhs: Float1,
 ) -> tuple[float, np.ndarray, np.ndarray]:
     """Add minus the gradient of half the sum of squares by the motion (size, c) and by static coordinates (S,).
 
@@ -63,7 +64,7 @@ def add_root_gradient(
         for r in range(6):
             pull[r] = left[r] / (sd[k, r] * sd[k, r])
             cost += 0.5 * left[r] * pull[r]
-        by_ground[k] = pull
+            by_ground[k, r] = pull[r]
         _at_origin(by_ground[k], about[k])
         _moving_centre(left, pull, slides, first[k], values[0, k], rhs)
         _by_bodies(tree, frame, rotation, translation, by_ground[k], columns.segments, by_bodies)
@@ -194,16 +195,17 @@ def _add_transposed(
 ) -> None:
     """Add the transposed `regressor.own_regressor` times a gradient by force and moment to `out` (10,)."""
     (x, y, z), (mx, my, mz) = force, moment
-    along, square = w[0] * x + w[1] * y + w[2] * z, w[0] * w[0] + w[1] * w[1] + w[2] * w[2]
-    out[0] += b[0] * x + b[1] * y + b[2] * z
-    out[1] += y * e[2] - z * e[1] + w[0] * along - x * square + b[1] * mz - b[2] * my
-    out[2] += z * e[0] - x * e[2] + w[1] * along - y * square + b[2] * mx - b[0] * mz
-    out[3] += x * e[1] - y * e[0] + w[2] * along - z * square + b[0] * my - b[1] * mx
+    wx, wy, wz, ex, ey, ez, bx, by, bz = w[0], w[1], w[2], e[0], e[1], e[2], b[0], b[1], b[2]
+    along, square = wx * x + wy * y + wz * z, wx * wx + wy * wy + wz * wz
+    out[0] += bx * x + by * y + bz * z
+    out[1] += y * ez - z * ey + wx * along - x * square + by * mz - bz * my
+    out[2] += z * ex - x * ez + wy * along - y * square + bz * mx - bx * mz
+    out[3] += x * ey - y * ex + wz * along - z * square + bx * my - by * mx
     # the moments of inertia give (moment) . I e + (moment x w) . I w
-    ux, uy, uz = my * w[2] - mz * w[1], mz * w[0] - mx * w[2], mx * w[1] - my * w[0]
-    out[4] += mx * e[0] + ux * w[0]
-    out[5] += mx * e[1] + my * e[0] + ux * w[1] + uy * w[0]
-    out[6] += my * e[1] + uy * w[1]
-    out[7] += mx * e[2] + mz * e[0] + ux * w[2] + uz * w[0]
-    out[8] += my * e[2] + mz * e[1] + uy * w[2] + uz * w[1]
-    out[9] += mz * e[2] + uz * w[2]
+    ux, uy, uz = my * wz - mz * wy, mz * wx - mx * wz, mx * wy - my * wx
+    out[4] += mx * ex + ux * wx
+    out[5] += mx * ey + my * ex + ux * wy + uy * wx
+    out[6] += my * ey + uy * wy
+    out[7] += mx * ez + mz * ex + ux * wz + uz * wx
+    out[8] += my * ez + mz * ey + uy * wz + uz * wy
+    out[9] += mz * ez + uz * wz

@@ -11,6 +11,7 @@ from kinertia.estimation.simultaneous.layout import Layout
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.normal_equations import NO_BORDER, Gradient, NormalEquations, write_by_splines
 from kinertia.estimation.simultaneous.root_gradient import add_root_gradient
+from kinertia.model.array_types import Float2, Float4, Int1, StridedFloat3
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.compiled import compiled
 from kinertia.model.kinematic_tree import KinematicTree
@@ -205,12 +206,12 @@ def add_root(into: NormalEquations, columns: slice, basis: MotionBasis, start: i
 
 @compiled
 def _add_intervals(
-    rows: np.ndarray,
-    static: np.ndarray,
-    first: np.ndarray,
-    ends: np.ndarray,
-    band: np.ndarray,
-    border: np.ndarray,
+    rows: Float2,
+    static: Float2,
+    first: Int1,
+    ends: Int1,
+    band: Float4,
+    border: StridedFloat3,
     bordered: bool,
 ) -> None:
     """Add squares of derivatives by spline coefficients, rows (6 d, 6 c), and products with static ones (6 d, s).

@@ -6,6 +6,7 @@ import numpy as np
 
 from kinertia.estimation.simultaneous.marker_errors import ErrorInformation, ErrorProcess
 from kinertia.estimation.simultaneous.skin import SkinPatterns
+from kinertia.model.array_types import Float2, Float3, Int1
 from kinertia.model.compiled import part
 from kinertia.model.kinematic_tree import KinematicTree, place_axes
 from kinertia.model.skeleton import Skeleton
@@ -29,20 +30,20 @@ class SeenMarkers(NamedTuple):
     """
 
     tree: KinematicTree
-    column: np.ndarray
-    at: np.ndarray
-    slopes: np.ndarray
-    carrier: np.ndarray
-    local: np.ndarray
-    turned: np.ndarray
-    measured: np.ndarray
-    own: np.ndarray
-    next: np.ndarray
-    second: np.ndarray
-    patterns: np.ndarray
-    first: np.ndarray
-    last: np.ndarray
-    columns: np.ndarray
+    column: Int1
+    at: Float2
+    slopes: Float2
+    carrier: Int1
+    local: Float3
+    turned: Float3
+    measured: Float3
+    own: Float2
+    next: Float2
+    second: Float2
+    patterns: Float2
+    first: Int1
+    last: Int1
+    columns: Int1
 
 
 class PlacedMarkers(NamedTuple):
