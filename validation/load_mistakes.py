@@ -187,6 +187,92 @@ def of_another_trial(person: MeasuredPerson, rng: np.random.Generator) -> Measur
     return None if earlier is None else moved(x_m=0.12, z_m=0.02)(earlier, rng)
 
 
+def vertical_reversed(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPerson:
+    """Reverse the vertical force of the plate that is stood on first, as its channel has it; of a force file the
+    component alone."""
+    plates, first = person.plates, _by_time(person.plates)[0]
+    force, point, torque = acting(plates)
+    reversed_ = force.copy()
+    reversed_[:, first, 1] *= -1.0
+    if plates.corners is None:
+        return person.with_plates(loads_of(plates, reversed_, point, torque))
+    middle = plates.corners.mean(axis=1)[None]
+    about = plates.moment - np.cross(middle, plates.force)
+    return person.with_plates(replace(plates, force=reversed_, moment=about + np.cross(middle, reversed_)))
+
+
+def about_middles(change: Callable[[FloatArray], FloatArray]) -> Change:
+    """Return a fault that changes the moments (k, p, 3) N m about the plates' middles; force files have none."""
+
+    def changed(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPerson | None:
+        plates = person.plates
+        if plates.corners is None:
+            return None
+        about = np.cross(plates.corners.mean(axis=1)[None], plates.force)
+        return person.with_plates(replace(plates, moment=about + change(plates.moment - about)))
+
+    return changed
+
+
+def tilting_reversed(moment: FloatArray) -> FloatArray:
+    """Reverse the horizontal moments: vertical channels 1 and 3, and 2 and 4 of type 3 plates are interchanged."""
+    return moment * np.array([-1.0, 1.0, -1.0])
+
+
+def across_dead(moment: FloatArray) -> FloatArray:
+    """Leave out the moments about X."""
+    return moment * np.array([0.0, 1.0, 1.0])
+
+
+def lateral_and_vertical_moment_reversed(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPerson | None:
+    """Reverse the forces along Z and the vertical moments about the plates' middles; in force files the torques."""
+    plates, signs = person.plates, np.array([1.0, 1.0, -1.0])
+    if plates.corners is None:
+        force, point, torque = acting(plates)
+        return person.with_plates(loads_of(plates, force * signs, point, torque * [1.0, -1.0, 1.0]))
+    middle = plates.corners.mean(axis=1)[None]
+    about = (plates.moment - np.cross(middle, plates.force)) * np.array([1.0, -1.0, 1.0])
+    force = plates.force * signs
+    return person.with_plates(replace(plates, force=force, moment=about + np.cross(middle, force)))
+
+
+def leaking(share: float, alone: bool = True) -> Change:
+    """Return a fault that adds a share of the vertical force to both horizontal ones, of the plate that is stood on
+    first or of all, at the same points."""
+
+    def change(plates: PlateLoads) -> PlateLoads:
+        force, point, torque = acting(plates)
+        wrong = np.isin(np.arange(force.shape[1]), _by_time(plates)[:1]) | (not alone)
+        leaked = np.where(wrong[:, None], share * force[..., 1:2] * np.array([1.0, 0.0, 1.0]), 0.0)
+        return loads_of(plates, force + leaked, point, torque)
+
+    return loads(change)
+
+
+def leaning(axis: str, degrees: float) -> Change:
+    """Return a fault that tilts all forces about a horizontal axis through their points: gravity is not vertical."""
+    turn = Rotation.from_euler(axis, degrees, degrees=True).as_matrix()
+
+    def change(plates: PlateLoads) -> PlateLoads:
+        force, point, torque = acting(plates)
+        return loads_of(plates, force @ turn.T, point, torque)
+
+    return loads(change)
+
+
+def at_rate(factor: float) -> Change:
+    """Return a fault that states the forces at another rate than they were recorded at, from the same beginning."""
+
+    def change(plates: PlateLoads) -> PlateLoads:
+        start = plates.time[0]
+        at = start + (plates.time - start) * factor
+        rows = np.searchsorted(plates.time, at[at <= plates.time[-1]])
+        rows = np.concatenate([rows, np.full(len(plates.time) - len(rows), len(plates.time) - 1)])
+        return replace(plates, force=plates.force[rows], moment=plates.moment[rows])
+
+    return loads(change)
+
+
 def _by_time(plates: PlateLoads) -> list[int]:
     """Return loaded plates in the order of their first load."""
     firm = plates.force[..., 1] > 5 * LOAD_THRESHOLD_N

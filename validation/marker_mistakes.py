@@ -4,8 +4,10 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+from scipy.signal import butter, sosfiltfilt
 from scipy.spatial.transform import Rotation
 
+from kinertia.diagnostics.evidence.body_centre import bridged_trajectory
 from kinertia.model.joint_centres import find_landmarks, hip_in_pelvis, pelvis_frame
 from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, Markers
 from validation.measured_person import MeasuredPerson
@@ -232,6 +234,39 @@ def half_speed(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPers
     if person.plates.corners is not None:
         person = person.with_plates(replace(person.plates, time=slow(person.plates.time)))
     return person.in_walk(lambda markers: replace(markers, time=slow(markers.time)))
+
+
+def few_frames(rate_hz: float) -> Change:
+    """Return a fault that leaves out frames of the walk until about this rate is left."""
+
+    def change(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPerson | None:
+        step = round(person.walk.markers.rate_hz / rate_hz)
+        plates, frames = person.plates, len(person.walk.markers.time)
+        kept = slice(0, frames // step * step, step)
+        own = slice(0, kept.stop * (len(plates.time) // frames))
+        cut = replace(plates, time=plates.time[own], force=plates.force[own], moment=plates.moment[own])
+        return person.with_plates(cut).in_walk(
+            lambda markers: replace(markers, time=markers.time[kept], positions=markers.positions[kept])
+        )
+
+    return change
+
+
+def low_passed(cutoff_hz: float) -> Change:
+    """Return a fault that filters all trajectories of the walk with a zero-lag Butterworth filter of fourth order."""
+
+    def change(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPerson:
+        def smooth(markers: Markers) -> Markers:
+            sections = butter(2, cutoff_hz, fs=markers.rate_hz, output="sos")
+            known = np.stack(
+                [bridged_trajectory(markers.time, one) for one in np.moveaxis(markers.positions, 1, 0)], axis=1
+            )
+            smoothed = sosfiltfilt(sections, known, axis=0)
+            return replace(markers, positions=np.where(np.isfinite(markers.positions), smoothed, np.nan))
+
+        return person.in_walk(smooth)
+
+    return change
 
 
 def virtual_markers(person: MeasuredPerson, rng: np.random.Generator) -> MeasuredPerson | None:

@@ -177,6 +177,30 @@ MISTAKES = (
     Mistake(
         "one plate turned by 5 degrees about the vertical", forces.turned_about_vertical(5.0, True), _codes("P237")
     ),
+    Mistake("vertical force of one plate with the wrong sign", forces.vertical_reversed, _codes("P238", "F157")),
+    Mistake(
+        "vertical channels of each plate interchanged (1 with 3, 2 with 4)",
+        forces.about_middles(forces.tilting_reversed),
+        _codes("P242"),
+    ),
+    Mistake(
+        "lateral forces and vertical moments reversed", forces.lateral_and_vertical_moment_reversed, _codes("P232")
+    ),
+    Mistake("one horizontal moment channel not exported", forces.about_middles(forces.across_dead), _codes("P111")),
+    Mistake(
+        "5 % of the vertical force in the horizontal forces of one plate",
+        forces.leaking(0.05),
+        _codes("P212"),
+    ),
+    Mistake("gravity 5 degrees off the vertical, along the walk", forces.leaning("z", 5.0), _codes("P214")),
+    Mistake("gravity 5 degrees off the vertical, to one side", forces.leaning("x", 5.0), _codes("P214")),
+    Mistake("forces at a rate 8 % off", forces.at_rate(1.08), _codes("T201")),
+    Mistake("markers at 30 Hz", markers.few_frames(30.0), _codes("M124")),
+    Mistake("markers low-passed at 3 Hz", markers.low_passed(3.0), _codes("M133")),
+    Mistake("cameras' scale 2 % too large in the walk", markers.scaled(1.02, "walk"), _codes("S205")),
+    Mistake(
+        "cameras' scale 2 % too large in both trials", markers.scaled(1.02, "both"), _codes("S205", "P243", "P246")
+    ),
     # who
     Mistake("height 20 cm too much", _more(height_m=0.2), _codes("S104")),
     Mistake("height 20 cm too little", _more(height_m=-0.2), _codes("S104")),

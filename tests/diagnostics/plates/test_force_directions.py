@@ -8,11 +8,13 @@ from scipy.spatial.transform import Rotation
 
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.horizontal_velocity import force_velocities
-from kinertia.diagnostics.plates.force_directions import force_directions
+from kinertia.diagnostics.plates.force_directions import force_directions, vertical_signs
+from kinertia.findings.finding import finding
+from kinertia.findings.where import Where
 from kinertia.io.marker_set_file import choose_marker_set
 from loads_and_feet import on_one_plate
 from plate_findings import codes, context_of, found_in, with_force
-from recordings import QUICK_WALKS, RUNS, SQUATS, WALKS, marker_set_for, slow_beside
+from recordings import QUICK_WALKS, RUNS, SQUATS, WALKS, here, marker_set_for, slow_beside
 
 
 @pytest.fixture(params=slow_beside(QUICK_WALKS, WALKS))
@@ -213,3 +215,41 @@ def test_loads_that_no_foot_carries_are_not_judged(recording_of):
     assert [*force_directions(RecordingContext(wrong))] == []
     marker_set = choose_marker_set(walk.markers.labels)
     assert [*force_directions(RecordingContext(replace(wrong, plates=None), marker_set))] == []
+
+
+MEASURED_PLATES = here(["pig_c3d/subject_a_walk.c3d", "pig_c3d/subject_b_walk.c3d"])
+
+
+def about_middles(plates):
+    """Moments about the middles of the plates."""
+    return plates.moment - np.cross(plates.corners.mean(axis=1)[None], plates.force)
+
+
+@pytest.mark.parametrize("name", MEASURED_PLATES)
+def test_a_force_and_the_vertical_moment_reversed_together(recording_of, name):
+    """With the force alone put right, joint moments were 10 SD off."""
+    recording = recording_of(name)
+    plates = recording.plates
+    force = plates.force * [1.0, 1.0, -1.0]
+    for moment_sign, beside in ((-1.0, " and the vertical moment"), (1.0, "")):
+        moment = about_middles(plates) * [1.0, moment_sign, 1.0]
+        moment += np.cross(plates.corners.mean(axis=1)[None], force)
+        (found,) = force_directions(context_of(replace(recording, plates=replace(plates, force=force, moment=moment))))
+        assert (found.code, found.evidence["beside"].value) == ("P232", beside)
+
+
+@pytest.mark.parametrize("name", MEASURED_PLATES)
+@pytest.mark.parametrize("plate", [0, 1])
+def test_a_vertical_force_with_the_wrong_sign(recording_of, name, plate):
+    """The reader turns the whole plate round, whose horizontal forces and corners were then accused."""
+    recording = recording_of(name)
+    plates = recording.plates
+    turned = np.where(np.arange(len(plates.names)) == plate, -1.0, 1.0)[:, None]
+    read_as = finding("F157", Where(plate=plates.names[plate]))
+    force = plates.force * np.where(turned < 0.0, [-1.0, 1.0, -1.0], 1.0)
+    moment = about_middles(plates) * turned + np.cross(plates.corners.mean(axis=1)[None], force)
+    wrong = replace(recording, plates=replace(plates, force=force, moment=moment), findings=(read_as,))
+    (found,) = vertical_signs(context_of(wrong))
+    assert (found.code, found.where.plate) == ("P238", plates.names[plate])
+    whole = replace(recording, findings=(read_as,))  # all channels had the other sign
+    assert [*vertical_signs(context_of(whole))] == []

@@ -67,3 +67,18 @@ def test_what_is_found_is_true(walk, which):
 def test_fault_free_and_displaced_plates_are_not_rotated(walk, offset_m):
     found = found_in(walk, offset_m=offset_m)
     assert found is None or found.code != "P242"
+
+
+@pytest.mark.parametrize("name", here(["pig_c3d/subject_a_walk.c3d", "pig_c3d/subject_b_walk.c3d"]))
+def test_the_remedy_is_that_of_the_forces(recording_of, name):
+    """Of plates whose horizontal forces were right, the order of the corners was to be corrected."""
+    recording, half_turn = recording_of(name), QUARTER @ QUARTER
+    turned = found_in(recording, (0, 1), half_turn)
+    assert "corners" in turned.evidence["mend"].value
+    plates = recording.plates
+    about = np.cross(plates.corners.mean(axis=1)[None], plates.force)
+    moment = about + (plates.moment - about) * [-1.0, 1.0, -1.0]
+    channels = error_of(replace(recording, plates=replace(plates, moment=moment)), feet_of(recording))
+    assert (channels.code, channels.evidence["operation"].value) == ("P242", "rotated by 180 degrees")
+    assert "Fz1 with Fz3" in channels.remedy
+    assert channels.causes != turned.causes

@@ -289,3 +289,18 @@ def test_a_child_who_stands_on_two_plates_is_no_zero():
     moment = 0.01 * force * [0.0, 1.0, 0.0]
     plate = PlateLoads(TIME, ("plate 1", "plate 2"), force, moment, (None, None), unloaded=(load.unloaded,) * 2)
     assert found(plate, mass_kg=20.0) == []
+
+
+def test_a_dead_moment_channel_keeps_the_centre_of_pressure_on_a_line(recording_of):
+    """No channel of forces was dead, and joint moments were 8 SD off."""
+    recording = recording_of("synthetic/walk.c3d")
+    plates = recording.plates
+    about = np.cross(plates.corners.mean(axis=1)[None], plates.force)
+    own = plates.moment - about
+    own[:, 0] *= [0.0, 1.0, 1.0]
+    dead = replace(recording, plates=replace(plates, moment=own + about))
+    assert [(one.code, one.where.plate) for one in found(dead.plates) if one.code == "P111"] == [("P111", "plate 1")]
+    assert [one for one in found(plates) if one.code == "P111"] == []
+    # a depth of the transducers, which readers account for, brings it to life only for horizontal forces
+    deep = own + np.cross([0.0, 0.04, 0.0], plates.force) * [1.0, 1.0, 1.0]
+    assert "P111" in {one.code for one in found(replace(plates, moment=deep + about))}

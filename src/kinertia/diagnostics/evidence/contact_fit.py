@@ -64,11 +64,19 @@ class Hypothesis(NamedTuple):
     finding: Finding
     corrected: PlateLoads | None
 
-    def misfit(self, feet: Feet) -> float:
-        """Return the `ContactFit.misfit` of the corrected loads; infinite where there are none."""
+    def misfit(self, feet: Feet) -> tuple[float, float]:
+        """Return the `ContactFit.misfit` of the corrected loads, and to the centimetre how far the worst step is from
+        its expected centre of pressure (m, RMS), which ranks what fits; infinite where there are none."""
         if self.corrected is None:
-            return np.inf
-        return ContactFit.of(contacts_of(self.corrected, feet), feet).misfit
+            return np.inf, np.inf
+        contacts = contacts_of(self.corrected, feet)
+        off_m = [
+            np.sqrt(np.average(np.square(one.place - expected).sum(axis=1), weights=one.weight))
+            for one in contacts
+            if one.is_step
+            for expected in (feet[one.foot].expected_cop(one.time, one.weight),)
+        ]
+        return ContactFit.of(contacts, feet).misfit, round(float(max(off_m, default=0.0)), 2)
 
 
 def _delays(contact: PlateContact, foot: FootTrajectory) -> list[float]:

@@ -19,6 +19,9 @@ from kinertia.findings.quantity import Quantity
 from kinertia.trial.data import Markers
 
 _QUICK_HZ, _LEAST_SHARE, _USUAL_SHARE, _LEAST_SWING_M_S = 4.0, 0.002, (0.008, 0.06), 1.0
+_CERTAIN_SHARE, _QUICK_OF_STANCE = 0.0013, 3.1
+"""Share that no fault-free motion has, of 30 (0.008 and more): after a filter at 3 Hz it is 0.0002 to 0.0012. Who
+stands longer also swings more slowly: the limit of quick motion in Hz is at most the latter over the stance in s."""
 _MOST_RATIO, _USUAL_RATIO, _RATIO_OF_A_RATE = 1.15, (0.8, 1.05), 1.8
 _RIGID_M = 0.0115
 """Distances between markers of a shank change by up to 10 mm (median over pairs, 2 to 98 %). A filter shortens whatever
@@ -31,12 +34,12 @@ def over_smoothed(context: RecordingContext) -> Iterator[Finding]:
     trial, owners, changes = context.trial, context.segment_of_label, context.velocity_changes
     if trial is None or changes is None or not context.has_strides:
         return
-    share = _quick_share(trial.markers, owners)
+    share = _quick_share(trial.markers, owners, _quick_hz(context))
     if share is None or share > _LEAST_SHARE:
         return
     ratio = min(changes.vertical_ratio(shown) or 0.0 for shown in (changes.pelvis, changes.centre))
     rigid = ratio > _RATIO_OF_A_RATE and _distances_change_m(trial.markers, owners) < _RIGID_M
-    if ratio >= _MOST_RATIO and not rigid:
+    if (ratio >= _MOST_RATIO or share <= _CERTAIN_SHARE) and not rigid:
         yield finding(
             "M133",
             context.at(),
@@ -45,7 +48,13 @@ def over_smoothed(context: RecordingContext) -> Iterator[Finding]:
         )
 
 
-def _quick_share(markers: Markers, owners: Mapping[str, str]) -> float | None:
+def _quick_hz(context: RecordingContext) -> float:
+    """Return the frequency above which motion is quick, lower for somebody whose steps last long."""
+    stances = [one.end_s - one.start_s for one in context.contacts if one.is_step]
+    return min(_QUICK_HZ, _QUICK_OF_STANCE / float(np.median(stances))) if stances else _QUICK_HZ
+
+
+def _quick_share(markers: Markers, owners: Mapping[str, str], quick_hz: float) -> float | None:
     """Return the fast share of the energy of motion, median over swinging feet's markers; None where no foot swings."""
     shares = []
     for k, label in enumerate(markers.labels):
@@ -58,7 +67,7 @@ def _quick_share(markers: Markers, owners: Mapping[str, str]) -> float | None:
             continue
         power = np.square(np.abs(np.fft.rfft(velocity * np.hanning(len(velocity))[:, None], axis=0))).sum(axis=1)
         frequency = np.fft.rfftfreq(len(velocity), 1.0 / markers.rate_hz)
-        shares.append(float(power[frequency > _QUICK_HZ].sum() / power.sum()))
+        shares.append(float(power[frequency > quick_hz].sum() / power.sum()))
     return float(np.median(shares)) if shares else None
 
 

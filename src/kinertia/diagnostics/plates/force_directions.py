@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
+from kinertia.diagnostics.evidence.braking import push_share
 from kinertia.diagnostics.evidence.horizontal_velocity import LEAST_CHANGE_M_S, ForceVelocity, VelocityChanges
 from kinertia.diagnostics.evidence.horizontal_velocity_residual import (
     CLEARLY_BEST,
@@ -25,7 +26,9 @@ from kinertia.diagnostics.evidence.horizontal_velocity_residual import (
 from kinertia.findings.finding import Finding, finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.rule import rule
+from kinertia.trial.centre_of_pressure import FIRM_LOAD_N, free_moment
 from kinertia.trial.data import PlateLoads, Trial
+from kinertia.trial.rms import rms
 from kinertia.trial.sampled_time import span_s
 
 _OPPOSED, _USUAL_CORRELATION = -0.4, (0.5, 1.0)
@@ -37,6 +40,10 @@ ones 0.9 (squats), 1.4 (runs) and more."""
 _ONE_MISREAD = 0.8
 """Where one plate's axes are exchanged or rotated, undoing it leaves 0.06 to 0.78 on 19 walks, on fault-free ones 1 and
 more."""
+
+
+_MUCH_SMALLER = 0.5
+_LEAST_PUSH, _USUAL_PUSH = 0.02, (0.08, 0.3)
 
 
 @dataclass(frozen=True)
@@ -118,8 +125,40 @@ def _reversed_axis(context: RecordingContext, residual: VelocityResidual, correl
         context.at(**context.along(axis)),
         correlation=Quantity(correlation, "1", limit=_OPPOSED, usual=_USUAL_CORRELATION),
         velocity_residual_m_s=residual.evidence(residual.all_reversed, residual.as_read),
+        beside=Quantity(" and the vertical moment" if _moment_reversed(context.plates, axis) else ""),
     )
     return _Hypothesis(found, residual.all_reversed)
+
+
+def _moment_reversed(plates: PlateLoads | None, axis: int) -> bool:
+    """Return whether the vertical moments of all plates are reversed like the forces along an axis: free moments are
+    small, and about the middle of a plate a vertical moment of the wrong sign leaves twice that of the forces."""
+    if plates is None or plates.corners is None:
+        return False
+    middle = plates.corners.mean(axis=1)[None]
+    force = plates.force * np.where(np.arange(3) == axis, -1.0, 1.0)
+    about = plates.moment - np.cross(middle, plates.force)
+    loaded = plates.force[..., 1] > FIRM_LOAD_N
+    if not loaded.any():
+        return False
+    left_nm = [
+        rms(free_moment(np.concatenate([force, about * [1.0, sign, 1.0] + np.cross(middle, force)], axis=2))[loaded])
+        for sign in (1.0, -1.0)
+    ]
+    return left_nm[1] < _MUCH_SMALLER * left_nm[0]
+
+
+def vertical_signs(context: RecordingContext) -> Iterator[Finding]:
+    """Report P238: a plate that was reversed when it was read, since its vertical force pointed down, unlike others',
+    and that pushes first and brakes later since."""
+    plates, reversed_ = context.plates, {one.where.plate for one in context.recording.findings if one.code == "F157"}
+    if plates is None or context.is_static:
+        return
+    pushes = {name: push_share(plates, p, context.travel) for p, name in enumerate(plates.names)}
+    others = [share for name, share in pushes.items() if name not in reversed_ and share is not None]
+    for name, share in pushes.items():
+        if name in reversed_ and share is not None and share < -_LEAST_PUSH < 0.0 < min(others, default=-1.0):
+            yield finding("P238", context.at(plate=name), push_share=Quantity(share, "1", usual=_USUAL_PUSH))
 
 
 def _reversed_plate(

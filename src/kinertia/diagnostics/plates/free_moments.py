@@ -77,7 +77,8 @@ def _about_fixed_point(
     context: RecordingContext, plates: PlateLoads, explained: Container[str | None]
 ) -> Iterator[Finding]:
     """Report P261: vertical moments about a fixed point, the plate's middle or the origin (Mz for Tz), not free
-    moments. Beside one plate whose moments are too large, smaller ones that a point explains are of the same kind.
+    moments. Beside one plate whose moments are too large, smaller ones that a point explains are of the same kind,
+    in force files, whose export made all of them alike.
     """
     found, too_large = [], False
     for name, wrench in loaded_wrenches(plates, _FEWEST):
@@ -86,7 +87,7 @@ def _about_fixed_point(
         torque = free_moment(wrench)
         lever_arm_m = float(np.percentile(np.abs(torque) / wrench[:, 1], _USUAL_PERCENT))
         point, left = _fixed_point(wrench, torque)
-        if rms(torque) > _ACCOUNTED * rms(left):
+        if rms(torque) > _ACCOUNTED * rms(left) and (lever_arm_m > _LONG_ARM_M or plates.corners is None):
             too_large |= lever_arm_m > _LONG_ARM_M
             found.append(
                 finding(

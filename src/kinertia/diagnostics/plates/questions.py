@@ -9,7 +9,7 @@ from kinertia.diagnostics.plates.axes_and_units import axes_and_units
 from kinertia.diagnostics.plates.cop_on_plate import cop_on_plate
 from kinertia.diagnostics.plates.cop_positions import loads_and_feet
 from kinertia.diagnostics.plates.cop_progression import cop_progression
-from kinertia.diagnostics.plates.force_directions import force_directions
+from kinertia.diagnostics.plates.force_directions import force_directions, vertical_signs
 from kinertia.diagnostics.plates.foreign_load import foreign_load, stray_loads
 from kinertia.diagnostics.plates.free_moments import free_moments
 from kinertia.diagnostics.plates.gains import gains
@@ -17,7 +17,7 @@ from kinertia.diagnostics.plates.ground_contact import both_feet, complete_conta
 from kinertia.diagnostics.plates.mains_interference import mains_interference
 from kinertia.diagnostics.plates.quantisation import quantisation
 from kinertia.diagnostics.plates.repeated_plates import repeated_plates
-from kinertia.diagnostics.plates.signals import signals, spikes
+from kinertia.diagnostics.plates.signals import dead_moments, signals, spikes
 from kinertia.diagnostics.plates.vertical_moment import vertical_moment
 from kinertia.diagnostics.plates.zeros import unloaded_levels, zeros
 from kinertia.diagnostics.plates.zeros_under_load import zeros_under_load
@@ -40,17 +40,19 @@ PLACE_QUESTIONS: tuple[Question[RecordingContext], ...] = (
 )
 _OTHER_AXES = ("P201",)
 """ERROR after which there is no vertical force to judge by."""
-_NO_VELOCITY = ("L20", "M12", "M14", "P10", "P20", "P24", "T201", "T211", "T212")
+_NO_VELOCITY = ("L20", "M12", "M14", "P10", "P11", "P20", "P24", "T201", "T211", "T212")
 """ERRORs after which markers, forces or their times do not belong to one moving body."""
 
 SIGNAL_QUESTIONS: tuple[Question[RecordingContext], ...] = (
     Question("P20", axes_and_units),
     Question("P28", repeated_plates),
     Question("P10", signals, unless=_OTHER_AXES),
+    Question("P11", dead_moments, unless=_OTHER_AXES),
     Question("P10", quantisation, unless=_OTHER_AXES),
     Question("P10", mains_interference, unless=_OTHER_AXES),
     Question("P21", zeros, unless=_OTHER_AXES),
     Question("P26", free_moments, unless=_OTHER_AXES),
+    Question("P23", vertical_signs, unless=_OTHER_AXES),
 )
 STANDING_QUESTIONS: tuple[Question[RecordingContext], ...] = (Question("P10", spikes), Question("P21", unloaded_levels))
 LOADED_QUESTIONS: tuple[Question[RecordingContext], ...] = (

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
+from kinertia.diagnostics.evidence.braking import push_share
 from kinertia.diagnostics.evidence.contact_fit import Feet, Hypothesis
 from kinertia.diagnostics.evidence.plate_contacts import PlateContact, cop_horizontal, displaced
 from kinertia.findings.finding import finding
@@ -19,13 +20,25 @@ from kinertia.trial.rms import rms
 _WRONG_M, _RIGHT_M, _CLEARLY_BEST = 0.1, 0.08, 0.6
 _ORDER = "a wrong order of the corners"
 _CHANNELS = "interchanged channels of the plate moments Mx and My"
+_ABOUT_X, _ABOUT_Z = (f"a wrong sign of the plate moment about {axis}" for axis in "XZ")
+_TILTING = "wrong signs of the plate moments Mx and My, or vertical channels interchanged with the opposite ones"
+_MENDING = {
+    _ORDER: "Correct the order of the corners",
+    _TILTING: "Reverse Mx and My; of four vertical channels interchange Fz1 with Fz3, and Fz2 with Fz4",
+    _ABOUT_X: "Reverse the plate moment about X",
+    _ABOUT_Z: "Reverse the plate moment about Z",
+    _CHANNELS: "Interchange the channels of Mx and My",
+}
+_HALF_TURN = "rotated by 180 degrees"
+LEAST_PUSH = 0.02
+"""Of forces that go with the motion; a plate that is rotated by its corners shows them reversed."""
 _OPERATIONS = (
     # places (x, z) from the plate's middle; from Z to X is a positive rotation about Y
-    ("rotated by 180 degrees", ((-1, 0), (0, -1)), _ORDER),
+    (_HALF_TURN, ((-1, 0), (0, -1)), _ORDER),
     ("rotated by 90 degrees", ((0, -1), (1, 0)), _ORDER),
     ("rotated by -90 degrees", ((0, 1), (-1, 0)), _ORDER),
-    ("mirrored along X", ((-1, 0), (0, 1)), "a wrong sign of the plate moment about Z"),
-    ("mirrored along Z", ((1, 0), (0, -1)), "a wrong sign of the plate moment about X"),
+    ("mirrored along X", ((-1, 0), (0, 1)), _ABOUT_Z),
+    ("mirrored along Z", ((1, 0), (0, -1)), _ABOUT_X),
     ("mirrored along a diagonal", ((0, 1), (1, 0)), _CHANNELS),
     ("mirrored along a diagonal", ((0, -1), (-1, 0)), _CHANNELS),
 )
@@ -57,6 +70,8 @@ def rotated_plates(context: RecordingContext) -> Iterator[Hypothesis]:
         return
     wrong = list(best[1:])
     operation, matrix, cause = _OPERATIONS[best[0]]
+    if operation == _HALF_TURN and min(push_share(plates, p, context.travel) or 0.0 for p in wrong) > LEAST_PUSH:
+        cause = _TILTING
     point = cop_horizontal(plates)
     by = np.zeros_like(point)
     by[:, wrong] = (_turned(point, middle, matrix) - point)[:, wrong]
@@ -64,6 +79,7 @@ def rotated_plates(context: RecordingContext) -> Iterator[Hypothesis]:
         "P242",
         context.at(plate=plates.names[wrong[0]] if len(wrong) == 1 else None),
         causes=(cause,),
+        mend=Quantity(_MENDING[cause]),
         before_m=Quantity(float(read_m.max()), "m", limit=_WRONG_M, usual=(0.016, 0.075)),
         after_m=Quantity(float(left_m[best].max()), "m", limit=_RIGHT_M),
         operation=Quantity(operation),

@@ -17,7 +17,7 @@ from kinertia.trial.data import BoolArray, FloatArray, PlateLoads
 from kinertia.trial.force_spikes import LIMITS_N
 from kinertia.trial.sampled_time import runs, span_s
 
-_DEAD_N = 0.5
+_DEAD_N, _DEAD_NM = 0.5, 0.5
 """Amplifiers have more noise than this."""
 _CARRIED_SHARE = 0.4
 """Share of the median load that a foot at contact or off takes several samples to gain or lose."""
@@ -53,6 +53,30 @@ def _dead_channels(context: RecordingContext, plates: PlateLoads) -> Iterator[Fi
                     "P101",
                     context.at(plate=name, **context.along(axis)),
                     peak_horizontal_n=Quantity(largest, "N", limit=_DEAD_N),
+                    peak_vertical_n=Quantity(float(wrench[:, 1].max()), "N"),
+                )
+
+
+def dead_moments(context: RecordingContext) -> Iterator[Finding]:
+    """Report P111: a horizontal axis about whose middle a plate that supports a person has no moment; readers add to
+    that of its channel the horizontal force times the depth of the transducers."""
+    plates, corners = context.plates, None if context.plates is None else context.plates.corners
+    if plates is None or corners is None:
+        return
+    for name, wrench in carrying(plates, context.adult_share):
+        p = plates.names.index(name)
+        middle, edges = corners[p].mean(axis=0), corners[p][[1, 3]] - corners[p][0]
+        about = wrench[:, 3:] - np.cross(middle, wrench[:, :3])
+        for edge in edges / np.linalg.norm(edges, axis=1, keepdims=True):
+            moment, force = about @ edge, wrench[:, :3] @ np.cross([0.0, 1.0, 0.0], edge)
+            depth = float(force @ moment) / max(float(force @ force), 1e-9)
+            largest = float(np.abs(moment - depth * force).max())
+            if largest < _DEAD_NM:
+                axis = int(np.argmax(np.abs(edge)))
+                yield finding(
+                    "P111",
+                    context.at(plate=name, **context.along(axis)),
+                    peak_nm=Quantity(largest, "N m", limit=_DEAD_NM),
                     peak_vertical_n=Quantity(float(wrench[:, 1].max()), "N"),
                 )
 

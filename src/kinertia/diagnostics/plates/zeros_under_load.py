@@ -17,6 +17,7 @@ from kinertia.findings.finding import Finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.rule import rule
 from kinertia.model.skeleton import GRAVITY_M_S2
+from kinertia.trial.centre_of_pressure import FIRM_LOAD_N
 from kinertia.trial.data import FloatArray, PlateLoads
 from kinertia.trial.sampled_time import span_s, within
 
@@ -115,14 +116,19 @@ def _plate_zero(
     names = [plates.names[p] for p in np.flatnonzero(residual.plate_zeroed * CLEARLY_BEST < zeroed)]
     if all_plates and not (len(names) == 1 and zeroed < CLEARLY_BEST * residual.without_trend):
         return None
+    vertical_n = plates.force[:, best, 1]
+    share = zero_offset_n / float(vertical_n[vertical_n > FIRM_LOAD_N].mean())
     evidence = {
         "offset_n": Quantity(zero_offset_n, "N", limit=limit_n, usual=(-9.0, 9.0)),
+        "share": Quantity(share, "1"),
         "velocity_residual_m_s": residual.evidence(zeroed, limit_m_s),
     }
-    levels = _levels(plates, axis)
+    levels, causes = _levels(plates, axis), rule("P212").causes
     if levels is not None:
         evidence["unloaded_n"] = Quantity(float(levels[best]), "N")
+        # an amplifier's zero is the same unloaded
+        causes = causes if abs(levels[best] - zero_offset_n) < _AGREES * abs(zero_offset_n) else causes[::-1]
     if len(names) > 1:
         evidence["plate"] = Quantity(" or ".join(names))
     place = context.at(plate=names[0] if len(names) == 1 else None, **context.along(axis))
-    return with_evidence("P212", place, evidence)
+    return with_evidence("P212", place, evidence, causes=causes)

@@ -14,6 +14,7 @@ from kinertia.estimation.simultaneous.calibration_entry import DELAY, ZERO, Cali
 from kinertia.findings.finding import Finding, Severity, finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
+from kinertia.model.skeleton import GRAVITY_M_S2
 
 _SD = 2.0
 _FEWEST = 2
@@ -79,5 +80,8 @@ def zero_offsets(context: ResultContext) -> Iterator[Finding]:
                 "P214",
                 context.along(axis, trial),
                 force_n=Quantity(float(np.mean(read_n)), "N", sd=max(one.sd for one in own)),
+                tilt_rad=Quantity(
+                    float(np.arctan(np.sum(read_n) / (GRAVITY_M_S2 * context.ready.total_mass.total_kg))), "rad"
+                ),
                 zero_offset_n=Quantity(read_n, "N", limit=2.0 * own[0].prior_sd),
             )
