@@ -44,12 +44,10 @@ def plate_positions(context: ResultContext) -> Iterator[Finding]:
 
 def _ambiguous(context: ResultContext, axis: str, errors: Sequence[CalibrationEntry]) -> list[Finding]:
     """Report P247: a plate seems displaced, but another may be instead. The uncertainty of each plate is ignored, since
-    it is what is ambiguous, but the difference of the plates must be certain. What all plates share makes none differ:
-    the limit is two SDs of a plate's own prior.
+    it is what is ambiguous, but the difference of the plates must be certain.
     """
     prior, posterior = context.ready.uncertainty.instruments, context.fit.posterior
-    beyond_m = 2.0 * prior.plate[axis].sd
-    off = [one for one in errors if abs(one.value) > beyond_m and not one.contradicted_by]
+    off = [one for one in errors if one.notable and not one.contradicted_by]
     if posterior is None or prior.plate[axis].fault_probability == 0.0 or not off:
         return []
     apart_m, each_m = position_deviations(posterior.instruments, prior, axis)

@@ -26,17 +26,14 @@ scale and plates of a laboratory may differ by 2 % before it is worth a warning.
 the vertical force at 0.3 m, and ten times that (no source). Turn: plates are mounted square; a corner that was surveyed
 or entered 25 mm beside its place rotates a plate by 3 degrees (no source)."""
 FLOOR_PRIOR: Mapping[str, FaultMixture] = {
-    "x": FaultMixture(0.0005, 0.015, FAULT_PROBABILITY),
-    "z": FaultMixture(0.0005, 0.015, FAULT_PROBABILITY),
+    "x": FaultMixture(0.0005, 0.005, FAULT_PROBABILITY),
+    "z": FaultMixture(0.0005, 0.005, FAULT_PROBABILITY),
     "turn": FaultMixture(float(np.radians(0.3)), float(np.radians(2.0)), 0.2),
 }
-"""Names and units as in FLOOR_UNKNOWNS: plates and cameras were surveyed in different axes. Position: as wide as a
-plate's own. With 5 mm, 95 % intervals of knee and ankle moments cover 37 to 43 % where OpenSim's walks have both plates
-20 mm off along the walk; with 15 mm 53 to 84 %, and errors are a fifth to a quarter smaller. Where plates are right,
-errors are equal and intervals 1 to 4 % longer; with four times the fault probability they would be 30 % longer. Turn:
-with a prior of 5 degrees, walks and runs of eleven laboratories show 0.2 to 0.5 degrees where they show them to half a
-degree (three), 1.6 and 3.6 degrees in two, and in the others less than their SDs, of 1 to 2 degrees. A frame laid on
-the floor by eye is a few degrees askew."""
+"""Names and units as in FLOOR_UNKNOWNS: plates and cameras were surveyed in different axes. Turn: with a prior of 5
+degrees, walks and runs of eleven laboratories show 0.2 to 0.5 degrees where they show them to half a degree (three),
+1.6 and 3.6 degrees in two, and in the others less than their SDs, of 1 to 2 degrees. A frame laid on the floor by eye
+is a few degrees askew."""
 DELAY_PRIOR_S = FaultMixture(0.0003, 0.005, 0.2, faulty_mean=0.006)
 """Apparent delay of the forces; soft tissue may contribute. Synchronous: half a sample of the plates. Delayed:
 published recordings show 7, 7, 7, 8.4, 13.5, -12 and 0.2 ms, twelve children on one pair of plates 9 ms: rather late
