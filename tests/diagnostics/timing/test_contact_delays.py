@@ -71,12 +71,8 @@ def test_a_foot_that_is_hidden_while_it_stands(walk, side):
 
 
 def test_two_contacts_do_not_distinguish_a_rate_from_a_delay(walk):
-    """Both are named; three contacts do."""
+    """Both are named."""
     found = found_in(walk, 1.05)
-    if found.code == "T201":
-        assert found.evidence["contacts"].value >= 3
-        assert found.evidence["ratio"].value == pytest.approx(1.05, abs=0.02)
-        return
     assert found.code == "T211"
     assert found.evidence["rate_alternative"].value == pytest.approx(0.05, abs=0.025)
 

@@ -18,7 +18,7 @@ from kinertia.findings.quantity import Quantity
 from kinertia.trial.data import FloatArray, PlateLoads
 
 _WRONG_S, _CLEARLY_BEST = 0.045, 0.5
-_LEAST_RATE, _MOST_RATE, _RATE_STEP = 1.04, 2.5, 0.01
+_LEAST_RATE, _MOST_RATE, _RATE_STEP = 1.08, 2.5, 0.01
 """Range and step of rate factors; smaller errors show in the growing delay of many contacts (`contact_delays`)."""
 _LONGEST_DELAY_S, _DELAY_STEP_S = 0.25, 0.01
 
