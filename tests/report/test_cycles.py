@@ -306,9 +306,9 @@ def next_to_opensim(fit_with_model, measured_folder):
     spline = smooth(
         coordinates.index.to_numpy(), np.where(trial.skeleton.rotational, np.radians(values), values), OPENSIM_FILTER_HZ
     )
-    k = replace(trial.kinematics, spline=spline, windows_s=((spline.time[0], spline.time[-1]),))
+    k = replace(trial.kinematics, spline=spline, windows_s=((spline.time[0], spline.time[-1]),), known=None)
     usual = inverse_dynamics(fit.skeleton, fit.literature, k.motion, measured_reactions(k).at(k.time))
-    moved = replace(trial, kinematics=k, joint_loads={"literature": usual})
+    moved = replace(trial, kinematics=k, motion=k.motion, joint_loads={"literature": usual}, joint_curves=None)
     known = (stride.time >= moments.index[0]) & (stride.time <= moments.index[-1])
     assert 75 < known.sum() < 85
 
