@@ -14,6 +14,7 @@ import pytest
 from command_line import run
 from found import FAULT_FREE, UNEXPLAINED, UNUSABLE
 from kinertia.diagnostics.result.suitability import Suitability
+from kinertia.estimation.joint_curves import JointCurves
 from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
 from kinertia.io.provenance import provenance_of
 from kinertia.io.subject_file import read_subject
@@ -313,17 +314,42 @@ def prolonged(trial, times):
             again(loads.moment, inside),
         ),
         measured=np.ones(len(time), dtype=bool),
+        leg_known=None,
+        on_ground=again(kinematics.trial.on_ground, shown),
     )
+    curves = trial.joint_curves
+    own = shown - kinematics.course_frames.start
+
+    def parts(one, frames=slice(None)):
+        return {name: again(getattr(one, name), frames) for name in vars(one)}
+
+    def joints(one):
+        return replace(one, moments=again(one.moments, own), forces=again(one.forces, own))
+
     solved = replace(ik, time=time, q=again(ik.q, shown), errors_m=again(ik.errors_m, shown))
     return replace(
         trial,
-        kinematics=replace(kinematics, trial=walked, ik=solved, windows_s=((0.0, float(time[-1])),)),
-        motion=Motion(*(again(getattr(trial.motion, name)) for name in ("q", "qd", "qdd"))),
+        kinematics=replace(
+            kinematics,
+            trial=walked,
+            ik=solved,
+            windows_s=((0.0, float(time[-1])),),
+            known=again(kinematics.known, shown),
+        ),
+        motion=Motion(**parts(trial.motion)),
         residuals={stage: again(values) for stage, values in trial.residuals.items()},
         full_residuals={stage: again(values) for stage, values in trial.full_residuals.items()},
         joint_loads={stage: again(values) for stage, values in trial.joint_loads.items()},
-        deviations=CurveDeviations(*(again(each) for each in vars(trial.deviations).values())),
+        deviations=CurveDeviations(**parts(trial.deviations)),
         marker_errors_m={stage: again(values) for stage, values in trial.marker_errors_m.items()},
+        joint_curves=JointCurves(
+            time,
+            again(curves.known, own),
+            Motion(**parts(curves.motion, own)),
+            {stage: again(values, own) for stage, values in curves.forces.items()},
+            {stage: joints(one) for stage, one in curves.joints.items()},
+            CurveDeviations(**parts(curves.deviations, own)),
+        ),
     )
 
 
