@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal
 import typer
 
 from kinertia.cli.findings_view import show_overview
+from kinertia.cli.fit_report import show_coverage
 from kinertia.cli.measured_demo import run_measured_demo
 from kinertia.cli.options import Output, Overwrite, Quiet, results_folder
 from kinertia.cli.outcome import Outcome
@@ -63,6 +64,7 @@ def _measured_demo(folder: Path) -> Outcome:
         "plates, from https://github.com/opensim-org/opensim-models (Apache License 2.0)."
     )
     show_overview(fit.overview, verbose=False)
+    show_coverage(fit)
     lab = folder / "lab"
     check = command_line(["kinertia", "check", str(lab / "subject.toml")])
     out.print(

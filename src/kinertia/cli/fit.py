@@ -9,7 +9,7 @@ import numpy as np
 import typer
 
 from kinertia.cli.findings_view import show_idle_waivers, show_overview, waivers_reported
-from kinertia.cli.fit_report import report_tables
+from kinertia.cli.fit_report import report_tables, show_coverage
 from kinertia.cli.next_commands import next_commands
 from kinertia.cli.options import (
     Calibrate,
@@ -32,7 +32,6 @@ from kinertia.cli.options import (
 from kinertia.cli.outcome import Outcome, of_error
 from kinertia.cli.terminal import out, show_problem, shown_progress
 from kinertia.errors import FileError, KinertiaError
-from kinertia.estimation.leg_moments import coverage_sentence
 from kinertia.estimation.result import Fit
 from kinertia.io.file_names import same_folder
 from kinertia.io.number_table import expect_path
@@ -193,8 +192,7 @@ def _show(fit: Fit, run: _Run, verbose: bool, tables: bool) -> None:
         report_tables(fit)
     show_overview(fit.overview, verbose)
     show_idle_waivers(run.overrule.waive, fit.overview.findings)
-    if covered := coverage_sentence(fit.trials):
-        out.print(f"joint moments {covered}", soft_wrap=True)
+    show_coverage(fit)
     out.print(f"results in {run.folder}", soft_wrap=True)
 
 

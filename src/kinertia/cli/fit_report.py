@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from kinertia.cli.terminal import out, plain_table
 from kinertia.estimation.identifiability import evidence
+from kinertia.estimation.leg_moments import coverage_sentence
 from kinertia.estimation.result import Fit
 from kinertia.report.files import summary
 from kinertia.report.wording import start_of
@@ -15,6 +16,12 @@ if TYPE_CHECKING:
 
 _MARKS = {"measured": "**", "informed": "*", "assumed": "", "held": ""}
 _STAGES = ("literature", "corrected", "estimate")
+
+
+def show_coverage(fit: Fit) -> None:
+    """Show in which part of each leg's stride joint moments are known, in one line."""
+    if covered := coverage_sentence(fit.trials):
+        out.print(f"joint moments {covered}", soft_wrap=True)
 
 
 def report_tables(fit: Fit) -> None:
