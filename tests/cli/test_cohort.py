@@ -119,6 +119,15 @@ def study(tmp_path):
     return tmp_path / "study"
 
 
+def workers_of(process):
+    """Processes that fit people for a command."""
+    workers = []
+    for child in psutil.Process(process.pid).children(recursive=True):
+        with contextlib.suppress(psutil.NoSuchProcess):
+            workers += [child] * ("kinertia.cohort.worker" in child.cmdline())
+    return workers
+
+
 @pytest.mark.slow
 def test_a_cohort_whose_workers_are_killed_is_finished_and_a_rerun_fits_nobody(study, tmp_path):
     out = tmp_path / "out"
@@ -126,9 +135,11 @@ def test_a_cohort_whose_workers_are_killed_is_finished_and_a_rerun_fits_nobody(s
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         while process.stderr.readline().strip() != "people":
             assert process.poll() is None
+        begun = time.monotonic()  # the command imports for seconds before its workers start
+        while not workers_of(process) and time.monotonic() < begun + 60.0:
+            time.sleep(0.05)
         time.sleep(random.Random(21).uniform(0.5, 2.0))
-        children = psutil.Process(process.pid).children(recursive=True)
-        workers = [child for child in children if "kinertia.cohort.worker" in child.cmdline()]
+        workers = workers_of(process)
         assert workers
         for worker in workers:
             with contextlib.suppress(psutil.NoSuchProcess):
