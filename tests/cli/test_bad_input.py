@@ -224,7 +224,7 @@ def write_unusable(path, markers):
         labels = [*labels[::2], *labels[::2]][: len(labels)]
     if path.stem == "plates alone":
         points, labels = points[:, :0], []
-    forces = np.tile([0.0, 0.0, -600.0, 0.0, 0.0, 0.0], (10 * len(points), 1))
+    forces = np.tile([0.0, 0.0, -600.0, 6e4, -3e4, 0.0], (10 * len(points), 1))
     corners = np.array([[[0, 500, 0], [500, 500, 0], [500, 0, 0], [0, 0, 0]]], float)
     parameters = {"POINT": {"Y_SCREEN": ["+Y"]}, "FORCE_PLATFORM": plate_parameters(corners)}
     write_c3d(path, points, labels, forces, parameters)
