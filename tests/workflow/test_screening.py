@@ -2,6 +2,7 @@
 
 import shutil
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -99,7 +100,10 @@ def test_check_and_fit_find_the_same(subject):
 @pytest.mark.parametrize("case", FIELD, ids=lambda case: case.title)
 def test_check_and_fit_find_the_same_in_recordings_of_other_laboratories(case, tmp_path):
     path = tmp_path / "subject.toml"
-    path.write_text(written(case.arguments[1:]), encoding="utf-8")
+    if case.arguments[1].endswith(".toml"):
+        path = Path(case.arguments[1])
+    else:
+        path.write_text(written(case.arguments[1:]), encoding="utf-8")
     wanted = read_subject(path)
     checked = check_person(read_person(wanted))
     try:
