@@ -40,14 +40,17 @@ def test_recordings_of_one_name_are_told_apart(lab):
 
 @pytest.mark.slow
 def test_files_of_two_people_keep_their_masses(measured_folder):
-    """The walk of A carries no mass, the others do: it is A's static trial's, until files of B come first."""
+    """Each file carries its person's mass: the first walk's is used, and that of the other person reported."""
     a, b = ([measured_folder / "pig_c3d" / f"subject_{who}_{kind}.c3d" for kind in ("static", "walk")] for who in "ab")
     (alone,) = [one for one in told(*a)["findings"] if one["code"] == "S111"]
     assert alone["evidence"]["stated_kg"]["value"] == pytest.approx(41.5, abs=0.1)
-    together = told(*a, *b, status=1)["findings"]
-    (stated,) = [one for one in together if (one["code"], one["where"].get("part")) == ("S103", "mass")]
-    assert [round(stated["evidence"][name]["value"], 1) for name in ("stated", "filed")] == [47.5, 41.5]
-    assert blocking_codes(together) == ["S203", "S111"]  # one static trial is used: of the other person
+    for files, masses in (((*a, *b), [41.5, 47.5]), ((*b, *a), [47.5, 41.5])):
+        together = told(*files, status=1)["findings"]
+        (stated,) = [one for one in together if (one["code"], one["where"].get("part")) == ("S103", "mass")]
+        assert [round(stated["evidence"][name]["value"], 1) for name in ("stated", "filed")] == masses
+        # each walk is of another person than one of the static trials
+        accused = {one["where"]["trial"] for one in blocking(together) if one["code"] == "S203"}
+        assert accused == {"subject_a_static", "subject_b_static"}
 
 
 def test_another_mass_is_status_1(lab):
