@@ -66,7 +66,8 @@ class Hypothesis(NamedTuple):
 
     def misfit(self, feet: Feet) -> tuple[float, float]:
         """Return the `ContactFit.misfit` of the corrected loads, and to the centimetre how far the worst step is from
-        its expected centre of pressure (m, RMS), which ranks what fits; infinite where there are none."""
+        its expected centre of pressure (m, RMS), which ranks what fits; infinite without corrected loads, the
+        second also without steps."""
         if self.corrected is None:
             return np.inf, np.inf
         contacts = contacts_of(self.corrected, feet)
@@ -76,7 +77,7 @@ class Hypothesis(NamedTuple):
             if one.is_step
             for expected in (feet[one.foot].expected_cop(one.time, one.weight),)
         ]
-        return ContactFit.of(contacts, feet).misfit, round(float(max(off_m, default=0.0)), 2)
+        return ContactFit.of(contacts, feet).misfit, round(float(max(off_m, default=np.inf)), 2)
 
 
 def _delays(contact: PlateContact, foot: FootTrajectory) -> list[float]:
