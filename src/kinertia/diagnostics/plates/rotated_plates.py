@@ -46,7 +46,7 @@ _OPERATIONS = (
 
 def rotated_plates(context: RecordingContext) -> Iterator[Hypothesis]:
     """Report P242: the one correction of one plate, or of all equally, that puts all loads under the feet; nothing
-    where none or several do.
+    where none does, or also one of other plates. Other operations on the same plates that do are among its causes.
     """
     plates, feet = context.plates, context.foot_trajectories
     steps = [one for one in context.contacts if one.is_step]
@@ -63,11 +63,14 @@ def rotated_plates(context: RecordingContext) -> Iterator[Hypothesis]:
         turned_m = _distances(steps, [_turned(one.place, middle[one.plate], matrix) for one in steps], feet)
         for which in {*((p,) for p in used), tuple(used)}:
             left_m[(k, *which)] = np.where([one.plate in which for one in steps], turned_m, read_m)
-    best, second = sorted(left_m, key=lambda one: rms(left_m[one]))[:2]
-    only = sum(each.max() <= _RIGHT_M for each in left_m.values()) == 1
-    clearly = only or rms(left_m[best]) < _CLEARLY_BEST * rms(left_m[second])
+    best, *others = sorted(left_m, key=lambda one: rms(left_m[one]))
+    rivals = [one for one in others if one[1:] != best[1:]]
+    only = not any(left_m[one].max() <= _RIGHT_M for one in rivals)
+    clearly = only or rms(left_m[best]) < _CLEARLY_BEST * rms(left_m[rivals[0]])
     if not best or left_m[best].max() > _RIGHT_M or not clearly:
         return
+    # of a step along the middle of its plate, a half turn is hardly another operation than mirroring along the walk
+    alike = [one for one in others if one[1:] == best[1:] and left_m[one].max() <= _RIGHT_M]
     wrong = list(best[1:])
     operation, matrix, cause = _OPERATIONS[best[0]]
     if operation == _HALF_TURN and min(push_share(plates, p, context.travel) or 0.0 for p in wrong) > LEAST_PUSH:
@@ -78,7 +81,7 @@ def rotated_plates(context: RecordingContext) -> Iterator[Hypothesis]:
     found = finding(
         "P242",
         context.at(plate=plates.names[wrong[0]] if len(wrong) == 1 else None),
-        causes=(cause,),
+        causes=(cause, *(f"{name}: {other}" for name, _, other in (_OPERATIONS[one[0]] for one in alike))),
         mend=Quantity(_MENDING[cause]),
         before_m=Quantity(float(read_m.max()), "m", limit=_WRONG_M, usual=(0.016, 0.075)),
         after_m=Quantity(float(left_m[best].max()), "m", limit=_RIGHT_M),
