@@ -84,7 +84,7 @@ def residual(size, column, peak=False, external_n=1e6):
     loads = np.zeros((10_000, 2, 6))
     loads[:, 0, 1] = external_n
     each = {"estimate": left}
-    kinematics = SimpleNamespace(foot_loads=loads)
+    kinematics = SimpleNamespace(foot_loads=loads, complete=True)
     trial = SimpleNamespace(name="walk", residuals=each, full_residuals=each, kinematics=kinematics, motion_hz=6.0)
     return residuals_of(trial)
 

@@ -82,3 +82,16 @@ def test_knots_moved_by_a_phase_make_splines_as_good(basis, phase):
     for order, values in enumerate(orders):
         expected = quintic.deriv(order)(TIME) if order else quintic(TIME)
         np.testing.assert_allclose(values[10:-10, 0], expected[10:-10], atol=2e-3 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("phase", [0.0, 0.5])
+def test_frames_around_a_part_do_not_move_its_knots(phase):
+    """The motion near measured windows must not depend on how long the trial is observed around them."""
+    time = np.linspace(0.0, 3.0, 301)
+    part = slice(77, 190)
+    alone, within = MotionBasis(time[part], 0.07, phase), MotionBasis(time, 0.07, phase, part)
+    np.testing.assert_allclose(within.values[:, part], alone.values, atol=1e-7 * np.abs(alone.values).max())
+    assert set(np.round((alone.knots[5:-5, None] - within.knots).__abs__().min(axis=1), 9)) == {0.0}
+    assert within.knots[5] <= time[0]
+    assert time[-1] <= within.knots[-6] + 1e-9
+    assert within.size == MotionBasis(time, 0.07, 0.0, part).size

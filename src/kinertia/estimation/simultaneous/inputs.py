@@ -60,7 +60,7 @@ class Given:
     @cached_property
     def bases(self) -> tuple[MotionBasis, ...]:
         """Spline bases of every trial's motion."""
-        return tuple(MotionBasis(trial.time, trial.spacing_s, self.phase) for trial in self.trials)
+        return tuple(MotionBasis(trial.time, trial.spacing_s, self.phase, trial.near_windows) for trial in self.trials)
 
     @cached_property
     def start(self) -> tuple[np.ndarray, ...]:

@@ -18,7 +18,9 @@ _ROUNDING = 1e-9
 class MotionBasis:
     """Uniform quintic B-splines over a trial's time, with knots no closer than every second frame.
 
-    The first knot is at the first frame, or a `phase` of a knot interval (0 to 1) before it; there are as many.
+    The first knot is at the first frame, or a `phase` of a knot interval (0 to 1) before it; there are as many. If only
+    a part of the trial is to begin and end at knots, those beyond it follow at the same distance: what is added around
+    the measured windows does not move the knots within.
 
     Six splines are active at any time, and seven at a frame and the two after it.
 
@@ -28,11 +30,16 @@ class MotionBasis:
         values: (3, n, 6) values of the active splines and their first two time derivatives.
     """
 
-    def __init__(self, time: np.ndarray, spacing_s: float, phase: float = 0.0) -> None:
-        intervals = (time[-1] - time[0]) / spacing_s * (1.0 - _ROUNDING)
-        count = min(max(1, int(np.ceil(intervals))), (len(time) - 1) // 2)
-        step = (time[-1] - time[0]) / (count - phase)
-        begin = time[0] - phase * step
+    def __init__(self, time: np.ndarray, spacing_s: float, phase: float = 0.0, part: slice = slice(None)) -> None:
+        own = time[part]
+        length = own[-1] - own[0]
+        count = min(max(1, int(np.ceil(length / spacing_s * (1.0 - _ROUNDING)))), (len(own) - 1) // 2)
+        before, after = (
+            int(np.ceil(more / length * count - _ROUNDING)) for more in (own[0] - time[0], time[-1] - own[-1])
+        )
+        step = length / (count - phase)
+        begin = own[0] - (before + phase) * step
+        count += before + after
         knots = begin + step * np.arange(-_DEGREE, count + _ACTIVE)
         self.size = count + _DEGREE
         self.first = np.minimum(((time - begin) / step + _ROUNDING).astype(int), count - 1)

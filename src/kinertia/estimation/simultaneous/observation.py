@@ -31,7 +31,7 @@ from kinertia.estimation.simultaneous.soft_tissue import swing_factors
 from kinertia.model.skeleton import GRAVITY_M_S2, Skeleton
 from kinertia.motion.frame_chunks import pieces
 from kinertia.motion.ground_reactions import ground_reactions
-from kinertia.motion.kinematics import AROUND_WINDOW_S, Kinematics
+from kinertia.motion.kinematics import Kinematics
 from kinertia.motion.smoothing import smooth
 from kinertia.settings import ForceCutoff
 from kinertia.trial.sampled_time import nearest_samples, within
@@ -92,9 +92,8 @@ def observe(
     displaced = _displacement_sd(skeleton, rest.displaced)
     # errors that the estimate finds to follow the joints recur, too: they count as often as before they were found, and
     # where root equations hold, whose errors recur with them: other strides of the markers repeat no force
-    near = [_near_windows(trial, each.time) for trial, each in zip(trials, errors, strict=True)]
     alike = [
-        repeats([weighed(e[own], o.marker_sd) for e, own, (o, _) in zip(every, near, pairs, strict=True)], rates)
+        repeats([weighed(e, o.marker_sd)[o.near_windows] for e, (o, _) in zip(every, pairs, strict=True)], rates)
         for every in ([each.varying for each in errors], rest.varying)
     ]
     counts = np.maximum(*alike)
@@ -105,13 +104,6 @@ def observe(
     ]
     pooled = tuple(replace(o, displacement_sd_m=displaced) for o, _ in pairs)
     return Observations(pooled, tuple(noise), _misplaced(skeleton, rest.displaced), counts)
-
-
-def _near_windows(kinematics: Kinematics, time: np.ndarray) -> slice:
-    """Return the frames, of those at times (n,), from the first to the last measured window and just around them."""
-    start, end = kinematics.window_s
-    near = np.flatnonzero(within(time, start - AROUND_WINDOW_S, end + AROUND_WINDOW_S))
-    return slice(int(near[0]), int(near[-1]) + 1) if near.size else slice(0, len(time))
 
 
 def _displacement_sd(skeleton: Skeleton, displaced: np.ndarray) -> np.ndarray:

@@ -11,6 +11,8 @@ from kinertia.estimation.simultaneous.instruments import InstrumentPrior
 from kinertia.estimation.simultaneous.marker_errors import ErrorProcess
 from kinertia.estimation.simultaneous.plates import FootPlates
 from kinertia.estimation.simultaneous.skin import SkinPatterns
+from kinertia.motion.kinematics import AROUND_WINDOW_S
+from kinertia.trial.sampled_time import within
 
 
 @dataclass(frozen=True)
@@ -62,6 +64,16 @@ class Observation:
     def curve_frames(self) -> np.ndarray:
         """Indices (d,) of the frames whose curves are reported."""
         return np.flatnonzero(self.dynamic if self.reported is None else self.dynamic | self.reported)
+
+    @cached_property
+    def near_windows(self) -> slice:
+        """The frames from the first to the last dynamic one and just around them; all if there is none."""
+        dynamic = np.flatnonzero(self.dynamic)
+        if not dynamic.size:
+            return slice(0, len(self.time))
+        start, end = self.time[dynamic[[0, -1]]]
+        near = np.flatnonzero(within(self.time, start - AROUND_WINDOW_S, end + AROUND_WINDOW_S))
+        return slice(int(near[0]), int(near[-1]) + 1)
 
     @cached_property
     def marker_process(self) -> tuple[np.ndarray, ErrorProcess]:
