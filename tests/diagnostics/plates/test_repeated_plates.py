@@ -70,6 +70,12 @@ def test_both_feet_in_a_squat_are_two_plates():
     assert found([squat + outwards, squat - outwards], PLACES) == []
 
 
+def test_the_feet_of_a_person_who_stands_evenly_are_two_plates():
+    sway = np.column_stack([0 * TIME, 5.0 * np.sin(6.0 * TIME), 0 * TIME])
+    standing = np.array([0.0, 350.0, 0.0])
+    assert found([standing + sway, standing - sway], PLACES) == []
+
+
 def test_selected_plates_keep_what_is_theirs():
     force = np.stack([RIGHT, LEFT, RIGHT + LEFT], axis=1)
     plates = PlateLoads(

@@ -13,6 +13,9 @@ from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads
 _EQUAL = 0.03
 """RMS difference of two forces over their peak. Both feet in a squat, which load two plates alike, differ by 0.1, since
 each pushes outwards."""
+_OF_VARIATION = 0.3
+"""The same over the variation of the force under load: a person who stands evenly loads two plates alike, and sways from
+one to the other."""
 _PROPORTIONAL, _SAME_PLACE_M = 0.99, 0.02
 _LOADED_N = 5 * LOAD_THRESHOLD_N
 _FEWEST = 20
@@ -47,14 +50,15 @@ def repeated_plates(context: RecordingContext) -> Iterator[Finding]:
 
 def _difference(plates: PlateLoads, p: int, parts: tuple[int, ...]) -> float:
     """Return the RMS difference of a plate's force from the sum of others', over its peak; infinite where one of them
-    is unloaded while the plate is loaded.
+    is unloaded while the plate is loaded, or where the forces vary differently.
     """
     force, total = plates.force[:, p], plates.force[:, list(parts)].sum(axis=1)
     loaded = (force[:, 1] > _LOADED_N) | (total[:, 1] > _LOADED_N)
     if any((plates.force[loaded, part, 1] > _LOADED_N).sum() < _FEWEST for part in parts):
         return np.inf
-    off = np.linalg.norm(force[loaded] - total[loaded], axis=1)
-    return float(np.sqrt(np.square(off).mean()) / force[:, 1].max())
+    off, varying = force[loaded] - total[loaded], force[loaded] - force[loaded].mean(axis=0)
+    rms, variation = (float(np.sqrt(np.square(each).sum(axis=1).mean())) for each in (off, varying))
+    return rms / float(force[:, 1].max()) if rms < _OF_VARIATION * variation else np.inf
 
 
 def _at_the_same_place(plates: PlateLoads, p: int, parts: tuple[int, ...]) -> bool:
