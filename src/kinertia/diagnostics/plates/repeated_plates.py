@@ -14,8 +14,8 @@ _EQUAL = 0.03
 """RMS difference of two forces over their peak. Both feet in a squat, which load two plates alike, differ by 0.1, since
 each pushes outwards."""
 _OF_VARIATION = 0.3
-"""The same over the variation of the force under load: a person who stands evenly loads two plates alike, and sways from
-one to the other."""
+"""The same over the variation of the force under load: a person who stands evenly loads two plates alike, and sways
+from one to the other."""
 _PROPORTIONAL, _SAME_PLACE_M = 0.99, 0.02
 _LOADED_N = 5 * LOAD_THRESHOLD_N
 _FEWEST = 20
