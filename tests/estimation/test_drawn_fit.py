@@ -147,9 +147,7 @@ def test_opensim_finds_the_reported_deviations_on_all_draws(opensim, fit, tmp_pa
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(
-    reason="known: knots that follow the measured windows leave the last interval partly without frames; there draws spread wider than stated"
-)
+@pytest.mark.xfail(reason="known: the last knot interval is partly without frames, and draws spread wider there")
 def test_many_draws_spread_as_reported_within_ten_percent(demo_run, tmp_path, monkeypatch):
     """Each joint, with hardly any sampling left."""
     from command_line import fitted
