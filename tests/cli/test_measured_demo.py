@@ -92,7 +92,9 @@ def test_results_are_those_of_a_fit(measured_demo):
     assert len(bsp) == 120
     np.testing.assert_allclose(bsp["estimate"], measured_demo.fit.bsp["estimate"], rtol=1e-9)
     motion = read_sto(folder / "kinematics.mot")
-    assert len(motion) == trial["n_dynamic_frames"]
+    measured = measured_demo.fit.trials[0].time
+    assert len(measured) == trial["n_dynamic_frames"]
+    assert np.abs(motion.index.to_numpy()[:, None] - measured).min(axis=0).max() < 1e-4
 
 
 @pytest.mark.slow
