@@ -71,7 +71,6 @@ def test_files_have_every_joint_and_nan_where_it_is_not_known(result):
 
 
 @pytest.mark.parametrize("walk", WALKS[-1:])
-@pytest.mark.xfail(strict=True, reason="since knots follow the windows draws spread too wide; cause not confirmed")
 def test_draws_spread_as_the_error_bars_say(fit_of, walk):
     """Also what a hinge transmits, in which the knee's geometry is drawn, too."""
     fit = load_fit(fit_of(walk).folder)

@@ -98,7 +98,7 @@ def curves_apart(problems: Sequence[MapProblem], points: Sequence[Point], k: int
         every = [_curves(problem, k, *estimate, loads, frames[some]) for problem, estimate, loads in rows]
         for variance, *each in zip(variances.curves, *every, strict=True):
             variance[some] = np.var(each, axis=0, ddof=1)
-    around = 1 + 2 * round(_KNOTS * len(basis.first) / (basis.size - 5))
+    around = 1 + 2 * round(_KNOTS * len(basis.first) / basis.intervals)
     for variance in variances.curves:
         variance[:] = even_mean(variance, around)
     return variances.roots()

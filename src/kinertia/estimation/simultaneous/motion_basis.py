@@ -26,6 +26,7 @@ class MotionBasis:
 
     Attributes:
         size: number of splines.
+        intervals: number of knot intervals.
         first: (n,) the first active spline of each frame.
         values: (3, n, 6) values of the active splines and their first two time derivatives.
     """
@@ -41,6 +42,7 @@ class MotionBasis:
         begin = own[0] - (before + phase) * step
         count += before + after
         knots = begin + step * np.arange(-_DEGREE, count + _ACTIVE)
+        self.intervals = count
         self.size = count + _DEGREE
         self.first = np.minimum(((time - begin) / step + _ROUNDING).astype(int), count - 1)
         # on a uniform grid all splines are shifted copies of one

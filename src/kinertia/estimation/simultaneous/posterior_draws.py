@@ -25,6 +25,8 @@ from kinertia.estimation.simultaneous.inputs import BSP, PLACES, STILL
 from kinertia.estimation.simultaneous.instrument_term import InstrumentErrors
 from kinertia.estimation.simultaneous.knot_phases import OfPhases, followed
 from kinertia.estimation.simultaneous.linearised import Point
+from kinertia.estimation.simultaneous.motion_basis import MotionBasis
+from kinertia.estimation.simultaneous.normal_equations import SPLINES_PER_BLOCK
 from kinertia.estimation.simultaneous.plate_loads import GAIN
 from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.model.bsp import BodySegmentParameters
@@ -40,6 +42,8 @@ _ALIKE = 1e-3
 """Relative difference between shares that is negligible."""
 _LOOSE_ENDS = 5
 """Splines at either end of a trial that few frames determine: they are not representative of the others."""
+_AT_ONCE = 1_000_000
+"""Numbers of curves that are filtered at once."""
 _LEAST_MASS = 0.05
 """Least share of a segment's estimated mass in a draw."""
 
@@ -159,7 +163,7 @@ def posterior_draws(
     of_trials = []
     for k, (trial, own) in enumerate(zip(trials, roots_in_trials, strict=True)):
         in_trial = drawn if own is root else _in_trial(drawn, normal, own, problem.layout.in_root.stop)
-        motions = _motions(point.coefficients[k].shape, trial, in_trial, noises[k], random)
+        motions = _motions(problem.bases[k], trial, in_trial, noises[k], random)
         for motion, shares in zip(motions, extra.astype(motions.dtype), strict=True):  # together they take memory
             for mode, share in zip(modes, shares, strict=True):
                 motion += share * mode.motions[k]
@@ -189,13 +193,14 @@ def _in_trial(drawn: np.ndarray, normal: np.ndarray, root: np.ndarray, first: in
 
 
 def _motions(
-    shape: tuple[int, ...], trial: Eliminated, static: np.ndarray, noise: np.ndarray, random: np.random.Generator
+    basis: MotionBasis, trial: Eliminated, static: np.ndarray, noise: np.ndarray, random: np.random.Generator
 ) -> np.ndarray:
-    """Draw differences (n, k, c) of a motion's coefficients (k, c), given these (n, S) of the static unknowns.
+    """Draw differences (n, k, c) of a motion's coefficients, given these (n, S) of the static unknowns.
 
     They are in single precision, as they are stored.
     """
-    size = (2 * len(static), *shape)
+    columns = trial.middle.band.diagonal.shape[1] // SPLINES_PER_BLOCK
+    size = (2 * len(static), basis.size, columns)
     steps = _Steps(static.T, random, np.empty(size, np.float32))
     after = steps.write(trial.middle)
     for branch in trial.branches:
@@ -203,7 +208,7 @@ def _motions(
         for part in branch.outwards():  # each is read once
             block = steps.write(part, block)
     follow, alone = np.split(steps.into, 2)
-    _narrow(alone, noise)
+    _narrow(alone, noise, basis)
     drawn: np.ndarray = follow + alone
     return drawn
 
@@ -238,24 +243,29 @@ class _Steps:
         return first
 
 
-def _narrow(alone: np.ndarray, shares: np.ndarray) -> None:
-    """Filter series (n, k, c) of spline coefficients so that their power is multiplied by shares (3,).
+def _narrow(alone: np.ndarray, shares: np.ndarray, basis: MotionBasis) -> None:
+    """Filter curves, given as spline coefficients (n, k, c), so that their power is multiplied by shares (3,).
 
-    The shares apply to the power of the sums of splines, of their rates and of their accelerations. The logarithm of
-    the filter's power is a parabola in the square of the frequency, the same for all columns, so that relations between
-    them are kept. Cosine transforms mirror the series at their ends, which avoids jumps.
+    The shares apply to the power of the curves, of their rates and of their accelerations. The logarithm of the
+    filter's power is a parabola in the square of the frequency, the same for all columns, so that relations between
+    them are kept. Curves are filtered and not their coefficients: those of splines that few frames determine, at either
+    end of a trial, are hundreds of times larger than the others, and would leak into these. Cosine transforms mirror
+    the curves at their ends, which avoids jumps.
     """
     if np.ptp(shares) < _ALIKE * shares.max():
         alone *= np.sqrt(shares.mean())
         return
-    size = alone.shape[1]
-    ends = min(_LOOSE_ENDS, (size - _LOOSE_ENDS) // 2)
-    # one draw at a time: of long trials the spectra of all would be most of the memory
-    power = sum(np.square(dct(one[ends : size - ends], axis=0)) for one in alone)
-    squares = _squares(len(power))
-    # a quintic spline's own spectrum
-    power = (power / power.sum(axis=0)).mean(axis=1) * np.sinc(0.5 * np.sqrt(squares)) ** 12
-    weights = power * squares ** np.arange(3)[:, None]
+    size, frames = basis.size, len(basis.first)
+    ends = min(_LOOSE_ENDS, (size - _LOOSE_ENDS) // 2) * frames // size
+    power = np.zeros((frames - 2 * ends, alone.shape[2]))
+    # a few draws at a time: of long trials the spectra of all would be most of the memory
+    some = max(1, _AT_ONCE // (frames * alone.shape[2]))
+    for start in range(0, len(alone), some):
+        curves = basis.evaluate(_side_by_side(alone[start : start + some]), derivatives=0)[0]
+        spectra = dct(curves[ends : frames - ends], axis=0).reshape(len(power), -1, alone.shape[2])
+        power += np.square(spectra).sum(axis=1)
+    squares = _squares(len(power), basis)
+    weights = (power / power.sum(axis=0)).mean(axis=1) * squares ** np.arange(3)[:, None]
     weights /= weights.sum(axis=1, keepdims=True)
     shape = squares ** np.arange(3)[:, None]
 
@@ -264,14 +274,27 @@ def _narrow(alone: np.ndarray, shares: np.ndarray) -> None:
         return gap
 
     found = least_squares(missing, [np.log(shares.mean()), 0.0, 0.0], bounds=([-20.0] * 3, [20.0] * 3))
-    gain = np.exp(0.5 * found.x @ _squares(size) ** np.arange(3)[:, None])
-    for one in alone:
-        one[:] = idct(dct(one, axis=0) * gain[:, None].astype(one.dtype), axis=0, overwrite_x=True)
+    gain = np.exp(0.5 * found.x @ _squares(frames, basis) ** np.arange(3)[:, None])
+    for start in range(0, len(alone), some):
+        each = alone[start : start + some]
+        curves = basis.evaluate(_side_by_side(each), derivatives=0)[0]
+        narrowed = basis.fit(idct(dct(curves, axis=0) * gain[:, None], axis=0, overwrite_x=True))
+        each[:] = narrowed.reshape(size, len(each), -1).transpose(1, 0, 2)
 
 
-def _squares(count: int) -> np.ndarray:
-    """Return the squares (f,) of the frequencies of a cosine transform, relative to half a cycle per knot interval."""
-    return np.square(np.arange(count) / count)
+def _side_by_side(series: np.ndarray) -> np.ndarray:
+    """Return series (n, k, c) as columns (k, n c)."""
+    result: np.ndarray = series.transpose(1, 0, 2).reshape(series.shape[1], -1)
+    return result
+
+
+def _squares(frames: int, basis: MotionBasis) -> np.ndarray:
+    """Return squares (f,) of the frequencies of a cosine transform, relative to half a cycle per knot interval.
+
+    Beyond it splines have no power, and all frequencies count as this one.
+    """
+    intervals = basis.intervals * frames / len(basis.first)
+    return np.minimum(np.square(np.arange(frames) / intervals), 1.0)
 
 
 def _bodies(problem: MapProblem, point: Point, departures: np.ndarray) -> np.ndarray:
