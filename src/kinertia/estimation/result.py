@@ -332,7 +332,7 @@ class Fit:
 
         Args:
             kind: "angle", "clinical" (deg), "moment", "joint_moment" (N m/kg; over time N m), "power", "force".
-            over: "percent" of the gait cycle, or "time" (s; angles and moments).
+            over: "percent" of the gait cycle, or "time" (s; angles, moments and joint moments).
 
         Raises:
             KinertiaError: xarray (the extra `xarray`) is missing, there are no such curves, or no strides.
@@ -360,7 +360,9 @@ class Fit:
     def draws_to_xarray(self, count: int = 50, seed: int = 0) -> Dataset:
         """Return posterior draws as an xarray Dataset with coordinates chain and draw, as ArviZ expects.
 
-        Variables: `angle` (deg) and `moment` (N m) by trial, time and joint; `bsp` by segment and parameter.
+        Variables: `angle` (deg) and `moment` (N m) by trial, time and joint; `joint_moment` (N m) by trial, time and
+        component ("knee_r_adduction"); `bsp` by segment and parameter. Components of one draw belong together: the
+        draws keep their covariance. What is not known is NaN.
 
         Args:
             count: number of draws; a result stores 200, for long trials fewer.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -18,7 +18,9 @@ from kinertia.trial.data import FEET
 if TYPE_CHECKING:
     from xarray import Dataset
 
-_OVER_TIME = {"angle": "deg", "moment": "N m"}
+_OVER_TIME = {"angle": "deg", "moment": "N m", "joint_moment": "N m"}
+_DRAWN_ALONG = {"angle": "joint", "moment": "joint", "joint_moment": "component"}
+"""Names of the dimension of draws that stands for joints, or for the components of their moments."""
 _TIME_DIGITS = 6
 """Decimals of times (s): times that differ by less are the same frame."""
 
@@ -27,7 +29,7 @@ def curve_dataset(fit: Fit, kind: str, over: str) -> Dataset:
     """Convert curves as `Fit.to_xarray` returns them."""
     units = {str(name): unit for name, unit in UNITS.items()} if over == "percent" else _OVER_TIME
     if over not in ("percent", "time") or kind not in units:
-        hint = "over='percent' has angle, clinical, moment, power and force, over='time' angle and moment"
+        hint = f"over='percent' has {', '.join(UNITS)}; over='time' {', '.join(_OVER_TIME)}"
         raise KinertiaError(f"no curves of {kind!r} over {over!r}: {hint}")
     build = _over_percent if over == "percent" else _over_time
     return _dataset(fit, kind, units[kind], *build(fit, kind))
@@ -37,18 +39,16 @@ def draw_dataset(fit: Fit, count: int, seed: int) -> Dataset:
     """Convert draws as `Fit.draws_to_xarray` returns them."""
     xarray = _xarray()
     drawn = [drawn_fit(fit, number) for number in chosen_draws(fit, count, seed)]
-    times, joints = _times(fit.trials), _joints(fit)
-    shape = (1, count, len(fit.trials), len(times), len(joints))
-    values = {kind: np.full(shape, np.nan) for kind in _OVER_TIME}
-    for n, one in enumerate(drawn):
-        for k, trial in enumerate(one.trials):
-            rows = _rows(trial, times)
-            for kind, value in values.items():
-                value[0, n, k, rows] = _over_own_time(trial, kind)[:, fit.skeleton.rotational]
-    dims, sample = ("trial", "time", "joint"), ("chain", "draw")
-    variables: dict[str, Any] = {
-        kind: ((*sample, *dims), value, {"units": _OVER_TIME[kind]}) for kind, value in values.items()
-    }
+    times, sample = _times(fit.trials), ("chain", "draw")
+    names = {kind: own for kind in _OVER_TIME if (own := _names(fit, kind))}
+    variables: dict[str, Any] = {}
+    for kind, own in names.items():
+        values = np.full((1, count, len(fit.trials), len(times), len(own)), np.nan)
+        for n, one in enumerate(drawn):
+            for k, trial in enumerate(one.trials):
+                curves = _over_own_time(trial, kind)
+                values[0, n, k, _rows(curves.time, times)] = curves.values
+        variables[kind] = (*sample, "trial", "time", _DRAWN_ALONG[kind]), values, {"units": _OVER_TIME[kind]}
     tables = np.array([one.estimate.table() for one in drawn])[None]
     by_parameter = "kg (mass), m (com), kg m2 (inertia)"
     variables["bsp"] = ((*sample, "segment", "parameter"), tables, {"units": by_parameter})
@@ -57,7 +57,7 @@ def draw_dataset(fit: Fit, count: int, seed: int) -> Dataset:
         "draw": np.arange(count),
         "trial": [trial.name for trial in fit.trials],
         "time": ("time", times, {"units": "s"}),
-        "joint": joints,
+        **{_DRAWN_ALONG[kind]: own for kind, own in names.items()},
         "segment": list(fit.estimate.segments),
         "parameter": list(PARAMETERS),
     }
@@ -84,16 +84,18 @@ def _over_percent(fit: Fit, kind: str) -> tuple[dict[str, Any], np.ndarray, np.n
 
 def _over_time(fit: Fit, kind: str) -> tuple[dict[str, Any], np.ndarray, np.ndarray]:
     """Return coordinates, values and SDs by trial, time and joint."""
-    times, joints, turns = _times(fit.trials), _joints(fit), fit.skeleton.rotational
-    value, sd = np.full((2, len(fit.trials), len(times), len(joints)), np.nan)
+    times, names = _times(fit.trials), _names(fit, kind)
+    if not names:
+        raise KinertiaError(f"no curves of {kind!r}: the two-level method and older results have none")
+    value, sd = np.full((2, len(fit.trials), len(times), len(names)), np.nan)
     for k, trial in enumerate(fit.trials):
-        rows = _rows(trial, times)
-        value[k, rows] = _over_own_time(trial, kind)[:, turns]
-        if trial.deviations is not None:
-            angle, moment = np.degrees(trial.deviations.coordinates), trial.deviations.moments
-            sd[k, rows] = (angle if kind == "angle" else moment)[:, turns]
+        own = _over_own_time(trial, kind)
+        rows = _rows(own.time, times)
+        value[k, rows] = own.values
+        if own.sd is not None:
+            sd[k, rows] = own.sd
     along = {"time": ("time", times, {"units": "s"})}
-    return {"trial": [trial.name for trial in fit.trials], **along, "joint": joints}, value, sd
+    return {"trial": [trial.name for trial in fit.trials], **along, "joint": names}, value, sd
 
 
 def _dataset(
@@ -111,24 +113,56 @@ def _attributes(fit: Fit) -> dict[str, str | float]:
     return {"kinertia": VERSION, "subject": fit.subject.name, "mass_kg": fit.mass_kg, "method": fit.settings.method}
 
 
-def _joints(fit: Fit) -> list[str]:
-    """Return the coordinates that are angles."""
-    return [name for name, turns in zip(fit.skeleton.coordinates, fit.skeleton.rotational, strict=True) if turns]
+class _OverTime(NamedTuple):
+    """Curves (f, r) of a trial at f times (s), in deg or N m, and their SDs, where there are any."""
+
+    time: np.ndarray
+    values: np.ndarray
+    sd: np.ndarray | None
+
+
+def _over_own_time(trial: TrialFit, kind: str) -> _OverTime:
+    """Return the curves of a trial wherever they are known; NaN between."""
+    curves, turns = trial.joint_curves, trial.skeleton.rotational
+    deviations = trial.deviations if curves is None else curves.deviations
+    if kind == "joint_moment":
+        time = _time(trial)
+        if curves is None:
+            return _OverTime(time, np.empty((len(time), 0)), None)
+        sd = None if curves.moment_sd is None else curves.moment_sd.reshape(len(time), -1)
+        return _OverTime(time, curves.joints["estimate"].moments.reshape(len(time), -1), sd)
+    if kind == "angle":
+        q = trial.motion.q
+        if curves is not None:
+            q = np.where(np.logical_or.reduce(curves.known, axis=1, keepdims=True), curves.motion.q, np.nan)
+        sd = None if deviations is None else np.degrees(deviations.coordinates[:, turns])
+        return _OverTime(_time(trial), np.degrees(q[:, turns]), sd)
+    loads = trial.joint_loads if curves is None else curves.forces
+    sd = None if deviations is None else deviations.moments[:, turns]
+    return _OverTime(_time(trial), loads["estimate"][:, turns], sd)
+
+
+def _names(fit: Fit, kind: str) -> list[str]:
+    """Return the coordinates that are angles, or the components of joint moments; none of these without any."""
+    if kind != "joint_moment":
+        return [name for name, turns in zip(fit.skeleton.coordinates, fit.skeleton.rotational, strict=True) if turns]
+    curves = [trial.joint_curves for trial in fit.trials if trial.joint_curves is not None]
+    return list(curves[0].joints["estimate"].names) if curves else []
+
+
+def _time(trial: TrialFit) -> np.ndarray:
+    """Return the times of a trial's curves, s."""
+    return trial.time if trial.joint_curves is None else trial.joint_curves.time
 
 
 def _times(trials: Sequence[TrialFit]) -> np.ndarray:
     """Return the times (t,) s of all trials."""
-    return np.unique(np.concatenate([np.round(trial.time, _TIME_DIGITS) for trial in trials]))
+    return np.unique(np.concatenate([np.round(_time(trial), _TIME_DIGITS) for trial in trials]))
 
 
-def _rows(trial: TrialFit, times: np.ndarray) -> np.ndarray:
-    """Return the rows (w,) of a trial's frames among these times."""
-    return np.searchsorted(times, np.round(trial.time, _TIME_DIGITS))
-
-
-def _over_own_time(trial: TrialFit, kind: str) -> np.ndarray:
-    """Return values (w, c) in deg or N m over the trial's own time."""
-    return np.degrees(trial.motion.q) if kind == "angle" else trial.joint_loads["estimate"]
+def _rows(time: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Return the rows (f,) of a trial's frames among these times."""
+    return np.searchsorted(times, np.round(time, _TIME_DIGITS))
 
 
 def _xarray() -> Any:
