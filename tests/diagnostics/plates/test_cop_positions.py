@@ -229,6 +229,19 @@ def test_a_load_of_both_feet_is_no_measure_of_where_a_plate_is():
     assert max(end for _, end in after if end < 0.85) <= 0.71
 
 
+def test_the_first_of_two_steps_in_turn_on_a_belt_is_not_shared():
+    """The file begins late in it, so that most of the load is the second foot's, which swings until 0.7 s."""
+    belt = on_one_plate(simple_walk([("r", 0), ("l", 0)]))
+    plates = belt.plates
+    late = plates.time > 0.45
+    cut = replace(plates, time=plates.time[late], force=plates.force[late], moment=plates.moment[late])
+    context = context_of(replace(belt, plates=cut), SIMPLE_FEET)
+    (shared,) = context.shared_loads
+    assert shared.contact.foot == 1
+    assert 0.55 < shared.span_s[0] <= 0.7  # a foot may bear load just before it stands
+    assert context.trial_on_plates.measured.any()
+
+
 def on_the_toes(recording, rise_m):
     """The walk of somebody whose heels stay in the air by so much, and whose loads are under the toes."""
     places = recording.markers.positions.copy()

@@ -49,7 +49,9 @@ class SharedLoad(NamedTuple):
 def shared_loads(contacts: Sequence[PlateContact], feet: Feet, marker_set: MarkerSet | None) -> Iterator[SharedLoad]:
     """Yield loads between the feet while both are on the ground; a foot that swings by its markers bears none."""
     for contact in contacts:
-        away = _under_both(_to_toes(contact, feet, marker_set)) & feet[1 - contact.foot].standing(contact.time)
+        away = _under_both(_to_toes(contact, feet, marker_set))
+        for foot in feet:
+            away &= foot.standing(contact.time)
         share = float(contact.weight[away].sum() / contact.weight.sum())
         limit = _MOSTLY if span_s(contact.time) > ONE_STEP_S else _OUTSIDE_SHARE
         if share > limit:
