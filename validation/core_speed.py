@@ -8,7 +8,7 @@ import pinocchio as pin
 
 from kinertia.motion.dynamics import axis_motion
 from kinertia.motion.regressor import regressor
-from kinertia.motion.rigid_body import axis_force_derivatives, root_load
+from kinertia.motion.rigid_body import axis_force_derivatives
 from kinertia.synthetic.walk import walk, walking_subject
 from validation.measured_trials import table
 from validation.pinocchio_skeleton import pinocchio_model
@@ -44,9 +44,9 @@ def core_section(runs: int) -> str:
             pin.computeJointJacobians(model, data, row[0])
 
     spent = {
-        "root": best(lambda: root_load(*core, origin), runs),
+        "root": best(lambda: axis_force_derivatives(*core, origin, ~every), runs),
         "regressor": best(lambda: regressor(*core[:2], *state, origin), runs),
-        "all axes": best(lambda: axis_force_derivatives(*core, every), runs),
+        "all axes": best(lambda: axis_force_derivatives(*core, origin, every), runs),
         "poses": best(lambda: skeleton.pose(trial.motion.q), runs),
     }
     derivatives, torque = (

@@ -145,7 +145,7 @@ def test_opensim_agrees_on_markers_mass_matrix_and_inverse_dynamics(model, bsp, 
     qd, qdd = rng.normal(0, 3, q.shape), rng.normal(0, 20, q.shape)
     ours = skeleton.marker_positions(skeleton.pose(q))
     state = (skeleton.tree, skeleton.gravity_m_s2, skeleton.bodies(tilted), q, qd, qdd)
-    forces, by = axis_force_derivatives(*state, np.ones(len(state[0].parent), dtype=bool))
+    forces, _, by, _ = axis_force_derivatives(*state, np.zeros((len(q), 3)), np.ones(len(state[0].parent), dtype=bool))
     for k in range(len(q)):
         oracle.pose(q[k], qd[k])
         np.testing.assert_allclose(ours[k], oracle.markers(), atol=1e-6)

@@ -10,7 +10,7 @@ from kinertia.model.gait27 import HIP_OFFSETS, SHOULDER_OFFSETS
 from kinertia.model.skeleton import Axis, Joint, Skeleton
 from kinertia.motion.dynamics import Motion, axis_motion
 from kinertia.motion.regressor import regressor
-from kinertia.motion.rigid_body import axis_force_derivatives, axis_forces, root_load
+from kinertia.motion.rigid_body import axis_force_derivatives, axis_forces
 from pinocchio_model import axis_forces as oracle_forces
 from pinocchio_model import pin, pinocchio_model
 
@@ -47,6 +47,11 @@ def state(skeleton, bsp, motion):
     return skeleton.tree, skeleton.gravity_m_s2, skeleton.bodies(bsp), *axis_motion(skeleton, motion)
 
 
+def origin(state) -> np.ndarray:
+    """The ground origin in every frame."""
+    return np.zeros((len(state[3]), 3))
+
+
 def close(ours, theirs):
     np.testing.assert_allclose(ours, theirs, atol=1e-11 * np.abs(theirs).max())
 
@@ -54,8 +59,8 @@ def close(ours, theirs):
 def test_forces_and_all_their_derivatives_are_pinocchios(skeleton, bsp, state):
     model = pinocchio_model(skeleton, bsp)
     data = model.createData()
-    tau, (by_x, by_v, by_a) = axis_force_derivatives(*state, every(skeleton))
-    np.testing.assert_array_equal(axis_forces(*state)[0], tau)
+    tau, _, (by_x, by_v, by_a), _ = axis_force_derivatives(*state, origin(state), every(skeleton))
+    np.testing.assert_array_equal(axis_forces(*state, origin(state))[0], tau)
     close(tau, oracle_forces(model, state[3:]))
     for k, rows in enumerate(zip(*state[3:], strict=True)):
         pin.computeRNEADerivatives(model, data, *rows)
@@ -75,25 +80,27 @@ def moved_to(load, about):
     return np.hstack([load[:, :3], load[:, 3:] - np.cross(about, load[:, :3])])
 
 
-def test_root_load_does_the_work_of_the_root_forces(skeleton, motion, state):
-    origin = np.zeros((len(motion.q), 3))
-    load, _ = root_load(*state, origin)
-    tau, whole = axis_forces(*state)
-    np.testing.assert_array_equal(load, whole)
+def test_load_of_the_body_does_the_work_of_the_root_forces(skeleton, motion, state):
+    tau, load, _ = axis_forces(*state, origin(state))
+    _, same, none, _ = axis_force_derivatives(*state, origin(state), ~every(skeleton))
+    np.testing.assert_array_equal(load, same)
+    assert none.shape == (3, len(load), 0, 0)
     close((skeleton.pose(motion.q).axes[:, :6] @ load[..., None])[..., 0], tau[:, :6])
 
 
 @pytest.mark.parametrize("order", [0, 1, 2])
-def test_derivatives_of_the_root_load_are_its_differences(state, order):
+def test_derivatives_of_the_load_are_its_differences(skeleton, state, order):
     about = np.random.default_rng(1).normal(size=(len(state[3]), 3))
-    _, by = root_load(*state, about)
+    *_, by = axis_force_derivatives(*state, about, ~every(skeleton))
+    if order == 2:
+        close(axis_forces(*state, about)[2], by[2, :, :, :6])
     h = (1e-6, 1e-3, 1e-1)[order]  # quadratic in the rates, linear in the accelerations
     for j in range(state[3].shape[1]):
         ends = []
         for sign in (1.0, -1.0):
             moved = [part.copy() for part in state[3:]]
             moved[order][:, j] += sign * h
-            ends.append(moved_to(axis_forces(*state[:3], *moved)[1], about))
+            ends.append(moved_to(axis_forces(*state[:3], *moved, about)[1], about))
         expected = (ends[0] - ends[1]) / (2 * h)
         np.testing.assert_allclose(by[order, :, :, j], expected, atol=1e-7 * max(1.0, np.abs(expected).max()))
 
@@ -102,7 +109,7 @@ def test_regressor_times_parameters_is_the_load(skeleton, bsp, state):
     about = np.random.default_rng(2).normal(size=(len(state[3]), 3))
     rows = [skeleton.segments.index(segment) for segment in bsp.segments]
     shown = regressor(*state[:2], *state[3:], about)[:, :, rows].reshape(len(about), 6, -1)
-    close(shown @ bsp.dynamic_parameters(), moved_to(axis_forces(*state)[1], about))
+    close(shown @ bsp.dynamic_parameters(), moved_to(axis_forces(*state, about)[1], about))
 
 
 def test_regressor_through_the_axes_is_pinocchios(skeleton, state):
@@ -123,8 +130,8 @@ def test_regressor_through_the_axes_is_pinocchios(skeleton, state):
 
 def test_axes_that_do_not_move_are_left_out(skeleton, state):
     moving = np.arange(len(skeleton.tree.parent)) % 3 != 1
-    tau, (by_x, by_v, by_a) = axis_force_derivatives(*state, every(skeleton))
-    some, (some_x, some_v, some_a) = axis_force_derivatives(*state, moving)
+    tau, _, (by_x, by_v, by_a), _ = axis_force_derivatives(*state, origin(state), every(skeleton))
+    some, _, (some_x, some_v, some_a), _ = axis_force_derivatives(*state, origin(state), moving)
     np.testing.assert_array_equal(some, tau)
     np.testing.assert_array_equal(some_x, by_x * moving[:, None])
     for ours, whole in ((some_v, by_v), (some_a, by_a)):
@@ -135,11 +142,14 @@ def test_no_frame_knows_of_another(skeleton, bsp):
     """An interval of a motion gives what the whole motion gives there."""
     _, motion = smooth_motion(skeleton, n=12, rate_hz=50.0)
     body = (skeleton.tree, 9.81, skeleton.bodies(bsp))
-    whole = axis_force_derivatives(*body, *axis_motion(skeleton, motion), every(skeleton))
+    about = np.random.default_rng(3).normal(size=(12, 3))
+    whole = axis_force_derivatives(*body, *axis_motion(skeleton, motion), about, every(skeleton))
     part = motion.cut(slice(5, 9))
-    cut = axis_force_derivatives(*body, *axis_motion(skeleton, part), every(skeleton))
-    np.testing.assert_array_equal(whole[0][5:9], cut[0])
-    np.testing.assert_array_equal(whole[1][:, 5:9], cut[1])
+    cut = axis_force_derivatives(*body, *axis_motion(skeleton, part), about[5:9], every(skeleton))
+    for before, after in zip(whole[:2], cut[:2], strict=True):
+        np.testing.assert_array_equal(before[5:9], after)
+    for before, after in zip(whole[2:], cut[2:], strict=True):
+        np.testing.assert_array_equal(before[:, 5:9], after)
 
 
 def test_branches_may_come_in_any_order():
@@ -158,11 +168,12 @@ def test_branches_may_come_in_any_order():
     )
     state = [rng.normal(size=(3, 5)) for _ in range(3)]
     tree = (skeleton.tree, 9.81, skeleton.bodies(bsp))
-    _, by = axis_force_derivatives(*tree, *state, every(skeleton))
+    about = np.zeros((3, 3))
+    _, _, by, _ = axis_force_derivatives(*tree, *state, about, every(skeleton))
     for order, j in np.ndindex(3, 5):
         ends = []
         for sign in (1.0, -1.0):
             moved = [part.copy() for part in state]
             moved[order][:, j] += sign * 1e-5
-            ends.append(axis_forces(*tree, *moved)[0])
+            ends.append(axis_forces(*tree, *moved, about)[0])
         np.testing.assert_allclose(by[order, :, :, j], (ends[0] - ends[1]) / 2e-5, atol=1e-6)

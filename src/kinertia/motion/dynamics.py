@@ -16,10 +16,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinertia.model.bsp import BodySegmentParameters
+from kinertia.model.kinematic_tree import KinematicTree
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.frame_chunks import pieces
 from kinertia.motion.regressor import regressor
-from kinertia.motion.rigid_body import axis_forces, root_balance, root_load
+from kinertia.motion.rigid_body import axis_force_derivatives, axis_forces
 
 
 @dataclass(frozen=True)
@@ -71,6 +72,14 @@ def axis_motion(skeleton: Skeleton, motion: Motion) -> tuple[np.ndarray, np.ndar
     return np.ascontiguousarray(x), np.ascontiguousarray(v), np.ascontiguousarray(a)
 
 
+def _state(
+    skeleton: Skeleton, bsp: BodySegmentParameters, motion: Motion
+) -> tuple[KinematicTree, float, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return what compiled functions take of a moving body, and the centre of its root's rotations."""
+    about = np.ascontiguousarray(skeleton.root.centre(motion.q))
+    return (skeleton.tree, skeleton.gravity_m_s2, skeleton.bodies(bsp), *axis_motion(skeleton, motion), about)
+
+
 def residual(skeleton: Skeleton, bsp: BodySegmentParameters, motion: Motion, wrench: np.ndarray) -> np.ndarray:
     """Compute the root residual P (n, 6), equation (1): inertial and gravity load minus the ground reactions.
 
@@ -79,8 +88,7 @@ def residual(skeleton: Skeleton, bsp: BodySegmentParameters, motion: Motion, wre
         motion: coordinates and derivatives.
         wrench: (n, 6) sum over both feet: force (N), moment about the ground origin (N m).
     """
-    state = axis_motion(skeleton, motion)
-    _, load = axis_forces(skeleton.tree, skeleton.gravity_m_s2, skeleton.bodies(bsp), *state)
+    _, load, _ = axis_forces(*_state(skeleton, bsp, motion))
     return skeleton.root.about_centre(motion.q, load - wrench)
 
 
@@ -88,10 +96,8 @@ def residual_terms(
     skeleton: Skeleton, bsp: BodySegmentParameters, motion: Motion, wrench: np.ndarray
 ) -> tuple[np.ndarray, RootDerivatives]:
     """Compute P (n, 6) as in `residual`, and its derivatives by all coordinates; the centre moves with the root."""
-    root, state, about = skeleton.root, axis_motion(skeleton, motion), skeleton.root.centre(motion.q)
-    load, by_axes = root_load(
-        skeleton.tree, skeleton.gravity_m_s2, skeleton.bodies(bsp), *state, np.ascontiguousarray(about)
-    )
+    root, moving = skeleton.root, np.zeros(len(skeleton.tree.parent), dtype=bool)
+    _, load, _, by_axes = axis_force_derivatives(*_state(skeleton, bsp, motion), moving)
     left = root.about_centre(motion.q, load - wrench)
     orders = by_axes[0], by_axes[1], by_axes[2]
     by = RootDerivatives(*skeleton.map.derivatives_to_coordinates(orders, motion.q, motion.qd, motion.qdd))
@@ -103,13 +109,7 @@ def consistent_root_acceleration(
     skeleton: Skeleton, bsp: BodySegmentParameters, motion: Motion, wrench: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Compute the root acceleration (n, 6) for which P is zero, equation (2), and its factor M_f (n, 6, 6)."""
-    load, mass = root_balance(
-        skeleton.tree,
-        skeleton.gravity_m_s2,
-        skeleton.bodies(bsp),
-        *axis_motion(skeleton, motion),
-        np.ascontiguousarray(skeleton.root.centre(motion.q)),
-    )
+    _, load, mass = axis_forces(*_state(skeleton, bsp, motion))
     left = skeleton.root.about_centre(motion.q, load - wrench)
     return motion.qdd[:, :6] - np.linalg.solve(mass, left[..., None])[..., 0], mass
 
@@ -148,10 +148,9 @@ def inverse_dynamics(
         foot_loads: (n, f, 6) per foot: force (N), moment about the ground origin (N m), ground axes.
         feet: the segments they act on; the skeleton's feet if None.
     """
-    result, bodies = np.empty_like(motion.q), skeleton.bodies(bsp)
+    result = np.empty_like(motion.q)
     for some in pieces(len(result)):
-        state = axis_motion(skeleton, motion.cut(some))
-        tau, _ = axis_forces(skeleton.tree, skeleton.gravity_m_s2, bodies, *state)
+        tau, _, _ = axis_forces(*_state(skeleton, bsp, motion.cut(some)))
         pose = skeleton.pose(motion.q[some])
         for i, foot in enumerate(skeleton.feet if feet is None else feet):
             moves = skeleton.support[skeleton.segments.index(foot)]

@@ -12,7 +12,7 @@ from kinertia.motion.rigid_body import empty_frame, move
 def regressor(tree: KinematicTree, gravity_m_s2: float, x: Float2, v: Float2, a: Float2, about: Float2) -> np.ndarray:
     """Compute the load (n, 6, s, 10) of every segment per unit of its ten parameters, in its own frame.
 
-    Moments are about `about`; the other arguments are those of `root_load`. With w, e and b the angular velocity,
+    Moments are about `about`; the other arguments are those of `axis_forces`. With w, e and b the angular velocity,
     angular acceleration and acceleration of the origin in the segment's axes, mass m, first moment h and inertia I
     require the force m b + e x h + w x (w x h) and, about the segment's origin, the moment h x b + I e + w x (I w).
     """

@@ -210,7 +210,8 @@ def bears(bodies: np.ndarray, j: int) -> bool:
 
 @part
 def fill(tree: KinematicTree, bodies: np.ndarray, x: np.ndarray, v: np.ndarray, a: np.ndarray, frame: Frame) -> None:
-    """Compute motion and forces of one frame, from bodies (a, 10) and x, v, a (a,) as in `root_load`.
+    """Compute motion and forces of one frame, from bodies (a, 10) and x, v, a (a,) as in `axis_forces`.
+
     The inertia is that of bodies attached directly to each axis.
     """
     move(tree, x, v, a, frame)
@@ -241,68 +242,6 @@ def differentiate(tree: KinematicTree, bodies: np.ndarray, frame: Frame) -> None
     _columns(frame)
 
 
-@compiled
-def root_load(
-    tree: KinematicTree,
-    gravity_m_s2: float,
-    bodies: Float2,
-    x: Float2,
-    v: Float2,
-    a: Float2,
-    about: Float2,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Compute the load of the whole body, and its derivatives.
-
-    Args:
-        tree: the skeleton.
-        gravity_m_s2: downward, along -y.
-        bodies: (a, 10) parameters of bodies attached directly to each axis, in its frame.
-        x, v, a: (n, a) values, rates and accelerations of the axes.
-        about: (n, 3) m, the point of the moment in the derivatives, which ignore that it moves with the axes.
-
-    Returns:
-        (n, 6) force, and moment about the ground origin, ground axes, as in `axis_forces`; and (3, n, 6, a)
-        derivatives by x, v and a of the force, and of the moment about the other point.
-    """
-    n, count = x.shape
-    load, by = np.zeros((n, 6)), np.empty((3, n, 6, count))
-    frame = empty_frame(count, gravity_m_s2)
-    column = frame.column
-    for k in range(n):
-        fill(tree, bodies, x[k], v[k], a[k], frame)
-        differentiate(tree, bodies, frame)
-        for j in range(count):
-            for order in range(3):
-                taken_about(column[order, j], about[k], by[order, k, :, j])
-        whole_load(tree.parent, frame.force, load, k)
-    return load, by
-
-
-@compiled
-def root_balance(
-    tree: KinematicTree,
-    gravity_m_s2: float,
-    bodies: Float2,
-    x: Float2,
-    v: Float2,
-    a: Float2,
-    about: Float2,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Compute the load (n, 6) as `root_load`, and its derivatives (n, 6, 6) by a of the first six axes, the root's."""
-    n, count = x.shape
-    load, by = np.zeros((n, 6)), np.empty((n, 6, 6))
-    frame = empty_frame(count, gravity_m_s2)
-    inertia, column = frame.inertia, frame.spare[0]
-    for k in range(n):
-        fill(tree, bodies, x[k], v[k], a[k], frame)
-        hand_down(tree.parent, inertia)
-        for j in range(6):
-            inertia_times(inertia, j, frame.axes, j, column, j)
-            taken_about(column[j], about[k], by[k, :, j])
-        whole_load(tree.parent, frame.force, load, k)
-    return load, by
-
-
 @inlined
 def taken_about(force: np.ndarray, about: np.ndarray, out: np.ndarray) -> None:
     """Write a force, and its moment about another point than the ground origin, to `out` (6,)."""
@@ -322,18 +261,48 @@ def whole_load(parent: np.ndarray, force: np.ndarray, out: np.ndarray, k: int) -
 
 @compiled
 def axis_forces(
-    tree: KinematicTree, gravity_m_s2: float, bodies: Float2, x: Float2, v: Float2, a: Float2
-) -> tuple[np.ndarray, np.ndarray]:
-    """Compute forces (n, a) of all axes, and the bodies' load (n, 6) at the ground origin; inputs as in `root_load`."""
+    tree: KinematicTree,
+    gravity_m_s2: float,
+    bodies: Float2,
+    x: Float2,
+    v: Float2,
+    a: Float2,
+    about: Float2,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Compute the forces of all axes, the load of the whole body, and its derivatives by the root's accelerations.
+
+    Args:
+        tree: the skeleton.
+        gravity_m_s2: downward, along -y.
+        bodies: (a, 10) parameters of bodies attached directly to each axis, in its frame.
+        x, v, a: (n, a) values, rates and accelerations of the axes.
+        about: (n, 3) m, the point of the moment in the derivatives.
+
+    Returns:
+        (n, a) forces; (n, 6) force, and moment about the ground origin, ground axes; and (n, 6, 6) derivatives by a of
+        the first six axes, the root's, of the force, and of the moment about the other point.
+    """
     n, count = x.shape
-    tau, load = np.empty((n, count)), np.zeros((n, 6))
+    root = min(6, count)
+    tau, load, by = np.empty((n, count)), np.zeros((n, 6)), np.empty((n, 6, root))
     frame = empty_frame(count, gravity_m_s2)
+    inertia, column = frame.inertia, frame.spare[0]
     for k in range(n):
         fill(tree, bodies, x[k], v[k], a[k], frame)
-        for j in range(count):
-            tau[k, j] = inner(frame.axes, j, frame.force, j)
-        whole_load(tree.parent, frame.force, load, k)
-    return tau, load
+        hand_down(tree.parent, inertia)
+        for j in range(root):
+            inertia_times(inertia, j, frame.axes, j, column, j)
+            taken_about(column[j], about[k], by[k, :, j])
+        _sum_up(tree.parent, frame, tau, load, k)
+    return tau, load, by
+
+
+@part
+def _sum_up(parent: np.ndarray, frame: Frame, tau: np.ndarray, load: np.ndarray, k: int) -> None:
+    """Write the forces of the axes to tau[k], and add the load of the whole body to load[k]."""
+    for j in range(len(parent)):
+        tau[k, j] = inner(frame.axes, j, frame.force, j)
+    whole_load(parent, frame.force, load, k)
 
 
 @compiled
@@ -344,22 +313,35 @@ def axis_force_derivatives(
     x: Float2,
     v: Float2,
     a: Float2,
+    about: Float2,
     moving: Bool1,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Compute forces (n, a) as `axis_forces`, and their derivatives (3, n, a, a) by x, v and a (columns).
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Compute the forces of all axes and the load of the whole body, and their derivatives.
 
-    They are zero for forces of axes that are not among `moving` (a,), and by the v and a of these axes.
+    Args:
+        tree, gravity_m_s2, bodies, x, v, a, about: as in `axis_forces`; the derivatives ignore that the point `about`
+            moves with the axes.
+        moving: (a,) axes whose forces are differentiated.
+
+    Returns:
+        (n, a) forces, (n, 6) load, and their derivatives by x, v and a, (3, n, a, a) and (3, n, 6, a). Those of forces
+        are zero for axes that are not `moving`, and by the v and a of these axes; if none is, they are (3, n, 0, 0).
     """
     n, count = x.shape
-    tau, by = np.empty((n, count)), np.zeros((3, n, count, count))
+    some = count if moving.any() else 0
+    tau, by = np.empty((n, count)), np.zeros((3, n, some, some))
+    load, by_load = np.zeros((n, 6)), np.empty((3, n, 6, count))
     frame = empty_frame(count, gravity_m_s2)
     for k in range(n):
         fill(tree, bodies, x[k], v[k], a[k], frame)
         differentiate(tree, bodies, frame)
+        _sum_up(tree.parent, frame, tau, load, k)
         for j in range(count):
-            tau[k, j] = inner(frame.axes, j, frame.force, j)
-        _through_axes(tree.parent, moving, frame, (by[0, k], by[1, k], by[2, k]))
-    return tau, by
+            for order in range(3):
+                taken_about(frame.column[order, j], about[k], by_load[order, k, :, j])
+        if some > 0:
+            _through_axes(tree.parent, moving, frame, (by[0, k], by[1, k], by[2, k]))
+    return tau, load, by, by_load
 
 
 @part

@@ -58,7 +58,7 @@ def root_columns(
     The derivatives are by coordinates, rates and accelerations.
 
     Args:
-        tree, gravity_m_s2, bodies: as in `root_load`.
+        tree, gravity_m_s2, bodies: as in `axis_forces`.
         motion: (n, a) values, rates and accelerations of the axes.
         bends: (n, a, 3) dependence of axes on their coordinates, `CoordinateMap.bends`; n is 0 if each axis is its
             coordinate.

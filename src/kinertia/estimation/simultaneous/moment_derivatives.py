@@ -127,11 +127,12 @@ class MomentsOfTrial:
         q, qd, qdd = map(self.virtual.embedded, motion)
         state, pose = axis_motion(skeleton, Motion(q, qd, qdd)), skeleton.pose(q)
         core = skeleton.tree, skeleton.gravity_m_s2
-        tau, (dq, dv, da) = axis_force_derivatives(*core, self._bodies, *state, rows >= 0)
+        origin = np.zeros((len(q), 3))
+        tau, _, (dq, dv, da), _ = axis_force_derivatives(*core, self._bodies, *state, origin, rows >= 0)
         slopes = np.ones(tau.shape) if pose.slopes is None else np.ascontiguousarray(pose.slopes)
         by_static = np.zeros((len(q), len(every), layout.in_root.stop))
         support = skeleton.support[self._segments]
-        by_parameter = regressor(*core, *state, np.zeros((len(q), 3)))
+        by_parameter = regressor(*core, *state, origin)
         add_bodies(pose.axes, slopes, rows, support, by_parameter, self._segments, self._chain, by_static)
         time = self.problem.trials[self.k].time[frames]
         late = delayed_loads(self.reactions, time, self.delay_sd_s)
