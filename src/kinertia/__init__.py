@@ -38,8 +38,8 @@ if TYPE_CHECKING:
     from kinertia.estimation.prior import BspPrior as BspPrior
     from kinertia.estimation.prior import literature_prior as literature_prior
     from kinertia.estimation.result import Fit as Fit
-    from kinertia.estimation.result import TrialFit as TrialFit
     from kinertia.estimation.simultaneous.fit import Posterior as Posterior
+    from kinertia.estimation.trial_fit import TrialFit as TrialFit
     from kinertia.findings.finding import Finding as Finding
     from kinertia.findings.finding import Severity as Severity
     from kinertia.findings.finding import finding as finding
@@ -124,7 +124,8 @@ _ROOMS = {
     "io.subject_tables": "SubjectFile",
     "estimation.prepared": "Prepared",
     "estimation.prior": "BspPrior literature_prior",
-    "estimation.result": "Fit TrialFit",
+    "estimation.result": "Fit",
+    "estimation.trial_fit": "TrialFit",
     "estimation.simultaneous.fit": "Posterior",
     "diagnostics.model.model_check": "ModelCheck check_model",
     "diagnostics.result.suitability": "Suitability suitability",

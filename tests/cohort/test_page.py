@@ -112,7 +112,7 @@ def test_few_people_who_are_close_together_by_chance_make_no_outlier():
 def test_where_nobody_was_measured_mean_curves_have_a_gap():
     every = np.tile([2.0, 4.0, 8.5], (101, 1))
     every[40:60] = 0.0
-    spread, line = _curves({("knee_angle_moment", "Knee moment, flexion +"): every}).data
+    spread, line = _curves({("walk", "knee_angle_moment", "Knee moment, flexion +"): every}).data
     assert np.isnan(np.asarray(line["y"], dtype=float)[40:60]).all()
     assert np.asarray(line["y"])[:40] == pytest.approx(2.0)
     assert not set(range(40, 60)) & set(np.asarray(spread["x"])[np.isfinite(spread["y"])].tolist())
@@ -122,13 +122,27 @@ def test_knees_of_models_with_opposite_signs_are_not_averaged(tmp_path):
     """One model's knee angle is flexion and another's extension: mean 0."""
     titles = {"Anna": ("Knee flexion +", 1.0), "Ben": ("Knee extension +", -1.0)}
     rows = pd.concat(
-        pd.DataFrame({"quantity": "knee_angle_angle", "title": title, "percent": np.arange(101), "value": 30.0 * sign})
+        pd.DataFrame({
+            "task": "walk", "quantity": "knee_angle_angle", "title": title,
+            "percent": np.arange(101), "value": 30.0 * sign,
+        })
         for title, sign in titles.values()
-    )
+    )  # fmt: skip
     rows.to_parquet(tmp_path / "cycles.parquet")
     (part,) = _mean_curves(tmp_path)
     means = [trace["y"][0] for trace in part.figure.data if trace["name"] == "mean"]
     assert sorted(means) == [-30.0, 30.0]
+    assert "separate panels" in part.caption
+
+
+def test_walks_and_turns_of_a_cohort_are_not_averaged(tmp_path):
+    shown = {"quantity": "knee_angle_moment", "title": "Knee moment, flexion +", "percent": np.arange(101)}
+    tasks = {"turn": 2.0, "walk": 1.0}
+    rows = pd.concat(pd.DataFrame({"task": task, **shown, "value": value}) for task, value in tasks.items())
+    rows.to_parquet(tmp_path / "cycles.parquet")
+    (part,) = _mean_curves(tmp_path)
+    means = [trace["y"][0] for trace in part.figure.data if trace["name"] == "mean"]
+    assert means == [1.0, 2.0]
     assert "separate panels" in part.caption
 
 

@@ -1,10 +1,12 @@
 """Peaks and impulses of joint moments: whole, or not at all."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from kinertia.estimation.cycles import CycleCurve
-from kinertia.estimation.moment_peaks import PEAKS, peak_columns
+from kinertia.estimation.moment_peaks import LANDING_PEAKS, PEAKS, peak_columns
 from kinertia.motion.gait_cycle import PERCENT, Stride
 from kinertia.report.cycle_figures import drawn_curves
 from kinertia.report.cycle_table import peak_rows
@@ -44,10 +46,38 @@ def test_the_largest_value_of_a_part_is_no_peak(first, last, missing):
     assert {name for name, (value, _, _) in peaks.items() if np.isnan(value)} == missing
 
 
+def test_a_stance_has_its_peaks_though_no_heel_strike_follows():
+    """The same moments over 0.6 s of stance: peaks at other percentages, the same impulse; nothing of swing."""
+    curve = adduction()
+    at = np.interp(PERCENT, [0, 100], [0, 60])
+    stance = replace(
+        curve,
+        stride=replace(STRIDE, end_s=0.6, toe_off_s=0.6, phase="stance"),
+        value=np.interp(at, PERCENT, curve.value),
+    )
+    whole, peaks = found(curve), found(stance)
+    assert peaks[FIRST] == pytest.approx((0.5, 0.05, 25.0), abs=1e-2)
+    assert peaks[SECOND] == pytest.approx((0.3, 0.05, 75.0), abs=1e-2)
+    assert peaks[IMPULSE][0] == pytest.approx(whole[IMPULSE][0], rel=0.02)
+    swing = replace(stance, kind="power", quantity="hip_flexion_power")
+    assert np.isnan(found(swing)["hip flexion power, generated, pull-off"][0])
+
+
+def test_a_landing_has_peaks_of_its_own():
+    landing = replace(adduction(), stride=replace(STRIDE, end_s=0.2, toe_off_s=0.2, phase="landing"), task="landing")
+    peaks = found(landing)
+    assert set(peaks) == {"knee adduction moment, external, landing", "knee abduction moment, external, landing"}
+    assert set(peaks) <= {one.name for one in LANDING_PEAKS}
+    assert peaks["knee adduction moment, external, landing"] == pytest.approx((0.5, 0.05, 15.0), abs=1e-3)
+    columns = peak_columns([landing])
+    assert set(columns["task"]) == set(columns["phase"]) == {"landing"}
+
+
 def test_peaks_of_a_fit(fit, two_level):
     first = fit.peaks[fit.peaks.peak == FIRST]
     known = first[first.value.notna()]
-    assert set(known.side) == {"r"}, "no heel strike follows the left stance on a plate"
+    assert set(known.side) == {"r", "l"}
+    assert set(known[known.side == "l"].phase) == {"stance"}, "no heel strike follows the left stance on a plate"
     assert (known.value.between(0.0, 1.0) & (known.sd > 0.0)).all()
     assert two_level.peaks.empty
     rows = {row.measure: row for row in peak_rows(drawn_curves(fit)["estimate"])}

@@ -19,9 +19,9 @@ STAGES = {"literature", "corrected", "estimate"}
 RESULTS = {
     "report.html", "fit.json", "fit.npz", "model.osim", "cycles.csv", "cycles_literature.csv", "spatiotemporal.csv",
     "bsp.csv", "kinematics.mot", "inverse_dynamics.sto", "inverse_dynamics_literature.sto", "residuals.sto",
-    "ground_reactions.mot", "external_loads.xml",
+    "ground_reactions.mot", "external_loads.xml", "contact_phases.csv",
 }  # fmt: skip
-CYCLES = {"cycles.csv", "cycles_literature.csv", "spatiotemporal.csv"}
+CYCLES = {"cycles.csv", "cycles_literature.csv", "spatiotemporal.csv", "contact_phases.csv"}
 FOR_ALL = {"report.html", "fit.json", "fit.npz", "bsp.csv", "model.osim", *CYCLES}
 PARAMETERS = ["mass", "com_x", "com_y", "com_z", "ixx", "iyy", "izz", "ixy", "ixz", "iyz"]
 

@@ -158,35 +158,37 @@ def _degrees(value: float) -> str:
 
 
 def _mean_curves(folder: Path) -> Iterator[Part]:
-    """Draw mean and spread of all strides over the gait cycle, both sides, summed up piece by piece; separately where
-    models differ in the positive direction.
+    """Draw mean and spread of all strides over the gait cycle, both sides, summed up piece by piece; separately of each
+    task, and where models differ in the positive direction.
     """
     from pyarrow import dataset
 
-    sums: defaultdict[tuple[str, str], np.ndarray] = defaultdict(lambda: np.zeros((len(PERCENT), 3)))
+    sums: defaultdict[tuple[str, str, str], np.ndarray] = defaultdict(lambda: np.zeros((len(PERCENT), 3)))
     source = dataset.dataset(folder / "cycles.parquet")
     wanted = dataset.field("quantity").isin(list(_CURVES))
-    for batch in source.to_batches(columns=["quantity", "title", "percent", "value"], filter=wanted):
+    for batch in source.to_batches(columns=["task", "quantity", "title", "percent", "value"], filter=wanted):
         frame = batch.to_pandas().dropna()
-        for curve, part in frame.groupby(["quantity", "title"]):
+        for curve, part in frame.groupby(["task", "quantity", "title"]):
             at, value = part["percent"].to_numpy(), part["value"].to_numpy()
             np.add.at(sums[curve], at, np.column_stack([np.ones_like(value), value, value**2]))
     if sums:
         text = "Over the gait cycle (%): mean and SD of all strides of all people, both sides"
-        apart = "; models of opposite sign conventions have separate panels"
-        caption = f"{text}{apart if len(sums) > len({quantity for quantity, _ in sums}) else ''}."
+        apart = "; tasks, and models of opposite sign conventions, have separate panels"
+        caption = f"{text}{apart if len(sums) > len({quantity for _, quantity, _ in sums}) else ''}."
         order = list(_CURVES)
-        shown = sorted(sums, key=lambda curve: (order.index(curve[0]), curve[1]))
+        shown = sorted(sums, key=lambda curve: (curve[0] != "walk", curve[0], order.index(curve[1]), curve[2]))
         yield Part("Mean curves", figure=_curves({curve: sums[curve] for curve in shown}), caption=caption)
 
 
-def _curves(sums: Mapping[tuple[str, str], np.ndarray]) -> Figure:
-    panels = []
-    for (quantity, title), every in sums.items():
+def _curves(sums: Mapping[tuple[str, str, str], np.ndarray]) -> Figure:
+    """Draw mean and spread by task, quantity and title."""
+    panels, several = [], len({task for task, *_ in sums}) > 1
+    for (task, quantity, title), every in sums.items():
         total = np.where(every[:, :1] > 0, every, np.nan)  # gaps where nobody was measured
         mean = total[:, 1] / total[:, 0]
         sd = np.sqrt(np.maximum(total[:, 2] / total[:, 0] - mean**2, 0.0))
         spread = {**band(mean - sd, mean + sd, style.faded(style.BLUE, 0.2)), "name": "mean ± SD"}
         line = {**mean_line(mean), "name": "mean", "line": {"color": style.BLUE}}
-        panels.append(Panel(f"{title} ({_CURVES[quantity]})", [spread, line]))
+        named = f"{task}: {title}" if several and task else title
+        panels.append(Panel(f"{named} ({_CURVES[quantity]})", [spread, line]))
     return small_multiples(panels, "Mean curves over the gait cycle.", {"range": [0, 100]})

@@ -59,7 +59,7 @@ _COLUMNS: Mapping[str, Mapping[str, str]] = {
         "unit": "string",
     },
     "cycles": {
-        **dict.fromkeys(("person", "trial", "side"), "string"),
+        **dict.fromkeys(("person", "trial", "task", "side"), "string"),
         **dict.fromkeys(("stride", "percent"), "int64"),
         **dict.fromkeys(("quantity", "title"), "string"),
         **dict.fromkeys(("value", "sd"), "double"),

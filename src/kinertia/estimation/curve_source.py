@@ -67,6 +67,10 @@ class Estimated(Protocol):
     def strides(self) -> tuple[Stride, ...]:
         """Strides of the whole trial."""
 
+    @property
+    def phases(self) -> tuple[Stride, ...]:
+        """Phases of contacts that are part of no stride."""
+
 
 class CurveSource:
     """Quantities of a trial at any time; NaN where they are not known."""

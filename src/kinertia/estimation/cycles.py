@@ -1,8 +1,8 @@
 """Resamples angles, moments, powers and ground reactions to 0 to 100 % of each gait cycle.
 
 A curve belongs to the side whose heel strikes begin and end its stride. It has a gap where it is not known
-(`joint_curves`). Clinical angles (`clinical_angles`) come from inverse kinematics, which covers whole strides: no
-estimate changes them.
+(`joint_curves`). What is no stride has curves over its phase (`contact_phases`), in tables of their own. Clinical
+angles (`clinical_angles`) come from inverse kinematics, which covers whole strides: no estimate changes them.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -16,10 +16,12 @@ from kinertia.estimation.curve_source import CurveSource, Estimated, Stage, trac
 from kinertia.model.shared_coordinates import by_side
 from kinertia.model.skeleton import GRAVITY_M_S2
 from kinertia.motion.clinical_angles import clinical_angles
-from kinertia.motion.gait_cycle import PERCENT, Stride, feet_under_pelvis
+from kinertia.motion.gait_cycle import PERCENT, FeetUnderPelvis, Stride, feet_under_pelvis
 from kinertia.motion.joint_moments import component_names, joint_and_side
 from kinertia.motion.spatiotemporal import Spatiotemporal, spatiotemporal, travelled
+from kinertia.trial.belt import Belt
 from kinertia.trial.data import FEET
+from kinertia.trial.sampled_time import within
 
 Kind = Literal["angle", "moment", "joint_moment", "power", "force", "clinical"]
 UNITS: Mapping[Kind, str] = {
@@ -48,6 +50,7 @@ class CycleCurve:
             "knee_flexion_clinical".
         value: (101,) at 0, 1, ..., 100 %; NaN where nothing was measured.
         sd: (101,) standard deviation of the estimate; NaN where there is none.
+        task: of the trial.
     """
 
     trial: str
@@ -56,6 +59,7 @@ class CycleCurve:
     quantity: str
     value: np.ndarray
     sd: np.ndarray
+    task: str = ""
 
 
 def cycle_curves(
@@ -80,10 +84,12 @@ def curves_by_stage(
     most_strides: int | None = None,
     stages: Sequence[Stage] = ("estimate", "literature"),
 ) -> dict[Stage, list[CycleCurve]]:
-    """Return all curves of these stages, from at most so many strides per trial and side, evenly spread."""
+    """Return all curves of these stages, from at most so many strides per trial and side, evenly spread, and from all
+    phases of what is no stride (`CycleCurve.stride.phase`).
+    """
     result: dict[Stage, list[CycleCurve]] = {stage: [] for stage in stages}
     for trial in trials:
-        if chosen := spread_evenly(trial.strides, most_strides):
+        if chosen := [*spread_evenly(trial.strides, most_strides), *trial.phases]:
             strides = _tracked_strides(trial, chosen)
             for stage, curves in result.items():
                 curves += _curves(trial, mass_kg, stage, strides)
@@ -99,10 +105,10 @@ class _TrackedStride(NamedTuple):
 
 
 def _curves(trial: Estimated, mass_kg: float, stage: Stage, strides: Sequence[_TrackedStride]) -> Iterator[CycleCurve]:
-    source, skeleton = CurveSource(trial, stage), trial.skeleton
+    source, skeleton, kinematics = CurveSource(trial, stage), trial.skeleton, trial.kinematics
     sides = by_side(skeleton.coordinates)
     for stride, path, angles in strides:
-        time, curve = stride.time, partial(CycleCurve, trial.name, stride)
+        time, curve = stride.time, partial(CycleCurve, trial.name, stride, task=kinematics.trial.task)
         angle, speed, moment = source.angle(time), source.speed(time), source.moment(time) / mass_kg
         sd = source.deviations(time)
         by_kind: dict[Kind, tuple[np.ndarray, np.ndarray]] = {
@@ -138,7 +144,7 @@ def _curves(trial: Estimated, mass_kg: float, stage: Stage, strides: Sequence[_T
 
 def _tracked_strides(trial: Estimated, strides: Sequence[Stride]) -> list[_TrackedStride]:
     skeleton, kinematics = trial.skeleton, trial.kinematics
-    paths = travelled(feet_under_pelvis(skeleton, kinematics), strides, kinematics.trial.belt)
+    paths = _paths(feet_under_pelvis(skeleton, kinematics), strides, kinematics.trial.belt)
     q = tracked(kinematics, np.concatenate([stride.time for stride in strides]), 0)
     heading = np.repeat(np.arctan2(-paths[:, 2], paths[:, 0]), len(PERCENT))
     angles = clinical_angles(skeleton, q, heading)
@@ -148,6 +154,16 @@ def _tracked_strides(trial: Estimated, strides: Sequence[Stride]) -> list[_Track
         )
         for k, (stride, path) in enumerate(zip(strides, paths, strict=True))
     ]
+
+
+def _paths(feet: FeetUnderPelvis, strides: Sequence[Stride], belt: Belt | None) -> np.ndarray:
+    """Return how far the person goes in each stride (k, 3) m; where the pelvis faces in phases that are no stride."""
+    moved = iter(travelled(feet, [one for one in strides if one.phase == "stride"], belt))
+    result = [
+        next(moved) if one.phase == "stride" else feet.heading[within(feet.time, one.start_s, one.end_s)].mean(axis=0)
+        for one in strides
+    ]
+    return np.reshape(result, (-1, 3))
 
 
 def _directions(path: np.ndarray, side: str) -> np.ndarray:
@@ -165,10 +181,18 @@ def cycle_columns(
 
 
 def columns_of(curves: Sequence[CycleCurve]) -> dict[str, Any]:
-    """Return the columns of `Fit.cycles`, by name, with these curves."""
+    """Return the columns of `Fit.cycles`, by name: of the strides among these curves."""
+    own = [one for one in curves if one.stride.phase == "stride"]
+    return {name: values for name, values in phase_columns(own).items() if name != "phase"}
+
+
+def phase_columns(curves: Sequence[CycleCurve]) -> dict[str, Any]:
+    """Return the columns of `Fit.contact_phases`, by name, with these curves."""
     samples = len(PERCENT)
     return {
         "trial": [one.trial for one in curves for _ in range(samples)],
+        "task": [one.task for one in curves for _ in range(samples)],
+        "phase": [one.stride.phase for one in curves for _ in range(samples)],
         "side": [one.stride.side for one in curves for _ in range(samples)],
         "stride": np.repeat([one.stride.number for one in curves], samples).astype(int),
         "percent": np.tile(PERCENT, len(curves)).astype(int),
@@ -194,7 +218,7 @@ def spatiotemporal_columns(trials: Sequence[Estimated]) -> dict[str, list[Any]]:
 
 
 def spread_evenly(strides: Sequence[Stride], most: int | None) -> list[Stride]:
-    """Select at most so many strides of each side, evenly spread over the trial."""
+    """Select at most so many strides of each side, evenly spread over the trial; all if None."""
     kept = []
     for side in FEET:
         own = [stride for stride in strides if stride.side == side]

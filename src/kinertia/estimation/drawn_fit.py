@@ -6,9 +6,10 @@ import numpy as np
 from scipy.interpolate import BSpline
 
 from kinertia.errors import KinertiaError
-from kinertia.estimation.result import Fit, TrialFit
+from kinertia.estimation.result import Fit
 from kinertia.estimation.simultaneous.plate_loads import GAIN, corrected_loads
 from kinertia.estimation.simultaneous.posterior_draws import PosteriorDraws, TrialDraws
+from kinertia.estimation.trial_fit import TrialFit
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion, inverse_dynamics

@@ -1,6 +1,7 @@
 """Finds peaks and impulses of joint moments and powers that gait studies report, with their standard deviations.
 
-A peak has a value only where its whole phase is known: the largest value of a part is not the peak.
+A peak has a value only where its whole phase is known: the largest value of a part is not the peak. A stance has its
+peaks whether a heel strike follows or not; a landing has peaks of its own.
 """
 
 from collections.abc import Sequence
@@ -44,31 +45,42 @@ PEAKS = (
     Peak("hip flexion power, generated, pull-off", "hip_flexion_power", 1.0, (0.5, 0.8), of_stride=True),
 )
 """Of stance, from heel strike to toe off, unless of the stride."""
+LANDING_PEAKS = (
+    Peak("knee extension moment, internal, landing", "knee_flexion_joint_moment", -1.0, (0.0, 1.0)),
+    Peak("knee adduction moment, external, landing", "knee_adduction_joint_moment", -1.0, (0.0, 1.0)),
+    Peak("knee abduction moment, external, landing", "knee_adduction_joint_moment", 1.0, (0.0, 1.0)),
+    Peak("hip extension moment, internal, landing", "hip_flexion_joint_moment", -1.0, (0.0, 1.0)),
+    Peak("ankle plantarflexion moment, internal, landing", "ankle_flexion_joint_moment", -1.0, (0.0, 1.0)),
+)
+"""From foot contact until the pelvis is lowest."""
 
 
 def peak_columns(curves: Sequence[CycleCurve]) -> dict[str, Any]:
-    """Return columns of all peaks, by name: trial, side, stride, peak, unit, value, sd, percent.
+    """Return columns of all peaks, by name: trial, task, phase, side, stride, peak, unit, value, sd, percent.
 
     Values are positive in the direction that the name states. A peak whose phase is not all known is NaN. `percent` is
-    where in the stride it is; NaN for impulses, whose SD is that of errors that last through stance.
+    where in the stride, stance or landing it is; NaN for impulses, whose SD is that of errors that last through stance.
 
     Args:
         curves: of the estimate, of all trials.
     """
     rows = []
-    for peak in PEAKS:
+    for peak in (*PEAKS, *LANDING_PEAKS):
         for one in curves:
-            if one.quantity == peak.quantity:
+            if one.quantity == peak.quantity and (one.stride.phase == "landing") == (peak in LANDING_PEAKS):
                 value, sd, percent = _read(peak, one)
                 unit = f"{UNITS[one.kind]} s".replace("/kg s", " s/kg") if peak.impulse else UNITS[one.kind]
-                rows.append((one.trial, one.stride.side, one.stride.number, peak.name, unit, value, sd, percent))
-    rows.sort(key=lambda row: (row[0], row[1] != "r", row[2]))
-    names = ("trial", "side", "stride", "peak", "unit", "value", "sd", "percent")
+                place = (one.trial, one.task, one.stride.phase, one.stride.side, one.stride.number)
+                rows.append((*place, peak.name, unit, value, sd, percent))
+    rows.sort(key=lambda row: (row[0], row[2] != "stride", row[3] != "r", row[4]))
+    names = ("trial", "task", "phase", "side", "stride", "peak", "unit", "value", "sd", "percent")
     return {name: [row[k] for row in rows] for k, name in enumerate(names)}
 
 
 def _phase(peak: Peak, curve: CycleCurve) -> np.ndarray:
-    """Return the mask (101,) of the phase; nothing without a toe off."""
+    """Return the mask (101,) of the phase; nothing without a toe off, nor of a stride where there is none."""
+    if peak.of_stride and curve.stride.phase != "stride":
+        return np.zeros(len(PERCENT), dtype=bool)
     whole = 100.0 if peak.of_stride else curve.stride.percent(curve.stride.toe_off_s)
     if not np.isfinite(whole):
         return np.zeros(len(PERCENT), dtype=bool)

@@ -1,9 +1,8 @@
-"""Defines the result of an estimate: `Fit`, with one `TrialFit` for every trial."""
+"""Defines the result of an estimate, `Fit`; its trials are `TrialFit`s."""
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -13,16 +12,15 @@ import numpy as np
 
 from kinertia.estimation.asymmetry import asymmetries, asymmetry_columns
 from kinertia.estimation.curve_source import Stage
-from kinertia.estimation.cycles import Kind, curves_by_stage, cycle_columns, spatiotemporal_columns
+from kinertia.estimation.cycles import Kind, curves_by_stage, cycle_columns, phase_columns, spatiotemporal_columns
 from kinertia.estimation.figure_names import FitPictures
 from kinertia.estimation.gait_scores import GaitProfile, with_norms
 from kinertia.estimation.identifiability import evidence
 from kinertia.estimation.input_checks import known
-from kinertia.estimation.joint_curves import JointCurves
 from kinertia.estimation.moment_peaks import peak_columns
 from kinertia.estimation.simultaneous.calibration_entry import calibration_columns
-from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
 from kinertia.estimation.simultaneous.fit import Posterior
+from kinertia.estimation.trial_fit import TrialFit
 from kinertia.findings.finding import Finding, Severity
 from kinertia.findings.overview import Overview
 from kinertia.io.norms_file import read_norms
@@ -30,120 +28,12 @@ from kinertia.model.anthropometry import SEGMENTS
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.imported_model import OsimModel
 from kinertia.model.skeleton import Skeleton
-from kinertia.motion.dynamics import Motion
-from kinertia.motion.gait_cycle import Stride, strides_of
-from kinertia.motion.ground_reactions import GroundReactions
-from kinertia.motion.kinematics import Kinematics
 from kinertia.settings import Settings, Subject
 from kinertia.trial import display
-from kinertia.trial.trial_input import WITHOUT_STRIDES
 
 if TYPE_CHECKING:
     import pandas as pd
     from xarray import Dataset
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class TrialFit:
-    """Result of one trial of a `Fit`. Arrays cover the w frames of the measured windows.
-
-    Attributes:
-        kinematics: markers, coordinates and ground reactions before estimation.
-        skeleton: with this trial's marker positions (`displacement`).
-        motion: estimated coordinates (rad, m), and their derivatives as OpenSim's tools compute them from
-            `kinematics.mot`, by natural quintic splines through the frames. They differ from the estimate's own in the
-            first and last frames only.
-        course: (f, c) coordinates of `kinematics.course_time`: all frames in which any joint's load is known, and
-            those between; None after two-level, which has none there.
-        motion_hz: bandwidth of the motion.
-        reactions: the corresponding ground reactions at the plates' rate, corrected for instrument errors.
-        residuals: root residual (w, 6: force N, moment N m about the pelvis origin, ground axes) per stage:
-            "literature" (no correction), "corrected" (literature BSPs, pelvis correction), "estimate"; forces have the
-            bandwidth of the motion.
-        full_residuals: the same at the forces' full bandwidth, with forces as measured before the estimate and
-            `reactions` after it. The estimate's equal those of OpenSim's inverse dynamics on the result files.
-        joint_loads: joint inverse dynamics (w, c: N m; N for translations) per stage: "literature" (with forces as
-            measured), "estimate" (with `reactions`); after two-level both with forces of the motion's bandwidth.
-            `moments` returns them as tables.
-        deviations: posterior standard deviations of the estimate's curves; None after two-level. `coordinate_sd` and
-            `moment_sd` return them as tables.
-        marker_errors_m: distances (w, m) between measured and model markers per stage: "ik", "final".
-        seconds: computing time per stage.
-        joint_curves: joint loads in three dimensions at the frames of `course`, wherever they are known; None after
-            two-level and in older files.
-
-    Examples:
-        >>> trial = fit.trials[0]  # fit = kinertia.fit_subject("subject.toml")
-        >>> trial.moments["estimate"]["knee_angle_r"].name, list(trial.residuals)
-        ('knee_angle_r', ['literature', 'corrected', 'estimate'])
-    """
-
-    kinematics: Kinematics
-    skeleton: Skeleton
-    motion: Motion
-    motion_hz: float
-    reactions: GroundReactions
-    residuals: Mapping[str, np.ndarray]
-    full_residuals: Mapping[str, np.ndarray]
-    joint_loads: Mapping[str, np.ndarray]
-    deviations: CurveDeviations | None
-    marker_errors_m: Mapping[str, np.ndarray]
-    seconds: Mapping[str, float]
-    course: np.ndarray | None = None
-    joint_curves: JointCurves | None = None
-
-    @property
-    def name(self) -> str:
-        """Name of the trial."""
-        return self.kinematics.trial.name
-
-    @property
-    def time(self) -> np.ndarray:
-        """Times (w,) of the frames, s."""
-        return self.kinematics.time
-
-    @property
-    def coordinates(self) -> pd.DataFrame:
-        """Estimated coordinates (rad, m) over time."""
-        return by_coordinate(self.kinematics, self.motion.q)
-
-    @cached_property
-    def coordinate_sd(self) -> pd.DataFrame | None:
-        """Posterior standard deviations of `coordinates`, in the same form; None after two-level."""
-        return None if self.deviations is None else by_coordinate(self.kinematics, self.deviations.coordinates)
-
-    @cached_property
-    def strides(self) -> tuple[Stride, ...]:
-        """Strides of the whole trial, by plates or else motion; none in squats and landings, found or stated."""
-        task = self.kinematics.trial.task
-        return () if task in WITHOUT_STRIDES else strides_of(self.skeleton, self.kinematics)
-
-    @cached_property
-    def moments(self) -> Mapping[str, pd.DataFrame]:
-        """Joint moments (`joint_loads`) over time, one column per coordinate."""
-        return {stage: by_coordinate(self.kinematics, loads) for stage, loads in self.joint_loads.items()}
-
-    @cached_property
-    def moment_sd(self) -> pd.DataFrame | None:
-        """Posterior standard deviations of the estimated moments, in the same form; None after two-level."""
-        return None if self.deviations is None else by_coordinate(self.kinematics, self.deviations.moments)
-
-    def __repr__(self) -> str:
-        """Return name, time and size only, since all the arrays would fill pages."""
-        start, end = self.kinematics.window_s
-        return f"TrialFit({self.name}: {start:.2f} to {end:.2f} s, {len(self.time)} frames)"
-
-    def _repr_html_(self) -> str:
-        """Return the HTML summary for a notebook: frames used, marker distances, residuals."""
-        return display.html(self)
-
-
-def by_coordinate(kinematics: Kinematics, values: np.ndarray) -> pd.DataFrame:
-    """Return values (w, c) of all coordinates as a table over the time (s) of the measured windows, one column each."""
-    import pandas as pd
-
-    index = pd.Index(kinematics.time, name="time")
-    return pd.DataFrame(values, index=index, columns=list(kinematics.ik.coordinates))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -224,8 +114,10 @@ class Fit:
     def cycles(self, stage: Stage = "estimate", norms: str | Path | None = None) -> pd.DataFrame:
         """Return curves over the gait cycle, one row per trial, side, stride, percent (0 to 100) and quantity.
 
-        Columns: trial, side ("r", "l": whose heel strikes begin and end the stride), stride (from 1), percent,
-        quantity, value, sd. Quantities: "..._angle" (deg), "..._moment" (N m/kg, internal, signed like the angle),
+        Columns: trial, task ("walk", "turn", ...), side ("r", "l": whose heel strikes begin and end the stride), stride
+        (from 1), percent, quantity, value, sd. Average only strides of one task.
+
+        Quantities: "..._angle" (deg), "..._moment" (N m/kg, internal, signed like the angle),
         "..._power" (W/kg), each of a coordinate without its side; "knee_adduction_joint_moment", ... (N m/kg, of
         `joint_moments`); "ground_force_forward", "..._upward", "..._medial" (% body weight; along the stride, up,
         towards the other foot); "..._clinical": Plug-in Gait's nine angles (deg). What is not known is NaN.
@@ -246,12 +138,32 @@ class Fit:
         columns = cycle_columns(self.trials, self.mass_kg, stage)
         return pd.DataFrame(columns if norms is None else with_norms(columns, read_norms(norms), self.skeleton))
 
+    def contact_phases(self, stage: Stage = "estimate") -> pd.DataFrame:
+        """Return curves over contacts with plates that are part of no stride, in the columns of `cycles`, and `phase`.
+
+        Phases: "stance", from foot contact to foot off, where no heel strike follows; "landing", in trials of that
+        task, from foot contact until the pelvis is lowest. `percent` is of the phase; `stride` counts the phases of a
+        side.
+
+        Args:
+            stage: as in `cycles`.
+
+        Examples:
+            >>> list(fit.contact_phases().columns)[:4]
+            ['trial', 'task', 'phase', 'side']
+        """
+        import pandas as pd
+
+        curves = curves_by_stage(self.trials, self.mass_kg, 0, [stage])[stage]
+        return pd.DataFrame(phase_columns(curves))
+
     @cached_property
     def peaks(self) -> pd.DataFrame:
-        """Peaks and impulses of joint moments and powers, one row per trial, side, stride and peak.
+        """Peaks and impulses of joint moments and powers, one row per trial, side, phase and peak.
 
-        Columns: trial, side, stride, peak, unit, value, sd, percent (of the stride). Values are positive in the
-        direction that `peak` states, NaN unless the whole phase is known. Empty without strides, and after two-level.
+        Columns: trial, task, phase ("stride"; or "stance", "landing", as in `contact_phases`), side, stride, peak,
+        unit, value, sd, percent (of the phase). Values are positive in the direction that `peak` states, NaN unless all
+        of it is known. Empty in squats, and after two-level.
 
         Examples:
             >>> first = fit.peaks[fit.peaks.peak == "knee adduction moment, external, first peak"]
@@ -260,8 +172,12 @@ class Fit:
         """
         import pandas as pd
 
+        return pd.DataFrame(self.peak_columns())
+
+    def peak_columns(self) -> dict[str, Any]:
+        """Return the columns of `peaks`, by name."""
         trials = [trial for trial in self.trials if trial.joint_curves is not None]
-        return pd.DataFrame(peak_columns(curves_by_stage(trials, self.mass_kg, None, ("estimate",))["estimate"]))
+        return peak_columns(curves_by_stage(trials, self.mass_kg, None, ("estimate",))["estimate"])
 
     @property
     def spatiotemporal(self) -> pd.DataFrame:

@@ -35,6 +35,7 @@ _STRIDE_S = (0.4, 3.0)
 _PHASE = (0.15, 0.85)
 """Part of a stride in which the other foot lands: not so in squats and jumps, where both feet move together."""
 _HEADING_S = 0.25
+Phase = Literal["stride", "stance", "landing"]
 
 
 @dataclass(frozen=True)
@@ -48,6 +49,7 @@ class Stride:
         toe_off_s: between them; NaN if it was not found.
         opposite_toe_off_s, opposite_strike_s: of the other foot, between them; the first may be NaN.
         on_plates: whether plates measured both heel strikes; else at least one comes from the motion.
+        phase: "stride"; or "stance", "landing" for what is no stride (`contact_phases`), which ends at `toe_off_s`.
 
     Examples:
         >>> stride = fit.strides[0]
@@ -63,6 +65,7 @@ class Stride:
     opposite_toe_off_s: float
     opposite_strike_s: float
     on_plates: bool
+    phase: Phase = "stride"
 
     @property
     def time(self) -> np.ndarray:

@@ -10,7 +10,8 @@ import numpy as np
 from kinertia.errors import FileError
 from kinertia.estimation.drawn_fit import drawn_fit
 from kinertia.estimation.joint_curves import JointCurves
-from kinertia.estimation.result import Fit, TrialFit
+from kinertia.estimation.result import Fit
+from kinertia.estimation.trial_fit import TrialFit
 from kinertia.io.c3d_analysis import Measure
 from kinertia.io.c3d_event_writer import EventToWrite
 from kinertia.io.c3d_outputs import C3dFrames, OutputPoint, frames_of, too_many, unit_factor, with_outputs

@@ -21,7 +21,7 @@ from kinertia.io.norms_file import Norm
 from kinertia.model.shared_coordinates import opposite_on_left
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.clinical_angles import CLINICAL_ANGLES
-from kinertia.motion.gait_cycle import PERCENT
+from kinertia.motion.gait_cycle import PERCENT, Phase
 from kinertia.motion.joint_moments import component_names, joint_and_side
 from kinertia.motion.joint_wrench import body_joints
 from kinertia.report import style
@@ -104,9 +104,9 @@ def drawn_curves(fit: Fit) -> CurvesByStage:
     return curves_by_stage(fit.trials, fit.mass_kg, MOST_STRIDES)
 
 
-def _by_quantity(curves: Iterable[CycleCurve]) -> Curves:
+def _by_quantity(curves: Iterable[CycleCurve], phase: Phase = "stride") -> Curves:
     result: dict[tuple[str, str], list[CycleCurve]] = {}
-    for one in curves:
+    for one in (each for each in curves if each.stride.phase == phase):
         result.setdefault((one.quantity, one.stride.side), []).append(one)
     return result
 

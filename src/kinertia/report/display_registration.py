@@ -1,7 +1,8 @@
 """Registers with `kinertia.trial.display` how trials and fits are shown and saved; loaded at the first use."""
 
 from kinertia.estimation.gait_profile import gait_profile
-from kinertia.estimation.result import Fit, TrialFit
+from kinertia.estimation.result import Fit
+from kinertia.estimation.trial_fit import TrialFit
 from kinertia.io.norms_file import read_norms
 from kinertia.report.datasets import curve_dataset, draw_dataset
 from kinertia.report.files import save_fit

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from kinertia.estimation.result import Fit, TrialFit
+from kinertia.estimation.result import Fit
+from kinertia.estimation.trial_fit import TrialFit
 from kinertia.motion.model_outputs import ModelOutput, model_outputs
 from kinertia.report import style
 from kinertia.report.coordinate_titles import Coordinate

@@ -15,13 +15,14 @@ import numpy as np
 
 from kinertia.diagnostics.result.masses import mass_from_force_kg
 from kinertia.diagnostics.result.suitability import suitability
-from kinertia.estimation.cycles import columns_of, spatiotemporal_columns
+from kinertia.estimation.cycles import columns_of, phase_columns, spatiotemporal_columns
 from kinertia.estimation.forces_used import forces_before, forces_used
 from kinertia.estimation.identifiability import BaseParameters
 from kinertia.estimation.joint_curves import JointCurves
 from kinertia.estimation.leg_moments import moment_coverage
 from kinertia.estimation.moment_peaks import peak_columns
-from kinertia.estimation.result import Fit, TrialFit
+from kinertia.estimation.result import Fit
+from kinertia.estimation.trial_fit import TrialFit
 from kinertia.findings.finding import Severity
 from kinertia.io.csv_file import inert
 from kinertia.io.osim.exporter import export_osim
@@ -81,12 +82,17 @@ def save_fit(
 
 
 def _write_cycles(fit: Fit, curves: CurvesByStage, folder: Path) -> None:
-    """Write the tables of `Fit.cycles` and `Fit.spatiotemporal`, where there are strides."""
+    """Write the tables of `Fit.contact_phases` and `Fit.peaks`; where there are strides, of these, too."""
+    phases = [one for one in curves["estimate"] if one.stride.phase != "stride"]
+    if phases:
+        write_columns(folder / "contact_phases.csv", phase_columns(phases), _SIX_DIGITS)
+    names = {trial.name for trial in fit.trials if trial.joint_curves is not None}
+    peaks = peak_columns([one for one in curves["estimate"] if one.trial in names])
+    if peaks["peak"]:
+        write_columns(folder / "moment_peaks.csv", peaks, _SIX_DIGITS)
     if not any(trial.strides for trial in fit.trials):
         return
     write_columns(folder / "spatiotemporal.csv", spatiotemporal_columns(fit.trials), _SIX_DIGITS)
-    if any(trial.joint_curves is not None for trial in fit.trials):
-        write_columns(folder / "moment_peaks.csv", peak_columns(curves["estimate"]), _SIX_DIGITS)
     write_columns(folder / "cycles.csv", columns_of(curves["estimate"]), _SIX_DIGITS)
     write_columns(folder / "cycles_literature.csv", columns_of(curves["literature"]), _SIX_DIGITS)
 

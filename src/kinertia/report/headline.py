@@ -12,7 +12,8 @@ import numpy as np
 
 from kinertia.diagnostics.result.suitability import Suitability, suitability
 from kinertia.estimation.identifiability import INFORMED, MEASURED, evidence
-from kinertia.estimation.result import Fit, TrialFit
+from kinertia.estimation.result import Fit
+from kinertia.estimation.trial_fit import TrialFit
 from kinertia.findings.finding import Severity
 from kinertia.findings.overview import DO_NOT_USE, USES, WITH_CARE
 from kinertia.model.bsp import PARAMETERS

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from kinertia.estimation.result import TrialFit
+from kinertia.estimation.trial_fit import TrialFit
 from kinertia.report import style
 from kinertia.report.figure import Figure, compact
 from kinertia.report.panels import base_layout, plain

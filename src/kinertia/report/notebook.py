@@ -1,6 +1,7 @@
 """Shows a `Fit`, its trials, a `Trial` and a `Recording` in a notebook."""
 
-from kinertia.estimation.result import Fit, TrialFit
+from kinertia.estimation.result import Fit
+from kinertia.estimation.trial_fit import TrialFit
 from kinertia.findings.finding import Severity
 from kinertia.report.finding_view import lines
 from kinertia.report.page import bsp_rows, residual_rows

@@ -12,9 +12,10 @@ import numpy as np
 from kinertia.estimation.forces_used import forces_used, full_bandwidth
 from kinertia.estimation.identifiability import evidence
 from kinertia.estimation.leg_moments import coverage_sentence
-from kinertia.estimation.result import Fit, TrialFit
+from kinertia.estimation.result import Fit
 from kinertia.estimation.simultaneous.calibration_entry import SHOWN_UNIT, item_text, quantity_text
 from kinertia.estimation.tasks import fits_by_task, main_task
+from kinertia.estimation.trial_fit import TrialFit
 from kinertia.io.provenance import Provenance, versions
 from kinertia.model.bsp import PARAMETERS, BodySegmentParameters
 from kinertia.motion.clinical_angles import CLINICAL_ANGLES

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Generic, TypeVar, get_args
 
 from kinertia.errors import KinertiaError
 from kinertia.estimation.cycles import UNITS, Kind
-from kinertia.estimation.result import Fit, TrialFit
+from kinertia.estimation.result import Fit
+from kinertia.estimation.trial_fit import TrialFit
 from kinertia.io.norms_file import read_norms
 from kinertia.report.body_figure import Shown, body_figure
 from kinertia.report.bsp_figures import change_figure, departure_figure, information_figure

@@ -7,7 +7,7 @@ from pathlib import Path
 from kinertia.errors import FileError
 from kinertia.estimation.identifiability import BaseParameters, Combination
 from kinertia.estimation.joint_curves import JointCurves
-from kinertia.estimation.result import Fit, TrialFit
+from kinertia.estimation.result import Fit
 from kinertia.estimation.simultaneous.calibration_entry import CalibrationEntry
 from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
 from kinertia.estimation.simultaneous.fit import Posterior
@@ -18,6 +18,7 @@ from kinertia.estimation.simultaneous.missing_load_evidence import MissingLoad
 from kinertia.estimation.simultaneous.model_evidence import FreeMomentSign
 from kinertia.estimation.simultaneous.posterior_draws import PosteriorDraws, TrialDraws
 from kinertia.estimation.simultaneous.prior_plausibility import Unlikeness
+from kinertia.estimation.trial_fit import TrialFit
 from kinertia.findings.finding import Finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where

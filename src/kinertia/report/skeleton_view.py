@@ -4,7 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from kinertia.estimation.result import Fit, TrialFit
+from kinertia.estimation.result import Fit
+from kinertia.estimation.trial_fit import TrialFit
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.kinematics import Kinematics

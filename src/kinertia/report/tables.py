@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from kinertia.estimation.cycles import cycle_columns, spatiotemporal_columns
-from kinertia.estimation.result import Fit, TrialFit
+from kinertia.estimation.cycles import curves_by_stage, cycle_columns, phase_columns, spatiotemporal_columns
+from kinertia.estimation.result import Fit
 from kinertia.estimation.simultaneous.calibration_entry import calibration_columns
+from kinertia.estimation.trial_fit import TrialFit
 from kinertia.report.files import write_columns
 
 Column = Sequence[Any] | np.ndarray
@@ -20,7 +21,9 @@ Table = Mapping[str, Column]
 
 
 def person_tables(fit: Fit) -> dict[str, Table]:
-    """Return tables of all trials together: body segment parameters, calibration, strides and curves over the cycle."""
+    """Return tables of all trials together: body segment parameters, calibration, strides, curves over the cycle and
+    other phases, peaks.
+    """
     tables: dict[str, Table] = {"bsp": fit.bsp_columns()}
     if fit.posterior is not None:
         tables["calibration"] = calibration_columns(fit.posterior.calibration)
@@ -28,7 +31,10 @@ def person_tables(fit: Fit) -> dict[str, Table]:
         tables["spatiotemporal"] = spatiotemporal_columns(fit.trials)
         tables["cycles"] = cycle_columns(fit.trials, fit.mass_kg)
         tables["cycles_literature"] = cycle_columns(fit.trials, fit.mass_kg, "literature")
-    return tables
+    if any(trial.phases for trial in fit.trials):
+        tables["contact_phases"] = phase_columns(curves_by_stage(fit.trials, fit.mass_kg, 0, ["estimate"])["estimate"])
+    peaks = fit.peak_columns()
+    return {**tables, "moment_peaks": peaks} if peaks["peak"] else tables
 
 
 def trial_tables(fit: Fit, trial: TrialFit) -> dict[str, Table]:

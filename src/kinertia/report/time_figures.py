@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from kinertia.estimation.forces_used import full_bandwidth
-from kinertia.estimation.result import TrialFit
+from kinertia.estimation.trial_fit import TrialFit
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.kinematics import Kinematics
 from kinertia.report import style

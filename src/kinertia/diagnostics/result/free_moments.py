@@ -13,8 +13,8 @@ from collections.abc import Iterator, Sequence
 from kinertia.diagnostics.result.context import ResultContext
 from kinertia.diagnostics.result.corrections import corrected
 from kinertia.estimation.free_moment_sign import VERTICAL, residual_moments_nm, residual_moments_without_offsets_nm
-from kinertia.estimation.result import TrialFit
 from kinertia.estimation.simultaneous.calibration_entry import FREE_MOMENT, CalibrationEntry
+from kinertia.estimation.trial_fit import TrialFit
 from kinertia.findings.finding import Finding, finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from kinertia.diagnostics.result.context import ResultContext
 from kinertia.estimation.input_checks import mass_by_force_kg
-from kinertia.estimation.result import TrialFit
+from kinertia.estimation.trial_fit import TrialFit
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where

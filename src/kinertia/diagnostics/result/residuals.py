@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kinertia.diagnostics.result.context import ResultContext
-from kinertia.estimation.result import TrialFit
+from kinertia.estimation.trial_fit import TrialFit
 from kinertia.findings.finding import Finding, Severity, finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where

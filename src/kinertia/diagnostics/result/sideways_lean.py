@@ -14,8 +14,8 @@ from kinertia.diagnostics.evidence.body_centre import owners_of
 from kinertia.diagnostics.evidence.foot_trajectories import FootTrajectory, foot_trajectories
 from kinertia.diagnostics.result.context import ResultContext
 from kinertia.diagnostics.result.corrections import equal
-from kinertia.estimation.result import TrialFit
 from kinertia.estimation.simultaneous.calibration_entry import POSITION
+from kinertia.estimation.trial_fit import TrialFit
 from kinertia.findings.finding import Finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.trial.centre_of_pressure import FIRM_LOAD_N, centre_of_pressure
