@@ -25,7 +25,7 @@ RESULTS = {
     "kinematics_sd.sto",
     *(f"joint_{kind}{sd}.sto" for kind in ("moments", "forces") for sd in ("", "_sd")),
     *("ground_reactions.mot", "external_loads.xml", "fit.npz"),
-    *("cycles.csv", "cycles_literature.csv", "moment_peaks.csv", "spatiotemporal.csv"),
+    *("cycles.csv", "cycles_literature.csv", "contact_phases.csv", "moment_peaks.csv", "spatiotemporal.csv"),
 }
 LAB = {*samples.SHA256, "subject.toml"}
 
