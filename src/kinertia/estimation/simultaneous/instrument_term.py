@@ -174,11 +174,14 @@ class InstrumentErrors(LoadTerm):
         return result
 
     def _shown(self, solution: Solution) -> InstrumentInformation:
-        """Return the information of the trials on the laboratory's instruments, without prior knowledge."""
+        """Return the information of the trials on the laboratory's instruments, without prior knowledge.
+
+        What is each trial's own is eliminated with its prior's standard deviation: the Gaussian that stands for the
+        prior in the posterior is of all errors together, and its part for these alone says too little.
+        """
         prior, session, every = solution.gaussian, self._session, self.layout.errors
         mean, covariance = solution.static[every], solution.covariance[every, every]
-        own = slice(len(session.rhs), len(mean))
-        more = (0, own.stop - own.start)
+        more = (0, len(mean) - len(session.rhs))
         before = ((prior.precision, prior.pull), (np.pad(session.information, more), np.pad(session.rhs, more)))
         shown = InstrumentInformation.of_posterior(self.given.plates, mean, covariance, before)
-        return shown.without_own(prior.precision[own, own], prior.pull[own])
+        return shown.without_own(np.array([one.sd for one in self.layout.error_priors.own[len(session.rhs) :]]))

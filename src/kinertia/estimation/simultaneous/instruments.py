@@ -86,17 +86,17 @@ class InstrumentInformation:
         rhs = after @ mean - sum(each for _, each in before)
         return cls(tuple(plates), *_never_negative(information, rhs, np.sqrt(np.diag(after))))
 
-    def without_own(self, precision: np.ndarray, pull: np.ndarray) -> InstrumentInformation:
-        """Eliminate the t unknowns that are specific to trials, which come last, given their prior: (t, t), (t,)."""
-        size = len(self.rhs) - len(pull)
+    def without_own(self, sd: np.ndarray) -> InstrumentInformation:
+        """Eliminate the t unknowns that are specific to trials, which come last, given their standard deviations (t,).
+
+        They are independent, with a mean of zero.
+        """
+        size = len(self.rhs) - len(sd)
         across = self.information[:size, size:]
-        own = self.information[size:, size:] + precision
-        through = np.linalg.solve(own, np.column_stack([across.T, self.rhs[size:] + pull]))
+        own = self.information[size:, size:] + np.diag(1.0 / np.square(sd))
+        through = np.linalg.solve(own, np.column_stack([across.T, self.rhs[size:]]))
         information = self.information[:size, :size] - across @ through[:, :-1]
-        scale = np.sqrt(np.maximum(np.diag(self.information)[:size], np.finfo(float).tiny))
-        return InstrumentInformation(
-            self.plates, *_never_negative(information, self.rhs[:size] - across @ through[:, -1], scale)
-        )
+        return InstrumentInformation(self.plates, information, self.rhs[:size] - across @ through[:, -1])
 
     def among(self, plates: Sequence[str], prior: InstrumentPrior) -> InstrumentInformation:
         """Convert to these plates; a plate that is not among them contributes no more than its prior."""
