@@ -39,7 +39,7 @@ def test_every_function_is_in_one_share(count):
     # what two functions call is compiled once where both are in one share
     assert sum(compiling._length(*share) for share in shares) >= compiling._length(*functions)
     if count == 2:
-        assert max(compiling._length(*share) for share in shares) < 0.6 * compiling._length(*functions)
+        assert max(compiling._length(*share) for share in shares) < 0.53 * compiling._length(*functions)
 
 
 def test_all_is_compiled_where_no_process_can_be_started(monkeypatch):

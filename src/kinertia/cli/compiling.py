@@ -5,10 +5,12 @@ them and takes less time than the third.
 """
 
 import gc
+import math
 import os
 import subprocess
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from functools import cache
 from importlib import import_module
 from typing import Any
 
@@ -16,6 +18,8 @@ from kinertia.cohort.process import PYTHON
 from kinertia.model.compiled import SOURCES, is_compiled, is_stored, set_compiled
 
 _STAGE = "compiling, once"
+_LONGER = (1.0, 1.02, 1.04, 1.06, 1.1, 1.15, 1.2)
+"""Lengths of a share to try, over that if nothing were compiled twice."""
 
 
 def compile_once(progress: Callable[[str, float], None]) -> None:
@@ -70,10 +74,23 @@ def compile_share(k: int, count: int) -> None:
 
 
 def shares(functions: Sequence[Any], count: int) -> list[list[Any]]:
-    """Share functions among so many processes: each to the one that has least to compile with it."""
+    """Share functions among so many processes so that the longest share is short: what calls the same together."""
+    divided = [_divided(functions, count, longer) for longer in _LONGER]
+    return min(divided, key=lambda shared: max(_length(*share) for share in shared))
+
+
+def _divided(functions: Sequence[Any], count: int, longer: float) -> list[list[Any]]:
+    """Share functions among so many processes: each goes to the share that then has least more to compile.
+
+    A share has room for so many times what it would have if nothing were compiled twice. What no share has room for
+    goes to the one that is then shortest.
+    """
     result: list[list[Any]] = [[] for _ in range(count)]
+    room = longer * _length(*functions) / count
     for function in functions:
-        min(result, key=lambda share: _length(*share, function)).append(function)
+        lengths = [(_length(*share), _length(*share, function)) for share in result]
+        costs = [(after - before if after <= room else math.inf, after) for before, after in lengths]
+        result[costs.index(min(costs))].append(function)
     return result
 
 
@@ -93,11 +110,17 @@ def _compiled(functions: Sequence[Any]) -> Iterator[float]:
 
 def _length(*functions: Any) -> int:
     """Return the length of the bytecode of functions and of all that they call, each counted once."""
-    parts = {function.py_func for function in functions}
+    return sum(len(python.__code__.co_code) for python in frozenset().union(*map(_needed, functions)))
+
+
+@cache
+def _needed(function: Any) -> frozenset[Any]:
+    """Return a function and all that it calls, as Python's."""
+    parts = {function.py_func}
     waiting = list(parts)
     while waiting:
         python = waiting.pop()
         called = {getattr(python.__globals__.get(name), "py_func", None) for name in python.__code__.co_names}
         waiting += (new := called - parts - {None})
         parts |= new
-    return sum(len(python.__code__.co_code) for python in parts)
+    return frozenset(parts)
