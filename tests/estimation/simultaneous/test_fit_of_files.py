@@ -25,6 +25,7 @@ def of_files(recording_of) -> Fit:
 
 
 @pytest.mark.slow
+@pytest.mark.measured
 def test_measured_walk_meets_residuals_and_markers(recording_of):
     found = fit_of_files(recording_of, "pig_c3d/subject_b_", "female")
     (trial,) = found.trials
@@ -39,6 +40,7 @@ def test_measured_walk_meets_residuals_and_markers(recording_of):
 
 
 @pytest.mark.slow
+@pytest.mark.measured
 @pytest.mark.parametrize("begin_s", [2.90, 2.92])
 def test_a_delay_that_few_frames_leave_open_is_no_other_with_other_knots(recording_of, begin_s):
     """On time or 6 ms late: the Gaussian of one set of knots let the delay of the other run away, to -24 ms."""

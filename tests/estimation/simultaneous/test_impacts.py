@@ -79,6 +79,7 @@ def test_the_clock_follows_forces_that_are_moved(recording_of):
 
 
 @pytest.mark.slow
+@pytest.mark.measured
 def test_the_clock_follows_forces_that_are_moved_where_the_heel_strikes_sharply(recording_of):
     """With it as sure as other frames the clock was 12.5 ms late where forces were 8 ms earlier, and 9.8 ms where they
     were 20 ms earlier, +-0.5 ms; 34 ms apart. A clock that may be sound counts as sound: it follows over some
