@@ -2,8 +2,10 @@
 
 import numpy as np
 
+from kinertia.trial.data import FootLoads
 from kinertia.trial.foot_motion import FootMotion
-from kinertia.trial.ground_contact import _learned
+from kinertia.trial.ground_contact import _learned, ground_contact
+from walk_on_plates import FEET, walk
 
 RATE_HZ, FRAMES = 100, 100
 
@@ -28,3 +30,18 @@ def test_slow_landings_do_not_hide_a_foot_that_rolls():
     _, landing, leaving = _learned([foot(rolling), foot(other)], loaded)
     assert 0.2 <= landing <= 0.3
     assert leaving >= landing
+
+
+def test_a_toe_that_brushes_over_the_plate_shows_no_landing():
+    """62 N for 20 ms in swing made both feet land 0.2 s before they did."""
+    recording = walk([("r", 0), ("l", -1)])  # a single landing
+    plates, times = recording.plates, recording.markers.time
+    brushed = plates.force.copy()
+    brushed[(plates.time > 0.895) & (plates.time < 0.915), 0, 1] = 62.0
+    expected, found = (
+        ground_contact(recording.markers, FootLoads(plates.time, force, np.zeros_like(force)), FEET)
+        for force in (plates.force, brushed)
+    )
+    there = found.loaded[:, 0] & (times > 0.85)
+    assert there.any()
+    assert np.array_equal(found.ground[~there], expected.ground[~there])

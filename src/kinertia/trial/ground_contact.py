@@ -36,6 +36,9 @@ _STANCE, _SLOW_LANDING = 0.9, 2.0
 """With fewer, which may be slow by chance, a foot has landed that is as slow as in this share of the frames under load,
 if it is at most so many times as fast as the landings."""
 
+_STEP_S = 0.1
+"""A load that begins and ends within less is of a toe that brushes over the plate: it shows no landing."""
+
 _ALL_CARRIED = 0.85
 """While plates carry this share of their usual load, a foot that does not move is in the air."""
 
@@ -112,7 +115,7 @@ def ground_contact(markers: Markers, loads: FootLoads, feet: FootMarkers, belt: 
     ground = loaded.copy()
     moves = foot_motions([markers.select(feet[foot]) for foot in FEET], loaded, belt)
     if loaded.any():
-        clearance, landing, leaving = _learned(moves, loaded)
+        clearance, landing, leaving = _learned(moves, _steps(loaded, markers.time))
         resting = np.stack([move.still for move in moves], axis=1) & ~loaded
         carried = _carried(loads, nearest, loaded, np.logical_or.reduce(resting, axis=1))
         for foot, move in enumerate(moves):
@@ -163,6 +166,16 @@ def _share_of_gap(pressure: FloatArray, own: FloatArray, other: FloatArray) -> F
     along = np.einsum("ni,ni->n", pressure - start, gap) / np.maximum(np.square(gap).sum(axis=1), 1e-6)
     result: FloatArray = np.nan_to_num(along)
     return result
+
+
+def _steps(loaded: BoolArray, time: FloatArray) -> BoolArray:
+    """Return `loaded` without loads that are too short for steps; all of them if none is long enough."""
+    steps = loaded.copy()
+    for foot in range(2):
+        for first, last in runs(loaded[:, foot]):
+            whole = first > 0 and last < len(time) - 1
+            steps[first : last + 1, foot] = not whole or span_s(time, first, last) >= _STEP_S
+    return steps if steps.any() else loaded
 
 
 def _learned(moves: Sequence[FootMotion], loaded: BoolArray) -> tuple[float, float, float]:
