@@ -167,6 +167,20 @@ def test_centres_of_pressure_beside_their_plate():
     assert found.evidence["share"].value == pytest.approx(1.0, abs=0.05)
 
 
+@pytest.mark.parametrize(("light_n", "found"), [(110.0, []), (700.0, ["P245"])])
+def test_what_counts_beside_the_plate_is_load_not_time(light_n, found):
+    """110 N of a child's toes was 13 mm beyond an edge for 5.02 % of a contact, and 2.3 % of its load."""
+    recording = on_plates()
+    plates = recording.plates
+    first = np.flatnonzero(plates.force[:, 0, 1] > 0)
+    early = first[: len(first) // 12]
+    force, moment = plates.force.copy(), plates.moment.copy()
+    force[early, 0, 1] = light_n
+    moment[early, 0] = np.cross(plates.corners[0].max(axis=0) + np.array([0.05, 0.0, 0.0]), force[early, 0])
+    light = replace(recording, plates=replace(plates, force=force, moment=moment))
+    assert [one.code for one in cop_on_plate(context_of(light, FEET))] == found
+
+
 def test_no_forces_and_one_frame():
     """D7: one severity wherever it is asked."""
     recording = walk([("r", 0), ("l", 0)])

@@ -16,8 +16,10 @@ from kinertia.findings.finding import Severity
 from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.settings import Subject
 from kinertia.trial.data import Markers
+from loads_and_feet import context_of
 from people import codes, with_markers
 from recordings import is_here
+from walk_on_plates import FEET, walk
 
 STATURES_M = {
     "synthetic/static.trc": 1.803,
@@ -98,6 +100,17 @@ def test_a_floor_too_low_by_hardly_more_than_soles_is_told_by_the_feet_in_motion
     (far,) = floor(person(risen(standing, 0.06)))
     lowest_m = far.evidence["height_m"].value - 0.06
     (found,) = floor(person(risen(standing, 0.055 - lowest_m), risen(standing, in_motion_m - lowest_m)))
+    assert (found.code, found.severity) == ("M143", severity)
+
+
+@pytest.mark.parametrize(("down_m", "severity"), [(0.0, Severity.INFO), (0.06, Severity.WARNING)])
+def test_the_floor_in_front_of_stairs_is_below_their_plates(standing, down_m, severity):
+    """The origin was on the first step; whether it is right shows where the feet are on the plates."""
+    climbing = walk([("r", 0), ("l", 0)], step_m=0.2)
+    corners = np.zeros((2, 4, 3))
+    corners[:, :, 1] = [[down_m], [0.2 + down_m]]  # feet and loads are at 0 and 0.2 m
+    trial = context_of(replace(climbing, plates=replace(climbing.plates, corners=corners)), FEET)
+    (found,) = floor(person(risen(standing, -0.16), trial))
     assert (found.code, found.severity) == ("M143", severity)
 
 

@@ -29,7 +29,7 @@ def cop_on_plate(context: RecordingContext) -> Iterator[Finding]:
 
 
 def off_plate(plates: PlateLoads, p: int) -> tuple[float, float] | None:
-    """Return the share of the reliably loaded samples of plate `p` with a centre of pressure off it, and their distance
+    """Return the share of the load of plate `p`, where it is reliable, whose centre of pressure is off it, and how far
     (m, 95th percentile; 0 where none is); None where the file has no corners or nothing is loaded.
     """
     loaded = plates.force[:, p, 1] > COP_MIN_FORCE_N
@@ -37,4 +37,5 @@ def off_plate(plates: PlateLoads, p: int) -> tuple[float, float] | None:
         return None
     beyond = beyond_edges(plates.corners[p], cop_horizontal(plates)[loaded, p])
     off = beyond > 0
-    return float(off.mean()), float(np.percentile(beyond[off], 95)) if off.any() else 0.0
+    load = plates.force[loaded, p, 1]
+    return float(load[off].sum() / load.sum()), float(np.percentile(beyond[off], 95)) if off.any() else 0.0

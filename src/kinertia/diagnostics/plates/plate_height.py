@@ -23,23 +23,26 @@ _LOW = 10.0
 def plate_heights(context: PersonContext) -> Iterator[Finding]:
     """Report P249: plates, or centres of pressure in a file, above the lowest markers of all feet on them."""
     for trial in context.trials:
-        plates = trial.recorded_plates
-        if plates is None:
-            continue
-        lowest: dict[int, float] = {}
-        for contact in trial.contacts:
-            height_m = _lowest_m(trial, contact)
-            if height_m is not None:
-                lowest[contact.plate] = max(height_m, lowest.get(contact.plate, -np.inf))
-        for plate, height_m in lowest.items():
-            surface_m = _surface_m(plates, plate)
+        for plate, (height_m, surface_m) in heights_on_plates(trial).items():
             if height_m - surface_m < _LEAST_M:
                 yield finding(
                     "P249",
-                    trial.at(plate=plates.names[plate]),
+                    trial.at(plate=plate),
                     depth_m=Quantity(surface_m - height_m, "m", limit=-_LEAST_M, usual=(-_USUAL_M[1], -_USUAL_M[0])),
                     surface_m=Quantity(surface_m, "m"),
                 )
+
+
+def heights_on_plates(trial: RecordingContext) -> dict[str, tuple[float, float]]:
+    """Return height (m) of the lowest marker of the feet on each loaded plate, in the step in which it is highest, and
+    of the plate's surface; NaN where that is unknown."""
+    plates = trial.recorded_plates
+    lowest: dict[int, float] = {}
+    for contact in () if plates is None else trial.contacts:
+        height_m = _lowest_m(trial, contact)
+        if height_m is not None:
+            lowest[contact.plate] = max(height_m, lowest.get(contact.plate, -np.inf))
+    return {} if plates is None else {plates.names[p]: (own, _surface_m(plates, p)) for p, own in lowest.items()}
 
 
 def _surface_m(plates: PlateLoads, plate: int) -> float:

@@ -21,10 +21,11 @@ _WRONG_M, _RIGHT_M, _CLEARLY_BEST = 0.1, 0.08, 0.6
 _ORDER = "a wrong order of the corners"
 _CHANNELS = "interchanged channels of the plate moments Mx and My"
 _ABOUT_X, _ABOUT_Z = (f"a wrong sign of the plate moment about {axis}" for axis in "XZ")
-_TILTING = "wrong signs of the plate moments Mx and My, or vertical channels interchanged with the opposite ones"
+_TILTING = "wrong signs of the plate moments Mx and My, or eight channels numbered from the opposite corner"
 _MENDING = {
     _ORDER: "Correct the order of the corners",
-    _TILTING: "Reverse Mx and My; of four vertical channels interchange Fz1 with Fz3, and Fz2 with Fz4",
+    _TILTING: "Reverse Mx and My; of eight channels, interchange Fz1 with Fz3, Fz2 with Fz4, Fx12 with Fx34 and Fy14 "
+    "with Fy23 (the last two unless Mz is right)",
     _ABOUT_X: "Reverse the plate moment about X",
     _ABOUT_Z: "Reverse the plate moment about Z",
     _CHANNELS: "Interchange the channels of Mx and My",

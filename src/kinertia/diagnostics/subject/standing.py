@@ -7,14 +7,16 @@ import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.person_context import PersonContext
+from kinertia.diagnostics.plates.plate_height import heights_on_plates
 from kinertia.estimation.simultaneous.model_uncertainty import JOINT_CENTRE_SD_M, WITHOUT_STATIC
 from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.motion.stance_pose import hidden_landmarks
 from kinertia.trial.stillness import still_span_s
 
-_LOWEST_M = (0.008, 0.050)
-"""A marker's own radius is 5 mm and more; soles are under both feet, and markers on the side of a foot are low.
+_LOWEST_M = (0.005, 0.050)
+"""A marker's own radius is 5 mm and more: one beside a small toe was 5.7 mm above the floor. Soles are under both feet,
+and markers on the side of a foot are low.
 
 On top of shoes markers are 53 to 60 mm above the floor while standing, but 44 to 48 mm in motion.
 """
@@ -53,8 +55,8 @@ def no_static(context: PersonContext) -> Iterator[Finding]:
 def floor(context: PersonContext) -> Iterator[Finding]:
     """Report M143: feet that stand above or below the floor, by the lowest marker of toes, metatarsals and heels.
 
-    It is an INFO where the trials show the floor at its height: the person then stands on something, or in thick
-    soles.
+    It is an INFO where the trials show the floor, or a plate, at its height: the person then stands on something, or in
+    thick soles.
     """
     static = context.static
     lowest = None if static is None else _lowest(static, _WHILE_STANDING)
@@ -64,11 +66,19 @@ def floor(context: PersonContext) -> Iterator[Finding]:
     low, high = _LOWEST_M
     if low <= height_m <= high:
         return
-    in_trials = [one for one in (_lowest(trial, _IN_MOTION) for trial in context.trials) if one is not None]
-    shared = all(own_m < low if height_m < low else own_m > high for _, own_m in in_trials)
+    in_trials = [own for trial in context.trials for own in _heights_in_motion(trial)]
+    shared = all(own_m < low if height_m < low else own_m > high for own_m in in_trials)
     height = Quantity(height_m, "m", limit=low if height_m < low else high, usual=_USUAL_LOWEST_M)
     found = finding("M143", static.at(markers=(label,)), height_m=height)
     yield found if shared else replace(found, severity=Severity.INFO)
+
+
+def _heights_in_motion(trial: RecordingContext) -> list[float]:
+    """Return how high (m) the lowest foot marker is: above each plate, or else above the floor; empty if unknown."""
+    on_plates = [lowest - surface for lowest, surface in heights_on_plates(trial).values()]
+    on_plates = [own for own in on_plates if np.isfinite(own)]
+    lowest = _lowest(trial, _IN_MOTION)
+    return on_plates or ([] if lowest is None else [lowest[1]])
 
 
 def _lowest(context: RecordingContext, percentile: float) -> tuple[str, float] | None:
