@@ -186,10 +186,9 @@ forces as measured, neither gains nor delay corrected.
 
 {stance}
 
-Every component has Vicon's sign. Most differences are above the error bars, and nearly all of them are explained:
-about the same centres, in the same axes and with the same forces what remains is at most a fifth of a component at the
-ankle and the knee. At the hip the remainder is larger in flexion and adduction, where segment masses, their
-acceleration and smoothing count most.
+All recordings together, every component has Vicon's sign. Most differences are above the error bars. Centres, axes and
+corrected forces explain most of them: with Vicon's, what remains is at most 22 % of a component at ankle and knee. It
+is larger at the hip; segment masses and smoothing, which also differ, were not separated.
 
 Error bars do not hold these differences, and need not: another definition of an axis is another quantity, and Vicon's
 joint centres are no truth. Most of all this holds for adduction and rotation of the ankle, where the axes of the feet
@@ -203,9 +202,9 @@ are 0.16 N m/kg of adduction.
 
 {correlations}
 
-The right ankle of child HC036A is not to be trusted: its shank marker sits in front of the shin, not beside it, and
-Kinertia, which takes the ankle's line from it, sets the ankle's centre on the wrong side of the marker, 55 mm from
-Vicon's.
+The right ankle of child HC036A is not to be trusted: Kinertia sets its centre lateral to the ankle's lateral marker,
+55 mm from Vicon's, without a finding. In the static trial the marker of that shank is in front of the line from knee
+to ankle, not beside it, and Kinertia takes the ankle's direction from it: the likely cause.
 
 ## Peaks
 
