@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from kinertia.estimation.result import Fit, TrialFit
+from kinertia.estimation.result import Fit
+from kinertia.estimation.trial_fit import TrialFit
 from kinertia.motion.ground_reactions import measured_reactions
 from kinertia.motion.joint_moments import component_signs
 from kinertia.motion.joint_wrench import joint_wrenches, leg_joints

@@ -92,7 +92,7 @@ def person(measured_folder, tmp_path_factory):
         model.printToXML(str(folder / "model.osim"))
         model = opensim.Model(str(folder / "model.osim"))
         model.initSystem()
-        inverse_kinematics(model, gait2354().markers, folder / "ik.mot", span_s=(0.0, 0.7))
+        inverse_kinematics(model, gait2354().markers, folder / "ik.mot", span_s=gait2354().span_s)
         q = radians(model, folder / "ik.mot")
         return folder, Person(model), Spline(q.index.to_numpy(), q.to_numpy())
 
@@ -105,7 +105,7 @@ def test_true_moments_at_hips_are_opensims(person):
     from validation.truth_trials import gait2354, ground_reactions, write_loads
 
     folder, model, motion = person
-    time = motion.times(200.0)
+    time = motion.times(100.0)
     with quietly(folder / "opensim.log"):
         forces = ground_reactions(model, motion, read_sto(gait2354().forces))
         write_sto(folder / "forces.mot", forces, False, "forces")
