@@ -20,6 +20,7 @@ EVIDENCE = (
     "measured-trials",
     "field-trials",
     "vicon-moments",
+    "whole-stance",
     "functional-trials",
     "held-out",
     "sessions",

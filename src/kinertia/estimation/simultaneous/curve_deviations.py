@@ -192,7 +192,7 @@ class _Curves:
         _write_variances(spread, seen, root[in_root, in_root], variance, rows)
         joints = replace(seen, by=every.rows(slice(c, None)), grown=self.grown[rows, c:])
         own = _joint_variances(spread, joints, root[in_root, in_root])
-        own += knee_geometry(moments.virtual.joints, joints.by.value)
+        own += knee_geometry(moments.virtual.skeleton, moments.virtual.joints, joints.by.value)
         self.of_joints[rows] = own.reshape(len(own), *self.of_joints.shape[1:])
         ground = np.square(by.ground @ root[problem.layout.errors, in_root]).sum(axis=-1) + by.ground_delay_squares
         noise_n = moments.reactions.noise_n * (by.loads[..., :3] != 0.0)
