@@ -32,8 +32,8 @@ MOST_BYTES = 3_200_000
 MOST_BYTES_OF_MANY = 4_500_000
 """However many trials there are, and however long."""
 PARTS = [
-    "verdict", "moments", "body", "findings", "changed", "cycle", "bsp", "residuals", "kinematics", "moments-over-time",
-    "markers", "view", "computed", "explained",
+    "verdict", "moments", "body", "findings", "changed", "cycle", "stance-walk", "bsp", "residuals", "kinematics",
+    "moments-over-time", "markers", "view", "computed", "explained",
 ]  # fmt: skip
 
 
@@ -197,7 +197,7 @@ def test_page_has_all_parts_and_is_small_enough(page):
     assert len(set(ids)) == len(ids)
     links = {attrs["href"].removeprefix("#") for attrs in elements.named("a")}
     assert links <= set(ids)
-    assert set(PARTS) - {"changed", "moments-over-time", "explained"} <= links
+    assert set(PARTS) - {"changed", "stance-walk", "moments-over-time", "explained"} <= links
 
 
 def test_every_picture_has_words_and_data(page):
