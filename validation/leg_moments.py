@@ -1,4 +1,4 @@
-"""Count the frames in which the joint moments of a leg are known, of those in which they can be."""
+"""Count the frames in which joint moments of a leg are known."""
 
 import tempfile
 from collections.abc import Iterator
