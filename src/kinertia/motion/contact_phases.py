@@ -26,7 +26,7 @@ _MOSTLY = 0.5
 
 
 def contact_phases(skeleton: Skeleton, kinematics: Kinematics, strides: Sequence[Stride]) -> tuple[Stride, ...]:
-    """Return the phases of feet on plates that are part of no stride, right foot first.
+    """Return the phases of feet on plates that are part of no stride and that markers show, right foot first.
 
     In a landing these are the landings, in squats there are none, in everything else there are stances.
 
@@ -40,7 +40,10 @@ def contact_phases(skeleton: Skeleton, kinematics: Kinematics, strides: Sequence
         return ()
     found = _landings(skeleton, kinematics) if trial.task == "landing" else _stances(trial, strides)
     result: list[Stride] = []
+    shown_from, shown_to = kinematics.spline.time[[0, -1]]
     for side, phase, start, end in found:
+        if start < shown_from or end > shown_to:
+            continue
         number = 1 + sum(one.side == side for one in result)
         result.append(Stride(side, number, start, end, end, np.nan, np.nan, True, phase))
     return tuple(result)
