@@ -17,6 +17,7 @@ MODEL = "subject4/addbiomechanics_scaled.osim"
 UNTIL_S = 2.5
 pytestmark = [
     pytest.mark.slow,
+    pytest.mark.measured,
     pytest.mark.skipif(not is_here([*FILES, MODEL]), reason="need measured recordings"),
 ]
 
