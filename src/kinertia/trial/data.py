@@ -326,7 +326,7 @@ class Trial:
         notes: one sentence for each assumption made so far.
         virtual_sd_m, belt, vertical, events, outputs: as the recording's.
         findings: about the assignment of loads to feet.
-        task: what the person does (`trial_input.Task`); empty where that was not asked.
+        task, condition: what the person does (`trial_input.Task`), and under which condition; empty where not asked.
 
     Examples:
         >>> recording = kinertia.read_recording("lab/walk.trc", "lab/walk_grf.mot")
@@ -351,6 +351,7 @@ class Trial:
     leg_known: BoolArray | None = None
     on_ground: BoolArray | None = None
     task: str = ""
+    condition: str = ""
 
     def __post_init__(self) -> None:
         _expect_shape("measured", self.measured, (len(self.markers.time),))
