@@ -1,5 +1,6 @@
 """Adds errors of force plates and synchronisation: the laboratory's in all trials, and each trial's own."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ from kinertia.estimation.simultaneous.inputs import FreedModel, Given
 from kinertia.estimation.simultaneous.instrument_errors import FoundErrors, instrument_errors
 from kinertia.estimation.simultaneous.instruments import InstrumentInformation
 from kinertia.estimation.simultaneous.layout import Unknowns
-from kinertia.estimation.simultaneous.mixture_prior import ErrorPriors, FaultMixture
+from kinertia.estimation.simultaneous.mixture_prior import ErrorPriors, FaultMixture, fault_probabilities
 from kinertia.estimation.simultaneous.plate_loads import GAIN
 from kinertia.estimation.simultaneous.plate_tilt import TILT_SD_RAD, mean_loads_n
 from kinertia.estimation.simultaneous.plates import PLATE_ERRORS, ZERO_UNKNOWNS, plates_with_floor
@@ -176,12 +177,18 @@ class InstrumentErrors(LoadTerm):
     def _shown(self, solution: Solution) -> InstrumentInformation:
         """Return the information of the trials on the laboratory's instruments, without prior knowledge.
 
-        What is each trial's own is eliminated with its prior's standard deviation: the Gaussian that stands for the
-        prior in the posterior is of all errors together, and its part for these alone says too little.
+        What is each trial's own is eliminated with its prior's standard deviation. The Gaussian that replaces priors
+        in the estimate is of all errors together, and its part for these alone says too little: single walks then
+        seemed to know of gains of 5 %. Several trials show which of them has a fault of its own.
         """
         prior, session, every = solution.gaussian, self._session, self.layout.errors
         mean, covariance = solution.static[every], solution.covariance[every, every]
-        more = (0, len(mean) - len(session.rhs))
+        size, priors = len(session.rhs), self.layout.error_priors
+        more = (0, len(mean) - size)
         before = ((prior.precision, prior.pull), (np.pad(session.information, more), np.pad(session.rhs, more)))
         shown = InstrumentInformation.of_posterior(self.given.plates, mean, covariance, before)
-        return shown.without_own(np.array([one.sd for one in self.layout.error_priors.own[len(session.rhs) :]]))
+        own = priors.own[size:]
+        if len(self.given.trials) > 1:
+            faulty = fault_probabilities(priors, shown.information, shown.rhs)[size:].tolist()
+            own = tuple(replace(one, fault_probability=share) for one, share in zip(own, faulty, strict=True))
+        return shown.without_own(np.array([one.sd for one in own]))

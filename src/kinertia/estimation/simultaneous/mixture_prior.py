@@ -187,6 +187,17 @@ def _posterior(priors: Sequence[FaultMixture], data: np.ndarray, rhs: np.ndarray
     return middle, spread + square / weight - np.outer(middle, middle)
 
 
+def fault_probabilities(priors: ErrorPriors, data: np.ndarray, rhs: np.ndarray) -> np.ndarray:
+    """Return the probability (k,) that each error's own part is faulty, after data as in `log_chance`."""
+    parts = priors.of_parts
+    every = _combinations(priors.parts, _sound_spread(priors.parts, parts.T @ data @ parts), parts.T @ rhs)
+    log_weight = np.concatenate([ways.log_weight for ways in every])
+    weight = np.exp(log_weight - log_weight.max())
+    off = np.concatenate([ways.off for ways in every])
+    result: np.ndarray = (weight @ off / weight.sum())[: len(priors.own)]
+    return result
+
+
 def log_chance(priors: ErrorPriors, data: np.ndarray, rhs: np.ndarray) -> float:
     """Return the log probability of data under these priors, up to a constant that depends on the priors alone.
 
