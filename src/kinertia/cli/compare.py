@@ -34,7 +34,7 @@ def compare(
     ],
     conditions: Annotated[
         tuple[str, str] | None,
-        typer.Option("--conditions", help="Two conditions of the trials: what changed from the first to the second."),
+        typer.Option("--conditions", help="What changed from one condition to the other."),
     ] = None,
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the page and table.")] = Path("comparison"),
     overwrite: Overwrite = False,
@@ -42,11 +42,9 @@ def compare(
 ) -> Outcome:
     """Compare fits: differences beyond their error bars between sessions of one person, methods or models.
 
-    The body segment parameters of the others are compared with those of the
-    first. Writes compare.html and compare.csv.
-
-    With --conditions, joint moments and angles of one session are compared:
-    trials that state condition = "..." in the subject file. Writes changes.csv.
+    The others are compared with the first: compare.html, compare.csv.
+    --conditions compares joint moments and angles of one session's trials,
+    by their condition in the subject file: changes.csv.
 
     [bold]Examples[/]
 
