@@ -1,4 +1,4 @@
-"""Compare joint moments with Vicon's own, over the stance and at their peaks."""
+"""Compare joint moments with Vicon's own over stance."""
 
 import contextlib
 import io
