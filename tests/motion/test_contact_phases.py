@@ -26,6 +26,15 @@ def test_only_stances_on_plates_that_are_part_of_no_stride(fit):
     assert len(every) > len(phases), "without strides all stances are phases of their own"
 
 
+def test_no_phase_that_the_motion_does_not_cover(fit):
+    (trial,) = fit.trials
+    one, spline = trial.phases[0], trial.kinematics.spline
+    shown = spline.time[spline.time < one.end_s - 0.05]
+    cut = replace(trial.kinematics, spline=replace(spline, time=shown))
+    found = contact_phases(trial.skeleton, cut, trial.strides)
+    assert not [each for each in found if each.side == one.side and abs(each.start_s - one.start_s) < 0.1]
+
+
 @pytest.mark.parametrize("missing", [{"task": "squat"}, {"on_ground": None}])
 def test_no_phases_of_squats_nor_where_contacts_are_unknown(fit, missing):
     (trial,) = fit.trials

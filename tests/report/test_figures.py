@@ -16,14 +16,14 @@ from kinertia.report.bsp_figures import change_figure, departure_figure, departu
 from kinertia.report.coordinate_titles import panels_of, title_of
 from kinertia.report.figure import Figure, compact
 from kinertia.report.marker_figures import fit_gap_figure, marker_figure
+from kinertia.report.moment_figures import joint_moment_figure, moment_figure
 from kinertia.report.page import render
 from kinertia.report.panels import Panel, small_multiples
 from kinertia.report.plots import as_plotly
-from kinertia.report.style import BLUE, between
+from kinertia.report.style import BLUE, SIDES, between, faded
 from kinertia.report.time_figures import (
     BAND_EVERY,
     coordinate_figure,
-    moment_figure,
     motion_change,
     residual_figure,
     stage_name,
@@ -148,15 +148,45 @@ def test_moments_are_per_body_mass_and_have_bands_where_there_are_deviations(fit
     trial = fit.trials[0]
     mass = fit.literature.total_mass_kg
     assert trial.moment_sd is not None
-    plain = as_plotly(moment_figure(replace(trial, deviations=None), fit.skeleton, mass))
+    curves, hip = trial.joint_curves, fit.skeleton.coordinates.index("hip_flexion_r")
+    without = replace(trial, deviations=None, joint_curves=replace(curves, deviations=None))
+    plain = as_plotly(moment_figure(without, fit.skeleton, mass))
     trace = next(t for t in plain.data if t.name == "right, estimate")
-    np.testing.assert_allclose(trace.y, trial.moments["estimate"]["hip_flexion_r"] / mass, rtol=1e-5)
+    np.testing.assert_allclose(trace.y, curves.forces["estimate"][:, hip] / mass, rtol=1e-5)
     assert not any("band" in (t.name or "") for t in plain.data)
     banded = as_plotly(moment_figure(trial, fit.skeleton, mass))
     upper = next(k for k, t in enumerate(banded.data) if t.name == "right 95 % band")
     width = banded.data[upper].y - banded.data[upper - 1].y
     assert banded.data[upper].xaxis == banded.data[upper - 1].xaxis
-    np.testing.assert_allclose(width, 2 * 1.96 * trial.moment_sd["hip_flexion_r"][::BAND_EVERY] / mass, rtol=1e-3)
+    sd = curves.deviations.moments[::BAND_EVERY, hip]
+    np.testing.assert_allclose(width, 2 * 1.96 * sd / mass, rtol=1e-3)
+
+
+def test_without_joint_curves_moments_are_those_of_the_measured_windows(fit):
+    trial, mass = fit.trials[0], fit.literature.total_mass_kg
+    older = replace(trial, joint_curves=None)
+    drawn = as_plotly(moment_figure(older, fit.skeleton, mass))
+    trace = next(t for t in drawn.data if t.name == "right, estimate")
+    np.testing.assert_allclose(trace.y, trial.moments["estimate"]["hip_flexion_r"] / mass, rtol=1e-5)
+    assert joint_moment_figure(older, mass) is None
+
+
+def test_joint_moments_over_time_are_shaded_where_a_side_is_not_known(fit):
+    trial, mass = fit.trials[0], fit.literature.total_mass_kg
+    curves = trial.joint_curves
+    figure = as_plotly(joint_moment_figure(trial, mass))
+    titles = [one.text for one in figure.layout.annotations]
+    panel = next(k for k, title in enumerate(titles) if "Knee moment, adduction" in title)
+    axis = f"x{panel + 1}" if panel else "x"
+    row = curves.joints["estimate"].joints.index("knee_r")
+    values = curves.joints["estimate"].moments[:, row, 1]
+    line = next(t for t in figure.data if t.name == "right, estimate" and (t.xaxis or "x") == axis)
+    np.testing.assert_allclose(line.y, values / mass, rtol=1e-5)
+    faint = faded(SIDES["r"][1], 0.1)
+    spans = [(s.x0, s.x1) for s in figure.layout.shapes if s.xref == axis and s.fillcolor == faint]
+    inside = np.array([any(a < t < b for a, b in spans) for t in curves.time])
+    assert (inside & ~np.isfinite(values)).any()
+    assert not (inside & np.isfinite(values)).any()
 
 
 def test_frames_outside_the_window_are_shaded(fit):

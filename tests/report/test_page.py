@@ -14,26 +14,20 @@ import pytest
 from command_line import run
 from found import FAULT_FREE, UNEXPLAINED, UNUSABLE
 from kinertia.diagnostics.result.suitability import Suitability
-from kinertia.estimation.joint_curves import JointCurves
-from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
 from kinertia.io.provenance import provenance_of
 from kinertia.io.subject_file import read_subject
 from kinertia.model.bsp import BodySegmentParameters
-from kinertia.motion.dynamics import Motion
 from kinertia.report.finding_view import FindingView
 from kinertia.report.headline import purposes, words
-from kinertia.report.page import MOST_TRIALS, bsp_rows, render
+from kinertia.report.page import bsp_rows, render
 from kinertia.report.plotly_script import packed_script
 from kinertia.report.wording import fixed
-from kinertia.trial.data import FootLoads
 from report_page import Elements, figures_of
 
 MOST_BYTES = 3_200_000
-MOST_BYTES_OF_MANY = 4_500_000
-"""However many trials there are, and however long."""
 PARTS = [
-    "verdict", "moments", "body", "findings", "changed", "cycle", "bsp", "residuals", "kinematics", "moments-over-time",
-    "markers", "view", "computed", "explained",
+    "verdict", "moments", "body", "findings", "changed", "cycle", "stance-walk", "bsp", "residuals", "kinematics",
+    "moments-over-time", "markers", "view", "computed", "explained",
 ]  # fmt: skip
 
 
@@ -197,7 +191,7 @@ def test_page_has_all_parts_and_is_small_enough(page):
     assert len(set(ids)) == len(ids)
     links = {attrs["href"].removeprefix("#") for attrs in elements.named("a")}
     assert links <= set(ids)
-    assert set(PARTS) - {"changed", "moments-over-time", "explained"} <= links
+    assert set(PARTS) - {"changed", "stance-walk", "moments-over-time", "explained"} <= links
 
 
 def test_every_picture_has_words_and_data(page):
@@ -294,80 +288,6 @@ def test_two_level_report_says_that_it_has_no_error_bars(two_level):
     assert {attrs["id"] for attrs in elements.named("section")} >= set(PARTS) - {"explained"}
 
 
-def prolonged(trial, times):
-    """The same trial many times over, with every frame in the window."""
-    kinematics = trial.kinematics
-    shown = kinematics.frames
-
-    def again(array, frames=slice(None)):
-        return np.concatenate([array[frames]] * times)
-
-    markers, loads, ik = kinematics.trial.markers, kinematics.trial.loads, kinematics.ik
-    time = np.arange(times * len(shown)) / markers.rate_hz
-    inside = (loads.time >= kinematics.window_s[0]) & (loads.time < kinematics.window_s[1] + 1 / markers.rate_hz)
-    walked = replace(
-        kinematics.trial,
-        markers=replace(markers, time=time, positions=again(markers.positions, shown)),
-        loads=FootLoads(
-            np.arange(times * inside.sum()) * len(time) / markers.rate_hz / (times * inside.sum()),
-            again(loads.force, inside),
-            again(loads.moment, inside),
-        ),
-        measured=np.ones(len(time), dtype=bool),
-        leg_known=None,
-        on_ground=again(kinematics.trial.on_ground, shown),
-    )
-    curves = trial.joint_curves
-    own = shown - kinematics.course_frames.start
-
-    def parts(one, frames=slice(None)):
-        return {name: again(getattr(one, name), frames) for name in vars(one)}
-
-    def joints(one):
-        return replace(one, moments=again(one.moments, own), forces=again(one.forces, own))
-
-    solved = replace(ik, time=time, q=again(ik.q, shown), errors_m=again(ik.errors_m, shown))
-    return replace(
-        trial,
-        kinematics=replace(
-            kinematics,
-            trial=walked,
-            ik=solved,
-            windows_s=((0.0, float(time[-1])),),
-            known=again(kinematics.known, shown),
-        ),
-        motion=Motion(**parts(trial.motion)),
-        residuals={stage: again(values) for stage, values in trial.residuals.items()},
-        full_residuals={stage: again(values) for stage, values in trial.full_residuals.items()},
-        joint_loads={stage: again(values) for stage, values in trial.joint_loads.items()},
-        deviations=CurveDeviations(**parts(trial.deviations)),
-        marker_errors_m={stage: again(values) for stage, values in trial.marker_errors_m.items()},
-        joint_curves=JointCurves(
-            time,
-            again(curves.known, own),
-            Motion(**parts(curves.motion, own)),
-            {stage: again(values, own) for stage, values in curves.forces.items()},
-            {stage: joints(one) for stage, one in curves.joints.items()},
-            CurveDeviations(**parts(curves.deviations, own)),
-        ),
-    )
-
-
-@pytest.mark.slow
-def test_many_long_trials_stay_below_the_limit(fit):
-    long = prolonged(fit.trials[0], 20)
-    assert len(long.time) > 1500
-    posterior = replace(fit.posterior, marker_noise=fit.posterior.marker_noise * 30)
-    made = render(replace(fit, trials=(long,) * 30, posterior=posterior))
-    assert len(made.encode()) <= MOST_BYTES_OF_MANY
-    elements = Elements(made)
-    assert len(elements.named("canvas")) == 1
-    (trials,) = re.findall(r'<select data-set="trial">(.*?)</select>', made)
-    assert trials.count("<option") == MOST_TRIALS
-    assert f"first {MOST_TRIALS} of 30 trials" in elements.text
-    assert len(render(replace(fit, trials=(long,))).encode()) <= MOST_BYTES_OF_MANY
-
-
 def test_command_and_hashes_are_in_the_report(demo_run):
     demo, folder = demo_run
     text = (folder / "report.html").read_text()
@@ -405,10 +325,3 @@ def test_a_marker_set_of_the_user_counts_as_a_file(demo_run, tmp_path):
     assert files[str(own.relative_to(above))] == hashlib.sha256(b"x").hexdigest()
     assert len(files) == 4
     assert set(provenance_of(read_subject(demo.subject_file), "").files) == {"static.trc", "walk.trc", "walk_grf.mot"}
-
-
-def test_three_trials_with_strides_stay_below_3_2_mb(fit):
-    posterior = replace(fit.posterior, marker_noise=fit.posterior.marker_noise * 3)
-    made = render(replace(fit, trials=fit.trials * 3, posterior=posterior))
-    assert 'id="cycle"' in made
-    assert len(made.encode()) < MOST_BYTES

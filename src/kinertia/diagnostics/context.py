@@ -50,6 +50,7 @@ class RecordingContext:
         without_forces: only its markers are used.
         forces_refused: because its forces cannot be.
         stated_task: what the person does, if the user states it.
+        condition: under which the trial was recorded, if the user states it.
         window_s: the window that the user vouches for.
         height_m: stature, where it is known.
         mass_kg: stated mass, where it is known.
@@ -65,6 +66,7 @@ class RecordingContext:
     without_forces: bool = False
     forces_refused: bool = False
     stated_task: Task | None = None
+    condition: str = ""
 
     @property
     def name(self) -> str:

@@ -94,7 +94,7 @@ class JointCurves:
     def drawn(self, kinematics: Kinematics, stage: Stage, random: np.random.Generator) -> JointCurves:
         """Return the curves of a draw of the estimate, with drawn knee geometry and without standard deviations."""
         own = type(self).of(kinematics, stage[2], {"estimate": stage}, None)
-        loads = with_drawn_knees(own.joints["estimate"], random)
+        loads = with_drawn_knees(stage[0], body_joints(stage[0]), own.joints["estimate"], random)
         return replace(own, forces={**self.forces, **own.forces}, joints={**self.joints, "estimate": loads})
 
 

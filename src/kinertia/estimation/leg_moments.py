@@ -15,13 +15,18 @@ def moment_coverage(trial: Estimated) -> tuple[LegCoverage, ...]:
     """
     if not trial.strides:
         return ()
+    return leg_coverage(trial.kinematics.trial, known_legs(trial))
+
+
+def known_legs(trial: Estimated) -> np.ndarray:
+    """Return the mask (n, 2) of marker frames in which all joint moments of the right, left leg are known."""
     k, skeleton = trial.kinematics, trial.skeleton
-    known = np.repeat(k.inside(k.trial.markers.time)[:, None], 2, axis=1)
+    known = np.repeat((k.inside(k.trial.markers.time) & k.complete)[:, None], 2, axis=1)
     if k.known is not None and trial.joint_curves is not None:
         for foot, segment in enumerate(skeleton.feet):
             own = np.unique(skeleton.map.owner[skeleton.support[skeleton.segments.index(segment)]])
             known[:, foot] |= k.known[:, own[own >= len(skeleton.joints[0].axes)]].all(axis=1)
-    return leg_coverage(k.trial, known)
+    return known
 
 
 def coverage_by_task(trials: Sequence[Estimated]) -> Mapping[str, tuple[LegCoverage, ...]]:

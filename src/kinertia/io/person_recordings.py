@@ -85,7 +85,7 @@ def read_trial(wanted: SubjectFile, files: TrialFiles) -> TrialInput:
     )
     apart = files.forces is not None and len(wanted.trials) > 1 and not wanted.instruments.same_plates
     used = with_plates_of_trial(recording) if apart else recording
-    return TrialInput(used, files.window_s, seconds, files.use, files.task)
+    return TrialInput(used, files.window_s, seconds, files.use, files.task, files.condition)
 
 
 def _as_used(wanted: SubjectFile, recording: Recording) -> Recording:

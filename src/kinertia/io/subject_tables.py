@@ -57,6 +57,10 @@ class TrialFiles(Table):
         description='"walk", "turn", "run", "landing", "squat" or "other"; left out: found; curves of different tasks '
         "are not averaged",
     )
+    condition: str = Field(
+        default="",
+        description='as "before", "with orthosis": `kinertia compare --conditions` compares trials of two conditions',
+    )
     belt_speed_m_s: BeltSpeed | None = Field(
         default=None,
         description="of a treadmill: m/s, of two belts `{ right = 1.2, left = 0.6 }`, or a file with it over time; "

@@ -26,7 +26,7 @@ _MOSTLY = 0.5
 
 
 def contact_phases(skeleton: Skeleton, kinematics: Kinematics, strides: Sequence[Stride]) -> tuple[Stride, ...]:
-    """Return the phases of feet on plates that are part of no stride, right foot first.
+    """Return the phases of feet on plates that are part of no stride and that markers show, right foot first.
 
     In a landing these are the landings, in squats there are none, in everything else there are stances.
 
@@ -40,9 +40,13 @@ def contact_phases(skeleton: Skeleton, kinematics: Kinematics, strides: Sequence
         return ()
     found = _landings(skeleton, kinematics) if trial.task == "landing" else _stances(trial, strides)
     result: list[Stride] = []
+    shown_from, shown_to = kinematics.spline.time[[0, -1]]
     for side, phase, start, end in found:
+        if start < shown_from or end > shown_to:
+            continue
         number = 1 + sum(one.side == side for one in result)
-        result.append(Stride(side, number, start, end, end, np.nan, np.nan, True, phase))
+        other = _other_foot(trial, side, start, end) if phase == "stance" else (np.nan, np.nan)
+        result.append(Stride(side, number, start, end, end, *other, True, phase))
     return tuple(result)
 
 
@@ -52,6 +56,18 @@ def _stances(trial: Trial, strides: Sequence[Stride]) -> Iterator[tuple[str, Pha
         part = any(each.side == one.side and abs(each.start_s - one.start_s) < _SAME_STEP_S for each in strides)
         if one.whole and not part and _on_plates(trial, FEET.index(one.side), one.start_s, one.end_s):
             yield one.side, "stance", one.start_s, one.end_s
+
+
+def _other_foot(trial: Trial, side: str, start_s: float, end_s: float) -> tuple[float, float]:
+    """Return when the other foot leaves the ground in a stance, and when it is back; NaN where it does not."""
+    assert trial.on_ground is not None  # else there are no stances
+    own = within(trial.markers.time, start_s, end_s)
+    time, ground = trial.markers.time[own], trial.on_ground[own, 1 - FEET.index(side)]
+    swing = np.flatnonzero(~ground)
+    if not len(swing):
+        return np.nan, np.nan
+    lifts = float(time[swing[0]]) if swing[0] > 0 else np.nan
+    return lifts, float(time[swing[-1] + 1]) if swing[-1] + 1 < len(time) else np.nan
 
 
 def _landings(skeleton: Skeleton, kinematics: Kinematics) -> Iterator[tuple[str, Phase, float, float]]:

@@ -272,11 +272,11 @@ def known_forces(skeleton: Skeleton, trial: Trial, seen: np.ndarray) -> np.ndarr
     for foot, segment in enumerate(skeleton.feet):
         known[:, moves[skeleton.segments.index(segment)]] &= trial.known_legs[:, foot, None]
     known[:, : len(skeleton.joints[0].axes)] = False  # the measured windows are added to it
-    result: np.ndarray = known & _near_contacts(trial)[:, None]
+    result: np.ndarray = known & near_contacts(trial)[:, None]
     return result
 
 
-def _near_contacts(trial: Trial) -> np.ndarray:
+def near_contacts(trial: Trial) -> np.ndarray:
     """Return the mask (n,) of marker frames at most AROUND_CONTACT_S from a foot's contact with a plate."""
     time, loaded = trial.loads.time, (trial.loads.force[:, :, 1] >= LOAD_THRESHOLD_N).any(axis=1)
     if not loaded.any():

@@ -2,7 +2,7 @@
 
 Strides are thin; the mean of those that are complete, or were measured longest (`common_strides`), is thick with a band
 of one standard deviation around it; the estimate's own 95 % band is the darker one. The result of the usual pipeline is
-dotted. There are gaps where nothing was measured.
+dotted. Gaps, where nothing was measured, are shaded in the side's colour.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -27,7 +27,7 @@ from kinertia.motion.joint_wrench import body_joints
 from kinertia.report import style
 from kinertia.report.coordinate_titles import joint_moment_title, load_title, panels_of, power_title
 from kinertia.report.figure import Figure, compact
-from kinertia.report.panels import Panel, plain, small_multiples
+from kinertia.report.panels import Panel, plain, shaded, small_multiples
 from kinertia.report.wording import INTERVAL_SD, USUAL, start_of
 from kinertia.trial.data import FEET
 from kinertia.trial.sampled_time import runs
@@ -36,7 +36,9 @@ MOST_STRIDES = 100
 """Largest number of strides of a trial and side; if there are more, this many are taken, evenly spread."""
 _MOST_DRAWN = 5
 """Number of strides drawn per side; mean and bands are of all."""
-_SD_OPACITY, _BAND_OPACITY, _STRIDE_OPACITY = 0.13, 0.25, 0.45
+_SD_OPACITY, _BAND_OPACITY, _STRIDE_OPACITY, _GAP_OPACITY = 0.13, 0.25, 0.45, 0.08
+_OF_LANDINGS: tuple[Kind, ...] = ("joint_moment", "moment", "angle", "power", "force")
+_PERCENT_OF: Mapping[Phase, str] = {"stride": "the gait cycle", "stance": "stance", "landing": "the landing"}
 _CLINICAL_TITLES = dict(
     zip(
         CLINICAL_ANGLES,
@@ -87,6 +89,34 @@ def cycle_figures(
     drawn = _Drawn(fit, estimate, literature, norms)
     figures = {kind: drawn.figure(kind) for kind in UNITS}
     return {kind: figure for kind, figure in figures.items() if figure is not None}
+
+
+@dataclass(frozen=True, eq=False)
+class PhaseFigures:
+    """Figures over contacts of one task that are no strides, by kind, and the curves that they show."""
+
+    task: str
+    phase: Phase
+    curves: Sequence[CycleCurve]
+    figures: dict[Kind, Figure]
+
+
+def phase_figures(fit: Fit, curves: CurvesByStage | None = None) -> tuple[PhaseFigures, ...]:
+    """Draw the stances and landings of each task over their own percentages, apart from all others.
+
+    Of stances the joint moments alone: angles and the rest are in the figures over the gait cycle, or over time.
+    """
+    known, result = curves or drawn_curves(fit), []
+    shown = [one for one in known["estimate"] if one.stride.phase != "stride"]
+    for task, phase in dict.fromkeys((one.task, one.stride.phase) for one in shown):
+        own = {stage: [one for one in some if one.task == task] for stage, some in known.items()}
+        estimate, literature = (_by_quantity(own[stage], phase) for stage in ("estimate", "literature"))
+        drawn = _Drawn(fit, estimate, literature, {}, phase)
+        kinds: tuple[Kind, ...] = _OF_LANDINGS if phase == "landing" else ("joint_moment",)
+        figures = {kind: drawn.figure(kind) for kind in kinds}
+        of_phase = [one for one in own["estimate"] if one.stride.phase == phase]
+        result.append(PhaseFigures(task, phase, of_phase, {k: each for k, each in figures.items() if each is not None}))
+    return tuple(result)
 
 
 def cycle_figure(fit: Fit, kind: Kind, norms: Norms = MappingProxyType({})) -> Figure | None:
@@ -141,17 +171,22 @@ class _Drawn:
     estimate: Curves
     usual: Curves
     norms: Norms
+    phase: Phase = "stride"
 
     def figure(self, kind: Kind) -> Figure | None:
         panels = [
-            Panel(f"{title} ({UNITS[kind]})", [*self._traces(quantity, self._usual_name(kind))], self._toe_offs())
+            Panel(
+                f"{title} ({UNITS[kind]})",
+                [*self._traces(quantity, self._usual_name(kind))],
+                [*self._gaps(quantity), *self._toe_offs()],
+            )
             for quantity, title in titled_quantities(self.fit.skeleton, kind)
             if any((quantity, side) in curves for side in FEET for curves in (self.estimate, self.usual))
         ]
         if not panels:
             return None
         axis: dict[str, Any] = {"range": [0, 100], "tickvals": [0, 20, 40, 60, 80, 100]}
-        axis["title"] = {"text": "% of the gait cycle", "font": {"size": 11}, "standoff": 2}
+        axis["title"] = {"text": f"% of {_PERCENT_OF[self.phase]}", "font": {"size": 11}, "standoff": 2}
         return small_multiples(panels, self._alt(kind), axis)
 
     def _usual_name(self, kind: Kind) -> str:
@@ -175,10 +210,20 @@ class _Drawn:
         base, _, kind = quantity.rpartition("_")
         return kind in ("angle", "moment") and base in opposite_on_left(self.fit.skeleton)
 
+    def _gaps(self, quantity: str) -> list[dict[str, Any]]:
+        """Shade what the mean of a side does not show, in its colour."""
+        shapes = []
+        for side in FEET:
+            if curves := self.estimate.get((quantity, side)):
+                colour = style.faded(style.SIDES[side][1], _GAP_OPACITY)
+                unknown = runs(~np.isfinite(mean_curve(curves)))
+                shapes += [shaded(max(a - 1.0, 0.0), min(b + 1.0, 100.0), colour) for a, b in unknown]
+        return shapes
+
     def _toe_offs(self) -> list[dict[str, Any]]:
         """Draw a vertical line per side at its mean toe-off."""
         shapes = []
-        for side in FEET:
+        for side in FEET if self.phase == "stride" else ():
             strides = [stride for trial in self.fit.trials for stride in trial.strides if stride.side == side]
             percents = [p for stride in strides if np.isfinite(p := stride.percent(stride.toe_off_s))]
             if percents:
@@ -196,10 +241,11 @@ class _Drawn:
             "force": "Ground reactions",
             "clinical": "Clinical angles",
         }
-        counts = [sum(stride.side == side for trial in self.fit.trials for stride in trial.strides) for side in FEET]
+        shown = {(one.trial, one.stride) for own in self.estimate.values() for one in own}
+        counts = [sum(stride.side == side for _, stride in shown) for side in FEET]
         against = "by inverse kinematics" if kind == "clinical" else f"estimate against {self._usual_name(kind)}"
-        strides = f"strides: {counts[0]} right, {counts[1]} left"
-        return f"{names[kind]} ({UNITS[kind]}) over the gait cycle, {against}; {strides}."
+        strides = f"{self.phase}s: {counts[0]} right, {counts[1]} left"
+        return f"{names[kind]} ({UNITS[kind]}) over {_PERCENT_OF[self.phase]}, {against}; {strides}."
 
 
 def _norm(norm: Norm, opposite: bool) -> Iterator[dict[str, Any]]:
@@ -240,8 +286,9 @@ def _estimate(curves: Sequence[CycleCurve], word: str, colour: str) -> Iterator[
     if len(curves) > 1:
         shown = [curves[k] for k in np.unique(np.linspace(0, len(curves) - 1, _MOST_DRAWN).round().astype(int))]
         line = {"color": style.faded(colour, _STRIDE_OPACITY), "width": 0.8}
-        yield {**_strides(shown), "name": f"{word}, strides", "line": line}
-    name = "mean" if spread is not None else "one stride" if len(curves) < 2 else "longest stride"
+        yield {**_strides(shown), "name": f"{word}, {curves[0].stride.phase}s", "line": line}
+    phase = curves[0].stride.phase
+    name = "mean" if spread is not None else f"one {phase}" if len(curves) < 2 else f"longest {phase}"
     yield {**mean_line(mean), "name": f"{word}, {name}", "line": {"color": colour, "width": 2.2}}
 
 

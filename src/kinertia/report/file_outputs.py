@@ -99,7 +99,7 @@ def _compared(trial: TrialFit, output: ModelOutput, stated: FileOutputs, mass_kg
     if output.name not in stated.values or output.kind not in _SHOWN:
         return None
     component, factor, unit = _SHOWN[output.kind]
-    theirs = stated.values[output.name][nearest_samples(stated.time, trial.time), component] / _divisor(
+    theirs = stated.values[output.name][nearest_samples(stated.time, trial.time), component] / moment_divisor(
         stated, output.kind, mass_kg
     )
     if np.isfinite(theirs).sum() < _FEWEST:
@@ -108,7 +108,7 @@ def _compared(trial: TrialFit, output: ModelOutput, stated: FileOutputs, mass_kg
     return OutputComparison(trial.name, output.joint, output.side, output.kind, unit, ours, sd, theirs)
 
 
-def _divisor(stated: FileOutputs, kind: str, mass_kg: float) -> float:
+def moment_divisor(stated: FileOutputs, kind: str, mass_kg: float) -> float:
     """Return body mass where the file's moments are not per kg, else 1; powers are treated alike."""
     moments = [values for name, values in stated.values.items() if name.endswith("Moment")]
     whole = bool(moments) and max(float(np.nanmax(np.abs(values))) for values in moments) > _PER_KG_N_M

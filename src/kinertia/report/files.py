@@ -279,6 +279,7 @@ def _trial_summary(fit: Fit, trial: TrialFit) -> dict[str, Any]:
         "window_s": list(trial.kinematics.window_s),
         "windows_s": [list(window) for window in trial.kinematics.windows_s],
         "task": trial.kinematics.trial.task,
+        "condition": trial.kinematics.trial.condition,
         "joint_moments": {leg.word: leg.to_dict() for leg in moment_coverage(trial)},
         "turned_deg": trial.kinematics.turned_deg,
         "cutoff_hz": trial.kinematics.cutoff_hz,

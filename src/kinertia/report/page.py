@@ -12,6 +12,7 @@ import numpy as np
 from kinertia.estimation.forces_used import forces_used, full_bandwidth
 from kinertia.estimation.identifiability import evidence
 from kinertia.estimation.leg_moments import coverage_sentence
+from kinertia.estimation.moment_gaps import gaps_sentence
 from kinertia.estimation.result import Fit
 from kinertia.estimation.simultaneous.calibration_entry import SHOWN_UNIT, item_text, quantity_text
 from kinertia.estimation.tasks import fits_by_task, main_task
@@ -31,7 +32,16 @@ from kinertia.report.bsp_figures import (
     information_figure,
     segment_name,
 )
-from kinertia.report.cycle_figures import MOST_STRIDES, CurvesByStage, Norms, cycle_figures, drawn_curves, has_spread
+from kinertia.report.cycle_figures import (
+    MOST_STRIDES,
+    CurvesByStage,
+    Norms,
+    PhaseFigures,
+    cycle_figures,
+    drawn_curves,
+    has_spread,
+    phase_figures,
+)
 from kinertia.report.cycle_table import peak_rows, stride_rows
 from kinertia.report.figure import Figure, written
 from kinertia.report.file_outputs import outputs_view
@@ -39,6 +49,7 @@ from kinertia.report.finding_view import FindingView
 from kinertia.report.gait_profile_view import profile_view
 from kinertia.report.headline import held_sentence, hidden_combinations, words
 from kinertia.report.marker_figures import fit_gap_figure, marker_figure
+from kinertia.report.moment_figures import joint_moment_figure, moment_figure
 from kinertia.report.rendering import rendered
 from kinertia.report.scene import view
 from kinertia.report.skeleton_view import scene
@@ -47,7 +58,6 @@ from kinertia.report.time_figures import (
     MOST_FRAMES,
     bandwidths,
     coordinate_figure,
-    moment_figure,
     residual_figure,
 )
 from kinertia.report.truth_comparison import Truth, truth_rows
@@ -96,7 +106,9 @@ def render(
         total_mass=[fit.subject.mass_kg, fit.literature.total_mass_kg, fit.estimate.total_mass_kg],
         cycle=_cycle(fit, norms, curves),
         more_cycles=[(task, _cycle(own, norms, curves)) for task, own in list(fits_by_task(fit).items())[1:]],
+        phases=[_phase(one) for one in phase_figures(fit, curves)],
         covered=coverage_sentence(fit.trials),
+        gaps=gaps_sentence(shown),
         beside=outputs_view(fit, shown, MOST_FRAMES // len(shown)),
         walks=any(gait_events(trial.kinematics.trial) for trial in fit.trials),
         body={
@@ -163,6 +175,20 @@ def _cycle(fit: Fit, norms: Norms, curves: CurvesByStage | None) -> dict[str, An
     }
 
 
+def _phase(one: PhaseFigures) -> dict[str, Any]:
+    """Collect everything that the templates show of the stances or landings of one task."""
+    shown = dict.fromkeys((curve.trial, curve.stride) for curve in one.curves)
+    return {
+        "id": f"{one.phase}-{one.task}",
+        "phase": one.phase,
+        "task": one.task,
+        "trials": list(dict.fromkeys(trial for trial, _ in shown)),
+        "count": len(shown),
+        "peaks": peak_rows(one.curves) if one.phase == "landing" else [],
+        **{kind: written(figure) for kind, figure in one.figures.items()},
+    }
+
+
 def _trial(fit: Fit, trial: TrialFit, k: int, count: int, truth: Truth | None) -> dict[str, Any]:
     """Collect everything that the templates show of one trial."""
     frames = MOST_FRAMES // count
@@ -187,6 +213,7 @@ def _trial(fit: Fit, trial: TrialFit, k: int, count: int, truth: Truth | None) -
                 None if truth is None else truth.joint_loads[trial.name],
             )
         ),
+        "joint_moments": _written(joint_moment_figure(trial, fit.mass_kg, frames // 2)),
         "bands": trial.deviations is not None,
         "forces": forces_used(trial.reactions, fit.settings, trial.motion_hz),
         "markers": written(marker_figure(trial, () if noise is None else noise.drifting)),

@@ -43,6 +43,12 @@ def plain(text: str) -> str:
     return html.escape(text)
 
 
+def shaded(first: float, last: float, colour: str) -> dict[str, Any]:
+    """Shade the panel from one value of the horizontal axis to another."""
+    place = {"x0": first, "x1": last, "y0": 0, "y1": 1, "yref": "domain"}
+    return {"type": "rect", **place, "fillcolor": colour, "line": {"width": 0}, "layer": "below"}
+
+
 def small_multiples(
     panels: Sequence[Panel], alt: str, x: dict[str, Any], row_px: int = 170, left_px: int = 52, linked: bool = True
 ) -> Figure:

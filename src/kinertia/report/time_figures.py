@@ -1,4 +1,4 @@
-"""Draws figures over time: root residuals, coordinates and joint moments of a trial.
+"""Draws figures over time: root residuals and coordinates of a trial.
 
 Frames that were not used are shaded; vertical lines are gait events, solid at foot contact, dashed at foot off.
 """
@@ -13,9 +13,9 @@ from kinertia.estimation.trial_fit import TrialFit
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.kinematics import Kinematics
 from kinertia.report import style
-from kinertia.report.coordinate_titles import Coordinate, load_title, panels_of
+from kinertia.report.coordinate_titles import Coordinate, panels_of
 from kinertia.report.figure import Figure, compact
-from kinertia.report.panels import Panel, small_multiples
+from kinertia.report.panels import Panel, shaded, small_multiples
 from kinertia.report.wording import INTERVAL_SD, LITERATURE, Start
 from kinertia.trial.gait_event import GaitEvent
 from kinertia.trial.gait_events import gait_events
@@ -36,8 +36,8 @@ def residual_figure(trial: TrialFit, most_frames: int = MOST_FRAMES, start: Star
     """Draw the residual force (N) and moment (N m) at the pelvis, stage by stage, with forces at the bandwidth of the
     motion, and for the estimate also at full bandwidth.
     """
-    thin, axis = _thin(len(trial.time), most_frames), time_axis(trial.kinematics)
-    marks = [*_unused(trial.kinematics, axis), *_lines(_shown_events(trial.kinematics))]
+    thin, axis = thinned(len(trial.time), most_frames), time_axis(trial.kinematics)
+    marks = [*_unused(trial.kinematics, axis), *event_lines(shown_events(trial.kinematics))]
     stages = {
         stage_name(stage, start, _hz(trial, stage)): (style.STAGES[stage], values)
         for stage, values in trial.residuals.items()
@@ -84,7 +84,7 @@ def _hz(trial: TrialFit, stage: str) -> float:
 def coordinate_figure(trial: TrialFit, skeleton: Skeleton, most_frames: int = MOST_FRAMES) -> Figure:
     """Draw every coordinate (degrees, m) by inverse kinematics frame by frame, and as estimated with its 95 % band."""
     ik, axis = trial.kinematics.ik, time_axis(trial.kinematics)
-    unused, events = _unused(trial.kinematics, axis), _shown_events(trial.kinematics)
+    unused, events = _unused(trial.kinematics, axis), shown_events(trial.kinematics)
     shown = (ik.time >= axis["range"][0]) & (ik.time <= axis["range"][1])
     stages = (
         ("inverse kinematics", ik.time[shown], ik.q[shown], {"dash": "dot", "width": 1.6}),
@@ -94,13 +94,13 @@ def coordinate_figure(trial: TrialFit, skeleton: Skeleton, most_frames: int = MO
     panels = []
     for one in panels_of(skeleton):
         scale = np.degrees(1.0) if one.rotational else 1.0
-        thin = _thin(len(trial.time), most_frames)
-        traces = [] if sd is None else _bands(one, trial.time, scale * trial.motion.q, scale * sd, thin)
+        thin = thinned(len(trial.time), most_frames)
+        traces = [] if sd is None else bands(one, trial.time, scale * trial.motion.q, scale * sd, thin)
         for name, time, values, line in stages:
-            thin = _thin(len(time), most_frames)
-            traces += _sides(one, name, time, scale * values, thin, line)
+            thin = thinned(len(time), most_frames)
+            traces += lines_by_side(one, name, time, scale * values, thin, line)
         unit = "degrees" if one.rotational else "m"
-        panels.append(Panel(f"{one.title} ({unit})", traces, [*unused, *_lines(events, one)]))
+        panels.append(Panel(f"{one.title} ({unit})", traces, [*unused, *event_lines(events, one)]))
     change = np.degrees(motion_change(trial)[:, skeleton.rotational])
     alt = (
         f"Coordinates of {trial.name} over time, inverse kinematics against estimate; the joint angles differ by "
@@ -113,42 +113,6 @@ def motion_change(trial: TrialFit) -> np.ndarray:
     """Return estimated coordinates minus those of inverse kinematics (w, c), rad and m; NaN where markers show none."""
     result: np.ndarray = trial.motion.q - trial.kinematics.ik.q[trial.kinematics.frames]
     return result
-
-
-def moment_figure(
-    trial: TrialFit,
-    skeleton: Skeleton,
-    mass_kg: float,
-    most_frames: int = MOST_FRAMES,
-    start: Start = LITERATURE,
-    truth: np.ndarray | None = None,
-) -> Figure:
-    """Draw joint moments (N m/kg) as before, on the measured motion, and as estimated, with the 95 % band.
-
-    `truth_comparison` (w, c) N m: of a synthetic person, dashed.
-    """
-    axis, thin = time_axis(trial.kinematics), _thin(len(trial.time), most_frames)
-    unused, events = _unused(trial.kinematics, axis), _shown_events(trial.kinematics)
-    sd = None if trial.deviations is None else trial.deviations.moments / mass_kg
-    middle = trial.joint_loads["estimate"] / mass_kg
-    panels = []
-    for one in panels_of(skeleton):
-        if min(one.columns.values()) < 6:
-            continue
-        traces = [] if sd is None else _bands(one, trial.time, middle, sd, thin)
-        for stage, line in (("literature", {"dash": "dot", "width": 1.6}), ("estimate", {"width": 2})):
-            name = stage_name(stage, start)
-            traces += _sides(one, name, trial.time, trial.joint_loads[stage] / mass_kg, thin, line)
-        if truth is not None:
-            dashed = {"color": style.BLACK, "dash": "dash", "width": 1.4}
-            traces += [
-                {**curve, "name": "truth"} for curve in _sides(one, "truth", trial.time, truth / mass_kg, thin, dashed)
-            ]
-        title = f"{load_title(one, 'moment')} (N m/kg)" if one.rotational else f"{load_title(one, 'force')} (N/kg)"
-        panels.append(Panel(title, traces, [*unused, *_lines(events, one)]))
-    peak = np.abs(trial.joint_loads["estimate"][:, 6:]).max() / mass_kg
-    alt = f"Joint moments of {trial.name} over time, {start.word} against estimate; the largest is {peak:.2f} N m/kg."
-    return small_multiples(panels, alt, axis)
 
 
 def panel_over_time(
@@ -167,15 +131,15 @@ def panel_over_time(
         band: values and SDs (w, c).
         most_frames: largest number of frames drawn per curve.
     """
-    axis, thin = time_axis(trial.kinematics), _thin(len(trial.time), most_frames)
-    traces = _bands(one, trial.time, *band, thin) if np.isfinite(band[1]).any() else []
+    axis, thin = time_axis(trial.kinematics), thinned(len(trial.time), most_frames)
+    traces = bands(one, trial.time, *band, thin) if np.isfinite(band[1]).any() else []
     for name, (values, line) in lines.items():
-        traces += _sides(one, name, trial.time, values, thin, line)
-    marks = [*_unused(trial.kinematics, axis), *_lines(_shown_events(trial.kinematics), one)]
+        traces += lines_by_side(one, name, trial.time, values, thin, line)
+    marks = [*_unused(trial.kinematics, axis), *event_lines(shown_events(trial.kinematics), one)]
     return Panel(one.title, traces, marks)
 
 
-def _bands(one: Coordinate, time: np.ndarray, values: np.ndarray, sd: np.ndarray, thin: slice) -> list[dict[str, Any]]:
+def bands(one: Coordinate, time: np.ndarray, values: np.ndarray, sd: np.ndarray, thin: slice) -> list[dict[str, Any]]:
     """Draw a 95 % band around values (w, c) per side: an invisible lower edge, and an upper one filled down to it."""
     traces, thin = [], slice(None, None, BAND_EVERY * thin.step)
     for side, column in one.columns.items():
@@ -190,9 +154,10 @@ def _bands(one: Coordinate, time: np.ndarray, values: np.ndarray, sd: np.ndarray
     return traces
 
 
-def _sides(
+def lines_by_side(
     one: Coordinate, name: str, time: np.ndarray, values: np.ndarray, thin: slice, line: dict[str, Any]
 ) -> list[dict[str, Any]]:
+    """Draw a line per side, with its colour and a name that begins with the side."""
     return [
         {
             **_curve(time, values[:, column], thin),
@@ -221,13 +186,14 @@ def _curve(time: np.ndarray, values: np.ndarray, thin: slice) -> dict[str, Any]:
     }
 
 
-def _thin(frames: int, most: int) -> slice:
+def thinned(frames: int, most: int) -> slice:
+    """Return the frames that are drawn: all, or every so many that at most `most` remain."""
     return slice(None, None, -(-frames // most))
 
 
-def time_axis(kinematics: Kinematics) -> dict[str, Any]:
-    """Return the settings of the time axis: all windows with a small margin."""
-    start, end = kinematics.window_s
+def time_axis(kinematics: Kinematics, span_s: tuple[float, float] | None = None) -> dict[str, Any]:
+    """Return the settings of the time axis: all windows, or this span (s), with a small margin."""
+    start, end = span_s or kinematics.window_s
     around = _AROUND * (end - start)
     time = kinematics.trial.markers.time
     limits = [max(start - around, float(time[0])), min(end + around, float(time[-1]))]
@@ -239,31 +205,17 @@ def _unused(kinematics: Kinematics, axis: dict[str, Any]) -> list[dict[str, Any]
     """Shade times outside the windows."""
     starts, ends = zip(*kinematics.windows_s, strict=True)
     spans = zip((axis["range"][0], *ends), (*starts, axis["range"][1]), strict=True)
-    return [
-        {
-            "type": "rect",
-            "x0": first,
-            "x1": last,
-            "y0": 0,
-            "y1": 1,
-            "yref": "domain",
-            "fillcolor": style.UNUSED,
-            "line": {"width": 0},
-            "layer": "below",
-        }
-        for first, last in spans
-        if last - first > 1e-6
-    ]
+    return [shaded(first, last, style.UNUSED) for first, last in spans if last - first > 1e-6]
 
 
-def _shown_events(kinematics: Kinematics) -> list[GaitEvent]:
-    """Return the events in the frames shown; none where there are too many."""
-    first, last = time_axis(kinematics)["range"]
+def shown_events(kinematics: Kinematics, axis: Mapping[str, Any] | None = None) -> list[GaitEvent]:
+    """Return the events in the frames shown, by default those of `time_axis`; none where there are too many."""
+    first, last = (axis or time_axis(kinematics))["range"]
     shown = [event for event in gait_events(kinematics.trial) if first <= event.time_s <= last]
     return shown if len(shown) <= MOST_EVENTS else []
 
 
-def _lines(events: Sequence[GaitEvent], one: Coordinate | None = None) -> list[dict[str, Any]]:
+def event_lines(events: Sequence[GaitEvent], one: Coordinate | None = None) -> list[dict[str, Any]]:
     """Draw lines at the events of the sides that the coordinate is on; at all events where it is on none."""
     sides = [] if one is None else [side for side in one.columns if side]
     return [_vertical_line(event) for event in events if not sides or event.side in sides]

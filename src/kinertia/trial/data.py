@@ -12,7 +12,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -27,6 +26,7 @@ from kinertia.trial.file_outputs import FileOutputs
 from kinertia.trial.force_spikes import ForceSpike
 from kinertia.trial.gait_event import FileEvent, StatedContact
 from kinertia.trial.impossible_data import impossible_markers, impossible_plates
+from kinertia.trial.plate_torque import TorqueColumns
 from kinertia.trial.sampled_time import nearest_samples, windows, within
 from kinertia.trial.unloaded_level import UnloadedReading
 
@@ -116,23 +116,6 @@ class Markers:
     def rotated(self, rotation: FloatArray) -> Markers:
         """Return the same markers in axes rotated by `rotation` (3, 3): new = rotation @ old."""
         return replace(self, positions=self.positions @ rotation.T)
-
-
-class TorqueColumns(NamedTuple):
-    """Content of the torque columns of one plate in its file, while the plate was loaded.
-
-    Attributes:
-        lever_arm_m: median of the horizontal torque over the vertical force, m; NaN where the point of application does
-            not move, or the plate was hardly loaded.
-        rms_nm: RMS torque about X, Y and Z, N m.
-        belongs_to: index of the other plate whose load the torque follows; None if there is none.
-        height_m: median height of the point of application, m; NaN where the plate was hardly loaded.
-    """
-
-    lever_arm_m: float
-    rms_nm: tuple[float, float, float]
-    belongs_to: int | None
-    height_m: float = np.nan
 
 
 @dataclass(frozen=True, eq=False)
@@ -343,7 +326,7 @@ class Trial:
         notes: one sentence for each assumption made so far.
         virtual_sd_m, belt, vertical, events, outputs: as the recording's.
         findings: about the assignment of loads to feet.
-        task: what the person does (`trial_input.Task`); empty where that was not asked.
+        task, condition: what the person does (`trial_input.Task`), and under which condition; empty where not asked.
 
     Examples:
         >>> recording = kinertia.read_recording("lab/walk.trc", "lab/walk_grf.mot")
@@ -368,6 +351,7 @@ class Trial:
     leg_known: BoolArray | None = None
     on_ground: BoolArray | None = None
     task: str = ""
+    condition: str = ""
 
     def __post_init__(self) -> None:
         _expect_shape("measured", self.measured, (len(self.markers.time),))

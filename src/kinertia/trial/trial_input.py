@@ -23,6 +23,7 @@ class TrialInput:
         window_s: first and last time; None: as detected.
         read_seconds: time that reading it took.
         task: what the person does; None: as found.
+        condition: under which the trial was recorded, as the laboratory names it; trials of two can be compared.
         use: "all", or "kinematics" to use its markers alone, for joint centres, joint axes and marker positions.
 
     Examples:
@@ -36,3 +37,4 @@ class TrialInput:
     read_seconds: float = 0.0
     use: TrialUse = "all"
     task: Task | None = None
+    condition: str = ""

@@ -48,7 +48,8 @@ def usable_trial(context: RecordingContext) -> Trial:
     seen = trial.markers.seen
     labels = [label for column, label in enumerate(trial.markers.labels) if seen[:, column].any()]
     usable = context.trial_on_plates or trial
-    return replace(usable, markers=without_copied_frames(trial.markers.select(labels)), task=task_of(context))
+    markers = without_copied_frames(trial.markers.select(labels))
+    return replace(usable, markers=markers, task=task_of(context), condition=context.condition)
 
 
 @dataclass(frozen=True, eq=False)

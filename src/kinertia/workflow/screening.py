@@ -204,6 +204,7 @@ def person_context(person: Person) -> PersonContext:
             stated.mass_kg,
             item.use == "kinematics",
             stated_task=item.task,
+            condition=item.condition,
         )
         for item in person.trials
     ]

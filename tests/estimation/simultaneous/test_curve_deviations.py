@@ -202,7 +202,7 @@ def test_deviations_are_those_of_the_dense_covariance(estimate, noise):
     left, c = derivatives_at(problem, coefficients, static, late)[1], coefficients.shape[1]
     of_joints = of_impacts(problem, coefficients, static, joints) + left.delay_squares[:, c:]
     more = {
-        "joints": of_joints + knee_geometry(body_joints(problem.skeleton), left.value[:, c:]),
+        "joints": of_joints + knee_geometry(problem.skeleton, body_joints(problem.skeleton), left.value[:, c:]),
         "moments": impacts + left.delay_squares[:, :c],
         "powers": (impacts + left.delay_squares[:, :c]) * speed**2,
         "ground_forces": noise_n**2 + left.ground_delay_squares,

@@ -13,7 +13,9 @@ decelerates segments is unknown.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -192,7 +194,7 @@ class _Curves:
         _write_variances(spread, seen, root[in_root, in_root], variance, rows)
         joints = replace(seen, by=every.rows(slice(c, None)), grown=self.grown[rows, c:])
         own = _joint_variances(spread, joints, root[in_root, in_root])
-        own += knee_geometry(moments.virtual.joints, joints.by.value)
+        own += knee_geometry(moments.virtual.skeleton, moments.virtual.joints, joints.by.value)
         self.of_joints[rows] = own.reshape(len(own), *self.of_joints.shape[1:])
         ground = np.square(by.ground @ root[problem.layout.errors, in_root]).sum(axis=-1) + by.ground_delay_squares
         noise_n = moments.reactions.noise_n * (by.loads[..., :3] != 0.0)
@@ -223,41 +225,32 @@ class _Seen:
     grown: np.ndarray
 
 
-def _write_variances(spread: MotionSpread, seen: _Seen, root: np.ndarray, into: CurveDeviations, rows: slice) -> None:
-    """Write the variances of coordinates, moments and powers into rows of `into`, as if the delay were known.
+class _Interval(NamedTuple):
+    """Rows in the frames of one knot interval (`write_variances`).
+
+    Attributes:
+        own: the frames, among those of `_Seen`.
+        moment, shaken, by_errors: (n r, ...) changes of the rows with the static unknowns, and with the errors.
+        covariance, carried: of the active splines, as in `MotionSpread.active`.
+        values: (3, n, 6) of these splines.
+    """
+
+    own: slice
+    moment: np.ndarray
+    shaken: np.ndarray
+    by_errors: np.ndarray
+    covariance: np.ndarray
+    carried: np.ndarray
+    values: np.ndarray
+
+
+def _intervals(spread: MotionSpread, seen: _Seen, root: np.ndarray) -> Iterator[_Interval]:
+    """Yield the rows of `seen` knot interval by knot interval.
 
     `root` (n, n) belongs to the static unknowns that root equations depend on.
     """
     by, precision = seen.by, spread.carried.dtype
-    (d, c, _), n = by.static.shape, len(root)
-    still = by.static.reshape(-1, n).astype(precision) @ root.astype(precision)
-    sums = np.empty((4, d, c))
-    starts = np.flatnonzero(np.diff(seen.first, prepend=-1))
-    for start, stop in zip(starts, np.append(starts[1:], d), strict=True):
-        own = slice(start, stop)
-        covariance, carried = spread.active(int(seen.first[start]))
-        values, orders = np.ascontiguousarray(seen.values[:, own]), (by.q[own], by.qd[own], by.qdd[own])
-        by_splines = np.empty((2, stop - start, c, 6, c), precision)
-        write_by_splines(values, *orders, by_splines[0])
-        write_by_splines(seen.shares[:, None, None] * values, *orders, by_splines[1])
-        plain, shaken = by_splines.reshape(2, -1, 6 * c)
-        shaken *= seen.grown[own].reshape(-1, 1)
-        moment = plain @ carried.reshape(6 * c, -1)
-        moment[:, :n] -= still[start * c : stop * c]
-        by_errors = shaken @ covariance.astype(precision)
-        write_variances(moment, carried, shaken, by_errors, covariance, values, seen.shares, sums[:, own])
-    place, rate, force, both = sums
-    into.coordinates[rows], into.moments[rows] = place, force
-    into.powers[rows] = seen.speed**2 * force + by.value**2 * rate + 2.0 * seen.speed * by.value * both
-
-
-def _joint_variances(spread: MotionSpread, seen: _Seen, root: np.ndarray) -> np.ndarray:
-    """Return the variances (d, r) of rows of joints, as `_write_variances` does of those of coordinates."""
-    by, precision = seen.by, spread.carried.dtype
     (d, r, n), c = by.static.shape, by.q.shape[2]
-    result = by.delay_squares.copy()
-    if not r:
-        return result
     still = by.static.reshape(-1, n).astype(precision) @ root.astype(precision)
     starts = np.flatnonzero(np.diff(seen.first, prepend=-1))
     for start, stop in zip(starts, np.append(starts[1:], d), strict=True):
@@ -271,7 +264,26 @@ def _joint_variances(spread: MotionSpread, seen: _Seen, root: np.ndarray) -> np.
         shaken *= seen.grown[own].reshape(-1, 1)
         moment = plain @ carried.reshape(6 * c, -1)
         moment[:, :n] -= still[start * r : stop * r]
-        by_errors = shaken @ covariance.astype(precision)
-        variance = np.einsum("ij,ij->i", moment, moment) + np.einsum("ij,ij->i", by_errors, shaken)
-        result[own] += variance.reshape(-1, r)
+        yield _Interval(own, moment, shaken, shaken @ covariance.astype(precision), covariance, carried, values)
+
+
+def _write_variances(spread: MotionSpread, seen: _Seen, root: np.ndarray, into: CurveDeviations, rows: slice) -> None:
+    """Write the variances of coordinates, moments and powers into rows of `into`, as if the delay were known."""
+    sums = np.empty((4, *seen.by.static.shape[:2]))
+    for one in _intervals(spread, seen, root):
+        errors = (one.shaken, one.by_errors, one.covariance, one.values, seen.shares)
+        write_variances(one.moment, one.carried, *errors, sums[:, one.own])
+    place, rate, force, both = sums
+    value = seen.by.value
+    into.coordinates[rows], into.moments[rows] = place, force
+    into.powers[rows] = seen.speed**2 * force + value**2 * rate + 2.0 * seen.speed * value * both
+
+
+def _joint_variances(spread: MotionSpread, seen: _Seen, root: np.ndarray) -> np.ndarray:
+    """Return the variances (d, r) of rows of joints, with that of the delay."""
+    result = seen.by.delay_squares.copy()
+    for one in _intervals(spread, seen, root) if result.shape[1] else ():
+        variance = np.einsum("ij,ij->i", one.moment, one.moment)
+        variance += np.einsum("ij,ij->i", one.by_errors, one.shaken)
+        result[one.own] += variance.reshape(-1, result.shape[1])
     return result

@@ -1,0 +1,59 @@
+"""Words and tables of what changed between two conditions, for the terminal, scripts and Excel."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
+from typing import Any
+
+from kinertia.estimation.condition_changes import SOURCES, Change
+from kinertia.report.style import SIDES
+
+_DIGITS = {"N m/kg": 3, "degrees": 1}
+
+
+def change_sentences(found: Sequence[Change]) -> Iterator[str]:
+    """Yield a sentence for each outcome that was named beforehand, as a report may state it."""
+    for one in found:
+        if one.primary:
+            side = f"{SIDES[one.side][0].capitalize()} " if one.side else ""
+            yield f"{side}{one.joint} {one.component} {one.quantity}, {one.event}: {_judgement(one)}"
+
+
+def _judgement(one: Change) -> str:
+    digits = _DIGITS[one.unit]
+    pair = f"{one.before:.{digits}f} before, {one.after:.{digits}f} after"
+    if one.verdict == "cannot be judged":
+        return f"cannot be judged, with {one.strides[0]} and {one.strides[1]} strides ({pair} {one.unit})"
+    if one.verdict == "changed":
+        return f"changed by {one.difference:+.{digits}f} {one.unit} (SD {one.sd:.{digits}f}; {pair})"
+    return f"no change shown; one below {one.mdc95:.{digits}f} {one.unit} would be missed ({pair})"
+
+
+def changed_sentence(found: Sequence[Change]) -> str:
+    """State how many of the other outcomes changed; by chance some do."""
+    others = [one for one in found if not one.primary and one.verdict != "cannot be judged"]
+    if not others:
+        return "Nothing else can be judged."
+    count = sum(one.verdict == "changed" for one in others)
+    return (
+        f"Of {len(others)} other moments and angles {count} changed; without any change about {0.05 * len(others):.0f} "
+        "would seem to."
+    )
+
+
+def change_columns(found: Sequence[Change]) -> dict[str, list[Any]]:
+    """Return the columns of `changes.csv`: a row per outcome, one column for each part of the standard deviation."""
+    names = ("quantity", "joint", "component", "side", "event", "unit", "before", "after", "difference", "sd")
+    return {
+        **{name: [getattr(one, name) for one in found] for name in names},
+        **{f"sd_{source}": [one.sd_by_source[source] for one in found] for source in SOURCES},
+        "mdc95": [one.mdc95 for one in found],
+        "strides_before": [one.strides[0] for one in found],
+        "strides_after": [one.strides[1] for one in found],
+        "verdict": [one.verdict for one in found],
+    }
+
+
+def changes_summary(before: str, after: str, found: Sequence[Change]) -> dict[str, Any]:
+    """Return what `kinertia compare --conditions ... --json` prints."""
+    rows = [{**asdict(one), "difference": one.difference, "verdict": one.verdict} for one in found]
+    return {"before": before, "after": after, "outcomes": rows}

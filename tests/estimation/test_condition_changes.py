@@ -1,0 +1,125 @@
+"""What changed between two conditions: known changes among made-up strides, and none between a walk and itself."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from command_line import run
+from kinertia.errors import KinertiaError
+from kinertia.estimation import condition_changes
+from kinertia.estimation.condition_changes import EVENTS, SOURCES, _judged, changes, event_bounds
+from kinertia.motion.gait_cycle import Stride
+from kinertia.report.changes import change_columns, change_sentences, changed_sentence
+from kinertia.report.saved_fit import write_fit
+
+DRAWS = 1000
+
+
+def judged(change, strides, shared_sd, own_sd, stride_sd, seed=0):
+    """Changes of one outcome: so many strides of two conditions, with errors that all share and that each has."""
+    rng = np.random.default_rng(seed)
+    count = sum(strides)
+    second = np.arange(count) >= strides[0]
+    keys = [(f"walk {k}", "moment knee_adduction late stance", "r", "stride 1") for k in range(count)]
+    truth = 0.3 + change * second + stride_sd * rng.standard_normal(count)
+    errors = shared_sd * rng.standard_normal() + own_sd * rng.standard_normal(count)
+    estimate = truth + errors
+    departures = shared_sd * rng.standard_normal((DRAWS, 1)) + own_sd * rng.standard_normal((DRAWS, count))
+    still = np.broadcast_to(estimate, departures.shape)
+    drawn = {"all": estimate + departures, "body": still, "instruments": still}
+    (found,) = _judged(keys, estimate, drawn, [~second, second])
+    return found
+
+
+def test_errors_that_all_strides_share_cancel():
+    found = judged(0.0, (4, 4), shared_sd=0.5, own_sd=0.01, stride_sd=0.0)
+    assert found.sd_by_source["markers"] == pytest.approx(0.01 * np.sqrt(0.5), rel=0.05)
+    assert found.sd < 0.02
+    assert (found.joint, found.component, found.side, found.event) == ("knee", "adduction", "r", "late stance")
+    np.testing.assert_allclose(np.hypot.reduce(list(found.sd_by_source.values())), found.sd, rtol=1e-6)
+
+
+@pytest.mark.parametrize("own_sd", [0.005, 0.05])
+def test_no_change_is_rarely_called_one_and_a_true_one_mostly(own_sd):
+    """Whether markers or strides vary more."""
+    none, some = ([judged(change, (4, 4), 0.3, own_sd, 0.03, seed) for seed in range(1500)] for change in (0.0, 0.2))
+    assert np.mean([one.verdict == "changed" for one in none]) < 0.08
+    assert np.mean([one.verdict == "changed" for one in some]) > 0.9
+    covered = [abs(one.difference - 0.2) <= one.mdc95 for one in some]
+    assert 0.93 < np.mean(covered) < 1.0
+
+
+def test_one_stride_is_not_judged():
+    found = judged(0.5, (1, 4), 0.1, 0.01, 0.01)
+    assert (found.verdict, found.strides) == ("cannot be judged", (1, 4))
+    assert np.isnan(found.mdc95)
+    assert found.difference == pytest.approx(0.5, abs=0.1)
+
+
+def test_few_strides_vary_no_less_than_is_usual():
+    few, several = (judged(0.0, (count, count), 0.0, 1e-4, 0.0) for count in (2, 5))
+    assert few.sd_by_source["stride"] > 0.015
+    assert several.sd_by_source["stride"] < 0.002
+
+
+def test_events_lie_between_contacts():
+    stride = Stride("r", 1, 10.0, 11.0, 10.6, 10.1, 10.5, True)
+    assert event_bounds(stride) == pytest.approx((0.0, 10.0, 30.0, 50.0, 60.0, 100.0))
+    assert len(event_bounds(stride)) == len(EVENTS) + 1
+
+
+@pytest.fixture(scope="module")
+def twice(fit):
+    """A walk under two conditions, which is one walk."""
+    (trial,), (draws,) = fit.trials, fit.posterior.draws.trials
+
+    def under(condition):
+        own = replace(trial.kinematics.trial, name=condition, condition=condition)
+        return replace(trial, kinematics=replace(trial.kinematics, trial=own))
+
+    posterior = replace(fit.posterior, draws=replace(fit.posterior.draws, trials=(draws, draws)))
+    return replace(fit, trials=(under("barefoot"), under("with shoes")), posterior=posterior)
+
+
+@pytest.fixture(scope="module")
+def found(twice):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(condition_changes, "DRAWS", 6)
+        return changes(twice, "barefoot", "with shoes")
+
+
+def test_a_walk_has_not_changed_from_itself(found):
+    assert {one.quantity for one in found} == {"moment", "angle"}
+    assert {"hip", "knee", "ankle", "lumbar"} <= {one.joint for one in found}
+    assert {one.verdict for one in found} <= {"not shown", "cannot be judged"}
+    assert max(abs(one.difference) for one in found) < 1e-9
+    for one in found:
+        assert set(one.sd_by_source) == set(SOURCES)
+        assert max(one.sd_by_source[source] for source in SOURCES[:3]) < 1e-9, "errors of one walk cancel"
+
+
+def test_tables_and_sentences_have_every_outcome(found):
+    table = pd.DataFrame(change_columns(found))
+    assert len(table) == len(found)
+    assert table["verdict"].tolist() == [one.verdict for one in found]
+    primary = [one for one in found if one.primary]
+    assert len(primary) == len(list(change_sentences(found))) >= 2
+    others = sum(not one.primary and one.verdict != "cannot be judged" for one in found)
+    assert f" {others} other" in changed_sentence(found) or others == 0
+
+
+def test_the_command_compares_conditions_of_a_result(twice, fit, tmp_path):
+    (tmp_path / "out").mkdir()
+    write_fit(twice, None, tmp_path / "out" / "fit.npz")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(condition_changes, "DRAWS", 2)
+        outcome = run("compare", tmp_path / "out", "--conditions", "barefoot", "with shoes", "-o", tmp_path / "c")
+        assert outcome.status == 0, outcome.err
+        assert len(pd.read_csv(tmp_path / "c" / "changes.csv")) > 50
+        refused = run("compare", tmp_path / "out", "--conditions", "barefoot", "running", "-o", tmp_path / "d")
+    assert refused.status == 2
+    assert "stated are: barefoot, with shoes" in refused.err
+    with pytest.raises(KinertiaError):
+        changes(fit, "barefoot", "with shoes")
