@@ -74,11 +74,10 @@ def floor(context: PersonContext) -> Iterator[Finding]:
 
 
 def _heights_in_motion(trial: RecordingContext) -> list[float]:
-    """Return how high (m) the lowest foot marker is: above each plate, or else above the floor; empty if unknown."""
+    """Return how high (m) the lowest foot marker is above each plate, and above the floor; empty if unknown."""
     on_plates = [lowest - surface for lowest, surface in heights_on_plates(trial).values()]
-    on_plates = [own for own in on_plates if np.isfinite(own)]
     lowest = _lowest(trial, _IN_MOTION)
-    return on_plates or ([] if lowest is None else [lowest[1]])
+    return [own for own in (*on_plates, *([] if lowest is None else [lowest[1]])) if np.isfinite(own)]
 
 
 def _lowest(context: RecordingContext, percentile: float) -> tuple[str, float] | None:
