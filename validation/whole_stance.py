@@ -1,4 +1,4 @@
-"""Three-dimensional joint moments over whole stances against the truth, with one or two steps on plates."""
+"""Joint moments over whole stances against the truth."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
