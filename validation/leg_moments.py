@@ -1,4 +1,4 @@
-"""Count the frames in which joint moments of a leg are known."""
+"""Count the frames in which a leg's moments are known."""
 
 import tempfile
 from collections.abc import Iterator
