@@ -238,7 +238,7 @@ def test_a_force_and_the_vertical_moment_reversed_together(recording_of, name):
         assert (found.code, found.evidence["beside"].value) == ("P232", beside)
 
 
-@pytest.mark.parametrize("name", MEASURED_PLATES)
+@pytest.mark.parametrize("name", ["synthetic/walk.c3d", *MEASURED_PLATES])
 @pytest.mark.parametrize("plate", [0, 1])
 def test_a_vertical_force_with_the_wrong_sign(recording_of, name, plate):
     """The reader turns the whole plate round, whose horizontal forces and corners were then accused."""
