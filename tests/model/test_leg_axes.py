@@ -58,13 +58,16 @@ def test_an_ankle_axis_is_judged_by_the_foot():
     assert [(one.part, one.limit.name) for one in departed] == [("ankle_l", "ankle axis")]
 
 
-def plug_in(wand_ahead_m):
-    """A person in Plug-in Gait's markers, with wands this far in front of the lateral line of the thigh."""
+def plug_in(wand_ahead_m, shank_wand_m=(0.0, 0.12, 0.03)):
+    """A person in Plug-in Gait's markers, with wands this far in front of the lateral line of the thigh, and from the
+    lateral malleolus forwards, up and outwards.
+    """
     positions = standing_positions(HEIGHT_M)
     own = {side + name: positions[f"{side}.{ours}"] for ours, name in INTO_PLUG_IN.items() for side in "RL"}
     for side, sign in (("R", 1.0), ("L", -1.0)):
         own[f"{side}PSI"] = HEIGHT_M * np.array([-0.065, 0.57, sign * 0.03])
         own[f"{side}THI"] = positions[f"{side}.Knee.Lat"] + [wand_ahead_m, 0.15, sign * 0.03]
+        own[f"{side}TIB"] = positions[f"{side}.Ankle.Lat"] + np.multiply(shank_wand_m, [1.0, 1.0, sign])
     static = replace(recording(own), measurements=WIDTHS_M)
     return RecordingContext(static, PLUG_IN, is_static=True, height_m=HEIGHT_M)
 
@@ -85,6 +88,21 @@ def test_a_wand_on_the_front_of_the_thigh_is_not_used():
         assert abs(axis[0]) < 0.01
         half = np.linalg.norm(centre - marks[f"knee_lateral_{side}"])
         assert half == pytest.approx(0.05 + jc.MARKER_RADIUS_M)
+
+
+def test_a_shank_wand_in_front_of_the_shin_is_not_used():
+    """It placed an ankle on the outer side of its lateral malleolus: a moment 0.4 N m/kg too large, without a word."""
+    context = plug_in(0.0, (0.06, 0.12, -0.05))
+    wands = [one for one in landmarks(context) if one.code == "L108"]
+    assert [one.where.part for one in wands] == ["right ankle", "left ankle"]
+    marks = jc.find_landmarks(context.recording, PLUG_IN)
+    pelvis, origin, width, depth = jc.pelvis_frame(marks)
+    for side, sign in (("r", 1.0), ("l", -1.0)):
+        leg = jc.leg_frames(marks, origin + pelvis @ jc.hip_in_pelvis(width, depth, "bell", side), side)
+        lateral = marks[f"ankle_lateral_{side}"]
+        half = marks.width(f"ankle_{side}") / 2 + jc.MARKER_RADIUS_M
+        assert np.linalg.norm(leg.ankle_at - lateral) == pytest.approx(half)
+        assert sign * (lateral - leg.ankle_at)[2] > 0.9 * half
 
 
 def test_a_wand_nearly_in_the_plane_is_used():

@@ -29,10 +29,34 @@ _TALOCRURAL_RIGHT = np.array([-0.105, -0.174, 0.979])
 _SUBTALAR_INCLINATION, _SUBTALAR_DEVIATION = np.radians(42.0), np.radians(23.0)
 _SUBTALAR_DROP_OF_FOOT = 0.018
 _METATARSALS_OF_FOOT = 0.73
-WAND_ROTATION_RAD, USUAL_WAND_RAD = float(np.radians(30.0)), float(np.radians(19.0))
-"""Rotation of a knee axis from the line of the ASIS beyond which a thigh wand is not believed, and the largest of ten
-people's; wands on the front of the thigh rotate it by 44 degrees."""
 _LUMBAR = {"male": np.array([-0.335, -0.032, 0.0]), "female": np.array([-0.340, 0.049, 0.0])}
+
+
+@dataclass(frozen=True)
+class WandLimit:
+    """How far a wand may rotate the axis of a joint from the line that is expected there.
+
+    Attributes:
+        wand: landmark of the wand, without its side.
+        line: the expected line, in words.
+        limit_rad: rotation beyond which the wand is not believed.
+        usual_rad: largest rotation by a wand that was where it should be.
+    """
+
+    wand: str
+    line: str
+    limit_rad: float
+    usual_rad: float
+
+
+WAND_LIMITS = {
+    "knee": WandLimit("thigh_wand", "the line of the ASIS", float(np.radians(30.0)), float(np.radians(19.0))),
+    "ankle": WandLimit(
+        "shank_wand", "the malleoli expected above the foot", float(np.radians(45.0)), float(np.radians(32.0))
+    ),
+}
+"""Of knees by ten people, where wands on the front of the thigh rotate the axis by 44 degrees; of ankles by twelve,
+where a wand on the other side of the shin rotates it by 136."""
 
 
 @dataclass(frozen=True)
@@ -180,36 +204,29 @@ def leg_frames(marks: Landmarks, hip_at: np.ndarray, side: str) -> LegFrames:
 
 
 def knee(marks: Landmarks, hip: np.ndarray, side: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return knee centre and flexion axis (unit, to the right); parallel to the line of the ASIS where the thigh wand
-    rotates it by more than `WAND_ROTATION_RAD` from there.
-    """
-    found = _hinge(marks, f"knee_{side}", hip, f"thigh_wand_{side}", side)
-    turned = wand_rotation(marks, hip, side)
-    if turned is None or abs(turned) <= WAND_ROTATION_RAD:
-        return found
-    lateral = marks[f"knee_lateral_{side}"]
-    half = float(np.linalg.norm(found[0] - lateral))
-    return _hinge_along(lateral, hip, half, _across_pelvis(marks), 1.0 if side == "r" else -1.0)
+    """Return knee centre and flexion axis (unit, to the right)."""
+    return _hinge(marks, "knee", hip, side)
 
 
-def wand_rotation(marks: Landmarks, hip: np.ndarray, side: str) -> float | None:
-    """Return how far (rad) the thigh wand rotates the knee axis outwards from the line of the ASIS, about the thigh;
-    None where no wand defines it.
+def wand_rotation(marks: Landmarks, name: str, proximal: np.ndarray, side: str) -> float | None:
+    """Return how far (rad) a wand rotates the axis of a "knee" or "ankle" outwards from the line that is expected
+    there, about the segment below the proximal joint's centre (3,) m; None where no wand defines it.
+
+    Where that is more than `WAND_LIMITS` allow, the expected line is used in its place.
     """
-    wand = f"thigh_wand_{side}"
-    if wand not in marks or _medial(marks, "knee", wand, side) is not None or marks.width(f"knee_{side}") is None:
+    wand, width = f"{WAND_LIMITS[name].wand}_{side}", marks.width(f"{name}_{side}")
+    if wand not in marks or width is None or _medial(marks, name, side) is not None:
         return None
-    _, axis = _hinge(marks, f"knee_{side}", hip, wand, side)
-    along = frame(hip - marks[f"knee_lateral_{side}"], marks["asis_r"] - marks["asis_l"])
-    return rotation_outwards(axis, along, side)
+    lateral, sign = marks[f"{name}_lateral_{side}"], _to_the_right(side)
+    _, axis = _hinge_along(lateral, proximal, width / 2 + MARKER_RADIUS_M, sign * (marks[wand] - lateral), sign)
+    return rotation_outwards(axis, frame(proximal - lateral, _expected_line(marks, name, side)), side)
 
 
 def rotation_outwards(axis: np.ndarray, frame_: np.ndarray, side: str) -> float:
     """Return the rotation (rad) of an axis to the right from the z axis of a frame (3, 3) about its y axis; positive
     where a foot that turned with it would point outwards.
     """
-    sign = 1.0 if side == "r" else -1.0
-    return float(np.arctan2(-sign * (axis @ frame_[:, 0]), axis @ frame_[:, 2]))
+    return float(np.arctan2(-_to_the_right(side) * (axis @ frame_[:, 0]), axis @ frame_[:, 2]))
 
 
 def ankle(marks: Landmarks, knee_centre: np.ndarray, shank: np.ndarray, side: str) -> tuple[np.ndarray, np.ndarray]:
@@ -218,12 +235,11 @@ def ankle(marks: Landmarks, knee_centre: np.ndarray, shank: np.ndarray, side: st
     The axis runs through the malleoli if both are marked, else it is Inman's in the shank frame (3, 3), or, for a
     centre by stature, in that frame rotated to the foot.
     """
-    wand = f"shank_wand_{side}"
-    centre, across = _hinge(marks, f"ankle_{side}", knee_centre, wand, side)
-    if _medial(marks, "ankle", wand, side) is not None:
+    centre, across = _hinge(marks, "ankle", knee_centre, side)
+    if _medial(marks, "ankle", side) is not None:
         return centre, across
     inman = mirrored_axis(_TALOCRURAL_RIGHT, side)
-    if _by_stature(marks, f"ankle_{side}", wand):
+    if _by_stature(marks, "ankle", side):
         return centre, frame(knee_centre - centre, foot_frame(marks, side)[0][:, 2]) @ inman
     return centre, shank @ inman
 
@@ -245,30 +261,44 @@ def mirrored_axis(right: np.ndarray, side: str) -> np.ndarray:
     return right if side == "r" else right * np.array([-1.0, -1.0, 1.0])
 
 
-def _hinge(marks: Landmarks, joint: str, proximal: np.ndarray, wand: str, side: str) -> tuple[np.ndarray, np.ndarray]:
-    name, _, _ = joint.rpartition("_")
-    lateral, medial = f"{name}_lateral_{side}", f"{name}_medial_{side}"
-    sign = 1.0 if side == "r" else -1.0
-    inner, width = _medial(marks, name, wand, side), marks.width(joint)
+def _hinge(marks: Landmarks, name: str, proximal: np.ndarray, side: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return centre and axis (unit, to the right) of a knee or ankle by both sides of it, by its wand, or, where that
+    is not believed or there is none, by the expected line.
+    """
+    joint, wand = f"{name}_{side}", f"{WAND_LIMITS[name].wand}_{side}"
+    lateral, medial, sign = f"{name}_lateral_{side}", f"{name}_medial_{side}", _to_the_right(side)
+    inner, width = _medial(marks, name, side), marks.width(joint)
     if inner is not None and lateral in marks:
         across = sign * (marks[lateral] - inner)
         return (marks[lateral] + inner) / 2, across / np.linalg.norm(across)
-    if lateral in marks and _by_stature(marks, joint, wand):
-        half = (width or _WIDTHS_OF_STATURE[name] * (marks.stature_m or 0.0)) / 2 + MARKER_RADIUS_M
-        across = _across_pelvis(marks) if name == "knee" else _malleoli_by_foot(marks, side)
-        return _hinge_along(marks[lateral], proximal, half, across, sign)
-    if width is None or wand not in marks:
-        marks.require(joint, lateral, medial) if wand not in marks else marks.require(joint, lateral)
-        stated = f"{name}_width_mm under [subject]"
-        raise _missing(joint, f"a medial marker ({medial}) or its width ({stated}, or in the C3D file)", [medial])
-    marks.require(joint, lateral, wand)
-    half = width / 2 + MARKER_RADIUS_M
-    return _hinge_along(marks[lateral], proximal, half, sign * (marks[wand] - marks[lateral]), sign)
+    by_stature = _by_stature(marks, name, side)
+    if not (by_stature and lateral in marks):
+        if width is None or wand not in marks:
+            marks.require(joint, lateral, medial) if wand not in marks else marks.require(joint, lateral)
+            stated = f"{name}_width_mm under [subject]"
+            raise _missing(joint, f"a medial marker ({medial}) or its width ({stated}, or in the C3D file)", [medial])
+        marks.require(joint, lateral, wand)
+    half = (width or _WIDTHS_OF_STATURE[name] * (marks.stature_m or 0.0)) / 2 + MARKER_RADIUS_M
+    if by_stature or abs(wand_rotation(marks, name, proximal, side) or 0.0) > WAND_LIMITS[name].limit_rad:
+        across = _expected_line(marks, name, side)
+    else:
+        across = sign * (marks[wand] - marks[lateral])
+    return _hinge_along(marks[lateral], proximal, half, across, sign)
 
 
-def _by_stature(marks: Landmarks, joint: str, wand: str) -> bool:
+def _by_stature(marks: Landmarks, name: str, side: str) -> bool:
     """Decide whether a joint without a medial marker is placed by stature: where width and wand do not show it."""
-    return marks.stature_m is not None and (marks.width(joint) is None or wand not in marks)
+    wand = f"{WAND_LIMITS[name].wand}_{side}"
+    return marks.stature_m is not None and (marks.width(f"{name}_{side}") is None or wand not in marks)
+
+
+def _to_the_right(side: str) -> float:
+    return 1.0 if side == "r" else -1.0
+
+
+def _expected_line(marks: Landmarks, name: str, side: str) -> np.ndarray:
+    """Return the line (unit, to the right) along which the axis of a knee or the malleoli are expected."""
+    return _across_pelvis(marks) if name == "knee" else _malleoli_by_foot(marks, side)
 
 
 def _malleoli_by_foot(marks: Landmarks, side: str) -> np.ndarray:
@@ -297,9 +327,9 @@ def _hinge_along(
     return centre, axis / np.linalg.norm(axis)
 
 
-def _medial(marks: Landmarks, joint: str, wand: str, side: str) -> np.ndarray | None:
+def _medial(marks: Landmarks, joint: str, side: str) -> np.ndarray | None:
     """Return the medial marker of a knee or ankle, or the mirrored one of the other side without width and wand."""
-    inner = marks.points.get(f"{joint}_medial_{side}")
+    inner, wand = marks.points.get(f"{joint}_medial_{side}"), f"{WAND_LIMITS[joint].wand}_{side}"
     if inner is None and (marks.width(f"{joint}_{side}") is None or wand not in marks):
         inner = medial_by_the_other_side(marks, joint, side)
     return inner

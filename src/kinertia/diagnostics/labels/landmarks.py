@@ -10,11 +10,11 @@ from kinertia.findings.quantity import Quantity
 from kinertia.model.assumptions import assumptions
 from kinertia.model.gait27 import build_gait27
 from kinertia.model.joint_centres import (
-    USUAL_WAND_RAD,
-    WAND_ROTATION_RAD,
+    WAND_LIMITS,
     Landmarks,
     find_landmarks,
     hip_in_pelvis,
+    leg_frames,
     pelvis_frame,
     wand_rotation,
 )
@@ -65,15 +65,19 @@ def _assumed(context: RecordingContext, marks: Landmarks) -> Iterator[Finding]:
 def _wands(context: RecordingContext, marks: Landmarks) -> Iterator[Finding]:
     pelvis, origin, width, depth = pelvis_frame(marks)
     for side in "rl":
-        hip = origin + pelvis @ hip_in_pelvis(width, depth, "bell", side)
-        turned = wand_rotation(marks, hip, side)
-        if turned is not None and abs(turned) > WAND_ROTATION_RAD:
-            yield finding(
-                "L108",
-                context.at(part=in_words(f"knee_{side}"), markers=marks.marker_set.landmarks[f"thigh_wand_{side}"]),
-                rotation_rad=Quantity(abs(turned), "rad", limit=WAND_ROTATION_RAD, usual=(0.0, USUAL_WAND_RAD)),
-                direction=Quantity("outwards" if turned > 0 else "inwards"),
-            )
+        hip_at = origin + pelvis @ hip_in_pelvis(width, depth, "bell", side)
+        for name, proximal in (("knee", hip_at), ("ankle", leg_frames(marks, hip_at, side).knee_at)):
+            limit, turned = WAND_LIMITS[name], wand_rotation(marks, name, proximal, side)
+            if turned is not None and abs(turned) > limit.limit_rad:
+                yield finding(
+                    "L108",
+                    context.at(
+                        part=in_words(f"{name}_{side}"), markers=marks.marker_set.landmarks[f"{limit.wand}_{side}"]
+                    ),
+                    rotation_rad=Quantity(abs(turned), "rad", limit=limit.limit_rad, usual=(0.0, limit.usual_rad)),
+                    direction=Quantity("outwards" if turned > 0 else "inwards"),
+                    line=Quantity(limit.line),
+                )
 
 
 def _legs(context: RecordingContext, marks: Landmarks) -> Iterator[Finding]:
