@@ -8,6 +8,7 @@ import pytest
 from kinertia.errors import KinertiaError
 from kinertia.estimation.drawn_fit import _reactions, chosen_draws, drawn_fit, kept_draws
 from kinertia.estimation.simultaneous import posterior_draws
+from kinertia.estimation.simultaneous.calibration_entry import GAIN as GAIN_OF_PLATE
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
 from kinertia.estimation.simultaneous.plate_loads import GAIN, corrected_loads
 from kinertia.estimation.simultaneous.posterior_draws import TrialDraws
@@ -54,6 +55,15 @@ def test_angles_and_parameters_spread_as_reported(fit, drawn):
     np.testing.assert_allclose(mass.std(axis=0), fit.posterior.sd[:, 0], rtol=SYSTEMATIC + sampling(len(drawn)))
     assert mass.sum(axis=1).std() < 0.5, "the scale knows the sum"
     assert all(one.estimate.physically_consistent().all() for one in drawn)
+
+
+def test_errors_of_plates_spread_as_reported(fit):
+    """Gains of force plates, which are drawn together with everything else."""
+    draws = kept_draws(fit)
+    reported = {each.plate: each.sd for each in fit.posterior.calibration if each.quantity == GAIN_OF_PLATE}
+    gains = draws.trials[0].plates[:, :, GAIN]
+    assert len(reported) == gains.shape[1]
+    np.testing.assert_allclose(gains.std(axis=0), [*reported.values()], rtol=SYSTEMATIC + sampling(len(gains)))
 
 
 def test_parts_of_a_draw_belong_together(fit, drawn):
