@@ -195,7 +195,7 @@ MISTAKES = (
     Mistake("gravity 5 degrees off the vertical, along the walk", forces.leaning("z", 5.0), _codes("P214")),
     Mistake("gravity 5 degrees off the vertical, to one side", forces.leaning("x", 5.0), _codes("P214")),
     Mistake("forces at a rate 10 % off", forces.at_rate(1.1), _codes("T201")),
-    Mistake("markers at 30 Hz", markers.few_frames(30.0), _codes()),
+    Mistake("markers at 30 Hz", markers.few_frames(30.0), _codes("M124")),
     Mistake("markers low-passed at 3 Hz", markers.low_passed(3.0), _codes("M133")),
     Mistake("cameras' scale 2 % too large in the walk", markers.scaled(1.02, "walk"), _codes("S205")),
     Mistake(

@@ -15,7 +15,7 @@ DOCS = Path(__file__).resolve().parents[1]
 
 _INDEX = """# Findings
 
-Kinertia checks files, recordings, people, models and results with {count} rules. What a rule finds is a *finding*: it
+Kinertia checks files, recordings, people, models and results with {count} rules. What one finds is a *finding*: it
 states what is wrong with its size, what that does to the results, the likely causes, and one thing to do.
 `kinertia explain P213` shows the same as these pages.
 

@@ -48,6 +48,13 @@ def walk(request, recording_of):
     return recording_of(*WALKS[request.param]).markers
 
 
+@pytest.mark.parametrize(("rate_hz", "codes"), [(44.9, ["M124"]), (45.1, [])])
+def test_few_frames_a_second_are_reported(walk, rate_hz, codes):
+    """Joint moments moved by up to 3.8 SDs with 33 of 100 frames a second, and nothing was said."""
+    markers = replace(walk, time=np.arange(len(walk.time)) / rate_hz)
+    assert [one.code for one in found(markers) if one.code == "M124"] == codes
+
+
 @pytest.mark.parametrize("times", [2, 3, 4])
 def test_frames_that_are_held(walk, times):
     held = replace(walk, positions=walk.positions[np.arange(len(walk.time)) // times * times])
