@@ -1,5 +1,4 @@
 import re
-from pathlib import Path
 
 import pytest
 
@@ -20,8 +19,3 @@ def test_step_by_step_example_runs(measured_folder, capsys):
 def test_every_exported_name_is_there():
     for name in kinertia.__all__:
         assert getattr(kinertia, name).__doc__
-
-
-def test_citation_names_this_version():
-    text = (Path(__file__).parents[2] / "CITATION.cff").read_text()
-    assert f"\nversion: {kinertia.__version__}\n" in text

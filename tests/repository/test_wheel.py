@@ -25,7 +25,7 @@ OLDEST = {
     "manylinux_2_28_aarch64": ("aarch64-manylinux_2_28", ""),
 }
 WITHOUT_EZC3D = {"manylinux_2_28_aarch64"}
-PYTHONS = ("3.11", "3.13")
+PYTHONS = ("3.11", "3.14")
 MOST_MB = 600
 
 

@@ -8,7 +8,7 @@ is ASCII. On some damaged files its C++ also crashes the process or never ends: 
 import contextlib
 import math
 import os
-import pickle
+import pickle  # nosec B403 - of this process' own child, below
 import shutil
 import subprocess
 import sys
@@ -216,7 +216,7 @@ def read_in_subprocess(path: Path) -> C3dContent:
             raise C3dTrouble(f"reading it took more than {_WAITING * seconds:.0f} s") from None
         if not result.is_file():
             raise C3dTrouble(f"the library that reads it crashed, exit status {done.returncode}")
-        content = pickle.loads(result.read_bytes())
+        content = pickle.loads(result.read_bytes())  # nosec B301 - written by the child, in a private folder
     if isinstance(content, str):
         raise C3dTrouble(content)
     return dict(content)

@@ -52,7 +52,7 @@ def templates_of(package: str) -> jinja2.Environment:
 @cache
 def _environment() -> jinja2.Environment:
     environment = templates_of("kinertia.report")
-    environment.globals.update(asset=_asset, packed_script=lambda: Markup(packed_script()))
+    environment.globals.update(asset=_asset, packed_script=lambda: Markup(packed_script()))  # nosec B704
     environment.globals.update(looks=LOOKS)
     environment.filters.update(fixed=fixed, outlined=outlined, linked=linked, unbroken=unbroken)
     return environment
@@ -62,4 +62,4 @@ def _asset(name: str) -> Markup:
     """Return a style sheet or script unchanged."""
     loader = _environment().loader
     assert loader is not None
-    return Markup(loader.get_source(_environment(), name)[0])
+    return Markup(loader.get_source(_environment(), name)[0])  # nosec B704 - of the package itself
