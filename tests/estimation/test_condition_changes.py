@@ -9,7 +9,8 @@ import pytest
 from command_line import run
 from kinertia.errors import KinertiaError
 from kinertia.estimation import condition_changes
-from kinertia.estimation.condition_changes import EVENTS, SOURCES, _judged, changes, event_bounds
+from kinertia.estimation.condition_changes import SOURCES, _judged, changes
+from kinertia.estimation.stride_features import EVENTS, event_bounds
 from kinertia.motion.gait_cycle import Stride
 from kinertia.report.changes import change_columns, change_sentences, changed_sentence
 from kinertia.report.saved_fit import write_fit

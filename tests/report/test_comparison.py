@@ -33,7 +33,7 @@ def test_what_changed_beyond_its_error_bars_is_found(fit):
     columns = pd.DataFrame(comparison_columns({"before": fit, "after": other}))
     assert columns[columns.changed].segment.tolist() == ["thigh_r"]
     shown = Elements(render_comparison({"before": fit, "after": other})).text
-    assert "1 of 120 parameters changed beyond their error bars" in shown
+    assert "1 of 120 body segment parameters changed beyond their error bars" in shown
     assert "None of 120" in Elements(render_comparison({"before": fit, "again": fit})).text
 
 
@@ -149,7 +149,9 @@ def test_the_command(fit, demo_run, tmp_path):
     save_fit(moved(fit, "torso", 0, 3.0), tmp_path / "again")
     outcome = run("compare", demo_run[1], tmp_path / "again", "-o", tmp_path / "comparison")
     assert outcome.status == 0, outcome.err
-    assert "1 of 120 parameters changed beyond their error bars (mass of torso)" in " ".join(outcome.out.split())
+    assert "1 of 120 body segment parameters changed beyond their error bars (mass of torso)" in " ".join(
+        outcome.out.split()
+    )
     assert {path.name for path in (tmp_path / "comparison").glob("[!.]*")} == {"compare.html", "compare.csv"}
     again = run("compare", demo_run[1], tmp_path / "again", "-o", tmp_path / "comparison")
     assert again.status == 0, again.err  # its own results are replaced

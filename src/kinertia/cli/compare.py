@@ -1,4 +1,4 @@
-"""Defines `kinertia compare`: shows several finished fits side by side."""
+"""Defines `kinertia compare`: what changed between sessions or conditions, and several results side by side."""
 
 from pathlib import Path
 from typing import Annotated
@@ -8,10 +8,16 @@ import typer
 from kinertia.cli.options import Overwrite, Quiet, results_folder
 from kinertia.cli.outcome import Outcome
 from kinertia.cli.terminal import out, shown_progress
-from kinertia.estimation.condition_changes import changes
+from kinertia.errors import KinertiaError
+from kinertia.estimation.condition_changes import Change
+from kinertia.estimation.prepared import Progress
+from kinertia.estimation.result import Fit
+from kinertia.estimation.session_changes import why_incomparable
 from kinertia.io.output_folder import complete_folder
 from kinertia.io.provenance import names_from_common_folder
 from kinertia.report.changes import change_columns, change_sentences, changed_sentence, changes_summary
+from kinertia.report.compare import compare as compare_sessions
+from kinertia.report.compare import fit_of
 from kinertia.report.comparison import (
     MOST_FITS,
     comparison_columns,
@@ -23,14 +29,12 @@ from kinertia.report.comparison import (
 )
 from kinertia.report.file_outputs import outputs_sentence
 from kinertia.report.files import write_columns
-from kinertia.report.saved_fit import load_fit
-from kinertia.workflow.from_files import fit_subject
 
 
 def compare(
     results: Annotated[
         list[Path],
-        typer.Argument(help="Two or more folders written by kinertia fit; with --conditions, one, or a subject file."),
+        typer.Argument(help="Two sessions, or more results; one with --conditions."),
     ],
     conditions: Annotated[
         tuple[str, str] | None,
@@ -40,36 +44,76 @@ def compare(
     overwrite: Overwrite = False,
     quiet: Quiet = False,
 ) -> Outcome:
-    """Compare fits: differences beyond their error bars between sessions of one person, methods or models.
+    """Compare sessions, conditions or methods: joint moments and angles, then body segment parameters.
 
-    The others are compared with the first: compare.html, compare.csv.
-    --conditions compares joint moments and angles of one session's trials,
-    by their condition in the subject file: changes.csv.
+    Two sessions, subject files or results: what changed (changes.csv).
+    --conditions compares trials of one session, or chooses those of each.
+    Two to six results: differences from the first (compare.html, compare.csv).
 
     [bold]Examples[/]
 
-    kinertia compare before/out after/out -o comparison
+    kinertia compare before/subject.toml after/subject.toml -o comparison
     kinertia compare subject.toml --conditions normal "toe out"
     """
-    if conditions is not None:
-        return _compare_conditions(results, conditions, output, overwrite)
+    if conditions is not None and len(results) == 1:
+        return _compare_conditions(results[0], conditions, output, overwrite)
+    if conditions is not None and len(results) > 2:
+        raise typer.BadParameter("with --conditions, give one session, or two")
     if not 2 <= len(results) <= MOST_FITS:
         raise typer.BadParameter(f"give 2 to {MOST_FITS} folders of results; these are {len(results)}")
     paths = [path.resolve() for path in results]
     if len(set(paths)) < len(paths):
         raise typer.BadParameter("one folder is named twice")
     results_folder(output, overwrite)
-    fits = {name: load_fit(path) for name, path in zip(names_from_common_folder(paths), paths, strict=True)}
+    names = names_from_common_folder(paths)
+    with shown_progress() as progress:
+        fits = {name: fit_of(path, progress) for name, path in zip(names, paths, strict=True)}
+        found, reason = _session_changes(list(fits.values()), conditions, progress)
     with complete_folder(output, "compare") as work:
         (work / "compare.html").write_text(render_comparison(fits), encoding="utf-8")
         write_columns(work / "compare.csv", comparison_columns(fits))
+        if not reason:
+            write_columns(work / "changes.csv", change_columns(found))
+    if reason:
+        out.print(f"Joint moments and angles are not compared: {reason}.", soft_wrap=True)
+    else:
+        _print_changes(names[0], names[1], found)
+    _print_bodies(fits)
+    out.print(f"comparison in {output / 'compare.html'}", soft_wrap=True)
+    return Outcome({**changes_summary(names[0], names[1], found), "not_compared": reason, **comparison_summary(fits)})
+
+
+def _session_changes(
+    fits: list[Fit], conditions: tuple[str, str] | None, progress: Progress
+) -> tuple[tuple[Change, ...], str]:
+    """Return what changed between two sessions, or why that cannot be determined."""
+    if len(fits) > 2:
+        return (), "there are more than two results"
+    before, after = fits
+    if reason := why_incomparable(before, after):
+        return (), reason
+    try:
+        return compare_sessions(before, after, conditions, progress), ""
+    except KinertiaError as error:  # results of several conditions may be compared otherwise
+        if conditions is not None:
+            raise
+        return (), str(error)
+
+
+def _print_changes(before: str, after: str, found: tuple[Change, ...]) -> None:
+    out.print(f"{before} -> {after}; internal moments over body mass", soft_wrap=True)
+    for sentence in (*change_sentences(found), changed_sentence(found)):
+        out.print(sentence, soft_wrap=True)
+
+
+def _print_bodies(fits: dict[str, Fit]) -> None:
     (first_name, first), *others = fits.items()
     for sentence in remarks(fits):
         out.print(f"note: {sentence}")
     for name, fit in fits.items():
         if sentence := outputs_sentence(fit):
             out.print(f"{name}: {sentence}")
-    out.print("Body segment parameters; joint moments and angles are compared by --conditions, within one session.")
+    out.print("Body segment parameters, which do not show whether joint moments changed:")
     for name, other in others:
         compared = differences(first, other)
         changed = [f"{one.parameter} of {one.segment}" for one in compared if one.changed]
@@ -77,22 +121,15 @@ def compare(
         if changed:
             sentence += f" ({', '.join(changed[:6])}{', ...' if changed[6:] else ''})"
         out.print(f"{name} against {first_name}: {sentence}")
-    out.print(f"comparison in {output / 'compare.html'}", soft_wrap=True)
-    return Outcome(comparison_summary(fits))
 
 
-def _compare_conditions(results: list[Path], conditions: tuple[str, str], output: Path, overwrite: bool) -> Outcome:
+def _compare_conditions(path: Path, conditions: tuple[str, str], output: Path, overwrite: bool) -> Outcome:
     """Compare trials of two conditions in one estimate, which is made first if a subject file is given."""
-    if len(results) != 1:
-        raise typer.BadParameter("with --conditions, give one folder of results, or one subject file")
     results_folder(output, overwrite)
     with shown_progress() as progress:
-        fit = load_fit(results[0]) if results[0].is_dir() else fit_subject(results[0], progress)
-        found = changes(fit, *conditions, lambda share: progress("comparison", share))
+        found = compare_sessions(path, None, conditions, progress)
     with complete_folder(output, "compare") as work:
         write_columns(work / "changes.csv", change_columns(found))
-    out.print(f"{conditions[0]} -> {conditions[1]}; internal moments over body mass", soft_wrap=True)
-    for sentence in (*change_sentences(found), changed_sentence(found)):
-        out.print(sentence, soft_wrap=True)
+    _print_changes(*conditions, found)
     out.print(f"all outcomes in {output / 'changes.csv'}", soft_wrap=True)
     return Outcome(changes_summary(*conditions, found))

@@ -12,23 +12,18 @@ deviations, with degrees of freedom by Satterthwaite (1946, Biometrics Bulletin 
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from scipy import stats
 
 from kinertia.errors import KinertiaError
-from kinertia.estimation.cycles import CycleCurve, curves_by_stage
-from kinertia.estimation.drawn_fit import drawn_fit, kept_draws
+from kinertia.estimation.drawn_fit import kept_draws
 from kinertia.estimation.result import Fit
-from kinertia.estimation.simultaneous.posterior_draws import PosteriorDraws
-from kinertia.motion.gait_cycle import PERCENT, Stride
+from kinertia.estimation.stride_features import Key, stride_features, usual_sources
 
 Verdict = Literal["changed", "not shown", "cannot be judged"]
-EVENTS = ("loading", "mid-stance", "late stance", "push-off", "swing")
-"""Phases of a stride: both feet, the other foot in the air (first half, second half), both feet again, this foot in the
-air."""
 SOURCES = ("instruments", "body", "markers", "stride")
 PRIMARY = (
     ("moment", "knee", "adduction", "mid-stance"),
@@ -55,7 +50,6 @@ _USUAL = {
 the least that is assumed with fewer strides of a condition than _FEW."""
 _COMPONENTS = {"angle": "flexion"}
 _UNITS = {"moment": "N m/kg", "angle": "degrees"}
-_KINDS = {"joint_moment": "moment", "angle": "angle"}
 
 
 @dataclass(frozen=True)
@@ -72,6 +66,7 @@ class Change:
         sd: standard deviation of the difference.
         sd_by_source: its parts by SOURCES; their squares add up.
         mdc95: smallest change that these recordings can show.
+        p: probability of at least this difference without any change.
         verdict: "changed", "not shown", or "cannot be judged" with fewer than two strides of a condition.
 
     Examples:
@@ -92,6 +87,7 @@ class Change:
     sd: float
     sd_by_source: Mapping[str, float]
     mdc95: float
+    p: float = np.nan
 
     @property
     def difference(self) -> float:
@@ -138,83 +134,14 @@ def changes(
             stated = ", ".join(sorted(filter(None, known))) or "none"
             raise KinertiaError(f"no trial has the condition {wanted!r}; stated are: {stated}")
     chosen = tuple(trial for trial in fit.trials if trial.kinematics.trial.condition in (before, after))
-    at = [fit.trials.index(trial) for trial in chosen]
     condition = {trial.name: trial.kinematics.trial.condition for trial in chosen}
-    draws = kept_draws(fit)
-    count = min(DRAWS, draws.count)
-    parts = {"all": draws, "body": _only(draws, body=True), "instruments": _only(draws, body=False)}
-    estimate, keys = _features(replace(fit, trials=chosen), None)
-    drawn: dict[str, np.ndarray] = {}
-    for step, (source, own) in enumerate(parts.items()):
-        varied = _with_draws(fit, own)
-        rows = []
-        for number in range(count):
-            one = drawn_fit(varied, number)
-            rows.append(_features(replace(one, trials=tuple(one.trials[k] for k in at)), keys)[0])
-            progress((step * count + number + 1) / (len(parts) * count))
-        drawn[source] = np.array(rows)
-    of_condition = [np.array([condition[trial] == name for trial, *_ in keys]) for name in (before, after)]
-    return tuple(_judged(keys, estimate, drawn, of_condition))
-
-
-def _with_draws(fit: Fit, draws: PosteriorDraws) -> Fit:
-    assert fit.posterior is not None  # it has draws
-    return replace(fit, posterior=replace(fit.posterior, draws=draws))
-
-
-def _only(draws: PosteriorDraws, body: bool) -> PosteriorDraws:
-    """Return draws in which only the body, or only plates and clock, differ from draw to draw."""
-    trials = tuple(
-        replace(
-            one,
-            coefficients=np.zeros_like(one.coefficients),
-            **({"plates": np.zeros_like(one.plates), "delay_s": np.zeros_like(one.delay_s)} if body else {}),
-            **({"impact": np.zeros_like(one.impact)} if body else {}),
-        )
-        for one in draws.trials
-    )
-    mean = np.broadcast_to(draws.coordinate_values.mean(axis=0), draws.coordinate_values.shape)
-    still = replace(draws, coordinate_values=mean, trials=trials).without_places()
-    return still if body else replace(still, bsp=np.broadcast_to(draws.bsp.mean(axis=0), draws.bsp.shape))
-
-
-Key = tuple[str, str, str, str]
-"""Trial, outcome, side, phase and number of the stride."""
-
-
-def _features(fit: Fit, keys: Sequence[Key] | None) -> tuple[np.ndarray, list[Key]]:
-    """Return the features of all strides (k,), and what they are of, in the order of `keys` if given."""
-    found: dict[Key, float] = {}
-    curves = curves_by_stage(fit.trials, fit.mass_kg, stages=("estimate",))["estimate"]
-    for curve in curves:
-        if curve.kind in _KINDS and curve.stride.phase != "landing":
-            for event, mean in _means(curve):
-                name = f"{_KINDS[curve.kind]} {curve.quantity.removesuffix(f'_{curve.kind}')} {event}"
-                found[curve.trial, name, curve.stride.side, f"{curve.stride.phase} {curve.stride.number}"] = mean
-    order = sorted(found) if keys is None else list(keys)
-    return np.array([found.get(key, np.nan) for key in order]), order
-
-
-def _means(curve: CycleCurve) -> Iterator[tuple[str, float]]:
-    """Yield the mean of each event of which all is known."""
-    bounds = event_bounds(curve.stride)
-    events = EVENTS if curve.stride.phase == "stride" else EVENTS[:-1]
-    for event, first, last in zip(events, bounds, bounds[1:], strict=False):
-        inside = (first <= PERCENT) & (last >= PERCENT)
-        if inside.any() and np.isfinite(curve.value[inside]).all():
-            yield event, float(curve.value[inside].mean())
-
-
-def event_bounds(stride: Stride) -> tuple[float, ...]:
-    """Return where in the stride (%) each of EVENTS begins, and the last ends; NaN where a contact is not known."""
-    lifts, strikes, off = (
-        stride.percent(time_s) for time_s in (stride.opposite_toe_off_s, stride.opposite_strike_s, stride.toe_off_s)
-    )
-    return 0.0, lifts, 0.5 * (lifts + strikes), strikes, off, 100.0
+    found = stride_features(fit, chosen, usual_sources(fit), min(DRAWS, kept_draws(fit).count), progress)
+    of_condition = [np.array([condition[trial] == name for trial, *_ in found.keys]) for name in (before, after)]
+    return tuple(_judged(found.keys, found.estimate, found.drawn, of_condition))
 
 
 @dataclass(frozen=True)
-class _Condition:
+class Condition:
     """Strides of one outcome in one condition.
 
     Attributes:
@@ -229,45 +156,82 @@ class _Condition:
     spread: float
 
 
+Parts = Callable[[str, Condition, Condition], dict[str, float]]
+"""Variances of an outcome's difference between two conditions by SOURCES, without strides."""
+
+
 def _judged(
     keys: Sequence[Key], estimate: np.ndarray, drawn: Mapping[str, np.ndarray], of_condition: Sequence[np.ndarray]
 ) -> Iterator[Change]:
-    """Yield the changes of all outcomes that both conditions show."""
+    """Yield the changes of all outcomes that both conditions of one estimate show."""
+    before, after = (conditions_by_outcome(keys, estimate, drawn, mask) for mask in of_condition)
+    return judged(before, after, _paired)
+
+
+def conditions_by_outcome(
+    keys: Sequence[Key], estimate: np.ndarray, drawn: Mapping[str, np.ndarray], mask: np.ndarray | None = None
+) -> dict[str, Condition]:
+    """Return the strides (in `mask`, if given) of each outcome: "moment knee_adduction loading r"."""
     named = np.array([f"{name} {side}" for _, name, side, _ in keys])
-    cells: dict[str, list[_Condition]] = {}
-    for outcome in dict.fromkeys(named.tolist()):
-        own = [_condition(estimate, drawn, (named == outcome) & mask) for mask in of_condition]
-        if min(one.count for one in own) > 0:
-            cells[outcome] = own
+    chosen = np.ones(len(named), dtype=bool) if mask is None else mask
+    found = {name: _condition(estimate, drawn, (named == name) & chosen) for name in dict.fromkeys(named.tolist())}
+    return {name: one for name, one in found.items() if one.count > 0}
+
+
+def judged(before: Mapping[str, Condition], after: Mapping[str, Condition], parts: Parts) -> Iterator[Change]:
+    """Yield the changes of all outcomes that both conditions show."""
+    cells = {name: (before[name], after[name]) for name in before if name in after}
     for outcome, own in cells.items():
         quantity, rest, event_side = outcome.split(" ", 2)
         group = f"{quantity} {rest.partition('_')[0]}"
         alike = [other for name, other in cells.items() if name.startswith(f"{group}_") or name.startswith(f"{group} ")]
         event, _, side = event_side.rpartition(" ")
         joint, _, component = rest.partition("_")
-        yield _change((quantity, joint, _COMPONENTS.get(component, component), side, event), own, alike)
+        named = quantity, joint, _COMPONENTS.get(component, component), side, event
+        yield _change(named, own, alike, parts(outcome, *own))
 
 
-def _condition(estimate: np.ndarray, drawn: Mapping[str, np.ndarray], mask: np.ndarray) -> _Condition:
+def _paired(_: str, before: Condition, after: Condition) -> dict[str, float]:
+    """Return variances over draws of one estimate, in which errors of both conditions belong together."""
+    total, body, instruments = (
+        float(np.var(after.drawn[source] - before.drawn[source], ddof=1)) for source in ("all", "body", "instruments")
+    )
+    return parts_of(total, instruments, body)
+
+
+def parts_of(total: float, instruments: float, body: float) -> dict[str, float]:
+    """Return the parts of a variance by SOURCES, without strides; what is left is due to markers and motion."""
+    share = min(1.0, total / max(instruments + body, 1e-300))
+    return {
+        "instruments": share * instruments,
+        "body": share * body,
+        "markers": max(0.0, total - instruments - body),
+    }
+
+
+def _condition(estimate: np.ndarray, drawn: Mapping[str, np.ndarray], mask: np.ndarray) -> Condition:
     seen = mask & np.isfinite(estimate)
     seen[seen] = np.isfinite(drawn["all"][:, seen]).all(axis=0)
     count = int(seen.sum())
     if count == 0:
-        return _Condition(np.nan, 0, {}, 0.0)
+        return Condition(np.nan, 0, {}, 0.0)
     means = {source: rows[:, seen].mean(axis=1) for source, rows in drawn.items()}
     spread = 0.0
     if count > 1:
-        measured = np.var(drawn["all"][:, seen] - estimate[seen], axis=1, ddof=1).mean()
+        departures = drawn["all"][:, seen] - drawn["all"][:, seen].mean(axis=0)
+        measured = np.var(departures, axis=1, ddof=1).mean()
         spread = max(0.0, float(np.var(estimate[seen], ddof=1) - measured))
-    return _Condition(float(estimate[seen].mean()), count, means, spread)
+    return Condition(float(estimate[seen].mean()), count, means, spread)
 
 
 def _change(
-    named: tuple[str, str, str, str, str], own: Sequence[_Condition], alike: Sequence[Sequence[_Condition]]
+    named: tuple[str, str, str, str, str],
+    own: Sequence[Condition],
+    alike: Sequence[Sequence[Condition]],
+    measured: Mapping[str, float],
 ) -> Change:
     before, after = own
     quantity, joint, component, side, event = named
-    variance = {s: float(np.var(after.drawn[s] - before.drawn[s], ddof=1)) for s in ("all", "body", "instruments")}
     between, freedom = [], []
     usual = _USUAL.get(f"{quantity} {joint} {component}", 0.0)
     for k, one in enumerate(own):
@@ -278,12 +242,12 @@ def _change(
             pooled, weight = max(pooled, usual**2), _SHRINK
         freedom.append(max(one.count - 1 + weight, 1.0))
         between.append(((one.count - 1) * one.spread + weight * pooled) / freedom[-1] / one.count)
-    stride, total = sum(between), variance["all"] + sum(between)
-    rest = max(0.0, variance["all"] - variance["body"] - variance["instruments"])
+    variances = {**measured, "stride": sum(between)}
+    total = sum(variances.values())
     of_strides = sum(each**2 / own_freedom for each, own_freedom in zip(between, freedom, strict=True))
-    limit = float(stats.t.ppf(0.975, total**2 / of_strides)) if of_strides > 0.0 else 1.96
+    of_sd = stats.t(total**2 / of_strides) if of_strides > 0.0 else stats.norm()
+    sd = float(np.sqrt(total))
     enough = min(one.count for one in own) > 1
-    parts = (variance["instruments"], variance["body"], rest, stride)
     return Change(
         quantity=quantity,
         joint=joint,
@@ -294,7 +258,8 @@ def _change(
         before=before.mean,
         after=after.mean,
         strides=(before.count, after.count),
-        sd=float(np.sqrt(total)),
-        sd_by_source={source: float(np.sqrt(part)) for source, part in zip(SOURCES, parts, strict=True)},
-        mdc95=limit * float(np.sqrt(total)) if enough else np.nan,
+        sd=sd,
+        sd_by_source={source: float(np.sqrt(variances[source])) for source in SOURCES},
+        mdc95=float(of_sd.ppf(0.975)) * sd if enough else np.nan,
+        p=float(2.0 * of_sd.sf(abs(after.mean - before.mean) / max(sd, 1e-300))) if enough else np.nan,
     )

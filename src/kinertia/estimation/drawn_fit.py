@@ -48,12 +48,17 @@ def chosen_draws(fit: Fit, count: int, seed: int = 0) -> list[int]:
     return result
 
 
-def drawn_fit(fit: Fit, number: int) -> Fit:
+def drawn_fit(fit: Fit, number: int, knees: bool = True) -> Fit:
     """Make the fit that corresponds to draw `number` (from 0), without uncertainty of its own.
 
     Body segment parameters, joint centres, marker positions, coordinates, ground reactions and the joint moments that
     follow from them all belong to one draw. Of `Fit` and `TrialFit` only these differ: `estimate`, `skeleton`, and
     each trial's `skeleton`, `motion`, `course`, `reactions`, `joint_loads["estimate"]` and `joint_curves`.
+
+    Args:
+        fit: by the simultaneous estimate.
+        number: of the draw.
+        knees: whether the geometry of the knees, which is not among the estimate's unknowns, is drawn as well.
 
     Raises:
         KinertiaError: no draws are stored.
@@ -62,8 +67,8 @@ def drawn_fit(fit: Fit, number: int) -> Fit:
     bsp = _bsp(fit.estimate, draws, number)
     skeleton = _skeleton(fit, fit.skeleton, draws, number)
     rows = zip(fit.trials, draws.trials, strict=True)
-    trials = tuple(_trial(fit, trial, own, number, bsp, skeleton) for trial, own in rows)
-    return replace(fit, estimate=bsp, skeleton=skeleton, trials=trials, posterior=None)
+    drawn = tuple(_trial(fit, trial, own, number, (skeleton, bsp), knees) for trial, own in rows)
+    return replace(fit, estimate=bsp, skeleton=skeleton, trials=drawn, posterior=None)
 
 
 def _bsp(estimate: BodySegmentParameters, draws: PosteriorDraws, number: int) -> BodySegmentParameters:
@@ -80,8 +85,14 @@ def _skeleton(fit: Fit, skeleton: Skeleton, draws: PosteriorDraws, number: int) 
 
 
 def _trial(
-    fit: Fit, trial: TrialFit, draws: TrialDraws, number: int, bsp: BodySegmentParameters, skeleton: Skeleton
+    fit: Fit,
+    trial: TrialFit,
+    draws: TrialDraws,
+    number: int,
+    model: tuple[Skeleton, BodySegmentParameters],
+    knees: bool,
 ) -> TrialFit:
+    skeleton, bsp = model
     k, in_trial = trial.kinematics, trial.skeleton.marker_locals - fit.skeleton.marker_locals
     time, course = (k.time, trial.motion.q) if trial.course is None else (k.course_time, trial.course)
     course = course + BSpline(draws.knots, draws.coefficients[number].astype(float), _DEGREE)(time)
@@ -92,7 +103,8 @@ def _trial(
     own = skeleton.with_positions(skeleton.marker_locals + in_trial)
     curves = trial.joint_curves
     if curves is not None:
-        curves = curves.drawn(k, (own, bsp, moved, reactions), np.random.default_rng([_GEOMETRY_SEED, number]))
+        random = np.random.default_rng([_GEOMETRY_SEED, number]) if knees else None
+        curves = curves.drawn(k, (own, bsp, moved, reactions), random)
     loads = inverse_dynamics(own, bsp, motion, reactions.at(k.time))
     return replace(
         trial,

@@ -91,10 +91,13 @@ class JointCurves:
             deviations = replace(deviations, **masked, joints=three)
         return cls(time, known, motion, forces, joints, deviations)
 
-    def drawn(self, kinematics: Kinematics, stage: Stage, random: np.random.Generator) -> JointCurves:
-        """Return the curves of a draw of the estimate, with drawn knee geometry and without standard deviations."""
+    def drawn(self, kinematics: Kinematics, stage: Stage, random: np.random.Generator | None) -> JointCurves:
+        """Return the curves of a draw of the estimate, with knee geometry drawn if `random` is given, without standard
+        deviations."""
         own = type(self).of(kinematics, stage[2], {"estimate": stage}, None)
-        loads = with_drawn_knees(stage[0], body_joints(stage[0]), own.joints["estimate"], random)
+        loads = own.joints["estimate"]
+        if random is not None:
+            loads = with_drawn_knees(stage[0], body_joints(stage[0]), loads, random)
         return replace(own, forces={**self.forces, **own.forces}, joints={**self.joints, "estimate": loads})
 
 

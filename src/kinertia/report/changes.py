@@ -4,6 +4,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from typing import Any
 
+import numpy as np
+
 from kinertia.estimation.condition_changes import SOURCES, Change
 from kinertia.report.style import SIDES
 
@@ -34,10 +36,21 @@ def changed_sentence(found: Sequence[Change]) -> str:
     if not others:
         return "Nothing else can be judged."
     count = sum(one.verdict == "changed" for one in others)
+    remain = sum(discovered([one.p for one in others]))
     return (
         f"Of {len(others)} other moments and angles {count} changed; without any change about {0.05 * len(others):.0f} "
-        "would seem to."
+        f"would seem to. At a false discovery rate of 5 %, {remain} remain."
     )
+
+
+def discovered(p: Sequence[float], rate: float = 0.05) -> list[bool]:
+    """Select what is discovered at this false discovery rate (Benjamini and Hochberg 1995, J R Stat Soc B 57:289)."""
+    order = np.argsort(p)
+    below = np.flatnonzero(np.asarray(p)[order] <= rate * np.arange(1, len(order) + 1) / len(order))
+    found = np.zeros(len(order), dtype=bool)
+    found[order[: below[-1] + 1 if len(below) else 0]] = True
+    chosen: list[bool] = found.tolist()
+    return chosen
 
 
 def change_columns(found: Sequence[Change]) -> dict[str, list[Any]]:
@@ -47,6 +60,7 @@ def change_columns(found: Sequence[Change]) -> dict[str, list[Any]]:
         **{name: [getattr(one, name) for one in found] for name in names},
         **{f"sd_{source}": [one.sd_by_source[source] for one in found] for source in SOURCES},
         "mdc95": [one.mdc95 for one in found],
+        "p": [one.p for one in found],
         "strides_before": [one.strides[0] for one in found],
         "strides_after": [one.strides[1] for one in found],
         "verdict": [one.verdict for one in found],

@@ -97,7 +97,8 @@ def outcome_of(compared: Sequence[Difference]) -> str:
         return f"{without}, differences only"
     changed = sum(bool(one.changed) for one in distinguished)
     their = "their" if changed else "its"
-    return f"{changed or 'none'} of {len(distinguished)} parameters changed beyond {their} error bars"
+    counted = f"{changed or 'none'} of {len(distinguished)} body segment parameters"
+    return f"{counted} changed beyond {their} error bars"
 
 
 def _sd(fit: Fit) -> np.ndarray:
