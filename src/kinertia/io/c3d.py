@@ -20,7 +20,7 @@ from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.io.c3d_events import file_events
 from kinertia.io.c3d_outputs import OUTPUT_TYPES, OWN_GROUP, USUAL_UNITS, unit_factor
-from kinertia.io.c3d_plates import PLATE_TYPES, lab_plates, person_on_plates, plate_left_out, to_ground_plates
+from kinertia.io.c3d_plates import PLATE_TYPES, lab_plates, person_on_plates
 from kinertia.io.c3d_structure import doubts_about, with_plain_samples
 from kinertia.io.c3d_subject import subject_data
 from kinertia.io.ezc3d_library import (
@@ -33,6 +33,7 @@ from kinertia.io.ezc3d_library import (
     text_list,
 )
 from kinertia.io.lab_axes import to_ground
+from kinertia.io.lab_plates import plate_left_out, to_ground_plates
 from kinertia.io.number_table import expect_file
 from kinertia.io.repeated_labels import most_seen
 from kinertia.io.subject_prefix import left_out, people_among, without_prefixes

@@ -15,7 +15,7 @@ from kinertia.errors import FileError
 from kinertia.findings.finding import Finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
-from kinertia.io.c3d_plates import LabPlates, to_ground_plates
+from kinertia.io.lab_plates import LabPlates, to_ground_plates
 from kinertia.io.number_table import mismatch, read_lines, read_rows
 from kinertia.io.sto import header_entry, other_count
 from kinertia.io.uniform_times import uneven

@@ -14,7 +14,7 @@ from kinertia.trial.data import BoolArray, FloatArray
 from kinertia.trial.marker_quality import UPRIGHT_SHARE
 
 if TYPE_CHECKING:
-    from kinertia.io.c3d_plates import LabPlates
+    from kinertia.io.lab_plates import LabPlates
 
 _FEWEST_SEEN = 6
 _ABOVE_FLOOR_M, _LOWEST_TOP_M, _HIGHEST_TOP_M = 0.2, 0.5, 2.5

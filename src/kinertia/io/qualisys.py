@@ -17,8 +17,8 @@ from kinertia.errors import FileError
 from kinertia.findings.finding import Finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
-from kinertia.io.c3d_plates import LabPlates, contradicting_moments, plate_left_out, to_ground_plates
 from kinertia.io.lab_axes import to_ground
+from kinertia.io.lab_plates import LabPlates, contradicting_moments, plate_left_out, to_ground_plates
 from kinertia.io.number_table import mismatch, read_lines, read_rows
 from kinertia.io.plate_moments import PlateMoments
 from kinertia.io.repeated_labels import most_seen

@@ -19,8 +19,8 @@ from kinertia.errors import FileError
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
-from kinertia.io.c3d_plates import LabPlates, contradicting_moments, plate_left_out, to_ground_plates
 from kinertia.io.lab_axes import to_ground
+from kinertia.io.lab_plates import LabPlates, contradicting_moments, plate_left_out, to_ground_plates
 from kinertia.io.number_table import malformed, mismatch, read_lines, wrong_cells
 from kinertia.io.plate_moments import PlateMoments
 from kinertia.io.sto import header_entry
