@@ -7,7 +7,7 @@ from urllib.parse import urlsplit
 from chromium import DESKTOP, PATIENCE_MS, playwright
 from found import FAULTY
 from kinertia.findings.overview import Overview
-from kinertia.io.provenance import sha256
+from kinertia.io.subject.provenance import sha256
 from kinertia.report.finding_view import digest
 
 

@@ -27,7 +27,7 @@ from kinertia.cohort.job import Job
 from kinertia.cohort.person import fit_person
 from kinertia.cohort.resources import LOG, Finished, measured
 from kinertia.estimation.result import Fit
-from kinertia.io.subject_tables import SubjectFile
+from kinertia.io.subject.tables import SubjectFile
 from kinertia.workflow.from_files import fit_subject
 
 NAMES = ("Anna", "Ben")

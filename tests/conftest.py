@@ -20,8 +20,8 @@ from kinertia.cli.measured_demo import run_measured_demo
 from kinertia.cli.synthetic_demo import Demo, run_demo
 from kinertia.estimation.result import Fit
 from kinertia.io import samples
-from kinertia.io.provenance import sha256
 from kinertia.io.recording import read_recording
+from kinertia.io.subject.provenance import sha256
 from kinertia.motion import two_threads
 from kinertia.report import matplotlib_extra
 from kinertia.settings import Settings, Subject

@@ -24,15 +24,17 @@ import numpy as np
 from c3d_writer import plate_parameters, write_c3d
 from kinertia.cli.app import main
 from kinertia.errors import KinertiaError
-from kinertia.io import c3d, ezc3d_library
+from kinertia.io import marker_set_file
+from kinertia.io.c3d import ezc3d_library
+from kinertia.io.c3d import reader as c3d
 from kinertia.io.ground_forces import read_forces
 from kinertia.io.marker_set_file import read_marker_set
-from kinertia.io.osim.exporter import export_osim
-from kinertia.io.osim.reader import read_osim
+from kinertia.io.opensim.exporter import export_osim
+from kinertia.io.opensim.reader import read_osim
 from kinertia.io.recording import read_recording
-from kinertia.io.sto import TimeTable, read_table, write_table
-from kinertia.io.subject_file import read_subject
-from kinertia.io.trc import write_trc
+from kinertia.io.subject.reader import read_subject
+from kinertia.io.text.sto import TimeTable, read_table, write_table
+from kinertia.io.text.trc import write_trc
 from kinertia.synthetic.walk import walking_subject
 from kinertia.trial.data import Markers, Recording
 from lab_files import lab_walk, write_nexus, write_qtm
@@ -122,7 +124,7 @@ def write_files(folder: Path) -> None:
     write_table(folder / "walk.mot", TimeTable(time_s, tuple(names), loads, False), "forces")
     (folder / "loads.xml").write_text(LOADS, encoding="utf-8")
     (folder / "subject.toml").write_text(SUBJECT, encoding="utf-8")
-    preset = Path(c3d.__file__).parent / "marker_sets" / "plug-in-gait.toml"
+    preset = Path(marker_set_file.__file__).parent / "marker_sets" / "plug-in-gait.toml"
     (folder / "markers.toml").write_bytes(preset.read_bytes())
     person = walking_subject()
     export_osim(folder / "model.osim", person.skeleton, person.bsp)

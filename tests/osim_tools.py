@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from kinertia.io.sto import read_sto
+from kinertia.io.text.sto import read_sto
 
 
 def inverse_dynamics_tool(opensim, model: Path, coordinates: Path, loads: Path, folder: Path) -> pd.DataFrame:

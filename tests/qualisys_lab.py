@@ -11,7 +11,7 @@ from pathlib import Path
 import ezc3d
 import numpy as np
 
-from kinertia.io.c3d_write import write_c3d
+from kinertia.io.c3d.writer import write_c3d
 from kinertia.model.skeleton import Marker
 from kinertia.motion.inverse_kinematics import solve_ik
 from kinertia.synthetic.laboratory import LabNoise, record

@@ -22,7 +22,7 @@ from kinertia.estimation.simultaneous.plates import PLATE_UNKNOWNS, FootPlates, 
 from kinertia.estimation.simultaneous.problem import MapProblem
 from kinertia.estimation.simultaneous.skin import SkinPatterns
 from kinertia.estimation.simultaneous.start_terms import AWAY_SD, CHANGE_SD
-from kinertia.io.osim.reader import read_osim
+from kinertia.io.opensim.reader import read_osim
 from kinertia.model.anatomy import segment_of
 from kinertia.model.gait27 import HIP_OFFSETS
 from kinertia.model.skeleton import Skeleton

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from command_line import run
-from kinertia.io.trc import read_trc, write_trc
+from kinertia.io.text.trc import read_trc, write_trc
 
 COMMAND = {
     "forces": "walk.mot",

@@ -12,7 +12,7 @@ from kinertia.errors import BlockedError
 from kinertia.estimation.result import Fit
 from kinertia.findings.finding import finding
 from kinertia.findings.where import Where
-from kinertia.io.provenance import VERSION
+from kinertia.io.versions import VERSION
 from kinertia.model.bsp import PARAMETERS
 from kinertia.studies.cross_validation import Explained, HeldOut
 from kinertia.studies.plan import Plan

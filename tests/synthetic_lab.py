@@ -15,10 +15,10 @@ from pathlib import Path
 
 import numpy as np
 
-from kinertia.io.c3d_write import write_c3d
-from kinertia.io.osim.exporter import export_osim
-from kinertia.io.sto import write_sto
-from kinertia.io.trc import write_trc
+from kinertia.io.c3d.writer import write_c3d
+from kinertia.io.opensim.exporter import export_osim
+from kinertia.io.text.sto import write_sto
+from kinertia.io.text.trc import write_trc
 from kinertia.model.anthropometry import literature_bsp
 from kinertia.model.gait27 import build_gait27
 from kinertia.model.skeleton import Marker, Skeleton

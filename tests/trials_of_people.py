@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.person_context import PersonContext
-from kinertia.io.osim.reader import read_osim
+from kinertia.io.opensim.reader import read_osim
 from kinertia.model.imported_model import markers_of_model
 from kinertia.model.marker_set import MarkerSet
 from kinertia.settings import Subject

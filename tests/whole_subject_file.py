@@ -1,6 +1,6 @@
 """A subject file with everything, to be changed, and how tests read it."""
 
-from kinertia.io.subject_file import read_subject
+from kinertia.io.subject.reader import read_subject
 
 GOOD = """\
 [subject]

@@ -21,8 +21,8 @@ from kinertia.estimation.simultaneous.instruments import FLOOR_PRIOR, PLATE_PRIO
 from kinertia.findings.finding import Finding
 from kinertia.findings.overview import reported
 from kinertia.findings.quantity import Quantity
-from kinertia.io.subject_file import read_subject
-from kinertia.io.subject_tables import SubjectFile
+from kinertia.io.subject.reader import read_subject
+from kinertia.io.subject.tables import SubjectFile
 from kinertia.studies.parallel import in_parallel
 from kinertia.synthetic.laboratory import LabNoise, record, write_lab
 from kinertia.synthetic.walk import walk, walking_subject

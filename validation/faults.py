@@ -14,9 +14,9 @@ import typer
 from kinertia.findings.finding import Severity
 from kinertia.findings.overview import reported
 from kinertia.findings.rule import rule
-from kinertia.io.provenance import VERSION
-from kinertia.io.subject_file import read_subject
-from kinertia.io.subject_tables import SubjectFile
+from kinertia.io.subject.reader import read_subject
+from kinertia.io.subject.tables import SubjectFile
+from kinertia.io.versions import VERSION
 from validation.fault_study import FaultOutcome, SoundWalk, run_faults, run_sound, sound_laboratories, synthetic_walk
 from validation.measured_data import data_folder
 from validation.page import write_page

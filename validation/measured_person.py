@@ -8,12 +8,12 @@ from typing import Self
 
 import numpy as np
 
-from kinertia.io.c3d_write import write_c3d
+from kinertia.io.c3d.writer import write_c3d
 from kinertia.io.marker_set_file import marker_set_of
-from kinertia.io.person_recordings import read_inputs
-from kinertia.io.sto import write_sto
-from kinertia.io.subject_tables import SubjectFile
-from kinertia.io.trc import write_trc
+from kinertia.io.subject.person_recordings import read_inputs
+from kinertia.io.subject.tables import SubjectFile
+from kinertia.io.text.sto import write_sto
+from kinertia.io.text.trc import write_trc
 from kinertia.model.marker_set import MarkerSet
 from kinertia.settings import Subject
 from kinertia.synthetic.laboratory import force_table

@@ -14,7 +14,7 @@ import numpy as np
 import opensim
 import pandas as pd
 
-from kinertia.io.sto import read_sto, write_sto
+from kinertia.io.text.sto import read_sto, write_sto
 
 CUTOFF_HZ = 6.0
 LIMIT_S = 900.0

@@ -11,8 +11,8 @@ import numpy as np
 import opensim
 import pandas as pd
 
-from kinertia.io.sto import read_sto
-from kinertia.io.trc import read_trc
+from kinertia.io.text.sto import read_sto
+from kinertia.io.text.trc import read_trc
 
 WHOLE = (-np.inf, np.inf)
 

@@ -14,8 +14,8 @@ import opensim
 import pandas as pd
 
 from kinertia.cli.app import main as kinertia
-from kinertia.io.sto import read_sto
-from kinertia.io.trc import read_trc
+from kinertia.io.text.sto import read_sto
+from kinertia.io.text.trc import read_trc
 from validation.measured_data import data_folder
 from validation.opensim_rra import Reduced, RRAFailed, reduce_residuals
 from validation.opensim_runs import (

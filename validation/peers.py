@@ -19,7 +19,7 @@ import pandas as pd
 import typer
 from scipy.signal import butter, sosfiltfilt
 
-from kinertia.io.sto import read_sto
+from kinertia.io.text.sto import read_sto
 from validation.measured_trials import table
 from validation.page import PAGES, write_page
 from validation.peer_cases import Case, Result, measured_cases, results, truth_case

@@ -18,7 +18,7 @@ import numpy as np
 import opensim
 import pandas as pd
 
-from kinertia.io.sto import read_sto
+from kinertia.io.text.sto import read_sto
 from validation.joint_accuracy import WITHIN
 from validation.measured_skin import MeasuredSkin, heel_strikes_s, stride_s
 from validation.measured_trials import table

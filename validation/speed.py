@@ -26,8 +26,8 @@ from kinertia.estimation.study_parameters import ParameterVector
 from kinertia.estimation.two_level import TwoLevelProblem, Window, intervals
 from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.io.recording import read_recording
-from kinertia.io.sto import read_sto, write_sto
-from kinertia.io.trc import read_trc, write_trc
+from kinertia.io.text.sto import read_sto, write_sto
+from kinertia.io.text.trc import read_trc, write_trc
 from kinertia.model.anthropometry import literature_bsp
 from kinertia.model.gait27 import Gait27, build_gait27
 from kinertia.model.marker_set import MarkerSet

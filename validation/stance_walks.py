@@ -12,7 +12,7 @@ import pandas as pd
 from scipy.interpolate import make_interp_spline
 from scipy.signal import butter, filtfilt
 
-from kinertia.io.sto import read_sto, write_sto
+from kinertia.io.text.sto import read_sto, write_sto
 from kinertia.motion.joint_moments import joint_and_side
 from kinertia.workflow.from_files import fit_subject
 from validation.measured_skin import MeasuredSkin

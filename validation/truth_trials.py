@@ -21,8 +21,8 @@ import opensim
 import pandas as pd
 from scipy.interpolate import BSpline
 
-from kinertia.io.sto import read_sto, write_sto
-from kinertia.io.trc import read_trc, write_trc
+from kinertia.io.text.sto import read_sto, write_sto
+from kinertia.io.text.trc import read_trc, write_trc
 from kinertia.trial.data import Markers
 from validation.measured_data import data_folder
 from validation.measured_skin import MeasuredSkin, on_measured_skin

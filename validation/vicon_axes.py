@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from kinertia.io.c3d_outputs import frames_of
+from kinertia.io.c3d.outputs import frames_of
 from kinertia.motion.joint_wrench import BodyJoint
 from kinertia.trial.data import Trial
 

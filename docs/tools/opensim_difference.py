@@ -13,7 +13,7 @@ import numpy as np
 import opensim
 import pandas as pd
 
-from kinertia.io.sto import read_sto
+from kinertia.io.text.sto import read_sto
 from validation.opensim_runs import (
     inverse_dynamics,
     inverse_kinematics,

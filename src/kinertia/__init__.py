@@ -50,10 +50,10 @@ if TYPE_CHECKING:
     from kinertia.io.b3d import read_b3d as read_b3d
     from kinertia.io.marker_set_file import choose_marker_set as choose_marker_set
     from kinertia.io.marker_set_file import read_marker_set as read_marker_set
-    from kinertia.io.osim.reader import read_osim as read_osim
+    from kinertia.io.opensim.reader import read_osim as read_osim
     from kinertia.io.recording import read_recording as read_recording
-    from kinertia.io.subject_file import read_subject as read_subject
-    from kinertia.io.subject_tables import SubjectFile as SubjectFile
+    from kinertia.io.subject.reader import read_subject as read_subject
+    from kinertia.io.subject.tables import SubjectFile as SubjectFile
     from kinertia.model.anthropometry import BodyGeometry as BodyGeometry
     from kinertia.model.anthropometry import literature_bsp as literature_bsp
     from kinertia.model.bsp import BodySegmentParameters as BodySegmentParameters
@@ -119,10 +119,10 @@ _ROOMS = {
     "motion.dynamics": "Motion inverse_dynamics residual",
     "io.b3d": "read_b3d",
     "io.marker_set_file": "choose_marker_set read_marker_set",
-    "io.osim.reader": "read_osim",
+    "io.opensim.reader": "read_osim",
     "io.recording": "read_recording",
-    "io.subject_file": "read_subject",
-    "io.subject_tables": "SubjectFile",
+    "io.subject.reader": "read_subject",
+    "io.subject.tables": "SubjectFile",
     "estimation.prepared": "Prepared",
     "estimation.prior": "BspPrior literature_prior",
     "estimation.result": "Fit",

@@ -9,8 +9,8 @@ import pytest
 
 from c3d_writer import plate_parameters, write_c3d
 from command_line import run
-from kinertia.io.c3d import read_c3d
-from kinertia.io.trc import read_trc, write_trc
+from kinertia.io.c3d.reader import read_c3d
+from kinertia.io.text.trc import read_trc, write_trc
 from recordings import named_here
 from spoilt_lab import (
     COMMAND,

@@ -18,7 +18,7 @@ from command_line import PROGRAM, run
 from kinertia.cohort.job import Job
 from kinertia.cohort.local import LocalSize, fit_here
 from kinertia.cohort.record import Place, inputs_of, prepare_folder
-from kinertia.io.subject_file import read_subject
+from kinertia.io.subject.reader import read_subject
 
 TESTS = Path(__file__).resolve().parents[1]
 COMMAND = [*PROGRAM, "cohort"]

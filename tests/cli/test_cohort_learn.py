@@ -11,10 +11,10 @@ import pytest
 from cohort_kills import in_this_process
 from command_line import run
 from kinertia.estimation.prior import literature_prior
-from kinertia.io.population_file import read_population
-from kinertia.io.provenance import recordings
-from kinertia.io.session_file import read_session
-from kinertia.io.subject_file import read_subject
+from kinertia.io.subject.population_file import read_population
+from kinertia.io.subject.provenance import recordings
+from kinertia.io.subject.reader import read_subject
+from kinertia.io.subject.session_file import read_session
 from kinertia.report.saved_fit import FIT_FILE, write_fit
 from kinertia.workflow.from_files import prepare_subject
 

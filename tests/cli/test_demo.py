@@ -9,8 +9,8 @@ import pytest
 from command_line import run
 from kinertia.cli import synthetic_demo as demo_module
 from kinertia.cli.demo import _two_level_verdict
-from kinertia.io.person_recordings import read_inputs
-from kinertia.io.subject_file import read_subject
+from kinertia.io.subject.person_recordings import read_inputs
+from kinertia.io.subject.reader import read_subject
 from kinertia.motion.dynamics import inverse_dynamics
 from kinertia.report.page import render
 from kinertia.synthetic.walk import unlike_literature, walking_subject

@@ -85,7 +85,7 @@ def test_trouble_with_the_disk_is_one_line(person, monkeypatch):
     def denied(*_, **__):
         raise PermissionError(13, "Permission denied", "/somewhere")
 
-    monkeypatch.setattr("kinertia.io.person_recordings.read_recording", denied)
+    monkeypatch.setattr("kinertia.io.subject.person_recordings.read_recording", denied)
     outcome = run("fit", person / "walk.c3d", "--static", person / "static.c3d", "--sex", "male", "-o", person / "out")
     assert outcome.status == 2
     assert outcome.err.splitlines()[-1].startswith("error: /somewhere: Permission denied; check")

@@ -7,15 +7,15 @@ from command_line import loaded_after, loaded_by
 PICTURES = {"plotly", "matplotlib"}
 SLOW = {*PICTURES, "scipy.stats", "scipy.signal"}
 SYNTHETIC = {"kinertia.studies", "kinertia.synthetic"}
-OSIM_MODELS = {"kinertia.io.osim.reader", "kinertia.workflow.opensim_model"}
-C3D = {"ezc3d", "kinertia.io.c3d", "kinertia.io.c3d_plates"}
+OSIM_MODELS = {"kinertia.io.opensim.reader", "kinertia.workflow.opensim_model"}
+C3D = {"ezc3d", "kinertia.io.c3d.reader", "kinertia.io.c3d.plates"}
 SELDOM_NAMED = {
     "kinertia.workflow.known_body",
     "kinertia.estimation.learnt_prior",
     "kinertia.workflow.session",
-    "kinertia.io.measures_file",
-    "kinertia.io.population_file",
-    "kinertia.io.session_file",
+    "kinertia.io.subject.measures_file",
+    "kinertia.io.subject.population_file",
+    "kinertia.io.subject.session_file",
 }
 
 

@@ -6,7 +6,7 @@ import shutil
 import pytest
 
 from command_line import fitted, run
-from kinertia.io.provenance import command_line
+from kinertia.io.subject.provenance import command_line
 
 
 @pytest.mark.slow

@@ -5,7 +5,7 @@ import json
 from command_line import run
 from generic_static import recording, standing_positions
 from kinertia.io.marker_set_file import read_marker_set
-from kinertia.io.trc import write_trc
+from kinertia.io.text.trc import write_trc
 
 
 def written(path, positions):

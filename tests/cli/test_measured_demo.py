@@ -11,7 +11,7 @@ from command_line import fitted, run
 from kinertia.estimation.simultaneous.skin import OTHER_EXPECTED_SD_M
 from kinertia.findings.finding import Severity
 from kinertia.io import samples
-from kinertia.io.sto import read_sto
+from kinertia.io.text.sto import read_sto
 from kinertia.workflow.from_files import prepare_subject
 from report_page import Elements, figures_of
 

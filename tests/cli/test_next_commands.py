@@ -6,7 +6,7 @@ from generic_static import recording, standing_positions
 from kinertia.cli.next_commands import next_commands
 from kinertia.errors import MarkerSetError, SubjectError
 from kinertia.io.marker_set_file import choose_marker_set, read_marker_set
-from kinertia.io.subject_tables import Model
+from kinertia.io.subject.tables import Model
 from kinertia.model.gait27 import build_gait27
 
 COMMAND = "kinertia fit walk.c3d --static static.c3d"

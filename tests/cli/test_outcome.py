@@ -11,7 +11,7 @@ import pytest
 from command_line import run
 from kinertia.cli import demo as demo_module
 from kinertia.cli import instruments as instruments_module
-from kinertia.io.session_file import read_session
+from kinertia.io.subject.session_file import read_session
 from reference import commands
 
 

@@ -10,8 +10,8 @@ import pytest
 
 from command_line import run
 from kinertia.io.recording import read_recording
-from kinertia.io.sto import read_sto, write_sto
-from kinertia.io.trc import write_trc
+from kinertia.io.text.sto import read_sto, write_sto
+from kinertia.io.text.trc import write_trc
 from report_page import Elements
 from spoilt_lab import blocking, blocking_codes
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from command_line import run
-from kinertia.io.sto import read_sto, write_sto
+from kinertia.io.text.sto import read_sto, write_sto
 from spoilt_lab import blocking_codes, changed_markers, complaint, expect_found, refused
 
 

@@ -11,7 +11,7 @@ from kinertia.cohort.job import Job
 from kinertia.cohort.person import fit_person
 from kinertia.cohort.record import inputs_of, prepare_folder
 from kinertia.errors import internal_error
-from kinertia.io.subject_file import read_subject
+from kinertia.io.subject.reader import read_subject
 
 
 @pytest.fixture

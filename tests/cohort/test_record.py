@@ -7,7 +7,7 @@ import pytest
 
 from kinertia.cohort.people import Participant
 from kinertia.cohort.record import RECORD, Place, Record, keep, prepare_folder, standings
-from kinertia.io.provenance import VERSION
+from kinertia.io.versions import VERSION
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ from kinertia.cohort.record import Place, Record
 from kinertia.cohort.tables import write_person, write_tables
 from kinertia.estimation.gait_profile import gait_profile
 from kinertia.io.norms_file import Norm
-from kinertia.io.provenance import VERSION
+from kinertia.io.versions import VERSION
 from kinertia.motion.clinical_angles import CLINICAL_ANGLES
 from kinertia.report.saved_fit import FIT_FILE, write_fit
 

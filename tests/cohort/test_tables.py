@@ -15,7 +15,7 @@ from kinertia.cohort.tables import write_findings, write_person, write_tables
 from kinertia.errors import BlockedError
 from kinertia.findings.finding import finding
 from kinertia.findings.where import Where
-from kinertia.io.provenance import VERSION
+from kinertia.io.versions import VERSION
 
 FOUND = (
     replace(RESIDUAL, where=Where(trial="early")),

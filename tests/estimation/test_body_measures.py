@@ -9,8 +9,8 @@ from kinertia.errors import PriorError
 from kinertia.estimation import body_measures
 from kinertia.estimation.body_measures import expected_measures, measured_body, with_measures
 from kinertia.estimation.prior import literature_prior
-from kinertia.io.measures_file import BodyMeasures, measures_sheet
-from kinertia.io.subject_tables import PriorFiles
+from kinertia.io.subject.measures_file import BodyMeasures, measures_sheet
+from kinertia.io.subject.tables import PriorFiles
 from kinertia.model.measures import measures
 from kinertia.synthetic.walk import HEIGHT_M, MASS_KG, walking_subject
 from kinertia.workflow.from_files import prepare_subject

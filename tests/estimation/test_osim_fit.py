@@ -10,10 +10,10 @@ import pandas as pd
 import pytest
 
 from command_line import fitted, run
-from kinertia.io.osim.exporter import export_osim
-from kinertia.io.osim.reader import read_osim
-from kinertia.io.sto import read_sto
-from kinertia.io.trc import read_trc
+from kinertia.io.opensim.exporter import export_osim
+from kinertia.io.opensim.reader import read_osim
+from kinertia.io.text.sto import read_sto
+from kinertia.io.text.trc import read_trc
 from kinertia.motion.kinematics import inside
 from recordings import FITTED
 from validation import osim_models

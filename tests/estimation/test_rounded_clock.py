@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kinertia.estimation.simultaneous.motion_basis import MotionBasis
-from kinertia.io.osim.reader import read_osim
+from kinertia.io.opensim.reader import read_osim
 from kinertia.settings import Subject
 from kinertia.trial.ground_contact import bridged
 from kinertia.trial.sampled_time import nearest_samples, span_s

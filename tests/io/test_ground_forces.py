@@ -4,7 +4,7 @@ import pytest
 
 from kinertia.findings.finding import Severity
 from kinertia.io.ground_forces import read_forces
-from kinertia.io.sto import write_sto
+from kinertia.io.text.sto import write_sto
 from recordings import here, is_here
 from refusals import only, refused
 

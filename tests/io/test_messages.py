@@ -7,8 +7,8 @@ from kinertia.errors import FileError
 from kinertia.findings.finding import finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
-from kinertia.io.subject_file import read_subject
-from kinertia.io.trc import read_trc
+from kinertia.io.subject.reader import read_subject
+from kinertia.io.text.trc import read_trc
 
 
 @pytest.fixture

@@ -12,8 +12,8 @@ from kinertia.findings.finding import finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.io.recording import read_recording
-from kinertia.io.sto import write_sto
-from kinertia.io.trc import write_trc
+from kinertia.io.text.sto import write_sto
+from kinertia.io.text.trc import write_trc
 from kinertia.trial.data import Markers
 from kinertia.trial.plate_names import with_plates_of_trial
 from refusals import codes, expect_evidence, only, refused

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from kinertia.io.c3d import read_c3d
+from kinertia.io.c3d.reader import read_c3d
 from kinertia.io.marker_set_file import read_marker_set
 from kinertia.model.alignment_device import device_labels, with_alignment_device, with_knees_of_device
 from kinertia.trial.data import Markers, Recording

@@ -3,7 +3,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import upright_model as upright
-from kinertia.io.osim.reader import read_osim
+from kinertia.io.opensim.reader import read_osim
 from kinertia.model.anatomy import model_segments, segment_of
 from kinertia.model.bsp import BodySegmentParameters
 from recordings import here

@@ -10,7 +10,7 @@ from generic_static import generic_model, random_coordinates, smooth_motion
 from kinertia.errors import MarkerSetError, TrialError
 from kinertia.estimation.calibration import marker_jacobian, sampled
 from kinertia.io.marker_set_file import choose_marker_set
-from kinertia.io.osim.reader import read_osim
+from kinertia.io.opensim.reader import read_osim
 from kinertia.io.recording import read_recording
 from kinertia.model.anthropometry import literature_bsp
 from kinertia.model.coordinate_range import Range

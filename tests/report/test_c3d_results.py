@@ -9,7 +9,7 @@ import pytest
 import kinertia
 from command_line import fitted, run
 from kinertia.errors import FileError
-from kinertia.io.c3d_outputs import frames_of
+from kinertia.io.c3d.outputs import frames_of
 from kinertia.motion.joint_wrench import joint_wrenches
 from kinertia.motion.smoothing import smooth
 from kinertia.report.c3d_results import c3d_with_results, outputs_of, prefix_of, to_file, usual_convention

@@ -10,7 +10,7 @@ from scipy import stats
 
 from kinertia.estimation.cycles import cycle_curves
 from kinertia.io.norms_file import Norm
-from kinertia.io.sto import read_sto
+from kinertia.io.text.sto import read_sto
 from kinertia.motion.dynamics import inverse_dynamics
 from kinertia.motion.ground_reactions import measured_reactions
 from kinertia.motion.smoothing import smooth

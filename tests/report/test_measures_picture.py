@@ -5,7 +5,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from command_line import run
-from kinertia.io.measures_file import measures_sheet
+from kinertia.io.subject.measures_file import measures_sheet
 from kinertia.model.measures import measures
 from kinertia.report.measures_picture import LEVELS, measures_picture
 

@@ -14,8 +14,8 @@ import pytest
 from command_line import run
 from found import FAULT_FREE, UNEXPLAINED, UNUSABLE
 from kinertia.diagnostics.result.suitability import Suitability
-from kinertia.io.provenance import provenance_of
-from kinertia.io.subject_file import read_subject
+from kinertia.io.subject.provenance import provenance_of
+from kinertia.io.subject.reader import read_subject
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.report.finding_view import FindingView
 from kinertia.report.headline import purposes, words

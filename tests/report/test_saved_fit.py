@@ -8,7 +8,7 @@ import pytest
 
 import kinertia
 from kinertia.errors import FileError
-from kinertia.io.provenance import Provenance
+from kinertia.io.subject.provenance import Provenance
 from kinertia.report.files import save_fit
 from kinertia.report.page import render
 from kinertia.report.saved_fit import FIT_FILE, read_saved

@@ -18,7 +18,7 @@ from kinertia.cli.app import application
 from kinertia.estimation.simultaneous.cost_term import CostTerm, LoadTerm
 from kinertia.io.marker_set_file import read_marker_set
 from kinertia.io.samples import NAME, SHA256
-from kinertia.io.subject_file import read_subject
+from kinertia.io.subject.reader import read_subject
 
 
 def _examples():

@@ -8,7 +8,7 @@ import pytest
 
 from kinertia.errors import KinertiaError
 from kinertia.io.ground_forces import read_forces
-from kinertia.io.osim.reader import read_osim
+from kinertia.io.opensim.reader import read_osim
 
 ROOT = Path(__file__).parents[2]
 

@@ -11,7 +11,7 @@ from kinertia.findings.finding import Severity, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.rule import all_rules
 from kinertia.findings.where import Where
-from kinertia.io.subject_file import read_subject
+from kinertia.io.subject.reader import read_subject
 from kinertia.workflow.from_files import prepare_subject
 from one_process import in_one_process
 from validation import faults

@@ -6,7 +6,7 @@ import pytest
 
 opensim = pytest.importorskip("opensim")
 
-from kinertia.io.sto import write_sto  # noqa: E402
+from kinertia.io.text.sto import write_sto  # noqa: E402
 from validation import opensim_rra, opensim_runs, peers, truth_trials  # noqa: E402
 from validation.peer_cases import Case, Result  # noqa: E402
 

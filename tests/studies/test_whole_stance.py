@@ -99,7 +99,7 @@ def person(measured_folder, tmp_path_factory):
 
 @pytest.mark.measured
 def test_true_moments_at_hips_are_opensims(person):
-    from kinertia.io.sto import read_sto, write_sto
+    from kinertia.io.text.sto import read_sto, write_sto
     from validation.opensim_runs import inverse_dynamics, quietly
     from validation.truth_moments import three_dimensional_moments
     from validation.truth_trials import gait2354, ground_reactions, write_loads

@@ -6,11 +6,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from kinertia.errors import TrialError
-from kinertia.io.c3d_write import write_c3d
+from kinertia.io.c3d.writer import write_c3d
 from kinertia.io.marker_set_file import read_marker_set
-from kinertia.io.person_recordings import read_inputs
 from kinertia.io.recording import read_recording
-from kinertia.io.subject_file import read_subject
+from kinertia.io.subject.person_recordings import read_inputs
+from kinertia.io.subject.reader import read_subject
 from kinertia.synthetic.laboratory import PERFECT, LabNoise, record, write_lab
 from kinertia.synthetic.walk import centre_of_pressure, walk, walking_subject
 from kinertia.trial.data import LOAD_THRESHOLD_N, Recording

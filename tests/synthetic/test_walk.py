@@ -4,7 +4,7 @@ import pytest
 from kinertia.errors import KinertiaError
 from kinertia.estimation.study_parameters import ParameterVector
 from kinertia.estimation.two_level import correct_pelvis
-from kinertia.io.subject_file import read_subject
+from kinertia.io.subject.reader import read_subject
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.motion.dynamics import residual, root_regressor
 from kinertia.studies.table1 import measured_trial, symmetric_truth

@@ -3,7 +3,7 @@
 import pytest
 
 from kinertia.findings.finding import Severity
-from kinertia.io.subject_file import subject_from_options
+from kinertia.io.subject.reader import subject_from_options
 from kinertia.settings import Subject
 from kinertia.workflow.check import check_person
 from kinertia.workflow.files import RecordingFiles, files_by_name, read_files

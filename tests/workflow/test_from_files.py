@@ -1,8 +1,8 @@
 import pytest
 
 from kinertia.errors import SettingsError
-from kinertia.io.person_recordings import read_inputs
-from kinertia.io.subject_file import read_subject, with_settings
+from kinertia.io.subject.person_recordings import read_inputs
+from kinertia.io.subject.reader import read_subject, with_settings
 from kinertia.settings import KnownSegment
 from kinertia.workflow.from_files import prepare_subject
 from kinertia.workflow.person import read_person

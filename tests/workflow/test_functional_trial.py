@@ -11,7 +11,7 @@ from kinertia import Settings, Subject, TrialInput, estimate, prepare, prepare_s
 from kinertia.errors import BlockedError, SettingsError
 from kinertia.estimation.drawn_fit import kept_draws
 from kinertia.estimation.simultaneous.calibration_entry import AXIS
-from kinertia.io.trc import write_trc
+from kinertia.io.text.trc import write_trc
 from kinertia.model.gait27 import LEG_AXIS_TILTS
 from kinertia.report.draw_files import write_draws
 from kinertia.synthetic.laboratory import LabNoise, record, write_lab

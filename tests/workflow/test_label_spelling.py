@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from kinertia.findings.finding import Severity
-from kinertia.io.osim.reader import read_osim
+from kinertia.io.opensim.reader import read_osim
 from kinertia.settings import Subject
 from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow.label_spelling import with_model_spelling

@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from kinertia.io.sto import TimeTable, read_table, write_table
-from kinertia.io.trc import read_trc, write_trc
+from kinertia.io.text.sto import TimeTable, read_table, write_table
+from kinertia.io.text.trc import read_trc, write_trc
 from kinertia.report.saved_fit import load_fit
 from kinertia.workflow.from_files import fit_subject
 from recordings import is_here

@@ -7,9 +7,9 @@ import pytest
 from kinertia.errors import BlockedError, OsimError, SubjectError
 from kinertia.estimation.prior import MASS_SD, OTHER_MASS_SD
 from kinertia.findings.finding import Severity
-from kinertia.io.osim.exporter import export_osim
-from kinertia.io.osim.reader import read_osim
-from kinertia.io.trc import read_trc
+from kinertia.io.opensim.exporter import export_osim
+from kinertia.io.opensim.reader import read_osim
+from kinertia.io.text.trc import read_trc
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.centre_offsets import centre_offsets
 from kinertia.model.imported_model import OsimModel

@@ -10,9 +10,9 @@ from kinertia.errors import BlockedError
 from kinertia.findings.finding import Severity
 from kinertia.findings.rule import STAGES
 from kinertia.io.recording import read_recording
-from kinertia.io.sto import read_sto, write_sto
-from kinertia.io.subject_file import read_subject
-from kinertia.io.trc import write_trc
+from kinertia.io.subject.reader import read_subject
+from kinertia.io.text.sto import read_sto, write_sto
+from kinertia.io.text.trc import write_trc
 from kinertia.settings import Overrule
 from kinertia.workflow.check import check_person
 from kinertia.workflow.from_files import prepare_subject

@@ -15,8 +15,8 @@ from kinertia.cli.outcome import add_command, of_error
 from kinertia.cli.renamed_options import as_named_now
 from kinertia.cli.terminal import out, print_json, show_error, show_problem
 from kinertia.errors import KinertiaError
-from kinertia.io.output_folder import INTERRUPTIONS
-from kinertia.io.provenance import VERSION
+from kinertia.io.results.output_folder import INTERRUPTIONS
+from kinertia.io.versions import VERSION
 
 # typer keeps these line ends: at most 78 columns
 _MANUAL = """Body segment parameters from gait.

@@ -32,9 +32,9 @@ from kinertia.cli.terminal import out, plain_table, shown_progress
 from kinertia.errors import FileError
 from kinertia.findings.overview import Overview
 from kinertia.io.marker_set_file import read_marker_set
-from kinertia.io.number_table import expect_path
-from kinertia.io.osim.reader import read_osim
-from kinertia.io.subject_file import expect_one_model, read_subject, subject_file_in
+from kinertia.io.opensim.reader import read_osim
+from kinertia.io.subject.reader import expect_one_model, read_subject, subject_file_in
+from kinertia.io.text.number_table import expect_path
 from kinertia.model.anthropometry import check_subject
 from kinertia.report.check_page import save_check_page
 from kinertia.settings import Subject

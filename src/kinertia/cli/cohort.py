@@ -31,8 +31,8 @@ from kinertia.cohort.slurm import slurm_cluster
 from kinertia.cohort.tables import write_tables
 from kinertia.errors import SettingsError
 from kinertia.estimation.gait_profile import expect_all_nine
-from kinertia.io.file_lock import sole_use
 from kinertia.io.norms_file import Norm, read_norms
+from kinertia.io.results.file_lock import sole_use
 from kinertia.io.slurm_file import SlurmFile, read_slurm
 
 _LOCK = ".kinertia-cohort.lock"

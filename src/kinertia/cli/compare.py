@@ -13,8 +13,8 @@ from kinertia.estimation.condition_changes import Change
 from kinertia.estimation.prepared import Progress
 from kinertia.estimation.result import Fit
 from kinertia.estimation.session_changes import why_incomparable
-from kinertia.io.output_folder import complete_folder
-from kinertia.io.provenance import names_from_common_folder
+from kinertia.io.results.output_folder import complete_folder
+from kinertia.io.subject.provenance import names_from_common_folder
 from kinertia.report.changes import change_columns, change_sentences, changed_sentence, changes_summary
 from kinertia.report.compare import compare as compare_sessions
 from kinertia.report.compare import fit_of

@@ -12,7 +12,7 @@ from kinertia.cli.options import Output, Overwrite, Quiet, results_folder
 from kinertia.cli.outcome import Outcome
 from kinertia.cli.synthetic_demo import Demo, run_demo
 from kinertia.cli.terminal import out, plain_table, shown_progress
-from kinertia.io.provenance import command_line
+from kinertia.io.subject.provenance import command_line
 from kinertia.report.files import summary
 
 Method = Literal["simultaneous", "two-level"]

@@ -9,8 +9,8 @@ import typer
 from kinertia.cli.options import Overwrite, Quiet, results_folder
 from kinertia.cli.outcome import Outcome
 from kinertia.cli.terminal import out
-from kinertia.io.output_folder import complete_folder
-from kinertia.io.provenance import VERSION
+from kinertia.io.results.output_folder import complete_folder
+from kinertia.io.versions import VERSION
 from kinertia.motion.model_outputs import CONVENTIONS
 from kinertia.report.c3d_results import write_c3d_results
 from kinertia.report.draw_files import write_draws

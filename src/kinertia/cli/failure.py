@@ -8,7 +8,8 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from kinertia.errors import internal_error
-from kinertia.io.provenance import VERSION, command_line
+from kinertia.io.subject.provenance import command_line
+from kinertia.io.versions import VERSION
 
 STATUS = 70
 """EX_SOFTWARE of sysexits.h: the fault is the program's."""

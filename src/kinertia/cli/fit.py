@@ -34,11 +34,11 @@ from kinertia.cli.terminal import out, show_problem, shown_progress
 from kinertia.errors import FileError, KinertiaError
 from kinertia.estimation.result import Fit
 from kinertia.io.file_names import same_folder
-from kinertia.io.number_table import expect_path
-from kinertia.io.provenance import command_line, provenance_of
 from kinertia.io.recording import expect_recording
-from kinertia.io.subject_file import read_subject, subject_file_in, subject_from_options, with_settings
-from kinertia.io.subject_tables import SubjectFile
+from kinertia.io.subject.provenance import command_line, provenance_of
+from kinertia.io.subject.reader import read_subject, subject_file_in, subject_from_options, with_settings
+from kinertia.io.subject.tables import SubjectFile
+from kinertia.io.text.number_table import expect_path
 from kinertia.report.files import FIT_FILES, TRIAL_FILES, save_fit, summary
 from kinertia.settings import Overrule, Settings
 from kinertia.workflow.from_files import fit_subject

@@ -10,10 +10,10 @@ from kinertia.cli.outcome import Outcome
 from kinertia.cli.terminal import out
 from kinertia.errors import FileError
 from kinertia.io.file_names import missing_file
-from kinertia.io.measures_file import measures_sheet
-from kinertia.io.output_folder import write_then_rename
-from kinertia.io.provenance import command_line
-from kinertia.io.subject_draft import FILL_IN, MARKER_SET, NO_FORCES, NOT_USED, SUBJECT, init_files
+from kinertia.io.results.output_folder import write_then_rename
+from kinertia.io.subject.draft import FILL_IN, MARKER_SET, NO_FORCES, NOT_USED, SUBJECT, init_files
+from kinertia.io.subject.measures_file import measures_sheet
+from kinertia.io.subject.provenance import command_line
 from kinertia.report.measures_picture import measures_picture
 
 

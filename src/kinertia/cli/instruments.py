@@ -12,11 +12,12 @@ from kinertia.cli.outcome import Outcome
 from kinertia.cli.terminal import out, plain_table, shown_progress
 from kinertia.errors import FileError, SessionError
 from kinertia.estimation.simultaneous.calibration_entry import SHOWN_UNIT
-from kinertia.io.output_folder import write_then_rename
-from kinertia.io.provenance import VERSION, recordings
-from kinertia.io.session_file import expect_session, session_text
-from kinertia.io.subject_file import read_subject
-from kinertia.io.subject_tables import InstrumentsFiles, SubjectFile
+from kinertia.io.results.output_folder import write_then_rename
+from kinertia.io.subject.provenance import recordings
+from kinertia.io.subject.reader import read_subject
+from kinertia.io.subject.session_file import expect_session, session_text
+from kinertia.io.subject.tables import InstrumentsFiles, SubjectFile
+from kinertia.io.versions import VERSION
 from kinertia.workflow.from_files import check_plates, fit_subject
 from kinertia.workflow.session import SessionInstruments, person_instruments, session_instruments
 

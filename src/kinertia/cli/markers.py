@@ -10,8 +10,8 @@ from kinertia.cli.terminal import out, plain_table
 from kinertia.errors import FileError
 from kinertia.io.marker_set_draft import draft_marker_set, preset_of
 from kinertia.io.marker_set_file import nearest_preset, preset_name, preset_names, read_marker_set
-from kinertia.io.output_folder import write_then_rename
 from kinertia.io.recording import read_recording
+from kinertia.io.results.output_folder import write_then_rename
 from kinertia.model.marker_set import fits_person, label_share, spelled_as
 from kinertia.trial.data import Recording
 from kinertia.trial.stillness import STILL_M_S, speed_m_s

@@ -5,10 +5,10 @@ from pathlib import Path
 
 from kinertia.estimation.prepared import Progress
 from kinertia.estimation.result import Fit
-from kinertia.io.output_folder import complete_folder
-from kinertia.io.provenance import command_line, provenance_of
+from kinertia.io.results.output_folder import complete_folder
 from kinertia.io.samples import SHA256, sample_walk
-from kinertia.io.subject_file import read_subject
+from kinertia.io.subject.provenance import command_line, provenance_of
+from kinertia.io.subject.reader import read_subject
 from kinertia.report.files import save_fit
 from kinertia.workflow.from_files import fit_subject
 

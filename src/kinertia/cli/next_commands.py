@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from kinertia.errors import KinertiaError, findings_of
-from kinertia.io.provenance import command_line
-from kinertia.io.subject_tables import Model
+from kinertia.io.subject.provenance import command_line
+from kinertia.io.subject.tables import Model
 
 _NO_MARKER_SET = {"L101", "L105"}
 _DRAFT = "markers.toml"

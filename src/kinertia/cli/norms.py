@@ -14,9 +14,9 @@ from kinertia.cli.terminal import out, shown_progress
 from kinertia.errors import FileError, KinertiaError
 from kinertia.estimation.normative_bands import Control, band_columns, mixture
 from kinertia.estimation.result import Fit
-from kinertia.io.csv_file import inert
 from kinertia.io.norms_file import read_norms
-from kinertia.io.output_folder import write_then_rename
+from kinertia.io.results.output_folder import write_then_rename
+from kinertia.io.text.csv_file import inert
 from kinertia.report.saved_fit import read_saved
 
 

@@ -10,7 +10,7 @@ from kinertia.cli.terminal import be_quiet
 from kinertia.diagnostics.runner import unknown_codes
 from kinertia.errors import FileError
 from kinertia.findings.rule import matching
-from kinertia.io.output_folder import check_folder, expect_own_folder
+from kinertia.io.results.output_folder import check_folder, expect_own_folder
 from kinertia.settings import Overrule, number_of, sex_of
 
 

@@ -8,7 +8,7 @@ import typer
 from kinertia.cli.options import Output, Overwrite, Quiet, results_folder
 from kinertia.cli.outcome import Outcome
 from kinertia.cli.terminal import out, plain_table, shown_progress
-from kinertia.io.subject_file import read_subject
+from kinertia.io.subject.reader import read_subject
 from kinertia.report.crossval_page import (
     CROSSVAL_HEADINGS,
     crossval_rows,

@@ -15,10 +15,10 @@ from kinertia.errors import KinertiaError, PriorError
 from kinertia.estimation.identifiability import evidence
 from kinertia.estimation.learnt_prior import LearntPrior, learn
 from kinertia.estimation.person_information import PersonInformation, information_of
-from kinertia.io.output_folder import write_then_rename
-from kinertia.io.population_file import population_text, read_population
-from kinertia.io.provenance import VERSION
 from kinertia.io.recording import MARKER_FILES
+from kinertia.io.results.output_folder import write_then_rename
+from kinertia.io.subject.population_file import population_text, read_population
+from kinertia.io.versions import VERSION
 from kinertia.model.bsp import PARAMETERS
 from kinertia.report.saved_fit import SavedFit, read_saved
 

@@ -15,7 +15,7 @@ from kinertia.estimation.gait_profile import check_convention, gait_profile
 from kinertia.estimation.gait_scores import with_norms
 from kinertia.estimation.result import Fit
 from kinertia.io.norms_file import Norm, read_norms
-from kinertia.io.output_folder import updated_files
+from kinertia.io.results.output_folder import updated_files
 from kinertia.motion.clinical_angles import CLINICAL_ANGLES
 from kinertia.report.cycle_figures import CurvesByStage, drawn_curves
 from kinertia.report.files import write_columns

@@ -6,7 +6,7 @@ from pathlib import Path
 from kinertia.cli.terminal import out
 from kinertia.cohort.tables import fitted_people
 from kinertia.errors import FileError
-from kinertia.io.csv_file import inert
+from kinertia.io.text.csv_file import inert
 from kinertia.report.saved_fit import FIT_FILE
 
 

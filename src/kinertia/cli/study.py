@@ -10,7 +10,7 @@ import typer
 from kinertia.cli.options import Output, Overwrite, Quiet, results_folder
 from kinertia.cli.outcome import Outcome, add_command
 from kinertia.cli.terminal import out, plain_table, shown_progress
-from kinertia.io.subject_file import read_subject
+from kinertia.io.subject.reader import read_subject
 from kinertia.report.matplotlib_extra import HOW, has_matplotlib
 from kinertia.report.sensitivity import save_sensitivity, sensitivity_summary
 from kinertia.report.table1 import save_table1, table1_rows, table1_summary

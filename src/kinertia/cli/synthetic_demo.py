@@ -14,11 +14,11 @@ import pandas as pd
 
 from kinertia.estimation.prepared import Progress
 from kinertia.estimation.result import Fit
-from kinertia.io.output_folder import complete_folder
-from kinertia.io.person_recordings import read_inputs
-from kinertia.io.provenance import command_line, provenance_of
-from kinertia.io.subject_file import read_subject, with_settings
-from kinertia.io.subject_tables import SubjectFile
+from kinertia.io.results.output_folder import complete_folder
+from kinertia.io.subject.person_recordings import read_inputs
+from kinertia.io.subject.provenance import command_line, provenance_of
+from kinertia.io.subject.reader import read_subject, with_settings
+from kinertia.io.subject.tables import SubjectFile
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.motion.dynamics import inverse_dynamics
 from kinertia.report.files import save_fit

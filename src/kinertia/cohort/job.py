@@ -8,7 +8,7 @@ from typing import Self
 from uuid import uuid4
 
 from kinertia.cohort.record import FAILED, Record, Standing, one_line
-from kinertia.io.provenance import VERSION
+from kinertia.io.versions import VERSION
 
 RETRIES = 2
 """How often the fit of a person whose process was killed is repeated."""

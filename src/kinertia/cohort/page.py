@@ -16,7 +16,7 @@ from kinertia.cohort.instruments import COLUMNS, drift
 from kinertia.cohort.outcomes import FINDINGS, PEOPLE, lead, outcome_parts, report_of
 from kinertia.cohort.record import AGAINST
 from kinertia.estimation.cycles import UNITS, Kind
-from kinertia.io.output_folder import write_then_rename
+from kinertia.io.results.output_folder import write_then_rename
 from kinertia.model.bsp import PARAMETERS
 from kinertia.motion.gait_cycle import PERCENT
 from kinertia.report import style

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from kinertia.errors import FileError
-from kinertia.io.csv_file import read_csv
 from kinertia.io.file_names import RESULT_FILES, fits_everywhere, path_from, same_name_key
-from kinertia.io.provenance import command_line
-from kinertia.io.subject_draft import is_capture
-from kinertia.io.subject_file import subject_file_in
+from kinertia.io.subject.draft import is_capture
+from kinertia.io.subject.provenance import command_line
+from kinertia.io.subject.reader import subject_file_in
+from kinertia.io.text.csv_file import read_csv
 
 _LONGEST_NAME = 200
 """Longest name in bytes: systems limit file names to 255, and some of Kinertia's begin with a person's."""

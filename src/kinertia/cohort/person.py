@@ -11,11 +11,12 @@ from kinertia.cohort.time_limit import no_end, time_limit, was_ended
 from kinertia.errors import KinertiaError, internal_error
 from kinertia.estimation.result import Fit
 from kinertia.findings.finding import Severity
-from kinertia.io.output_folder import complete_folder, write_then_rename
-from kinertia.io.provenance import VERSION, command_line, provenance_of
-from kinertia.io.recording_date import session_date
-from kinertia.io.subject_file import read_subject
-from kinertia.io.subject_tables import SubjectFile
+from kinertia.io.results.output_folder import complete_folder, write_then_rename
+from kinertia.io.subject.provenance import command_line, provenance_of
+from kinertia.io.subject.reader import read_subject
+from kinertia.io.subject.recording_date import session_date
+from kinertia.io.subject.tables import SubjectFile
+from kinertia.io.versions import VERSION
 from kinertia.report.files import save_fit
 from kinertia.workflow.from_files import fit_subject
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, Self, TypeVar
 
 from kinertia.cohort.record import Record
-from kinertia.io.csv_file import inert
+from kinertia.io.text.csv_file import inert
 
 LOG = "resources.csv"
 _COLUMNS = ("ended", "person", "status", "seconds", "memory_mb", "worker")

@@ -25,9 +25,9 @@ from kinertia.estimation.result import Fit
 from kinertia.estimation.simultaneous.calibration_entry import calibration_columns
 from kinertia.findings.finding import Severity
 from kinertia.findings.overview import Overview, finding_columns
-from kinertia.io.csv_file import inert, read_csv
 from kinertia.io.norms_file import Norm
-from kinertia.io.working_folder import working_folder
+from kinertia.io.results.working_folder import working_folder
+from kinertia.io.text.csv_file import inert, read_csv
 from kinertia.report.cycle_figures import MOST_STRIDES, titled_quantities
 from kinertia.report.files import summary
 from kinertia.report.saved_fit import load_fit

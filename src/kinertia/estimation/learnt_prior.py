@@ -32,7 +32,7 @@ from kinertia.estimation.prior import BspPrior
 from kinertia.findings.finding import with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
-from kinertia.io.population_file import PopulationFile
+from kinertia.io.subject.population_file import PopulationFile
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.shared_coordinates import by_side
 

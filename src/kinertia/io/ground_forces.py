@@ -14,9 +14,9 @@ from kinertia.findings.finding import Finding, finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.io.file_names import path_from
-from kinertia.io.number_table import expect_file, mismatch
-from kinertia.io.sto import TimeTable, read_table
-from kinertia.io.uniform_times import uniform_times
+from kinertia.io.text.number_table import expect_file, mismatch
+from kinertia.io.text.sto import TimeTable, read_table
+from kinertia.io.text.uniform_times import uniform_times
 from kinertia.model.anatomy import segment_of
 from kinertia.trial.data import LOAD_THRESHOLD_N, FloatArray, PlateLoads
 from kinertia.trial.force_spikes import without_spikes

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from kinertia.errors import MarkerSetError
 from kinertia.io.marker_places.placement import Placement, place_markers
 from kinertia.io.marker_set_file import marker_set_of, nearest_preset, preset_names, read_marker_set
-from kinertia.io.toml_lines import quoted
+from kinertia.io.text.toml_lines import quoted
 from kinertia.model.alignment_device import with_alignment_device
 from kinertia.model.gait27 import build_gait27
 from kinertia.model.joint_centres import find_landmarks

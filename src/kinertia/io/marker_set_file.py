@@ -11,8 +11,8 @@ from pathlib import Path
 
 from kinertia.errors import FileError
 from kinertia.findings.quantity import Quantity
-from kinertia.io.number_table import expect_file
-from kinertia.io.toml_lines import TomlFile, parse_toml, read_toml
+from kinertia.io.text.number_table import expect_file
+from kinertia.io.text.toml_lines import TomlFile, parse_toml, read_toml
 from kinertia.model.marker_set import (
     LANDMARKS,
     SEGMENTS,

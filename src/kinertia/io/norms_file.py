@@ -16,7 +16,7 @@ import numpy as np
 
 from kinertia.errors import FileError
 from kinertia.findings.quantity import Quantity
-from kinertia.io.csv_file import Row, read_csv
+from kinertia.io.text.csv_file import Row, read_csv
 
 COLUMNS = ("quantity", "percent", "mean", "sd")
 Span = tuple[float, float]

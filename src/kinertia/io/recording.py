@@ -11,8 +11,8 @@ from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.io.ground_forces import read_forces
 from kinertia.io.lab_axes import upright_along_z
-from kinertia.io.number_table import expect_file, wrong_kind
-from kinertia.io.trc import read_trc_recording
+from kinertia.io.text.number_table import expect_file, wrong_kind
+from kinertia.io.text.trc import read_trc_recording
 from kinertia.model.alignment_device import with_knees_of_device
 from kinertia.trial.data import FloatArray, PlateLoads, Recording
 from kinertia.trial.impossible_data import impossible_load, impossible_position
@@ -88,7 +88,7 @@ def _forces(
         return read_forces(path, loads_path, turn)
     if loads_path is not None:
         raise wrong_kind(Path(loads_path), "An ExternalLoads file", f"explain a {CORTEX} file", "a .mot or .sto file")
-    from kinertia.io.cortex_forces import read_cortex_forces
+    from kinertia.io.text.cortex import read_cortex_forces
 
     return read_cortex_forces(path, turn)
 
@@ -108,15 +108,15 @@ def _read_markers(path: Path, plate: Path | None, length_unit: str | None, stand
         if kind != ".tsv":
             raise wrong_kind(plate, "A plate of Qualisys", f"go with markers in a '{kind}' file", "a .tsv file of them")
     if kind == ".c3d":
-        from kinertia.io.c3d import read_c3d
+        from kinertia.io.c3d.reader import read_c3d
 
         return read_c3d(path, length_unit, standing)
     if kind == ".tsv":
-        from kinertia.io.qualisys import plates_beside, read_qualisys
+        from kinertia.io.text.qualisys import plates_beside, read_qualisys
 
         return read_qualisys(path, None if plate is None else plates_beside(plate))
     if kind == ".csv":
-        from kinertia.io.vicon_csv import read_vicon_csv
+        from kinertia.io.text.vicon import read_vicon_csv
 
         return read_vicon_csv(path)
     return read_trc_recording(path)
@@ -191,7 +191,8 @@ def _span(time: FloatArray) -> Quantity:
 
 def frame_count(path: Path) -> int:
     """Return the number of frames in the header of a .c3d or .trc file; 0 where not stated (reading explains why)."""
-    from kinertia.io import c3d_structure, trc
+    from kinertia.io.c3d import structure as c3d_structure
+    from kinertia.io.text import trc
 
     try:
         return c3d_structure.header_frames(path) if path.suffix.lower() == ".c3d" else trc.header_frames(path)

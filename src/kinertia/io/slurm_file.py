@@ -6,7 +6,7 @@ from typing import Annotated
 from pydantic import Field, ValidationError
 
 from kinertia.errors import FileError
-from kinertia.io.toml_lines import read_toml
+from kinertia.io.text.toml_lines import read_toml
 from kinertia.settings import Table
 
 Lines = Annotated[tuple[str, ...], Field(strict=False)]

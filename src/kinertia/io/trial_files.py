@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path, PurePosixPath
 
 from kinertia.errors import FileError
-from kinertia.io.provenance import Provenance, sha256
+from kinertia.io.subject.provenance import Provenance, sha256
 
 _KINDS = (".c3d", ".trc", ".tsv", ".csv")
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from kinertia.findings.finding import Finding
 from kinertia.findings.overview import Overview, reported
-from kinertia.io.output_folder import complete_folder
+from kinertia.io.results.output_folder import complete_folder
 from kinertia.report.check_figures import MOST_CONTACTS, force_figure, pressure_figure
 from kinertia.report.figure import Figure, written
 from kinertia.report.finding_view import FindingView

@@ -6,8 +6,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from kinertia.io.output_folder import complete_folder
-from kinertia.io.provenance import VERSION
+from kinertia.io.results.output_folder import complete_folder
+from kinertia.io.versions import VERSION
 from kinertia.report.result_page import Part, render_parts
 from kinertia.report.row_figures import dot_figure
 from kinertia.studies.cross_validation import Explained, HeldOut

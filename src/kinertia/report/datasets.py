@@ -12,7 +12,7 @@ from kinertia.estimation.cycles import UNITS, cycle_curves
 from kinertia.estimation.drawn_fit import chosen_draws, drawn_fit
 from kinertia.estimation.result import Fit
 from kinertia.estimation.trial_fit import TrialFit
-from kinertia.io.provenance import VERSION
+from kinertia.io.versions import VERSION
 from kinertia.model.bsp import PARAMETERS
 from kinertia.trial.data import FEET
 

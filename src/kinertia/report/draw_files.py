@@ -4,7 +4,7 @@ from pathlib import Path
 
 from kinertia.estimation.drawn_fit import chosen_draws, drawn_fit
 from kinertia.estimation.result import Fit
-from kinertia.io.sto import write_table
+from kinertia.io.text.sto import write_table
 from kinertia.report.files import coordinates_table, write_model
 from kinertia.report.ground_reactions_file import write_ground_reactions
 

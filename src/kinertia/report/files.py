@@ -24,11 +24,12 @@ from kinertia.estimation.moment_peaks import peak_columns
 from kinertia.estimation.result import Fit
 from kinertia.estimation.trial_fit import TrialFit
 from kinertia.findings.finding import Severity
-from kinertia.io.csv_file import inert
-from kinertia.io.osim.exporter import export_osim
-from kinertia.io.output_folder import complete_folder, expect_own_folder
-from kinertia.io.provenance import VERSION, Provenance
-from kinertia.io.sto import TimeTable, write_table
+from kinertia.io.opensim.exporter import export_osim
+from kinertia.io.results.output_folder import complete_folder, expect_own_folder
+from kinertia.io.subject.provenance import Provenance
+from kinertia.io.text.csv_file import inert
+from kinertia.io.text.sto import TimeTable, write_table
+from kinertia.io.versions import VERSION
 from kinertia.model.centre_offsets import centre_offsets
 from kinertia.report.cycle_figures import CurvesByStage, drawn_curves
 from kinertia.report.ground_reactions_file import write_ground_reactions
@@ -131,7 +132,7 @@ def write_model(fit: Fit, folder: Path) -> None:
     if fit.file is None:
         export_osim(folder / "model.osim", fit.skeleton, fit.estimate)
         return
-    from kinertia.io.osim.editor import write_osim
+    from kinertia.io.opensim.editor import write_osim
 
     positions = {marker.label: marker.position for marker in fit.skeleton.markers}
     shifts = centre_offsets(fit.skeleton)

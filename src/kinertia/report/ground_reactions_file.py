@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from kinertia.io.output_folder import write_then_rename
-from kinertia.io.sto import TimeTable, write_table
+from kinertia.io.results.output_folder import write_then_rename
+from kinertia.io.text.sto import TimeTable, write_table
 from kinertia.motion.ground_reactions import GroundReactions
 from kinertia.trial.data import FEET
 

@@ -17,7 +17,8 @@ from kinertia.estimation.result import Fit
 from kinertia.estimation.simultaneous.calibration_entry import SHOWN_UNIT, item_text, quantity_text
 from kinertia.estimation.tasks import fits_by_task, main_task
 from kinertia.estimation.trial_fit import TrialFit
-from kinertia.io.provenance import Provenance, versions
+from kinertia.io.subject.provenance import Provenance
+from kinertia.io.versions import versions
 from kinertia.model.bsp import PARAMETERS, BodySegmentParameters
 from kinertia.motion.clinical_angles import CLINICAL_ANGLES
 from kinertia.report.body_figure import body_figure

@@ -10,7 +10,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from kinertia.errors import FileError
-from kinertia.io.output_folder import write_then_rename
+from kinertia.io.results.output_folder import write_then_rename
 from kinertia.model.compiled import cache_folder
 
 _BEST = 9

@@ -12,7 +12,7 @@ from jinja2.bccache import Bucket
 from markupsafe import Markup
 
 from kinertia.findings.display import outlined
-from kinertia.io.provenance import VERSION
+from kinertia.io.versions import VERSION
 from kinertia.report.finding_view import LOOKS, linked, unbroken
 from kinertia.report.plotly_script import packed_script
 from kinertia.report.wording import fixed

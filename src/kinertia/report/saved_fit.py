@@ -22,8 +22,9 @@ from kinertia.estimation.trial_fit import TrialFit
 from kinertia.findings.finding import Finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
-from kinertia.io.object_archive import read_archive, write_archive
-from kinertia.io.provenance import VERSION, Provenance, versions
+from kinertia.io.results.object_archive import read_archive, write_archive
+from kinertia.io.subject.provenance import Provenance
+from kinertia.io.versions import VERSION, versions
 from kinertia.model.axis_functions import Composed, PiecewisePolynomial
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.coordinate_range import Range

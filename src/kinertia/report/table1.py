@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from kinertia.io.output_folder import complete_folder
-from kinertia.io.provenance import VERSION
+from kinertia.io.results.output_folder import complete_folder
+from kinertia.io.versions import VERSION
 from kinertia.report.matplotlib_extra import has_matplotlib
 from kinertia.report.result_page import Part, drawing, render_parts
 from kinertia.studies.table1 import CONDITIONS, PUBLISHED, Table1, table1_json

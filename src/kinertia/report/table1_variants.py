@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from kinertia.io.output_folder import complete_folder
+from kinertia.io.results.output_folder import complete_folder
 from kinertia.report.matplotlib_extra import has_matplotlib
 from kinertia.report.result_page import Part, drawing, render_parts
 from kinertia.report.table1 import QUANTITIES, short

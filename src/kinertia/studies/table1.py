@@ -15,8 +15,8 @@ import numpy as np
 from kinertia.estimation.prepared import Progress
 from kinertia.estimation.study_parameters import ParameterVector
 from kinertia.estimation.two_level import Window, correct_pelvis, estimate_two_level
-from kinertia.io.person_recordings import read_inputs
-from kinertia.io.subject_tables import SubjectFile
+from kinertia.io.subject.person_recordings import read_inputs
+from kinertia.io.subject.tables import SubjectFile
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion, residual

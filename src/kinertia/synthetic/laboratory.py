@@ -12,10 +12,10 @@ import numpy as np
 import pandas as pd
 
 from kinertia.errors import TrialError
-from kinertia.io.c3d_write import write_c3d
-from kinertia.io.output_folder import complete_folder
-from kinertia.io.sto import write_sto
-from kinertia.io.trc import write_trc
+from kinertia.io.c3d.writer import write_c3d
+from kinertia.io.results.output_folder import complete_folder
+from kinertia.io.text.sto import write_sto
+from kinertia.io.text.trc import write_trc
 from kinertia.synthetic.noise import SkinMotion, camera_noise, plate_noise, study_noise
 from kinertia.synthetic.walk import HEIGHT_M, MASS_KG, SEX, SyntheticSubject, SyntheticTrial
 from kinertia.trial.centre_of_pressure import centre_of_pressure

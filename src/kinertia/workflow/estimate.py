@@ -58,7 +58,7 @@ def estimate_bsp(
     Args:
         subject: mass and height may be None where a recording carries them; height and sex with an OpenSim model.
         source: of the model: the person standing, for the built-in one; or a scaled OpenSim model, as
-            `kinertia.io.osim.reader.read_osim` reads it, for the simultaneous estimate.
+            `kinertia.io.opensim.reader.read_osim` reads it, for the simultaneous estimate.
         inputs: the trials.
         settings: defaults if None.
         marker_set: found from the static trial's labels if None; none with an OpenSim model.

@@ -8,9 +8,9 @@ from pathlib import Path
 
 from kinertia.errors import FileError
 from kinertia.findings.quantity import Quantity
-from kinertia.io.qualisys import is_plate_file
 from kinertia.io.recording import FORCE_FILES, MARKER_FILES, expect_recording, read_recording
-from kinertia.io.subject_draft import STATIC_NAME, matched_by_name
+from kinertia.io.subject.draft import STATIC_NAME, matched_by_name
+from kinertia.io.text.qualisys import is_plate_file
 from kinertia.trial.data import Recording
 from kinertia.trial.marker_quality import travel
 from kinertia.trial.trial_input import TrialInput

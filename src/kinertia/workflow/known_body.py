@@ -21,8 +21,8 @@ from kinertia.findings.display import shown
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
-from kinertia.io.bsp_file import BspTable
-from kinertia.io.measures_file import BodyMeasures
+from kinertia.io.subject.bsp_file import BspTable
+from kinertia.io.subject.measures_file import BodyMeasures
 from kinertia.model.bsp import PARAMETERS, UNITS, BodySegmentParameters
 from kinertia.model.measures import measures as all_measures
 from kinertia.settings import Attached, KnownSegment, PriorSettings

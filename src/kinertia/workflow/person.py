@@ -10,8 +10,8 @@ from kinertia.errors import BlockedError, KinertiaError, MarkerSetError, Subject
 from kinertia.estimation.input_checks import complete_subject, lacking
 from kinertia.findings.finding import Finding
 from kinertia.io.marker_set_file import marker_set_of, read_marker_set
-from kinertia.io.person_recordings import read_static, read_trial
-from kinertia.io.subject_tables import SubjectFile
+from kinertia.io.subject.person_recordings import read_static, read_trial
+from kinertia.io.subject.tables import SubjectFile
 from kinertia.model.imported_model import OsimModel, markers_of_model
 from kinertia.model.marker_set import MarkerSet, check_marker_set
 from kinertia.settings import Attached, Overrule, Subject
@@ -132,7 +132,7 @@ def read_person(wanted: SubjectFile, progress: Progress = lambda stage, share: N
 
 
 def _read_model(path: Path) -> OsimModel:
-    from kinertia.io.osim.reader import read_osim  # which few subject files need
+    from kinertia.io.opensim.reader import read_osim  # which few subject files need
 
     return read_osim(path)
 

@@ -16,7 +16,7 @@ from kinertia.estimation.simultaneous.mixture_prior import GaussianPrior
 from kinertia.estimation.simultaneous.plates import PLATE_ERRORS, plates_with_floor
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
-from kinertia.io.session_file import PersonInstruments
+from kinertia.io.subject.session_file import PersonInstruments
 from kinertia.settings import Instruments
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from kinertia.estimation.prepared import Progress
 from kinertia.estimation.result import Fit
-from kinertia.io.subject_file import read_subject
+from kinertia.io.subject.reader import read_subject
 from kinertia.workflow.estimate import estimate
 from kinertia.workflow.from_files import prepare_subject
 

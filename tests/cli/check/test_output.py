@@ -11,7 +11,7 @@ import pytest
 
 from checked import facts_of, told
 from command_line import run
-from kinertia.io.trc import write_trc
+from kinertia.io.text.trc import write_trc
 from report_page import Elements
 
 

@@ -5,7 +5,7 @@ import shutil
 
 from checked import facts_of, told
 from command_line import run
-from kinertia.io.trc import write_trc
+from kinertia.io.text.trc import write_trc
 from spoilt_lab import blocking, blocking_codes
 
 

@@ -10,8 +10,8 @@ pytest.importorskip("uvicorn", reason="needs the extra app (pip install -e '.[te
 from app_tab import Tab, ready, with_everything
 from chromium import DESKTOP, PATIENCE_MS, PHONE, VIOLATIONS, picture, playwright
 from kinertia.cli.web import work
-from kinertia.io.measures_file import measures_sheet
-from kinertia.io.subject_file import read_subject
+from kinertia.io.subject.measures_file import measures_sheet
+from kinertia.io.subject.reader import read_subject
 
 pytestmark = pytest.mark.slow
 

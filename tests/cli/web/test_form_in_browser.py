@@ -6,7 +6,7 @@ pytest.importorskip("starlette", reason="needs the extra app (pip install -e '.[
 pytest.importorskip("uvicorn", reason="needs the extra app (pip install -e '.[test]')")
 from app_tab import folder_of
 from chromium import playwright
-from kinertia.io.subject_file import read_subject
+from kinertia.io.subject.reader import read_subject
 
 pytestmark = pytest.mark.slow
 

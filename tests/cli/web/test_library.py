@@ -17,7 +17,7 @@ from kinertia.cli.web.person_page import standing
 from kinertia.errors import FileError
 from kinertia.findings.overview import Overview
 from kinertia.io.file_names import fits_everywhere
-from kinertia.io.provenance import sha256
+from kinertia.io.subject.provenance import sha256
 from kinertia.report.finding_view import digest
 
 

@@ -16,8 +16,8 @@ from kinertia.cli.web.marker_assignment import FILE, marker_places, save_places
 from kinertia.cli.web.marker_routes import in_words
 from kinertia.errors import KinertiaError, SettingsError
 from kinertia.io.marker_set_file import read_marker_set
-from kinertia.io.subject_file import read_subject
-from kinertia.io.trc import read_trc
+from kinertia.io.subject.reader import read_subject
+from kinertia.io.text.trc import read_trc
 
 WALK = {"model": {"static": "static.c3d"}, "trial": [{"markers": "walk.c3d"}], "subject": {"sex": "male"}}
 

@@ -12,7 +12,7 @@ from app_tab import Tab, ready
 from chromium import DESKTOP, PHONE, picture, playwright
 from kinertia.cli.web.entries import recognise
 from kinertia.io.marker_set_file import read_marker_set
-from kinertia.io.subject_file import read_subject
+from kinertia.io.subject.reader import read_subject
 
 UNKNOWN = np.array([0xD5, 0x5E, 0x00]) / 255
 """Colour of markers without a place."""

@@ -18,8 +18,8 @@ from kinertia.cli.web import routes
 from kinertia.cli.web.jobs import Jobs
 from kinertia.errors import internal_error
 from kinertia.io import samples
-from kinertia.io.measures_file import measures_sheet
-from kinertia.io.subject_file import read_subject
+from kinertia.io.subject.measures_file import measures_sheet
+from kinertia.io.subject.reader import read_subject
 from kinertia.report.measures_picture import measures_picture
 
 

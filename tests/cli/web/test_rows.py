@@ -10,7 +10,7 @@ from kinertia.cli.web.entries import entries, recognise, trouble, write_form
 from kinertia.cli.web.library import Library
 from kinertia.cli.web.rows import rows, with_rows
 from kinertia.errors import SettingsError
-from kinertia.io.subject_file import read_subject
+from kinertia.io.subject.reader import read_subject
 
 CONTENT = {
     "segment": {

@@ -7,7 +7,7 @@ import pytest
 
 import upright_model as upright
 from kinertia.diagnostics.model.length_unit import length_unit
-from kinertia.io.osim.reader import read_osim
+from kinertia.io.opensim.reader import read_osim
 from kinertia.model.skeleton import Marker, Skeleton
 from people import with_model
 from sound_models import MODELS

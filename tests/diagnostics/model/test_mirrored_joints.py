@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 import upright_model as upright
 from kinertia.diagnostics.model.mirrored_joints import mirrored_joints
-from kinertia.io.osim.reader import read_osim
+from kinertia.io.opensim.reader import read_osim
 from kinertia.model.joint_centres import subtalar_axis
 from kinertia.model.skeleton import Joint, Skeleton
 from people import with_model

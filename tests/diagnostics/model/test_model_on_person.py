@@ -10,7 +10,7 @@ from kinertia.diagnostics.model.model_on_person import model_and_trials, moved_m
 from kinertia.diagnostics.person_context import PersonContext
 from kinertia.diagnostics.runner import explained
 from kinertia.findings.finding import Severity
-from kinertia.io.osim.reader import read_osim
+from kinertia.io.opensim.reader import read_osim
 from kinertia.model.imported_model import markers_of_model
 from kinertia.settings import Subject
 from kinertia.trial.data import Markers

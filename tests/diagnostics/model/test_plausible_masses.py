@@ -9,7 +9,7 @@ import upright_model as upright
 from kinertia.diagnostics.model.questions import PERSON_QUESTIONS
 from kinertia.diagnostics.runner import asked, explained
 from kinertia.findings.finding import Severity
-from kinertia.io.osim.reader import read_osim
+from kinertia.io.opensim.reader import read_osim
 from kinertia.model.bsp import PARAMETERS, BodySegmentParameters
 from people import UNMOVED, with_model
 from recordings import here

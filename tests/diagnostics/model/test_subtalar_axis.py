@@ -7,7 +7,7 @@ import pytest
 
 import upright_model as upright
 from kinertia.diagnostics.model.subtalar_axis import subtalar_axis
-from kinertia.io.osim.reader import read_osim
+from kinertia.io.opensim.reader import read_osim
 from kinertia.model.skeleton import Skeleton
 from people import with_model
 from sound_models import MODELS

@@ -8,7 +8,7 @@ import pytest
 from kinertia.diagnostics.plates.plate_height import plate_heights
 from kinertia.io.ground_forces import read_forces
 from kinertia.io.recording import read_recording
-from kinertia.io.sto import read_table, write_table
+from kinertia.io.text.sto import read_table, write_table
 from people import person
 from recordings import WALKS, here, is_here, marker_set_for
 

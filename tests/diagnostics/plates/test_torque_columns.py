@@ -8,7 +8,7 @@ import pytest
 from kinertia.diagnostics.plates.free_moments import free_moments
 from kinertia.findings.quantity import Quantity
 from kinertia.io.ground_forces import read_forces
-from kinertia.io.sto import read_table, write_table
+from kinertia.io.text.sto import read_table, write_table
 from plate_findings import plates_alone
 from recordings import WALKS, here, slow_beside
 

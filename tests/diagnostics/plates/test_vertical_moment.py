@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from gait_loads import MASS_KG, gait_loads
 from kinertia.diagnostics.plates.vertical_moment import VERTICAL_MOMENT_LEVER_M, mean_vertical_moment, vertical_moment
 from kinertia.io.marker_set_file import choose_marker_set
-from kinertia.io.osim.reader import read_osim
+from kinertia.io.opensim.reader import read_osim
 from kinertia.model.imported_model import markers_of_model
 from kinertia.model.marker_set import MarkerSet
 from kinertia.synthetic.walk import walk, walking_subject

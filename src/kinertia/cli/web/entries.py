@@ -20,11 +20,11 @@ from kinertia.cli.web.library import SUBJECT, PersonFolder
 from kinertia.cli.web.rows import with_rows
 from kinertia.errors import KinertiaError, SettingsError
 from kinertia.io.marker_set_file import preset_names
-from kinertia.io.output_folder import write_then_rename
-from kinertia.io.subject_draft import init_subject
-from kinertia.io.subject_file import read_subject
-from kinertia.io.subject_text import subject_text
-from kinertia.io.toml_lines import parse_toml, read_toml
+from kinertia.io.results.output_folder import write_then_rename
+from kinertia.io.subject.draft import init_subject
+from kinertia.io.subject.reader import read_subject
+from kinertia.io.subject.text import subject_text
+from kinertia.io.text.toml_lines import parse_toml, read_toml
 from kinertia.settings import Subject, number_of, sex_of
 
 _HEADING = "Written by kinertia app; `kinertia fit` takes it as it is."

@@ -18,7 +18,7 @@ from kinertia.cli.web.guard import RESULT_POLICY
 from kinertia.cli.web.library import PersonFolder
 from kinertia.cli.web.work import Work
 from kinertia.errors import FileError
-from kinertia.io.provenance import VERSION
+from kinertia.io.versions import VERSION
 from kinertia.report.rendering import templates_of
 
 _LARGEST_FORM = 1_000_000

@@ -23,9 +23,9 @@ from kinertia.cli.web.person_page import person_page, progress, standing
 from kinertia.cli.web.responses import archive, chosen_folder, expect, form, page, result_file, time_left, to
 from kinertia.cli.web.uploads import ENDINGS, LIMITS, receive
 from kinertia.errors import KinertiaError, internal_error
-from kinertia.io.measures_file import measures_sheet
-from kinertia.io.output_folder import complete_folder, expect_own_folder
+from kinertia.io.results.output_folder import complete_folder, expect_own_folder
 from kinertia.io.samples import SIZE_MB
+from kinertia.io.subject.measures_file import measures_sheet
 from kinertia.report.measures_picture import measures_picture
 
 Example = Callable[[Path], object]

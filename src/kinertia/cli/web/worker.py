@@ -16,9 +16,9 @@ from typing import Any, TextIO
 from kinertia.cli.compiling import compile_once
 from kinertia.cli.web.library import OUTCOME, SUBJECT, SUMMARY, PersonFolder
 from kinertia.errors import KinertiaError
-from kinertia.io.output_folder import complete_folder
-from kinertia.io.provenance import command_line, sha256
-from kinertia.io.subject_file import read_subject
+from kinertia.io.results.output_folder import complete_folder
+from kinertia.io.subject.provenance import command_line, sha256
+from kinertia.io.subject.reader import read_subject
 
 Progress = Callable[[str, float], None]
 
@@ -38,7 +38,7 @@ def check(person: PersonFolder, progress: Progress) -> None:
 
 def fit(person: PersonFolder, progress: Progress) -> None:
     """Run `kinertia fit` on the subject file: the results, and the subject file that they are of."""
-    from kinertia.io.provenance import provenance_of
+    from kinertia.io.subject.provenance import provenance_of
     from kinertia.report.files import save_fit
     from kinertia.report.finding_view import digest
     from kinertia.report.headline import words

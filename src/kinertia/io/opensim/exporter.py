@@ -1,0 +1,168 @@
+"""Writes a skeleton built here (the 27-DOF model) as an OpenSim model file.
+
+Every joint becomes a CustomJoint (or a WeldJoint) with the skeleton's own coordinate names. Locked coordinates are
+constants: those at the beginning and end of a joint place its frames in parent and child, those between moving axes
+stay as axes that do not move. OpenSim 4.0 and later open it. There are no muscles and no geometry.
+"""
+
+import warnings
+from collections.abc import Sequence
+from html import escape
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from kinertia.io.results.output_folder import write_then_rename
+from kinertia.model.bsp import BodySegmentParameters
+from kinertia.model.skeleton import Axis, Joint, Marker, Skeleton, inverse, placed, placed_by
+
+_FORMAT = 40000
+"""The oldest of the current formats: every OpenSim 4 reads it."""
+_ANGLE_RANGE, _LENGTH_RANGE = "-3.15 3.15", "-10 10"
+
+
+def export_osim(path: str | Path, skeleton: Skeleton, bsp: BodySegmentParameters) -> None:
+    """Write the skeleton with these body segment parameters; segments that it does not have are massless.
+
+    Raises:
+        ValueError: an axis follows its coordinate by a function, or rotates before another translates.
+    """
+    rows = dict(zip(bsp.segments, bsp.table(), strict=True))
+    bodies = [body_text(segment, rows.get(segment, np.zeros(10))) for segment in skeleton.segments]
+    text = "\n".join(
+        [
+            '<?xml version="1.0" encoding="UTF-8" ?>',
+            f'<OpenSimDocument Version="{_FORMAT}">',
+            f"<Model name={_quoted(skeleton.name)}>",
+            f"<gravity>0 {-skeleton.gravity_m_s2!r} 0</gravity>",
+            "<length_units>meters</length_units>",
+            "<force_units>N</force_units>",
+            *_set("BodySet", bodies),
+            *_set("JointSet", [_joint(joint, skeleton) for joint in skeleton.joints]),
+            *_set("MarkerSet", [_marker(marker) for marker in skeleton.markers]),
+            "</Model>",
+            "</OpenSimDocument>",
+            "",
+        ]
+    )
+    write_then_rename(Path(path), text)
+
+
+def _set(tag: str, objects: Sequence[str]) -> list[str]:
+    return [f"<{tag} name={_quoted(tag.lower())}>", "<objects>", *objects, "</objects>", "<groups />", f"</{tag}>"]
+
+
+def _numbers(values: Sequence[float] | np.ndarray) -> str:
+    return " ".join(repr(float(value)) for value in values)
+
+
+def body_text(name: str, row: np.ndarray) -> str:
+    """Write a body of the current formats; `row` is one of `BodySegmentParameters.table`."""
+    return (
+        f"<Body name={_quoted(name)}><mass>{_numbers(row[:1])}</mass><mass_center>{_numbers(row[1:4])}</mass_center>"
+        f"<inertia>{_numbers(row[4:])}</inertia></Body>"
+    )
+
+
+def _marker(marker: Marker) -> str:
+    return (
+        f"<Marker name={_quoted(marker.label)}><socket_parent_frame>/bodyset/{escape(marker.segment)}"
+        f"</socket_parent_frame><location>{_numbers(marker.position)}</location><fixed>false</fixed></Marker>"
+    )
+
+
+def weld_text(parent: str, child: str) -> str:
+    """Write a joint of the current formats that fixes one body in the frame of another."""
+    near, far = (_frame(f"{name}_offset", f"/bodyset/{name}", np.eye(3), np.zeros(3)) for name in (parent, child))
+    return (
+        f"<WeldJoint name={_quoted('to_' + child)}><socket_parent_frame>{parent}_offset</socket_parent_frame>"
+        f"<socket_child_frame>{child}_offset</socket_child_frame><frames>{near}{far}</frames></WeldJoint>"
+    )
+
+
+def _joint(joint: Joint, skeleton: Skeleton) -> str:
+    joint = _folded(joint, skeleton)
+    slides = [axis for axis in joint.axes if axis.kind == "translation"]
+    turns = [axis for axis in joint.axes if axis.kind == "rotation"]
+    if [*slides, *turns] != list(joint.axes) or any(axis.function is not None for axis in joint.axes):
+        raise ValueError(f"the joint of {joint.child} has axes that a file of plain coordinates cannot hold")
+    parent = "/ground" if joint.parent == "ground" else f"/bodyset/{joint.parent}"
+    name = "ground_" + joint.child if joint.parent == "ground" else "to_" + joint.child
+    near = _frame(f"{joint.parent}_offset", parent, joint.rotation, joint.translation)
+    far = _frame(f"{joint.child}_offset", f"/bodyset/{joint.child}", joint.child_rotation, joint.child_translation)
+    free = [axis for axis in (*turns, *slides) if axis.coordinate not in skeleton.locked]
+    kind = "CustomJoint" if joint.axes else "WeldJoint"
+    inside = [
+        f"<{kind} name={_quoted(name)}>",
+        f"<socket_parent_frame>{joint.parent}_offset</socket_parent_frame>",
+        f"<socket_child_frame>{joint.child}_offset</socket_child_frame>",
+        f"<coordinates>{''.join(_coordinate(axis) for axis in free)}</coordinates>",
+        f"<frames>{near}{far}</frames>",
+    ]
+    if joint.axes:
+        axes = [*_filled("rotation", turns, skeleton), *_filled("translation", slides, skeleton)]
+        inside += ["<SpatialTransform>", *axes, "</SpatialTransform>"]
+    return "\n".join([*inside, f"</{kind}>"])
+
+
+def _folded(joint: Joint, skeleton: Skeleton) -> Joint:
+    """Return the joint without axes locked at zero, with its two frames where locked axes at its beginning and end put
+    them.
+    """
+    axes = [axis for axis in joint.axes if skeleton.locked.get(axis.coordinate) != 0.0 or axis.function is not None]
+    near = placed(joint.rotation, joint.translation)
+    far = placed(joint.child_rotation, joint.child_translation)
+    while axes and axes[0].coordinate in skeleton.locked:
+        axis = axes.pop(0)
+        near = near @ placed_by(axis, skeleton.locked[axis.coordinate])
+    while axes and axes[-1].coordinate in skeleton.locked:
+        axis = axes.pop()
+        far = far @ inverse(placed_by(axis, skeleton.locked[axis.coordinate]))
+    frames = (near[:3, :3], near[:3, 3], tuple(axes), far[:3, :3], far[:3, 3])
+    return Joint(joint.parent, joint.child, *frames)
+
+
+def _frame(name: str, parent: str, rotation: np.ndarray, translation: np.ndarray) -> str:
+    with warnings.catch_warnings(action="ignore"):  # at gimbal lock one of the possible triples will do
+        angles = Rotation.from_matrix(np.asarray(rotation)).as_euler("XYZ")
+    return (
+        f"<PhysicalOffsetFrame name={_quoted(name)}><socket_parent>{parent}</socket_parent>"
+        f"<translation>{_numbers(translation)}</translation><orientation>{_numbers(angles)}</orientation>"
+        f"</PhysicalOffsetFrame>"
+    )
+
+
+def _quoted(text: str) -> str:
+    """Return an attribute's value in quotes."""
+    return f'"{escape(text)}"'
+
+
+def _coordinate(axis: Axis) -> str:
+    limits = _ANGLE_RANGE if axis.kind == "rotation" else _LENGTH_RANGE
+    return f"<Coordinate name={_quoted(axis.coordinate)}><range>{limits}</range></Coordinate>"
+
+
+def _filled(kind: str, axes: Sequence[Axis], skeleton: Skeleton) -> list[str]:
+    """Return three TransformAxis elements: these axes, then axes at zero that keep the three independent."""
+    directions = [np.array(axis.direction) for axis in axes]
+    spare: list[np.ndarray] = []
+    while len(directions) + len(spare) < 3:
+        taken = np.array([*directions, *spare]).reshape(-1, 3)
+        spare.append(np.linalg.svd(taken)[2][-1] if len(taken) else np.eye(3)[0])
+    elements = [
+        _axis(f"{kind}{i + 1}", axis.direction, "" if axis.coordinate in skeleton.locked else axis.coordinate, value)
+        for i, axis in enumerate(axes)
+        for value in [skeleton.locked.get(axis.coordinate, 0.0)]
+    ]
+    return elements + [_axis(f"{kind}{len(axes) + i + 1}", direction, "", 0.0) for i, direction in enumerate(spare)]
+
+
+def _axis(name: str, direction: Sequence[float] | np.ndarray, coordinate: str, value: float) -> str:
+    function = f'<Constant name="function"><value>{value!r}</value></Constant>'
+    if coordinate:
+        function = '<LinearFunction name="function"><coefficients>1 0</coefficients></LinearFunction>'
+    return (
+        f'<TransformAxis name="{name}"><coordinates>{escape(coordinate)}</coordinates>'
+        f"<axis>{_numbers(direction)}</axis>{function}</TransformAxis>"
+    )

@@ -1,0 +1,1 @@
+"""Writes folders and archives of results, complete or not at all."""

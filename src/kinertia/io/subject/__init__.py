@@ -1,0 +1,1 @@
+"""Reads and drafts subject files and the files that they name."""

@@ -1,0 +1,1 @@
+"""Reads and writes text files: tables of OpenSim, and exports of Vicon, Qualisys and Cortex."""

@@ -1,0 +1,94 @@
+"""What a subject file states of its recordings: the part of the static trial, plates, whose foot a load is."""
+
+import numpy as np
+import pytest
+
+from kinertia.errors import SettingsError
+from kinertia.io.subject.person_recordings import read_static, read_trial
+from kinertia.io.subject.reader import read_subject
+from kinertia.io.text.trc import write_trc
+from kinertia.trial.data import Markers
+from refusals import refused
+from walk_on_plates import walk
+
+COLUMNS = [f"{plate}_{kind}{axis}" for plate in "ab" for kind in ("force_v", "force_p", "moment_") for axis in "xyz"]
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A static trial of 3 s, and a walk with the steps of two feet on plates a and b."""
+    recording = walk([("r", 0), ("l", 0)], duration_s=1.5)
+    write_trc(tmp_path / "walk.trc", recording.markers)
+    still = np.tile(recording.markers.positions[:1], (300, 1, 1))
+    write_trc(tmp_path / "static.trc", Markers(np.arange(300) / 100, recording.markers.labels, still))
+    plates = recording.plates
+    point = np.zeros((len(plates.time), 3))
+    columns = [part for p in range(2) for part in (plates.force[:, p], point, plates.moment[:, p])]
+    rows = np.column_stack([plates.time, *columns])
+    header = ["grf", f"nRows={len(rows)}", f"nColumns={rows.shape[1]}", "endheader", "\t".join(["time", *COLUMNS])]
+    text = "\n".join([*header, *("\t".join(f"{value:.6f}" for value in row) for row in rows)])
+    (tmp_path / "walk.mot").write_text(text, encoding="utf-8")
+    return tmp_path
+
+
+def subject(folder, model="", trial="", instruments=""):
+    path = folder / "subject.toml"
+    path.write_text(
+        f"""[subject]
+sex = "male"
+mass_kg = 75.0
+height_m = 1.8
+[model]
+static = "static.trc"
+{model}
+[[trial]]
+markers = "walk.trc"
+forces = "walk.mot"
+{trial}
+[instruments]
+{instruments}
+""",
+        encoding="utf-8",
+    )
+    return read_subject(path, to_fit=False)
+
+
+def test_a_window_of_the_static_trial_is_all_that_is_read_of_it(folder):
+    static = read_static(subject(folder, model="window_s = [1.0, 1.5]"))
+    assert (static.markers.time[0], static.markers.time[-1]) == (pytest.approx(1.0), pytest.approx(1.5))
+
+
+def test_a_window_outside_the_static_trial_is_refused(folder):
+    with pytest.raises(SettingsError, match=r"from 0\.00 to 2\.99 s"):
+        read_static(subject(folder, model="window_s = [4.0, 5.0]"))
+
+
+def test_plates_that_are_named_are_used_and_no_others(folder):
+    wanted = subject(folder, instruments='plates = ["b_force"]')
+    assert read_trial(wanted, wanted.trials[0]).recording.plates.names == ("b_force",)
+
+
+def test_stated_feet_reach_the_recording(folder):
+    line = 'feet = [{ plate = "a_force", foot = "left", window_s = [0.1, 0.8] }, { plate = "b_force", foot = "none" }]'
+    wanted = subject(folder, trial=line)
+    stated = read_trial(wanted, wanted.trials[0]).recording.stated_contacts
+    assert [(one.plate, one.foot, one.span_s) for one in stated] == [
+        ("a_force", 1, (0.1, 0.8)),
+        ("b_force", None, (-np.inf, np.inf)),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("entries", "missing"),
+    [({"instruments": 'plates = ["a_force", "c"]'}, "c"), ({"trial": 'feet = [{ plate = "d", foot = "left" }]'}, "d")],
+)
+def test_a_plate_that_is_not_there_is_refused_with_those_that_are(folder, entries, missing):
+    wanted = subject(folder, **entries)
+    with pytest.raises(SettingsError, match=rf"no '{missing}'; its plates are .*b_force"):
+        read_trial(wanted, wanted.trials[0])
+
+
+@pytest.mark.parametrize("feet", ['"left"', "[]", '[{ plate = "a_force", foot = "links" }]', '[{ foot = "left" }]'])
+def test_feet_in_another_form_are_refused(folder, feet):
+    with refused("F191"):
+        subject(folder, trial=f"feet = {feet}")
