@@ -78,10 +78,31 @@ def test_export_says_what_the_tables_say(fit, results):
     np.testing.assert_allclose(mat["trials"]["coordinates"]["knee_angle_r"], angle, rtol=1e-12)
 
 
+def test_a_workbook_holds_the_strides_side_by_side(fit, results):
+    folder = results.parent / "excel"
+    outcome = run("export", results, "--xlsx", "-o", folder)
+    assert outcome.status == 0, outcome.err
+    sheets = pd.read_excel(folder / "tables.xlsx", sheet_name=None, header=None)
+    expected = ["About", "Spatiotemporal", "Peaks", "Clinical angles", "Joint moments", "Model angles", "Model moments"]
+    assert list(sheets)[:7] == expected
+    book = pd.read_excel(
+        folder / "tables.xlsx", sheet_name="Joint moments", header=[0, 1, 2, 3, 4, 5], index_col=0
+    ).sort_index(axis=1)
+    cycles = fit.cycles()
+    chosen = cycles[cycles.quantity.str.endswith("_joint_moment")]
+    assert book.shape == (101, 2 * len(chosen) / 101)
+    for key, stride in chosen.groupby(["quantity", "trial", "task", "side", "stride"]):
+        kept = book[key]
+        assert list(kept) == ["N m/kg", "SD (N m/kg)"]
+        np.testing.assert_allclose(kept.to_numpy(float), stride[["value", "sd"]].to_numpy(), rtol=1e-12)
+    peaks = pd.read_excel(folder / "tables.xlsx", sheet_name="Peaks")
+    pd.testing.assert_frame_equal(peaks, fit.peaks, check_dtype=False, rtol=1e-12)
+
+
 def test_export_asks_for_a_form(results):
     outcome = run("export", results, "-o", results.parent / "export")
     assert outcome.status == 2
-    assert "--csv, --json, --mat, --c3d or --draws" in " ".join(outcome.err.split())
+    assert "--xlsx, --csv, --json, --mat, --c3d or --draws" in " ".join(outcome.err.split())
 
 
 @pytest.mark.parametrize("command", [["report"], ["export", "--csv", "-o", "tables"]])

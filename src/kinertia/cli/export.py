@@ -16,6 +16,7 @@ from kinertia.report.c3d_results import write_c3d_results
 from kinertia.report.draw_files import write_draws
 from kinertia.report.saved_fit import read_saved
 from kinertia.report.tables import write_csv, write_json, write_mat
+from kinertia.report.workbook import write_xlsx
 
 
 def _conventions(typed: str) -> list[str]:
@@ -25,9 +26,12 @@ def _conventions(typed: str) -> list[str]:
 
 def export(
     results: Annotated[Path, typer.Argument(help="Folder written by kinertia fit.")],
-    csv: Annotated[bool, typer.Option("--csv", help="A file per table, for Excel, R and others.")] = False,
+    csv: Annotated[bool, typer.Option("--csv", help="A file per table, for R and others.")] = False,
     as_json: Annotated[
         bool, typer.Option("--json", help="One file, tables.json; the names of written files are also printed as JSON.")
+    ] = False,
+    xlsx: Annotated[
+        bool, typer.Option("--xlsx", help="One workbook, tables.xlsx: strides, peaks, curves side by side, segments.")
     ] = False,
     mat: Annotated[bool, typer.Option("--mat", help="One file, tables.mat, for MATLAB and Octave.")] = False,
     c3d: Annotated[
@@ -61,14 +65,14 @@ def export(
 
     kinertia export out --csv
 
-    kinertia export out --mat -o matlab
+    kinertia export out --xlsx -o excel
 
     kinertia export out --c3d -o for-nexus
 
     kinertia export out --draws 50 -o draws
     """
-    if not (csv or as_json or mat or c3d or draws):
-        forms = "--csv, --json, --mat, --c3d or --draws N"
+    if not (csv or as_json or xlsx or mat or c3d or draws):
+        forms = "--xlsx, --csv, --json, --mat, --c3d or --draws N"
         raise typer.BadParameter(f"choose a form: {forms} (several at once are fine)")
     if convention is not None and convention not in CONVENTIONS:
         raise typer.BadParameter(f"--convention is {' or '.join(CONVENTIONS)}, not '{convention}'")
@@ -84,6 +88,8 @@ def export(
             write_csv(fit, work)
         if as_json:
             write_json(fit, work / "tables.json")
+        if xlsx:
+            write_xlsx(fit, work / "tables.xlsx")
         if mat:
             write_mat(fit, work / "tables.mat")
         if c3d:
