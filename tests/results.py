@@ -8,8 +8,8 @@ from kinertia.diagnostics.result.context import ResultContext
 from kinertia.diagnostics.result.questions import ESTIMATE_QUESTIONS
 from kinertia.diagnostics.runner import asked, explained
 from kinertia.estimation.simultaneous.calibration_entry import DELAY, CalibrationEntry
-from kinertia.estimation.simultaneous.instruments import InstrumentInformation, InstrumentPrior
-from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINTY
+from kinertia.estimation.simultaneous.instruments.model_uncertainty import GAIT27_UNCERTAINTY
+from kinertia.estimation.simultaneous.instruments.priors import InstrumentInformation, InstrumentPrior
 from kinertia.estimation.total_mass import TotalMass
 from kinertia.findings.finding import Severity
 from kinertia.settings import Settings

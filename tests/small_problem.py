@@ -12,16 +12,16 @@ from generic_static import smooth_motion
 from kinertia.estimation.prior import BspPrior, literature_prior
 from kinertia.estimation.simultaneous.calibration_entry import BENDING
 from kinertia.estimation.simultaneous.inputs import PLACES, SKIN, STILL
-from kinertia.estimation.simultaneous.instrument_term import GAINS, ZEROS
-from kinertia.estimation.simultaneous.instrument_term import PLATES as PLATE_ERRORS
-from kinertia.estimation.simultaneous.instruments import InstrumentPrior
-from kinertia.estimation.simultaneous.marker_errors import ErrorProcess
+from kinertia.estimation.simultaneous.instruments.plates import PLATE_UNKNOWNS, FootPlates, plate_middles
+from kinertia.estimation.simultaneous.instruments.priors import InstrumentPrior
+from kinertia.estimation.simultaneous.markers.marker_errors import ErrorProcess
+from kinertia.estimation.simultaneous.markers.skin import SkinPatterns
 from kinertia.estimation.simultaneous.mixture_prior import FaultMixture
 from kinertia.estimation.simultaneous.observed_trial import CalibrationPrior, Observation
-from kinertia.estimation.simultaneous.plates import PLATE_UNKNOWNS, FootPlates, plate_middles
-from kinertia.estimation.simultaneous.problem import MapProblem
-from kinertia.estimation.simultaneous.skin import SkinPatterns
-from kinertia.estimation.simultaneous.start_terms import AWAY_SD, CHANGE_SD
+from kinertia.estimation.simultaneous.search.problem import MapProblem
+from kinertia.estimation.simultaneous.terms.instrument_term import GAINS, ZEROS
+from kinertia.estimation.simultaneous.terms.instrument_term import PLATES as PLATE_ERRORS
+from kinertia.estimation.simultaneous.terms.start_terms import AWAY_SD, CHANGE_SD
 from kinertia.io.opensim.reader import read_osim
 from kinertia.model.anatomy import segment_of
 from kinertia.model.gait27 import HIP_OFFSETS

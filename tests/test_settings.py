@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from kinertia.estimation.simultaneous.instruments import InstrumentPrior
+from kinertia.estimation.simultaneous.instruments.priors import InstrumentPrior
 from kinertia.settings import Attached, Instruments, Settings, Subject
 
 

@@ -13,9 +13,9 @@ import numpy as np
 
 from kinertia.estimation.identifiability import evidence
 from kinertia.estimation.prior import BspPrior
-from kinertia.estimation.simultaneous.fisher_information import Information
 from kinertia.estimation.simultaneous.observed_trial import Observation
-from kinertia.estimation.simultaneous.problem import MapProblem
+from kinertia.estimation.simultaneous.search.problem import MapProblem
+from kinertia.estimation.simultaneous.uncertainty.fisher_information import Information
 from kinertia.report.truth_comparison import JOINTS
 from kinertia.studies.parallel import in_parallel
 from kinertia.studies.simulated_people import Scenario, estimate_person

@@ -17,7 +17,7 @@ import numpy as np
 from kinertia.errors import KinertiaError, findings_of
 from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.result import Fit
-from kinertia.estimation.simultaneous.instruments import FLOOR_PRIOR, PLATE_PRIOR
+from kinertia.estimation.simultaneous.instruments.priors import FLOOR_PRIOR, PLATE_PRIOR
 from kinertia.findings.finding import Finding
 from kinertia.findings.overview import reported
 from kinertia.findings.quantity import Quantity

@@ -21,14 +21,14 @@ from kinertia.estimation.learnt_prior import FEWEST_PEOPLE, LearntPrior, learn
 from kinertia.estimation.person_information import PersonInformation, person_information
 from kinertia.estimation.population import population_prior
 from kinertia.estimation.prior import BspPrior, literature_prior
-from kinertia.estimation.simultaneous.bandwidth import Bandwidth
 from kinertia.estimation.simultaneous.fit import calibration_prior
-from kinertia.estimation.simultaneous.instruments import InstrumentPrior
-from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINTY
+from kinertia.estimation.simultaneous.instruments.model_uncertainty import GAIT27_UNCERTAINTY
+from kinertia.estimation.simultaneous.instruments.priors import InstrumentPrior
+from kinertia.estimation.simultaneous.linear_algebra.bandwidth import Bandwidth
 from kinertia.estimation.simultaneous.observation import Observations, observe
 from kinertia.estimation.simultaneous.outcome import SimultaneousResult
-from kinertia.estimation.simultaneous.prior_plausibility import unlikeness
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous
+from kinertia.estimation.simultaneous.uncertainty.prior_plausibility import unlikeness
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import inverse_dynamics

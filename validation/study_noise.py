@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from kinertia.estimation.prior import BspPrior, with_symmetry
-from kinertia.estimation.simultaneous.bandwidth import Bandwidth
+from kinertia.estimation.simultaneous.linear_algebra.bandwidth import Bandwidth
 from kinertia.estimation.simultaneous.observed_trial import Observation
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous
 from kinertia.estimation.study_parameters import ParameterVector

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from kinertia.estimation.simultaneous.bandwidth import Bandwidth
+from kinertia.estimation.simultaneous.linear_algebra.bandwidth import Bandwidth
 from kinertia.estimation.simultaneous.observation import observe
 from kinertia.estimation.simultaneous.observed_trial import Observation
 from kinertia.motion.kinematics import Kinematics, solve_kinematics

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from command_line import fitted, run
-from kinertia.estimation.simultaneous.skin import OTHER_EXPECTED_SD_M
+from kinertia.estimation.simultaneous.markers.skin import OTHER_EXPECTED_SD_M
 from kinertia.findings.finding import Severity
 from kinertia.io import samples
 from kinertia.io.text.sto import read_sto

@@ -7,11 +7,11 @@ import pytest
 
 from kinertia.errors import KinertiaError
 from kinertia.estimation.drawn_fit import _reactions, chosen_draws, drawn_fit, kept_draws
-from kinertia.estimation.simultaneous import posterior_draws
 from kinertia.estimation.simultaneous.calibration_entry import GAIN as GAIN_OF_PLATE
-from kinertia.estimation.simultaneous.motion_basis import MotionBasis
-from kinertia.estimation.simultaneous.plate_loads import GAIN, corrected_loads
-from kinertia.estimation.simultaneous.posterior_draws import TrialDraws
+from kinertia.estimation.simultaneous.instruments.plate_loads import GAIN, corrected_loads
+from kinertia.estimation.simultaneous.linear_algebra.motion_basis import MotionBasis
+from kinertia.estimation.simultaneous.uncertainty import posterior_draws
+from kinertia.estimation.simultaneous.uncertainty.posterior_draws import TrialDraws
 from kinertia.motion.dynamics import inverse_dynamics
 from kinertia.motion.ground_reactions import GroundReactions
 from kinertia.report.draw_files import write_draws

@@ -13,8 +13,8 @@ from kinertia.estimation.free_moment_sign import (
     with_undisputed_plates,
 )
 from kinertia.estimation.simultaneous.calibration_entry import POSITION, CalibrationEntry
-from kinertia.estimation.simultaneous.instrument_errors import ANOTHER_TRIAL, OTHER_SIGN
-from kinertia.estimation.simultaneous.instruments import InstrumentPrior
+from kinertia.estimation.simultaneous.instruments.instrument_errors import ANOTHER_TRIAL, OTHER_SIGN
+from kinertia.estimation.simultaneous.instruments.priors import InstrumentPrior
 from kinertia.motion.dynamics import residual
 from kinertia.trial.centre_of_pressure import held_centre_of_pressure
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from kinertia.estimation.drawn_fit import drawn_fit, kept_draws
-from kinertia.estimation.simultaneous.knee_geometry import CENTRE_SD_M
+from kinertia.estimation.simultaneous.uncertainty.knee_geometry import CENTRE_SD_M
 from kinertia.io.text.sto import read_sto
 from kinertia.motion.joint_wrench import body_joints
 from kinertia.report.saved_fit import load_fit

@@ -15,8 +15,8 @@ from kinertia.estimation.free_moment_sign import with_likelier_sign
 from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.simultaneous.calibration_entry import CalibrationEntry
 from kinertia.estimation.simultaneous.fit import fit_simultaneous
-from kinertia.estimation.simultaneous.instruments import InstrumentPrior
-from kinertia.estimation.simultaneous.model_evidence import Evidence, FreeMomentSign
+from kinertia.estimation.simultaneous.instruments.priors import InstrumentPrior
+from kinertia.estimation.simultaneous.uncertainty.model_evidence import Evidence, FreeMomentSign
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.kinematics import Kinematics

@@ -7,7 +7,7 @@ import pytest
 
 from kinertia.estimation.population import UNKNOWN_SPREAD, population_prior
 from kinertia.estimation.prior import literature_prior
-from kinertia.estimation.simultaneous.prior_plausibility import unlikeness
+from kinertia.estimation.simultaneous.uncertainty.prior_plausibility import unlikeness
 from kinertia.model.anthropometry import BodyGeometry, literature_bsp, reference_lengths
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.settings import Instruments, Subject

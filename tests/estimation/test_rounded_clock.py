@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinertia.estimation.simultaneous.motion_basis import MotionBasis
+from kinertia.estimation.simultaneous.linear_algebra.motion_basis import MotionBasis
 from kinertia.io.opensim.reader import read_osim
 from kinertia.settings import Subject
 from kinertia.trial.ground_contact import bridged

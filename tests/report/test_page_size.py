@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from kinertia.estimation.joint_curves import JointCurves
-from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
+from kinertia.estimation.simultaneous.uncertainty.curve_deviations import CurveDeviations
 from kinertia.motion.dynamics import Motion
 from kinertia.report.page import MOST_TRIALS, render
 from kinertia.trial.data import FootLoads

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from kinertia.estimation.prior import literature_prior
-from kinertia.estimation.simultaneous.fisher_information import Information
-from kinertia.estimation.simultaneous.instruments import InstrumentPrior
+from kinertia.estimation.simultaneous.instruments.priors import InstrumentPrior
 from kinertia.estimation.simultaneous.mixture_prior import FaultMixture
-from kinertia.estimation.simultaneous.problem import MapProblem
+from kinertia.estimation.simultaneous.search.problem import MapProblem
+from kinertia.estimation.simultaneous.uncertainty.fisher_information import Information
 from kinertia.studies.simulated_people import held
 from kinertia.synthetic.walk import walking_subject
 from validation import study_bound

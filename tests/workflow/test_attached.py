@@ -9,9 +9,9 @@ from pydantic import ValidationError
 from kinertia.errors import BlockedError, PriorError, SettingsError
 from kinertia.estimation.prepared import Prepared
 from kinertia.estimation.prior import literature_prior
-from kinertia.estimation.simultaneous.bandwidth import Bandwidth
 from kinertia.estimation.simultaneous.fit import calibration_prior
-from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINTY
+from kinertia.estimation.simultaneous.instruments.model_uncertainty import GAIT27_UNCERTAINTY
+from kinertia.estimation.simultaneous.linear_algebra.bandwidth import Bandwidth
 from kinertia.estimation.simultaneous.observation import observe
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous
 from kinertia.estimation.total_mass import TotalMass

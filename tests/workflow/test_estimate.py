@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from kinertia.estimation.simultaneous.markers.skin import OTHER_EXPECTED_SD_M
 from kinertia.estimation.simultaneous.observation import FORCE_SD_OF_WEIGHT
-from kinertia.estimation.simultaneous.skin import OTHER_EXPECTED_SD_M
 from kinertia.io.recording import read_recording
 from kinertia.model.skeleton import GRAVITY_M_S2
 from kinertia.settings import Settings, Subject

@@ -10,7 +10,7 @@ from kinertia.errors import PriorError
 from kinertia.estimation.learnt_prior import LearntPrior
 from kinertia.estimation.prepared import Prepared
 from kinertia.estimation.prior import literature_prior
-from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINTY
+from kinertia.estimation.simultaneous.instruments.model_uncertainty import GAIT27_UNCERTAINTY
 from kinertia.io.subject.bsp_file import BspTable
 from kinertia.model.bsp import PARAMETERS
 from kinertia.settings import KnownSegment, PriorSettings

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from kinertia.estimation.prior import literature_prior
-from kinertia.estimation.simultaneous.bandwidth import Bandwidth
 from kinertia.estimation.simultaneous.fit import calibration_prior
-from kinertia.estimation.simultaneous.instruments import InstrumentInformation, InstrumentPrior
+from kinertia.estimation.simultaneous.instruments.plates import PLATE_UNKNOWNS, plates_with_floor
+from kinertia.estimation.simultaneous.instruments.priors import InstrumentInformation, InstrumentPrior
+from kinertia.estimation.simultaneous.linear_algebra.bandwidth import Bandwidth
 from kinertia.estimation.simultaneous.mixture_prior import GaussianPrior
 from kinertia.estimation.simultaneous.observation import observe
-from kinertia.estimation.simultaneous.plates import PLATE_UNKNOWNS, plates_with_floor
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous
 from kinertia.studies.simulated_people import MOTIONS
 from kinertia.synthetic.faults import Faults, measured

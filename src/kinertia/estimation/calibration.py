@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from kinertia.errors import TrialError
-from kinertia.estimation.simultaneous.range_terms import RangeTerms
+from kinertia.estimation.simultaneous.terms.range_terms import RangeTerms
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.model.coordinate_range import Bounds

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.interpolate import make_interp_spline
 
 from kinertia.estimation.joint_curves import JointCurves
-from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
+from kinertia.estimation.simultaneous.uncertainty.curve_deviations import CurveDeviations
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion
 from kinertia.motion.gait_cycle import Stride

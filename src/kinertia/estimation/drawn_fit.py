@@ -7,8 +7,8 @@ from scipy.interpolate import BSpline
 
 from kinertia.errors import KinertiaError
 from kinertia.estimation.result import Fit
-from kinertia.estimation.simultaneous.plate_loads import GAIN, corrected_loads
-from kinertia.estimation.simultaneous.posterior_draws import PosteriorDraws, TrialDraws
+from kinertia.estimation.simultaneous.instruments.plate_loads import GAIN, corrected_loads
+from kinertia.estimation.simultaneous.uncertainty.posterior_draws import PosteriorDraws, TrialDraws
 from kinertia.estimation.trial_fit import TrialFit
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Skeleton

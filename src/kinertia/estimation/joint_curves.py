@@ -12,8 +12,8 @@ from typing import Self, TypeAlias
 
 import numpy as np
 
-from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
-from kinertia.estimation.simultaneous.knee_geometry import with_drawn_knees
+from kinertia.estimation.simultaneous.uncertainty.curve_deviations import CurveDeviations
+from kinertia.estimation.simultaneous.uncertainty.knee_geometry import with_drawn_knees
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion, inverse_dynamics

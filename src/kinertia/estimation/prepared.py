@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 from kinertia.estimation.input_checks import known
 from kinertia.estimation.prior import BspPrior
-from kinertia.estimation.simultaneous.model_uncertainty import ModelUncertainty
+from kinertia.estimation.simultaneous.instruments.model_uncertainty import ModelUncertainty
 from kinertia.estimation.total_mass import TotalMass
 from kinertia.findings.finding import Finding
 from kinertia.model.bsp import BodySegmentParameters

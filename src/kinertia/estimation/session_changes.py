@@ -29,7 +29,7 @@ from kinertia.estimation.condition_changes import (
 )
 from kinertia.estimation.drawn_fit import kept_draws
 from kinertia.estimation.result import Fit
-from kinertia.estimation.simultaneous.posterior_draws import PosteriorDraws
+from kinertia.estimation.simultaneous.uncertainty.posterior_draws import PosteriorDraws
 from kinertia.estimation.stride_features import features_of_draw, only, stride_features, usual_sources
 from kinertia.estimation.trial_fit import TrialFit
 from kinertia.model.gait27 import AXIS_TILTS

@@ -11,7 +11,7 @@ import numpy as np
 from kinertia.estimation.cycles import CycleCurve, curves_by_stage
 from kinertia.estimation.drawn_fit import drawn_fit, kept_draws
 from kinertia.estimation.result import Fit
-from kinertia.estimation.simultaneous.posterior_draws import PosteriorDraws
+from kinertia.estimation.simultaneous.uncertainty.posterior_draws import PosteriorDraws
 from kinertia.estimation.trial_fit import TrialFit
 from kinertia.motion.gait_cycle import PERCENT, Stride
 

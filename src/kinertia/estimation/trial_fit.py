@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kinertia.estimation.joint_curves import JointCurves
-from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
+from kinertia.estimation.simultaneous.uncertainty.curve_deviations import CurveDeviations
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.contact_phases import contact_phases
 from kinertia.motion.dynamics import Motion

@@ -9,15 +9,15 @@ from kinertia.estimation.identifiability import BaseParameters, Combination
 from kinertia.estimation.joint_curves import JointCurves
 from kinertia.estimation.result import Fit
 from kinertia.estimation.simultaneous.calibration_entry import CalibrationEntry
-from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
 from kinertia.estimation.simultaneous.fit import Posterior
-from kinertia.estimation.simultaneous.instruments import InstrumentInformation
-from kinertia.estimation.simultaneous.marker_noise import MarkerNoise
-from kinertia.estimation.simultaneous.mass_asymmetry import OneSided
-from kinertia.estimation.simultaneous.missing_load_evidence import MissingLoad
-from kinertia.estimation.simultaneous.model_evidence import FreeMomentSign
-from kinertia.estimation.simultaneous.posterior_draws import PosteriorDraws, TrialDraws
-from kinertia.estimation.simultaneous.prior_plausibility import Unlikeness
+from kinertia.estimation.simultaneous.instruments.priors import InstrumentInformation
+from kinertia.estimation.simultaneous.markers.marker_noise import MarkerNoise
+from kinertia.estimation.simultaneous.uncertainty.curve_deviations import CurveDeviations
+from kinertia.estimation.simultaneous.uncertainty.mass_asymmetry import OneSided
+from kinertia.estimation.simultaneous.uncertainty.missing_load_evidence import MissingLoad
+from kinertia.estimation.simultaneous.uncertainty.model_evidence import FreeMomentSign
+from kinertia.estimation.simultaneous.uncertainty.posterior_draws import PosteriorDraws, TrialDraws
+from kinertia.estimation.simultaneous.uncertainty.prior_plausibility import Unlikeness
 from kinertia.estimation.trial_fit import TrialFit
 from kinertia.findings.finding import Finding
 from kinertia.findings.quantity import Quantity

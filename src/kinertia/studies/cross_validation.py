@@ -14,8 +14,8 @@ from kinertia.errors import KinertiaError
 from kinertia.estimation.free_moment_sign import with_likelier_sign
 from kinertia.estimation.prepared import Prepared, Progress
 from kinertia.estimation.prior import BspPrior
-from kinertia.estimation.simultaneous.bandwidth import Bandwidth
 from kinertia.estimation.simultaneous.fit import SimultaneousFit, fit_simultaneous
+from kinertia.estimation.simultaneous.linear_algebra.bandwidth import Bandwidth
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.motion.dynamics import residual
 from kinertia.motion.kinematics import Kinematics

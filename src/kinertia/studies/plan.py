@@ -17,11 +17,11 @@ import pandas as pd
 from kinertia.estimation.identifiability import evidence
 from kinertia.estimation.prepared import Prepared
 from kinertia.estimation.prior import BspPrior, literature_prior
-from kinertia.estimation.simultaneous.bandwidth import Bandwidth
-from kinertia.estimation.simultaneous.fisher_information import Information
 from kinertia.estimation.simultaneous.fit import calibration_prior, observed, used_skeleton
-from kinertia.estimation.simultaneous.model_uncertainty import GAIT27_UNCERTAINTY, ModelUncertainty
-from kinertia.estimation.simultaneous.problem import MapProblem
+from kinertia.estimation.simultaneous.instruments.model_uncertainty import GAIT27_UNCERTAINTY, ModelUncertainty
+from kinertia.estimation.simultaneous.linear_algebra.bandwidth import Bandwidth
+from kinertia.estimation.simultaneous.search.problem import MapProblem
+from kinertia.estimation.simultaneous.uncertainty.fisher_information import Information
 from kinertia.model.bsp import PARAMETERS, UNITS
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.kinematics import Kinematics

@@ -9,14 +9,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kinertia.estimation.prior import BspPrior, literature_prior
-from kinertia.estimation.simultaneous.bandwidth import Bandwidth
 from kinertia.estimation.simultaneous.fit import calibration_prior
-from kinertia.estimation.simultaneous.instruments import InstrumentPrior
+from kinertia.estimation.simultaneous.instruments.plates import FLOOR_UNKNOWNS, PLATE_UNKNOWNS
+from kinertia.estimation.simultaneous.instruments.priors import InstrumentPrior
+from kinertia.estimation.simultaneous.linear_algebra.bandwidth import Bandwidth
 from kinertia.estimation.simultaneous.mixture_prior import FaultMixture
 from kinertia.estimation.simultaneous.observation import Observations, observe
 from kinertia.estimation.simultaneous.observed_trial import CalibrationPrior
 from kinertia.estimation.simultaneous.outcome import SimultaneousResult
-from kinertia.estimation.simultaneous.plates import FLOOR_UNKNOWNS, PLATE_UNKNOWNS
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.kinematics import Kinematics

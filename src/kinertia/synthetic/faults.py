@@ -12,9 +12,9 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
-from kinertia.estimation.simultaneous.instruments import InstrumentPrior
-from kinertia.estimation.simultaneous.model_uncertainty import JOINT_CENTRE_SD_M, MARKER_SD_M
-from kinertia.estimation.simultaneous.plates import plate_middles, turned_loads
+from kinertia.estimation.simultaneous.instruments.model_uncertainty import JOINT_CENTRE_SD_M, MARKER_SD_M
+from kinertia.estimation.simultaneous.instruments.plates import plate_middles, turned_loads
+from kinertia.estimation.simultaneous.instruments.priors import InstrumentPrior
 from kinertia.model.gait27 import HIP_OFFSETS, LUMBAR_OFFSETS, SHOULDER_OFFSETS
 from kinertia.model.skeleton import GRAVITY_M_S2, Skeleton
 from kinertia.motion.kinematics import Kinematics, solve_kinematics

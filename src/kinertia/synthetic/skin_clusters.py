@@ -1,9 +1,9 @@
 """Moves each segment's markers as a rigid cluster, by harmonics of the stride that no joint angle explains.
 
-It contradicts the estimator's model of skin (`kinertia.estimation.simultaneous.skin`) on purpose: displacements along
-three axes and rotations about three, each a sum of the stride's first harmonics with random phases. Sizes are those of
-`kinertia.synthetic.noise.SkinMotion`. Rotations are as large as displacements at `_ARM_M` from the middle of the
-markers.
+It contradicts the estimator's model of skin (`kinertia.estimation.simultaneous.markers.skin`) on purpose: displacements
+along three axes and rotations about three, each a sum of the stride's first harmonics with random phases. Sizes are
+those of `kinertia.synthetic.noise.SkinMotion`. Rotations are as large as displacements at `_ARM_M` from the middle of
+the markers.
 """
 
 from collections.abc import Mapping

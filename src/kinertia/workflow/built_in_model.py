@@ -22,7 +22,7 @@ from kinertia.estimation.input_checks import complete_subject, known
 from kinertia.estimation.knee_excursion import show_knee_axes
 from kinertia.estimation.population import population_prior
 from kinertia.estimation.prior import literature_prior
-from kinertia.estimation.simultaneous.model_uncertainty import (
+from kinertia.estimation.simultaneous.instruments.model_uncertainty import (
     GAIT27_UNCERTAINTY,
     JOINT_AXIS_SD_RAD,
     MARKER_SD_M,

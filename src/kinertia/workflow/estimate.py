@@ -15,10 +15,10 @@ from kinertia.estimation.joint_curves import JointCurves
 from kinertia.estimation.prepared import Prepared, Progress
 from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.result import Fit
-from kinertia.estimation.simultaneous.bandwidth import Bandwidth
-from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
 from kinertia.estimation.simultaneous.fit import Posterior, SimultaneousFit, fit_simultaneous
-from kinertia.estimation.simultaneous.model_uncertainty import ModelUncertainty
+from kinertia.estimation.simultaneous.instruments.model_uncertainty import ModelUncertainty
+from kinertia.estimation.simultaneous.linear_algebra.bandwidth import Bandwidth
+from kinertia.estimation.simultaneous.uncertainty.curve_deviations import CurveDeviations
 from kinertia.estimation.trial_fit import TrialFit
 from kinertia.estimation.two_level import Window, correct_pelvis, estimate_two_level, intervals
 from kinertia.model.bsp import BodySegmentParameters

@@ -15,7 +15,11 @@ from kinertia.estimation.estimated_bodies import estimated_bodies
 from kinertia.estimation.input_checks import complete_subject, known
 from kinertia.estimation.population import population_prior
 from kinertia.estimation.prior import SCALE_SD, BspPrior, literature_prior
-from kinertia.estimation.simultaneous.model_uncertainty import JOINT_CENTRE_SD_M, MARKER_SD_M, ModelUncertainty
+from kinertia.estimation.simultaneous.instruments.model_uncertainty import (
+    JOINT_CENTRE_SD_M,
+    MARKER_SD_M,
+    ModelUncertainty,
+)
 from kinertia.estimation.total_mass import TotalMass
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity

@@ -8,7 +8,7 @@ import numpy as np
 
 from kinertia.errors import SettingsError
 from kinertia.estimation.prior import BspPrior
-from kinertia.estimation.simultaneous.model_uncertainty import ModelUncertainty
+from kinertia.estimation.simultaneous.instruments.model_uncertainty import ModelUncertainty
 from kinertia.findings.finding import Finding
 from kinertia.model.coordinate_range import UNKNOWN, Range
 from kinertia.model.skeleton import Skeleton

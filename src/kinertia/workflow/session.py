@@ -10,10 +10,10 @@ from kinertia.errors import SessionError
 from kinertia.estimation.prepared import Prepared
 from kinertia.estimation.result import Fit
 from kinertia.estimation.simultaneous.calibration_entry import CalibrationEntry, item_text, quantity_text
-from kinertia.estimation.simultaneous.instrument_errors import laboratory_errors
-from kinertia.estimation.simultaneous.instruments import InstrumentInformation, InstrumentPrior
+from kinertia.estimation.simultaneous.instruments.instrument_errors import laboratory_errors
+from kinertia.estimation.simultaneous.instruments.plates import PLATE_ERRORS, plates_with_floor
+from kinertia.estimation.simultaneous.instruments.priors import InstrumentInformation, InstrumentPrior
 from kinertia.estimation.simultaneous.mixture_prior import GaussianPrior
-from kinertia.estimation.simultaneous.plates import PLATE_ERRORS, plates_with_floor
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.io.subject.session_file import PersonInstruments

@@ -8,7 +8,7 @@ from kinertia.diagnostics.result.corrections import delays, zero_offsets
 from kinertia.diagnostics.result.free_moments import free_moments
 from kinertia.diagnostics.result.plate_positions import plate_positions
 from kinertia.diagnostics.runner import explained
-from kinertia.estimation.simultaneous.model_evidence import FreeMomentSign
+from kinertia.estimation.simultaneous.uncertainty.model_evidence import FreeMomentSign
 from kinertia.findings.finding import Severity
 from results import codes, context, error, walking
 

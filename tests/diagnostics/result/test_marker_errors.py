@@ -7,7 +7,7 @@ import pytest
 
 from kinertia.diagnostics.result.marker_errors import corrected_joints, moved_markers
 from kinertia.estimation.simultaneous.calibration_entry import AXIS, CalibrationEntry
-from kinertia.estimation.simultaneous.marker_noise import MarkerNoise
+from kinertia.estimation.simultaneous.markers.marker_noise import MarkerNoise
 from results import codes, context, walking
 
 TWO = {"walk": walking(), "run": walking()}

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kinertia.diagnostics.result.plate_positions import plate_positions
-from kinertia.estimation.simultaneous.instruments import InstrumentInformation, InstrumentPrior
+from kinertia.estimation.simultaneous.instruments.priors import InstrumentInformation, InstrumentPrior
 from kinertia.findings.finding import Severity
 from kinertia.settings import Instruments
 from results import codes, context, error

@@ -12,7 +12,7 @@ import numpy as np
 from kinertia.diagnostics.result.context import ResultContext
 from kinertia.diagnostics.result.corrections import corrected, equal
 from kinertia.estimation.simultaneous.calibration_entry import GAIN, CalibrationEntry
-from kinertia.estimation.simultaneous.missing_load_evidence import SURE
+from kinertia.estimation.simultaneous.uncertainty.missing_load_evidence import SURE
 from kinertia.findings.finding import Finding, finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where

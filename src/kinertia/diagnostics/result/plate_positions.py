@@ -14,8 +14,8 @@ import numpy as np
 from kinertia.diagnostics.result.context import ResultContext
 from kinertia.diagnostics.result.corrections import corrected, correction, equal
 from kinertia.estimation.simultaneous.calibration_entry import POSITION, CalibrationEntry
-from kinertia.estimation.simultaneous.instruments import InstrumentInformation, InstrumentPrior
-from kinertia.estimation.simultaneous.plates import FLOOR_UNKNOWNS, PLATE_UNKNOWNS
+from kinertia.estimation.simultaneous.instruments.plates import FLOOR_UNKNOWNS, PLATE_UNKNOWNS
+from kinertia.estimation.simultaneous.instruments.priors import InstrumentInformation, InstrumentPrior
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 

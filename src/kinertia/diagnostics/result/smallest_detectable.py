@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from kinertia.estimation.simultaneous.instruments import InstrumentInformation, InstrumentPrior
-from kinertia.estimation.simultaneous.plates import FLOOR_UNKNOWNS, PLATE_UNKNOWNS
+from kinertia.estimation.simultaneous.instruments.plates import FLOOR_UNKNOWNS, PLATE_UNKNOWNS
+from kinertia.estimation.simultaneous.instruments.priors import InstrumentInformation, InstrumentPrior
 
 
 def smallest_detectable(shown: InstrumentInformation, prior: InstrumentPrior, unknown: str) -> float:

@@ -10,8 +10,8 @@ import numpy as np
 
 from kinertia.diagnostics.result.context import ResultContext
 from kinertia.estimation.result import Fit
-from kinertia.estimation.simultaneous.mass_asymmetry import OneSided
-from kinertia.estimation.simultaneous.prior_plausibility import UNLIKE_CHANCE, Unlikeness
+from kinertia.estimation.simultaneous.uncertainty.mass_asymmetry import OneSided
+from kinertia.estimation.simultaneous.uncertainty.prior_plausibility import UNLIKE_CHANCE, Unlikeness
 from kinertia.findings.display import first_few
 from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.quantity import Quantity

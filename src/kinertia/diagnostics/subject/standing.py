@@ -8,7 +8,7 @@ import numpy as np
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.person_context import PersonContext
 from kinertia.diagnostics.plates.plate_height import heights_on_plates
-from kinertia.estimation.simultaneous.model_uncertainty import JOINT_CENTRE_SD_M, WITHOUT_STATIC
+from kinertia.estimation.simultaneous.instruments.model_uncertainty import JOINT_CENTRE_SD_M, WITHOUT_STATIC
 from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.motion.stance_pose import hidden_landmarks

@@ -7,11 +7,11 @@ from functools import cached_property
 import numpy as np
 
 from kinertia.estimation.prior import BspPrior
+from kinertia.estimation.simultaneous.instruments.plates import FootPlates
 from kinertia.estimation.simultaneous.layout import Layout
-from kinertia.estimation.simultaneous.motion_basis import MotionBasis
+from kinertia.estimation.simultaneous.linear_algebra.motion_basis import MotionBasis
+from kinertia.estimation.simultaneous.markers.skin import SkinPatterns
 from kinertia.estimation.simultaneous.observed_trial import CalibrationPrior, Observation
-from kinertia.estimation.simultaneous.plates import FootPlates
-from kinertia.estimation.simultaneous.skin import SkinPatterns
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.log_cholesky import from_log_cholesky
 from kinertia.model.skeleton import Skeleton

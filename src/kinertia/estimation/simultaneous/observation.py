@@ -10,10 +10,11 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from kinertia.estimation.simultaneous.bandwidth import Bandwidth
-from kinertia.estimation.simultaneous.error_repetition import repeats
-from kinertia.estimation.simultaneous.impacts import impact_factors
-from kinertia.estimation.simultaneous.marker_noise import (
+from kinertia.estimation.simultaneous.instruments.impacts import impact_factors
+from kinertia.estimation.simultaneous.instruments.plates import FootPlates, plate_middles
+from kinertia.estimation.simultaneous.linear_algebra.bandwidth import Bandwidth
+from kinertia.estimation.simultaneous.markers.error_repetition import repeats
+from kinertia.estimation.simultaneous.markers.marker_noise import (
     MarkerNoise,
     WithoutSkin,
     correlated_frames,
@@ -23,11 +24,10 @@ from kinertia.estimation.simultaneous.marker_noise import (
     taken_by_chance,
     weighed,
 )
+from kinertia.estimation.simultaneous.markers.shoulder_girdle import girdle_variance
+from kinertia.estimation.simultaneous.markers.skin import SkinPatterns, skin_patterns
+from kinertia.estimation.simultaneous.markers.soft_tissue import swing_factors
 from kinertia.estimation.simultaneous.observed_trial import Observation
-from kinertia.estimation.simultaneous.plates import FootPlates, plate_middles
-from kinertia.estimation.simultaneous.shoulder_girdle import girdle_variance
-from kinertia.estimation.simultaneous.skin import SkinPatterns, skin_patterns
-from kinertia.estimation.simultaneous.soft_tissue import swing_factors
 from kinertia.model.skeleton import GRAVITY_M_S2, Skeleton
 from kinertia.motion.frame_chunks import pieces
 from kinertia.motion.ground_reactions import ground_reactions

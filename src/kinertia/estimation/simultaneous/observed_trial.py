@@ -7,10 +7,10 @@ from typing import Self
 
 import numpy as np
 
-from kinertia.estimation.simultaneous.instruments import InstrumentPrior
-from kinertia.estimation.simultaneous.marker_errors import ErrorProcess
-from kinertia.estimation.simultaneous.plates import FootPlates
-from kinertia.estimation.simultaneous.skin import SkinPatterns
+from kinertia.estimation.simultaneous.instruments.plates import FootPlates
+from kinertia.estimation.simultaneous.instruments.priors import InstrumentPrior
+from kinertia.estimation.simultaneous.markers.marker_errors import ErrorProcess
+from kinertia.estimation.simultaneous.markers.skin import SkinPatterns
 from kinertia.motion.kinematics import AROUND_WINDOW_S
 from kinertia.trial.sampled_time import within
 

@@ -7,16 +7,16 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from kinertia.estimation.simultaneous.calibration_entry import CalibrationEntry
-from kinertia.estimation.simultaneous.cost_term import Solution
-from kinertia.estimation.simultaneous.curve_deviations import CurveDeviations
-from kinertia.estimation.simultaneous.instrument_support import InstrumentSupport
-from kinertia.estimation.simultaneous.instruments import InstrumentInformation
-from kinertia.estimation.simultaneous.linearised import Linearised, Point
-from kinertia.estimation.simultaneous.missing_load_evidence import MissingLoad
+from kinertia.estimation.simultaneous.instruments.priors import InstrumentInformation
 from kinertia.estimation.simultaneous.mixture_prior import GaussianPrior
-from kinertia.estimation.simultaneous.model_evidence import Evidence
-from kinertia.estimation.simultaneous.posterior_draws import PosteriorDraws
-from kinertia.estimation.simultaneous.problem import MapProblem
+from kinertia.estimation.simultaneous.search.linearised import Linearised, Point
+from kinertia.estimation.simultaneous.search.problem import MapProblem
+from kinertia.estimation.simultaneous.terms.cost_term import Solution
+from kinertia.estimation.simultaneous.uncertainty.curve_deviations import CurveDeviations
+from kinertia.estimation.simultaneous.uncertainty.instrument_support import InstrumentSupport
+from kinertia.estimation.simultaneous.uncertainty.missing_load_evidence import MissingLoad
+from kinertia.estimation.simultaneous.uncertainty.model_evidence import Evidence
+from kinertia.estimation.simultaneous.uncertainty.posterior_draws import PosteriorDraws
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion

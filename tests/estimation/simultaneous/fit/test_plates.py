@@ -5,8 +5,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from kinertia.estimation.simultaneous.fit import held_against
-from kinertia.estimation.simultaneous.instruments import DELAY_PRIOR_S, FLOOR_PRIOR, PLATE_PRIOR
-from kinertia.estimation.simultaneous.model_uncertainty import JOINT_CENTRE_SD_M
+from kinertia.estimation.simultaneous.instruments.model_uncertainty import JOINT_CENTRE_SD_M
+from kinertia.estimation.simultaneous.instruments.priors import DELAY_PRIOR_S, FLOOR_PRIOR, PLATE_PRIOR
 from kinertia.synthetic.walk import walking_subject
 from kinertia.trial.centre_of_pressure import centre_of_pressure
 from kinertia.trial.sampled_time import runs

@@ -1,0 +1,227 @@
+"""Defines priors of plates and synchronisation: from the literature, the laboratory, and the session's other people."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from kinertia.estimation.simultaneous.instruments.plates import FLOOR_UNKNOWNS, PLATE_UNKNOWNS
+from kinertia.estimation.simultaneous.mixture_prior import ErrorPriors, FaultMixture
+from kinertia.settings import Instruments
+from kinertia.trial.plate_names import columns_of_several_trials
+
+FAULT_PROBABILITY = 0.05
+PLATE_PRIOR: Mapping[str, FaultMixture] = {
+    "x": FaultMixture(0.0005, 0.015, FAULT_PROBABILITY),
+    "z": FaultMixture(0.0005, 0.015, FAULT_PROBABILITY),
+    "gain": FaultMixture(0.002, 0.03, FAULT_PROBABILITY),
+    "free moment": FaultMixture(0.0003, 0.003, FAULT_PROBABILITY),
+    "turn": FaultMixture(float(np.radians(0.1)), float(np.radians(3.0)), FAULT_PROBABILITY),
+}
+"""Names and units as in PLATE_UNKNOWNS. Place: centres of pressure of four commercial plates were off by 2.3, 2.6, 11.8
+and 14.0 mm on average (Cedraro et al. 2011, Gait Posture 33:724), part of it a constant; sound plates and others. Gain:
+scale and plates of a laboratory may differ by 2 % before it is worth a warning. Free moment: a tenth of a percent of
+the vertical force at 0.3 m, and ten times that (no source). Turn: plates are mounted square; a corner that was surveyed
+or entered 25 mm beside its place rotates a plate by 3 degrees (no source)."""
+FLOOR_PRIOR: Mapping[str, FaultMixture] = {
+    "x": FaultMixture(0.0005, 0.005, FAULT_PROBABILITY),
+    "z": FaultMixture(0.0005, 0.005, FAULT_PROBABILITY),
+    "turn": FaultMixture(float(np.radians(0.3)), float(np.radians(2.0)), 0.2),
+}
+"""Names and units as in FLOOR_UNKNOWNS: plates and cameras were surveyed in different axes. Turn: with a prior of 5
+degrees, walks and runs of eleven laboratories show 0.2 to 0.5 degrees where they show them to half a degree (three),
+1.6 and 3.6 degrees in two, and in the others less than their SDs, of 1 to 2 degrees. A frame laid on the floor by eye
+is a few degrees askew."""
+DELAY_PRIOR_S = FaultMixture(0.0003, 0.005, 0.2, faulty_mean=0.006)
+"""Apparent delay of the forces. Synchronous: half a sample of the plates. Delayed: with a prior that says nothing (SD
+20 ms), 80 recordings of 26 laboratories have delays of 4.3 ms with an SD of 4.4 between laboratories, 8.2 where
+amplifiers are analogue and 2.3 elsewhere: rather late than early. Some 2 ms of a delay may be soft tissue, which lags
+behind. Delays are assumed rarer than among these: where forces are synchronous, 30 % with zero mean cost ankle
+moments 6 %, these 1 %. Forces that are 10 ms early are found as well as with that prior."""
+TRIAL_DELAY_PRIOR_S = FaultMixture(0.00003, 0.010, 0.04)
+"""Delay of one trial, besides the synchronisation delay: cameras and plates that start together do so in every trial;
+of two runs on one treadmill, forces of the first are delayed by 8.4 ms and of the second by 13.5. A stated
+synchronisation holds for every trial."""
+ZERO_PRIOR_N = FaultMixture(1.0, 10.0, FAULT_PROBABILITY)
+"""Zero offset of horizontal forces. Unloaded, four plates of published trials read 0.2 to 3 N and a fifth one 12 N;
+under people who stand still, two plates together read 2 N."""
+
+TRIAL_GAIN_PRIOR = FaultMixture(0.001, 0.03, 0.3)
+"""Gain error of a plate in one trial, besides that in all trials. One person weighed 60 kg standing and squatting, and
+63.5 to 64 walking on the same plates of one session: two trials of seven are 4 % off the others."""
+
+
+@dataclass(frozen=True, eq=False)
+class InstrumentInformation:
+    """Information of one person's trials on plates and synchronisation.
+
+    There are k = 5 p + 4 unknowns for p plates, the common plate offset and the delay, in this order, each plate's as
+    in PLATE_UNKNOWNS, the common ones as in FLOOR_UNKNOWNS. No prior is included.
+
+    Attributes:
+        plates: names.
+        information: (k, k) of normal equations in m, 1, N m/N, rad and s.
+        rhs: (k,) their right-hand side: information times the values from these trials.
+
+    >>> shown = InstrumentInformation(("left",), np.eye(9), np.zeros(9))
+    >>> shown.among(("right", "left"), InstrumentPrior()).information.shape
+    (14, 14)
+    """
+
+    plates: tuple[str, ...]
+    information: np.ndarray
+    rhs: np.ndarray
+
+    @classmethod
+    def of_posterior(
+        cls, plates: Sequence[str], mean: np.ndarray, covariance: np.ndarray, before: Sequence[tuple[np.ndarray, ...]]
+    ) -> InstrumentInformation:
+        """Return what a posterior, mean (k,) and covariance (k, k), adds to prior knowledge.
+
+        `before` holds information and right-hand side of each source of prior knowledge.
+        """
+        after = np.linalg.inv(covariance)
+        information = after - sum(each for each, _ in before)
+        rhs = after @ mean - sum(each for _, each in before)
+        return cls(tuple(plates), *_never_negative(information, rhs, np.sqrt(np.diag(after))))
+
+    def without_own(self, sd: np.ndarray) -> InstrumentInformation:
+        """Eliminate the t unknowns that are specific to trials, which come last, given their standard deviations (t,).
+
+        They are independent, with a mean of zero.
+        """
+        size = len(self.rhs) - len(sd)
+        across = self.information[:size, size:]
+        own = self.information[size:, size:] + np.diag(1.0 / np.square(sd))
+        through = np.linalg.solve(own, np.column_stack([across.T, self.rhs[size:]]))
+        information = self.information[:size, :size] - across @ through[:, :-1]
+        return InstrumentInformation(self.plates, information, self.rhs[:size] - across @ through[:, -1])
+
+    def among(self, plates: Sequence[str], prior: InstrumentPrior) -> InstrumentInformation:
+        """Convert to these plates; a plate that is not among them contributes no more than its prior."""
+        every = tuple(dict.fromkeys([*plates, *self.plates]))
+        each = len(PLATE_UNKNOWNS)
+        here = np.concatenate([each * every.index(name) + np.arange(each) for name in self.plates]).astype(int)
+        size = each * len(every)
+        here = np.concatenate([here, size + np.arange(len(FLOOR_UNKNOWNS) + 1)])
+        information, rhs = np.zeros((size + len(FLOOR_UNKNOWNS) + 1,) * 2), np.zeros(size + len(FLOOR_UNKNOWNS) + 1)
+        information[np.ix_(here, here)], rhs[here] = self.information, self.rhs
+        other = np.arange(each * len(plates), size)
+        kept = np.setdiff1d(np.arange(len(rhs)), other)
+        deviations = np.tile([prior.plate[name].sd for name in PLATE_UNKNOWNS], len(every) - len(plates))
+        own = information[np.ix_(other, other)] + np.diag(1.0 / np.square(deviations))
+        through = np.linalg.solve(own, np.column_stack([information[np.ix_(other, kept)], rhs[other]]))
+        across = information[np.ix_(kept, other)]
+        return InstrumentInformation(
+            tuple(plates),
+            information[np.ix_(kept, kept)] - across @ through[:, :-1],
+            rhs[kept] - across @ through[:, -1],
+        )
+
+
+def _never_negative(information: np.ndarray, rhs: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Remove directions in which the information, over its scale, is negative.
+
+    They may result from rounding, and from replacing a mixture of two components by one Gaussian.
+    """
+    values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
+    kept = vectors[:, values > 0.0]
+    scaled = kept * scale[:, None]
+    return scaled * values[values > 0.0] @ scaled.T, scale * (kept @ (kept.T @ (rhs / scale)))
+
+
+@dataclass(frozen=True, eq=False)
+class InstrumentPrior:
+    """Prior knowledge of plates and synchronisation, before a person's trials.
+
+    Attributes:
+        plate: prior of each of PLATE_UNKNOWNS, for every plate on its own.
+        floor: prior of each of FLOOR_UNKNOWNS, for all plates together.
+        delay_s: prior of the delay between forces and markers.
+        trial_delay_s: prior of the additional delay of the forces of one of several trials.
+        zero_offset_n: prior of the zero offsets of each plate's horizontal forces in each trial.
+        trial_gain: prior of each plate's additional gain error in each trial.
+        session: information from other people measured with the same instruments.
+        incomplete: plates of whose loads a part is missing: these trials do not show their gains, which stay nominal.
+
+    >>> stated = InstrumentPrior.stated(Instruments(plate_sd_mm=1.0))
+    >>> stated.plate["x"].sd, stated.delay_s == InstrumentPrior().delay_s
+    (0.001, True)
+    """
+
+    plate: Mapping[str, FaultMixture] = field(default_factory=lambda: PLATE_PRIOR)
+    floor: Mapping[str, FaultMixture] = field(default_factory=lambda: FLOOR_PRIOR)
+    delay_s: FaultMixture = DELAY_PRIOR_S
+    trial_delay_s: FaultMixture = TRIAL_DELAY_PRIOR_S
+    zero_offset_n: FaultMixture = ZERO_PRIOR_N
+    trial_gain: FaultMixture = TRIAL_GAIN_PRIOR
+    session: tuple[InstrumentInformation, ...] = ()
+    incomplete: frozenset[str] = frozenset()
+
+    @classmethod
+    def stated(cls, instruments: Instruments, session: Sequence[InstrumentInformation] = ()) -> InstrumentPrior:
+        """Build the prior from the laboratory's statements: what it has checked is normal with that standard deviation.
+
+        The rest is the literature's. A check of the centre of pressure against the cameras covers plate and common
+        offset together.
+        """
+        result = cls(session=tuple(session))
+        if instruments.plate_sd_mm is not None:
+            place, none = (FaultMixture.certain(mm / 1e3) for mm in (instruments.plate_sd_mm, _NO_FLOOR_MM))
+            result = replace(
+                result,
+                plate={**result.plate, **dict.fromkeys(_PLACE, place)},
+                floor={**result.floor, **dict.fromkeys(_PLACE, none)},
+            )
+        if instruments.gain_sd_percent is not None:
+            gain = FaultMixture.certain(instruments.gain_sd_percent / 100.0)
+            of_trials = FaultMixture.certain(TRIAL_GAIN_PRIOR.nominal_sd)
+            result = replace(result, plate={**result.plate, "gain": gain}, trial_gain=of_trials)
+        if instruments.clock_sd_ms is not None:
+            delay, of_trial = instruments.clock_sd_ms / 1e3, TRIAL_DELAY_PRIOR_S.nominal_sd
+            result = replace(result, delay_s=FaultMixture.certain(delay), trial_delay_s=FaultMixture.certain(of_trial))
+        return result
+
+    def of_unknowns(self, plates: Sequence[str]) -> ErrorPriors:
+        """Return the priors of all plates' unknowns, the common plate offset's and the delay's.
+
+        Columns of the same name in the force files of several trials count as plates of their own, but are mostly the
+        same one: the common part of their faults has a prior, too.
+        """
+        names = list(PLATE_UNKNOWNS)
+        own = [self._nominal(self.plate[name], plate, name) for plate in plates for name in names]
+        common = [
+            (FaultMixture(_HARDLY * prior.nominal_sd, prior.faulty_sd, prior.fault_probability), tuple(places))
+            for column in columns_of_several_trials(plates)
+            for k, prior in enumerate(self.plate[name] for name in names)
+            if (places := [len(names) * plate + k for plate in column]) and prior.fault_probability > 0.0
+        ]
+        floor = [self.floor[name] for name in FLOOR_UNKNOWNS]
+        return ErrorPriors((*own, *floor, self.delay_s), tuple(common))
+
+    def trial_gain_of(self, plate: str) -> FaultMixture:
+        """Return the prior of a plate's additional gain error in each trial."""
+        return self._nominal(self.trial_gain, plate, "gain")
+
+    def _nominal(self, prior: FaultMixture, plate: str, name: str) -> FaultMixture:
+        """Return the prior of an error of a plate, without a fault if incomplete loads would seem to be one."""
+        return FaultMixture.certain(prior.nominal_sd) if name == "gain" and plate in self.incomplete else prior
+
+    def of_session(self, plates: Sequence[str]) -> InstrumentInformation:
+        """Return the information of the session's other people on these plates, combined."""
+        size = len(PLATE_UNKNOWNS) * len(plates) + len(FLOOR_UNKNOWNS) + 1
+        information, rhs = np.zeros((size, size)), np.zeros(size)
+        for each in self.session:
+            shown = each.among(plates, self)
+            information += shown.information
+            rhs += shown.rhs
+        return InstrumentInformation(tuple(plates), information, rhs)
+
+
+_HARDLY = 0.1
+"""Fault-free columns have hardly anything in common that they do not have with all plates."""
+_PLACE = ("x", "z")
+_NO_FLOOR_MM = 0.1
+"""Standard deviation of the common plate offset if the plates' positions have been checked against the cameras."""

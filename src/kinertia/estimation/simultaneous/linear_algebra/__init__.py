@@ -1,0 +1,1 @@
+"""Solves the normal equations: bands over time, with a border of what does not move."""

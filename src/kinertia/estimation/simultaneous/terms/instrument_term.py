@@ -1,0 +1,194 @@
+"""Adds errors of force plates and synchronisation: the laboratory's in all trials, and each trial's own."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from kinertia.estimation.simultaneous.inputs import FreedModel, Given
+from kinertia.estimation.simultaneous.instruments.instrument_errors import FoundErrors, instrument_errors
+from kinertia.estimation.simultaneous.instruments.plate_loads import GAIN
+from kinertia.estimation.simultaneous.instruments.plates import PLATE_ERRORS, ZERO_UNKNOWNS, plates_with_floor
+from kinertia.estimation.simultaneous.instruments.priors import InstrumentInformation
+from kinertia.estimation.simultaneous.layout import Unknowns
+from kinertia.estimation.simultaneous.mixture_prior import ErrorPriors, FaultMixture, fault_probabilities
+from kinertia.estimation.simultaneous.terms.cost_term import LoadTerm, Solution
+from kinertia.estimation.simultaneous.terms.plate_tilt import TILT_SD_RAD, mean_loads_n
+
+PLATES, CLOCK, TRIAL_DELAYS, ZEROS, GAINS = "plates", "clock", "delays", "zeros", "gains"
+
+
+class InstrumentErrors(LoadTerm):
+    """Errors of plates and synchronisation.
+
+    PLATES has PLATE_UNKNOWNS of each plate, then FLOOR_UNKNOWNS. Each of several trials has a delay of its own besides
+    the synchronisation delay, and so has a single trial whose synchronisation was not checked. Zero offsets
+    (ZERO_UNKNOWNS) and gains belong to each trial's plates; the gains add to those of all trials.
+    """
+
+    @classmethod
+    def unknowns(cls, given: Given) -> tuple[Unknowns, ...]:
+        """Return all errors, each with a prior of being fault-free or faulty."""
+        known, trials = given.calibration.instruments, given.trials
+        shared = known.of_unknowns(given.plates)
+        # one trial of a session is one of several, and so may be one whose synchronisation nobody has checked
+        count = sum(bool(trial.ground.plates) for trial in trials)
+        delay_unknowns = count > 1 or known.session or known.delay_s.fault_probability > 0.0
+        plates = sum(len(trial.ground.plates) for trial in trials)
+        gains = tuple(known.trial_gain_of(name) for trial in trials for name in trial.ground.plates)
+
+        def of_trials(prior: FaultMixture, count: int) -> ErrorPriors:
+            return ErrorPriors((prior,) * count)
+
+        return (
+            Unknowns.errors(
+                PLATES, "m, 1, N m/N or rad", ErrorPriors(shared.own[:-1], shared.common), of_laboratory=True
+            ),
+            Unknowns.errors(CLOCK, "s", ErrorPriors(shared.own[-1:]), of_laboratory=True),
+            Unknowns.errors(TRIAL_DELAYS, "s", of_trials(known.trial_delay_s, count if delay_unknowns else 0)),
+            Unknowns.errors(ZEROS, "N", of_trials(known.zero_offset_n, len(ZERO_UNKNOWNS) * plates)),
+            Unknowns.errors(GAINS, "1", ErrorPriors(gains)),
+        )
+
+    def __init__(self, model: FreedModel) -> None:
+        super().__init__(model)
+        given = self.given
+        self._own = [[given.plates.index(name) for name in trial.ground.plates] for trial in given.trials]
+        self._to_plates = plates_with_floor(len(given.plates))
+        self._session = given.calibration.instruments.of_session(given.plates)
+
+    def add_information(self, into: np.ndarray, static: np.ndarray) -> None:
+        """Add the information from other people of the session."""
+        at = self.layout.laboratory
+        into[at, at] += self._session.information
+
+    def add_pull(self, rhs: np.ndarray, static: np.ndarray) -> float:
+        """Add the right-hand side from other people of the session, and return the change in twice the cost."""
+        own, shown = static[self.layout.laboratory], self._session
+        pull = shown.information @ own
+        rhs[self.layout.laboratory] += shown.rhs - pull
+        return float(own @ (pull - 2.0 * shown.rhs))
+
+    def left_out(self, static: np.ndarray) -> np.ndarray:
+        """Return the zero offsets that a tilt about each horizontal axis imitates (`plate_tilt`)."""
+        result = np.zeros((len(static), len(ZERO_UNKNOWNS)))
+        for k, trial in enumerate(self.given.trials):
+            for axis, places in enumerate(self.zeros_of(k).T):
+                result[places, axis] = TILT_SD_RAD * mean_loads_n(trial)
+        return result
+
+    def delay_unknowns(self, k: int) -> list[int]:
+        """Return the indices of the synchronisation delay and of the trial's own delay."""
+        delays = self.layout[TRIAL_DELAYS]
+        return [self.layout[CLOCK].start, *range(delays.start, delays.stop)[k : k + 1]]
+
+    def profiled(self) -> list[int]:
+        """Return the delays of a single trial with forces, if it is undetermined whether they are delayed."""
+        places, priors = self.delay_unknowns(0), self.layout.error_priors.own
+        own = [priors[at - self.layout.errors.start] for at in places]
+        uncertain = any(0.0 < prior.fault_probability < 1.0 for prior in own)
+        return places if uncertain and sum(map(bool, self._own)) < 2 else []
+
+    def corrected_loads(
+        self, k: int, static: np.ndarray, loads: np.ndarray, loaded: np.ndarray, carrier: np.ndarray
+    ) -> np.ndarray:
+        """Correct loads for all errors but delays."""
+        return self.given.grounds[k].corrected_loads(loads, loaded, carrier, self.plates_in(k, static))
+
+    def by_unknowns(
+        self, k: int, static: np.ndarray, loads: np.ndarray, loaded: np.ndarray, carrier: np.ndarray
+    ) -> np.ndarray:
+        """Return derivatives (n, 2, 6, p, 7) by the errors of the plates in trial k."""
+        return self.given.grounds[k].by_plate(loads, loaded, carrier, self.plates_in(k, static))
+
+    def add_by_unknowns(self, k: int, by_static: np.ndarray, by: np.ndarray) -> None:
+        """Add derivatives (n, r, p, 7) by the errors of the plates in trial k."""
+        n, rows, *_ = by.shape
+        errors = len(PLATE_ERRORS)
+        by_static[:, :, self.layout[PLATES]] += by[..., :errors].reshape(n, rows, -1) @ self._to_plates
+        by_static[:, :, self.zeros_of(k)] += by[:, :, self._own[k], errors:]
+        by_static[:, :, self.gains_of(k)] += by[:, :, self._own[k], GAIN]
+
+    def plates_in(self, k: int, static: np.ndarray) -> np.ndarray:
+        """Return PLATE_ERRORS and ZERO_UNKNOWNS (..., p, 7) of every plate in trial k, from unknowns (..., S)."""
+        kinds, plates = static.shape[:-1], len(self.given.plates)
+        zeros = np.zeros((*kinds, plates, len(ZERO_UNKNOWNS)))
+        errors = (static[..., self.layout[PLATES]] @ self._to_plates.T).reshape(*kinds, plates, len(PLATE_ERRORS))
+        errors[..., self._own[k], GAIN] += static[..., self.gains_of(k)]
+        zeros[..., self._own[k], :] = static[..., self.zeros_of(k)]
+        return np.concatenate([errors, zeros], axis=-1)
+
+    def zeros_of(self, k: int) -> np.ndarray:
+        """Return the indices (q, 2) of the zero offsets of the q plates of trial k."""
+        return self._of_trial(k, ZEROS, len(ZERO_UNKNOWNS)).reshape(-1, len(ZERO_UNKNOWNS))
+
+    def gains_of(self, k: int) -> np.ndarray:
+        """Return the indices (q,) of the trial-specific gains of the q plates of trial k."""
+        return self._of_trial(k, GAINS, 1)
+
+    def _of_trial(self, k: int, name: str, each: int) -> np.ndarray:
+        first = self.layout[name].start + each * sum(map(len, self._own[:k]))
+        return np.arange(first, first + each * len(self._own[k]))
+
+    def read(self, solution: Solution) -> dict[str, Any]:
+        """Return an entry of each error with standard deviation and support, and the information for the session."""
+        trials, plates, values, sd = self.given.trials, self.given.plates, solution.static, solution.sd
+        own = solution.covariance[self.layout[PLATES], self.layout[PLATES]]
+        shape = len(plates), len(PLATE_ERRORS)
+        shared = (self._to_plates @ values[self.layout[PLATES]]).reshape(shape)
+        shared_sd = np.sqrt(np.diag(self._to_plates @ own @ self._to_plates.T)).reshape(shape)
+        zeros = [(trial.ground.plates, self.zeros_of(k)) for k, trial in enumerate(trials)]
+        found = FoundErrors(
+            plates=dict(zip(plates, zip(shared, shared_sd, strict=True), strict=True)),
+            delay_s=solution.pairs(self.layout[CLOCK])[0],
+            delays_s=self._delays(solution),
+            zeros_n=tuple(dict(zip(names, zip(values[at], sd[at], strict=True), strict=True)) for names, at in zeros),
+            gains=tuple(self._gains(k, solution) for k in range(len(trials))),
+            instruments=self._shown(solution),
+        )
+        first = self.layout.errors.start
+        entries = instrument_errors(
+            found,
+            self.given.calibration.instruments,
+            [trial.name for trial in trials],
+            (solution.moved, solution.contradicted),
+            self.layout[TRIAL_DELAYS].start - first,
+        )
+        return {"calibration": entries, "instruments": found.instruments}
+
+    def _delays(self, solution: Solution) -> tuple[tuple[float, float], ...]:
+        """Return the additional delays of several trials, or a single trial's total, with standard deviations, s."""
+        own = solution.pairs(self.layout[TRIAL_DELAYS])
+        if len(own) != 1:
+            return tuple(own)
+        both = self.delay_unknowns(0)
+        return ((float(solution.static[both].sum()), float(np.sqrt(solution.covariance[np.ix_(both, both)].sum()))),)
+
+    def _gains(self, k: int, solution: Solution) -> dict[str, tuple[float, float]]:
+        """Return the total gain errors of a trial's plates, and their standard deviations."""
+        result = {}
+        for plate, at in zip(self.given.trials[k].ground.plates, self.gains_of(k), strict=True):
+            sums = np.zeros(self.layout.size)
+            sums[self.layout[PLATES]] = self._to_plates[len(PLATE_ERRORS) * self.given.plates.index(plate) + GAIN]
+            sums[at] = 1.0
+            result[plate] = float(sums @ solution.static), float(np.sqrt(sums @ solution.covariance @ sums))
+        return result
+
+    def _shown(self, solution: Solution) -> InstrumentInformation:
+        """Return the information of the trials on the laboratory's instruments, without prior knowledge.
+
+        What is each trial's own is eliminated with its prior's standard deviation. The Gaussian that replaces priors
+        in the estimate is of all errors together, and its part for these alone says too little: single walks then
+        seemed to know of gains of 5 %. Several trials show which of them has a fault of its own.
+        """
+        prior, session, every = solution.gaussian, self._session, self.layout.errors
+        mean, covariance = solution.static[every], solution.covariance[every, every]
+        size, priors = len(session.rhs), self.layout.error_priors
+        more = (0, len(mean) - size)
+        before = ((prior.precision, prior.pull), (np.pad(session.information, more), np.pad(session.rhs, more)))
+        shown = InstrumentInformation.of_posterior(self.given.plates, mean, covariance, before)
+        own = priors.own[size:]
+        if len(self.given.trials) > 1:
+            faulty = fault_probabilities(priors, shown.information, shown.rhs)[size:].tolist()
+            own = tuple(replace(one, fault_probability=share) for one, share in zip(own, faulty, strict=True))
+        return shown.without_own(np.array([one.sd for one in own]))

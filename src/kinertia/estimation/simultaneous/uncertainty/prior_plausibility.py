@@ -1,0 +1,88 @@
+"""Tests whether a person as a whole is far from the prior, where single parameters are poorly determined.
+
+The data determine combinations of parameters. Along each, the estimate's distance from the prior's mean is normal with
+the variance that the data removed from the prior's, if prior and model hold; over the combinations that the data
+determine better than the prior, the squares sum to chi-square. A parameter may look ordinary while a combination is
+not. The total mass is excluded as far as scale and plates may disagree, which has a warning of its own.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import eigh
+from scipy.special import chdtrc
+
+from kinertia.estimation.prior import BspPrior
+from kinertia.estimation.simultaneous.uncertainty.mass_asymmetry import OneSided, one_sided
+from kinertia.model.bsp import BodySegmentParameters
+
+UNLIKE_CHANCE = 1e-3
+"""Share of the prior's people at the same or a larger distance, below which a person counts as implausible."""
+_KNOWN_SHARE = 0.5
+"""Share of a combination's prior variance that the data must have removed for it to count."""
+
+
+_MIRRORED = (3, 8, 9)
+"""Parameters whose sign differs between right and left: com_z, ixz, iyz."""
+_ALIKE = 0.5
+"""Share of a segment's change that its other side must show, too."""
+_SCALE_AGAINST_PLATES = 0.03
+"""Relative standard deviation of the total mass in this test."""
+
+
+@dataclass(frozen=True)
+class Unlikeness:
+    """Distance of an estimate from its prior.
+
+    Attributes:
+        distance2: squared distance in standard deviations, over the combinations that the data determine.
+        combinations: number of these.
+        chance: share of the prior's people at the same or a larger distance.
+        segments: those that have changed most, the largest change first.
+        both_sides: whether the first of them and its other side have changed equally: misplaced joint centres have this
+            effect, a prosthesis does not.
+        one_sided: the heavier side, if mass asymmetry is the largest difference; through the prior the other side
+            changes too, so that both may seem to have changed equally.
+    """
+
+    distance2: float
+    combinations: int
+    chance: float
+    segments: tuple[str, ...]
+    both_sides: bool
+    one_sided: OneSided | None = None
+
+    @property
+    def implausible(self) -> bool:
+        """Whether the person is implausible under the prior."""
+        return self.chance < UNLIKE_CHANCE
+
+
+def unlikeness(prior: BspPrior, estimate: BodySegmentParameters, covariance: np.ndarray) -> Unlikeness:
+    """Compute the distance of the estimate (with its table's posterior covariance) from the prior given the scale."""
+    mean, before = replace(prior, mass_sd_kg=_SCALE_AGAINST_PLATES * prior.mass_kg).given_scale()
+    sd = np.sqrt(np.diag(before))
+    left, directions = eigh(covariance / np.outer(sd, sd), before / np.outer(sd, sd))
+    shown = left < 1.0 - _KNOWN_SHARE
+    moved = (estimate.table().ravel() - mean) / sd
+    along = directions[:, shown].T @ moved / np.sqrt(1.0 - left[shown])
+    distance2, count = float(along @ along), int(shown.sum())
+    chance = float(chdtrc(count, distance2)) if count else 1.0
+    by_segment = moved.reshape(-1, 10)
+    order = np.argsort(-np.abs(by_segment).max(axis=1))[:3]
+    segments = tuple(estimate.segments[k] for k in order)
+    side = one_sided(prior, estimate, covariance)
+    alike = side is None and _alike(estimate.segments, by_segment, int(order[0]))
+    return Unlikeness(distance2, count, chance, segments, alike, side)
+
+
+def _alike(segments: Sequence[str], moved: np.ndarray, k: int) -> bool:
+    """Decide whether segment k and its other side changed (s, 10) equally in the parameter that changed most."""
+    name = segments[k]
+    other = name[:-1] + {"r": "l", "l": "r"}.get(name[-1], "")
+    if name[-2:] not in ("_r", "_l") or other not in segments:
+        return False
+    most = int(np.argmax(np.abs(moved[k])))
+    sign = -1.0 if most in _MIRRORED else 1.0
+    return bool(sign * moved[segments.index(other), most] / moved[k, most] > _ALIKE)

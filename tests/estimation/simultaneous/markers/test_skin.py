@@ -1,0 +1,121 @@
+import numpy as np
+import pytest
+
+from kinertia.estimation.simultaneous.linear_algebra.bandwidth import Bandwidth
+from kinertia.estimation.simultaneous.markers.marker_noise import WithoutSkin
+from kinertia.estimation.simultaneous.markers.skin import (
+    ALIKE,
+    EXPECTED_SD_M,
+    MOST_PATTERNS,
+    OTHER_EXPECTED_SD_M,
+    SkinPatterns,
+    skin_patterns,
+)
+from kinertia.estimation.simultaneous.observation import observe
+from kinertia.synthetic.noise import SkinMotion, camera_noise
+from validation.synthetic_walks import kinematics_of, study_walk
+
+MASS_KG = 72.6
+
+
+@pytest.fixture(scope="module")
+def trial():
+    return study_walk(1.2)
+
+
+@pytest.fixture(scope="module")
+def patterns(trial):
+    (of_trial,) = skin_patterns(trial.skeleton, [trial.motion.q])
+    return of_trial
+
+
+def drawn(patterns: SkinPatterns, rng: np.random.Generator) -> np.ndarray:
+    """Coefficients from their prior."""
+    return np.linalg.solve(np.linalg.cholesky(patterns.information()).T, rng.standard_normal(patterns.size))
+
+
+@pytest.mark.slow
+def test_the_prior_displaces_markers_by_what_is_expected(trial, patterns):
+    rng = np.random.default_rng(0)
+    moved = np.array([patterns.displaced(drawn(patterns, rng)) for _ in range(300)])
+    sd = np.sqrt(np.square(moved).mean(axis=(0, 1, 3)))
+    for segment, value in zip(trial.skeleton.marker_segments, sd, strict=True):
+        kind = trial.skeleton.segments[segment].rpartition("_")[0]
+        assert value == pytest.approx(EXPECTED_SD_M.get(kind, OTHER_EXPECTED_SD_M), rel=0.15)
+
+
+def test_coefficients_of_a_segment_are_alike(trial, patterns):
+    covariance = np.linalg.inv(patterns.information())
+    assert np.diag(covariance) == pytest.approx(np.ones(patterns.size))
+    thigh = np.flatnonzero(trial.skeleton.marker_segments == trial.skeleton.segments.index("thigh_r"))
+    one, other = (patterns.begin[marker] for marker in thigh[:2])
+    assert covariance[one, other] == pytest.approx(ALIKE)
+    assert covariance[one, other + 1] == pytest.approx(0.0, abs=1e-12)
+    elsewhere = np.flatnonzero(trial.skeleton.marker_segments == trial.skeleton.segments.index("shank_r"))[0]
+    assert covariance[one, patterns.begin[elsewhere]] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_few_patterns_per_segment_and_none_of_the_whole_body(trial, patterns):
+    assert (patterns.last - patterns.first).max() == MOST_PATTERNS
+    turned = trial.motion.q.copy()
+    turned[:, :6] += 0.3
+    (of_turned,) = skin_patterns(trial.skeleton, [turned])
+    np.testing.assert_allclose(of_turned.values, patterns.values, atol=1e-12)
+
+
+def test_trials_share_their_patterns(trial):
+    first, second = skin_patterns(trial.skeleton, [trial.motion.q[:60], trial.motion.q[60:]])
+    (both,) = skin_patterns(trial.skeleton, [trial.motion.q])
+    np.testing.assert_allclose(np.vstack([first.values, second.values]), both.values)
+    assert first.first.tolist() == second.first.tolist() == both.first.tolist()
+
+
+def test_skin_is_at_rest_where_the_markers_were_adapted(trial):
+    adapted, other = skin_patterns(trial.skeleton, [trial.motion.q[:40], trial.motion.q[60:100]], [True, False])
+    np.testing.assert_allclose(adapted.values.mean(axis=0), 0.0, atol=1e-12)
+    assert np.abs(other.values.mean(axis=0)).max() > 1e-3
+
+
+def test_a_motionless_trial_has_no_patterns(trial):
+    (of_still,) = skin_patterns(trial.skeleton, [np.tile(trial.motion.q[:1], (20, 1))])
+    assert of_still.size == 0
+    assert not of_still.displaced(np.zeros(0)).any()
+    assert of_still.information().shape == (0, 0)
+
+
+def test_regression_takes_what_goes_with_the_joints_and_leaves_the_rest(trial, patterns):
+    rng = np.random.default_rng(1)
+    skin, noise = patterns.displaced(drawn(patterns, rng)), rng.normal(0.0, 0.001, trial.markers.positions.shape)
+    errors = skin + noise
+    errors[10:20, 3] = np.nan
+    middle = np.nanmean(errors, axis=0)
+    errors -= middle
+    rest = WithoutSkin.of([errors], middle[None], [patterns], [1.0])
+    assert np.isnan(rest.varying[0][10:20, 3]).all()
+    assert np.nanstd(rest.varying[0]) == pytest.approx(0.001, rel=0.1)
+    # where a marker was seen in all frames its patterns are zero on average: what is left of the place is the place
+    np.testing.assert_allclose(np.delete(rest.displaced[0], 3, axis=0), np.delete(middle, 3, axis=0), atol=1e-9)
+
+
+def test_another_posture_is_no_displacement(trial):
+    """Skin that goes with the joints carries markers along in a trial of another posture: they were not moved."""
+    q = [trial.motion.q[:40], trial.motion.q[60:100]]
+    skin = skin_patterns(trial.skeleton, q)
+    coefficients = drawn(skin[0], np.random.default_rng(2))
+    moved = [each.displaced(coefficients) for each in skin]
+    places = np.array([each.mean(axis=0) for each in moved])
+    rest = WithoutSkin.of([each - each.mean(axis=0) for each in moved], places, skin, [1.0, 1.0])
+    before, after = (np.abs(each[0] - each[1]).max() for each in (places, rest.displaced))
+    assert after < 0.25 * before
+
+
+def test_noise_is_what_skin_leaves(trial):
+    """Skin that goes with the joints is mostly explained; deviations fall, but not to the cameras'."""
+    rng = np.random.default_rng(0)
+    skin = SkinMotion.draw(trial.skeleton, trial.motion.q, rng)
+    moved = camera_noise(skin.moved(trial.markers, trial.skeleton, trial.motion.q), 0.0005, rng)
+    seen = observe(trial.skeleton, [kinematics_of(trial, moved)], MASS_KG, [Bandwidth(10.0)])
+    size = np.sqrt(np.square(moved.positions - trial.markers.positions).mean())
+    assert 0.0005 < np.median(list(seen.noise[0].sd_m.values())) < 0.6 * size
+    assert seen.separate[0].skin is not None
+    assert np.isfinite(seen.separate[0].skin.values).all()
