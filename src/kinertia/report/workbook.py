@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from kinertia.estimation.result import Fit
-from kinertia.io.subject.provenance import VERSION
+from kinertia.io.versions import VERSION
 from kinertia.report.tables import Table, person_tables
 
 _CURVES = (
