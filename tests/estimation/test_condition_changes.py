@@ -12,7 +12,7 @@ from kinertia.estimation import condition_changes
 from kinertia.estimation.condition_changes import SOURCES, _judged, changes
 from kinertia.estimation.stride_features import EVENTS, event_bounds
 from kinertia.motion.gait_cycle import Stride
-from kinertia.report.changes import change_columns, change_sentences, changed_sentence
+from kinertia.report.changes import change_columns, change_sentences, changed_sentence, discovered
 from kinertia.report.saved_fit import write_fit
 
 DRAWS = 1000
@@ -111,6 +111,23 @@ def test_tables_and_sentences_have_every_outcome(found):
     assert f" {others} other" in changed_sentence(found) or others == 0
 
 
+def test_false_discoveries_are_controlled():
+    """By the step-up rule: 0.03 fails its own limit of 0.025, but 0.035 holds that of 0.0375."""
+    assert discovered([0.5, 0.001, 0.035, 0.03]) == [False, True, True, True]
+    assert discovered([0.5, 0.02, 0.04, 0.04]) == [False] * 4
+    assert discovered([]) == []
+    rng = np.random.default_rng(0)
+    nothing = [any(discovered(rng.random(100))) for _ in range(1000)]
+    assert 0.03 < np.mean(nothing) < 0.07
+
+
+def test_p_and_verdict_agree(found):
+    judged_ones = [one for one in found if one.verdict != "cannot be judged"]
+    assert judged_ones
+    for one in judged_ones:
+        assert (one.p < 0.05) == (one.verdict == "changed")
+
+
 def test_the_command_compares_conditions_of_a_result(twice, fit, tmp_path):
     (tmp_path / "out").mkdir()
     write_fit(twice, None, tmp_path / "out" / "fit.npz")
@@ -118,7 +135,10 @@ def test_the_command_compares_conditions_of_a_result(twice, fit, tmp_path):
         patch.setattr(condition_changes, "DRAWS", 2)
         outcome = run("compare", tmp_path / "out", "--conditions", "barefoot", "with shoes", "-o", tmp_path / "c")
         assert outcome.status == 0, outcome.err
-        assert len(pd.read_csv(tmp_path / "c" / "changes.csv")) > 50
+        table = pd.read_csv(tmp_path / "c" / "changes.csv")
+        assert len(table) > 50
+        page = (tmp_path / "c" / "compare.html").read_text(encoding="utf-8")
+        assert page.count("<tr") == len(table) + 1
         refused = run("compare", tmp_path / "out", "--conditions", "barefoot", "running", "-o", tmp_path / "d")
     assert refused.status == 2
     assert "stated are: barefoot, with shoes" in refused.err

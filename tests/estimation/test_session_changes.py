@@ -14,6 +14,7 @@ from kinertia.estimation import session_changes as module
 from kinertia.estimation.session_changes import Session, session, session_changes, why_incomparable
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.report.saved_fit import write_fit
+from report_page import Elements
 
 
 def trial_under(trial, condition, shift_m=0.0):
@@ -148,7 +149,10 @@ def test_the_command_compares_sessions_first_of_all_by_joint_moments(sessions, t
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, "DRAWS", 2)
         said = run("compare", *folders, "-o", tmp_path / "c").out
-    assert said.index("knee adduction moment") < said.index("ody segment parameters")
+    assert said.index("Walking speed") < said.index("knee adduction moment") < said.index("ody segment parameters")
+    page = (tmp_path / "c" / "compare.html").read_text(encoding="utf-8")
+    assert page.index('id="changes"') < page.index('id="bsp"')
+    assert page.count("<td>not shown</td>") == sum(row["verdict"] == "not shown" for row in rows)
 
 
 def test_results_that_are_no_sessions_say_why(demo_run, two_level_run, tmp_path):
@@ -157,6 +161,7 @@ def test_results_that_are_no_sessions_say_why(demo_run, two_level_run, tmp_path)
     assert content["outcomes"] == []
     assert "two-level" in content["not_compared"]
     assert not (tmp_path / "c" / "changes.csv").exists()
+    assert content["not_compared"] in Elements((tmp_path / "c" / "compare.html").read_text(encoding="utf-8")).text
 
 
 def test_python_compares_what_the_command_does(sessions):
@@ -165,4 +170,5 @@ def test_python_compares_what_the_command_does(sessions):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, "DRAWS", 2)
         found = kinertia.compare(*sessions, conditions=("before", "after"))
-    assert len(found) > 50
+    assert len(found.outcomes) > 50
+    assert found.speed.difference == pytest.approx(0.0, abs=1e-9)

@@ -9,15 +9,14 @@ from kinertia.cli.options import Overwrite, Quiet, results_folder
 from kinertia.cli.outcome import Outcome
 from kinertia.cli.terminal import out, shown_progress
 from kinertia.errors import KinertiaError
-from kinertia.estimation.condition_changes import Change
 from kinertia.estimation.prepared import Progress
 from kinertia.estimation.result import Fit
 from kinertia.estimation.session_changes import why_incomparable
 from kinertia.io.results.output_folder import complete_folder
 from kinertia.io.subject.provenance import names_from_common_folder
-from kinertia.report.changes import change_columns, change_sentences, changed_sentence, changes_summary
+from kinertia.report.changes import change_columns
+from kinertia.report.compare import Comparison, fit_of
 from kinertia.report.compare import compare as compare_sessions
-from kinertia.report.compare import fit_of
 from kinertia.report.comparison import (
     MOST_FITS,
     comparison_columns,
@@ -68,41 +67,41 @@ def compare(
     names = names_from_common_folder(paths)
     with shown_progress() as progress:
         fits = {name: fit_of(path, progress) for name, path in zip(names, paths, strict=True)}
-        found, reason = _session_changes(list(fits.values()), conditions, progress)
+        found, reason = _sessions(list(fits.values()), conditions, progress)
+    page = render_comparison(fits, None if found is None else found.shown(), reason)
     with complete_folder(output, "compare") as work:
-        (work / "compare.html").write_text(render_comparison(fits), encoding="utf-8")
+        (work / "compare.html").write_text(page, encoding="utf-8")
         write_columns(work / "compare.csv", comparison_columns(fits))
-        if not reason:
-            write_columns(work / "changes.csv", change_columns(found))
-    if reason:
+        if found is not None:
+            write_columns(work / "changes.csv", change_columns(found.outcomes))
+    if found is None:
         out.print(f"Joint moments and angles are not compared: {reason}.", soft_wrap=True)
     else:
-        _print_changes(names[0], names[1], found)
+        _print_changes(found)
     _print_bodies(fits)
     out.print(f"comparison in {output / 'compare.html'}", soft_wrap=True)
-    return Outcome({**changes_summary(names[0], names[1], found), "not_compared": reason, **comparison_summary(fits)})
+    summary = {"outcomes": []} if found is None else found.summary
+    return Outcome({**summary, "not_compared": reason, **comparison_summary(fits)})
 
 
-def _session_changes(
-    fits: list[Fit], conditions: tuple[str, str] | None, progress: Progress
-) -> tuple[tuple[Change, ...], str]:
+def _sessions(fits: list[Fit], conditions: tuple[str, str] | None, progress: Progress) -> tuple[Comparison | None, str]:
     """Return what changed between two sessions, or why that cannot be determined."""
     if len(fits) > 2:
-        return (), "there are more than two results"
+        return None, "there are more than two results"
     before, after = fits
     if reason := why_incomparable(before, after):
-        return (), reason
+        return None, reason
     try:
         return compare_sessions(before, after, conditions, progress), ""
     except KinertiaError as error:  # results of several conditions may be compared otherwise
         if conditions is not None:
             raise
-        return (), str(error)
+        return None, str(error)
 
 
-def _print_changes(before: str, after: str, found: tuple[Change, ...]) -> None:
-    out.print(f"{before} -> {after}; internal moments over body mass", soft_wrap=True)
-    for sentence in (*change_sentences(found), changed_sentence(found)):
+def _print_changes(found: Comparison) -> None:
+    out.print(f"{found.before} -> {found.after}; internal moments over body mass", soft_wrap=True)
+    for sentence in found.sentences:
         out.print(sentence, soft_wrap=True)
 
 
@@ -129,7 +128,8 @@ def _compare_conditions(path: Path, conditions: tuple[str, str], output: Path, o
     with shown_progress() as progress:
         found = compare_sessions(path, None, conditions, progress)
     with complete_folder(output, "compare") as work:
-        write_columns(work / "changes.csv", change_columns(found))
-    _print_changes(*conditions, found)
-    out.print(f"all outcomes in {output / 'changes.csv'}", soft_wrap=True)
-    return Outcome(changes_summary(*conditions, found))
+        (work / "compare.html").write_text(found.page(), encoding="utf-8")
+        write_columns(work / "changes.csv", change_columns(found.outcomes))
+    _print_changes(found)
+    out.print(f"all outcomes in {output / 'compare.html'}", soft_wrap=True)
+    return Outcome(found.summary)

@@ -6,25 +6,39 @@ from typing import Any
 
 import numpy as np
 
-from kinertia.estimation.condition_changes import SOURCES, Change
+from kinertia.estimation.condition_changes import PRIMARY, SOURCES, Change
+from kinertia.estimation.walking_speed import NOTABLE
 from kinertia.report.style import SIDES
 
-_DIGITS = {"N m/kg": 3, "degrees": 1}
+_DIGITS = {"N m/kg": 3, "degrees": 1, "m/s": 2}
 
 
 def change_sentences(found: Sequence[Change]) -> Iterator[str]:
     """Yield a sentence for each outcome that was named beforehand, as a report may state it."""
-    for one in found:
-        if one.primary:
-            side = f"{SIDES[one.side][0].capitalize()} " if one.side else ""
-            yield f"{side}{one.joint} {one.component} {one.quantity}, {one.event}: {_judgement(one)}"
+    for wanted in PRIMARY:
+        for one in found:
+            if (one.quantity, one.joint, one.component, one.event) == wanted:
+                side = f"{SIDES[one.side][0].capitalize()} " if one.side else ""
+                yield f"{side}{one.joint} {one.component} {one.quantity}, {one.event}: {_judgement(one)}."
+
+
+def speed_sentence(speed: Change | None) -> str:
+    """State whether walking speed changed, and that moments change with it where it did, or may have."""
+    if speed is None:
+        return "Walking speed is not known; if it changed, moments did, too."
+    sentence = f"Walking speed: {_judgement(speed)}."
+    if speed.verdict == "changed" or abs(speed.difference) > NOTABLE * speed.before:
+        sentence += " Moments change with speed: the speed may explain what changed below."
+    return sentence
 
 
 def _judgement(one: Change) -> str:
     digits = _DIGITS[one.unit]
     pair = f"{one.before:.{digits}f} before, {one.after:.{digits}f} after"
+    if one.verdict != "changed":
+        pair += f", {one.unit}"
     if one.verdict == "cannot be judged":
-        return f"cannot be judged, with {one.strides[0]} and {one.strides[1]} strides ({pair} {one.unit})"
+        return f"cannot be judged, with {one.strides[0]} and {one.strides[1]} repeats ({pair})"
     if one.verdict == "changed":
         return f"changed by {one.difference:+.{digits}f} {one.unit} (SD {one.sd:.{digits}f}; {pair})"
     return f"no change shown; one below {one.mdc95:.{digits}f} {one.unit} would be missed ({pair})"
@@ -67,7 +81,39 @@ def change_columns(found: Sequence[Change]) -> dict[str, list[Any]]:
     }
 
 
-def changes_summary(before: str, after: str, found: Sequence[Change]) -> dict[str, Any]:
-    """Return what `kinertia compare --conditions ... --json` prints."""
-    rows = [{**asdict(one), "difference": one.difference, "verdict": one.verdict} for one in found]
-    return {"before": before, "after": after, "outcomes": rows}
+def change_rows(found: Sequence[Change]) -> list[dict[str, Any]]:
+    """Return the rows of the page's table: numbers with their text, outcomes that were named beforehand first."""
+    order = sorted(found, key=lambda one: (not one.primary, one.quantity != "moment"))
+    return [
+        {
+            "outcome": f"{one.joint.replace('_', ' ')} {one.component.replace('_', ' ')} {one.quantity}",
+            "side": SIDES[one.side][0] if one.side else "",
+            "event": one.event,
+            "unit": one.unit,
+            "verdict": one.verdict,
+            "cells": [_cell(one, value) for value in (one.before, one.after)]
+            + [_cell(one, one.difference, "+")]
+            + [_cell(one, value) for value in (one.mdc95, one.sd, *(one.sd_by_source[source] for source in SOURCES))],
+        }
+        for one in order
+    ]
+
+
+def _cell(one: Change, value: float, sign: str = "") -> dict[str, Any]:
+    known = bool(np.isfinite(value))
+    return {"value": value if known else 0.0, "text": f"{value:{sign}.{_DIGITS[one.unit]}f}" if known else "–"}
+
+
+def changes_summary(before: str, after: str, found: Sequence[Change], speed: Change | None) -> dict[str, Any]:
+    """Return what `kinertia compare --json` prints of changes."""
+    rows = [_summary(one) for one in found]
+    return {
+        "before": before,
+        "after": after,
+        "walking_speed": None if speed is None else _summary(speed),
+        "outcomes": rows,
+    }
+
+
+def _summary(one: Change) -> dict[str, Any]:
+    return {**asdict(one), "difference": one.difference, "verdict": one.verdict}

@@ -178,8 +178,14 @@ def comparison_summary(fits: Mapping[str, Fit]) -> dict[str, Any]:
     }
 
 
-def render_comparison(fits: Mapping[str, Fit]) -> str:
-    """Render the page of `kinertia compare`, which titles results by these names."""
+def render_comparison(fits: Mapping[str, Fit], changes: Mapping[str, Any] | None = None, not_compared: str = "") -> str:
+    """Render the page of `kinertia compare`, which titles results by these names.
+
+    Args:
+        fits: results.
+        changes: what is shown of joint moments and angles (`Comparison.shown`).
+        not_compared: why these are not compared.
+    """
     (name, first), *others = fits.items()
     figure = moments_figure(fits)
     pairs = [(other_name, differences(first, other)) for other_name, other in others]
@@ -187,6 +193,8 @@ def render_comparison(fits: Mapping[str, Fit]) -> str:
         "compare.html.j2",
         title="Comparison: " + ", ".join(fits),
         first=name,
+        changes=changes,
+        not_compared=not_compared,
         results=[_head(one, fit) for one, fit in fits.items()],
         remarks=remarks(fits),
         judged=any(judged(compared) for _, compared in pairs),
