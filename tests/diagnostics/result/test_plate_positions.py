@@ -47,6 +47,11 @@ def test_an_error_that_is_shared_out_among_plates_is_certain_as_a_difference_onl
     assert codes(found(uncertain, ("right", "left"))) == ["P247"]
 
 
+def test_a_difference_counts_where_neither_plate_is_notable():
+    shared_out = replace(LEFT, value=0.006, sd=0.006), replace(RIGHT, value=-0.006, sd=0.006)
+    assert codes(found(shared_out, ("right", "left"))) == ["P247"]
+
+
 def test_an_apparent_error_stays_a_correction_beside_it():
     apparent, _ = found((replace(LEFT, moved=0.5), RIGHT), ("right", "left"))
     assert apparent.severity is Severity.CORRECTED

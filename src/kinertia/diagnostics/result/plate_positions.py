@@ -47,12 +47,13 @@ def _ambiguous(context: ResultContext, axis: str, errors: Sequence[CalibrationEn
     it is what is ambiguous, but the difference of the plates must be certain.
     """
     prior, posterior = context.ready.uncertainty.instruments, context.fit.posterior
-    off = [one for one in errors if one.notable and not one.contradicted_by]
-    if posterior is None or prior.plate[axis].fault_probability == 0.0 or not off:
+    values = [one.value for one in errors if not one.contradicted_by]
+    if posterior is None or prior.plate[axis].fault_probability == 0.0 or not values:
+        return []
+    differ_m = max(values) - min(values)
+    if differ_m <= _CERTAIN * prior.plate[axis].sd:
         return []
     apart_m, each_m = position_deviations(posterior.instruments, prior, axis)
-    values = [one.value for one in errors]
-    differ_m = max(values) - min(values)
     if each_m <= _HARDLY_M or apart_m >= _BETTER * each_m or differ_m <= _CERTAIN * 2.0 * apart_m:
         return []
     found = finding(

@@ -151,6 +151,18 @@ def test_of_plates_along_the_way_one_is_accused_if_not_which(trial):
     assert 1e3 * found.evidence["difference_m"].value == pytest.approx(20.0, abs=4.5)  # as "16 mm" was before
 
 
+def test_plates_that_may_be_off_together_along_the_walk_are_as_uncertain(trial):
+    """A short walk does not show it, but three standard deviations reach as far."""
+
+    def shift(positions, loads):
+        loads[..., 3:] += np.cross([0.03, 0.0, 0.0], loads[..., :3])
+
+    outcome = fitted(trial, disturb=shift)
+    for plate in ("right foot", "left foot"):
+        found = entry_of(outcome, "position", plate=plate, axis="x")
+        assert 0.0 < found.value < 0.03 < found.value + 3.0 * found.sd
+
+
 @pytest.mark.slow
 def test_a_plate_that_is_off_in_one_trial_of_three_is_not_accused(trial):
     """It has not moved in the meantime: what one says and the others contradict is apparent."""
