@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from kinertia.estimation.result import Fit as Fit
     from kinertia.estimation.simultaneous.fit import Posterior as Posterior
     from kinertia.estimation.trial_fit import TrialFit as TrialFit
+    from kinertia.findings.extensions import RulePackage as RulePackage
     from kinertia.findings.finding import Finding as Finding
     from kinertia.findings.finding import Severity as Severity
     from kinertia.findings.finding import finding as finding
@@ -103,6 +104,7 @@ _ROOMS = {
         "BlockedError FileError KinertiaError MarkerSetError OsimError SessionError SettingsError SubjectError "
         "TrialError"
     ),
+    "findings.extensions": "RulePackage",
     "findings.finding": "Finding Severity finding",
     "findings.quantity": "Quantity",
     "findings.rule": "Rule rule",

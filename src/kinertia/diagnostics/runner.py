@@ -9,8 +9,9 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Generic, TypeVar
 
+from kinertia.findings.extensions import RULES, loaded, names
 from kinertia.findings.finding import Finding, Severity
-from kinertia.findings.rule import matching, rule
+from kinertia.findings.rule import FAMILIES, matching, rule
 from kinertia.findings.where import Where
 from kinertia.settings import Overrule
 
@@ -52,6 +53,14 @@ def asked(
         for one in question.ask(context):
             result.append(one if trial is None or one.where.trial is not None else one.in_trial(trial))
     return result
+
+
+def added_questions() -> tuple[Question[Any], ...]:
+    """Return the questions about recordings that installed packages add."""
+    families = [one for one in names(RULES) if one not in FAMILIES]
+    return tuple(
+        Question(code, ask) for one in families for code, ask in loaded(RULES, one).recording_questions.items()
+    )
 
 
 def rules_of(*questions: Question[Any]) -> int:

@@ -5,7 +5,10 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cache
 from importlib.resources import files
+from pathlib import Path
 from typing import Any
+
+from kinertia.findings.extensions import RULES, loaded, names
 
 FAMILIES = ("F", "M", "L", "P", "T", "S", "O", "R")
 STAGES = ("file", "recording", "person", "kinematics", "estimate", "result")
@@ -84,8 +87,8 @@ def questions(family: str) -> dict[str, str]:
 
 
 def all_rules() -> dict[str, Rule]:
-    """Return all rules of the catalogue."""
-    return {code: one for family in FAMILIES for code, one in rules(family).items()}
+    """Return all rules of the catalogue, and those of installed packages."""
+    return {code: one for family in (*FAMILIES, *names(RULES)) for code, one in rules(family).items()}
 
 
 def matching(code: str) -> tuple[str, ...]:
@@ -118,7 +121,10 @@ def _rule(code: str, entry: dict[str, Any]) -> Rule:
 
 @cache
 def _read(family: str) -> dict[str, Any]:
-    if family not in FAMILIES:
+    if family in FAMILIES:
+        path = files("kinertia.findings").joinpath(f"catalogue/{family}.toml")
+    elif family in names(RULES):
+        path = Path(loaded(RULES, family).catalogue)
+    else:
         return {}
-    path = files("kinertia.findings").joinpath(f"catalogue/{family}.toml")
     return tomllib.loads(path.read_text(encoding="utf-8"))

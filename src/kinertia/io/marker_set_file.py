@@ -10,6 +10,7 @@ from importlib import resources
 from pathlib import Path
 
 from kinertia.errors import FileError
+from kinertia.findings.extensions import MARKER_SETS, loaded, names
 from kinertia.findings.quantity import Quantity
 from kinertia.io.text.number_table import expect_file
 from kinertia.io.text.toml_lines import TomlFile, parse_toml, read_toml
@@ -30,9 +31,14 @@ from kinertia.trial.data import Markers
 
 @cache
 def preset_names() -> tuple[str, ...]:
-    """Return the names of the marker sets that come with the package."""
+    """Return the names of the marker sets that come with the package, or with installed packages that extend it."""
+    return tuple(sorted({*_own_names(), *names(MARKER_SETS)}))
+
+
+@cache
+def _own_names() -> tuple[str, ...]:
     folder = resources.files("kinertia.io") / "marker_sets"
-    return tuple(sorted(Path(entry.name).stem for entry in folder.iterdir() if entry.name.endswith(".toml")))
+    return tuple(Path(entry.name).stem for entry in folder.iterdir() if entry.name.endswith(".toml"))
 
 
 def read_marker_set(name: str | Path) -> MarkerSet:
@@ -50,6 +56,9 @@ def read_marker_set(name: str | Path) -> MarkerSet:
 
 @cache
 def _preset(name: str) -> MarkerSet:
+    if name not in _own_names():
+        added = Path(loaded(MARKER_SETS, name))
+        return _marker_set(read_toml(added, "a marker set"), added)
     path = Path(f"{name}.toml")
     text = (resources.files("kinertia.io") / "marker_sets" / path).read_text(encoding="utf-8")
     return _marker_set(parse_toml(text, path), path)

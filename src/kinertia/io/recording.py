@@ -5,7 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from kinertia.errors import FileError, TrialError
+from kinertia.errors import FileError, KinertiaError, TrialError
+from kinertia.findings.extensions import READERS, loaded, names
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
@@ -17,11 +18,12 @@ from kinertia.model.alignment_device import with_knees_of_device
 from kinertia.trial.data import FloatArray, PlateLoads, Recording
 from kinertia.trial.impossible_data import impossible_load, impossible_position
 
-MARKER_FILES = (".trc", ".c3d", ".tsv", ".csv")
+ADDED_FILES = tuple(f".{name}" for name in names(READERS))
+MARKER_FILES = (".trc", ".c3d", ".tsv", ".csv", *ADDED_FILES)
 CORTEX = ".forces"
 _SUBJECT = ".b3d"
 FORCE_FILES = (".mot", ".sto", ".tsv", CORTEX)
-"""Endings of what is read."""
+"""Endings of what is read; those of installed packages that extend Kinertia are read by their functions."""
 _FARTHEST_M, _STRONGEST_N = 1000.0, 1e6
 """Farther and stronger than anything in a laboratory."""
 
@@ -119,7 +121,18 @@ def _read_markers(path: Path, plate: Path | None, length_unit: str | None, stand
         from kinertia.io.text.vicon import read_vicon_csv
 
         return read_vicon_csv(path)
-    return read_trc_recording(path)
+    return read_trc_recording(path) if kind == ".trc" else _read_by_package(path)
+
+
+def _read_by_package(path: Path) -> Recording:
+    """Read a file of an ending that an installed package adds; what it raises is a fault of the file."""
+    try:
+        read: Recording = loaded(READERS, path.suffix.lower().removeprefix("."))(path)
+    except KinertiaError:
+        raise
+    except Exception as error:
+        raise FileError(path, f"the package that reads such files failed: {error!r}") from error
+    return read
 
 
 def _turned(recording: Recording, path: Path, turn: FloatArray) -> Recording:

@@ -5,9 +5,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path, PurePosixPath
 
 from kinertia.errors import FileError
+from kinertia.io.recording import MARKER_FILES
 from kinertia.io.subject.provenance import Provenance, sha256
-
-_KINDS = (".c3d", ".trc", ".tsv", ".csv")
 
 
 def trial_file(provenance: Provenance | None, name: str, results: Path, recordings: Path | None) -> Path:
@@ -28,7 +27,7 @@ def trial_file(provenance: Provenance | None, name: str, results: Path, recordin
     stated = None if provenance is None else provenance.trials.get(name)
     if provenance is None or stated is None:
         named = [Path(file) for file in (provenance.files if provenance else ()) if PurePosixPath(file).stem == name]
-        names = [str(path) for path in named] or [name + kind for kind in _KINDS]
+        names = [str(path) for path in named] or [name + kind for kind in MARKER_FILES]
     else:
         names = [stated]
     folders = [recordings] if recordings is not None else list(_folders(provenance, results))

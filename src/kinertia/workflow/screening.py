@@ -20,7 +20,15 @@ from kinertia.diagnostics.plates.questions import (
     SIGNAL_QUESTIONS,
     STANDING_QUESTIONS,
 )
-from kinertia.diagnostics.runner import Question, asked, blocking, explained, overruled, rules_of
+from kinertia.diagnostics.runner import (
+    Question,
+    added_questions,
+    asked,
+    blocking,
+    explained,
+    overruled,
+    rules_of,
+)
 from kinertia.diagnostics.subject import questions as subject
 from kinertia.diagnostics.timing import questions as timing
 from kinertia.errors import BlockedError, KinertiaError, MarkerSetError, SubjectError
@@ -47,6 +55,7 @@ MOTION_QUESTIONS: tuple[Question[RecordingContext], ...] = (
     *timing.QUESTIONS,
     *PLACE_QUESTIONS,
     *LOADED_QUESTIONS,
+    *added_questions(),
 )
 PERSON_QUESTIONS: tuple[Question[PersonContext], ...] = (
     *subject.PERSON_QUESTIONS,

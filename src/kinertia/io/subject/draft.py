@@ -13,7 +13,7 @@ from kinertia.findings.quantity import Quantity
 from kinertia.io.file_names import RESULT_FILES, missing_file
 from kinertia.io.marker_set_draft import MarkerSetDraft, draft_marker_set, preset_of
 from kinertia.io.marker_set_file import marker_set_of, preset_name
-from kinertia.io.recording import CORTEX, MARKER_FILES, read_recording
+from kinertia.io.recording import ADDED_FILES, CORTEX, MARKER_FILES, read_recording
 from kinertia.io.subject.measures_file import is_measures_sheet
 from kinertia.io.subject.tables import Model, PriorFiles, TrialFiles
 from kinertia.io.subject.text import entry_line
@@ -257,7 +257,7 @@ def _holds_markers(file: Path) -> bool:
     """Return whether a text file is a recording of markers, by its extension and its head."""
     marks = {".tsv": "MARKER_NAMES", ".csv": "Sub Frame"}
     kind = file.suffix.lower()
-    return kind == ".trc" or (kind in marks and marks[kind] in _head(file))
+    return kind in (".trc", *ADDED_FILES) or (kind in marks and marks[kind] in _head(file))
 
 
 def _brings_forces(file: Path) -> bool:
