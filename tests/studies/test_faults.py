@@ -46,7 +46,6 @@ LEFT_TO_THE_FIT = {
     "cameras tilted by 3 degrees to one side",
     "plates turned by 3 degrees about the vertical",
     "one plate turned by 5 degrees about the vertical",
-    "markers at 30 Hz",
     "the other sex",
 }
 """What `check` says nothing about: the study in `docs/validation/faults.md` tells what becomes of it."""
