@@ -62,9 +62,9 @@ def test_export_says_what_the_tables_say(fit, results):
         outcome = run("export", results, "--csv", "--json", "--mat", "-o", folder)
         assert outcome.status == 0, outcome.err
     (trial,) = fit.trials
-    csv = pd.read_csv(folder / "cycles.csv")
+    csv = pd.read_csv(folder / "cycles.csv", float_precision="round_trip")
     pd.testing.assert_frame_equal(csv, fit.cycles(), check_dtype=False, rtol=1e-15, atol=0)
-    moments = pd.read_csv(folder / trial.name / "moments.csv", index_col="time_s")
+    moments = pd.read_csv(folder / trial.name / "moments.csv", index_col="time_s", float_precision="round_trip")
     np.testing.assert_allclose(moments, trial.moments["estimate"], rtol=1e-15)
     plain = json.loads((folder / "tables.json").read_text())
     np.testing.assert_array_equal(plain["bsp"]["estimate"], fit.bsp.estimate)

@@ -165,7 +165,7 @@ def test_headers_say_which_forces_and_hurt_nobody(saved, opensim):
         assert header[-1] == "endheader"
         assert header[-2].endswith("Hz")
         assert ("Ground reactions: " in header[-2]) == (path.name != "kinematics.mot")
-        by_pandas = pd.read_csv(path, sep="\t", skiprows=HEADER_LINES, index_col="time")
+        by_pandas = pd.read_csv(path, sep="\t", skiprows=HEADER_LINES, index_col="time", float_precision="round_trip")
         time, labels, values = table(opensim, path)
         assert list(by_pandas.columns) == labels
         np.testing.assert_array_equal(by_pandas.index, time)
