@@ -164,7 +164,7 @@ def pelvis_frame(marks: Landmarks) -> tuple[np.ndarray, np.ndarray, float, float
 
 def hip_in_pelvis(width: float, depth: float, method: str, side: str) -> np.ndarray:
     """Return the hip centre in the pelvis frame (mid ASIS), m, by Bell et al. (1990) or Harrington et al. (2007)."""
-    sign = 1.0 if side == "r" else -1.0
+    sign = _to_the_right(side)
     if method == "bell":
         return width * np.array([-0.19, -0.30, sign * 0.36])
     return np.array([-0.24 * depth - 0.0099, -0.30 * width - 0.0109, sign * (0.33 * width + 0.0073)])

@@ -109,14 +109,16 @@ def write_mat(fit: Fit, path: Path) -> None:
 
 
 def _lists(table: Table) -> dict[str, list[Any]]:
-    return {name: [_plain(value) for value in _list(values)] for name, values in table.items()}
+    return {name: [plain(value) for value in cells(values)] for name, values in table.items()}
 
 
-def _list(values: Column) -> list[Any]:
+def cells(values: Column) -> list[Any]:
+    """Return the values of a column as Python's own."""
     return values.tolist() if isinstance(values, np.ndarray) else list(values)
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
+    """Return a value, or None for a number that is not known."""
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
@@ -128,7 +130,7 @@ def _fields(table: Table) -> dict[str, Any]:
     for name, values in table.items():
         texts = all(value is None or isinstance(value, str) for value in values)
         blank = "" if texts else math.nan
-        cells = [blank if value is None else value for value in _list(values)]
+        filled = [blank if value is None else value for value in cells(values)]
         word = re.sub(r"\W", "_", name, flags=re.ASCII)
-        fields[word if word[:1].isalpha() else f"x{word}"] = np.array(cells, dtype=str if texts else None)
+        fields[word if word[:1].isalpha() else f"x{word}"] = np.array(filled, dtype=str if texts else None)
     return fields

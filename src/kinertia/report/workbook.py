@@ -1,25 +1,26 @@
 """Writes an Excel workbook of a result: strides, peaks, curves side by side, body segments."""
 
-import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from kinertia.estimation.cycles import UNITS, Kind
 from kinertia.estimation.result import Fit
 from kinertia.io.versions import VERSION
-from kinertia.report.tables import Table, person_tables
+from kinertia.motion.gait_cycle import PERCENT
+from kinertia.report.tables import Table, cells, person_tables, plain
 
-_CURVES = (
-    ("_clinical", "Clinical angles", "deg"),
-    ("_joint_moment", "Joint moments", "N m/kg"),
-    ("_angle", "Model angles", "deg"),
-    ("_moment", "Model moments", "N m/kg"),
-    ("_power", "Joint powers", "W/kg"),
-    ("", "Ground forces", "% body weight"),
+_CURVES: tuple[tuple[str, str, Kind], ...] = (
+    ("_clinical", "Clinical angles", "clinical"),
+    ("_joint_moment", "Joint moments", "joint_moment"),
+    ("_angle", "Model angles", "angle"),
+    ("_moment", "Model moments", "moment"),
+    ("_power", "Joint powers", "power"),
+    ("", "Ground forces", "force"),
 )
-"""Endings of quantities, the first that fits, with sheet and unit."""
+"""Endings of quantities, the first that fits, with sheet and kind."""
 _TITLES = {
     "spatiotemporal": "Spatiotemporal",
     "moment_peaks": "Peaks",
@@ -28,7 +29,6 @@ _TITLES = {
     "calibration": "Calibration",
 }
 _NAMED_BY = ("quantity", "trial", "task", "side", "stride")
-_PERCENT = 101
 
 
 def write_xlsx(fit: Fit, path: Path) -> None:
@@ -43,15 +43,15 @@ def write_xlsx(fit: Fit, path: Path) -> None:
         sheet = book.create_sheet(title)
         sheet.freeze_panes = below
         for row in rows:
-            sheet.append([_cell(value) for value in row])
+            sheet.append([plain(value) for value in row])
 
     write("About", _about(fit), None)
     for name in ("spatiotemporal", "moment_peaks"):
         if name in tables:
             write(_TITLES[name], _rows(tables[name]), "A2")
     if "cycles" in tables:
-        for ending, title, unit in _CURVES:
-            if rows := list(_side_by_side(tables["cycles"], ending, unit)):
+        for ending, title, kind in _CURVES:
+            if rows := list(_side_by_side(tables["cycles"], ending, UNITS[kind])):
                 write(title, iter(rows), f"B{len(_NAMED_BY) + 2}")
     for name in ("contact_phases", "bsp", "calibration"):
         if name in tables:
@@ -73,30 +73,23 @@ def _about(fit: Fit) -> Iterator[Sequence[Any]]:
 
 def _rows(table: Table) -> Iterator[Sequence[Any]]:
     yield list(table)
-    yield from zip(*table.values(), strict=True)
+    yield from zip(*map(cells, table.values()), strict=True)
 
 
 def _side_by_side(cycles: Table, ending: str, unit: str) -> Iterator[Sequence[Any]]:
     """Yield the rows of a sheet of curves: what each column is, line by line, then a row per percent."""
-    first = range(0, len(cycles["quantity"]), _PERCENT)
-    chosen = [row for row in first if _ending(str(cycles["quantity"][row])) == ending]
+    named = {name: cells(cycles[name])[:: len(PERCENT)] for name in _NAMED_BY}
+    chosen = [row for row, quantity in enumerate(named["quantity"]) if _ending(quantity) == ending]
     if not chosen:
         return
     for name in _NAMED_BY:
-        yield [name, *(cell for row in chosen for cell in (cycles[name][row], cycles[name][row]))]
+        yield [name, *(named[name][row] for row in chosen for _ in ("value", "sd"))]
     yield ["percent", *(cell for _ in chosen for cell in (unit, f"SD ({unit})"))]
-    values, sd = (np.reshape(np.asarray(cycles[name], dtype=float), (-1, _PERCENT)) for name in ("value", "sd"))
-    rows = np.array(chosen) // _PERCENT
-    columns = np.stack([values[rows], sd[rows]], axis=1).reshape(-1, _PERCENT)
-    for percent, cells in enumerate(columns.T):
-        yield [percent, *cells]
+    values, sd = (np.reshape(np.asarray(cycles[name], dtype=float), (-1, len(PERCENT))) for name in ("value", "sd"))
+    columns = np.stack([values[chosen], sd[chosen]], axis=1).reshape(-1, len(PERCENT))
+    for percent, row in zip(cells(PERCENT), cells(columns.T), strict=True):
+        yield [percent, *row]
 
 
 def _ending(quantity: str) -> str:
     return next(ending for ending, _, _ in _CURVES if quantity.endswith(ending))
-
-
-def _cell(value: Any) -> Any:
-    """Return what Excel shows: plain numbers and texts, nothing where a value is not known."""
-    value = value.item() if isinstance(value, np.generic) else value
-    return None if isinstance(value, float) and not math.isfinite(value) else value

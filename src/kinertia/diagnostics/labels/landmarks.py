@@ -14,7 +14,7 @@ from kinertia.model.joint_centres import (
     Landmarks,
     find_landmarks,
     hip_in_pelvis,
-    leg_frames,
+    knee,
     pelvis_frame,
     wand_rotation,
 )
@@ -66,7 +66,7 @@ def _wands(context: RecordingContext, marks: Landmarks) -> Iterator[Finding]:
     pelvis, origin, width, depth = pelvis_frame(marks)
     for side in "rl":
         hip_at = origin + pelvis @ hip_in_pelvis(width, depth, "bell", side)
-        for name, proximal in (("knee", hip_at), ("ankle", leg_frames(marks, hip_at, side).knee_at)):
+        for name, proximal in (("knee", hip_at), ("ankle", knee(marks, hip_at, side)[0])):
             limit, turned = WAND_LIMITS[name], wand_rotation(marks, name, proximal, side)
             if turned is not None and abs(turned) > limit.limit_rad:
                 yield finding(
