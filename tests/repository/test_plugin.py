@@ -100,6 +100,17 @@ def test_a_package_that_cannot_be_loaded_is_named(tmp_path):
     assert "kinertia-example" in done.stderr
 
 
+@pytest.mark.parametrize("command", ["explain X101", "check walk.csv"])
+def test_the_command_line_names_it_and_no_internal_error(tmp_path, command):
+    describe(tmp_path / "site", {"kinertia.rules": {"X": "nowhere:x"}})
+    code = f"from kinertia.cli.app import main; main({command.split()})"
+    done = ran(code, [tmp_path / "site"], tmp_path)
+    assert done.returncode == 2
+    assert "kinertia-example" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert "Internal error" not in done.stderr
+
+
 @pytest.mark.parametrize("installed", [False, True])
 def test_nothing_that_lies_beside_recordings_is_taken_for_a_package(tmp_path, installed):
     describe(tmp_path, {"kinertia.rules": {"X": "trap:x"}})

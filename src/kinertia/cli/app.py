@@ -15,6 +15,7 @@ from kinertia.cli.outcome import add_command, of_error
 from kinertia.cli.renamed_options import as_named_now
 from kinertia.cli.terminal import out, print_json, show_error, show_problem
 from kinertia.errors import KinertiaError
+from kinertia.findings.extensions import ExtensionError
 from kinertia.io.results.output_folder import INTERRUPTIONS
 from kinertia.io.versions import VERSION
 
@@ -118,7 +119,11 @@ _UsageError: type[Exception] = typer.BadParameter.__mro__[1]
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line on these arguments, or on those of this process."""
     given = sys.argv[1:] if arguments is None else list(arguments)
-    run(application_for(given), given)
+    try:
+        run(application_for(given), given)
+    except ExtensionError as error:  # as soon as its modules are imported
+        _show(str(error), "--json" in given)
+        raise SystemExit(2) from None
 
 
 def application_for(given: Sequence[str]) -> typer.Typer:
@@ -143,6 +148,8 @@ def run(app: typer.Typer, given: Sequence[str]) -> None:
         where = "" if error.filename is None else f"{error.filename}: "
         problem = f"{where}{error.strerror or error}; check the path, its permissions and the space on the disk"
         _show(problem, as_json)
+    except ExtensionError:
+        raise
     except Exception as error:
         # Ctrl-C in the middle of a compiled function, which reports it so
         cause: BaseException | None = error
