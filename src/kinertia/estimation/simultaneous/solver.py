@@ -143,7 +143,7 @@ def estimate_simultaneous(
     modes = [of_knots(phases), *of_root(model, point, more)]
     motions, (covariance, curves, draws) = both(
         lambda: _through_impacts(problem, point),
-        lambda: _uncertainty(problem, ended, model, roots, modes, phases),
+        lambda: _uncertainty(problem, ended, model, (roots, more), modes, phases),
     )
     covariance += phases.covariance + more @ more.T
     support = instrument_support(model, ended.point, ended.instruments, curves)
@@ -361,16 +361,18 @@ def _uncertainty(
     problem: MapProblem,
     ended: Ended,
     model: GaussNewton,
-    roots: Sequence[np.ndarray],
+    uncertain: tuple[Sequence[np.ndarray], np.ndarray],
     modes: Sequence[Mode],
     phases: OfPhases,
 ) -> tuple[np.ndarray, tuple[CurveDeviations, ...], PosteriorDraws]:
     """Return covariance (S, S) of the static unknowns with these knots, SDs of the curves of every trial, and draws.
 
-    `roots` are those of `_roots_in_trials`, `modes` other uncertain quantities.
+    `uncertain` are the roots of `_roots_in_trials` and that of `_left_out`, `modes` its effects and those of the knots.
     """
     root, point, of_curves, noises = model.static.root_of_covariance(), ended.point, [], []
-    for k, (trial, in_trial) in enumerate(zip(ended.here.trials, roots, strict=True)):
+    roots, more = uncertain
+    for k, (trial, own) in enumerate(zip(ended.here.trials, roots, strict=True)):
+        in_trial = np.hstack([model.in_trial(k, more), own])
         here = point.coefficients[k], problem.in_trial(k, point)
         # errors that recur count more often only for what does not move
         noises.append(motion_noise(problem, k, *here) / problem.trials[k].repeats)

@@ -1,8 +1,10 @@
 import numpy as np
 import pytest
 
+from kinertia.estimation.simultaneous.terms import task_masses
 from kinertia.estimation.simultaneous.terms.task_masses import hips_bent_rad, task_direction
-from kinertia.synthetic.walk import walking_subject
+from kinertia.synthetic.walk import walk, walking_subject
+from short_walk_fit import fitted
 
 SEGMENTS = ("pelvis", "femur_r", "femur_l", "torso")
 MASS_KG = np.array([10.0, 8.0, 8.0, 20.0])
@@ -26,3 +28,16 @@ def test_hips_are_bent_as_far_as_a_thigh_turns(turned):
     q[:, 3] = 0.7  # the whole person
     q[10:, list(skeleton.coordinates).index("hip_flexion_l")] = turned
     assert hips_bent_rad(skeleton, q) == pytest.approx(abs(turned), abs=1e-6)
+
+
+def test_moments_of_hips_are_less_certain_by_it(monkeypatch):
+    trial = walk(walking_subject(), 0.9, trapezoid=False)
+    monkeypatch.setattr(task_masses, "TASK_SD_PER_RAD", 0.0)
+    names, sd = list(trial.skeleton.coordinates), []
+    for share in (0.0, 0.3):
+        monkeypatch.setattr(task_masses, "LEAST_TASK_SD", share)
+        sd.append(np.sqrt(np.square(fitted(trial).result.curve_deviations[0].moments).mean(axis=0)))
+    longer = dict(zip(names, sd[1] / sd[0], strict=True))
+    assert longer["hip_flexion_r"] > 1.01
+    assert longer["pelvis_tx"] > 1.05
+    assert longer["ankle_angle_r"] == pytest.approx(1.0, abs=0.002)

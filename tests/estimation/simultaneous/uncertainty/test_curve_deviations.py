@@ -217,6 +217,27 @@ def test_deviations_are_those_of_the_dense_covariance(estimate, noise):
         np.testing.assert_allclose(found, np.sqrt(expected), rtol=1e-3, err_msg=name)
 
 
+def test_unknowns_that_are_left_out_of_the_vector_count_in_all_curves(estimate):
+    """As the mass that moves with a thigh in other tasks: motion, loads and parameters follow it."""
+    problem, coefficients, static = estimate
+    n, layout, rng = coefficients.size, problem.layout, np.random.default_rng(3)
+    part = problem.eliminated(0, coefficients, static)
+    information = prior_information(problem, static) + part.information
+    root = StaticInformation.of(information, layout.in_root.stop).root_of_covariance()
+    more = 10.0 * root @ rng.normal(size=(layout.size, 2)) / np.sqrt(layout.size)
+    more[problem.loads.delay_unknowns(0)] = 0.0  # their derivatives depend on their own deviation
+    here = problem, 0, coefficients, static, part
+    without, with_more = (curve_deviations(*here, each, np.ones(3)) for each in (root, np.hstack([more, root])))
+    normal = problem.normal(0, coefficients, static)
+    followed = -np.linalg.solve(dense_band(normal.band), normal.border.reshape(n, -1) @ more)
+    late = delay_sd_s(problem, root @ root.T)
+    for name, by in dense_derivatives(problem, coefficients, static, delay_sd_s=late).items():
+        change = np.square(by @ np.concatenate([followed, more])).sum(axis=-1)
+        before, after = (np.square(getattr(each, name)).reshape(change.shape) for each in (without, with_more))
+        assert not change.size or (change > 0.1 * before).any(), name
+        np.testing.assert_allclose(after, before + change, rtol=1e-3, atol=1e-6 * change.max(initial=0.0), err_msg=name)
+
+
 def grown(problem, static: np.ndarray) -> np.ndarray:
     """(d, r, 1) by how much more the markers' errors make of moments where skin moves unseen."""
     time = problem.trials[0].time[problem.trials[0].dynamic]
@@ -246,7 +267,8 @@ def test_deviations_of_two_trials_are_those_of_one_dense_matrix(estimate, noise,
     ended = Ended(here.point, here, gaussian, True, 1, (0.0, 0.0))
     none = Mode(np.zeros(pair.layout.size), tuple(np.zeros_like(one) for one in here.point.coefficients))
     alike = OfPhases(static, np.zeros((len(static),) * 2), (pair, pair), (here.point, here.point))
-    static_covariance, sds, _ = _uncertainty(pair, ended, model, _roots_in_trials(pair, ended, model), [none], alike)
+    uncertain = _roots_in_trials(pair, ended, model), np.zeros((pair.layout.size, 0))
+    static_covariance, sds, _ = _uncertainty(pair, ended, model, uncertain, [none], alike)
     s = pair.layout.size
     scale = np.sqrt(np.diag(static_covariance))
     np.testing.assert_allclose(

@@ -69,6 +69,12 @@ class GaussNewton:
             moved.append(own)
         return np.concatenate([*(motion.ravel() for motion in motions), step, *moved])
 
+    def in_trial(self, k: int, steps: np.ndarray) -> np.ndarray:
+        """Return steps (S, u) of the static unknowns as they are in trial k, with its displacements following."""
+        result, places = steps.copy(), self.problem.layout.displaced
+        result[places] -= self.problem.displaced_sd[k][:, None] * (self.displaced[k].gain @ steps)
+        return result
+
     def of_instruments(self, point: Point, step: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return posterior mean (k,) and covariance (k, k) of the instruments, given the step to the optimum."""
         return (point.static + point.like(step).static)[self.problem.layout.errors], self._covariance_of_instruments

@@ -109,9 +109,9 @@ def curve_deviations(
         k: the trial.
         coefficients, static: the estimate.
         eliminated: the trial's normal equations there, undamped.
-        root: (S, S) root of the posterior covariance of the static unknowns, as in `StaticInformation`: the rows of
-            unknowns in the root equations, which come first, have only as many nonzero columns as there are such
-            unknowns.
+        root: (S, S + u) root of the posterior covariance of the static unknowns: u columns of their own
+            (`omitted_unknowns`), then those of `StaticInformation`, of which the rows of unknowns in the root
+            equations, which come first, have only as many nonzero columns as there are such unknowns.
         noise: (3,) `motion_noise`, of errors that do not recur.
     """
     basis, frames = problem.bases[k], problem.trials[k].curve_frames
@@ -190,13 +190,14 @@ class _Curves:
         every, c = moments.derivatives(motion, chosen), len(problem.moving)
         self.impact[rows], self.speed[rows] = every.impact, motion[1][:, problem.moving]
         by, values, in_root = every.rows(slice(0, c)), basis.values[:, chosen], problem.layout.in_root
+        known = root[in_root, : root.shape[1] - len(root) + in_root.stop]
         seen = _Seen(by, self.speed[rows], basis.first[chosen], values, self.shares, self.grown[rows, :c])
-        _write_variances(spread, seen, root[in_root, in_root], variance, rows)
+        _write_variances(spread, seen, known, variance, rows)
         joints = replace(seen, by=every.rows(slice(c, None)), grown=self.grown[rows, c:])
-        own = _joint_variances(spread, joints, root[in_root, in_root])
+        own = _joint_variances(spread, joints, known)
         own += knee_geometry(moments.virtual.skeleton, moments.virtual.joints, joints.by.value)
         self.of_joints[rows] = own.reshape(len(own), *self.of_joints.shape[1:])
-        ground = np.square(by.ground @ root[problem.layout.errors, in_root]).sum(axis=-1) + by.ground_delay_squares
+        ground = np.square(by.ground @ known[problem.layout.errors]).sum(axis=-1) + by.ground_delay_squares
         noise_n = moments.reactions.noise_n * (by.loads[..., :3] != 0.0)
         variance.ground_forces[rows] = ground.reshape(-1, 2, 3) + np.square(noise_n)
         variance.moments[rows] += by.delay_squares
@@ -247,10 +248,10 @@ class _Interval(NamedTuple):
 def _intervals(spread: MotionSpread, seen: _Seen, root: np.ndarray) -> Iterator[_Interval]:
     """Yield the rows of `seen` knot interval by knot interval.
 
-    `root` (n, n) belongs to the static unknowns that root equations depend on.
+    `root` (n, n + u) belongs to the static unknowns that root equations depend on.
     """
     by, precision = seen.by, spread.carried.dtype
-    (d, r, n), c = by.static.shape, by.q.shape[2]
+    (d, r, n), c, some = by.static.shape, by.q.shape[2], root.shape[1]
     still = by.static.reshape(-1, n).astype(precision) @ root.astype(precision)
     starts = np.flatnonzero(np.diff(seen.first, prepend=-1))
     for start, stop in zip(starts, np.append(starts[1:], d), strict=True):
@@ -263,7 +264,7 @@ def _intervals(spread: MotionSpread, seen: _Seen, root: np.ndarray) -> Iterator[
         plain, shaken = by_splines.reshape(2, -1, 6 * c)
         shaken *= seen.grown[own].reshape(-1, 1)
         moment = plain @ carried.reshape(6 * c, -1)
-        moment[:, :n] -= still[start * r : stop * r]
+        moment[:, :some] -= still[start * r : stop * r]
         yield _Interval(own, moment, shaken, shaken @ covariance.astype(precision), covariance, carried, values)
 
 

@@ -43,7 +43,7 @@ class MotionSpread:
         start: the first of the splines.
         pairs: (b, 2 k, 2 k) covariance of every two neighbouring blocks of SPLINES_PER_BLOCK splines, given the static
             unknowns.
-        carried: (splines, c, S) their change with one standard deviation of each independent part of the static
+        carried: (splines, c, r) their change with one standard deviation of each independent part of the static
             unknowns.
     """
 
@@ -60,7 +60,7 @@ class MotionSpread:
         Args:
             part: the eliminated splines.
             time_block: theirs.
-            root: (S, S) root of the static unknowns' covariance.
+            root: (S, r) root of the static unknowns' covariance.
             end: of the block of splines with which the time block ends.
             needed: splines of the trial. Blocks beyond them are left out; if all are, there is no result.
         """
@@ -81,10 +81,10 @@ class MotionSpread:
         pairs = np.empty((len(below), 2 * k, 2 * k))
         pairs[:, :k, :k], pairs[:, :k, k:] = diagonal[:-1], below.transpose(0, 2, 1)
         pairs[:, k:, :k], pairs[:, k:, k:] = below, diagonal[1:]
-        return cls(start, pairs, carried.reshape(-1, k // SPLINES_PER_BLOCK, len(root))), other
+        return cls(start, pairs, carried.reshape(-1, k // SPLINES_PER_BLOCK, root.shape[1])), other
 
     def active(self, first: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return covariance (6 c, 6 c) and dependence (6, c, S) of the trial's six splines from `first` on."""
+        """Return covariance (6 c, 6 c) and dependence (6, c, r) of the trial's six splines from `first` on."""
         block, offset = divmod(first - self.start, SPLINES_PER_BLOCK)
         c = self.carried.shape[1]
         here = slice(offset * c, (offset + 6) * c)
@@ -92,14 +92,15 @@ class MotionSpread:
 
 
 def _times_root(border: np.ndarray, root: np.ndarray) -> np.ndarray:
-    """Multiply a border (b, k, S) by a root (S, S), many rows of whose columns are zero."""
-    flat, result = border.reshape(-1, len(root)), np.empty_like(border)
-    precise = root.astype(border.dtype)
-    for start in range(0, len(root), _COLUMNS):
+    """Multiply a border (b, k, S) by a root (S, r), many rows of whose columns are zero."""
+    flat, precise = border.reshape(-1, len(root)), root.astype(border.dtype)
+    result = np.empty((*border.shape[:2], root.shape[1]), border.dtype)
+    into = result.reshape(len(flat), -1)
+    for start in range(0, root.shape[1], _COLUMNS):
         columns = precise[:, start : start + _COLUMNS]
         rows = np.flatnonzero(columns.any(axis=1))
         some = slice(rows[0], rows[-1] + 1)
-        np.matmul(flat[:, some], columns[some], out=result.reshape(flat.shape)[:, start : start + _COLUMNS])
+        np.matmul(flat[:, some], columns[some], out=into[:, start : start + _COLUMNS])
     return result
 
 
