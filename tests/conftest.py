@@ -22,7 +22,7 @@ from kinertia.estimation.result import Fit
 from kinertia.io import samples
 from kinertia.io.recording import read_recording
 from kinertia.io.subject.provenance import sha256
-from kinertia.motion import two_threads
+from kinertia.motion import workload
 from kinertia.report import matplotlib_extra
 from kinertia.settings import Settings, Subject
 from kinertia.synthetic.laboratory import LabNoise
@@ -49,7 +49,7 @@ threadpool_limits(1, user_api="blas")
 
 if "PYTEST_XDIST_WORKER" in os.environ:
     # the other workers use the other cores; processes that tests start have their second thread, and give the same bits
-    two_threads.cores = lambda: 1
+    workload.cores = lambda: 1
 
 LOOKED_FOR = (
     f"measured recordings are looked for in the folder that {samples.VARIABLE} names or, if it names none, in "

@@ -5,7 +5,7 @@ from functools import cache
 
 import numpy as np
 
-from kinertia.model.measures import log_size, measures, usual_build
+from kinertia.model.stadium_body import log_size, measures, usual_build
 
 SIZES = {"Ann": (61.0, 1.66), "Ben": (58.0, 1.72), "Carl": (92.0, 1.79), "Dan": (80.0, 1.81), "Ed": (78.7, 1.76)}
 """Mass (kg) and stature (m) that their measures are drawn for."""

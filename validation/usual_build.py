@@ -11,8 +11,15 @@ from pathlib import Path
 import numpy as np
 
 from kinertia.model.bsp import FloatArray
-from kinertia.model.measures import GIRTH_OVER_WIDTH, UsualBuild, girths_with_widths, log_size, measures
-from kinertia.model.stadium_body import KINDS, stadium_bsp
+from kinertia.model.stadium_body import (
+    GIRTH_OVER_WIDTH,
+    KINDS,
+    UsualBuild,
+    girths_with_widths,
+    log_size,
+    measures,
+    stadium_bsp,
+)
 
 FILE = Path(__file__).resolve().parents[1] / "src" / "kinertia" / "model" / "data" / "usual_build.csv"
 HEADER = """\

@@ -6,7 +6,7 @@ import sys
 import pytest
 
 from kinertia.cli import compiling
-from kinertia.motion import two_threads
+from kinertia.motion import workload
 
 _ESTIMATE = """
 from kinertia.cli.compiling import stored_functions
@@ -47,7 +47,7 @@ def test_all_is_compiled_where_no_process_can_be_started(monkeypatch):
     ran, told = [], []
     monkeypatch.setattr(compiling, "is_compiled", lambda: False)
     monkeypatch.setattr(compiling, "set_compiled", lambda: ran.append("complete"))
-    monkeypatch.setattr(two_threads, "cores", lambda: 2)
+    monkeypatch.setattr(workload, "cores", lambda: 2)
     monkeypatch.setattr(compiling, "_compiled", lambda functions: ran.append(len(functions)) or iter((0.5,)))
     monkeypatch.setattr(compiling, "PYTHON", ("/nowhere/python",))
     compiling.compile_once(lambda stage, share: told.append(share))

@@ -11,7 +11,7 @@ from kinertia.estimation.body_measures import expected_measures, measured_body, 
 from kinertia.estimation.prior import literature_prior
 from kinertia.io.subject.measures_file import BodyMeasures, measures_sheet
 from kinertia.io.subject.tables import PriorFiles
-from kinertia.model.measures import measures
+from kinertia.model.stadium_body import measures
 from kinertia.synthetic.walk import HEIGHT_M, MASS_KG, walking_subject
 from kinertia.workflow.from_files import prepare_subject
 from kinertia.workflow.known_body import with_known_body

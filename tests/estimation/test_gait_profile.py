@@ -13,8 +13,8 @@ from kinertia.estimation.mean_cycles import convention_of, mean_curves
 from kinertia.estimation.normative_bands import Control, band_columns, mixture
 from kinertia.io.norms_file import Norm
 from kinertia.model.shared_coordinates import opposite_on_left
-from kinertia.motion.clinical_angles import CLINICAL_ANGLES
 from kinertia.motion.gait_cycle import PERCENT, feet_under_pelvis
+from kinertia.motion.model_outputs import CLINICAL_ANGLES
 
 OFFSETS = dict(zip(CLINICAL_ANGLES, (1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0), strict=True))
 

@@ -5,7 +5,7 @@ import pytest
 
 from kinertia.estimation import body_measures
 from kinertia.estimation.body_measures import measured_body
-from kinertia.model.measures import log_size, measures, usual_build
+from kinertia.model.stadium_body import log_size, measures, usual_build
 from stadium_people import SIZES, stadium_people
 from validation.measured_data import find
 from validation.usual_build import FILE, HEADER, fitted, read_people, stadium_mass_kg, stature_m, written

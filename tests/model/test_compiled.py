@@ -39,7 +39,7 @@ def test_all_files_with_compiled_functions_are_among_the_sources():
         for path in PACKAGE.rglob("*.py")
         if re.search(r"^@(compiled|compiled_sums|part|inlined)$", path.read_text(encoding="utf-8"), re.MULTILINE)
     }
-    assert users | {"model/compiled.py", "model/machine_code_cache.py"} == set(compiled.SOURCES)
+    assert users | {"model/compiled.py"} == set(compiled.SOURCES)
 
 
 def test_a_change_of_any_source_leads_to_another_folder(installation):

@@ -5,8 +5,7 @@ import pytest
 
 from kinertia.errors import PriorError
 from kinertia.model.bsp import combine
-from kinertia.model.measures import measures
-from kinertia.model.stadium_body import DENSITY_KG_M3, KINDS, stadium_bsp
+from kinertia.model.stadium_body import DENSITY_KG_M3, KINDS, measures, stadium_bsp
 from stadium_people import stadium_people
 
 yeadon = pytest.importorskip("yeadon", reason="needs yeadon (pip install -e '.[test]')")

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinertia.motion.contact_phases import contact_phases
+from kinertia.motion.gait_cycle import contact_phases
 from kinertia.motion.joint_moments import component_names
 
 

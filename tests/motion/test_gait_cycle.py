@@ -18,7 +18,7 @@ from kinertia.motion.spatiotemporal import _double_support, spatiotemporal
 from kinertia.synthetic.walk import walk, walking_subject
 from kinertia.trial.belt import Belt
 from kinertia.trial.data import FEET, LOAD_THRESHOLD_N, FootLoads, Trial
-from kinertia.trial.gait_event import FileEvent
+from kinertia.trial.file_contents import FileEvent
 from kinertia.trial.gait_events import contradicted_events, sides_exchanged
 from kinertia.trial.rms import rms
 from kinertia.trial.sampled_time import runs

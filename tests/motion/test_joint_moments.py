@@ -8,8 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from kinertia.motion.dynamics import Motion, inverse_dynamics
 from kinertia.motion.joint_moments import component_names, joint_axes, joint_moments
-from kinertia.motion.joint_wrench import body_joints, joint_wrenches, lumbar_joint
-from kinertia.motion.virtual_axes import VirtualAxes
+from kinertia.motion.joint_wrench import VirtualAxes, body_joints, joint_wrenches, lumbar_joint
 from kinertia.synthetic.walk import walk, walking_subject
 
 SIDES = ("r", "l")

@@ -9,7 +9,7 @@ from kinertia.motion.model_outputs import model_outputs
 from kinertia.report.comparison import comparison_summary, render_comparison
 from kinertia.report.file_outputs import compared_outputs, outputs_sentence, outputs_summary
 from kinertia.report.page import render
-from kinertia.trial.file_outputs import FileOutputs
+from kinertia.trial.file_contents import FileOutputs
 from report_page import figures_of
 
 SHIFT_DEG = 5.0

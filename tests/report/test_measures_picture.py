@@ -6,7 +6,7 @@ from xml.etree import ElementTree
 
 from command_line import run
 from kinertia.io.subject.measures_file import measures_sheet
-from kinertia.model.measures import measures
+from kinertia.model.stadium_body import measures
 from kinertia.report.measures_picture import LEVELS, measures_picture
 
 SVG = "{http://www.w3.org/2000/svg}"

@@ -7,7 +7,7 @@ import pytest
 
 from kinertia.diagnostics.evidence.foot_trajectories import foot_trajectories
 from kinertia.diagnostics.timing.belt_speed import belt_speed
-from kinertia.io.subject.belt_file import read_belt
+from kinertia.io.subject.person_recordings import read_belt
 from kinertia.trial.belt import Belt
 from kinertia.trial.plate_assignment import build_trial
 from loads_and_feet import context_of

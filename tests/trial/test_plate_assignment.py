@@ -8,7 +8,7 @@ from kinertia.findings.finding import finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.trial.data import FootLoads, Markers, PlateLoads, Recording
-from kinertia.trial.gait_event import StatedContact
+from kinertia.trial.file_contents import StatedContact
 from kinertia.trial.ground_contact import CONTACT_MARGIN_S, CONTACT_SLACK_S, ground_contact
 from kinertia.trial.plate_assignment import assign_plates, build_trial
 from kinertia.trial.sampled_time import runs, within

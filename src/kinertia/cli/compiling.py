@@ -27,7 +27,7 @@ def compile_once(progress: Callable[[str, float], None]) -> None:
     if is_compiled():
         return
     progress(_STAGE, 0.0)
-    from kinertia.motion.two_threads import cores
+    from kinertia.motion.workload import cores
 
     # Numba reads it when it compiles, here and in the processes beside
     os.environ.setdefault("NUMBA_OPT", "1")

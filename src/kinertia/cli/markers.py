@@ -14,7 +14,7 @@ from kinertia.io.recording import read_recording
 from kinertia.io.results.output_folder import write_then_rename
 from kinertia.model.marker_set import fits_person, label_share, spelled_as
 from kinertia.trial.data import Recording
-from kinertia.trial.stillness import STILL_M_S, speed_m_s
+from kinertia.trial.marker_quality import STILL_M_S, speed_m_s
 
 _LISTED = 6
 

@@ -16,7 +16,7 @@ from kinertia.estimation.gait_scores import with_norms
 from kinertia.estimation.result import Fit
 from kinertia.io.norms_file import Norm, read_norms
 from kinertia.io.results.output_folder import updated_files
-from kinertia.motion.clinical_angles import CLINICAL_ANGLES
+from kinertia.motion.model_outputs import CLINICAL_ANGLES
 from kinertia.report.cycle_figures import CurvesByStage, drawn_curves
 from kinertia.report.files import write_columns
 from kinertia.report.page import render

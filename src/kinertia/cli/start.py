@@ -48,7 +48,7 @@ def program() -> None:
 
 def _end(status: object) -> None:
     """End this process without freeing every object first, unless something else is at work in it."""
-    from kinertia.motion.two_threads import THREAD
+    from kinertia.motion.workload import THREAD
 
     at_work = [each for each in threading.enumerate() if not each.name.startswith(THREAD)]
     if len(at_work) > 1 or not isinstance(status, int):

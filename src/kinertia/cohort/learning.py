@@ -23,13 +23,12 @@ from kinertia.estimation.learnt_prior import FEWEST_PEOPLE, LearntPrior, learn
 from kinertia.estimation.person_information import PersonInformation, information_of
 from kinertia.io.file_names import path_from
 from kinertia.io.results.output_folder import write_then_rename
+from kinertia.io.subject.person_recordings import session_date
 from kinertia.io.subject.population_file import population_text
 from kinertia.io.subject.provenance import recordings, sha256
 from kinertia.io.subject.reader import read_subject
-from kinertia.io.subject.recording_date import session_date
 from kinertia.io.subject.session_file import PersonInstruments, session_text
-from kinertia.io.subject.tables import InstrumentsFiles, SubjectFile
-from kinertia.io.subject.text import subject_text
+from kinertia.io.subject.tables import InstrumentsFiles, SubjectFile, subject_text
 from kinertia.io.text.toml_lines import read_toml
 from kinertia.io.versions import VERSION
 from kinertia.report.saved_fit import read_saved

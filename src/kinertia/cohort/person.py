@@ -12,9 +12,9 @@ from kinertia.errors import KinertiaError, internal_error
 from kinertia.estimation.result import Fit
 from kinertia.findings.finding import Severity
 from kinertia.io.results.output_folder import complete_folder, write_then_rename
+from kinertia.io.subject.person_recordings import session_date
 from kinertia.io.subject.provenance import command_line, provenance_of
 from kinertia.io.subject.reader import read_subject
-from kinertia.io.subject.recording_date import session_date
 from kinertia.io.subject.tables import SubjectFile
 from kinertia.io.versions import VERSION
 from kinertia.report.files import save_fit

@@ -30,9 +30,18 @@ from kinertia.findings.finding import Finding, Severity, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.model.bsp import PARAMETERS, BodySegmentParameters
-from kinertia.model.measures import GIRTH_OVER_WIDTH, girths_with_widths, log_size, measures, usual_build
 from kinertia.model.skeleton import Skeleton
-from kinertia.model.stadium_body import DENSITY_KG_M3, KINDS, expect_yeadon, stadium_bsp
+from kinertia.model.stadium_body import (
+    DENSITY_KG_M3,
+    GIRTH_OVER_WIDTH,
+    KINDS,
+    expect_yeadon,
+    girths_with_widths,
+    log_size,
+    measures,
+    stadium_bsp,
+    usual_build,
+)
 
 _DENSITY_SD = {
     **{"head": 0.027, "shoulders": 0.10, "thorax": 0.09, "abdomen": 0.10, "upper_arm": 0.033, "forearm": 0.036},

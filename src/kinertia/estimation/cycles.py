@@ -15,9 +15,9 @@ import numpy as np
 from kinertia.estimation.curve_source import CurveSource, Estimated, Stage, tracked
 from kinertia.model.shared_coordinates import by_side
 from kinertia.model.skeleton import GRAVITY_M_S2
-from kinertia.motion.clinical_angles import clinical_angles
 from kinertia.motion.gait_cycle import PERCENT, FeetUnderPelvis, Stride, feet_under_pelvis
 from kinertia.motion.joint_moments import component_names, joint_and_side
+from kinertia.motion.model_outputs import clinical_angles
 from kinertia.motion.spatiotemporal import Spatiotemporal, spatiotemporal, travelled
 from kinertia.trial.belt import Belt
 from kinertia.trial.data import FEET

@@ -19,8 +19,8 @@ from kinertia.estimation.mean_cycles import MeanCurves, convention_of, mean_curv
 from kinertia.estimation.normative_bands import ADULT_YEARS, mean_speed_m_s
 from kinertia.estimation.result import Fit
 from kinertia.io.norms_file import Norm
-from kinertia.motion.clinical_angles import CLINICAL_ANGLES
 from kinertia.motion.gait_cycle import PERCENT
+from kinertia.motion.model_outputs import CLINICAL_ANGLES
 from kinertia.trial.data import FEET
 
 _PELVIS = tuple(CLINICAL_ANGLES)[:3]

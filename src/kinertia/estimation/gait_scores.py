@@ -11,8 +11,8 @@ import numpy as np
 from kinertia.io.norms_file import Norm
 from kinertia.model.shared_coordinates import opposite_on_left
 from kinertia.model.skeleton import Skeleton
-from kinertia.motion.clinical_angles import CLINICAL_ANGLES
 from kinertia.motion.gait_cycle import PERCENT
+from kinertia.motion.model_outputs import CLINICAL_ANGLES
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -16,7 +16,7 @@ from scipy.linalg import block_diag
 from kinertia.model.bsp import MIRROR_SIGNS, PARAMETERS, BodySegmentParameters, dynamic_by_table
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion, root_regressor
-from kinertia.motion.frame_chunks import pieces
+from kinertia.motion.workload import pieces
 
 MEASURED, INFORMED = 0.75, 0.25
 """Variance reduction above which a parameter counts as well informed ("measured"), as partly informed ("informed")."""

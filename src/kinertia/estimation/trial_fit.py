@@ -12,9 +12,8 @@ import numpy as np
 from kinertia.estimation.joint_curves import JointCurves
 from kinertia.estimation.simultaneous.uncertainty.curve_deviations import CurveDeviations
 from kinertia.model.skeleton import Skeleton
-from kinertia.motion.contact_phases import contact_phases
 from kinertia.motion.dynamics import Motion
-from kinertia.motion.gait_cycle import Stride, strides_of
+from kinertia.motion.gait_cycle import Stride, contact_phases, strides_of
 from kinertia.motion.ground_reactions import GroundReactions
 from kinertia.motion.kinematics import Kinematics
 from kinertia.trial import display

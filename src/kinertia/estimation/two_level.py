@@ -25,7 +25,7 @@ from kinertia.estimation.study_parameters import ParameterVector
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion, consistent_root_acceleration, residual, root_derivatives, root_regressor
-from kinertia.motion.single_blas_thread import one_blas_thread
+from kinertia.motion.workload import one_blas_thread
 from kinertia.trial.sampled_time import span_s
 
 LONGEST_INTERVAL_S = 1.1

@@ -4,6 +4,9 @@ Functions over the frames of a trial are compiled, and stored in a folder whose 
 line of a compiled function changes, or another version is installed, they are compiled again, and code of older lines
 never runs. The folder is beside this file or, if that is not writable, in the user's cache; if neither is, in the
 folder for temporary files.
+
+Numba also stores what other functions, compiled later, would need to inline it: as much again, which takes longer to
+load than the machine code. Only Python calls the functions stored here.
 """
 
 import hashlib
@@ -16,21 +19,23 @@ from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import platformdirs
+from llvmlite import binding as llvm
+from numba.core.caching import CompileResultCacheImpl, FunctionCache
+from numba.core.runtime import rtsys
 
 F = TypeVar("F", bound=Callable[..., Any])
-
 _COMPLETE = "complete"
 """File that marks a complete folder."""
 SOURCES = (
     "model/compiled.py",
-    "model/machine_code_cache.py",
+    "model/compiled.py",
     "model/spatial.py",
     "model/kinematic_tree.py",
     "motion/rigid_body.py",
     "motion/regressor.py",
     "motion/root_columns.py",
     "motion/marker_sums.py",
-    "motion/load_splines.py",
+    "motion/ground_reactions.py",
     "estimation/simultaneous/instruments/plate_loads.py",
     "estimation/simultaneous/uncertainty/axis_columns.py",
     "estimation/simultaneous/uncertainty/curve_variances.py",
@@ -61,7 +66,6 @@ def compiled_sums(function: F) -> F:
 
 
 def _stored(function: F, **options: Any) -> F:
-    from kinertia.model.machine_code_cache import MachineCodeCache  # brings numba
 
     result: Any = _compiled(function, **options)
     with _kept_in(cache_folder()):
@@ -148,3 +152,31 @@ def _kept_in(folder: Path) -> Iterator[None]:
         yield
     finally:
         config.CACHE_DIR = before
+
+
+class _MachineCode(CompileResultCacheImpl):  # type: ignore[misc]
+    """Serialised form of a compiled function."""
+
+    def reduce(self, result: Any) -> tuple[Any, ...]:
+        """Serialise as Numba does, but with only the name by which Python calls the code, and without what nobody looks
+        up: types of all variables, and modules of functions that need no constants from there.
+        """
+        (name, kind, (code, _)), *others, places = super().reduce(result._replace(type_annotation=""))
+        called = llvm.parse_assembly(f'define void @"{result.fndesc.llvm_cpython_wrapper_name}"() {{ ret void }}')
+        needed = tuple(place for place in places if place.consts)
+        return ((name, kind, (code, called.as_bitcode())), *others, needed)
+
+
+class MachineCodeCache(FunctionCache):  # type: ignore[misc]
+    """Cache files of one function that Python calls."""
+
+    _impl_class = _MachineCode
+
+    def load_overload(self, signature: Any, target: Any) -> Any:
+        """Load as Numba does, without registering all that Numba can compile, which takes longer than loading code."""
+        rtsys.initialize(target)
+        with self._guard_against_spurious_io_errors():
+            kept = self._load_overload(signature, target)
+            if kept is not None:
+                return kept
+        return super().load_overload(signature, target)

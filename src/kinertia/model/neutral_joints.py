@@ -1,8 +1,9 @@
-"""Locates a model's joints and their axes with all coordinates at zero, as in upright standing.
+"""Locates a model's joints and axes with all coordinates at zero, and how far calibration moved joint centres.
 
 Mirroring is across the plane between the sides: in ground axes, and in the axes of the joints' parent bodies.
 """
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -80,3 +81,19 @@ def mirrored(axis: int) -> FloatArray:
 def angle_deg(one: FloatArray, other: FloatArray) -> float:
     """Return the angle between two lines of these directions (unit): an axis and its opposite are the same line."""
     return float(np.degrees(np.arccos(min(1.0, abs(float(one @ other))))))
+
+
+def centre_offsets(skeleton: Skeleton) -> dict[str, np.ndarray]:
+    """Return by joint how far (3,) m its centre offsets move it in its parent, along the parent's axes."""
+    names = {name.removesuffix("/offset_x") for name in skeleton.locked if name.endswith("/offset_x")}
+    return {name: np.array([skeleton.locked[f"{name}/offset_{axis}"] for axis in "xyz"]) for name in names}
+
+
+def joint_and_axis(coordinate: str) -> tuple[str, str]:
+    """Return joint and axis that a static coordinate moves or tilts, from its name.
+
+    >>> [joint_and_axis(name) for name in ("hip_x_r", "lumbar_y", "knee_tilt_1_l", "hip_l/offset_z")]
+    [('hip_r', 'x'), ('lumbar', 'y'), ('knee_l', '1'), ('hip_l', 'z')]
+    """
+    joint, axis, side = re.fullmatch(r"(.+?)(?:/offset|_tilt)?_([xyz12])(_[rl])?", coordinate).groups("")  # type: ignore[union-attr]
+    return f"{joint}{side}", axis

@@ -13,13 +13,20 @@ levels at which girth and width were measured. The segments are:
 - torso: all above, with neck and head.
 
 Axes of the package are x to the left, y backwards, z up.
+
+Yeadon (1990, J Biomech 23:67) builds the body from 95 of them, 58 if the two sides are assumed equal: 21 of trunk and
+head, 18 of an arm, 19 of a leg. A level (T0 to T8, A0 to A7, L0 to L9) is the position of a measurement; the picture
+that `kinertia init --measures` draws shows it.
 """
 
 import contextlib
+import csv
 import io
 import warnings
 from collections.abc import Mapping, Sequence
-from functools import lru_cache
+from dataclasses import dataclass
+from functools import cache, lru_cache
+from importlib.resources import files
 from importlib.util import find_spec
 from types import MappingProxyType
 from typing import Any
@@ -31,7 +38,6 @@ from kinertia.findings.finding import Severity, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.model.bsp import BodySegmentParameters, FloatArray, combine
-from kinertia.model.measures import measures
 
 KINDS = ("pelvis", "torso", "thigh_r", "shank_r", "foot_r", "upper_arm_r", "forearm_r")
 """Segments of a body with equal sides."""
@@ -55,6 +61,8 @@ _FOREARM = ("forearm", "forearm", "hand", "hand", "hand")
 _UPRIGHT = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [-1.0, 0.0, 0.0]])
 _POINTED = np.array([[0.0, 0.0, -1.0], [0.0, -1.0, 0.0], [-1.0, 0.0, 0.0]])
 """The package's axes in those of a segment, and of the foot."""
+GIRTH_OVER_WIDTH = (2.0, np.pi)
+"""Least and greatest ratio in any stadium; depths count as widths."""
 
 
 def expect_yeadon() -> None:
@@ -174,3 +182,97 @@ def _joined(stack: Sequence[tuple[Any, float]], bottoms_m: np.ndarray) -> tuple[
     com[:, 2] = bottoms_m + [float(solid.rel_center_of_mass[2, 0]) for solid, _ in stack]
     inertia = factors[:, None, None] * np.array([solid.rel_inertia for solid, _ in stack])
     return combine(mass, com, inertia)
+
+
+@dataclass(frozen=True)
+class Measure:
+    """One measurement.
+
+    Attributes:
+        name: as in the form.
+        key: as in the package `yeadon`, for limbs on the left.
+        level: position, as in the picture.
+        kind: "length", "girth", "width" or "depth".
+        sd_m: standard deviation of a careful measurement: chosen here, about twice the repeatability of trained people
+            (1 % of a girth is the usual target of courses in anthropometry), and more if a joint centre must be
+            guessed.
+        first: whether it is one of the most informative for the time that it takes.
+        what: description.
+    """
+
+    name: str
+    key: str
+    level: str
+    kind: str
+    sd_m: float
+    first: bool
+    what: str
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Names of the measurement in the package, for limbs on both sides."""
+        other = {"a": "b", "j": "k"}.get(self.key[1])
+        return (self.key,) if other is None else (self.key, f"L{other}{self.key[2:]}")
+
+
+@dataclass(frozen=True, eq=False)
+class UsualBuild:
+    """Mean and variation of the measurements of people of one stature and mass, in the order of `measures`.
+
+    Attributes:
+        median_m: (n,) of the people behind the other figures.
+        log_shape: (n,) mean of the logarithms of measures (m), less `log_size`.
+        log_sd: (n,) standard deviation between people of one size, and of the mean.
+        common: (n, k) correlated variation, in principal components; the rows' squares sum to one.
+    """
+
+    median_m: FloatArray
+    log_shape: FloatArray
+    log_sd: FloatArray
+    common: FloatArray
+
+
+@cache
+def measures() -> tuple[Measure, ...]:
+    """Return all measurements, from the hips up, then an arm and a leg downwards."""
+    return tuple(
+        Measure(row["name"], row["key"], row["level"], row["kind"], float(row["sd_mm"]) / 1e3, bool(row["first"]), text)
+        for row in _rows("measures.csv")
+        for text in [row["what"]]
+    )
+
+
+@cache
+def girths_with_widths() -> tuple[tuple[int, int], ...]:
+    """Return the indices in `measures` of each girth and of the width or depth of the same cross-section."""
+    places = {measure.key: k for k, measure in enumerate(measures())}
+    pairs = [(key, f"{key[:-1]}{other}") for key in places if key.endswith("p") for other in "wd"]
+    return tuple((places[girth], places[width]) for girth, width in pairs if width in places)
+
+
+def log_size(mass_kg: float, height_m: float) -> FloatArray:
+    """Return the logarithm (58,) of the size that each measurement is proportional to.
+
+    It is the stature, or the square root of mass over stature.
+    """
+    along = np.array([one.kind == "length" for one in measures()])
+    size: FloatArray = np.where(along, np.log(height_m), 0.5 * np.log(mass_kg / height_m))
+    return size
+
+
+@cache
+def usual_build() -> UsualBuild:
+    """Return the build fitted to the five people that come with the package `yeadon` (four men, a woman)."""
+    rows = {row["name"]: row for row in _rows("usual_build.csv")}
+    columns = {
+        column: np.array([float(rows[one.name][column]) for one in measures()])
+        for column in next(iter(rows.values()))
+        if column != "name"
+    }
+    common = [values for column, values in columns.items() if column.startswith("common")]
+    return UsualBuild(columns["median_cm"] / 100.0, columns["log_shape"], columns["log_sd"], np.transpose(common))
+
+
+def _rows(name: str) -> list[dict[str, str]]:
+    with files("kinertia.model").joinpath("data", name).open(encoding="utf-8") as file:
+        return list(csv.DictReader(line for line in file if not line.startswith("#")))

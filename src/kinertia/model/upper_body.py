@@ -1,18 +1,20 @@
-"""Computes joint centres and axes of trunk and arms of a standing person from landmarks.
+"""Computes joint centres and axes of trunk and arms of a standing person from landmarks; finds head markers.
 
 Points are in ground axes (m), frames follow ISB: x anterior, y up or proximal, z right. Sources: cervical joint Dumas
 et al. (2007); shoulder Rab et al. (2002). What the trial does not show is replaced by stature and an upright pose:
 `assumptions` lists it.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from kinertia.model.anatomy import segment_of
 from kinertia.model.anthropometry import reference_lengths
 from kinertia.model.joint_centres import MARKER_RADIUS_M, Landmarks, frame
+from kinertia.model.skeleton import Skeleton
 
 _SHOULDER_DROP = 0.17
 _BIACROMIAL_OF_STATURE = 0.2
@@ -22,6 +24,13 @@ _CERVICAL_RAISED = {"male": np.radians(8.0), "female": np.radians(14.0)}
 _CERVICAL = {"male": 0.55, "female": 0.53}
 _SIGNS = {"r": 1.0, "l": -1.0}
 ARM_SEGMENTS = ("upper_arm", "forearm")
+_HEAD_M = 0.14
+"""Height above the shoulder centres; the temples of a child of six are higher, with hanging arms."""
+_TRUNK_M = 0.12
+"""Height below which markers are on the trunk: C7 and the acromia are lower."""
+_GAP_M = 0.08
+"""Least distance between the highest marker of the trunk and the lowest of the head."""
+_SHOW_A_SEGMENT = 3
 
 
 class Arm(NamedTuple):
@@ -131,3 +140,40 @@ def _elbow_axis(shoulder: np.ndarray, elbow: np.ndarray, wrist: np.ndarray, tors
         swing, _ = Rotation.align_vectors(upper[None], -torso[:, 1][None])
         axis = swing.apply(torso[:, 2])
     return axis
+
+
+def head_markers(skeleton: Skeleton) -> tuple[str, ...]:
+    """Return the labels of head markers: far above the shoulder centres, and separated from those below by a gap.
+
+    None is found where shoulders are raised, nor without shoulders.
+    """
+    above = sorted((height, label) for label, height in _above_shoulders_m(skeleton).items())
+    heights = np.array([height for height, _ in above])
+    lowest = np.flatnonzero((heights > _HEAD_M) & (np.diff(heights, prepend=-np.inf) > _GAP_M))
+    return tuple(label for _, label in above[lowest[0] :]) if lowest.size else ()
+
+
+def without_head(skeleton: Skeleton, arms: Collection[str], worn: Collection[str]) -> tuple[Skeleton, tuple[str, ...]]:
+    """Remove the head markers from the skeleton if three others show the trunk; return it with their labels.
+
+    Args:
+        skeleton: with all markers.
+        arms: labels on the trunk that move with the arms, such as those of the acromia; they do not count.
+        worn: labels that all trials have.
+    """
+    head = head_markers(skeleton)
+    trunk = {label for label, height in _above_shoulders_m(skeleton).items() if height < _TRUNK_M}
+    if not head or len((trunk & set(worn)) - set(arms)) < _SHOW_A_SEGMENT:
+        return skeleton, ()
+    return skeleton.with_markers([marker for marker in skeleton.markers if marker.label not in head]), head
+
+
+def _above_shoulders_m(skeleton: Skeleton) -> dict[str, float]:
+    """Return the height (m) of each trunk marker above the middle of the shoulder centres, along the trunk."""
+    shoulders = [
+        float(joint.translation[1])
+        for joint in skeleton.joints
+        if segment_of(joint.parent) == "torso" and str(segment_of(joint.child)).startswith("upper_arm")
+    ]
+    worn = [marker for marker in skeleton.markers if segment_of(marker.segment) == "torso"]
+    return {marker.label: float(marker.position[1] - np.mean(shoulders)) for marker in worn} if shoulders else {}

@@ -18,9 +18,9 @@ import numpy as np
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.kinematic_tree import KinematicTree
 from kinertia.model.skeleton import Skeleton
-from kinertia.motion.frame_chunks import pieces
 from kinertia.motion.regressor import regressor
 from kinertia.motion.rigid_body import axis_force_derivatives, axis_forces
+from kinertia.motion.workload import pieces
 
 
 @dataclass(frozen=True)

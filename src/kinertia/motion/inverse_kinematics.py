@@ -6,6 +6,11 @@ several sets of angles describe the same pose: an arm rotated by half a turn wit
 upside down. So frames a tenth of a second apart are solved first; among equally good poses each takes the one that
 continues its neighbour's, outwards from the frame that fits best, and among equivalent angles those that do not jump
 (`angle_continuity`). All other frames start from there.
+
+Model and markers differ by millimetres to centimetres (skin, marker placement), so a pose that is fitted to fewer
+markers differs: where a marker vanishes for a frame, the joint jumps, and accelerations at the edges of the gap are
+hundreds of times those of the body. If a marker in a gap keeps its offset, in the axes of its segment, it has no effect
+on the pose, which stays continuous.
 """
 
 from dataclasses import dataclass, replace
@@ -16,11 +21,9 @@ from scipy.interpolate import PchipInterpolator
 from kinertia.errors import MarkerSetError, TrialError
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.angle_continuity import EquivalentAngles
-from kinertia.motion.frame_chunks import pieces
-from kinertia.motion.marker_gaps import GapOffsets
 from kinertia.motion.marker_sums import variances
 from kinertia.motion.pose_fit import PoseFit, Stop, fit_poses
-from kinertia.motion.single_blas_thread import one_blas_thread
+from kinertia.motion.workload import one_blas_thread, pieces
 from kinertia.trial.data import Markers
 from kinertia.trial.rms import rms
 
@@ -130,7 +133,7 @@ def solve_ik(
 
 
 def _hold_in_gaps(model: Skeleton, measured: np.ndarray, placed: np.ndarray, q: np.ndarray, stop: Stop) -> None:
-    """Solve frames with missing markers again, with the offsets that these have before and after (`marker_gaps`)."""
+    """Solve frames with missing markers again, with the offsets that these have before and after (`GapOffsets`)."""
     gaps = GapOffsets(measured, placed)
     for _ in range(_ROUNDS):
         for some in (gaps.frames[piece] for piece in pieces(len(gaps.frames))):
@@ -236,3 +239,52 @@ def _uninformed(normal: np.ndarray) -> np.ndarray:
     """Return the mask (n, c) of coordinates that visible markers do not determine, from J^T J (n, c, c)."""
     result: np.ndarray = np.sqrt(variances(normal, 1e-9)) > _UNINFORMED_RAD_PER_M
     return result
+
+
+class GapOffsets:
+    """Interpolated marker offsets in the gaps of a trial.
+
+    Args:
+        measured: (n, m, 3) m; NaN where not seen.
+        placed: (n,) frames that have a pose.
+    """
+
+    def __init__(self, measured: np.ndarray, placed: np.ndarray) -> None:
+        self._measured = measured
+        seen = np.isfinite(measured).all(axis=-1) & placed[:, None]
+        frames = np.arange(len(seen))[:, None]
+        before = np.maximum.accumulate(np.where(seen, frames, -1), axis=0)
+        after = np.minimum.accumulate(np.where(seen, frames, len(seen))[::-1], axis=0)[::-1]
+        ever = seen.any(axis=0)
+        # before the first and after the last frame that shows a marker, the offset is that of this frame
+        self._before = np.where(ever, np.where(before < 0, after, before), 0)
+        self._after = np.where(ever, np.where(after >= len(seen), self._before, after), 0)
+        self._gap = ~seen & ever & placed[:, None]
+
+    @property
+    def frames(self) -> np.ndarray:
+        """Frames with a pose that lack a marker visible elsewhere in the trial."""
+        return np.flatnonzero(self._gap.any(axis=1))
+
+    def filled(self, model: Skeleton, q: np.ndarray, frames: np.ndarray) -> np.ndarray:
+        """Return the markers (f, m, 3) m of these frames, gaps filled by the poses q (n, c) of all frames."""
+        ends = [at[frames] for at in (self._before, self._after)]
+        edges = np.unique(np.concatenate([end[self._gap[frames]] for end in ends]))
+        local = self._errors(model, q, edges)
+        columns = np.arange(self._gap.shape[1])
+        first, last = (local[np.minimum(np.searchsorted(edges, end), len(edges) - 1), columns] for end in ends)
+        length = np.maximum(ends[1] - ends[0], 1)
+        share = np.clip((frames[:, None] - ends[0]) / length, 0.0, 1.0)[..., None]
+        pose = model.pose(q[frames])
+        turned = pose.rotation[:, model.marker_segments]
+        error = (turned @ (first + share * (last - first))[..., None])[..., 0]
+        held = model.marker_positions(pose) + error
+        result: np.ndarray = np.where(self._gap[frames][..., None], held, self._measured[frames])
+        return result
+
+    def _errors(self, model: Skeleton, q: np.ndarray, frames: np.ndarray) -> np.ndarray:
+        """Return measured minus model markers (f, m, 3) m of these frames, in the axes of their segments."""
+        pose = model.pose(q[frames])
+        turned = pose.rotation[:, model.marker_segments].transpose(0, 1, 3, 2)
+        result: np.ndarray = (turned @ (self._measured[frames] - model.marker_positions(pose))[..., None])[..., 0]
+        return result

@@ -21,8 +21,8 @@ import numpy as np
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion
-from kinertia.motion.frame_chunks import pieces
 from kinertia.motion.joint_wrench import BodyJoint, body_joints, joint_wrenches
+from kinertia.motion.workload import pieces
 from kinertia.trial.data import FEET
 
 Frame = Literal["joint", "distal", "proximal"]

@@ -22,8 +22,8 @@ from kinertia.model.skeleton import Skeleton
 from kinertia.motion.common_cutoff import Cutoff, common_cutoff
 from kinertia.motion.dynamics import Motion
 from kinertia.motion.inverse_kinematics import InverseKinematics, solve_ik
-from kinertia.motion.single_blas_thread import one_blas_thread
 from kinertia.motion.smoothing import SmoothedSpline, SmoothingError, smooth
+from kinertia.motion.workload import one_blas_thread
 from kinertia.trial.data import LOAD_THRESHOLD_N, Markers, Trial
 from kinertia.trial.foot_motion import AROUND_LOAD_S
 from kinertia.trial.sampled_time import TIME_TOLERANCE_S, nearest_samples, runs, span_s, within

@@ -8,11 +8,16 @@ for the foot down, left, forward). Powers (W/kg) are the third component.
 "isb" (Wu et al. 2002, J Biomech 35:543) has the same angles except for the pelvis, whose backward tilt and lower side
 are positive. Moments (N m/kg) are internal, about the axes of the angles (flexion of the parent, floating, long axis of
 the child), and have the signs of the angles; forces (N/kg) are in the distal segment's axes x, y, z.
+
+Signs are equal on both sides: anterior tilt, the side up, internal rotation, flexion, adduction and dorsiflexion are
+positive. Angles of pelvis and foot are relative to the direction of the stride. Segments are the model's: compared with
+Vicon's own angles, from markers frame by frame, curves have the same shape and constant offsets (flexion of the hip by
+up to 13 degrees).
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, Protocol, get_args
+from typing import Literal, NamedTuple, Protocol, get_args
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -268,3 +273,47 @@ def _of_pelvis_and_feet(skeleton: Skeleton, pose: Pose, clinical: bool, ground: 
 def _third(values: np.ndarray) -> np.ndarray:
     """Return (n, 3) with a scalar in the third component, as in Vicon's files."""
     return np.column_stack([np.zeros(len(values)), np.zeros(len(values)), values])
+
+
+class ClinicalAngle(NamedTuple):
+    """One of the nine angles: its title, and the joint and component of the Vicon output that it equals."""
+
+    title: str
+    joint: str
+    component: int
+
+
+CLINICAL_ANGLES = {
+    "pelvis_tilt_clinical": ClinicalAngle("pelvic tilt", "Pelvis", 0),
+    "pelvis_obliquity_clinical": ClinicalAngle("pelvic obliquity", "Pelvis", 1),
+    "pelvis_rotation_clinical": ClinicalAngle("pelvic rotation", "Pelvis", 2),
+    "hip_flexion_clinical": ClinicalAngle("hip flexion", "Hip", 0),
+    "hip_adduction_clinical": ClinicalAngle("hip adduction", "Hip", 1),
+    "hip_rotation_clinical": ClinicalAngle("hip rotation", "Hip", 2),
+    "knee_flexion_clinical": ClinicalAngle("knee flexion", "Knee", 0),
+    "ankle_dorsiflexion_clinical": ClinicalAngle("ankle dorsiflexion", "Ankle", 0),
+    "foot_progression_clinical": ClinicalAngle("foot progression", "FootProgress", 2),
+}
+"""The nine angles by their quantity in `cycles.csv` and norms."""
+
+
+def clinical_angles(skeleton: Skeleton, q: np.ndarray, heading_rad: np.ndarray) -> dict[str, dict[str, np.ndarray]]:
+    """Compute the clinical angles (n,) deg of each side ("r", "l"), by quantity; NaN where coordinates from ground to
+    foot are NaN.
+
+    None for a model without legs of hip, knee and ankle in ISB's axes.
+
+    Args:
+        skeleton: the model.
+        q: (n, c) coordinates, rad and m.
+        heading_rad: (n,) direction of the strides, from ground's X axis to the left.
+    """
+    outputs = plug_in_gait_angles(skeleton, np.where(np.isfinite(q), q, 0.0), heading_rad)
+    result: dict[str, dict[str, np.ndarray]] = {side: {} for side in FEET}
+    for side, name in zip(FEET, skeleton.feet, strict=True) if outputs else ():
+        foot = skeleton.segments.index(name)
+        known = np.isfinite(q[:, np.unique(skeleton.map.owner[skeleton.support[foot]])]).all(axis=1)
+        for quantity, one in CLINICAL_ANGLES.items():
+            values = outputs[f"{side.upper()}{one.joint}Angles"][:, one.component]
+            result[side][quantity] = np.where(known, values, np.nan)
+    return result

@@ -59,7 +59,7 @@ from scipy.linalg import lapack
 from scipy.optimize import minimize_scalar
 
 from kinertia.errors import KinertiaError
-from kinertia.motion.frame_chunks import pieces
+from kinertia.motion.workload import pieces
 
 Array = NDArray[np.float64]
 

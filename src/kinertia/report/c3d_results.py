@@ -12,13 +12,12 @@ from kinertia.estimation.drawn_fit import drawn_fit
 from kinertia.estimation.joint_curves import JointCurves
 from kinertia.estimation.result import Fit
 from kinertia.estimation.trial_fit import TrialFit
-from kinertia.io.c3d.analysis import Measure
-from kinertia.io.c3d.event_writer import EventToWrite
-from kinertia.io.c3d.outputs import C3dFrames, OutputPoint, frames_of, too_many, unit_factor, with_outputs
+from kinertia.io.c3d.events import EventToWrite
+from kinertia.io.c3d.outputs import C3dFrames, Measure, OutputPoint, frames_of, too_many, unit_factor, with_outputs
 from kinertia.io.c3d.parameters import TooManyParameters, Value
 from kinertia.io.c3d.writer import write_c3d
 from kinertia.io.recording import read_recording
-from kinertia.io.trial_files import trial_file
+from kinertia.io.subject.provenance import trial_file
 from kinertia.io.versions import VERSION
 from kinertia.model.bsp import PARAMETERS
 from kinertia.model.marker_set import shared_prefix, spellings

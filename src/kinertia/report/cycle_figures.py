@@ -20,10 +20,10 @@ from kinertia.estimation.tasks import main_task
 from kinertia.io.norms_file import Norm
 from kinertia.model.shared_coordinates import opposite_on_left
 from kinertia.model.skeleton import Skeleton
-from kinertia.motion.clinical_angles import CLINICAL_ANGLES
 from kinertia.motion.gait_cycle import PERCENT, Phase
 from kinertia.motion.joint_moments import component_names, joint_and_side
 from kinertia.motion.joint_wrench import body_joints
+from kinertia.motion.model_outputs import CLINICAL_ANGLES
 from kinertia.report import style
 from kinertia.report.coordinate_titles import joint_moment_title, load_title, panels_of, power_title
 from kinertia.report.figure import Figure, compact

@@ -15,7 +15,7 @@ from kinertia.report.figure import Figure, written
 from kinertia.report.panels import small_multiples
 from kinertia.report.time_figures import MOST_FRAMES, panel_over_time, time_axis
 from kinertia.report.wording import INTERVAL_SD
-from kinertia.trial.file_outputs import FileOutputs
+from kinertia.trial.file_contents import FileOutputs
 from kinertia.trial.sampled_time import nearest_samples
 
 _SHOWN = {"ANGLES": (0, 1.0, "deg"), "MOMENTS": (0, 1e-3, "N m/kg"), "POWERS": (2, 1.0, "W/kg")}

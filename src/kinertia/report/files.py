@@ -30,7 +30,7 @@ from kinertia.io.subject.provenance import Provenance
 from kinertia.io.text.csv_file import inert
 from kinertia.io.text.sto import TimeTable, write_table
 from kinertia.io.versions import VERSION
-from kinertia.model.centre_offsets import centre_offsets
+from kinertia.model.neutral_joints import centre_offsets
 from kinertia.report.cycle_figures import CurvesByStage, drawn_curves
 from kinertia.report.ground_reactions_file import write_ground_reactions
 from kinertia.report.page import render

@@ -9,7 +9,7 @@ import numpy as np
 from kinertia.estimation.gait_profile import gait_profile
 from kinertia.estimation.result import Fit
 from kinertia.io.norms_file import Norm
-from kinertia.motion.clinical_angles import CLINICAL_ANGLES
+from kinertia.motion.model_outputs import CLINICAL_ANGLES
 from kinertia.trial.data import FEET
 
 

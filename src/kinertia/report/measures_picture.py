@@ -4,7 +4,7 @@ from html import escape
 
 import numpy as np
 
-from kinertia.model.measures import girths_with_widths, measures, usual_build
+from kinertia.model.stadium_body import girths_with_widths, measures, usual_build
 
 LEVELS = {
     "T8": "top of the head",

@@ -20,7 +20,7 @@ from kinertia.estimation.trial_fit import TrialFit
 from kinertia.io.subject.provenance import Provenance
 from kinertia.io.versions import versions
 from kinertia.model.bsp import PARAMETERS, BodySegmentParameters
-from kinertia.motion.clinical_angles import CLINICAL_ANGLES
+from kinertia.motion.model_outputs import CLINICAL_ANGLES
 from kinertia.report.body_figure import body_figure
 from kinertia.report.bsp_figures import (
     MAIN,

@@ -40,8 +40,7 @@ from kinertia.report.truth_comparison import Truth
 from kinertia.settings import Overrule, Settings, Subject
 from kinertia.trial.belt import Belt
 from kinertia.trial.data import FootLoads, Markers, Trial
-from kinertia.trial.file_outputs import FileOutputs
-from kinertia.trial.gait_event import FileEvent
+from kinertia.trial.file_contents import FileEvent, FileOutputs
 
 FIT_FILE = "fit.npz"
 

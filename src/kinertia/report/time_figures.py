@@ -17,7 +17,7 @@ from kinertia.report.coordinate_titles import Coordinate, panels_of
 from kinertia.report.figure import Figure, compact
 from kinertia.report.panels import Panel, shaded, small_multiples
 from kinertia.report.wording import INTERVAL_SD, LITERATURE, Start
-from kinertia.trial.gait_event import GaitEvent
+from kinertia.trial.file_contents import GaitEvent
 from kinertia.trial.gait_events import gait_events
 from kinertia.trial.rms import rms, rms_length
 

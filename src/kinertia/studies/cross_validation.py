@@ -19,7 +19,7 @@ from kinertia.estimation.simultaneous.linear_algebra.bandwidth import Bandwidth
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.motion.dynamics import residual
 from kinertia.motion.kinematics import Kinematics
-from kinertia.motion.single_blas_thread import one_blas_thread
+from kinertia.motion.workload import one_blas_thread
 from kinertia.trial.rms import rms_length
 
 _FROZEN = 1e-3

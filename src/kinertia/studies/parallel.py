@@ -13,7 +13,7 @@ from typing import TypeVar
 
 from threadpoolctl import threadpool_limits
 
-from kinertia.motion.two_threads import in_one_thread
+from kinertia.motion.workload import in_one_thread
 
 _SAFE_PATH = "PYTHONSAFEPATH"
 _MOST_ON_WINDOWS = 61

@@ -25,7 +25,7 @@ from kinertia.estimation.simultaneous.uncertainty.fisher_information import Info
 from kinertia.model.bsp import PARAMETERS, UNITS
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.kinematics import Kinematics
-from kinertia.motion.single_blas_thread import one_blas_thread
+from kinertia.motion.workload import one_blas_thread
 from kinertia.synthetic.faults import Faults, measured
 from kinertia.synthetic.motions import MOTIONS
 from kinertia.synthetic.walk import walking_subject

@@ -21,8 +21,8 @@ from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion, residual
 from kinertia.motion.inverse_kinematics import solve_ik
-from kinertia.motion.single_blas_thread import one_blas_thread
 from kinertia.motion.smoothing import SmoothedSpline, smooth
+from kinertia.motion.workload import one_blas_thread
 from kinertia.studies.parallel import in_parallel
 from kinertia.synthetic.manner import Manner
 from kinertia.synthetic.noise import study_noise

@@ -14,8 +14,8 @@ from kinertia.estimation.two_level import TwoLevelProblem, Window, radius_of_gyr
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.inverse_kinematics import solve_ik
-from kinertia.motion.single_blas_thread import one_blas_thread
 from kinertia.motion.smoothing import SmoothedSpline, interpolate, smooth
+from kinertia.motion.workload import one_blas_thread
 from kinertia.studies.table1 import coordinates, random_start, study_trial
 from kinertia.synthetic.noise import STUDY_RATE_RAD_S, displaced
 from kinertia.synthetic.walk import SyntheticTrial

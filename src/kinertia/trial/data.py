@@ -22,11 +22,9 @@ from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.trial import display
 from kinertia.trial.belt import Belt
-from kinertia.trial.file_outputs import FileOutputs
+from kinertia.trial.file_contents import FileEvent, FileOutputs, StatedContact, TorqueColumns
 from kinertia.trial.force_spikes import ForceSpike
-from kinertia.trial.gait_event import FileEvent, StatedContact
 from kinertia.trial.impossible_data import impossible_markers, impossible_plates
-from kinertia.trial.plate_torque import TorqueColumns
 from kinertia.trial.sampled_time import nearest_samples, windows, within
 from kinertia.trial.unloaded_level import UnloadedReading
 

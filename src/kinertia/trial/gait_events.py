@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from kinertia.trial.data import FEET, LOAD_THRESHOLD_N, FootLoads, Trial
-from kinertia.trial.gait_event import SAME_EVENT_S, FileEvent, GaitEvent, nearest_event
+from kinertia.trial.file_contents import SAME_EVENT_S, FileEvent, GaitEvent, nearest_event
 from kinertia.trial.ground_contact import BRIDGED_GAP_S, bridged
 from kinertia.trial.plate_assignment import SHORTEST_CONTACT_S
 from kinertia.trial.sampled_time import TIME_TOLERANCE_S, runs, span_s

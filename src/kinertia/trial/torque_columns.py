@@ -19,7 +19,7 @@ import numpy as np
 
 from kinertia.trial.centre_of_pressure import FIRM_LOAD_N
 from kinertia.trial.data import LOAD_THRESHOLD_N, BoolArray, FloatArray
-from kinertia.trial.plate_torque import TorqueColumns
+from kinertia.trial.file_contents import TorqueColumns
 from kinertia.trial.rms import rms
 
 _FEWEST = 20

@@ -43,14 +43,13 @@ from kinertia.model.gait27 import (
     Gait27,
     build_gait27,
 )
-from kinertia.model.head_markers import without_head
 from kinertia.model.marker_set import MarkerSet
 from kinertia.model.skeleton import Skeleton
-from kinertia.model.upper_body import ARM_SEGMENTS
+from kinertia.model.upper_body import ARM_SEGMENTS, without_head
 from kinertia.motion.kinematics import facing
-from kinertia.motion.single_blas_thread import one_blas_thread
 from kinertia.motion.stance_pose import hidden_landmarks, stance_pose
 from kinertia.motion.upright_trunk import shows_trunk, with_upright_trunk
+from kinertia.motion.workload import one_blas_thread
 from kinertia.settings import Settings
 from kinertia.trial.data import Recording, Trial
 from kinertia.workflow.joint_widths import with_widths

@@ -29,8 +29,8 @@ from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion, inverse_dynamics, joined, residual
 from kinertia.motion.ground_reactions import GroundReactions, ground_reactions, measured_reactions
 from kinertia.motion.kinematics import Kinematics
-from kinertia.motion.single_blas_thread import one_blas_thread
 from kinertia.motion.smoothing import interpolate
+from kinertia.motion.workload import one_blas_thread
 from kinertia.settings import Attached, Overrule, Settings, Subject
 from kinertia.trial.data import Recording
 from kinertia.trial.trial_input import TrialInput

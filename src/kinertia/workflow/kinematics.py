@@ -5,6 +5,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, Self
 
+import numpy as np
+
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.copied_frames import without_copied_frames
 from kinertia.diagnostics.model.range_limits import range_findings
@@ -14,8 +16,8 @@ from kinertia.estimation.prepared import Progress
 from kinertia.findings.finding import Finding
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.kinematics import Kinematics, solve_kinematics
-from kinertia.trial.data import Trial
-from kinertia.trial.without_forces import trial_without_forces
+from kinertia.trial.data import FootLoads, Recording, Trial
+from kinertia.trial.sampled_time import within
 
 
 @dataclass(frozen=True)
@@ -123,3 +125,28 @@ def solved_trials(
     for k in kinematics:
         found += [*k.findings, *(limit.in_trial(k.trial.name) for limit in range_findings(skeleton, k.ik))]
     return Solved(tuple(kinematics), tuple(seconds), (*found, *reasons))
+
+
+def trial_without_forces(recording: Recording, window_s: tuple[float, float] | None = None) -> Trial:
+    """Return the trial without plates; every frame counts, or only frames of the window (s) that the user states.
+
+    Examples:
+        >>> from kinertia.workflow.kinematics import trial_without_forces
+        >>> recording = kinertia.read_recording("lab/walk.trc", "lab/walk_grf.mot")
+        >>> trial_without_forces(recording).loads.plates
+        ()
+    """
+    time = recording.markers.time
+    zero = np.zeros((len(time), 2, 3))
+    used = np.ones(len(time), dtype=bool) if window_s is None else within(time, *window_s)
+    return Trial(
+        recording.name,
+        recording.markers,
+        FootLoads(time, zero, zero, plates=()),
+        used,
+        recording.notes,
+        recording.virtual_sd_m,
+        recording.belt,
+        vertical=recording.vertical,
+        events=recording.events,
+    )

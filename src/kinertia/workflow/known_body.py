@@ -24,7 +24,7 @@ from kinertia.findings.where import Where
 from kinertia.io.subject.bsp_file import BspTable
 from kinertia.io.subject.measures_file import BodyMeasures
 from kinertia.model.bsp import PARAMETERS, UNITS, BodySegmentParameters
-from kinertia.model.measures import measures as all_measures
+from kinertia.model.stadium_body import measures as all_measures
 from kinertia.settings import Attached, KnownSegment, PriorSettings
 from kinertia.workflow.attached import with_attached
 

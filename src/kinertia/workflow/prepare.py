@@ -13,7 +13,7 @@ from kinertia.estimation.input_checks import check_trials
 from kinertia.estimation.prepared import Prepared, Progress
 from kinertia.model.imported_model import OsimModel
 from kinertia.model.marker_set import MarkerSet
-from kinertia.motion.single_blas_thread import one_blas_thread
+from kinertia.motion.workload import one_blas_thread
 from kinertia.settings import Attached, Overrule, Settings, Subject
 from kinertia.trial.data import Recording
 from kinertia.trial.trial_input import TrialInput

@@ -9,8 +9,7 @@ from scipy.signal import butter, sosfiltfilt
 from kinertia.diagnostics.plates.quantisation import quantisation
 from kinertia.diagnostics.plates.signals import signals
 from kinertia.trial.data import PlateLoads
-from kinertia.trial.force_resolution import ringing_s
-from kinertia.trial.plate_loading import without_unloaded_level
+from kinertia.trial.plate_loading import ringing_s, without_unloaded_level
 from plate_findings import plates_alone
 
 TIME = np.arange(2000) / 1000

@@ -11,7 +11,7 @@ from kinertia.diagnostics.timing.file_events import file_events
 from kinertia.findings.where import Where
 from kinertia.synthetic.walk import walk, walking_subject
 from kinertia.trial.data import FEET, FootLoads, Trial
-from kinertia.trial.gait_event import FileEvent
+from kinertia.trial.file_contents import FileEvent
 from kinertia.trial.gait_events import load_edges
 
 FOOT_MARKERS = {

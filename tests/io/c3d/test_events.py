@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 
 from c3d_writer import write_c3d
-from kinertia.io.c3d.event_writer import EventToWrite, add_events, subject_of
-from kinertia.io.c3d.events import file_events
+from kinertia.io.c3d.events import EventToWrite, add_events, file_events, subject_of
 from kinertia.io.c3d.parameters import ParameterSection
 from kinertia.io.c3d.reader import read_c3d
-from kinertia.trial.gait_event import GaitEvent
+from kinertia.trial.file_contents import GaitEvent
 
 
 def events_of(path, contexts, labels, seconds, minutes=0.0, **more):

@@ -7,14 +7,13 @@ import pytest
 
 from c3d_writer import plate_parameters, write_c3d
 from kinertia.errors import FileError
-from kinertia.io.c3d.analysis import Measure
-from kinertia.io.c3d.event_writer import EventToWrite
-from kinertia.io.c3d.outputs import OutputPoint, frames_of, with_outputs
+from kinertia.io.c3d.events import EventToWrite
+from kinertia.io.c3d.outputs import Measure, OutputPoint, frames_of, with_outputs
 from kinertia.io.c3d.parameters import ParameterSection
 from kinertia.io.c3d.reader import read_c3d
 from kinertia.io.c3d.structure import doubts_about
 from kinertia.io.versions import VERSION
-from kinertia.trial.gait_event import GaitEvent
+from kinertia.trial.file_contents import GaitEvent
 from recordings import here
 
 MAKERS = (

@@ -3,7 +3,7 @@
 import pytest
 
 from kinertia.io.subject.measures_file import COLUMNS, is_measures_sheet, measures_sheet, read_measures
-from kinertia.model.measures import girths_with_widths, measures, usual_build
+from kinertia.model.stadium_body import girths_with_widths, measures, usual_build
 from refusals import refused
 
 

@@ -23,7 +23,7 @@ from kinertia.io.marker_set_file import preset_names
 from kinertia.io.results.output_folder import write_then_rename
 from kinertia.io.subject.draft import init_subject
 from kinertia.io.subject.reader import read_subject
-from kinertia.io.subject.text import subject_text
+from kinertia.io.subject.tables import subject_text
 from kinertia.io.text.toml_lines import parse_toml, read_toml
 from kinertia.settings import Subject, number_of, sex_of
 

@@ -20,7 +20,7 @@ from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.trial.centre_of_pressure import centre_of_pressure, free_moment
 from kinertia.trial.data import FloatArray, PlateLoads
-from kinertia.trial.plate_torque import TorqueColumns
+from kinertia.trial.file_contents import TorqueColumns
 from kinertia.trial.rms import rms
 
 _ABSENT_NM = 0.005

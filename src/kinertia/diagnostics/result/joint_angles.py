@@ -8,8 +8,7 @@ from kinertia.diagnostics.result.context import ResultContext
 from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
-from kinertia.model.coordinate_range import UNKNOWN
-from kinertia.model.range_of_motion import TOLERANCE_DEG
+from kinertia.model.coordinate_range import TOLERANCE_DEG, UNKNOWN
 
 _IMPOSSIBLE_RAD = float(np.radians(TOLERANCE_DEG))
 """Excess beyond the range of any person."""

@@ -11,8 +11,8 @@ from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.model.anatomy import segment_of
-from kinertia.model.head_markers import head_markers
 from kinertia.model.skeleton import Skeleton
+from kinertia.model.upper_body import head_markers
 
 _MOVED_M = 0.03
 """Skin moves markers up to some 30 mm."""

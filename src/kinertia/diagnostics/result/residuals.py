@@ -18,7 +18,7 @@ from kinertia.findings.finding import Finding, Severity, finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.model.anatomy import segment_of
-from kinertia.model.centre_offsets import centre_offsets
+from kinertia.model.neutral_joints import centre_offsets
 from kinertia.trial.rms import rms, rms_by_marker
 
 

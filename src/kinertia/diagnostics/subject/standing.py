@@ -12,7 +12,7 @@ from kinertia.estimation.simultaneous.instruments.model_uncertainty import JOINT
 from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.motion.stance_pose import hidden_landmarks
-from kinertia.trial.stillness import still_span_s
+from kinertia.trial.marker_quality import still_span_s
 
 _LOWEST_M = (0.005, 0.050)
 """A marker's own radius is 5 mm and more: one beside a small toe was 5.7 mm above the floor. Soles are under both feet,

@@ -6,7 +6,7 @@ from kinertia.diagnostics.context import RecordingContext
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.trial.data import FEET, Trial
-from kinertia.trial.gait_event import GaitEvent
+from kinertia.trial.file_contents import GaitEvent
 from kinertia.trial.gait_events import (
     EVENT_LIMIT_S,
     contradicted_events,

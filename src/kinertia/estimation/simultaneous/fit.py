@@ -30,7 +30,7 @@ from kinertia.model.gait27 import VIRTUAL_TRUNK
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion
 from kinertia.motion.kinematics import Kinematics
-from kinertia.motion.single_blas_thread import one_blas_thread
+from kinertia.motion.workload import one_blas_thread
 
 _STAYING_SD_M = 1e-4
 """Least standard deviation of markers that are fixed in the model."""

@@ -29,10 +29,10 @@ from kinertia.estimation.simultaneous.markers.skin import SkinPatterns, skin_pat
 from kinertia.estimation.simultaneous.markers.soft_tissue import swing_factors
 from kinertia.estimation.simultaneous.observed_trial import Observation
 from kinertia.model.skeleton import GRAVITY_M_S2, Skeleton
-from kinertia.motion.frame_chunks import pieces
 from kinertia.motion.ground_reactions import ground_reactions
 from kinertia.motion.kinematics import Kinematics
 from kinertia.motion.smoothing import smooth
+from kinertia.motion.workload import pieces
 from kinertia.settings import ForceCutoff
 from kinertia.trial.sampled_time import nearest_samples, within
 

@@ -50,8 +50,7 @@ from kinertia.estimation.simultaneous.uncertainty.posterior_draws import (
     posterior_draws,
 )
 from kinertia.model.skeleton import Skeleton
-from kinertia.motion.single_blas_thread import one_blas_thread
-from kinertia.motion.two_threads import both
+from kinertia.motion.workload import both, one_blas_thread
 
 CONVERGED = 1e-3
 """Predicted decrease of half the sum of squares below which a step is the last of the search: after one more step, from

@@ -1,4 +1,4 @@
-"""Writes model outputs into a copy of a C3D file: points, their types, and parameters of Kinertia's own.
+"""Writes model outputs and measures of strides into a copy of a C3D file.
 
 ezc3d would rewrite the whole file: header, order and width of parameters, analog samples by their scales. Here the
 bytes of markers, analog samples, events and all parameters but the lists of points are unchanged. Files of integers
@@ -10,13 +10,13 @@ import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from kinertia.errors import FileError
 from kinertia.findings.quantity import Quantity
-from kinertia.io.c3d.analysis import Measure, add_analysis
-from kinertia.io.c3d.event_writer import EventToWrite, add_events, subject_of
+from kinertia.io.c3d.events import EventToWrite, add_events, subject_of
 from kinertia.io.c3d.parameters import ParameterSection, Value, continued
 from kinertia.io.c3d.structure import doubts_about, with_plain_samples
 from kinertia.io.versions import VERSION
@@ -39,6 +39,43 @@ _UNITS = {
 """By type: letters of units, per kg or not, and their factors to SI and degrees."""
 USUAL_UNITS = {"ANGLES": "deg", "FORCES": "N", "MOMENTS": "Nmm", "POWERS": "W"}
 """Units of outputs in a file that states none: Vicon's."""
+_GROUP = "ANALYSIS"
+_OURS = "Kinertia"
+_MOST = 255
+
+
+class Measure(NamedTuple):
+    """One value: side ("Left", "Right"), and name and unit as Vicon has them: "Walking Speed", "m/s"."""
+
+    context: str
+    name: str
+    unit: str
+    value: float
+
+
+def add_analysis(section: ParameterSection, measures: Sequence[Measure], subject: str) -> None:
+    """Write the measures into a file that states none of its own; those of an earlier export are replaced.
+
+    Args:
+        section: parameters of the file.
+        measures: at most 255.
+        subject: name of the person; empty where the file has no names.
+    """
+    names, described = (section.get(_GROUP, name) for name in ("NAMES", "DESCRIPTIONS"))
+    stated = 0 if names is None else len(names)
+    if not measures or len(measures) > _MOST or (stated and list(described or ()) != [_OURS] * stated):
+        return
+    lists: dict[str, Value] = {
+        "USED": np.array([len(measures)], dtype=np.int16),
+        "NAMES": [one.name for one in measures],
+        "DESCRIPTIONS": [_OURS] * len(measures),
+        "SUBJECTS": [subject] * len(measures),
+        "CONTEXTS": [one.context for one in measures],
+        "UNITS": [one.unit for one in measures],
+        "VALUES": np.array([one.value for one in measures], dtype=np.float32),
+    }
+    for name, value in lists.items():
+        section.put(_GROUP, name, value)
 
 
 def unit_factor(kind: str, unit: str) -> float | None:

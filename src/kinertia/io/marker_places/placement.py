@@ -6,17 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from kinertia.io.marker_places.body_axes import body_axes
 from kinertia.io.marker_places.computed_points import computed_points, unusable_points
 from kinertia.io.marker_places.label_hints import roles, sides
-from kinertia.io.marker_places.leg_search import Found, find_legs, metatarsals
+from kinertia.io.marker_places.landmark_search import Found, find_legs, find_upper_body, metatarsals
 from kinertia.io.marker_places.segment_members import segment_members, wands
-from kinertia.io.marker_places.standing_body import StandingBody
-from kinertia.io.marker_places.upper_search import find_upper_body
+from kinertia.io.marker_places.standing_body import StandingBody, body_axes
 from kinertia.io.marker_places.usual_places import WHERE
 from kinertia.model.alignment_device import device_labels
 from kinertia.trial.data import FloatArray, Markers, Recording
-from kinertia.trial.stillness import STILL_M_S, speed_m_s
+from kinertia.trial.marker_quality import STILL_M_S, speed_m_s
 
 _OFTEN = 0.25
 """Share of the frames in which a marker is seen that is used."""

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from kinertia.io.marker_places.leg_search import Found
+from kinertia.io.marker_places.landmark_search import Found
 from kinertia.io.marker_places.standing_body import StandingBody
 from kinertia.trial.data import FloatArray
 

@@ -14,8 +14,7 @@ from kinertia.errors import OsimError
 from kinertia.findings.finding import with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
-from kinertia.io.opensim.joints import Frames, JointElement, coupled, read_joint, read_joint_in_body
-from kinertia.io.opensim.properties import Values
+from kinertia.io.opensim.joints import Frames, JointElement, Values, coupled, read_joint, read_joint_in_body
 from kinertia.io.opensim.xml import Element, XmlError, parse
 from kinertia.io.text.number_table import expect_file
 from kinertia.model.bsp import BodySegmentParameters

@@ -1,5 +1,6 @@
 """Writes result folders that appear complete or not at all, and never overwrite other files unasked."""
 
+import ctypes
 import json
 import os
 import shutil
@@ -11,7 +12,6 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from kinertia.errors import FileError
-from kinertia.io.results.folder_exchange import put_in_place
 from kinertia.io.results.working_folder import BEFORE, sweep, working_folder
 
 GENERATOR = '<meta name="generator" content="kinertia'
@@ -30,6 +30,10 @@ _ANYWHERE = {".DS_Store", ".localized", ".directory", ".gitkeep", ".gitignore", 
 """Files that file managers and Git leave in folders that hold nothing else."""
 _RESULTS = {".html", ".json", ".csv", ".osim", ".sto", ".mot", ".trc", ".c3d", ".xml", ".toml", ".md", ".png"}
 """Types of files that results have."""
+_HERE = -100
+"""AT_FDCWD of Linux: paths count from the current folder."""
+_EXCHANGE = 2
+"""RENAME_EXCHANGE of Linux, RENAME_SWAP of macOS."""
 
 
 def check_folder(folder: str | Path, sub_folders: Collection[str] = (), files: Collection[str] = ()) -> None:
@@ -311,3 +315,41 @@ def write_then_rename(path: Path, text: str) -> None:
         temporary = work / path.name
         temporary.write_text(text, encoding="utf-8", newline="\n")
         os.replace(temporary, path)
+
+
+def put_in_place(new: Path, folder: Path, aside: Path) -> Path:
+    """Put `new` in the place of `folder`; return where the former `folder` is now.
+
+    Linux and macOS exchange the two in one step, so that a process killed at any moment leaves one or the other.
+    Windows, and file systems that cannot, take two steps: `folder` goes to `aside`, where `sweep` finds it.
+
+    Raises:
+        OSError: it cannot be done; everything is unchanged.
+    """
+    if not folder.exists():
+        os.rename(new, folder)
+        return aside
+    if _exchanged(new, folder):
+        return new
+    aside.parent.mkdir(exist_ok=True)
+    os.rename(folder, aside)
+    try:
+        os.rename(new, folder)
+    except OSError:
+        os.rename(aside, folder)
+        raise
+    return aside
+
+
+def _exchanged(one: Path, other: Path) -> bool:
+    """Exchange the two folders; return whether the system could."""
+    if sys.platform == "win32":
+        return False
+    system = ctypes.CDLL(None)
+    first, second = os.fsencode(one), os.fsencode(other)
+    try:
+        if sys.platform == "darwin":
+            return bool(system.renamex_np(first, second, _EXCHANGE) == 0)
+        return bool(system.renameat2(_HERE, first, _HERE, second, _EXCHANGE) == 0)
+    except AttributeError:  # a C library without it
+        return False

@@ -15,13 +15,12 @@ from kinertia.io.marker_set_draft import MarkerSetDraft, draft_marker_set, prese
 from kinertia.io.marker_set_file import marker_set_of, preset_name
 from kinertia.io.recording import ADDED_FILES, CORTEX, MARKER_FILES, read_recording
 from kinertia.io.subject.measures_file import is_measures_sheet
-from kinertia.io.subject.tables import Model, PriorFiles, TrialFiles
-from kinertia.io.subject.text import entry_line
+from kinertia.io.subject.tables import Model, PriorFiles, TrialFiles, entry_line
 from kinertia.io.text.qualisys import plates_beside
 from kinertia.model.marker_set import MarkerSet
 from kinertia.settings import Settings, Subject, Table
 from kinertia.trial.data import Recording
-from kinertia.trial.stillness import STILL_M_S, speed_m_s
+from kinertia.trial.marker_quality import STILL_M_S, speed_m_s
 
 FILL_IN = "  # FILL IN: "
 """Prefix of the description of an entry that stays unknown."""

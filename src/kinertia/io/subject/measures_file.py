@@ -10,7 +10,7 @@ from pathlib import Path
 from kinertia.errors import FileError
 from kinertia.findings.quantity import Quantity
 from kinertia.io.text.csv_file import has_columns, read_csv
-from kinertia.model.measures import Measure, measures
+from kinertia.model.stadium_body import Measure, measures
 
 COLUMNS = ("measure", "level", "what", "cm", "sd_cm", "first")
 _NEEDED = ("measure", "cm")

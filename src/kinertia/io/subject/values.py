@@ -14,7 +14,7 @@ from kinertia.findings.where import Where
 from kinertia.io.file_names import missing_file, path_from
 from kinertia.io.marker_set_file import preset_names
 from kinertia.settings import folder_of
-from kinertia.trial.gait_event import StatedContact
+from kinertia.trial.file_contents import StatedContact
 
 
 class CodedError(ValueError):

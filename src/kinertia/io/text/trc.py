@@ -13,10 +13,9 @@ from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.io.results.output_folder import write_then_rename
+from kinertia.io.text.marker_labels import most_seen, without_prefixes
 from kinertia.io.text.number_table import malformed, mismatch, read_lines, read_rows
-from kinertia.io.text.repeated_labels import most_seen
 from kinertia.io.text.sto import header_entry, other_count
-from kinertia.io.text.subject_prefix import without_prefixes
 from kinertia.io.text.uniform_times import rounding_s, times_rounded, uneven
 from kinertia.trial.data import BoolArray, FloatArray, Markers, Recording
 

@@ -3,7 +3,7 @@
 A section has a line with its name, one with its rate, one with what the columns belong to, one with the columns' names,
 one with units, and then a row per frame or, of devices, per sub frame. A force plate is three groups of a device: `...
 - Force`, `... - Moment` and `... - CoP`. Nexus writes centres of pressure in the laboratory's axes, and forces in the
-same axes or in the plate's, depending on which agree (`plate_moments`).
+same axes or in the plate's, depending on which agree (`PlateMoments`).
 """
 
 import csv
@@ -20,11 +20,10 @@ from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.io.lab_axes import to_ground
-from kinertia.io.lab_plates import LabPlates, contradicting_moments, plate_left_out, to_ground_plates
-from kinertia.io.plate_moments import PlateMoments
+from kinertia.io.lab_plates import LabPlates, PlateMoments, contradicting_moments, plate_left_out, to_ground_plates
+from kinertia.io.text.marker_labels import without_prefixes
 from kinertia.io.text.number_table import malformed, mismatch, read_lines, wrong_cells
 from kinertia.io.text.sto import header_entry
-from kinertia.io.text.subject_prefix import without_prefixes
 from kinertia.io.text.trc import METRES_PER_UNIT, seen_positions, unknown_unit
 from kinertia.io.text.uniform_times import uneven
 from kinertia.trial.data import FloatArray, Markers, Recording

@@ -16,7 +16,7 @@ from kinertia.estimation.simultaneous.search.problem import MapProblem
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous
 from kinertia.estimation.simultaneous.uncertainty.curve_deviations import CurveDeviations, curve_deviations
 from kinertia.estimation.simultaneous.uncertainty.posterior_draws import _Steps
-from kinertia.motion import two_threads
+from kinertia.motion import workload
 from kinertia.synthetic.walk import walk, walking_subject
 from small_problem import point, small_ground, small_problem, small_skin
 from validation.study_bound import dense_band
@@ -175,7 +175,7 @@ def test_two_threads_give_what_one_gives_bit_for_bit(monkeypatch):
     given = problem.skeleton, problem.prior, problem.calibration, problem.trials
     results = []
     for cores in (1, 2):
-        monkeypatch.setattr(two_threads, "cores", lambda cores=cores: cores)
+        monkeypatch.setattr(workload, "cores", lambda cores=cores: cores)
         results.append(estimate_simultaneous(*given))
     one, two = results
     assert len(problem.time_blocks[0]) > 1

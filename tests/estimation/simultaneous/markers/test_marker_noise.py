@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from kinertia.estimation.simultaneous.markers import marker_noise as module
-from kinertia.motion import frame_chunks
+from kinertia.motion import workload
 from kinertia.synthetic.walk import walking_subject
 
 N = 50
@@ -13,7 +13,7 @@ N = 50
 @pytest.fixture
 def seen(monkeypatch):
     """Skeleton and errors (n, m, 3), of which some were not seen; frames come in seven pieces."""
-    monkeypatch.setattr(module, "pieces", lambda count: frame_chunks.pieces(count, 8))
+    monkeypatch.setattr(module, "pieces", lambda count: workload.pieces(count, 8))
     skeleton, rng = walking_subject().skeleton, np.random.default_rng(1)
     errors = rng.normal(0.0, 0.01, (N, len(skeleton.markers), 3)).cumsum(axis=0)
     errors[rng.random(errors.shape[:2]) < 0.1] = np.nan

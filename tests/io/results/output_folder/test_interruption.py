@@ -50,7 +50,8 @@ def test_interruption_while_folders_are_exchanged_waits(tmp_path, name):
 
 KILLED = """
     import os, signal, sys
-    from kinertia.io.results import folder_exchange as exchange, output_folder as folder
+    from kinertia.io.results import output_folder as exchange
+    from kinertia.io.results import output_folder as folder
     exchange._exchanged = lambda one, other: False
     rename, done = os.rename, []
     def renamed(source, target):

@@ -28,7 +28,7 @@ from kinertia.estimation.simultaneous.linear_algebra.normal_equations import (
 )
 from kinertia.model.array_types import Float4
 from kinertia.model.compiled import compiled
-from kinertia.motion.two_threads import side_by_side
+from kinertia.motion.workload import side_by_side
 
 UNSAFE = 1e4
 """Ratio of the information on a static unknown with the motion known to that with it unknown, above which the border is

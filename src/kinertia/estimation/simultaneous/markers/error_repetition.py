@@ -17,7 +17,7 @@ from typing import Self
 import numpy as np
 from scipy.fft import next_fast_len, rfft
 
-from kinertia.motion.frame_chunks import pieces
+from kinertia.motion.workload import pieces
 
 _UNLIKE, _REPEATING = 0.05, 0.3
 """Correlations below which errors count as uncorrelated, and above which they count as recurring."""

@@ -16,7 +16,7 @@ import numpy as np
 from kinertia.estimation.simultaneous.markers.error_repetition import Repetition
 from kinertia.estimation.simultaneous.markers.skin import SkinPatterns
 from kinertia.model.skeleton import Skeleton
-from kinertia.motion.frame_chunks import pieces
+from kinertia.motion.workload import pieces
 
 SMALLEST_MARKER_SD_M = 0.001
 _WANDERING = 3.0

@@ -11,7 +11,7 @@ import numpy as np
 
 from kinertia.model.anatomy import segment_of
 from kinertia.model.skeleton import Joint, Skeleton
-from kinertia.motion.frame_chunks import pieces
+from kinertia.motion.workload import pieces
 
 CLAVICLE_M = 0.15
 CLAVICLE_PER_ARM = 0.16

@@ -27,7 +27,7 @@ from kinertia.estimation.simultaneous.search.linearised import Linearised, Point
 from kinertia.estimation.simultaneous.terms.all_terms import TERMS
 from kinertia.estimation.simultaneous.terms.cost_term import CostTerm, GroundLoads, InTrial, Solution
 from kinertia.model.skeleton import Skeleton
-from kinertia.motion.two_threads import side_by_side
+from kinertia.motion.workload import side_by_side
 
 T = TypeVar("T", bound=CostTerm)
 

@@ -7,7 +7,7 @@ from kinertia.estimation.simultaneous.linear_algebra.normal_equations import Gra
 from kinertia.estimation.simultaneous.terms.cost_term import CostTerm, InTrial
 from kinertia.estimation.simultaneous.terms.root_terms import RootFrames, add_root, columns_of
 from kinertia.motion.dynamics import Motion
-from kinertia.motion.frame_chunks import pieces
+from kinertia.motion.workload import pieces
 
 
 class RootLoads(CostTerm):

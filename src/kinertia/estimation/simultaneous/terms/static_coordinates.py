@@ -8,7 +8,7 @@ from kinertia.estimation.simultaneous.calibration_entry import AXIS, CENTRE, Cal
 from kinertia.estimation.simultaneous.inputs import STILL, Given
 from kinertia.estimation.simultaneous.layout import Unknowns
 from kinertia.estimation.simultaneous.terms.cost_term import CostTerm, Solution
-from kinertia.model.centre_offsets import joint_and_axis
+from kinertia.model.neutral_joints import joint_and_axis
 
 
 class StaticCoordinates(CostTerm):

@@ -28,7 +28,7 @@ from kinertia.estimation.simultaneous.uncertainty.moment_derivatives import Mome
 from kinertia.estimation.simultaneous.uncertainty.motion_spread import EndSpread, MotionSpread
 from kinertia.estimation.simultaneous.uncertainty.skin_blocks import block_growth
 from kinertia.motion.moving_windows import even_mean
-from kinertia.motion.two_threads import side_by_side
+from kinertia.motion.workload import side_by_side
 
 _FRAMES_AT_ONCE = 100
 """Number of frames processed at once; larger arrays would exceed the processor's cache."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from kinertia.model.skeleton import Pose, Skeleton
 from kinertia.motion.joint_moments import joint_axes
-from kinertia.motion.virtual_axes import VirtualAxes
+from kinertia.motion.joint_wrench import VirtualAxes
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,11 +17,11 @@ from kinertia.estimation.simultaneous.search.linearised import Point
 from kinertia.estimation.simultaneous.search.problem import MapProblem
 from kinertia.estimation.simultaneous.uncertainty.curve_deviations import CurveDeviations
 from kinertia.motion.dynamics import Motion, inverse_dynamics
-from kinertia.motion.frame_chunks import pieces
 from kinertia.motion.ground_reactions import GroundReactions
 from kinertia.motion.joint_moments import joint_moments
 from kinertia.motion.joint_wrench import body_joints
 from kinertia.motion.moving_windows import even_mean
+from kinertia.motion.workload import pieces
 
 PHASES = (0.5,)
 """Shares of a knot interval by which knots are shifted."""

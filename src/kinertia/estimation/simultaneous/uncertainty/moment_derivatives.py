@@ -1,7 +1,7 @@
 """Computes joint moments, and the derivatives of moments and ground reactions by all unknowns.
 
 Besides the generalised forces these are the three-dimensional moments and forces of `body_joints`, which virtual axes
-give (`virtual_axes`), projected on the axes of the joint coordinate system (`joint_rows`).
+give (`joint_wrench`), projected on the axes of the joint coordinate system (`joint_rows`).
 """
 
 from collections.abc import Sequence
@@ -20,10 +20,9 @@ from kinertia.model.log_cholesky import dynamic_jacobian
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion, axis_motion
 from kinertia.motion.ground_reactions import GroundReactions
-from kinertia.motion.joint_wrench import body_joints
+from kinertia.motion.joint_wrench import VirtualAxes, body_joints
 from kinertia.motion.regressor import regressor
 from kinertia.motion.rigid_body import axis_force_derivatives
-from kinertia.motion.virtual_axes import VirtualAxes
 
 
 @dataclass(frozen=True)

@@ -1,13 +1,14 @@
-"""Removes the subject's name that Vicon puts before labels, as in `Anna:LASI`."""
+"""Cleans labels of markers: without the subject's name that Vicon puts before them, and none given twice."""
 
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
 from kinertia.errors import FileError
-from kinertia.findings.finding import Finding, finding
+from kinertia.findings.finding import Finding, Severity, finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
+from kinertia.trial.data import BoolArray
 
 _PERSON_SHARE = 0.5
 """Share of the largest person's labels; a prefix with fewer is no second person, but a wand, or a stray label."""
@@ -47,3 +48,27 @@ def without_prefixes(path: Path, labels: Sequence[str], subject: str = "") -> tu
 def left_out(path: Path, count: int, what: str) -> Finding:
     """Return the finding that a number of points, or parts of labels, were left out."""
     return finding("F163", Where(path.name), count=Quantity(count, "1"), what=Quantity(what))
+
+
+def most_seen(path: Path, labels: Sequence[str], seen: BoolArray) -> tuple[dict[str, int], list[Finding]]:
+    """Choose one trajectory for each label, the one in most frames, of equals the first; F113 lists repeated labels.
+
+    Args:
+        path: the file, for findings.
+        labels: labels of the m trajectories.
+        seen: (n, m) whether a frame shows them.
+
+    Returns:
+        label -> column of its trajectory, in the order of the file, and what was found.
+    """
+    chosen: dict[str, int] = {}
+    frames = seen.sum(axis=0)
+    for column, label in enumerate(labels):
+        if label not in chosen or frames[column] > frames[chosen[label]]:
+            chosen[label] = column
+    findings = []
+    for label, times in Counter(labels).items():
+        if times > 1:
+            evidence = {"count": Quantity(times, "1"), "label": Quantity(label)}
+            findings.append(with_evidence("F113", Where(path.name, markers=(label,)), evidence, Severity.INFO))
+    return chosen, findings

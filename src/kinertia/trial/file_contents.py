@@ -1,15 +1,16 @@
-"""Defines `GaitEvent`, `FileEvent` and `StatedContact`: ground contact as measured, in a file, and stated."""
+"""Defines what files state besides markers and forces: events, angles and moments of other software, torque columns."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 EventKind = Literal["heel strike", "toe off"]
-
 SAME_EVENT_S = 0.15
 """Events of a file and of the forces that are farther apart belong to different steps."""
+FloatArray = npt.NDArray[np.float64]
 
 
 class GaitEvent(NamedTuple):
@@ -38,7 +39,7 @@ class FileEvent:
         kind: what the foot does; None for a general event.
 
     Examples:
-        >>> from kinertia.trial.gait_event import FileEvent
+        >>> from kinertia.trial.file_contents import FileEvent
         >>> FileEvent(1.63, "l", "Foot Strike", "", "heel strike").of_gait
         GaitEvent(time_s=1.63, side='l', kind='heel strike')
     """
@@ -67,3 +68,34 @@ class StatedContact(NamedTuple):
     plate: str
     foot: int | None
     span_s: tuple[float, float] = (-np.inf, np.inf)
+
+
+@dataclass(frozen=True, eq=False)
+class FileOutputs:
+    """Model outputs of the legs, with the names and axes of Plug-in Gait.
+
+    Attributes:
+        time: (f,) s, all frames of the file.
+        values: "LHipAngles" -> (f, 3) deg, "LHipMoment" -> N m, "LHipPower" -> W, the last two per kg or not, as the
+            file has them; NaN where they are missing.
+    """
+
+    time: FloatArray
+    values: Mapping[str, FloatArray]
+
+
+class TorqueColumns(NamedTuple):
+    """Content of the torque columns of one plate in its file, while the plate was loaded.
+
+    Attributes:
+        lever_arm_m: median of the horizontal torque over the vertical force, m; NaN where the point of application does
+            not move, or the plate was hardly loaded.
+        rms_nm: RMS torque about X, Y and Z, N m.
+        belongs_to: index of the other plate whose load the torque follows; None if there is none.
+        height_m: median height of the point of application, m; NaN where the plate was hardly loaded.
+    """
+
+    lever_arm_m: float
+    rms_nm: tuple[float, float, float]
+    belongs_to: int | None
+    height_m: float = np.nan

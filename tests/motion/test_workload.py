@@ -7,13 +7,13 @@ import threading
 import numpy as np
 import pytest
 
-from kinertia.motion import two_threads
-from kinertia.motion.two_threads import both, side_by_side
+from kinertia.motion import workload
+from kinertia.motion.workload import both, side_by_side
 
 
 @pytest.fixture(params=[1, 2])
 def cores(request, monkeypatch):
-    monkeypatch.setattr(two_threads, "cores", lambda: request.param)
+    monkeypatch.setattr(workload, "cores", lambda: request.param)
     return request.param
 
 
@@ -23,7 +23,7 @@ def test_results_keep_the_order_of_the_items(cores, count):
 
 
 def test_there_are_two_threads_and_no_third(monkeypatch):
-    monkeypatch.setattr(two_threads, "cores", lambda: 2)
+    monkeypatch.setattr(workload, "cores", lambda: 2)
     meeting = threading.Barrier(2, timeout=20)
 
     def within(_: int) -> int:
@@ -53,7 +53,7 @@ def test_an_error_comes_through_and_leaves_nothing_held(cores, failing):
 
 
 def test_an_interruption_does_not_wait_for_the_second_thread(monkeypatch):
-    monkeypatch.setattr(two_threads, "cores", lambda: 2)
+    monkeypatch.setattr(workload, "cores", lambda: 2)
     begun, go_on, ended = threading.Event(), threading.Event(), threading.Event()
 
     def interrupted() -> None:
@@ -79,7 +79,7 @@ def test_numpy_is_as_forgiving_in_the_second_thread(cores):
 
 def test_a_process_among_others_stays_in_one_thread():
     program = (
-        "import threading\nfrom kinertia.motion import two_threads as two\ntwo.cores = lambda: 2\n"
+        "import threading\nfrom kinertia.motion import workload as two\ntwo.cores = lambda: 2\n"
         "two.in_one_thread()\nprint(len(set(two.side_by_side(lambda _: threading.get_ident(), [0, 1]))))"
     )
     assert subprocess.run([sys.executable, "-c", program], capture_output=True, text=True).stdout.strip() == "1"

@@ -5,7 +5,7 @@ import pytest
 
 from c3d_writer import plate_parameters, write_c3d
 from kinertia.io.c3d.reader import read_c3d
-from kinertia.io.text.subject_prefix import without_prefixes
+from kinertia.io.text.marker_labels import without_prefixes
 from person_on_plate import CORNERS
 from refusals import only, refused
 

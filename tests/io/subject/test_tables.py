@@ -2,7 +2,7 @@
 
 import tomllib
 
-from kinertia.io.subject.text import subject_text
+from kinertia.io.subject.tables import subject_text
 from kinertia.settings import Subject
 
 
