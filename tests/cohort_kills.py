@@ -23,9 +23,8 @@ from unittest import mock
 
 from cohort_faults import write_study
 from command_line import run
-from kinertia.cohort.job import Job
+from kinertia.cohort.job import LOG, Finished, Job, measured
 from kinertia.cohort.person import fit_person
-from kinertia.cohort.resources import LOG, Finished, measured
 from kinertia.estimation.result import Fit
 from kinertia.io.subject.tables import SubjectFile
 from kinertia.workflow.from_files import fit_subject

@@ -16,8 +16,7 @@ from threadpoolctl import threadpool_limits
 
 from command_line import Outcome, fitted, run
 from kinertia.cli.compiling import compile_once
-from kinertia.cli.measured_demo import run_measured_demo
-from kinertia.cli.synthetic_demo import Demo, run_demo
+from kinertia.cli.demo import Demo, run_demo, run_measured_demo
 from kinertia.estimation.result import Fit
 from kinertia.io import samples
 from kinertia.io.recording import read_recording

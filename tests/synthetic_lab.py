@@ -24,11 +24,11 @@ from kinertia.model.gait27 import build_gait27
 from kinertia.model.skeleton import Marker, Skeleton
 from kinertia.motion.inverse_kinematics import solve_ik
 from kinertia.synthetic.laboratory import LabNoise, LabRecordings, force_table, record
-from kinertia.synthetic.manner import Manner
 from kinertia.synthetic.walk import (
     HEIGHT_M,
     MASS_KG,
     SEX,
+    Manner,
     SyntheticSubject,
     unlike_literature,
     walk,

@@ -18,7 +18,7 @@ from kinertia.estimation.simultaneous.search.problem import MapProblem
 from kinertia.estimation.simultaneous.uncertainty.fisher_information import Information
 from kinertia.report.truth_comparison import JOINTS
 from kinertia.studies.parallel import in_parallel
-from kinertia.studies.simulated_people import Scenario, estimate_person
+from kinertia.studies.sensitivity import Scenario, estimate_person
 from kinertia.synthetic.faults import Faults
 from kinertia.synthetic.walk import SyntheticTrial
 from kinertia.trial.rms import rms

@@ -12,7 +12,7 @@ from kinertia.estimation.simultaneous.outcome import SimultaneousResult
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous
 from kinertia.model.gait27 import HIP_OFFSETS
 from kinertia.motion.smoothing import smooth
-from kinertia.studies.simulated_people import held
+from kinertia.studies.sensitivity import held
 from kinertia.synthetic.noise import camera_noise
 from kinertia.synthetic.walk import unlike_literature, walk, walking_subject
 from validation.bsp_errors import errors

@@ -16,10 +16,9 @@ from kinertia.motion.dynamics import inverse_dynamics
 from kinertia.settings import Settings, Subject
 from kinertia.studies.parallel import in_parallel
 from kinertia.synthetic.laboratory import PERFECT, record
-from kinertia.synthetic.manner import Manner
 from kinertia.synthetic.motions import FAST_PACE, squat
 from kinertia.synthetic.noise import SkinMotion, camera_noise
-from kinertia.synthetic.walk import SyntheticSubject, SyntheticTrial, walk, walking_subject
+from kinertia.synthetic.walk import Manner, SyntheticSubject, SyntheticTrial, walk, walking_subject
 from kinertia.trial.data import Markers, Recording
 from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow.estimate import estimate

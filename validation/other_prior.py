@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from kinertia.estimation.person_information import PersonInformation, relative_parameters
+from kinertia.estimation.learnt_prior import PersonInformation, relative_parameters
 from kinertia.estimation.prior import BspPrior
 from kinertia.model.bsp import BodySegmentParameters
 

@@ -17,8 +17,7 @@ from functools import partial
 import numpy as np
 
 from kinertia.estimation.input_checks import known
-from kinertia.estimation.learnt_prior import FEWEST_PEOPLE, LearntPrior, learn
-from kinertia.estimation.person_information import PersonInformation, person_information
+from kinertia.estimation.learnt_prior import FEWEST_PEOPLE, LearntPrior, PersonInformation, learn, person_information
 from kinertia.estimation.population import population_prior
 from kinertia.estimation.prior import BspPrior, literature_prior
 from kinertia.estimation.simultaneous.fit import calibration_prior
@@ -35,10 +34,9 @@ from kinertia.motion.dynamics import inverse_dynamics
 from kinertia.motion.kinematics import Kinematics
 from kinertia.settings import Attached, Instruments, Subject
 from kinertia.studies.parallel import in_parallel
-from kinertia.studies.simulated_people import WALK_S
+from kinertia.studies.sensitivity import WALK_S
 from kinertia.synthetic.faults import Faults, measured
-from kinertia.synthetic.manner import Manner
-from kinertia.synthetic.walk import HEIGHT_M, MASS_KG, SEX, SyntheticTrial, walk, walking_subject
+from kinertia.synthetic.walk import HEIGHT_M, MASS_KG, SEX, Manner, SyntheticTrial, walk, walking_subject
 from kinertia.trial.rms import rms
 from kinertia.workflow.attached import with_attached_prior
 from kinertia.workflow.known_body import with_prosthesis

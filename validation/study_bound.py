@@ -15,7 +15,7 @@ from kinertia.estimation.simultaneous.inputs import BSP
 from kinertia.estimation.simultaneous.observed_trial import Observation
 from kinertia.estimation.simultaneous.search.problem import MapProblem
 from kinertia.model.log_cholesky import table_jacobian
-from kinertia.studies.simulated_people import held
+from kinertia.studies.sensitivity import held
 from kinertia.synthetic.noise import STUDY_AMPLITUDE_M, STUDY_RATE_RAD_S
 from kinertia.synthetic.walk import SyntheticTrial
 from validation.accuracy_study import at_truth

@@ -15,7 +15,7 @@ from kinertia.model.bsp import BodySegmentParameters
 from kinertia.motion.dynamics import Motion
 from kinertia.motion.inverse_kinematics import solve_ik
 from kinertia.motion.smoothing import smooth
-from kinertia.studies.simulated_people import held
+from kinertia.studies.sensitivity import held
 from kinertia.studies.table1 import MARGIN_S, START_SHARE
 from kinertia.synthetic.noise import camera_noise, study_noise
 from kinertia.synthetic.walk import SyntheticTrial

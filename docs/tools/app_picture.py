@@ -8,7 +8,7 @@ from pathlib import Path
 
 from playwright.sync_api import sync_playwright
 
-from kinertia.cli.measured_demo import write_measured_lab
+from kinertia.cli.demo import write_measured_lab
 from kinertia.cli.web.library import Library
 from kinertia.cli.web.server import Server
 

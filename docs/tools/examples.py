@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 
-from kinertia.cli.measured_demo import write_measured_lab
+from kinertia.cli.demo import write_measured_lab
 from validation.measured_data import data_folder
 
 ROOT = Path(__file__).resolve().parents[2]

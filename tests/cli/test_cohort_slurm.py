@@ -13,9 +13,8 @@ from cohort_faults import write_study
 from command_line import PROGRAM, run
 from kinertia.cohort.cluster import run_jobs
 from kinertia.cohort.job import Job
-from kinertia.cohort.slurm import ENVIRONMENT, slurm_cluster
+from kinertia.cohort.slurm import ENVIRONMENT, SlurmFile, read_slurm, slurm_cluster
 from kinertia.errors import FileError, KinertiaError
-from kinertia.io.slurm_file import SlurmFile, read_slurm
 
 
 def test_the_file_says_what_to_ask_for(tmp_path):
@@ -66,7 +65,7 @@ def slurm_that(tmp_path, monkeypatch):
     def that(*answers):
         folder = fake_slurm.fake_slurm(tmp_path / "bin", list(answers))
         monkeypatch.setenv("PATH", os.pathsep.join([str(folder), os.environ["PATH"]]))
-        monkeypatch.setattr("kinertia.cohort.slurm_jobs.LOOK_S", 0.1)
+        monkeypatch.setattr("kinertia.cohort.slurm.LOOK_S", 0.1)
         return folder
 
     return that
@@ -134,7 +133,7 @@ def _dies_once_and_is_replaced(found, folder, monkeypatch):
     """The first job ends before there is a worker."""
     for name in ("PATH", "SLURM_CONF"):
         monkeypatch.setenv(name, found[name])
-    monkeypatch.setattr("kinertia.cohort.slurm_jobs.LOOK_S", 1.0)
+    monkeypatch.setattr("kinertia.cohort.slurm.LOOK_S", 1.0)
     dies_once = f"test -e {folder}/died || {{ touch {folder}/died; exit 1; }}"
     with slurm_cluster(SlurmFile(workers=1, memory_gb=1.0, before=(dies_once,)), 1) as client:
         assert client.submit(abs, -3).result(timeout=120) == 3

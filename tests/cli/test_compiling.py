@@ -11,7 +11,7 @@ from kinertia.motion import workload
 _ESTIMATE = """
 from kinertia.cli.compiling import stored_functions
 from kinertia.model.array_types import argument_types
-from kinertia.studies.simulated_people import Scenario, estimate_person
+from kinertia.studies.sensitivity import Scenario, estimate_person
 from kinertia.synthetic.faults import Faults
 
 estimate_person(0, (Scenario("", Faults("artefact"), walk_s=0.5), 0))

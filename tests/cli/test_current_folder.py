@@ -9,7 +9,7 @@ import pytest
 
 from command_line import PROGRAM
 from kinertia.cli.compiling import _beside
-from kinertia.cli.web.work import WORKER as PAGE_WORKER
+from kinertia.cli.web.jobs import WORKER as PAGE_WORKER
 from kinertia.cohort.job import Job
 from kinertia.cohort.local import WORKER as COHORT_WORKER
 from kinertia.cohort.process import Process

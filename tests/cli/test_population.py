@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from command_line import run
-from kinertia.estimation.person_information import information_of
+from kinertia.estimation.learnt_prior import information_of
 from kinertia.estimation.prior import literature_prior
 from kinertia.io.subject.provenance import Provenance, command_line, recordings
 from kinertia.io.subject.reader import read_subject

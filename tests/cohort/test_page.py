@@ -9,8 +9,16 @@ import pandas as pd
 import pytest
 
 from kinertia.cohort.instruments import drift
-from kinertia.cohort.outcomes import lead, outcome_parts, overruled_in_vain
-from kinertia.cohort.page import PAGE, _curves, _mean_curves, _outliers, write_cohort_page
+from kinertia.cohort.page import (
+    PAGE,
+    _curves,
+    _mean_curves,
+    _outliers,
+    lead,
+    outcome_parts,
+    overruled_in_vain,
+    write_cohort_page,
+)
 from kinertia.cohort.tables import write_tables
 from report_page import figures_of
 from study_results import person_record, write_cohort

@@ -1,6 +1,9 @@
 """What a worker says of a person who cannot be fitted: nothing is raised, and what may end otherwise is not kept."""
 
+import os
 import shutil
+import subprocess
+import sys
 from dataclasses import replace
 from unittest import mock
 
@@ -8,7 +11,7 @@ import pandas as pd
 import pytest
 
 from kinertia.cohort.job import Job
-from kinertia.cohort.person import fit_person
+from kinertia.cohort.person import fit_person, no_end, time_limit, was_ended
 from kinertia.cohort.record import inputs_of, prepare_folder
 from kinertia.errors import internal_error
 from kinertia.io.subject.reader import read_subject
@@ -63,3 +66,31 @@ def test_a_full_disk_is_told_and_tried_again(job):
         record = fit_person(job)
     assert (record.status, record.inputs) == (2, "")
     assert record.sentence.startswith("out/x: No space left; ")
+
+
+HANGS = """
+    import re, sys
+    from pathlib import Path
+    from kinertia.cohort.person import time_limit
+    with time_limit(0.2, Path(sys.argv[1]), "this"):
+        re.match("(a+)+b", "a" * 60)
+"""
+
+
+def test_what_hangs_is_ended_and_known_in_this_run_only(tmp_path):
+    log = tmp_path / "Ben.log"
+    code = "\n".join(line.strip() if "re.match" not in line else "    " + line.strip() for line in HANGS.splitlines())
+    path = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    done = subprocess.run([sys.executable, "-c", code, log], env=path, timeout=60)
+    assert done.returncode == 1
+    assert was_ended(log, "this")
+    assert not was_ended(log, "the next")
+    assert str(log) in no_end(900.0, log)
+
+
+def test_what_ends_leaves_nothing(tmp_path):
+    log = tmp_path / "Anna.log"
+    with time_limit(60.0, log, "this"):
+        assert not was_ended(log, "this")
+    assert not log.exists()
+    assert not was_ended(log, "this")

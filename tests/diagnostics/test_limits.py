@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from kinertia.diagnostics.evidence.force_mass import ForceMass
-from kinertia.diagnostics.markers.visibility import visible
-from kinertia.diagnostics.plates.cop_on_plate import cop_on_plate
-from kinertia.diagnostics.plates.quantisation import quantisation
+from kinertia.diagnostics.markers.trajectories import visible
+from kinertia.diagnostics.plates.cop_path import cop_on_plate
+from kinertia.diagnostics.plates.signals import quantisation
 from kinertia.diagnostics.plates.zeros import zeros
-from kinertia.diagnostics.result import common_offset, masses, rotation
+from kinertia.diagnostics.result import masses, plate_errors
 from kinertia.diagnostics.result.residuals import residuals_of
-from kinertia.diagnostics.subject import movements, stature
+from kinertia.diagnostics.subject import body_data, movements
 from kinertia.diagnostics.subject.body_data import stated_and_filed
 from kinertia.diagnostics.subject.mass import masses_of_trials, stated_mass
 from kinertia.diagnostics.timing import belt_speed
@@ -136,16 +136,16 @@ def fitted():
 
 
 def displaced(detectable_m, patched):
-    patched.setattr(common_offset, "smallest_detectable", lambda *known: detectable_m)
-    return [*common_offset.common_offset(fitted())][:1]
+    patched.setattr(plate_errors, "smallest_detectable", lambda *known: detectable_m)
+    return [*plate_errors.common_offset(fitted())][:1]
 
 
 def rotated(all_deg, one_deg, patched):
     for name, degrees in (("smallest_detectable", all_deg), ("smallest_detectable_of_one", one_deg)):
-        patched.setattr(rotation, name, lambda *known, degrees=degrees: np.radians(degrees))
-    patched.setattr(rotation, "equal", lambda *rotations: False)
-    patched.setattr(rotation, "corrected", lambda *rotations: ())
-    return rotation.plate_rotation(fitted())
+        patched.setattr(plate_errors, name, lambda *known, degrees=degrees: np.radians(degrees))
+    patched.setattr(plate_errors, "equal", lambda *rotations: False)
+    patched.setattr(plate_errors, "corrected", lambda *rotations: ())
+    return plate_errors.plate_rotation(fitted())
 
 
 def shown(share):
@@ -158,8 +158,8 @@ def tall(share, patched):
     """From ankle to shoulder over the stature."""
     heights = {"ankle_lateral": 0.0, "knee_lateral": 0.4, "asis": 0.9, "acromion": 1.4}
     marks = {f"{name}_{side}": np.array([0.0, high, 0.0]) for name, high in heights.items() for side in "rl"}
-    patched.setattr(stature, "find_landmarks", lambda recording, marker_set: marks)
-    return stature.stature(SimpleNamespace(height_m=1.4 / share, marker_set=object(), recording=None, at=at))
+    patched.setattr(body_data, "find_landmarks", lambda recording, marker_set: marks)
+    return body_data.stature(SimpleNamespace(height_m=1.4 / share, marker_set=object(), recording=None, at=at))
 
 
 STEADY = np.full(200, 500.0)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinertia.diagnostics.result.free_moments import reversed_sign
+from kinertia.diagnostics.result.plate_errors import reversed_sign
 from kinertia.estimation.free_moment_sign import (
     VERTICAL,
     residual_moments_nm,

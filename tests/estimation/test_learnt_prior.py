@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from kinertia.errors import PriorError
-from kinertia.estimation.learnt_prior import BETWEEN, WITHIN, learn
-from kinertia.estimation.person_information import PersonInformation, information_of
+from kinertia.estimation.learnt_prior import BETWEEN, WITHIN, PersonInformation, information_of, learn
 from kinertia.estimation.prior import literature_prior
 from kinertia.synthetic.walk import walking_subject
 from validation.population_bodies import POPULATIONS

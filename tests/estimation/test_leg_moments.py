@@ -4,7 +4,17 @@ import numpy as np
 import pytest
 
 from kinertia.diagnostics.result.suitability import suitability
-from kinertia.estimation.leg_moments import coverage_by_task, coverage_sentence, moment_coverage
+from kinertia.estimation.leg_moments import (
+    BESIDE,
+    HIDDEN,
+    PARTLY,
+    SHARED,
+    coverage_by_task,
+    coverage_sentence,
+    gaps_sentence,
+    moment_coverage,
+    moment_gaps,
+)
 
 
 def test_a_walk_over_plates_has_joint_moments_in_all_of_stance(fit):
@@ -47,3 +57,76 @@ def test_without_strides_there_is_nothing(fit):
     unknown = replace(walk, kinematics=replace(k, trial=replace(k.trial, on_ground=None)))
     assert moment_coverage(unknown) == ()
     assert coverage_sentence([unknown]) == ""
+
+
+FOOT = 1
+
+
+@pytest.fixture(scope="module")
+def interrupted(fit):
+    """The trial, itself without some frames of the left stance, these frames, and their first and last time."""
+    (trial,) = fit.trials
+    k = trial.kinematics
+    time = k.trial.markers.time
+    loads = k.trial.loads
+    loaded = np.interp(time, loads.time, loads.force[:, FOOT, 1]) > 100.0
+    stance = np.flatnonzero(loaded & k.inside(time))
+    span = (float(time[stance[5]]), float(time[stance[25]]))
+    here = (time >= span[0]) & (time <= span[1])
+
+    def changed(columns=slice(None), **fields):
+        known = np.where(here[:, None], False, k.known | k.inside(time)[:, None])
+        cut = replace(k, known=known, windows_s=((-2.0, -1.9), (time[0], time[0]), (time[-1], time[-1])), **fields)
+        return replace(trial, kinematics=cut)
+
+    return trial, changed, here, span
+
+
+def lost(trial, here):
+    """The trial in which the load of the left leg is unknown there."""
+    k = trial.kinematics
+    legs = np.where(here[:, None], [True, False], k.trial.known_legs)
+    return replace(k.trial, leg_known=legs, measured=k.trial.measured & ~here)
+
+
+def test_whatever_is_known_is_no_gap(fit):
+    (trial,) = fit.trials
+    known = trial.joint_curves.known.all(axis=1)
+    time = trial.joint_curves.time
+    for gap in moment_gaps(trial):
+        assert not known[(time >= gap.start_s) & (time <= gap.end_s)].any()
+        assert gap.reason == BESIDE
+
+
+def reasons(trial, span):
+    middle = (span[0] + span[1]) / 2
+    return {gap.reason for gap in moment_gaps(trial) if gap.side == "l" and gap.start_s <= middle <= gap.end_s}
+
+
+def test_a_foot_that_is_partly_on_its_plate(interrupted):
+    trial, changed, here, span = interrupted
+    assert reasons(changed(trial=lost(trial, here)), span) == {PARTLY}
+
+
+def test_a_plate_under_both_feet(interrupted):
+    trial, changed, here, span = interrupted
+    own = lost(trial, here)
+    shared = replace(own, loads=replace(own.loads, on_shared_plate=np.ones(len(own.loads.time), dtype=bool)))
+    assert reasons(changed(trial=shared), span) == {SHARED}
+
+
+def test_a_foot_beside_the_plates(interrupted):
+    trial, changed, here, span = interrupted
+    own = lost(trial, here)
+    force = own.loads.force.copy()
+    force[:, FOOT] = 0.0
+    beside = changed(trial=replace(own, loads=replace(own.loads, force=force)))
+    assert reasons(beside, span) == {BESIDE}
+    assert f"{BESIDE} (" in gaps_sentence([beside])
+
+
+def test_hidden_markers(interrupted):
+    trial, changed, here, span = interrupted
+    ik = trial.kinematics.ik
+    hidden = replace(ik, q=np.where(here[:, None], np.nan, ik.q))
+    assert reasons(changed(trial=trial.kinematics.trial, ik=hidden), span) == {HIDDEN}

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from kinertia.estimation.person_information import PersonInformation, person_information
+from kinertia.estimation.learnt_prior import PersonInformation, person_information
 from kinertia.estimation.prior import literature_prior
 from kinertia.synthetic.walk import walking_subject
 from validation.other_prior import with_prior

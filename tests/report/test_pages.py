@@ -21,8 +21,7 @@ from kinertia.report.sensitivity import render_sensitivity
 from kinertia.report.table1 import render_table1
 from kinertia.report.table1_variants import render_variants
 from kinertia.settings import Subject
-from kinertia.workflow.check import check_person
-from kinertia.workflow.files import files_by_name, read_files
+from kinertia.workflow.check import check_person, files_by_name, read_files
 from kinertia.workflow.person import Person
 from report_page import without_plotly
 from study_results import HELD_OUT, PLAN

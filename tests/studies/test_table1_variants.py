@@ -8,7 +8,7 @@ from kinertia.estimation.study_parameters import ParameterVector
 from kinertia.estimation.two_level import TwoLevelProblem, Window
 from kinertia.motion.dynamics import residual
 from kinertia.motion.inverse_kinematics import solve_ik
-from kinertia.studies import table1_guesses
+from kinertia.studies import table1_variants
 from kinertia.studies.table1 import (
     CONDITIONS,
     PUBLISHED,
@@ -23,7 +23,6 @@ from kinertia.studies.table1 import (
     study_trial,
     two_level,
 )
-from kinertia.studies.table1_guesses import error_signal, trust_region
 from kinertia.studies.table1_variants import (
     BASE,
     CLASSES,
@@ -31,9 +30,11 @@ from kinertia.studies.table1_variants import (
     VARIANTS,
     Variant,
     distance,
+    error_signal,
     helped,
     run_variants,
     stopped_by,
+    trust_region,
 )
 from kinertia.synthetic.noise import camera_noise, displaced, study_noise
 from kinertia.synthetic.walk import balancing_wrench
@@ -112,7 +113,7 @@ def test_noise_per_marker_and_segment(trial):
     def moved(noise):
         return noise(trial, np.random.default_rng(1)).positions - trial.markers.positions
 
-    per_marker, per_segment = moved(table1_guesses.noise_per_marker), moved(table1_guesses.noise_per_segment)
+    per_marker, per_segment = moved(table1_variants.noise_per_marker), moved(table1_variants.noise_per_segment)
     np.testing.assert_allclose(per_marker, np.repeat(per_marker[..., :1], 3, axis=2), atol=1e-14)
     assert len(np.unique(per_marker[40, :, 0])) == 41
     segments = [marker.segment for marker in trial.skeleton.markers]
@@ -124,7 +125,7 @@ def test_noise_per_marker_and_segment(trial):
 
 
 def test_slower_noise_is_the_same_at_half_the_speed(trial):
-    slow = table1_guesses.slower_noise(trial, np.random.default_rng(1)).positions
+    slow = table1_variants.slower_noise(trial, np.random.default_rng(1)).positions
     half = replace(trial.markers, time=trial.time / 2)
     shape = half.positions.shape[1:]
     np.testing.assert_allclose(slow, displaced(half, shape, np.random.default_rng(1)).positions, atol=1e-12)
@@ -154,7 +155,7 @@ def test_starts_differ_where_they_say(vector, trial):
     truth = vector.values(trial.bsp)
     usual, mass, com = (
         start(vector, np.random.default_rng(1)).reshape(-1, 7)
-        for start in (TODAY.start, table1_guesses.mass_of_scale, table1_guesses.com_by_distance)
+        for start in (TODAY.start, table1_variants.mass_of_scale, table1_variants.com_by_distance)
     )
     assert 0.4 < np.abs(usual.ravel() / truth - 1.0).max() <= 0.5
     assert vector.bsp(mass.ravel()).total_mass_kg == pytest.approx(trial.bsp.total_mass_kg)
@@ -168,7 +169,7 @@ def test_starts_differ_where_they_say(vector, trial):
 
 
 def test_29_markers_still_show_every_coordinate(trial):
-    fewer = table1_guesses.fewer_markers()
+    fewer = table1_variants.fewer_markers()
     assert len(fewer.markers.labels) == 29
     np.testing.assert_array_equal(fewer.motion.q, trial.motion.q)
     few = slice(0, 20)
@@ -193,7 +194,7 @@ def test_centres_of_mass_on_the_axes(trial):
 def test_known_variance_finds_the_cutoffs_of_gcv_where_errors_are_independent(trial):
     """Then both are estimates of the same least error."""
     noisy = camera_noise(trial.markers, 0.003, np.random.default_rng(1))
-    known, gcv = (smoothed(trial, noisy) for smoothed in (table1_guesses.known_variance, coordinates))
+    known, gcv = (smoothed(trial, noisy) for smoothed in (table1_variants.known_variance, coordinates))
     raw = solve_ik(trial.skeleton, noisy).q
     off, off_gcv, off_raw = (
         np.sqrt(np.square(q - trial.motion.q).mean(axis=0)) for q in (known(trial.time), gcv(trial.time), raw)

@@ -8,9 +8,9 @@ from kinertia.io.subject.reader import read_subject
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.motion.dynamics import residual, root_regressor
 from kinertia.studies.table1 import measured_trial, symmetric_truth
-from kinertia.synthetic.manner import Manner
 from kinertia.synthetic.walk import (
     STATIC_ONLY,
+    Manner,
     centre_of_pressure,
     consistent_trial,
     unlike_literature,

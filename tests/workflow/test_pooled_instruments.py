@@ -13,7 +13,7 @@ from kinertia.estimation.simultaneous.linear_algebra.bandwidth import Bandwidth
 from kinertia.estimation.simultaneous.mixture_prior import GaussianPrior
 from kinertia.estimation.simultaneous.observation import observe
 from kinertia.estimation.simultaneous.solver import estimate_simultaneous
-from kinertia.studies.simulated_people import MOTIONS
+from kinertia.studies.sensitivity import MOTIONS
 from kinertia.synthetic.faults import Faults, measured
 from kinertia.synthetic.walk import walk, walking_subject
 

@@ -1,4 +1,4 @@
-"""Lists the commands of the command line and loads the module of each when it is called."""
+"""Lists the commands of the command line, loads each when it is called, and keeps former names working."""
 
 import signal
 import sys
@@ -12,8 +12,7 @@ import typer
 
 from kinertia.cli.failure import STATUS, failure_text
 from kinertia.cli.outcome import add_command, of_error
-from kinertia.cli.renamed_options import as_named_now
-from kinertia.cli.terminal import out, print_json, show_error, show_problem
+from kinertia.cli.terminal import err, out, print_json, show_error, show_problem
 from kinertia.errors import KinertiaError
 from kinertia.findings.extensions import ExtensionError
 from kinertia.io.results.output_folder import INTERRUPTIONS
@@ -63,7 +62,6 @@ Or, with fit --model, your scaled OpenSim model (.osim), trials and body mass.
 Results go to standard output, progress and errors to standard error; with
 --json the results are JSON, for scripts.
 """
-
 _MODULES = {
     "demo": "demo",
     "app": "app_command",
@@ -87,6 +85,10 @@ _MORE = {
     "warm-up": "warm_up",
 }
 """Module of every command, which has its name there (with underscores); in the order of `kinertia --help`."""
+RENAMED = {"--force": "--overwrite"}
+"""Old names, each with what it is called now; they go with the next version."""
+MOVED = {f"study {name}": f"python -m validation {name}" for name in ("accuracy", "faults", "populations")}
+"""Commands that are no longer installed, each with what to run in a clone of the repository."""
 
 
 def application(only: str | None = None) -> typer.Typer:
@@ -212,3 +214,17 @@ def _root(
     ] = False,
 ) -> None:
     pass
+
+
+def as_named_now(given: Sequence[str]) -> list[str]:
+    """Replace old names of options among these arguments, with a notice on standard error.
+
+    Raises:
+        KinertiaError: the command is no longer installed.
+    """
+    command = " ".join(given[:2])
+    if command in MOVED:
+        raise KinertiaError(f"kinertia {command} moved to the repository: run {MOVED[command]} in a clone of it")
+    for old in [name for name in RENAMED if name in given]:
+        err.print(f"{old} is now {RENAMED[old]}; the old name will be removed in the next version")
+    return [RENAMED.get(one, one) for one in given]

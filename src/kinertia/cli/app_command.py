@@ -8,8 +8,7 @@ from typing import Annotated
 
 import typer
 
-from kinertia.cli.measured_demo import write_measured_lab
-from kinertia.cli.synthetic_demo import write_synthetic_lab
+from kinertia.cli.demo import write_measured_lab, write_synthetic_lab
 from kinertia.cli.terminal import out, print_json
 from kinertia.errors import KinertiaError, how_to_install
 

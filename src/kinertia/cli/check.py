@@ -38,8 +38,16 @@ from kinertia.io.text.number_table import expect_path
 from kinertia.model.anthropometry import check_subject
 from kinertia.report.check_page import save_check_page
 from kinertia.settings import Subject
-from kinertia.workflow.check import ModelOverview, PersonCheck, check_osim, check_person
-from kinertia.workflow.files import RecordingFiles, files_by_name, read_files, trial_names
+from kinertia.workflow.check import (
+    ModelOverview,
+    PersonCheck,
+    RecordingFiles,
+    check_osim,
+    check_person,
+    files_by_name,
+    read_files,
+    trial_names,
+)
 from kinertia.workflow.person import Person, Progress, read_person
 from kinertia.workflow.recording import RecordingCheck
 

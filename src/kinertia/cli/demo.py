@@ -1,23 +1,163 @@
-"""Defines `kinertia demo`: fits a synthetic person of known truth, or a measured walk that is downloaded."""
+"""Defines `kinertia demo`: fits a synthetic person of known truth, or a measured walk that is downloaded.
 
+The truth differs from the literature as much as people do, and the laboratory's instruments have errors. Only the
+comparison at the end uses either; the estimator reads the laboratory's files.
+"""
+
+import shutil
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import numpy as np
+import pandas as pd
 import typer
 
 from kinertia.cli.findings_view import show_overview
 from kinertia.cli.fit_report import show_coverage
-from kinertia.cli.measured_demo import run_measured_demo
 from kinertia.cli.options import Output, Overwrite, Quiet, results_folder
 from kinertia.cli.outcome import Outcome
-from kinertia.cli.synthetic_demo import Demo, run_demo
 from kinertia.cli.terminal import out, plain_table, shown_progress
-from kinertia.io.subject.provenance import command_line
-from kinertia.report.files import summary
+from kinertia.estimation.prepared import Progress
+from kinertia.estimation.result import Fit
+from kinertia.io.results.output_folder import complete_folder
+from kinertia.io.samples import SHA256, sample_walk
+from kinertia.io.subject.person_recordings import read_inputs
+from kinertia.io.subject.provenance import command_line, provenance_of
+from kinertia.io.subject.reader import read_subject, with_settings
+from kinertia.io.subject.tables import SubjectFile
+from kinertia.model.bsp import BodySegmentParameters
+from kinertia.motion.dynamics import inverse_dynamics
+from kinertia.report.files import save_fit, summary
+from kinertia.report.truth_comparison import Truth
+from kinertia.synthetic.laboratory import LabNoise, record, write_lab
+from kinertia.synthetic.walk import SyntheticTrial, unlike_literature, walk, walking_subject
+from kinertia.workflow.estimate import estimate_bsp
+from kinertia.workflow.from_files import fit_subject
 
 Method = Literal["simultaneous", "two-level"]
 _SHOWN_JOINTS = ("hip flexion", "hip adduction", "knee", "ankle", "lumbar extension")
 """Joints on the terminal; `report.html` has all."""
+PLATE_RATE_HZ, SAMPLES_PER_FRAME = 1000.0, 10
+"""Force plates at 1000 Hz, cameras at 100 Hz."""
+DURATION_S, START = 2.7, 0.75
+"""A bit over two strides, begun so that one right and one left contact are whole."""
+LABORATORY = LabNoise(delay_s=0.008, gain=0.05)
+"""The demo's laboratory: forces are late, and one plate reads too much."""
+_SUBJECT = """# OpenSim's gait2354 example: https://github.com/opensim-org/opensim-models, Pipelines/Gait2354_Simbody.
+
+[subject]
+name = "gait2354"
+sex = "male"
+mass_kg = 72.6
+height_m = 1.803
+
+[model]
+static = "subject01_static.trc"
+
+[[trial]]
+markers = "subject01_walk1.trc"
+forces = "subject01_walk1_grf.mot"
+loads = "subject01_walk1_grf.xml"
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class Demo:
+    """A fit of synthetic files, and the truth behind them.
+
+    Attributes:
+        fit: the estimate.
+        walk: the person's motion and BSPs, from which the files were made.
+        noise: the laboratory's errors.
+        subject_file: subject file of the synthetic laboratory.
+    """
+
+    fit: Fit
+    walk: SyntheticTrial
+    noise: LabNoise
+    subject_file: Path
+
+    @property
+    def truth(self) -> BodySegmentParameters:
+        """True BSPs of the person."""
+        return self.walk.bsp
+
+    @cached_property
+    def moment_errors(self) -> dict[str, tuple[float, float]]:
+        """RMS error (N m) of joint moments per joint, by IK + ID and by the estimate."""
+        return truth_of(self.walk, self.fit).moment_errors(self.fit)
+
+    @property
+    def moment_intervals(self) -> dict[str, tuple[float, float]]:
+        """Half-width (N m) of the 95 % intervals of joint moments, and the share that holds the truth, per joint."""
+        return truth_of(self.walk, self.fit).moment_intervals(self.fit)
+
+    @cached_property
+    def table(self) -> pd.DataFrame:
+        """Table with columns segment, parameter, unit, truth, literature, estimate, and sd unless after two-level."""
+        table = self.fit.bsp.filter(["segment", "parameter", "unit", "literature", "estimate", "sd"])
+        table.insert(3, "truth", self.truth.to_frame()["value"])
+        return table
+
+    def rms_errors(self, source: BodySegmentParameters) -> tuple[float, float, float]:
+        """Return the RMS errors over the segments of mass (kg), CoM distance (m), moments of inertia (kg m2)."""
+        return Truth(self.walk.bsp, {}).parameter_errors(source)
+
+
+def truth_of(made: SyntheticTrial, fit: Fit) -> Truth:
+    """Return the truth behind a fit of one trial."""
+    (trial,) = fit.trials
+    at = np.searchsorted(made.time, trial.time - 1e-9)
+    loads = inverse_dynamics(made.skeleton, made.bsp, made.motion.cut(at), made.foot_loads[at])
+    columns = [made.skeleton.coordinates.index(name) for name in fit.skeleton.coordinates]
+    return Truth(made.bsp, {trial.name: loads[:, columns]})
+
+
+def write_synthetic_lab(
+    folder: Path, seed: int = 1, noise: LabNoise | None = None
+) -> tuple[SubjectFile, SyntheticTrial]:
+    """Write the files of a synthetic laboratory, with a subject file; return the latter as read, and the walk."""
+    truth_rng, noise_rng = np.random.default_rng(seed).spawn(2)
+    subject = unlike_literature(walking_subject(), truth_rng)
+    trial = walk(subject, DURATION_S, PLATE_RATE_HZ, START)
+    recordings = record(subject, trial, noise or LabNoise(), noise_rng, SAMPLES_PER_FRAME)
+    return read_subject(write_lab(folder, recordings)), trial
+
+
+def run_demo(
+    folder: str | Path,
+    seed: int = 1,
+    noise: LabNoise = LABORATORY,
+    progress: Progress = lambda stage, share: None,
+    method: Literal["simultaneous", "two-level"] = "simultaneous",
+) -> Demo:
+    """Make the laboratory's files in `folder`/lab, estimate from them, write results and `bsp_truth.csv` into `folder`.
+
+    Args:
+        folder: folder to write to, made if necessary.
+        seed: seed of truth and noise.
+        noise: the laboratory's errors.
+        method: the estimator.
+        progress: called as the work progresses.
+
+    Raises:
+        FileError: the folder cannot be written to.
+    """
+    folder = Path(folder)
+    with complete_folder(folder, "demo") as work:
+        progress("measuring", 0.0)
+        wanted, trial = write_synthetic_lab(work / "lab", seed, noise)
+        static, inputs, marker_set = read_inputs(wanted, progress)
+        of_method = [] if method == "simultaneous" else ["--method", method]
+        provenance = provenance_of(wanted, command_line(["kinertia", "demo", *of_method, "-o", str(folder)]))
+        settings = with_settings(wanted, method=method).settings
+        fit = estimate_bsp(wanted.subject, static, inputs, settings, marker_set, progress)
+        save_fit(fit, work, provenance, truth_of(trial, fit), force=True)
+        demo = Demo(fit, trial, noise, folder / "lab" / "subject.toml")
+        demo.table.to_csv(work / "bsp_truth.csv", index=False, lineterminator="\n")
+    return demo
 
 
 def demo(
@@ -155,3 +295,38 @@ def _two_level_verdict(before: tuple[float, float, float], after: tuple[float, f
         "The study that two-level comes from found the same (docs/validation/study.md); without noise two-level "
         "finds them exactly (kinertia study table1)."
     )
+
+
+def write_measured_lab(folder: Path, progress: Progress = lambda stage, share: None) -> Path:
+    """Copy the sample walk into a folder, made if necessary, with a subject file, and return that file.
+
+    Raises:
+        KinertiaError: it is not on this computer and cannot be downloaded.
+    """
+    source = sample_walk(progress)
+    folder.mkdir(parents=True, exist_ok=True)
+    for name in SHA256:
+        shutil.copyfile(source / name, folder / name)
+    subject = folder / "subject.toml"
+    subject.write_text(_SUBJECT, encoding="utf-8")
+    return subject
+
+
+def run_measured_demo(folder: str | Path, progress: Progress = lambda stage, share: None) -> Fit:
+    """Copy the sample walk to `folder`/lab, fit it, and write the results of the fit into `folder`.
+
+    Args:
+        folder: folder to write to, made if necessary.
+        progress: called as the work progresses.
+
+    Raises:
+        FileError: the folder cannot be written to.
+        KinertiaError: the walk is not on this computer and cannot be downloaded.
+    """
+    folder = Path(folder)
+    with complete_folder(folder, "demo") as work:
+        wanted = read_subject(write_measured_lab(work / "lab", progress))
+        fit = fit_subject(wanted, progress)
+        command = command_line(["kinertia", "demo", "--measured", "-o", str(folder)])
+        save_fit(fit, work, provenance_of(wanted, command), force=True)
+    return fit

@@ -9,8 +9,7 @@ import numpy as np
 import typer
 
 from kinertia.cli.findings_view import show_idle_waivers, show_overview, waivers_reported
-from kinertia.cli.fit_report import report_tables, show_coverage
-from kinertia.cli.next_commands import next_commands
+from kinertia.cli.fit_report import next_commands, report_tables, show_coverage
 from kinertia.cli.options import (
     Calibrate,
     Forces,

@@ -13,8 +13,7 @@ from kinertia.cli.results_of_people import PersonResults, results_of_people
 from kinertia.cli.terminal import out, plain_table, shown_progress
 from kinertia.errors import KinertiaError, PriorError
 from kinertia.estimation.identifiability import evidence
-from kinertia.estimation.learnt_prior import LearntPrior, learn
-from kinertia.estimation.person_information import PersonInformation, information_of
+from kinertia.estimation.learnt_prior import LearntPrior, PersonInformation, information_of, learn
 from kinertia.io.recording import MARKER_FILES
 from kinertia.io.results.output_folder import write_then_rename
 from kinertia.io.subject.population_file import population_text, read_population

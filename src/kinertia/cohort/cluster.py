@@ -9,9 +9,8 @@ from contextlib import contextmanager
 from importlib.util import find_spec
 from typing import Any
 
-from kinertia.cohort.job import Job
+from kinertia.cohort.job import Finished, Job, measured
 from kinertia.cohort.record import FAILED, Record, one_line
-from kinertia.cohort.resources import Finished, measured
 from kinertia.errors import KinertiaError, SettingsError, how_to_install
 
 HOW = how_to_install("cohort")

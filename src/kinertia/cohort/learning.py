@@ -19,8 +19,7 @@ from kinertia.cohort.people import Participant
 from kinertia.cohort.record import RECORD, Place
 from kinertia.errors import KinertiaError, PriorError
 from kinertia.estimation.input_checks import known
-from kinertia.estimation.learnt_prior import FEWEST_PEOPLE, LearntPrior, learn
-from kinertia.estimation.person_information import PersonInformation, information_of
+from kinertia.estimation.learnt_prior import FEWEST_PEOPLE, LearntPrior, PersonInformation, information_of, learn
 from kinertia.io.file_names import path_from
 from kinertia.io.results.output_folder import write_then_rename
 from kinertia.io.subject.person_recordings import session_date

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from queue import Empty, SimpleQueue
 from threading import Event, Thread
 
-from kinertia.cohort.job import RETRIES, Job
+from kinertia.cohort.job import RETRIES, Finished, Job
 from kinertia.cohort.process import PYTHON, Process
-from kinertia.cohort.resources import Finished
 
 WORKER = (*PYTHON, "-m", "kinertia.cohort.worker")
 PERSON_MEMORY_BYTES = 2 * 1024**3

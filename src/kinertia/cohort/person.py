@@ -1,13 +1,21 @@
-"""Fits one person of a cohort in a worker, and writes results and rows of the cohort's tables."""
+"""Fits one person of a cohort in a worker, and writes results and rows of the cohort's tables.
 
+A file reader may hang in compiled code that blocks every other thread of its process, Dask's and any watchdog's. The
+watchdog of `faulthandler` works without them. Dask then starts another process and tries the person again, which the
+log prevents.
+"""
+
+import faulthandler
 import time
 import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
+from pathlib import Path
 
 from kinertia.cohort.job import Job
 from kinertia.cohort.record import AGAINST, BAD_INPUT, FAILED, PASSED, RECORD, Place, Record, inputs_of
 from kinertia.cohort.tables import write_findings, write_person
-from kinertia.cohort.time_limit import no_end, time_limit, was_ended
 from kinertia.errors import KinertiaError, internal_error
 from kinertia.estimation.result import Fit
 from kinertia.findings.finding import Severity
@@ -19,6 +27,9 @@ from kinertia.io.subject.tables import SubjectFile
 from kinertia.io.versions import VERSION
 from kinertia.report.files import save_fit
 from kinertia.workflow.from_files import fit_subject
+
+_ENDED = "Timeout ("
+"""Beginning of faulthandler's output."""
 
 
 def fit_person(job: Job) -> Record:
@@ -97,3 +108,41 @@ def _failed(job: Job, error: Exception) -> Record:
     log = Place(job.cohort, job.person).log
     write_then_rename(log, "".join(traceback.format_exception(error)))
     return job.record(FAILED, internal_error(error, log), settled=not isinstance(error, MemoryError))
+
+
+@contextmanager
+def time_limit(seconds: float, log: Path, run: str) -> Iterator[None]:
+    """End this process if the block takes longer; `log` then states where it was, and in which run.
+
+    One block at a time in a process.
+    """
+    with log.open("w", encoding="utf-8") as file:
+        file.write(_heading(run))
+        file.flush()
+        faulthandler.dump_traceback_later(seconds, exit=True, file=file)
+        try:
+            yield
+        finally:
+            faulthandler.cancel_dump_traceback_later()
+            file.close()  # Windows removes no file that is open
+            log.unlink(missing_ok=True)
+
+
+def was_ended(log: Path, run: str) -> bool:
+    """Return whether a block of this run with this log was ended."""
+    try:
+        return log.read_text(encoding="utf-8").startswith(_heading(run) + _ENDED)
+    except OSError:
+        return False
+
+
+def no_end(seconds: float, log: Path) -> str:
+    """Describe the time limit that was exceeded."""
+    return (
+        f"the fit did not finish within {seconds / 60.0:.0f} min and was stopped; look for anything unusual in the "
+        f"files, and send {log}, which shows where the fit was, to Kinertia's developers; the next run tries again"
+    )
+
+
+def _heading(run: str) -> str:
+    return f"run {run}\n"

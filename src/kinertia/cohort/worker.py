@@ -11,10 +11,9 @@ from queue import SimpleQueue
 from threading import Thread
 from typing import TextIO
 
-from kinertia.cohort.job import Job
+from kinertia.cohort.job import Job, measured
 from kinertia.cohort.person import fit_person
 from kinertia.cohort.record import Record
-from kinertia.cohort.resources import measured
 from kinertia.studies.parallel import one_thread
 
 

@@ -10,18 +10,28 @@ import numpy as np
 from kinertia.diagnostics.axes import Axes, AxisNames
 from kinertia.diagnostics.evidence.copied_frames import FEWEST_FRAMES, without_copied_frames
 from kinertia.diagnostics.evidence.foot_trajectories import FootTrajectory, foot_trajectories
-from kinertia.diagnostics.evidence.force_mass import ForceMass, ForeignLoad, force_mass
-from kinertia.diagnostics.evidence.hallux import halluces
+from kinertia.diagnostics.evidence.force_mass import (
+    ForceMass,
+    ForeignLoad,
+    StandingMass,
+    adult_share,
+    force_mass,
+    plate_masses,
+    standing_mass,
+)
 from kinertia.diagnostics.evidence.horizontal_velocity import ForceVelocity, VelocityChanges, force_velocities
-from kinertia.diagnostics.evidence.landmarks import CLEAR, cosine, headings, landmark_positions, most_forwards
-from kinertia.diagnostics.evidence.loaded_plates import adult_share
+from kinertia.diagnostics.evidence.landmarks import CLEAR, cosine, halluces, headings, landmark_positions, most_forwards
 from kinertia.diagnostics.evidence.marker_precision import MarkerPrecision
 from kinertia.diagnostics.evidence.plate_contacts import PlateContact, contact_span_s, contacts_of
 from kinertia.diagnostics.evidence.plate_edges import LITTLE_BEYOND_M, FootPoints, Overhang, overhangs
-from kinertia.diagnostics.evidence.plate_masses import plate_masses
-from kinertia.diagnostics.evidence.shared_plates import SharedLoad, shared_loads, shows_whole_feet, without_legs
-from kinertia.diagnostics.evidence.standing_mass import StandingMass, standing_mass
-from kinertia.diagnostics.evidence.stray_loads import stray_contacts, without_loads
+from kinertia.diagnostics.evidence.shared_and_stray_loads import (
+    SharedLoad,
+    shared_loads,
+    shows_whole_feet,
+    stray_contacts,
+    without_legs,
+    without_loads,
+)
 from kinertia.diagnostics.evidence.strides import periods, swing_in_turn
 from kinertia.diagnostics.evidence.trajectory_faults import TrajectoryFaults
 from kinertia.errors import KinertiaError

@@ -1,7 +1,8 @@
-"""Holds one person with all recordings, for the questions about the person."""
+"""Holds one person with all recordings, and decides which of two that disagree is the odd one."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.estimation.total_mass import TotalMass
@@ -9,6 +10,8 @@ from kinertia.findings.finding import Finding, Severity
 from kinertia.model.imported_model import OsimModel
 from kinertia.model.marker_set import MarkerSet
 from kinertia.settings import Subject
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,3 +58,19 @@ class PersonContext:
             one.severity is Severity.ERROR and one.where.trial == trial and one.code.startswith(codes)
             for one in self.found
         )
+
+
+def odd_ones(first: T, other: T, witnesses: Iterable[tuple[float, float]]) -> tuple[T, ...]:
+    """Return the one that most other recordings are farther from; both if there are none, or on a tie.
+
+    Args:
+        first, other: the two that disagree.
+        witnesses: distances of every further recording from the first and from the other.
+
+    >>> odd_ones("walk 1", "walk 2", [(0.001, 0.02), (0.002, 0.015)])
+    ('walk 2',)
+    >>> odd_ones("walk 1", "walk 2", [])
+    ('walk 1', 'walk 2')
+    """
+    votes = sum((to_first > to_other) - (to_first < to_other) for to_first, to_other in witnesses)
+    return (first, other) if votes == 0 else (first,) if votes > 0 else (other,)

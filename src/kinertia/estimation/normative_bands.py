@@ -7,9 +7,8 @@ from typing import Any, Self
 import numpy as np
 
 from kinertia.errors import KinertiaError
-from kinertia.estimation.common_strides import mean_of_common
 from kinertia.estimation.cycles import spatiotemporal_columns
-from kinertia.estimation.mean_cycles import convention_of, mean_curves
+from kinertia.estimation.mean_cycles import convention_of, mean_curves, mean_of_common
 from kinertia.estimation.result import Fit
 from kinertia.motion.gait_cycle import PERCENT
 from kinertia.trial.data import FEET

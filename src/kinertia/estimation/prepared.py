@@ -40,7 +40,7 @@ class Prepared:
         left_out: names of the trials that could not be used.
         rules: number of rules checked so far.
         elbow_rotations_rad: side ("r", "l") -> rotation of the static trial's elbow axis by the trials
-            (`elbow_direction.elbow_rotations`).
+            (`joint_adaptation.elbow_rotations`).
         torso_rotation_rad: rotation of the torso under its markers that calibration would have made and that was
             prevented; None if there was none.
 

@@ -12,11 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from kinertia.estimation.common_strides import common_strides, mean_of, mean_of_common
 from kinertia.estimation.curve_source import Stage
 from kinertia.estimation.cycles import FORCES, UNITS, CycleCurve, Kind, curves_by_stage
+from kinertia.estimation.mean_cycles import common_strides, main_task, mean_of, mean_of_common
 from kinertia.estimation.result import Fit
-from kinertia.estimation.tasks import main_task
 from kinertia.io.norms_file import Norm
 from kinertia.model.shared_coordinates import opposite_on_left
 from kinertia.model.skeleton import Skeleton

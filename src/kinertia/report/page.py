@@ -11,11 +11,10 @@ import numpy as np
 
 from kinertia.estimation.forces_used import forces_used, full_bandwidth
 from kinertia.estimation.identifiability import evidence
-from kinertia.estimation.leg_moments import coverage_sentence
-from kinertia.estimation.moment_gaps import gaps_sentence
+from kinertia.estimation.leg_moments import coverage_sentence, gaps_sentence
+from kinertia.estimation.mean_cycles import fits_by_task, main_task
 from kinertia.estimation.result import Fit
 from kinertia.estimation.simultaneous.calibration_entry import SHOWN_UNIT, item_text, quantity_text
-from kinertia.estimation.tasks import fits_by_task, main_task
 from kinertia.estimation.trial_fit import TrialFit
 from kinertia.io.subject.provenance import Provenance
 from kinertia.io.versions import versions

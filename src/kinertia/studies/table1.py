@@ -24,9 +24,8 @@ from kinertia.motion.inverse_kinematics import solve_ik
 from kinertia.motion.smoothing import SmoothedSpline, smooth
 from kinertia.motion.workload import one_blas_thread
 from kinertia.studies.parallel import in_parallel
-from kinertia.synthetic.manner import Manner
 from kinertia.synthetic.noise import study_noise
-from kinertia.synthetic.walk import SyntheticTrial, consistent_trial, walk, walking_subject, without_products
+from kinertia.synthetic.walk import Manner, SyntheticTrial, consistent_trial, walk, walking_subject, without_products
 from kinertia.trial.data import Markers
 from kinertia.trial.rms import rms
 from kinertia.workflow.prepare import prepare

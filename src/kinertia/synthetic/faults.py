@@ -19,8 +19,7 @@ from kinertia.model.gait27 import HIP_OFFSETS, LUMBAR_OFFSETS, SHOULDER_OFFSETS
 from kinertia.model.skeleton import GRAVITY_M_S2, Skeleton
 from kinertia.motion.kinematics import Kinematics, solve_kinematics
 from kinertia.settings import Instruments
-from kinertia.synthetic.noise import SkinMotion, camera_noise, study_noise
-from kinertia.synthetic.skin_clusters import ClusterMotion
+from kinertia.synthetic.noise import ClusterMotion, SkinMotion, camera_noise, study_noise
 from kinertia.synthetic.walk import SyntheticTrial
 from kinertia.trial.data import LOAD_THRESHOLD_N, FootLoads, Markers, Trial
 
@@ -37,7 +36,7 @@ class Faults:
 
     Attributes:
         noise: "study" (`noise.study_noise`); or skin and 0.5 mm of camera noise: "artefact" follows the joints
-            (`noise.SkinMotion`), "clusters" the stride (`skin_clusters.ClusterMotion`), "mixed" has two thirds of the
+            (`noise.SkinMotion`), "clusters" the stride (`noise.ClusterMotion`), "mixed" has two thirds of the
             variance from the first and one third from the second.
         amplitude: factor on that noise, except the cameras'.
         calibration: joint centres, markers, plates and synchronisation have errors drawn from the estimator's own

@@ -12,8 +12,7 @@ from scipy.interpolate import make_interp_spline
 
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion
-from kinertia.synthetic.manner import Manner
-from kinertia.synthetic.walk import SyntheticSubject, SyntheticTrial, balancing_wrench, walk
+from kinertia.synthetic.walk import Manner, SyntheticSubject, SyntheticTrial, balancing_wrench, walk
 
 DURATION_S, RATE_HZ = 5.0, 100.0
 FAST_PACE = 4.0 / 3.0

@@ -5,9 +5,8 @@ from dataclasses import dataclass, replace
 
 from kinertia.diagnostics.labels.swapped_markers import labels_by_model
 from kinertia.diagnostics.runner import blocking
-from kinertia.diagnostics.subject.unobserved_segments import unobserved_segments
+from kinertia.diagnostics.subject.body_data import unobserved_segments
 from kinertia.errors import BlockedError, MarkerSetError, SettingsError, TrialError
-from kinertia.estimation.arm_rotation import with_rotating_arms
 from kinertia.estimation.calibration import (
     Adaptation,
     AdaptationInputs,
@@ -17,9 +16,13 @@ from kinertia.estimation.calibration import (
     turn_about,
     without_partly_shown,
 )
-from kinertia.estimation.elbow_direction import elbow_rotations, with_elbows_that_bend_forwards
 from kinertia.estimation.input_checks import complete_subject, known
-from kinertia.estimation.knee_excursion import show_knee_axes
+from kinertia.estimation.joint_adaptation import (
+    elbow_rotations,
+    show_knee_axes,
+    with_elbows_that_bend_forwards,
+    with_rotating_arms,
+)
 from kinertia.estimation.population import population_prior
 from kinertia.estimation.prior import literature_prior
 from kinertia.estimation.simultaneous.instruments.model_uncertainty import (

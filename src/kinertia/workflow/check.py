@@ -1,19 +1,29 @@
-"""Runs `kinertia check`: a person's recordings up to inverse kinematics, or OpenSim models alone."""
+"""Runs `kinertia check`: files grouped into persons, recordings up to inverse kinematics, or OpenSim models alone."""
 
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
 
 from kinertia.diagnostics.model import questions as model_questions
 from kinertia.diagnostics.model.model_check import ModelCheck, check_model
 from kinertia.diagnostics.person_context import PersonContext
 from kinertia.diagnostics.runner import asked, explained, overruled, rules_of
+from kinertia.errors import FileError
 from kinertia.findings.finding import Finding
 from kinertia.findings.overview import Overview
+from kinertia.findings.quantity import Quantity
+from kinertia.io.recording import FORCE_FILES, MARKER_FILES, expect_recording, read_recording
+from kinertia.io.subject.draft import STATIC_NAME, matched_by_name
+from kinertia.io.text.qualisys import is_plate_file
 from kinertia.model.imported_model import OsimModel
 from kinertia.model.marker_set import MarkerSet
 from kinertia.settings import Overrule, Subject
 from kinertia.trial.data import Recording
+from kinertia.trial.marker_quality import travel
 from kinertia.trial.trial_input import TrialInput
-from kinertia.workflow.person import Person
+from kinertia.workflow.person import Person, Unread
 from kinertia.workflow.recording import RecordingCheck
 from kinertia.workflow.screening import Screened, screen
 
@@ -117,3 +127,127 @@ def check_osim(model: OsimModel, subject: Subject, overrule: Overrule | None = N
     findings = overruled(explained(found), overrule or Overrule())
     facts = check_model(model.skeleton, model.bsp, subject.mass_kg, subject.height_m, subject.sex)
     return ModelOverview(model.path.name, facts, Overview(findings, rules_of(*model_questions.PERSON_QUESTIONS), 0))
+
+
+@dataclass(frozen=True)
+class RecordingFiles:
+    """Files of one recording."""
+
+    markers: Path
+    forces: Path | None = None
+    loads: Path | None = None
+
+
+def files_by_name(
+    files: Sequence[Path], loads: Path | None = None, forces: Path | None = None, static: Path | None = None
+) -> tuple[RecordingFiles, ...]:
+    """Group files into recordings of motions, by their names.
+
+    Args:
+        files: markers and forces.
+        loads: ExternalLoads file for the only recording with forces.
+        forces: forces of the only marker file.
+        static: the static trial, which is left out unless it is the only file, as poses may be.
+
+    Raises:
+        FileError: a file of another kind, forces without markers, or loads and forces that belong to no trial or to
+            several.
+    """
+    files = [path for path in files if path != static] or files
+    for path in files:
+        if path.is_dir():
+            raise _unpaired(path, "is a folder", "Give the files in it, or a subject file (kinertia init drafts one)")
+        if path.suffix.lower() not in (*MARKER_FILES, *FORCE_FILES):
+            expect_recording(path)
+            raise unknown_kind(path)
+    marked = [path for path in files if path.suffix.lower() in MARKER_FILES and not is_plate_file(path)]
+    beside = [path for path in files if path not in marked]
+    pairs = _matched(marked, beside)
+    alone = [path for path in beside if path not in pairs.values()]
+    if alone:
+        goes = "matches none of the marker files by name" if marked else "holds forces only"
+        raise _unpaired(alone[0], goes, f"Check it together with its markers ({', '.join(MARKER_FILES)})")
+    wanted = [RecordingFiles(path, pairs.get(path)) for path in marked]
+    if forces is not None:
+        if len(wanted) != 1 or pairs:
+            problem = f"are one trial's forces, but {len(files)} files are given"
+            raise _unpaired(forces, problem, "Give one file of markers with --forces")
+        wanted = [replace(wanted[0], forces=forces)]
+    if loads is not None:
+        having = [k for k, one in enumerate(wanted) if one.forces is not None] or list(range(len(wanted)))
+        if len(having) != 1:
+            problem = f"explains one trial's forces, but {len(having)} are given"
+            raise _unpaired(loads, problem, "Check one trial at a time")
+        wanted[having[0]] = replace(wanted[having[0]], loads=loads)
+    return tuple(wanted)
+
+
+def _unpaired(path: Path, problem: str, action: str) -> FileError:
+    return FileError.found(path, "F108", problem=Quantity(problem), action=Quantity(action))
+
+
+def trial_names(wanted: Sequence[RecordingFiles]) -> list[str]:
+    """Name recordings by their marker files, with as much of the path as distinguishes them."""
+    paths = [one.markers for one in wanted]
+    names = [[path.stem, path.name, str(path)] for path in paths]
+    times = [Counter(level) for level in zip(*names, strict=True)]
+    return [next((name for k, name in enumerate(each) if times[k][name] == 1), each[-1]) for each in names]
+
+
+def unknown_kind(path: Path) -> FileError:
+    """Return the error for a file of a kind that cannot be checked."""
+    known = ", ".join(dict.fromkeys((*MARKER_FILES, *FORCE_FILES, ".toml", ".osim")))
+    hint = "; give ExternalLoads with --loads" if path.suffix.lower() == ".xml" else ""
+    return FileError(path, f"a '{path.suffix}' file cannot be checked; expected {known}{hint}")
+
+
+def read_files(
+    wanted: Sequence[RecordingFiles],
+    stated: Person,
+    static: Path | None = None,
+    progress: Callable[[float], None] = lambda share: None,
+) -> Person:
+    """Read a person from files alone: a recording in which the person stands still is the static trial.
+
+    Args:
+        wanted: the files of each recording; the static trial may be among them.
+        stated: the person without recordings.
+        static: the static trial; found by the data if None, unless there is an OpenSim model in its place.
+        progress: called with the share of files read.
+
+    Raises:
+        KinertiaError: no recording can be read.
+    """
+    unread = Unread()
+    statics: list[Recording] = []
+    moving: list[Recording] = []
+    if static is not None:
+        wanted = [one for one in wanted if one.markers != static] or wanted
+        recording = unread.tried(partial(read_recording, static, standing=True), None)
+        statics += [] if recording is None else [recording]
+    for k, (name, one) in enumerate(zip(trial_names(wanted), wanted, strict=True)):
+        progress(k / len(wanted))
+        recording = unread.tried(partial(read_recording, one.markers, one.forces, one.loads), name)
+        if recording is not None:
+            by_data = static is None and stated.model is None
+            stands = by_data and travel(recording.markers).kind == "stands still"
+            (statics if stands else moving).append(replace(recording, name=name))
+    unread.expect_any([*statics, *moving])
+    return replace(
+        stated,
+        trials=[TrialInput(one) for one in moving],
+        static=statics[0] if len(statics) == 1 else None,
+        more_statics=statics if len(statics) > 1 else (),
+        unread=tuple(unread.findings),
+    )
+
+
+def _matched(marked: Sequence[Path], forces: Sequence[Path]) -> dict[Path, Path]:
+    """Match marker files with their forces; static trials among themselves, unless there are just two files."""
+    if len(marked) == len(forces) == 1:
+        return matched_by_name(marked, forces)
+    pairs: dict[Path, Path] = {}
+    for static in (True, False):
+        groups = [[p for p in paths if bool(STATIC_NAME.search(p.stem)) == static] for paths in (marked, forces)]
+        pairs |= matched_by_name(*groups)
+    return pairs

@@ -15,6 +15,7 @@ from kinertia.estimation.joint_curves import JointCurves
 from kinertia.estimation.prepared import Prepared, Progress
 from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.result import Fit
+from kinertia.estimation.simultaneous.calibration_entry import GAIN
 from kinertia.estimation.simultaneous.fit import Posterior, SimultaneousFit, fit_simultaneous
 from kinertia.estimation.simultaneous.instruments.model_uncertainty import ModelUncertainty
 from kinertia.estimation.simultaneous.linear_algebra.bandwidth import Bandwidth
@@ -36,8 +37,9 @@ from kinertia.trial.data import Recording
 from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow.attached import with_attached
 from kinertia.workflow.doubted_mass import at_mass_of_plates
-from kinertia.workflow.missing_loads import without_gains_of_missing_loads
 from kinertia.workflow.prepare import prepare
+
+_BEYOND_EDGE = "P282"
 
 
 @one_blas_thread
@@ -333,3 +335,20 @@ def _of_worn(k: Kinematics, errors_m: np.ndarray) -> np.ndarray:
     """Return marker errors (w, m) without the markers of a trunk that is not tracked."""
     virtual = np.array([label in {marker.label for marker in VIRTUAL_TRUNK} for label in k.ik.labels])
     return np.where(virtual, np.nan, errors_m)
+
+
+def without_gains_of_missing_loads(ready: Prepared, fitted: SimultaneousFit) -> Prepared | None:
+    """Return the person with incomplete plates: of their contacts, part of the load is missing.
+
+    A plate is incomplete where the estimate shows it, or where a foot extends beyond its edge and it seems to read too
+    little. None if there is none.
+    """
+    beyond = {one.where.plate for one in ready.findings if one.code == _BEYOND_EDGE}
+    light = {
+        one.plate for one in fitted.posterior.instrument_errors if one.quantity == GAIN and one.found and one.value < 0
+    }
+    incomplete = {one.plate for one in fitted.posterior.missing_loads} | {name for name in beyond & light if name}
+    if not incomplete:
+        return None
+    instruments = replace(ready.uncertainty.instruments, incomplete=frozenset(incomplete))
+    return replace(ready, uncertainty=replace(ready.uncertainty, instruments=instruments))

@@ -10,7 +10,7 @@ import numpy as np
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.copied_frames import without_copied_frames
 from kinertia.diagnostics.model.range_limits import range_findings
-from kinertia.diagnostics.subject.task import task_of
+from kinertia.diagnostics.subject.movements import task_of
 from kinertia.errors import SettingsError, TrialError
 from kinertia.estimation.prepared import Progress
 from kinertia.findings.finding import Finding

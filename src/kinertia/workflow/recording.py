@@ -7,9 +7,8 @@ from typing import Self
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.labels.marker_set_match import MarkerSetMatch, match_labels
 from kinertia.diagnostics.plates.plate_summary import PlateCheck, check_plates
-from kinertia.diagnostics.subject.movements import InformativeMovements
+from kinertia.diagnostics.subject.movements import InformativeMovements, task_of
 from kinertia.diagnostics.subject.stance_coverage import coverage_of
-from kinertia.diagnostics.subject.task import task_of
 from kinertia.findings.finding import Finding
 from kinertia.model.marker_set import MarkerSet
 from kinertia.trial.data import Recording

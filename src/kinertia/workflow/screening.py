@@ -38,9 +38,8 @@ from kinertia.model.alignment_device import with_alignment_device
 from kinertia.settings import Subject
 from kinertia.trial.data import Recording
 from kinertia.workflow.joint_widths import with_widths
-from kinertia.workflow.label_spelling import with_model_spelling
 from kinertia.workflow.person import Person
-from kinertia.workflow.upright_static import with_upright_static
+from kinertia.workflow.recording_corrections import with_model_spelling, with_upright_static
 
 STATIC_QUESTIONS: tuple[Question[RecordingContext], ...] = (
     *markers.STATIC_QUESTIONS,

@@ -2,8 +2,7 @@
 
 import pytest
 
-from kinertia.cli.measured_demo import write_measured_lab
-from kinertia.cli.synthetic_demo import write_synthetic_lab
+from kinertia.cli.demo import write_measured_lab, write_synthetic_lab
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ pytest.importorskip("starlette", reason="needs the extra app (pip install -e '.[
 pytest.importorskip("uvicorn", reason="needs the extra app (pip install -e '.[test]')")
 from app_tab import Tab, ready, with_everything
 from chromium import DESKTOP, PATIENCE_MS, PHONE, VIOLATIONS, picture, playwright
-from kinertia.cli.web import work
+from kinertia.cli.web import jobs
 from kinertia.io.subject.measures_file import measures_sheet
 from kinertia.io.subject.reader import read_subject
 
@@ -31,7 +31,7 @@ def press(page, name, key="Enter", most=60):
 
 
 def test_everything_is_reached_by_the_keyboard_alone(browser, app, monkeypatch, c3d_lab):
-    monkeypatch.setattr(work, "WORKER", (sys.executable, "-c", "pass"))
+    monkeypatch.setattr(jobs, "WORKER", (sys.executable, "-c", "pass"))
     person = with_everything(app.library, "Keyboard", c3d_lab)
     tab = Tab(browser, app).home()
     page = tab.page
@@ -56,7 +56,7 @@ def test_everything_is_reached_by_the_keyboard_alone(browser, app, monkeypatch, 
 
 
 def test_rows_of_the_form_are_filled_in_by_the_keyboard_alone(browser, app, monkeypatch, c3d_lab):
-    monkeypatch.setattr(work, "WORKER", (sys.executable, "-c", "pass"))
+    monkeypatch.setattr(jobs, "WORKER", (sys.executable, "-c", "pass"))
     person = ready(app.library, "Rows by keyboard", c3d_lab)
     (person.folder / "measures.csv").write_text(measures_sheet(), encoding="utf-8")
     tab = Tab(browser, app)

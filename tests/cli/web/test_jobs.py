@@ -10,7 +10,6 @@ import pytest
 pytest.importorskip("starlette", reason="needs the extra app (pip install -e '.[test]')")
 
 from kinertia.cli.web import jobs as jobs_module
-from kinertia.cli.web import work as module
 from kinertia.cli.web.jobs import Jobs
 from kinertia.cli.web.library import Library, PersonFolder
 from kinertia.cli.web.person_page import progress
@@ -33,7 +32,7 @@ def worker(monkeypatch):
             "import json, pathlib, sys, time, os\nfolder = pathlib.Path(sys.argv[-1])\n"
             "def say(**told): print(json.dumps(told), flush=True)\n"
         )
-        monkeypatch.setattr(module, "WORKER", (sys.executable, "-c", lead + program))
+        monkeypatch.setattr(jobs_module, "WORKER", (sys.executable, "-c", lead + program))
 
     return replace
 
@@ -196,8 +195,8 @@ def test_a_fit_that_was_asked_for_meanwhile_begins_when_all_is_compiled(library,
 
 def test_the_time_left_falls_until_the_next_share_is_told(monkeypatch):
     now = [0.0]
-    monkeypatch.setattr(module.time, "monotonic", lambda: now[0])
-    work = module.Work()
+    monkeypatch.setattr(jobs_module.time, "monotonic", lambda: now[0])
+    work = jobs_module.Work()
     work._moved("compiling, once", 0.0)
     assert work.seconds_left() is None
     now[0] = 8.0

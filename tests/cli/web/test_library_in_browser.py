@@ -12,7 +12,7 @@ pytest.importorskip("uvicorn", reason="needs the extra app (pip install -e '.[te
 from app_server import running
 from app_tab import Tab, ready, with_everything
 from chromium import DESKTOP, PHONE, playwright
-from kinertia.cli.web import work
+from kinertia.cli.web import jobs
 
 WAITING = "import json, sys, time\nprint(json.dumps({'stage': 'estimate', 'share': 0.3}), flush=True)\ntime.sleep(90)"
 """A fit that is not done before it is cancelled."""
@@ -23,7 +23,7 @@ pytestmark = pytest.mark.slow
 @pytest.fixture
 def waiting(monkeypatch, app, c3d_lab):
     """A person whose fit does not end by itself."""
-    monkeypatch.setattr(work, "WORKER", (sys.executable, "-c", WAITING))
+    monkeypatch.setattr(jobs, "WORKER", (sys.executable, "-c", WAITING))
     return ready(app.library, "Waiting", c3d_lab)
 
 
@@ -54,7 +54,7 @@ def test_a_fit_that_ends_repeats_no_form(browser, app, monkeypatch, tmp_path, c3
     """A tab that shows the answer to a form shows the person's page when the fit is done."""
     go = tmp_path / "go"
     code = f"import os, time\nwhile not os.path.exists({str(go)!r}): time.sleep(0.05)"
-    monkeypatch.setattr(work, "WORKER", (sys.executable, "-c", code))
+    monkeypatch.setattr(jobs, "WORKER", (sys.executable, "-c", code))
     person = ready(app.library, "Copied", c3d_lab)
     person.results.mkdir()
     (person.results / "fit.json").write_text('{"kinertia": "x"}')
@@ -79,7 +79,7 @@ def test_a_fit_that_ends_repeats_no_form(browser, app, monkeypatch, tmp_path, c3
 
 def test_a_crash_of_one_fit_is_said_and_the_next_one_is_done(browser, app, monkeypatch, c3d_lab):
     crash = "import os, sys\nif 'Crashing' in sys.argv[2]: os.abort()"
-    monkeypatch.setattr(work, "WORKER", (sys.executable, "-c", crash))
+    monkeypatch.setattr(jobs, "WORKER", (sys.executable, "-c", crash))
     tab = Tab(browser, app)
     for name, said in (("Crashing", "Internal error of Kinertia"), ("Next", "")):
         tab.page.goto(f"{app.address}people/{ready(app.library, name, c3d_lab).name}")

@@ -12,8 +12,7 @@ pytest.importorskip("starlette", reason="needs the extra app (pip install -e '.[
 pytest.importorskip("uvicorn", reason="needs the extra app (pip install -e '.[test]')")
 
 from app_server import running
-from kinertia.cli.measured_demo import write_measured_lab
-from kinertia.cli.synthetic_demo import write_synthetic_lab
+from kinertia.cli.demo import write_measured_lab, write_synthetic_lab
 from kinertia.cli.web import routes
 from kinertia.cli.web.jobs import Jobs
 from kinertia.errors import internal_error

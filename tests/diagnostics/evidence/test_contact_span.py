@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from kinertia.diagnostics.markers.frames import frames
-from kinertia.diagnostics.markers.trajectories import trajectories
-from kinertia.diagnostics.markers.visibility import visible
+from kinertia.diagnostics.markers.trajectories import trajectories, visible
 from kinertia.model.marker_set import MarkerSet
 from kinertia.trial.data import Markers
 from kinertia.trial.plate_assignment import build_trial

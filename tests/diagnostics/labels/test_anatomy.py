@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from kinertia.diagnostics.labels.anatomy import anatomy
-from kinertia.diagnostics.labels.heading import direction_of_travel, heading
+from kinertia.diagnostics.labels.anatomy import anatomy, direction_of_travel, heading
 from kinertia.diagnostics.markers.axes_and_floor import unit_and_vertical
 from kinertia.findings.finding import Severity
 from kinertia.io.marker_set_file import choose_marker_set

@@ -7,7 +7,7 @@ import pytest
 
 from kinertia.diagnostics.evidence.copied_frames import without_copied_frames
 from kinertia.diagnostics.markers.frames import frames
-from kinertia.diagnostics.markers.precision import precision
+from kinertia.diagnostics.markers.trajectories import precision
 from kinertia.findings.finding import Severity
 from marker_contexts import context_of
 from recordings import RUNS, WALKS, named_here

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from kinertia.diagnostics.markers.visibility import visible
+from kinertia.diagnostics.markers.trajectories import visible
 from kinertia.io.marker_set_file import read_marker_set
 from kinertia.model.marker_set import MarkerSet
 from kinertia.trial.data import Markers

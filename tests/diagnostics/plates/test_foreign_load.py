@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinertia.diagnostics.plates.foreign_load import foreign_load, stray_loads
 from kinertia.diagnostics.plates.gains import gains
+from kinertia.diagnostics.plates.ground_contact import foreign_load, stray_loads
 from kinertia.diagnostics.runner import explained
 from kinertia.findings.finding import Severity
 from kinertia.trial.sampled_time import runs, within

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinertia.diagnostics.plates.cop_on_plate import cop_on_plate
+from kinertia.diagnostics.plates.cop_path import cop_on_plate
 from kinertia.diagnostics.plates.ground_contact import complete_contact, plate_edges
 from kinertia.findings.finding import Severity
 from kinertia.model.marker_set import MarkerSet

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfiltfilt
 
-from kinertia.diagnostics.plates.quantisation import quantisation
-from kinertia.diagnostics.plates.signals import signals
+from kinertia.diagnostics.plates.signals import quantisation, signals
 from kinertia.trial.data import PlateLoads
 from kinertia.trial.plate_loading import ringing_s, without_unloaded_level
 from plate_findings import plates_alone

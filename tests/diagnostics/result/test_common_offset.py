@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from kinertia.diagnostics.result.common_offset import common_offset
+from kinertia.diagnostics.result.plate_errors import common_offset
 from kinertia.estimation.simultaneous.instruments.priors import InstrumentInformation, InstrumentPrior
 from kinertia.settings import Instruments
 from results import codes, context

@@ -5,8 +5,7 @@ from dataclasses import replace
 import pytest
 
 from kinertia.diagnostics.result.corrections import delays, zero_offsets
-from kinertia.diagnostics.result.free_moments import free_moments
-from kinertia.diagnostics.result.plate_positions import plate_positions
+from kinertia.diagnostics.result.plate_errors import free_moments, plate_positions
 from kinertia.diagnostics.runner import explained
 from kinertia.estimation.simultaneous.uncertainty.model_evidence import FreeMomentSign
 from kinertia.findings.finding import Severity

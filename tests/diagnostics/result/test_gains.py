@@ -2,7 +2,7 @@
 
 import pytest
 
-from kinertia.diagnostics.result.gains import gains
+from kinertia.diagnostics.result.plate_errors import gains
 from kinertia.diagnostics.runner import explained
 from kinertia.findings.finding import Severity
 from results import codes, context, error

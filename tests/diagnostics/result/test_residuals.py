@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from kinertia.diagnostics.result.context import ResultContext
-from kinertia.diagnostics.result.joint_angles import joint_angles
-from kinertia.diagnostics.result.residuals import residuals
+from kinertia.diagnostics.result.residuals import joint_angles, residuals
 from kinertia.model.coordinate_range import Range
 
 FRAMES = 50

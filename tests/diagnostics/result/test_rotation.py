@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinertia.diagnostics.result.rotation import plate_rotation
-from kinertia.diagnostics.result.smallest_detectable import smallest_detectable
+from kinertia.diagnostics.result.plate_errors import plate_rotation, smallest_detectable
 from kinertia.estimation.simultaneous.instruments.priors import FLOOR_PRIOR, InstrumentInformation, InstrumentPrior
 from kinertia.findings.finding import Severity
 from results import codes, context, error

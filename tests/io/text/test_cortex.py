@@ -9,7 +9,7 @@ from kinertia.io.subject.draft import has_force_columns
 from kinertia.io.text.cortex import read_cortex_forces
 from kinertia.io.text.trc import write_trc
 from kinertia.trial.data import Markers
-from kinertia.workflow.files import files_by_name
+from kinertia.workflow.check import files_by_name
 from refusals import codes, only, refused
 
 COLUMNS = [f"{name}{plate}" for plate in (1, 2) for name in ("FX", "FY", "FZ", "X", "Y", "Z", "MZ")]

@@ -5,7 +5,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from kinertia.cli.web.field import Field, choices_of
 from kinertia.cli.web.file_table import (
     Content,
     file_table,
@@ -17,7 +16,7 @@ from kinertia.cli.web.file_table import (
     within_folder,
 )
 from kinertia.cli.web.library import SUBJECT, PersonFolder
-from kinertia.cli.web.rows import with_rows
+from kinertia.cli.web.rows import Field, choices_of, with_rows
 from kinertia.errors import KinertiaError, SettingsError
 from kinertia.io.marker_set_file import preset_names
 from kinertia.io.results.output_folder import write_then_rename

@@ -15,8 +15,8 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, HTMLResponse, RedirectResponse, Response, StreamingResponse
 
 from kinertia.cli.web.guard import RESULT_POLICY
+from kinertia.cli.web.jobs import Work
 from kinertia.cli.web.library import PersonFolder
-from kinertia.cli.web.work import Work
 from kinertia.errors import FileError
 from kinertia.io.versions import VERSION
 from kinertia.report.rendering import templates_of

@@ -18,7 +18,7 @@ from kinertia.cli.web.entries import recognise, trouble, write_form, write_text
 from kinertia.cli.web.guard import RESULT_POLICY
 from kinertia.cli.web.jobs import KINDS, Jobs
 from kinertia.cli.web.library import Library, PersonFolder
-from kinertia.cli.web.marker_routes import marker_routes
+from kinertia.cli.web.marker_page import marker_routes
 from kinertia.cli.web.person_page import person_page, progress, standing
 from kinertia.cli.web.responses import archive, chosen_folder, expect, form, page, result_file, time_left, to
 from kinertia.cli.web.uploads import ENDINGS, LIMITS, receive

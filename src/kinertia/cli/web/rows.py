@@ -6,9 +6,8 @@ Rows are written as typed, numbers as numbers; `read_subject` reports what is wr
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal, get_args, get_origin
 
-from kinertia.cli.web.field import Field
 from kinertia.cli.web.file_table import Content
 from kinertia.errors import SettingsError
 from kinertia.settings import Attached, KnownSegment, Table, number_of
@@ -38,6 +37,33 @@ _LONGEST_NUMBER = 4
 _THREE = ("com_mm", "size_mm")
 _BETWEEN = re.compile(r"\s*;\s*|,?\s+")
 _DECIMAL_COMMA = re.compile(r"(?<=\d),(?=\d)")
+
+
+@dataclass(frozen=True)
+class Field:
+    """One entry of the form.
+
+    Attributes:
+        key: its name in the form.
+        label, about: description, short and long.
+        value: value as the field shows it.
+        choices: choices of a field that is not a number or text.
+        optional: whether most people leave it empty.
+    """
+
+    key: str
+    label: str
+    about: str
+    value: str
+    choices: tuple[str, ...]
+    optional: bool
+
+
+def choices_of(annotation: object) -> tuple[str, ...]:
+    """Return the possible values of an entry where they are a list."""
+    if get_origin(annotation) is Literal:
+        return get_args(annotation)
+    return next((found for part in get_args(annotation) if (found := choices_of(part))), ())
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""L20: do the labels make a body? Left and right, front and back, lateral and medial of a person, by the markers alone.
+"""L106, L20 and S311: do the labels make a body that faces and walks one way? Left, right, front, back, lateral.
 
 The heading is known from the feet and the pelvis, whatever their sides; then every pair of landmarks shows whether its
 right one is on the right, and every joint whether its lateral landmark is outside. What is already explained by a swap
@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.evidence.landmarks import CLEAR, cosine, horizontal, unit
+from kinertia.diagnostics.evidence.landmarks import CLEAR, cosine, horizontal, most_forwards, unit
 from kinertia.findings.finding import Finding, Severity, finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.model.marker_set import MarkerSet, in_words
@@ -28,6 +28,7 @@ _BENT = 0.35
 _PAIRS = ("asis", "psis", "knee_lateral", "ankle_lateral", "heel", "metatarsal", "acromion")
 _STANDING_PAIRS = ("knee_medial", "ankle_medial", "toe")
 """Legs that move may cross."""
+_ASIS = ("asis_r", "asis_l")
 
 
 @dataclass(frozen=True, eq=False)
@@ -289,3 +290,36 @@ def _elbows(body: _Body, right: FloatArray) -> Iterator[Finding]:
 
 def _other_way_round(body: _Body, joint: str, names: tuple[str, ...] | list[str], outwards: float) -> Finding:
     return body.found("L208", *names, cosine=Quantity(outwards, "1", limit=-CLEAR), joint=Quantity(in_words(joint)))
+
+
+def heading(context: RecordingContext) -> Iterator[Finding]:
+    """Report L106: the sides of the pelvis are absent, or never visible together."""
+    if context.marker_set is None or not context.marker_set.landmarks:
+        return
+    places = context.landmark_positions
+    if set(_ASIS) <= set(places) and np.isfinite(places["asis_r"] - places["asis_l"]).all(axis=1).any():
+        return
+    labels = tuple(label for name in _ASIS for label in context.marker_set.landmarks.get(name, ()))
+    absent = [label for label in labels if label not in context.all_markers.labels]
+    yield finding(
+        "L106",
+        context.at(markers=labels),
+        absent=Quantity(float(len(absent)), "1"),
+    )
+
+
+def direction_of_travel(context: RecordingContext) -> Iterator[Finding]:
+    """Report S311: the person walks where neither feet nor pelvis point.
+
+    Where no markers show the front of either, the sides of the pelvis decide, whose labels may be swapped as well.
+    """
+    if context.marker_set is None or not context.marker_set.landmarks:
+        return
+    places, forwards = context.landmark_positions, context.most_forwards
+    causes: tuple[str, ...] = ("walking backwards",)
+    if not context.headings and set(_ASIS) <= set(places):
+        across = {"pelvis": np.cross([0.0, 1.0, 0.0], places["asis_r"] - places["asis_l"])}
+        forwards = most_forwards(context.all_markers, across)
+        causes = ("walking backwards", "swapped left and right labels")
+    if forwards < -CLEAR:
+        yield finding("S311", context.at(), causes=causes, cosine=Quantity(forwards, "1", limit=-CLEAR))

@@ -1,8 +1,7 @@
 """Lists the questions about the labels of one recording."""
 
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.labels.anatomy import anatomy
-from kinertia.diagnostics.labels.heading import direction_of_travel, heading
+from kinertia.diagnostics.labels.anatomy import anatomy, direction_of_travel, heading
 from kinertia.diagnostics.labels.landmarks import landmarks
 from kinertia.diagnostics.labels.marker_set_match import labels_match
 from kinertia.diagnostics.labels.segment_rigidity import rigidity

@@ -4,9 +4,7 @@ from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.markers.axes_and_floor import floor_slope, unit_and_vertical
 from kinertia.diagnostics.markers.computed_markers import computed_markers
 from kinertia.diagnostics.markers.frames import frames
-from kinertia.diagnostics.markers.precision import precision
-from kinertia.diagnostics.markers.trajectories import trajectories
-from kinertia.diagnostics.markers.visibility import visible
+from kinertia.diagnostics.markers.trajectories import precision, trajectories, visible
 from kinertia.diagnostics.runner import Question
 
 _SIZE = "M141"

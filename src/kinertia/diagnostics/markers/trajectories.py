@@ -1,10 +1,11 @@
-"""M11: are single trajectories intact? Spikes, jumps, frozen markers, filled gaps, and one marker with two labels."""
+"""M10, M11 and M13: is each trajectory visible, intact and precise? Gaps, jumps, frozen, rounded and noisy markers."""
 
 from collections.abc import Iterator
 
 import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
+from kinertia.diagnostics.evidence.marker_precision import COARSE_M, USUAL_NOISE_M, USUAL_ROUNDING_M
 from kinertia.diagnostics.evidence.trajectory_faults import (
     BODY_M,
     MOST_SPIKES,
@@ -15,10 +16,17 @@ from kinertia.diagnostics.evidence.trajectory_faults import (
 )
 from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.quantity import Quantity
+from kinertia.model.marker_set import in_words
+from kinertia.motion.kinematics import LONGEST_BRIDGE_S
+from kinertia.trial.data import Markers
+from kinertia.trial.marker_quality import visibility
 from kinertia.trial.sampled_time import windows
 
 _COINCIDING_M, _COINCIDING_S, _MOSTLY = 0.003, 0.1, 0.5
 """The centres of two markers are at least a diameter apart: 4 mm for the smallest."""
+_RARE = 0.5
+_DISPENSABLE = ("upper_arm", "forearm")
+"""Arms need not be seen."""
 
 
 def trajectories(context: RecordingContext) -> Iterator[Finding]:
@@ -73,3 +81,56 @@ def _coinciding(context: RecordingContext) -> Iterator[Finding]:
                     Severity.ERROR if same.sum() > _MOSTLY * np.isfinite(apart).sum() else None,
                     distance_m=Quantity(float(np.median(apart[same])), "m", limit=_COINCIDING_M),
                 )
+
+
+def visible(context: RecordingContext) -> Iterator[Finding]:
+    """Report M101 to M104: one finding per marker (M102 and M103 over the measured window), M104 one per bare
+    segment."""
+    for one in visibility(context.markers):
+        if one.share == 0.0:
+            yield finding("M101", context.at(markers=(one.label,)), share=Quantity(0.0, "1"))
+    for one in visibility(_in_window(context)):
+        where = context.at(markers=(one.label,))
+        if 0.0 < one.share < _RARE:
+            yield finding("M102", where, share=Quantity(one.share, "1", limit=_RARE))
+        elif one.share > 0.0 and one.longest_gap_s > LONGEST_BRIDGE_S:
+            yield finding("M103", where, gap_s=Quantity(one.longest_gap_s, "s", limit=LONGEST_BRIDGE_S))
+    yield from _bare_segments(context)
+
+
+def _in_window(context: RecordingContext) -> Markers:
+    """Return the frames that a fit would use; those around loads on plates where they are unknown."""
+    windows = () if context.trial is None else context.trial.windows()
+    return context.markers.cut(*windows[0]) if windows else context.measured_markers
+
+
+def _bare_segments(context: RecordingContext) -> Iterator[Finding]:
+    """Report M104: pelvis, legs, feet without markers, the trunk if the static trial shows it; of an OpenSim model,
+    feet."""
+    marker_set = context.marker_set
+    if marker_set is None:
+        return
+    trunk = set(marker_set.segments.get("torso", ()))
+    markers = context.measured_markers
+    seen = {label for label, shown in zip(markers.labels, markers.seen.T, strict=True) if shown.any()}
+    trunk_known = context.static is not None and trunk & context.static.seen_labels
+    for segment, labels in marker_set.segments.items():
+        if marker_set.landmarks:
+            needed = bool(labels) and not segment.startswith(_DISPENSABLE) and (segment != "torso" or trunk_known)
+        else:
+            needed = segment in ("foot_r", "foot_l")
+        if needed and not set(labels) & seen:
+            expected = ", ".join(labels) or "markers of the model"
+            count = Quantity(float(len(labels)), "1")
+            yield finding("M104", context.at(part=in_words(segment)), expected=count, labels=Quantity(expected))
+
+
+def precision(context: RecordingContext) -> Iterator[Finding]:
+    """Report M131 and M132: coarsely rounded coordinates, and noisy ones."""
+    precise = context.marker_precision
+    if precise.rounded:
+        step = Quantity(precise.step_m, "m", limit=COARSE_M, usual=USUAL_ROUNDING_M)
+        yield finding("M131", context.at(), step_m=step)
+    if precise.noisy:
+        noise = Quantity(precise.noise_m, "m", limit=precise.noise_limit_m, usual=USUAL_NOISE_M)
+        yield finding("M132", context.at(), noise_m=noise)

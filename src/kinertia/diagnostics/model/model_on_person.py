@@ -1,4 +1,4 @@
-"""Does an OpenSim model belong to the person in the trials, with its markers where they are on the person?
+"""Does an OpenSim model belong to the person in the trials, with the markers and bodies that a fit needs?
 
 A fit that lets markers and joint centres move (`calibrate`) makes nearly any model fit the markers: its errors go
 unnoticed into joint centres and segment lengths, and so into joint moments. Therefore the markers of the model in its
@@ -117,3 +117,27 @@ def _mirror_ratio(model: FloatArray, person: FloatArray) -> float:
     turned = squares - 2.0 * (values[:, 0] + values[:, 1] + sign * values[:, 2])
     mirrored = squares - 2.0 * (values[:, 0] + values[:, 1] - sign * values[:, 2])
     return float(np.median(np.sqrt(np.maximum(turned, 0.0) / np.maximum(mirrored, 1e-12))))
+
+
+def markers_and_feet(context: PersonContext) -> Iterator[Finding]:
+    """Report O106 and O107: a model without markers, which only a fit needs (O106), or without a body of a foot
+    (O107)."""
+    model = context.model
+    if model is None:
+        return
+    if not model.skeleton.markers:
+        yield finding("O106", None, Severity.ERROR if context.has_trials else Severity.INFO, count=Quantity(0, "1"))
+    for side, foot in (("r", "right foot"), ("l", "left foot")):
+        if context.has_trials and not any(segment_of(body) == f"foot_{side}" for body in model.skeleton.segments):
+            yield finding("O107", Where(part=foot), expected=Quantity(f"calcn_{side} or foot_{side}"))
+
+
+def unmatched_markers(context: PersonContext) -> Iterator[Finding]:
+    """Report O414: markers of a trial that the model does not have."""
+    if context.model is None:
+        return
+    known = set(context.model.skeleton.labels)
+    for trial in context.trials:
+        unknown = tuple(label for label in trial.all_markers.labels if label not in known)
+        if unknown:
+            yield finding("O414", Where(trial=trial.name, markers=unknown), source=Quantity("trial"))

@@ -1,25 +1,21 @@
 """Lists the questions about OpenSim models, alone or with the trials of a person."""
 
+from kinertia.diagnostics.model.joint_frames import mirrored_joints, subtalar_axis
 from kinertia.diagnostics.model.length_unit import length_unit
 from kinertia.diagnostics.model.mass_properties import (
+    arms_in_torso,
+    compared_with_tables,
     degenerate_inertia,
     impossible_inertia,
     inertia_size,
     mass_unit,
     missing_inertia,
-)
-from kinertia.diagnostics.model.mirrored_joints import mirrored_joints
-from kinertia.diagnostics.model.missing_parts import markers_and_feet, unmatched_markers
-from kinertia.diagnostics.model.model_on_person import model_and_trials
-from kinertia.diagnostics.model.plausible_masses import (
-    arms_in_torso,
-    compared_with_tables,
     model_mass,
     placeholders,
     sides,
     unlike_tables,
 )
-from kinertia.diagnostics.model.subtalar_axis import subtalar_axis
+from kinertia.diagnostics.model.model_on_person import markers_and_feet, model_and_trials, unmatched_markers
 from kinertia.diagnostics.person_context import PersonContext
 from kinertia.diagnostics.runner import Question
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.evidence.loaded_plates import loaded_wrenches
+from kinertia.diagnostics.evidence.force_mass import loaded_wrenches
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.trial.centre_of_pressure import free_moment

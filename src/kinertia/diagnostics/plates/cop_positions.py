@@ -18,11 +18,9 @@ from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.contact_fit import Hypothesis
 from kinertia.diagnostics.evidence.plate_contacts import FAR_M, PlateContact, displaced
 from kinertia.diagnostics.evidence.vertical_acceleration import LARGEST_RESIDUAL, vertical_match_of
-from kinertia.diagnostics.plates.heel_landing import goes_forwards, heel_steps, one_foot_loads, shows_feet_equally
-from kinertia.diagnostics.plates.interchanged_plates import interchanged_plates
-from kinertia.diagnostics.plates.rotated_plates import rotated_plates
-from kinertia.diagnostics.timing.contact_delays import contact_delays, stance_durations
-from kinertia.diagnostics.timing.rate_and_delay import fitted_rate_or_delay
+from kinertia.diagnostics.plates.cop_path import goes_forwards, heel_steps, one_foot_loads, shows_feet_equally
+from kinertia.diagnostics.plates.plate_positions import interchanged_plates, rotated_plates
+from kinertia.diagnostics.timing.contact_delays import contact_delays, fitted_rate_or_delay, stance_durations
 from kinertia.findings.finding import Finding, Severity, finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.rule import rule

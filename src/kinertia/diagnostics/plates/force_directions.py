@@ -13,8 +13,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.evidence.braking import push_share
-from kinertia.diagnostics.evidence.horizontal_velocity import LEAST_CHANGE_M_S, ForceVelocity, VelocityChanges
+from kinertia.diagnostics.evidence.horizontal_velocity import (
+    LEAST_CHANGE_M_S,
+    ForceVelocity,
+    VelocityChanges,
+    push_share,
+)
 from kinertia.diagnostics.evidence.horizontal_velocity_residual import (
     CLEARLY_BEST,
     DISTINGUISHABLE,

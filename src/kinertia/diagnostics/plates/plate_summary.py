@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 
-from kinertia.diagnostics.plates.cop_on_plate import off_plate
+from kinertia.diagnostics.plates.cop_path import off_plate
 from kinertia.trial.data import FEET, BoolArray, FloatArray, Recording
 from kinertia.trial.ground_contact import FootMarkers, bridged
 from kinertia.trial.plate_assignment import SHORTEST_CONTACT_S, assign_plates

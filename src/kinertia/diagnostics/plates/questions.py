@@ -6,24 +6,24 @@ Plates, rates and delays compete as explanations.
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.markers.over_smoothed import over_smoothed
 from kinertia.diagnostics.plates.axes_and_units import axes_and_units
-from kinertia.diagnostics.plates.cop_on_plate import cop_on_plate
+from kinertia.diagnostics.plates.cop_path import cop_on_plate, cop_progression
 from kinertia.diagnostics.plates.cop_positions import loads_and_feet
-from kinertia.diagnostics.plates.cop_progression import cop_progression
 from kinertia.diagnostics.plates.force_directions import force_directions, vertical_signs
-from kinertia.diagnostics.plates.foreign_load import foreign_load, stray_loads
-from kinertia.diagnostics.plates.free_moments import free_moments
+from kinertia.diagnostics.plates.free_moments import free_moments, vertical_moment
 from kinertia.diagnostics.plates.gains import gains
-from kinertia.diagnostics.plates.ground_contact import both_feet, complete_contact, plate_edges
-from kinertia.diagnostics.plates.mains_interference import mains_interference
-from kinertia.diagnostics.plates.quantisation import quantisation
+from kinertia.diagnostics.plates.ground_contact import (
+    both_feet,
+    complete_contact,
+    foreign_load,
+    plate_edges,
+    stray_loads,
+)
 from kinertia.diagnostics.plates.repeated_plates import repeated_plates
-from kinertia.diagnostics.plates.signals import dead_moments, signals, spikes
-from kinertia.diagnostics.plates.vertical_moment import vertical_moment
-from kinertia.diagnostics.plates.zeros import unloaded_levels, zeros
-from kinertia.diagnostics.plates.zeros_under_load import zeros_under_load
+from kinertia.diagnostics.plates.signals import dead_moments, mains_interference, quantisation, signals, spikes
+from kinertia.diagnostics.plates.zeros import unloaded_levels, zeros, zeros_under_load
 from kinertia.diagnostics.runner import Question
+from kinertia.diagnostics.timing.delays import plate_delay
 from kinertia.diagnostics.timing.force_rate import force_rate
-from kinertia.diagnostics.timing.plate_delay import plate_delay
 
 _NOT_UNDER_FEET = ("P201", "P202", "P203", "P204", "P24", "T20", "T21")
 """ERRORs after which it is not known where on a foot a load acts."""

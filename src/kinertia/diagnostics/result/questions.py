@@ -1,17 +1,19 @@
 """Lists the questions about an estimate, and about a result."""
 
 from kinertia.diagnostics.result.basis import basis, filters
-from kinertia.diagnostics.result.common_offset import common_offset
 from kinertia.diagnostics.result.context import ResultContext
 from kinertia.diagnostics.result.corrections import delays, zero_offsets
-from kinertia.diagnostics.result.free_moments import free_moments
-from kinertia.diagnostics.result.gains import gains, missing_loads
-from kinertia.diagnostics.result.joint_angles import joint_angles
 from kinertia.diagnostics.result.marker_errors import corrected_joints, moved_markers
 from kinertia.diagnostics.result.masses import attached_items, forces_of_the_motion, total_mass
-from kinertia.diagnostics.result.plate_positions import plate_positions
-from kinertia.diagnostics.result.residuals import residuals
-from kinertia.diagnostics.result.rotation import plate_rotation
+from kinertia.diagnostics.result.plate_errors import (
+    common_offset,
+    free_moments,
+    gains,
+    missing_loads,
+    plate_positions,
+    plate_rotation,
+)
+from kinertia.diagnostics.result.residuals import joint_angles, residuals
 from kinertia.diagnostics.result.sideways_lean import sideways_lean
 from kinertia.diagnostics.result.soundness import soundness
 from kinertia.diagnostics.runner import Question, asked

@@ -1,4 +1,4 @@
-"""R30, may the result be used? Residuals and markers by OpenSim's guideline; these thresholds are defined here only.
+"""R30, may the result be used? Residuals and markers by OpenSim's guideline, and joint angles by ranges of motion.
 
 The guideline for residual reduction ("Simulation with OpenSim - Best Practices" and Hicks et al. 2015, J Biomech Eng
 137:020905) also wants the peak force below 5 % of the largest external force. OpenSim judges each axis on its own; here
@@ -18,8 +18,14 @@ from kinertia.findings.finding import Finding, Severity, finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.model.anatomy import segment_of
+from kinertia.model.coordinate_range import TOLERANCE_DEG, UNKNOWN
 from kinertia.model.neutral_joints import centre_offsets
 from kinertia.trial.rms import rms, rms_by_marker
+
+_IMPOSSIBLE_RAD = float(np.radians(TOLERANCE_DEG))
+"""Excess beyond the range of any person."""
+_SURE = 2.0
+"""SDs of an estimated angle."""
 
 
 class Guideline(NamedTuple):
@@ -125,3 +131,28 @@ def _markers(context: ResultContext, trial: TrialFit) -> Iterator[Finding]:
         angles=Quantity(far),
         advice=Quantity(advice[0].upper() + advice[1:]),
     )
+
+
+def joint_angles(context: ResultContext) -> Iterator[Finding]:
+    """Report R305: every coordinate that leaves its range in a trial, with its most extreme angle.
+
+    Angles beyond the range by less than two of their own SDs are not reported.
+    """
+    for trial in context.fit.trials:
+        for column, name in enumerate(trial.kinematics.ik.coordinates):
+            known = trial.skeleton.ranges.get(name, UNKNOWN).anatomical(name)
+            if known is None:
+                continue
+            low, high = known.of_anybody
+            angles = trial.motion.q[:, column]
+            beyond = np.maximum(low - angles, angles - high)
+            worst = int(np.argmax(beyond))
+            sd = 0.0 if trial.deviations is None else float(trial.deviations.coordinates[worst, column])
+            if beyond[worst] > min(_SURE * sd, _IMPOSSIBLE_RAD):
+                yield finding(
+                    "R305",
+                    Where(trial=trial.name, part=name),
+                    Severity.ERROR if beyond[worst] > _IMPOSSIBLE_RAD else None,
+                    angle_rad=Quantity(float(angles[worst]), "rad", sd=sd),
+                    range_rad=Quantity((low, high), "rad"),
+                )

@@ -17,8 +17,7 @@ import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.segment_distances import FEWEST_PAIRS, SAME_SESSION_M, SegmentDistances
-from kinertia.diagnostics.person_context import PersonContext
-from kinertia.diagnostics.subject.odd_recording import odd_ones
+from kinertia.diagnostics.person_context import PersonContext, odd_ones
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where

@@ -15,8 +15,7 @@ from itertools import combinations
 import numpy as np
 
 from kinertia.diagnostics.evidence.force_mass import MISSING, ForceMass, UnmeasuredSupport
-from kinertia.diagnostics.person_context import PersonContext
-from kinertia.diagnostics.subject.odd_recording import odd_ones
+from kinertia.diagnostics.person_context import PersonContext, odd_ones
 from kinertia.estimation.total_mass import TotalMass
 from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.quantity import Quantity

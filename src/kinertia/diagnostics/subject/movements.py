@@ -1,4 +1,4 @@
-"""Do the trials include trunk sway and squats, the two movements that complement walking best?
+"""What does a person do in the trials: walk, turn, run, land, squat? Do they include what complements walking best?
 
 In the synthetic laboratory, adding a trial of trunk sway lowers the errors of moments of inertia by a third, more than
 any other movement (`kinertia plan` predicts both for a person's own trials).
@@ -14,10 +14,16 @@ from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.person_context import PersonContext
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
-from kinertia.trial.data import Markers
+from kinertia.trial.data import BoolArray, Markers
+from kinertia.trial.sampled_time import runs, span_s
+from kinertia.trial.trial_input import Task
 
 SWAY_RAD, SQUAT_M = float(np.radians(12.0)), 0.15
 """A walking trunk leans by up to 5 degrees from its mean; a walking pelvis moves up and down by up to 0.08 m."""
+_FLIGHT_S = 0.03
+"""Shortest flight of a run; contacts by markers are uncertain by about as much."""
+_LANDING_S = 0.1
+"""Shortest flight before a landing: walking has none."""
 
 
 @dataclass(frozen=True)
@@ -101,3 +107,38 @@ def movements_of(context: RecordingContext) -> InformativeMovements | None:
     """Compute how far trunk and pelvis move in a recording; None where its markers do not show both."""
     segments = {} if context.marker_set is None else context.marker_set.segments
     return InformativeMovements.of(context.all_markers, *(segments.get(name, ()) for name in ("pelvis", "torso")))
+
+
+def task_of(context: RecordingContext) -> Task:
+    """Return the task: as stated, or found from the contacts of the feet, the heading and height of the pelvis.
+
+    Strides (`RecordingContext.has_strides`) with a flight phase and without double support are a run, others a turn
+    where the pelvis turns by more than 30 degrees, else a walk. Without strides it is a landing where both feet land
+    after 0.1 s in the air, and a squat where both stay on the ground while the pelvis moves up and down by 0.15 m.
+    """
+    if context.stated_task is not None:
+        return context.stated_task
+    trial = context.trial
+    ground = None if trial is None or trial.on_ground is None else trial.on_ground
+    if context.has_strides:
+        runs_ = ground is not None and _runs(context.all_markers.time, ground)
+        return "turn" if context.turns else "run" if runs_ else "walk"
+    if ground is None:
+        return "other"
+    if _flights(context.all_markers.time, ground, _LANDING_S):
+        return "landing"
+    movements = movements_of(context)
+    return "squat" if movements is not None and movements.squats and ground.all() else "other"
+
+
+def _runs(time: np.ndarray, ground: BoolArray) -> bool:
+    """Return whether the feet (n, 2) are in the air together between contacts, and never on the ground together."""
+    flights = _flights(time, ground, _FLIGHT_S)
+    first, last = (flights[0][0], flights[-1][1]) if flights else (0, -1)
+    return bool(flights) and not ground[first : last + 1].all(axis=1).any()
+
+
+def _flights(time: np.ndarray, ground: BoolArray, least_s: float) -> list[tuple[int, int]]:
+    """Return first and last frame of the flights between two contacts that last so long."""
+    air = runs(~np.logical_or.reduce(ground, axis=1))
+    return [(a, b) for a, b in air if a > 0 and b < len(time) - 1 and span_s(time, a - 1, b + 1) > least_s]

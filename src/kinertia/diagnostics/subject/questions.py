@@ -4,7 +4,7 @@ from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.person_context import PersonContext
 from kinertia.diagnostics.plates.plate_height import plate_heights
 from kinertia.diagnostics.runner import Question
-from kinertia.diagnostics.subject.body_data import absent_markers, population, stated_and_filed
+from kinertia.diagnostics.subject.body_data import absent_markers, population, stated_and_filed, stature
 from kinertia.diagnostics.subject.camera_scale import trial_scales
 from kinertia.diagnostics.subject.mass import masses_of_trials, stated_mass
 from kinertia.diagnostics.subject.movements import informative_movements
@@ -12,7 +12,6 @@ from kinertia.diagnostics.subject.repeated_trials import repeated_trials
 from kinertia.diagnostics.subject.same_person import static_and_trials, trials_of_one_person
 from kinertia.diagnostics.subject.stance_coverage import stance_coverage
 from kinertia.diagnostics.subject.standing import flat_feet, floor, no_static, standing
-from kinertia.diagnostics.subject.stature import stature
 
 STATIC_QUESTIONS: tuple[Question[RecordingContext], ...] = (
     Question("S20", standing),

@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.label_exchange import swapped_labels
 from kinertia.diagnostics.evidence.segment_distances import FEWEST_PAIRS, SAME_SESSION_M, SegmentDistances
-from kinertia.diagnostics.person_context import PersonContext
+from kinertia.diagnostics.person_context import PersonContext, odd_ones
 from kinertia.diagnostics.subject.camera_scale import AGAINST_STANDING, camera_scale
-from kinertia.diagnostics.subject.odd_recording import odd_ones
 from kinertia.findings.finding import Finding, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where

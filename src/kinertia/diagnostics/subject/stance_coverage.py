@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.person_context import PersonContext
-from kinertia.diagnostics.subject.task import task_of
+from kinertia.diagnostics.subject.movements import task_of
 from kinertia.findings.finding import Finding, with_evidence
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where

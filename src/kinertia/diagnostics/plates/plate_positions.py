@@ -1,0 +1,190 @@
+"""Finds plates that are interchanged, rotated or mirrored in the file: undone, centres of pressure are under the feet.
+
+A load moves from the heel to the ball of its foot. On fourteen fault-free trials it is 16 to 75 mm from that line (RMS
+over a whole contact); with a plate rotated or mirrored about its middle, 106 mm and more.
+"""
+
+from collections.abc import Iterator, Sequence
+from itertools import combinations
+
+import numpy as np
+
+from kinertia.diagnostics.context import RecordingContext
+from kinertia.diagnostics.evidence.contact_fit import Feet, Hypothesis
+from kinertia.diagnostics.evidence.horizontal_velocity import push_share
+from kinertia.diagnostics.evidence.plate_contacts import (
+    COP_MIN_FORCE_N,
+    FAR_M,
+    PlateContact,
+    contacts_of,
+    cop_horizontal,
+    displaced,
+)
+from kinertia.findings.finding import finding
+from kinertia.findings.quantity import Quantity
+from kinertia.trial.data import FloatArray, PlateLoads
+from kinertia.trial.rms import rms
+
+_WRONG_M, _RIGHT_M, _CLEARLY_BEST = 0.1, 0.08, 0.6
+_ORDER = "a wrong order of the corners"
+_CHANNELS = "interchanged channels of the plate moments Mx and My"
+_ABOUT_X, _ABOUT_Z = (f"a wrong sign of the plate moment about {axis}" for axis in "XZ")
+_TILTING = "wrong signs of the plate moments Mx and My, or eight channels numbered from the opposite corner"
+_MENDING = {
+    _ORDER: "Correct the order of the corners",
+    _TILTING: "Reverse Mx and My; of eight channels, interchange Fz1 with Fz3, Fz2 with Fz4, Fx12 with Fx34 and Fy14 "
+    "with Fy23 (the last two unless Mz is right)",
+    _ABOUT_X: "Reverse the plate moment about X",
+    _ABOUT_Z: "Reverse the plate moment about Z",
+    _CHANNELS: "Interchange the channels of Mx and My",
+}
+_HALF_TURN = "rotated by 180 degrees"
+LEAST_PUSH = 0.02
+"""Of forces that go with the motion; a plate that is rotated by its corners shows them reversed."""
+_OPERATIONS = (
+    # places (x, z) from the plate's middle; from Z to X is a positive rotation about Y
+    (_HALF_TURN, ((-1, 0), (0, -1)), _ORDER),
+    ("rotated by 90 degrees", ((0, -1), (1, 0)), _ORDER),
+    ("rotated by -90 degrees", ((0, 1), (-1, 0)), _ORDER),
+    ("mirrored along X", ((-1, 0), (0, 1)), _ABOUT_Z),
+    ("mirrored along Z", ((1, 0), (0, -1)), _ABOUT_X),
+    ("mirrored along a diagonal", ((0, 1), (1, 0)), _CHANNELS),
+    ("mirrored along a diagonal", ((0, -1), (-1, 0)), _CHANNELS),
+)
+_DIFFERENCE = 0.25
+"""Share of their distance by which the displacements of two plates may differ from being opposite."""
+
+
+def rotated_plates(context: RecordingContext) -> Iterator[Hypothesis]:
+    """Report P242: the one correction of one plate, or of all equally, that puts all loads under the feet; nothing
+    where none does, or also one of other plates. Other operations on the same plates that do are among its causes.
+    """
+    plates, feet = context.plates, context.foot_trajectories
+    steps = [one for one in context.contacts if one.is_step]
+    if plates is None or feet is None or plates.corners is None or not steps or not context.has_strides:
+        return
+    read_m = _distances(steps, [one.place for one in steps], feet)
+    if read_m.max() < _WRONG_M:
+        return
+    middle = plates.corners.mean(axis=1)[:, [0, 2]]
+    used = sorted({one.plate for one in steps})
+    offset = np.mean([one.own_offset_m for one in steps], axis=0)
+    left_m: dict[tuple[int, ...], FloatArray] = {(): _distances(steps, [one.place - offset for one in steps], feet)}
+    for k, (_, matrix, _) in enumerate(_OPERATIONS):
+        turned_m = _distances(steps, [_turned(one.place, middle[one.plate], matrix) for one in steps], feet)
+        for which in {*((p,) for p in used), tuple(used)}:
+            left_m[(k, *which)] = np.where([one.plate in which for one in steps], turned_m, read_m)
+    best, *others = sorted(left_m, key=lambda one: rms(left_m[one]))
+    rivals = [one for one in others if one[1:] != best[1:]]
+    only = not any(left_m[one].max() <= _RIGHT_M for one in rivals)
+    clearly = only or rms(left_m[best]) < _CLEARLY_BEST * rms(left_m[rivals[0]])
+    if not best or left_m[best].max() > _RIGHT_M or not clearly:
+        return
+    # of a step along the middle of its plate, a half turn is hardly another operation than mirroring along the walk
+    alike = [one for one in others if one[1:] == best[1:] and left_m[one].max() <= _RIGHT_M]
+    wrong = list(best[1:])
+    operation, matrix, cause = _OPERATIONS[best[0]]
+    if operation == _HALF_TURN and min(push_share(plates, p, context.travel) or 0.0 for p in wrong) > LEAST_PUSH:
+        cause = _TILTING
+    point = cop_horizontal(plates)
+    by = np.zeros_like(point)
+    by[:, wrong] = (_turned(point, middle, matrix) - point)[:, wrong]
+    found = finding(
+        "P242",
+        context.at(plate=plates.names[wrong[0]] if len(wrong) == 1 else None),
+        causes=(cause, *(f"{name}: {other}" for name, _, other in (_OPERATIONS[one[0]] for one in alike))),
+        mend=Quantity(_MENDING[cause]),
+        before_m=Quantity(float(read_m.max()), "m", limit=_WRONG_M, usual=(0.016, 0.075)),
+        after_m=Quantity(float(left_m[best].max()), "m", limit=_RIGHT_M),
+        operation=Quantity(operation),
+        plates=Quantity(" and ".join(plates.names[p] for p in wrong)),
+    )
+    yield Hypothesis(found, displaced(plates, by))
+
+
+def _turned(place: FloatArray, middle: FloatArray, matrix: Sequence[Sequence[int]]) -> FloatArray:
+    """Rotate positions (..., 2) m about the middle of their plate."""
+    result: FloatArray = middle + (place - middle) @ np.array(matrix).T
+    return result
+
+
+def _distances(steps: Sequence[PlateContact], place: Sequence[FloatArray], feet: Feet) -> FloatArray:
+    """Return the distance (m, RMS) of each step from where the load of the nearer foot is expected."""
+    errors = []
+    for one, each in zip(steps, place, strict=True):
+        off = [np.square(each - foot.expected_cop(one.time, one.weight)).sum(axis=1) for foot in feet]
+        errors.append(min(float(np.sqrt(np.average(square, weights=one.weight))) for square in off))
+    return np.array(errors)
+
+
+def interchanged_plates(context: RecordingContext) -> Iterator[Hypothesis]:
+    """Report P241: loads that are under no foot at their own position, but under one at another plate's."""
+    plates, feet, contacts = context.plates, context.foot_trajectories, context.contacts
+    if plates is None or feet is None or len({one.plate for one in contacts}) < 2:
+        return
+    before = max(one.distance_m for one in contacts)
+    if before <= FAR_M:
+        return
+    used = sorted({one.plate for one in contacts})
+    middle = _middles(plates, used)
+    tried = []
+    for pair in combinations(used, 2):
+        by = np.zeros((len(plates.names), 2))
+        by[pair[0]], by[pair[1]] = middle[pair[1]] - middle[pair[0]], middle[pair[0]] - middle[pair[1]]
+        moved = displaced(plates, by)
+        tried.append((max(one.distance_m for one in contacts_of(moved, feet)), pair, moved))
+    after, pair, moved = min(tried, key=lambda one: one[0])
+    if after > min(FAR_M / 2, before):
+        yield from _opposite(context, plates, feet)
+        return
+    yield _interchanged(context, pair, moved, before, after)
+
+
+def _interchanged(
+    context: RecordingContext, pair: Sequence[int], corrected: PlateLoads, before_m: float, after_m: float
+) -> Hypothesis:
+    names = [corrected.names[p] for p in pair]
+    found = finding(
+        "P241",
+        context.at(),
+        before_m=Quantity(before_m, "m", limit=FAR_M),
+        after_m=Quantity(after_m, "m", limit=FAR_M / 2),
+        plate=Quantity(names[0]),
+        other=Quantity(names[1]),
+    )
+    return Hypothesis(found, corrected)
+
+
+def _middles(plates: PlateLoads, used: Sequence[int]) -> dict[int, FloatArray]:
+    """Return the middle (2,) m of each plate: from its corners, or from where it is loaded."""
+    if plates.corners is not None:
+        return {p: plates.corners[p].mean(axis=0)[[0, 2]] for p in used}
+    point = cop_horizontal(plates)
+    loaded = {p: plates.force[:, p, 1] > COP_MIN_FORCE_N for p in used}
+    return {p: np.average(point[loaded[p], p], axis=0, weights=plates.force[loaded[p], p, 1]) for p in used}
+
+
+def _opposite(context: RecordingContext, plates: PlateLoads, feet: Feet) -> Iterator[Hypothesis]:
+    """Yield loads of two plates, or belts, displaced equally in opposite directions, each by a constant amount."""
+    steps = [one for one in context.contacts if one.is_step]
+    used = sorted({one.plate for one in steps})
+    if len(used) != 2:
+        return
+    offsets: dict[int, list[FloatArray]] = {p: [] for p in used}
+    for one in steps:
+        from_feet = [one.place - foot.expected_cop(one.time, one.weight) for foot in feet]
+        mean = [np.average(each, axis=0, weights=one.weight) for each in from_feet]
+        # the swinging foot moves away
+        foot = int(np.argmin([np.square(each - m).sum(axis=1).mean() for each, m in zip(from_feet, mean, strict=True)]))
+        offsets[one.plate].append(mean[foot])
+    first, second = (np.mean(offsets[p], axis=0) for p in used)
+    half = (first - second) / 2
+    size = float(np.linalg.norm(half))
+    residual = max(
+        float(np.linalg.norm(each - sign * half)) for p, sign in zip(used, (1, -1), strict=True) for each in offsets[p]
+    )
+    if size < FAR_M or residual > min(FAR_M / 2, _DIFFERENCE * size):
+        return
+    by = np.zeros((len(plates.names), 2))
+    by[used[0]], by[used[1]] = -half, half
+    yield _interchanged(context, used, displaced(plates, by), size, residual)

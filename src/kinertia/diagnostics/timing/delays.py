@@ -1,0 +1,176 @@
+"""T21, do forces lag: those of one plate behind the others, or those of all trials equally?
+
+The vertical velocity from the markers follows the force-derived one with a delay: the synchronisation delay of the
+forces, and some ms added by skin, trunk and arms, which are the same in all movements. Between trials of one person
+(two walks, squats, parts of walks and runs) each of the two measures of it differs by up to 8 ms, but both in one
+direction by at most 4 ms; even trials of eight people with different skin motion differ by at most 10 ms. Parts of less
+than a second differ by up to 15 ms.
+
+Plates of two makers may be recorded through different devices. A delayed plate takes over the body's weight too late
+and keeps it too long: the sum of all forces is too small at one step and too large at the next. On 22 fault-free walks
+and runs plates differ by up to 5 ms, and by 10 and 13 ms where this explains almost nothing; one plate that is 20 or 30
+ms late shows 15 to 40 ms in all but two of 27. A foot over the edge of a plate also looks late or early, but only at
+one end of its step, while the forces of a late plate are late from beginning to end.
+"""
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from kinertia.diagnostics.context import RecordingContext
+from kinertia.diagnostics.evidence.horizontal_velocity import ForceVelocity, joined_without_trend
+from kinertia.diagnostics.evidence.vertical_acceleration import LARGEST_RESIDUAL, vertical_match_of
+from kinertia.diagnostics.person_context import PersonContext
+from kinertia.findings.finding import Finding, finding, with_evidence
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
+from kinertia.trial.centre_of_pressure import FIRM_LOAD_N
+from kinertia.trial.data import FloatArray
+from kinertia.trial.sampled_time import span_s
+
+_LEAST_WINDOW_S = 0.8
+"""Parts of half a second of one trial differ by up to 40 ms."""
+_SHORT_S = 1.0
+_APART_S, _SHORT_APART_S = 0.012, 0.018
+"""Smallest notable difference of delays, in longer windows and in shorter ones."""
+_USUAL_S = (-0.004, 0.004)
+_LEAST_PLATE_WINDOW_S = 0.6
+_DIFFERENCE_S, _USUAL_DIFFERENCE_S = 0.012, 0.005
+_EXPLAINS, _CLEARLY_BEST = 0.65, 0.85
+"""Shares of the residual with one delay for all plates, and of that with a gain error of each plate, that may be left.
+On fault-free recordings 0.70 of the former and more are."""
+_BOTH_ENDS, _UNEQUAL_S = 0.4, 0.02
+"""While its force grows and while it falls, a late plate lags by at least this share of the difference; the two delays
+of the other plate differ by no more than this. On nine walks this holds for every late plate that meets the other
+limits, and for no plate with a simulated foot 10 to 30 mm over its edge."""
+
+
+class TrialDelay(NamedTuple):
+    """Delay (s) of the forces of a trial by the pelvis and by the marker-based centre, and whether only short windows
+    show it.
+    """
+
+    name: str
+    by_pelvis_s: float
+    by_markers_s: float
+    short: bool = False
+
+
+def trial_delay(context: RecordingContext) -> TrialDelay | None:
+    """Compute the delay over all windows that are long enough; None where none is, or without movement."""
+    if context.trial is None or context.travel.kind == "stands still":
+        return None
+    found, spans = [], []
+    for part in context.velocities:
+        if span_s(part.time) < _LEAST_WINDOW_S:
+            continue
+        both = vertical_match_of(part)
+        if both and max(one.residual for one in both) <= LARGEST_RESIDUAL:
+            found.append([one.delay_s for one in both])
+            spans.append(span_s(part.time))
+    if not found:
+        return None
+    pelvis, markers = np.average(found, axis=0, weights=spans)
+    return TrialDelay(context.name, float(pelvis), float(markers), max(spans) < _SHORT_S)
+
+
+def trial_delays(person: PersonContext) -> Iterator[Finding]:
+    """Report T213: trials whose delay differs from the other trials'."""
+    if len(person.trials) > 1:
+        yield from uneven_delays([trial_delay(one) for one in person.trials])
+
+
+def uneven_delays(delays: Sequence[TrialDelay | None]) -> Iterator[Finding]:
+    """Report T213: each trial whose delay is far from the median of three and more; of two that differ both, since it
+    is unknown which of them is wrong.
+    """
+    known = [one for one in delays if one is not None]
+    if len(known) < 2:
+        return
+    values = np.array([[one.by_pelvis_s, one.by_markers_s] for one in known])
+    usual = values[::-1] if len(known) == 2 else np.broadcast_to(np.median(values, axis=0), values.shape)
+    limit_s = _SHORT_APART_S if any(one.short for one in known) else _APART_S
+    for one, others, delays_s in zip(known, usual, values - usual, strict=True):
+        if np.abs(delays_s).min() <= limit_s or delays_s.prod() <= 0:
+            continue
+        yield finding(
+            "T213",
+            Where(trial=one.name),
+            delay_s=Quantity(float(delays_s.mean()), "s", limit=limit_s, usual=_USUAL_S),
+            by_pelvis_s=Quantity(one.by_pelvis_s, "s"),
+            by_markers_s=Quantity(one.by_markers_s, "s"),
+            others_s=Quantity(tuple(float(each) for each in others), "s"),
+        )
+
+
+def plate_delay(context: RecordingContext) -> Iterator[Finding]:
+    """Report T216: each plate with a delay of its own explains the vertical velocity, and neither one for all nor gains
+    do."""
+    plates, parts = context.plates, [one for one in context.velocities if span_s(one.time) >= _LEAST_PLATE_WINDOW_S]
+    if plates is None or not parts or not context.has_strides:
+        return
+    used = np.flatnonzero(plates.force[..., 1].max(axis=0) > FIRM_LOAD_N)
+    if len(used) < 2:
+        return
+    time, vertical = plates.time, plates.force[:, used, 1]
+    off = joined_without_trend(parts, [(one.pelvis + one.centre)[:, 1] / 2 - one.by_forces[:, 1] for one in parts])
+    pushed = _accelerations(parts, time, vertical)
+    by_forces = np.stack(
+        [joined_without_trend(parts, [one.by(time, own) for one in parts]) for own in vertical.T], axis=1
+    )
+    delays_s, own = _fitted(pushed, off)
+    _, together = _fitted(pushed.sum(axis=1, keepdims=True), off)
+    _, gains = _fitted(by_forces, off)
+    late, early = int(np.argmax(delays_s)), int(np.argmin(delays_s))
+    difference_s = float(delays_s[late] - delays_s[early])
+    if difference_s <= _DIFFERENCE_S or own > _EXPLAINS * together or own > _CLEARLY_BEST * gains:
+        return
+    named, other = (plates.names[used[p]] for p in (late, early))
+    if {named, other} & context.plates_reached_beyond:
+        return
+    growing, falling = (_accelerations(parts, time, change) for change in _changes(vertical))
+    ends_s = _fitted(np.hstack([growing, falling]), off)[0].reshape(2, -1)
+    if not _late_at_both_ends(ends_s[:, late], ends_s[:, early]):
+        return
+    yield with_evidence(
+        "T216",
+        context.at(),
+        {
+            "plate": Quantity(named),
+            "difference_s": Quantity(
+                difference_s, "s", limit=_DIFFERENCE_S, usual=(-_USUAL_DIFFERENCE_S, _USUAL_DIFFERENCE_S)
+            ),
+            "other": Quantity(other),
+            "velocity_residual_m_s": Quantity((together, own), "m/s", limit=_EXPLAINS * together),
+        },
+    )
+
+
+def _accelerations(parts: Sequence[ForceVelocity], time: FloatArray, force: FloatArray) -> FloatArray:
+    """Return accelerations (n, p) m/s2 of the body by forces (k, p) N over (k,) s, in all windows."""
+    return np.stack(
+        [
+            joined_without_trend(parts, [np.interp(part.time, time, own) / part.mass_kg for part in parts])
+            for own in force.T
+        ],
+        axis=1,
+    )
+
+
+def _changes(force: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return how far forces (k, p) have grown, and fallen, up to each sample; the two add up to the force's change."""
+    change = np.diff(force, axis=0, prepend=force[:1])
+    return np.cumsum(np.maximum(change, 0.0), axis=0), np.cumsum(np.minimum(change, 0.0), axis=0)
+
+
+def _late_at_both_ends(late_s: FloatArray, early_s: FloatArray) -> bool:
+    """Return whether the late plate lags while its force grows and while it falls, and the early one's delays agree."""
+    lag_s = late_s - early_s.mean()
+    return bool(lag_s.min() >= _BOTH_ENDS * lag_s.mean() > 0.0) and bool(np.ptp(early_s) <= _UNEQUAL_S)
+
+
+def _fitted(terms: FloatArray, wanted: FloatArray) -> tuple[FloatArray, float]:
+    """Return the factors (k,) of terms (n, k) that explain values (n,) best, and the SD that they leave."""
+    factors = np.asarray(np.linalg.lstsq(terms, wanted, rcond=None)[0], dtype=float)
+    return factors, float(np.std(wanted - terms @ factors))
