@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.plates.questions import PLACE_QUESTIONS
+from kinertia.diagnostics.registry import PLACE_CHECKS
 from kinertia.diagnostics.runner import asked, explained
 from kinertia.findings.finding import Severity
 from kinertia.io.marker_set_file import choose_marker_set
@@ -38,7 +38,7 @@ def on_one_plate(recording):
 
 def place_findings(recording, feet=None, context=None, **more):
     """What all questions of places find, with causes over their consequences."""
-    return explained(asked(PLACE_QUESTIONS, context or context_of(recording, feet, **more)))
+    return explained(asked(PLACE_CHECKS, context or context_of(recording, feet, **more)))
 
 
 def doubted(recording, feet=None, **more):

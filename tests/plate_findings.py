@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.plates.questions import LOADED_QUESTIONS, SIGNAL_QUESTIONS
+from kinertia.diagnostics.registry import LOADED_CHECKS, SIGNAL_CHECKS
 from kinertia.diagnostics.runner import asked, explained
 from kinertia.io.marker_set_file import choose_marker_set
 from kinertia.trial.centre_of_pressure import centre_of_pressure
@@ -26,7 +26,7 @@ def plates_alone(plates, **stated):
 
 def found_in(context):
     """All that is found of a recording's plates, with what explains what."""
-    return explained(asked((*SIGNAL_QUESTIONS, *LOADED_QUESTIONS), context))
+    return explained(asked((*SIGNAL_CHECKS, *LOADED_CHECKS), context))
 
 
 def codes(findings):

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from kinertia.diagnostics.result.context import ResultContext
-from kinertia.diagnostics.result.questions import ESTIMATE_QUESTIONS
+from kinertia.diagnostics.result.registry import ESTIMATE_CHECKS
 from kinertia.diagnostics.runner import asked, explained
 from kinertia.estimation.simultaneous.calibration_entry import DELAY, CalibrationEntry
 from kinertia.estimation.simultaneous.instruments.model_uncertainty import GAIT27_UNCERTAINTY
@@ -108,4 +108,4 @@ def of_estimate(fitted, *names, literature=None):
     )
     made = ResultContext(fit, ready)
     made.__dict__["force_masses"] = {}
-    return [one for one in explained(asked(ESTIMATE_QUESTIONS, made)) if one.is_open and one.severity > Severity.INFO]
+    return [one for one in explained(asked(ESTIMATE_CHECKS, made)) if one.is_open and one.severity > Severity.INFO]

@@ -217,7 +217,7 @@ CASES = {
     "S104 impossible": (tall, 0.999, 1.001, ["S104 WARNING"], ["S104 ERROR"]),
     "S104 impossible too": (tall, 0.651, 0.649, ["S104 WARNING"], ["S104 ERROR"]),
 }
-"""Question, a value just within the limit, one just beyond it, and what is found of each."""
+"""Check, a value just within the limit, one just beyond it, and what is found of each."""
 
 
 @pytest.mark.parametrize("case", CASES)

@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kinertia.diagnostics.runner import Question, asked, blocking, explained, overruled, unknown_codes
+from kinertia.diagnostics.runner import Check, asked, blocking, explained, overruled, unknown_codes
 from kinertia.findings.finding import Severity, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.rule import all_rules
@@ -114,13 +114,13 @@ def test_a_question_without_meaning_is_not_asked():
         return [OTHER_ZERO]
 
     wrong_axis = finding("P201", Where(trial="walk"))
-    assert asked([Question("P21", ask, unless=("P20",))], "walk", [wrong_axis]) == []
-    assert asked([Question("P21", ask, unless=("P24",))], "walk", [wrong_axis]) == [OTHER_ZERO]
+    assert asked([Check("P21", ask, unless=("P20",))], "walk", [wrong_axis]) == []
+    assert asked([Check("P21", ask, unless=("P24",))], "walk", [wrong_axis]) == [OTHER_ZERO]
     assert calls == ["walk"]
 
 
 def test_findings_without_a_trial_are_of_the_one_asked():
-    (found,) = asked([Question("P21", lambda _: [finding("P211", drift_n=Quantity(1.0, "N"))])], None, (), "walk")
+    (found,) = asked([Check("P21", lambda _: [finding("P211", drift_n=Quantity(1.0, "N"))])], None, (), "walk")
     assert found.where.trial == "walk"
 
 

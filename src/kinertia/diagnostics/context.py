@@ -1,4 +1,4 @@
-"""Holds one recording for its questions, with evidence computed once."""
+"""Holds one recording for its checks, with evidence computed once."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -50,7 +50,7 @@ _STRAIGHT = 0.87
 
 @dataclass(frozen=True, eq=False)
 class RecordingContext:
-    """One recording, for the questions about it.
+    """One recording, for its checks.
 
     Attributes:
         recording: in ground axes, SI units; its name is the trial's.

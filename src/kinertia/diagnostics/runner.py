@@ -1,8 +1,8 @@
-"""Asks questions, lets causes explain their consequences, and applies what the user overrules.
+"""Runs checks, lets causes explain their consequences, and applies what the user overrules.
 
-A question returns all findings that apply, or fits every hypothesis and returns the best. Only the relation
-`supersedes` of the catalogue hides findings, whatever their order. The order of questions matters to `unless` only: a
-question is left out where earlier ones found that it is meaningless, so it comes after those that it names.
+A check returns all findings that apply, or fits every hypothesis and returns the best. Only the relation
+`supersedes` of the catalogue hides findings, whatever their order. The order of checks matters to `unless` only: a
+check is left out where earlier ones found that it is meaningless, so it comes after those that it names.
 """
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
@@ -19,8 +19,8 @@ Context = TypeVar("Context")
 
 
 @dataclass(frozen=True)
-class Question(Generic[Context]):
-    """One question about a recording, person or result, answered by one function.
+class Check(Generic[Context]):
+    """One check of a recording, person or result: a question, answered by one function.
 
     Attributes:
         code: first three characters of its codes, "P21".
@@ -35,37 +35,35 @@ class Question(Generic[Context]):
 
 
 def asked(
-    questions: Iterable[Question[Context]], context: Context, found: Sequence[Finding] = (), trial: str | None = None
+    checks: Iterable[Check[Context]], context: Context, found: Sequence[Finding] = (), trial: str | None = None
 ) -> list[Finding]:
-    """Ask these questions, except those that earlier findings make meaningless, and return the findings.
+    """Run these checks, except those that earlier findings make meaningless, and return the findings.
 
     Args:
-        questions: in the order in which they are asked.
+        checks: in the order in which they run.
         context: what they are asked of.
         found: earlier findings.
         trial: name of the trial for findings that state none.
     """
     result: list[Finding] = []
-    for question in questions:
+    for check in checks:
         errors = {one.code for one in (*found, *result) if one.severity is Severity.ERROR}
-        if any(code.startswith(unless) for code in errors for unless in question.unless):
+        if any(code.startswith(unless) for code in errors for unless in check.unless):
             continue
-        for one in question.ask(context):
+        for one in check.ask(context):
             result.append(one if trial is None or one.where.trial is not None else one.in_trial(trial))
     return result
 
 
-def added_questions() -> tuple[Question[Any], ...]:
-    """Return the questions about recordings that installed packages add."""
+def added_checks() -> tuple[Check[Any], ...]:
+    """Return the checks of recordings that installed packages add."""
     families = [one for one in names(RULES) if one not in FAMILIES]
-    return tuple(
-        Question(code, ask) for one in families for code, ask in loaded(RULES, one).recording_questions.items()
-    )
+    return tuple(Check(code, ask) for one in families for code, ask in loaded(RULES, one).recording_questions.items())
 
 
-def rules_of(*questions: Question[Any]) -> int:
-    """Count the rules that these questions cover."""
-    return len({code for one in questions for code in matching(one.code)})
+def rules_of(*checks: Check[Any]) -> int:
+    """Count the rules that these checks cover."""
+    return len({code for one in checks for code in matching(one.code)})
 
 
 def explained(findings: Iterable[Finding], left_out: Collection[str] = ()) -> list[Finding]:

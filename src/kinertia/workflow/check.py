@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
-from kinertia.diagnostics.model import questions as model_questions
 from kinertia.diagnostics.model.model_check import ModelCheck, check_model
 from kinertia.diagnostics.person_context import PersonContext
+from kinertia.diagnostics.registry import MODEL_CHECKS
 from kinertia.diagnostics.runner import asked, explained, overruled, rules_of
 from kinertia.errors import FileError
 from kinertia.findings.finding import Finding
@@ -123,10 +123,10 @@ def check_osim(model: OsimModel, subject: Subject, overrule: Overrule | None = N
         subject: mass, stature and sex where they are known.
         overrule: what the user overrules.
     """
-    found = asked(model_questions.PERSON_QUESTIONS, PersonContext(subject, (), model=model))
+    found = asked(MODEL_CHECKS, PersonContext(subject, (), model=model))
     findings = overruled(explained(found), overrule or Overrule())
     facts = check_model(model.skeleton, model.bsp, subject.mass_kg, subject.height_m, subject.sex)
-    return ModelOverview(model.path.name, facts, Overview(findings, rules_of(*model_questions.PERSON_QUESTIONS), 0))
+    return ModelOverview(model.path.name, facts, Overview(findings, rules_of(*MODEL_CHECKS), 0))
 
 
 @dataclass(frozen=True)

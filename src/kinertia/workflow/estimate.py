@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kinertia.diagnostics.result.context import ResultContext
-from kinertia.diagnostics.result.questions import ESTIMATE_QUESTIONS, RESULT_QUESTIONS, judged
+from kinertia.diagnostics.result.registry import ESTIMATE_CHECKS, RESULT_CHECKS, judged
 from kinertia.diagnostics.runner import explained, overruled, rules_of
 from kinertia.errors import SettingsError
 from kinertia.estimation.free_moment_sign import Signed, with_likelier_sign
@@ -106,7 +106,7 @@ def estimate(ready: Prepared, progress: Progress = lambda stage, share: None) ->
         notes=ready.notes,
         file=ready.file,
         left_out=ready.left_out,
-        rules=ready.rules + rules_of(*ESTIMATE_QUESTIONS, *RESULT_QUESTIONS),
+        rules=ready.rules + rules_of(*ESTIMATE_CHECKS, *RESULT_CHECKS),
         evaluations=outcome.evaluations,
     )
     found = explained([*ready.findings, *judged(ResultContext(fit, ready))], ready.left_out)

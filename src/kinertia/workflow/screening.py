@@ -1,6 +1,6 @@
-"""Asks every question of the stages before inverse kinematics, of all recordings of a person.
+"""Runs all checks before inverse kinematics, of all recordings of a person.
 
-`check` ends here and `fit` goes on from here, so that both ask the same questions. A trial with an open ERROR is left
+`check` ends here and `fit` goes on from here, so that both run the same checks. A trial with an open ERROR is left
 out; one of the person, or of the static trial, stops everything.
 """
 
@@ -9,28 +9,18 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.diagnostics.labels import questions as labels
-from kinertia.diagnostics.markers import questions as markers
-from kinertia.diagnostics.model import questions as model
 from kinertia.diagnostics.person_context import PersonContext
 from kinertia.diagnostics.plates.ground_contact import complete_contact
-from kinertia.diagnostics.plates.questions import (
-    LOADED_QUESTIONS,
-    PLACE_QUESTIONS,
-    SIGNAL_QUESTIONS,
-    STANDING_QUESTIONS,
-)
+from kinertia.diagnostics.registry import MOTION_CHECKS, PERSON_CHECKS, STATIC_CHECKS
 from kinertia.diagnostics.runner import (
-    Question,
-    added_questions,
+    Check,
+    added_checks,
     asked,
     blocking,
     explained,
     overruled,
     rules_of,
 )
-from kinertia.diagnostics.subject import questions as subject
-from kinertia.diagnostics.timing import questions as timing
 from kinertia.errors import BlockedError, KinertiaError, MarkerSetError, SubjectError
 from kinertia.estimation.total_mass import TotalMass
 from kinertia.findings.finding import Finding
@@ -41,26 +31,7 @@ from kinertia.workflow.joint_widths import with_widths
 from kinertia.workflow.person import Person
 from kinertia.workflow.recording_corrections import with_model_spelling, with_upright_static
 
-STATIC_QUESTIONS: tuple[Question[RecordingContext], ...] = (
-    *markers.STATIC_QUESTIONS,
-    *labels.STATIC_QUESTIONS,
-    *subject.STATIC_QUESTIONS,
-    *STANDING_QUESTIONS,
-)
-MOTION_QUESTIONS: tuple[Question[RecordingContext], ...] = (
-    *markers.MOTION_QUESTIONS,
-    *labels.MOTION_QUESTIONS,
-    *SIGNAL_QUESTIONS,
-    *timing.QUESTIONS,
-    *PLACE_QUESTIONS,
-    *LOADED_QUESTIONS,
-    *added_questions(),
-)
-PERSON_QUESTIONS: tuple[Question[PersonContext], ...] = (
-    *subject.PERSON_QUESTIONS,
-    *model.PERSON_QUESTIONS,
-    *timing.PERSON_QUESTIONS,
-)
+_MOTION_CHECKS = (*MOTION_CHECKS, *added_checks())
 _OF_FORCES = ("P", "T211", "T212")
 """ERRORs that do not concern the markers."""
 
@@ -71,7 +42,7 @@ class Screened:
 
     Attributes:
         person: as given.
-        context: what the questions were asked of: every recording, also those that are left out.
+        context: what was checked: every recording, also those that are left out.
         findings: all of them, with what explains and what overrules them.
         markers_only: trials that are left out for their forces; their markers can be used beside the others.
     """
@@ -84,8 +55,8 @@ class Screened:
     @property
     def rules(self) -> int:
         """Number of rules that were checked."""
-        of_static = STATIC_QUESTIONS if self.context.standing else ()
-        return rules_of(*MOTION_QUESTIONS, *of_static, *PERSON_QUESTIONS)
+        of_static = STATIC_CHECKS if self.context.standing else ()
+        return rules_of(*_MOTION_CHECKS, *of_static, *PERSON_CHECKS)
 
     @cached_property
     def stops(self) -> list[Finding]:
@@ -142,9 +113,9 @@ def screen(person: Person) -> Screened:
     if isinstance(person.completed, SubjectError) and person.completed.finding is not None:
         found += [person.completed.finding] if person.completed.finding.code == "S102" else []
     for static in context.standing:
-        found += _of_recording(static, STATIC_QUESTIONS)
+        found += _of_recording(static, STATIC_CHECKS)
     for trial in context.trials:
-        found += _of_recording(trial, MOTION_QUESTIONS)
+        found += _of_recording(trial, _MOTION_CHECKS)
     unmatched = person.labels.finding if isinstance(person.labels, MarkerSetError) else None
     if unmatched is not None and unmatched.code not in {one.code for one in found}:
         found.append(unmatched)
@@ -174,7 +145,7 @@ def _markers_only(screened: Screened) -> tuple[RecordingContext, ...]:
     names = {one.name for one in markers_only}
     found = [one for one in screened.findings if one.where.trial not in names]
     for trial in markers_only:
-        found += _of_recording(trial, MOTION_QUESTIONS)
+        found += _of_recording(trial, _MOTION_CHECKS)
     trials = [one for one in context.trials if one.name not in names]
     found += _of_person(replace(context, trials=[*trials, *markers_only]), found)
     more = [one for one in blocking(screened.overruled(found)) if one not in against]
@@ -188,7 +159,7 @@ def _of_forces(one: Finding) -> bool:
 
 
 def person_context(person: Person) -> PersonContext:
-    """Build the context in which questions about a person are asked."""
+    """Build the context of the checks of a person."""
     label_set = None if isinstance(person.labels, MarkerSetError) else person.labels
     stated = _stated(person)
 
@@ -245,9 +216,9 @@ def _total(mass_kg: float, person: Person) -> TotalMass | None:
         return None
 
 
-def _of_recording(context: RecordingContext, questions: Sequence[Question[RecordingContext]]) -> list[Finding]:
+def _of_recording(context: RecordingContext, checks: Sequence[Check[RecordingContext]]) -> list[Finding]:
     read = [one if one.where.trial is not None else one.in_trial(context.name) for one in context.recording.findings]
-    return [*read, *asked(questions, context, read, context.name)]
+    return [*read, *asked(checks, context, read, context.name)]
 
 
 def _of_person(context: PersonContext, found: Sequence[Finding]) -> list[Finding]:
@@ -255,7 +226,7 @@ def _of_person(context: PersonContext, found: Sequence[Finding]) -> list[Finding
     blocked = {one.where.trial for one in blocking(explained(found))}
     sound = replace(context, trials=[one for one in context.trials if one.name not in blocked], found=tuple(found))
     of_person = [one for one in found if one.where.trial is None]
-    return [_in_model(one, context) for one in asked(PERSON_QUESTIONS, sound, of_person)]
+    return [_in_model(one, context) for one in asked(PERSON_CHECKS, sound, of_person)]
 
 
 def _in_model(one: Finding, context: PersonContext) -> Finding:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import upright_model as upright
-from kinertia.diagnostics.model.questions import PERSON_QUESTIONS
+from kinertia.diagnostics.registry import MODEL_CHECKS
 from kinertia.diagnostics.runner import asked, explained
 from kinertia.findings.finding import Severity
 from kinertia.io.opensim.reader import read_osim
@@ -19,7 +19,7 @@ from upright_model import changed, with_moments
 def found(bsp, trials=()):
     """Code, body and severity of what speaks against mass properties and is not explained by another."""
     context = replace(with_model(upright.skeleton(), bsp), trials=trials)
-    questions = [one for one in PERSON_QUESTIONS if one.code == "O20"]
+    questions = [one for one in MODEL_CHECKS if one.code == "O20"]
     return {(one.code, one.where.part, one.severity) for one in explained(asked(questions, context)) if one.is_open}
 
 
@@ -60,7 +60,7 @@ def test_what_no_distribution_of_mass_has(change, condition):
     bsp = changed("femur_r", **change)
     assert ("O201", "femur_r", Severity.ERROR) in found(bsp)
     context = with_model(upright.skeleton(), bsp)
-    (one,) = (each for each in asked(PERSON_QUESTIONS, context) if each.code == "O201")
+    (one,) = (each for each in asked(MODEL_CHECKS, context) if each.code == "O201")
     assert condition in one.evidence["condition"].value
     if "mass" not in change:
         assert ("O201", "femur_r", Severity.ERROR) in found(bsp, [UNMOVED])
@@ -77,9 +77,7 @@ def test_bodies_that_a_fit_does_not_estimate():
 def test_a_ball_is_as_dense_as_it_is(density, codes):
     assert {code for code, _, _ in found(ball(5.0, density))} == codes
     (one, *_) = [
-        each
-        for each in asked(PERSON_QUESTIONS, with_model(upright.skeleton(), ball(5.0, 8000.0)))
-        if each.code == "O203"
+        each for each in asked(MODEL_CHECKS, with_model(upright.skeleton(), ball(5.0, 8000.0))) if each.code == "O203"
     ]
     assert one.evidence["density_kg_m3"].value == pytest.approx(8000.0)
 
@@ -115,5 +113,5 @@ def test_models_in_use(file_of, name):
     """With trials none has a fault of bodies that are estimated."""
     model = read_osim(file_of(name))
     context = replace(with_model(model.skeleton, model.bsp), trials=[UNMOVED])
-    questions = [one for one in PERSON_QUESTIONS if one.code in ("O20", "O21", "O30")]
+    questions = [one for one in MODEL_CHECKS if one.code in ("O20", "O21", "O30")]
     assert [one for one in asked(questions, context) if one.severity > Severity.INFO] == []

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import upright_model as upright
-from kinertia.diagnostics.model.questions import PERSON_QUESTIONS
+from kinertia.diagnostics.registry import MODEL_CHECKS
 from kinertia.diagnostics.runner import asked, explained
 from kinertia.findings.finding import Severity
 from kinertia.io.opensim.reader import read_osim
@@ -22,7 +22,7 @@ def findings(bsp=None, arms=True, trials=(), **person):
     """Of a model beside this person, those that no other one explains."""
     own = upright.bsp(arms) if bsp is None else bsp
     context = replace(with_model(upright.skeleton(arms), own, **person), trials=trials)
-    return [one for one in explained(asked(PERSON_QUESTIONS, context)) if one.is_open]
+    return [one for one in explained(asked(MODEL_CHECKS, context)) if one.is_open]
 
 
 def answers(code, *arguments, **more):
@@ -140,8 +140,8 @@ def test_mass_centres_in_millimetres():
 def test_a_model_without_markers():
     """A simulation needs none."""
     bare = replace(upright.skeleton(), markers=())
-    alone = asked(PERSON_QUESTIONS, with_model(bare, upright.bsp(), **PERSON))
-    fitted = asked(PERSON_QUESTIONS, replace(with_model(bare, upright.bsp(), **PERSON), trials=[UNMOVED]))
+    alone = asked(MODEL_CHECKS, with_model(bare, upright.bsp(), **PERSON))
+    fitted = asked(MODEL_CHECKS, replace(with_model(bare, upright.bsp(), **PERSON), trials=[UNMOVED]))
     assert [one.severity for one in alone if one.code == "O106"] == [Severity.INFO]
     assert [one.severity for one in fitted if one.code == "O106"] == [Severity.ERROR]
 
@@ -151,7 +151,7 @@ def test_a_model_without_a_foot():
     bsp = upright.bsp()
     rows = [bsp.segments.index(name) for name in without.segments]
     own = BodySegmentParameters.from_table(without.segments, bsp.table()[rows])
-    found = asked(PERSON_QUESTIONS[:1], replace(with_model(without, own), trials=[UNMOVED]))
+    found = asked(MODEL_CHECKS[:1], replace(with_model(without, own), trials=[UNMOVED]))
     assert [(one.code, one.where.part) for one in found] == [("O107", "right foot"), ("O107", "left foot")]
 
 
@@ -173,6 +173,6 @@ def test_models_in_use(file_of, name):
     """None is impossible; those with arms carry them twice, which is known of them."""
     person, codes = KNOWN[name]
     model = read_osim(file_of(name))
-    found = asked(PERSON_QUESTIONS, with_model(model.skeleton, model.bsp, **person))
+    found = asked(MODEL_CHECKS, with_model(model.skeleton, model.bsp, **person))
     assert max(one.severity for one in found) <= Severity.WARNING
     assert {one.code for one in found if one.severity == Severity.WARNING} == codes

@@ -8,7 +8,7 @@ import pytest
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.evidence.horizontal_velocity import force_velocities
 from kinertia.diagnostics.plates.cop_positions import forces_keep_time
-from kinertia.diagnostics.plates.questions import LOADED_QUESTIONS, PLACE_QUESTIONS
+from kinertia.diagnostics.registry import LOADED_CHECKS, PLACE_CHECKS
 from kinertia.diagnostics.runner import asked
 from kinertia.findings.finding import Severity
 from kinertia.model.marker_set import MarkerSet
@@ -47,7 +47,7 @@ def test_drop_landings_of_another_laboratory(recording_of, name):
     """The trunk bends by so much that the pelvis shows 147 N that would accelerate nothing."""
     context = RecordingContext(recording_of(name), LABORATORY)
     assert not context.has_strides
-    found = asked((*PLACE_QUESTIONS, *LOADED_QUESTIONS), context)
+    found = asked((*PLACE_CHECKS, *LOADED_CHECKS), context)
     assert [one.code for one in found if one.severity > Severity.CORRECTED] == []
     assert context.velocities[0].mass_kg == pytest.approx(58.8, rel=0.08)
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinertia.diagnostics.plates.questions import SIGNAL_QUESTIONS, STANDING_QUESTIONS
 from kinertia.diagnostics.plates.signals import mains_interference
+from kinertia.diagnostics.registry import SIGNAL_CHECKS, STANDING_CHECKS
 from kinertia.diagnostics.runner import asked, explained
 from kinertia.findings.finding import Severity
 from kinertia.trial.data import PlateLoads
@@ -32,7 +32,7 @@ def plates(offset=(0.0, 0.0, 0.0), drift_n=0.0, factor=1.0, weight_n=700.0, zero
 
 
 def found(plates, **stated):
-    return explained(asked(SIGNAL_QUESTIONS, plates_alone(plates, **stated)))
+    return explained(asked(SIGNAL_CHECKS, plates_alone(plates, **stated)))
 
 
 def only(plates, **stated):
@@ -236,7 +236,7 @@ def test_a_spike_is_bridged_and_reported(axis, samples, start):
 
 def test_a_spike_while_somebody_stands_is_reported():
     spiked = plates(extra=pulse(1, 900.0))
-    assert codes(asked(STANDING_QUESTIONS, plates_alone(spiked))) == ["P109"]
+    assert codes(asked(STANDING_CHECKS, plates_alone(spiked))) == ["P109"]
 
 
 def test_what_is_no_spike_stays():

@@ -8,9 +8,9 @@ import pytest
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.labels.landmarks import landmarks
 from kinertia.diagnostics.person_context import PersonContext
+from kinertia.diagnostics.registry import SUBJECT_STATIC_CHECKS
 from kinertia.diagnostics.runner import asked
 from kinertia.diagnostics.subject.body_data import stature
-from kinertia.diagnostics.subject.questions import STATIC_QUESTIONS
 from kinertia.diagnostics.subject.standing import flat_feet, floor
 from kinertia.findings.finding import Severity
 from kinertia.io.marker_set_file import choose_marker_set
@@ -48,7 +48,7 @@ def moved(context, positions):
 
 
 def test_the_own_stature_and_floor(standing):
-    assert asked(STATIC_QUESTIONS, standing) == []
+    assert asked(SUBJECT_STATIC_CHECKS, standing) == []
     assert list(floor(person(standing, standing))) == []
 
 
@@ -134,7 +134,7 @@ def test_a_foot_that_does_not_stand_flat(standing, landmark, rise_m):
 def test_a_walk_that_was_given_as_the_static_trial(recording_of):
     walk = recording_of("synthetic/walk.trc")
     marker_set = choose_marker_set(recording_of("synthetic/static.trc").markers.labels)
-    found = asked(STATIC_QUESTIONS, RecordingContext(walk, marker_set, is_static=True))
+    found = asked(SUBJECT_STATIC_CHECKS, RecordingContext(walk, marker_set, is_static=True))
     assert found[0].code == "S201"
     assert found[0].evidence["distance_m"].value > 1.0
 

@@ -6,9 +6,9 @@ from itertools import combinations
 import pytest
 
 from kinertia.diagnostics.context import RecordingContext
+from kinertia.diagnostics.registry import TIMING_PERSON_CHECKS
 from kinertia.diagnostics.runner import asked, explained
 from kinertia.diagnostics.timing.interchanged_forces import interchanged_forces
-from kinertia.diagnostics.timing.questions import PERSON_QUESTIONS
 from kinertia.trial.sampled_time import within
 from trials_of_people import PEOPLE, Trials
 
@@ -69,7 +69,7 @@ def test_an_interchange_does_not_hide_the_delay_of_a_third_trial(person):
     for name in (first, second):
         again = person.context(name)
         trials.append(replace(again, recording=replace(again.recording, name=f"{name} again")))
-    found = explained(asked(PERSON_QUESTIONS, person.together(trials)))
+    found = explained(asked(TIMING_PERSON_CHECKS, person.together(trials)))
     muted = {one.where.trial: one.muted_by for one in found if one.code == "T213"}
     assert muted[third] is None
     assert {by for name, by in muted.items() if name in (first, second)} <= {"S304"}

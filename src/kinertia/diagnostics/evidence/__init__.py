@@ -1,1 +1,1 @@
-"""Computes evidence for several questions: velocities from forces and markers, plate contacts, segment distances."""
+"""Computes evidence for several checks: velocities from forces and markers, plate contacts, segment distances."""

@@ -1,4 +1,4 @@
-"""Holds the subject of questions about a result: the fit, and the person that it was made from."""
+"""Holds the subject of the checks of a result: the fit, and the person that it was made from."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Lists the questions about an estimate, and about a result."""
+"""Lists the checks of an estimate, and of a result, in the order in which they run."""
 
 from kinertia.diagnostics.result.basis import basis, filters
 from kinertia.diagnostics.result.context import ResultContext
@@ -16,34 +16,34 @@ from kinertia.diagnostics.result.plate_errors import (
 from kinertia.diagnostics.result.residuals import joint_angles, residuals
 from kinertia.diagnostics.result.sideways_lean import sideways_lean
 from kinertia.diagnostics.result.soundness import soundness
-from kinertia.diagnostics.runner import Question, asked
+from kinertia.diagnostics.runner import Check, asked
 from kinertia.findings.finding import Finding
 
-ESTIMATE_QUESTIONS: tuple[Question[ResultContext], ...] = (
-    Question("R10", forces_of_the_motion),
-    Question("R20", soundness),
-    Question("P21", zero_offsets),
-    Question("P22", gains),
-    Question("P28", missing_loads),
-    Question("P23", plate_rotation),
-    Question("P24", plate_positions),
-    Question("P24", common_offset),
-    Question("M14", sideways_lean),
-    Question("P26", free_moments),
-    Question("T21", delays),
-    Question("M16", moved_markers),
-    Question("M17", corrected_joints),
-    Question("S11", total_mass),
-    Question("S40", attached_items),
-    Question("R11", filters),
+ESTIMATE_CHECKS: tuple[Check[ResultContext], ...] = (
+    Check("R10", forces_of_the_motion),
+    Check("R20", soundness),
+    Check("P21", zero_offsets),
+    Check("P22", gains),
+    Check("P28", missing_loads),
+    Check("P23", plate_rotation),
+    Check("P24", plate_positions),
+    Check("P24", common_offset),
+    Check("M14", sideways_lean),
+    Check("P26", free_moments),
+    Check("T21", delays),
+    Check("M16", moved_markers),
+    Check("M17", corrected_joints),
+    Check("S11", total_mass),
+    Check("S40", attached_items),
+    Check("R11", filters),
 )
-RESULT_QUESTIONS: tuple[Question[ResultContext], ...] = (
-    Question("R30", residuals),
-    Question("R30", joint_angles),
-    Question("R40", basis),
+RESULT_CHECKS: tuple[Check[ResultContext], ...] = (
+    Check("R30", residuals),
+    Check("R30", joint_angles),
+    Check("R40", basis),
 )
 
 
 def judged(context: ResultContext) -> list[Finding]:
     """Return all findings about an estimate, before explanation by one another or by those of earlier stages."""
-    return asked((*ESTIMATE_QUESTIONS, *RESULT_QUESTIONS), context)
+    return asked((*ESTIMATE_CHECKS, *RESULT_CHECKS), context)

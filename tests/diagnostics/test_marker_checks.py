@@ -3,14 +3,13 @@
 import numpy as np
 import pytest
 
-from kinertia.diagnostics.labels import questions as labels
-from kinertia.diagnostics.markers import questions as markers
+from kinertia.diagnostics.registry import LABEL_MOTION_CHECKS, MARKER_MOTION_CHECKS
 from kinertia.diagnostics.runner import asked, explained
 from kinertia.findings.finding import Severity
 from kinertia.io.marker_set_file import choose_marker_set
 from marker_contexts import changed, context_of
 
-MOTION = (*markers.MOTION_QUESTIONS, *labels.MOTION_QUESTIONS)
+MOTION = (*MARKER_MOTION_CHECKS, *LABEL_MOTION_CHECKS)
 
 
 def frozen(places, time):
