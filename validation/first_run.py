@@ -22,7 +22,7 @@ import gc, json, sys, time
 from collections import defaultdict
 from numba.core import event
 from kinertia.cli.compiling import stored_functions
-from kinertia.model.array_types import argument_types
+from kinertia.model.compiled import argument_types
 
 class Own(event.Listener):
     def __init__(self, name):

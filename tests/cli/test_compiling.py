@@ -10,7 +10,7 @@ from kinertia.motion import workload
 
 _ESTIMATE = """
 from kinertia.cli.compiling import stored_functions
-from kinertia.model.array_types import argument_types
+from kinertia.model.compiled import argument_types
 from kinertia.studies.sensitivity import Scenario, estimate_person
 from kinertia.synthetic.faults import Faults
 

@@ -11,8 +11,8 @@ from command_line import run
 from found import FAULT_FREE, FAULTY, UNUSABLE
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.report.comparison import comparison_columns, differences, moments_figure, remarks, render_comparison
+from kinertia.report.coordinate_titles import same_segment, same_sign
 from kinertia.report.files import save_fit
-from kinertia.report.shared_quantities import same_segment, same_sign
 from report_page import Elements
 
 

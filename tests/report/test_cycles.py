@@ -17,9 +17,9 @@ from kinertia.motion.smoothing import smooth
 from kinertia.report.cycle_figures import cycle_figure, cycle_figures, drawn_curves, mean_curve, usual_mean
 from kinertia.report.cycle_table import stride_rows
 from kinertia.report.files import save_fit
-from kinertia.report.moment_figures import moment_figure
 from kinertia.report.page import render
 from kinertia.report.saved_fit import load_fit
+from kinertia.report.time_figures import moment_figure
 from report_page import Elements
 
 

@@ -16,7 +16,6 @@ from kinertia.report.bsp_figures import change_figure, departure_figure, departu
 from kinertia.report.coordinate_titles import panels_of, title_of
 from kinertia.report.figure import Figure, compact
 from kinertia.report.marker_figures import fit_gap_figure, marker_figure
-from kinertia.report.moment_figures import joint_moment_figure, moment_figure
 from kinertia.report.page import render
 from kinertia.report.panels import Panel, small_multiples
 from kinertia.report.plots import as_plotly
@@ -24,6 +23,8 @@ from kinertia.report.style import BLUE, SIDES, between, faded
 from kinertia.report.time_figures import (
     BAND_EVERY,
     coordinate_figure,
+    joint_moment_figure,
+    moment_figure,
     motion_change,
     residual_figure,
     stage_name,

@@ -17,10 +17,10 @@ from kinertia.diagnostics.result.suitability import Suitability
 from kinertia.io.subject.provenance import provenance_of
 from kinertia.io.subject.reader import read_subject
 from kinertia.model.bsp import BodySegmentParameters
+from kinertia.report.figure import packed_script
 from kinertia.report.finding_view import FindingView
 from kinertia.report.headline import purposes, words
 from kinertia.report.page import bsp_rows, render
-from kinertia.report.plotly_script import packed_script
 from kinertia.report.wording import fixed
 from report_page import Elements, figures_of
 

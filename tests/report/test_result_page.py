@@ -6,8 +6,15 @@ import plotly.graph_objects as go
 import pytest
 
 from kinertia.cli.terminal import print_json
-from kinertia.report.crossval_page import crossval_rows, crossval_sentence, crossval_summary, render_crossval
-from kinertia.report.plan_page import plan_rows, render_plan, save_plan
+from kinertia.report.plan_page import (
+    crossval_rows,
+    crossval_sentence,
+    crossval_summary,
+    plan_rows,
+    render_crossval,
+    render_plan,
+    save_plan,
+)
 from kinertia.report.result_page import Part, render_parts
 from report_page import figures_of
 from study_results import HELD_OUT, PLAN

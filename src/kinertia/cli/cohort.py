@@ -31,7 +31,7 @@ from kinertia.cohort.tables import write_tables
 from kinertia.errors import SettingsError
 from kinertia.estimation.gait_profile import expect_all_nine
 from kinertia.io.norms_file import Norm, read_norms
-from kinertia.io.results.file_lock import sole_use
+from kinertia.io.results.working_folder import sole_use
 
 _LOCK = ".kinertia-cohort.lock"
 _MOST_SHOWN = 20

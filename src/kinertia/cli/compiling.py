@@ -96,7 +96,7 @@ def _divided(functions: Sequence[Any], count: int, longer: float) -> list[list[A
 
 def _compiled(functions: Sequence[Any]) -> Iterator[float]:
     """Compile functions, or load what is stored of them; yield the share done after each."""
-    from kinertia.model.array_types import argument_types
+    from kinertia.model.compiled import argument_types
 
     gc.disable()  # compiling makes millions of lasting objects, and looking for garbage there takes a tenth of its time
     try:

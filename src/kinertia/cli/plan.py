@@ -9,14 +9,18 @@ from kinertia.cli.options import Output, Overwrite, Quiet, results_folder
 from kinertia.cli.outcome import Outcome
 from kinertia.cli.terminal import out, plain_table, shown_progress
 from kinertia.io.subject.reader import read_subject
-from kinertia.report.crossval_page import (
+from kinertia.report.plan_page import (
     CROSSVAL_HEADINGS,
+    PLAN_CAPTION,
+    PLAN_HEADINGS,
     crossval_rows,
     crossval_sentence,
     crossval_summary,
+    plan_rows,
+    plan_summary,
     save_crossval,
+    save_plan,
 )
-from kinertia.report.plan_page import PLAN_CAPTION, PLAN_HEADINGS, plan_rows, plan_summary, save_plan
 from kinertia.report.wording import start_of
 from kinertia.studies.cross_validation import cross_validate
 from kinertia.studies.plan import plan as plan_motions

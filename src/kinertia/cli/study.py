@@ -13,9 +13,15 @@ from kinertia.cli.terminal import out, plain_table, shown_progress
 from kinertia.io.subject.reader import read_subject
 from kinertia.report.matplotlib_extra import HOW, has_matplotlib
 from kinertia.report.sensitivity import save_sensitivity, sensitivity_summary
-from kinertia.report.table1 import save_table1, table1_rows, table1_summary
-from kinertia.report.table1_variants import HEADINGS as VARIANT_HEADINGS
-from kinertia.report.table1_variants import save_variants, variants_frame, variants_rows
+from kinertia.report.table1 import HEADINGS as VARIANT_HEADINGS
+from kinertia.report.table1 import (
+    save_table1,
+    save_variants,
+    table1_rows,
+    table1_summary,
+    variants_frame,
+    variants_rows,
+)
 from kinertia.studies.sensitivity import KINDS, run_sensitivity
 from kinertia.studies.table1 import CONDITIONS, Table1, measured_trial, run_table1, study_trial
 from kinertia.studies.table1_variants import run_variants

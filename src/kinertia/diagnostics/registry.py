@@ -45,7 +45,7 @@ from kinertia.diagnostics.plates.ground_contact import (
     stray_loads,
 )
 from kinertia.diagnostics.plates.plate_height import plate_heights
-from kinertia.diagnostics.plates.repeated_plates import repeated_plates
+from kinertia.diagnostics.plates.plate_positions import repeated_plates
 from kinertia.diagnostics.plates.signals import dead_moments, mains_interference, quantisation, signals, spikes
 from kinertia.diagnostics.plates.zeros import unloaded_levels, zeros, zeros_under_load
 from kinertia.diagnostics.runner import Check
@@ -53,14 +53,12 @@ from kinertia.diagnostics.subject.body_data import absent_markers, population, s
 from kinertia.diagnostics.subject.camera_scale import trial_scales
 from kinertia.diagnostics.subject.mass import masses_of_trials, stated_mass
 from kinertia.diagnostics.subject.movements import informative_movements
-from kinertia.diagnostics.subject.repeated_trials import repeated_trials
-from kinertia.diagnostics.subject.same_person import static_and_trials, trials_of_one_person
+from kinertia.diagnostics.subject.same_person import repeated_trials, static_and_trials, trials_of_one_person
 from kinertia.diagnostics.subject.stance_coverage import stance_coverage
 from kinertia.diagnostics.subject.standing import flat_feet, floor, no_static, standing
 from kinertia.diagnostics.timing.belt_speed import belt_speed
-from kinertia.diagnostics.timing.delays import plate_delay, trial_delays
 from kinertia.diagnostics.timing.file_events import file_events
-from kinertia.diagnostics.timing.force_rate import force_rate
+from kinertia.diagnostics.timing.force_timing import force_rate, plate_delay, trial_delays
 from kinertia.diagnostics.timing.interchanged_forces import interchanged_forces
 
 _SIZE = "M141"

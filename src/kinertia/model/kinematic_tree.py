@@ -9,8 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kinertia.model.array_types import Bool1, Float2, Float3, Int1
-from kinertia.model.compiled import compiled, inlined, part
+from kinertia.model.compiled import Bool1, Float2, Float3, Int1, compiled, inlined, part
 
 
 class KinematicTree(NamedTuple):

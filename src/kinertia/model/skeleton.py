@@ -20,10 +20,9 @@ from scipy.spatial.transform import Rotation
 
 from kinertia.model.axis_functions import AxisFunction
 from kinertia.model.bsp import BodySegmentParameters, transformed_parameters
-from kinertia.model.coordinate_map import CoordinateMap
+from kinertia.model.coordinate_map import CoordinateMap, Root
 from kinertia.model.coordinate_range import ANYTHING, Bounds, Range
 from kinertia.model.kinematic_tree import KinematicTree, poses
-from kinertia.model.root_joint import Root
 
 GRAVITY_M_S2 = 9.80665
 """Standard gravity; OpenSim's default models use 9.80665 or 9.8066."""

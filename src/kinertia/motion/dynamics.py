@@ -1,6 +1,6 @@
 """Computes root equations of motion, their regressor and derivatives, and inverse dynamics of all joints.
 
-The root is the pelvis: three translations, then three rotations (`kinertia.model.root_joint`), the free coordinates f;
+The root is the pelvis: three translations, then three rotations (`coordinate_map.Root`), the free coordinates f;
 all others, p, are prescribed. The root equations of motion, taken as force and moment about the pelvis origin in ground
 axes, are
 

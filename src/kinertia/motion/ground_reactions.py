@@ -18,8 +18,7 @@ from typing import Self
 
 import numpy as np
 
-from kinertia.model.array_types import Float1, Float3, Int1
-from kinertia.model.compiled import compiled, part
+from kinertia.model.compiled import Float1, Float3, Int1, compiled, part
 from kinertia.motion.kinematics import Kinematics
 from kinertia.motion.moving_windows import gaussian_mean
 from kinertia.motion.smoothing import smooth

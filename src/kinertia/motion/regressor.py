@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from kinertia.model.array_types import Float2
-from kinertia.model.compiled import compiled, part
+from kinertia.model.compiled import Float2, compiled, part
 from kinertia.model.kinematic_tree import KinematicTree, place_segments
 from kinertia.motion.rigid_body import empty_frame, move
 

@@ -25,8 +25,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kinertia.model.array_types import Bool1, Float2
-from kinertia.model.compiled import compiled, inlined, part
+from kinertia.model.compiled import Bool1, Float2, compiled, inlined, part
 from kinertia.model.kinematic_tree import KinematicTree, hand_down, place_axes
 from kinertia.model.spatial import force_cross, inner, motion_cross
 

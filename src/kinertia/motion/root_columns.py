@@ -8,8 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from kinertia.model.array_types import Float2, Float3, Int1
-from kinertia.model.compiled import compiled, part
+from kinertia.model.compiled import Float2, Float3, Int1, compiled, part
 from kinertia.model.kinematic_tree import KinematicTree, place_segments
 from kinertia.motion.regressor import in_segment, own_regressor
 from kinertia.motion.rigid_body import Frame, differentiate, empty_frame, fill, taken_about, whole_load

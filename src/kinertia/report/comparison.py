@@ -15,14 +15,13 @@ from kinertia.estimation.result import Fit
 from kinertia.model.bsp import PARAMETERS, UNITS
 from kinertia.report import style
 from kinertia.report.bsp_figures import NAMES, segment_name
-from kinertia.report.coordinate_titles import load_title, panels_of
+from kinertia.report.coordinate_titles import load_title, panels_of, same_segment, same_sign
 from kinertia.report.cycle_figures import estimated_curves, mean_curve, mean_line
 from kinertia.report.cycle_table import stride_rows
 from kinertia.report.figure import Figure, written
 from kinertia.report.file_outputs import outputs_summary, outputs_view
 from kinertia.report.panels import Panel, plain, small_multiples
 from kinertia.report.rendering import rendered
-from kinertia.report.shared_quantities import same_segment, same_sign
 from kinertia.report.time_figures import MOST_FRAMES
 from kinertia.report.wording import INTERVAL_SD, decimals, fixed, read_in
 from kinertia.trial.data import FEET

@@ -3,22 +3,102 @@
 from kinertia.estimation.gait_profile import gait_profile
 from kinertia.estimation.result import Fit
 from kinertia.estimation.trial_fit import TrialFit
+from kinertia.findings.finding import Severity
 from kinertia.io.norms_file import read_norms
 from kinertia.report.datasets import curve_dataset, draw_dataset
 from kinertia.report.files import save_fit
+from kinertia.report.finding_view import lines
 from kinertia.report.journal_figure import save_figure
-from kinertia.report.notebook import fit_html, recording_html, trial_fit_html, trial_html
+from kinertia.report.page import bsp_rows, residual_rows
 from kinertia.report.plots import FitFigures, as_plotly
+from kinertia.report.rendering import rendered
+from kinertia.report.wording import start_of
 from kinertia.trial import display
-from kinertia.trial.data import Recording, Trial
+from kinertia.trial.data import LOAD_THRESHOLD_N, Markers, Recording, Trial
+from kinertia.trial.rms import rms
+
+
+def fit_html(fit: Fit) -> str:
+    """Show verdict, findings, residuals and body segment parameters."""
+    return rendered(
+        "notebook_fit.html.j2",
+        fit=fit,
+        found=lines(fit.findings),
+        residuals=residual_rows(fit.trials),
+        start=start_of(fit).word,
+        rows=bsp_rows(fit),
+        information=fit.posterior is not None,
+    )
+
+
+def trial_html(trial: Trial) -> str:
+    """Show frames, markers and their gaps, measured windows, peak vertical force under each foot, and findings."""
+    peaks = trial.loads.force[:, :, 1].max(axis=0, initial=0.0)
+    return rendered(
+        "notebook_trial.html.j2",
+        trial=trial,
+        found=lines(trial.findings, Severity.INFO),
+        gappy=_gappy(trial.markers),
+        peaks=[float(peak) if peak > LOAD_THRESHOLD_N else None for peak in peaks],
+    )
+
+
+def trial_fit_html(trial: TrialFit) -> str:
+    """Show window, distances of the markers, residuals before and after, and computing time."""
+    return rendered(
+        "notebook_trial_fit.html.j2",
+        trial=trial,
+        errors_mm={stage: 1e3 * rms(errors) for stage, errors in trial.marker_errors_m.items()},
+        residuals=residual_rows([trial]),
+        start="before",  # a trial does not know whether that was the literature or a model
+    )
+
+
+def recording_html(recording: Recording) -> str:
+    """Show frames, markers and gaps, plates and the largest force on each, known data of the person, and findings."""
+    plates = recording.plates
+    peaks = [] if plates is None else plates.force[:, :, 1].max(axis=0, initial=0.0)
+    return rendered(
+        "notebook_recording.html.j2",
+        recording=recording,
+        found=lines(recording.findings, Severity.INFO),
+        gappy=_gappy(recording.markers),
+        peaks=[] if plates is None else [(name, float(peak)) for name, peak in zip(plates.names, peaks, strict=True)],
+    )
+
+
+def _gappy(markers: Markers) -> list[tuple[str, float]]:
+    """Return labels of markers that are not always visible, with the percentage of frames with them, lowest first."""
+    seen = markers.seen.mean(axis=0)
+    shares = [(label, 100 * float(share)) for label, share in zip(markers.labels, seen, strict=True) if share < 1]
+    return sorted(shares, key=lambda item: item[1])
+
 
 display.html.register(Recording, recording_html)
+
+
 display.html.register(Trial, trial_html)
+
+
 display.html.register(TrialFit, trial_fit_html)
+
+
 display.html.register(Fit, fit_html)
+
+
 display.pictures.register(Fit, lambda fit: FitFigures(fit, as_plotly))
+
+
 display.save.register(Fit, save_fit)
+
+
 display.figure.register(Fit, save_figure)
+
+
 display.dataset.register(Fit, curve_dataset)
+
+
 display.draws.register(Fit, draw_dataset)
+
+
 display.gait_profile.register(Fit, lambda fit, norms: gait_profile(fit, read_norms(norms)))

@@ -4,18 +4,21 @@ plotly.js is in the page once, compressed; its policy (Content-Security-Policy) 
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from kinertia.estimation.forces_used import forces_used, full_bandwidth
+from kinertia.estimation.gait_profile import gait_profile
 from kinertia.estimation.identifiability import evidence
 from kinertia.estimation.leg_moments import coverage_sentence, gaps_sentence
 from kinertia.estimation.mean_cycles import fits_by_task, main_task
 from kinertia.estimation.result import Fit
 from kinertia.estimation.simultaneous.calibration_entry import SHOWN_UNIT, item_text, quantity_text
 from kinertia.estimation.trial_fit import TrialFit
+from kinertia.io.norms_file import Norm
 from kinertia.io.subject.provenance import Provenance
 from kinertia.io.versions import versions
 from kinertia.model.bsp import PARAMETERS, BodySegmentParameters
@@ -46,10 +49,8 @@ from kinertia.report.cycle_table import peak_rows, stride_rows
 from kinertia.report.figure import Figure, written
 from kinertia.report.file_outputs import outputs_view
 from kinertia.report.finding_view import FindingView
-from kinertia.report.gait_profile_view import profile_view
 from kinertia.report.headline import held_sentence, hidden_combinations, words
 from kinertia.report.marker_figures import fit_gap_figure, marker_figure
-from kinertia.report.moment_figures import joint_moment_figure, moment_figure
 from kinertia.report.rendering import rendered
 from kinertia.report.scene import view
 from kinertia.report.skeleton_view import scene
@@ -58,10 +59,13 @@ from kinertia.report.time_figures import (
     MOST_FRAMES,
     bandwidths,
     coordinate_figure,
+    joint_moment_figure,
+    moment_figure,
     residual_figure,
 )
 from kinertia.report.truth_comparison import Truth, truth_rows
 from kinertia.report.wording import INTERVAL_SD, asymmetry_sentences, decimals, expected_of, fixed, read_in, start_of
+from kinertia.trial.data import FEET
 from kinertia.trial.gait_events import gait_events
 from kinertia.trial.rms import rms_by_marker, rms_length
 from kinertia.trial.sampled_time import runs
@@ -290,3 +294,45 @@ def _marker_rows(trial: TrialFit, sd_m: Mapping[str, float], drifting: tuple[str
             }
         )
     return rows
+
+
+class ScoreRow(NamedTuple):
+    """One variable in words, with its score per side, degrees."""
+
+    variable: str
+    right: str
+    left: str
+
+
+@dataclass(frozen=True)
+class ProfileView:
+    """Gait profile scores in words.
+
+    Attributes:
+        rows: the nine variables, then the score of each side.
+        overall: score of the person, degrees.
+        norm_people: number of people in the norms, if the file states it.
+        remarks: sentences on differences between the norms' people and this person.
+    """
+
+    rows: tuple[ScoreRow, ...]
+    overall: str
+    norm_people: int | None
+    remarks: tuple[str, ...]
+
+
+def profile_view(fit: Fit, norms: Mapping[str, Norm]) -> ProfileView | None:
+    """Compute scores against these norms; None where they lack one of the nine variables."""
+    if not set(CLINICAL_ANGLES) <= set(norms):
+        return None
+    profile = gait_profile(fit, norms)
+    rows = [
+        ScoreRow(one.title, *(_degrees(profile.gvs_deg[quantity, side]) for side in FEET))
+        for quantity, one in CLINICAL_ANGLES.items()
+    ]
+    rows.append(ScoreRow("Gait Profile Score", *(_degrees(profile.gps_deg[side]) for side in FEET)))
+    return ProfileView(tuple(rows), _degrees(profile.overall_deg), profile.norm_people, profile.remarks)
+
+
+def _degrees(value: float) -> str:
+    return f"{value:.1f}" if np.isfinite(value) else "–"

@@ -17,10 +17,9 @@ from kinertia.report.bsp_figures import change_figure, departure_figure, informa
 from kinertia.report.cycle_figures import cycle_figure
 from kinertia.report.figure import Figure
 from kinertia.report.marker_figures import fit_gap_figure, marker_figure
-from kinertia.report.moment_figures import moment_figure
 from kinertia.report.panels import plain, sentence_figure
 from kinertia.report.skeleton_view import skeleton_figure
-from kinertia.report.time_figures import coordinate_figure, residual_figure
+from kinertia.report.time_figures import coordinate_figure, moment_figure, residual_figure
 from kinertia.report.wording import start_of
 
 if TYPE_CHECKING:

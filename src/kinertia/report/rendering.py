@@ -13,8 +13,8 @@ from markupsafe import Markup
 
 from kinertia.findings.display import outlined
 from kinertia.io.versions import VERSION
+from kinertia.report.figure import packed_script
 from kinertia.report.finding_view import LOOKS, linked, unbroken
-from kinertia.report.plotly_script import packed_script
 from kinertia.report.wording import fixed
 
 

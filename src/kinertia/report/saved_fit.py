@@ -13,11 +13,10 @@ from kinertia.estimation.simultaneous.fit import Posterior
 from kinertia.estimation.simultaneous.instruments.priors import InstrumentInformation
 from kinertia.estimation.simultaneous.markers.marker_noise import MarkerNoise
 from kinertia.estimation.simultaneous.uncertainty.curve_deviations import CurveDeviations
-from kinertia.estimation.simultaneous.uncertainty.mass_asymmetry import OneSided
 from kinertia.estimation.simultaneous.uncertainty.missing_load_evidence import MissingLoad
 from kinertia.estimation.simultaneous.uncertainty.model_evidence import FreeMomentSign
 from kinertia.estimation.simultaneous.uncertainty.posterior_draws import PosteriorDraws, TrialDraws
-from kinertia.estimation.simultaneous.uncertainty.prior_plausibility import Unlikeness
+from kinertia.estimation.simultaneous.uncertainty.prior_plausibility import OneSided, Unlikeness
 from kinertia.estimation.trial_fit import TrialFit
 from kinertia.findings.finding import Finding
 from kinertia.findings.quantity import Quantity

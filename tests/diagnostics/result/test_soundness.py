@@ -9,8 +9,7 @@ import pytest
 from kinertia.diagnostics.result.context import ResultContext
 from kinertia.diagnostics.result.soundness import soundness
 from kinertia.diagnostics.runner import explained
-from kinertia.estimation.simultaneous.uncertainty.mass_asymmetry import OneSided
-from kinertia.estimation.simultaneous.uncertainty.prior_plausibility import Unlikeness
+from kinertia.estimation.simultaneous.uncertainty.prior_plausibility import OneSided, Unlikeness
 from kinertia.model.bsp import BodySegmentParameters
 from results import codes
 

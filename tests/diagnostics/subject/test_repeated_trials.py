@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kinertia.diagnostics.subject.repeated_trials import repeated_trials
+from kinertia.diagnostics.subject.same_person import repeated_trials
 from people import person
 from recordings import WALKS
 

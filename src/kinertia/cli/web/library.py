@@ -23,9 +23,8 @@ from typing import Any
 from kinertia.cohort.record import inputs_of
 from kinertia.errors import FileError, KinertiaError
 from kinertia.io.file_names import fits_everywhere, same_folder
-from kinertia.io.results.file_lock import sole_use
 from kinertia.io.results.output_folder import check_folder, write_then_rename
-from kinertia.io.results.working_folder import sweep
+from kinertia.io.results.working_folder import sole_use, sweep
 from kinertia.io.subject.provenance import sha256
 from kinertia.io.subject.reader import read_subject
 

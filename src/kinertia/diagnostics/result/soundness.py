@@ -10,8 +10,7 @@ import numpy as np
 
 from kinertia.diagnostics.result.context import ResultContext
 from kinertia.estimation.result import Fit
-from kinertia.estimation.simultaneous.uncertainty.mass_asymmetry import OneSided
-from kinertia.estimation.simultaneous.uncertainty.prior_plausibility import UNLIKE_CHANCE, Unlikeness
+from kinertia.estimation.simultaneous.uncertainty.prior_plausibility import UNLIKE_CHANCE, OneSided, Unlikeness
 from kinertia.findings.display import first_few
 from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.quantity import Quantity
@@ -30,7 +29,7 @@ CONTRADICTING_COM_M = 0.1
 """A centre of mass this far from the literature contradicts it, if no prior states the variation between people: 34 mm
 (SD) for a trunk."""
 _ONE_SIDED_SD = 4.0
-"""As in `mass_asymmetry`."""
+"""As in `one_sided`."""
 _ARMS = ("upper_arm", "forearm", "hand")
 _WRONG = "a misplaced marker or joint centre, or an error of a plate"
 _WORN = "something worn or carried that was not declared ([[attached]])"

@@ -1,4 +1,4 @@
-"""Makes a hidden folder for unfinished results, locked while its process lives.
+"""Makes a hidden folder for unfinished results, locked while its process lives; locks files for one process.
 
 A killed process cannot clean up, but the system releases its lock: an unlocked folder is no longer needed.
 """
@@ -14,7 +14,12 @@ from typing import TYPE_CHECKING
 from uuid import uuid4
 
 from kinertia.errors import FileError
-from kinertia.io.results.file_lock import locked
+
+if TYPE_CHECKING:
+    from filelock import FileLock
+import json
+import platform
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from filelock import FileLock
@@ -67,3 +72,47 @@ def _remove(folder: Path, lock: FileLock) -> None:
     shutil.rmtree(folder, ignore_errors=True)
     lock.release()
     shutil.rmtree(folder, ignore_errors=True)  # Windows removes no file that is open
+
+
+def locked(path: Path) -> FileLock | None:
+    """Lock a file, created if necessary, until the lock is released; None where another process holds it.
+
+    None also where no file can be created, or a network drive does not support locks.
+    """
+    from filelock import FileLock, Timeout  # takes 40 ms to load
+
+    lock = FileLock(path, timeout=0)
+    try:
+        lock.acquire()
+    except (Timeout, OSError, NotImplementedError):
+        return None
+    return lock
+
+
+@contextmanager
+def sole_use(path: Path, what: str) -> Iterator[None]:
+    """Ensure that no other process works on `what` during the block; a file beside the lock at `path` states which one
+    does.
+
+    Raises:
+        FileError: another process does, on this computer or on another with the same drive.
+    """
+    holder = path.with_name(f"{path.name}.holder")
+    lock = locked(path)
+    if lock is None:
+        raise FileError(path, f"{what} is in use{_by(holder)}; wait until that run has ended, or give another folder")
+    try:
+        holder.write_text(json.dumps({"pid": os.getpid(), "host": platform.node()}), encoding="utf-8")
+        yield
+    finally:
+        holder.unlink(missing_ok=True)
+        lock.release()
+
+
+def _by(holder: Path) -> str:
+    """Return the stated holder of the lock."""
+    try:
+        known = json.loads(holder.read_text(encoding="utf-8"))
+        return f" by process {known['pid']} on {known['host']}"
+    except (OSError, ValueError, KeyError, TypeError):
+        return " (or its drive cannot be written to, or does not support locks)"

@@ -7,8 +7,7 @@ the gain. The errors of a plate are a row of seven: PLATE_ERRORS, then ZERO_UNKN
 
 import numpy as np
 
-from kinertia.model.array_types import Float2, Float3, Int2
-from kinertia.model.compiled import compiled, part
+from kinertia.model.compiled import Float2, Float3, Int2, compiled, part
 
 X, Z, GAIN, FREE_MOMENT, TURN, ZERO_X, ZERO_Z = range(7)
 """Indices of a plate's errors."""

@@ -18,16 +18,14 @@ from typing import Self
 import numpy as np
 
 from kinertia.estimation.simultaneous.linear_algebra.arrays_on_disk import KeptArrays
-from kinertia.estimation.simultaneous.linear_algebra.blas import solve_lower
-from kinertia.estimation.simultaneous.linear_algebra.block_tridiagonal import BlockBand
+from kinertia.estimation.simultaneous.linear_algebra.block_tridiagonal import BlockBand, solve_lower
 from kinertia.estimation.simultaneous.linear_algebra.frame_blocks import TimeBlock, halves
 from kinertia.estimation.simultaneous.linear_algebra.normal_equations import (
     SPLINES_PER_BLOCK,
     Gradient,
     NormalEquations,
 )
-from kinertia.model.array_types import Float4
-from kinertia.model.compiled import compiled
+from kinertia.model.compiled import Float4, compiled
 from kinertia.motion.workload import side_by_side
 
 UNSAFE = 1e4

@@ -1,21 +1,23 @@
-"""Accumulates the normal equations of a trial's motion and of static unknowns, knot interval by knot interval."""
+"""Accumulates the normal equations of a trial's motion and of static unknowns, knot interval by knot interval.
+
+The same six splines are active in all frames of an interval, and seven with the two frames after it.
+"""
 
 from dataclasses import dataclass
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 
-from kinertia.model.array_types import Float3, Float4, Single4
-from kinertia.model.compiled import compiled
+from kinertia.estimation.simultaneous.markers.marker_errors import LATER
+from kinertia.model.compiled import Float3, Float4, Single4, compiled, inlined, part
 
 SPLINES_PER_BLOCK = 6
 """A frame and the two after it involve seven splines: each is coupled at most to the six after it, and so at most to
 the next block."""
-
-
 NO_BORDER = np.zeros((2, 2, 2))[..., :1]
 """Placeholder for compiled functions, of the array type that they take: a part of a larger array. An array without
 columns would be of another type, for which they would be compiled once more."""
+_TOGETHER = SPLINES_PER_BLOCK + 1
 
 
 @dataclass
@@ -125,3 +127,124 @@ def write_by_splines(values: Float3, q: Float3, qd: Float3, qdd: Float3, out: Fl
                 for j in range(c):
                     total = place * q[k, row, j] + rate * qd[k, row, j]
                     out[k, row, i, j] = total + acceleration * qdd[k, row, j]
+
+
+class Interval(NamedTuple):
+    """Terms of the frames of a knot interval, and of the two frames after them.
+
+    Attributes:
+        squares: (5 f, c c) J^T W J of each frame with itself, f frames with the next, the latter transposed, and the
+            same with the second after it.
+        across: (f + 2, c, s) J^T W S.
+        gradient: (f, c) J^T W r.
+    """
+
+    squares: np.ndarray
+    across: np.ndarray
+    gradient: np.ndarray
+
+
+@part
+def longest_run(first: np.ndarray) -> int:
+    """Return the largest number of frames in an interval."""
+    longest, run = 1, 1
+    for k in range(1, len(first)):
+        run = run + 1 if first[k] == first[k - 1] else 1
+        longest = max(longest, run)
+    return longest
+
+
+@part
+def to_splines(
+    first: np.ndarray,
+    values: np.ndarray,
+    start: int,
+    end: int,
+    interval: Interval,
+    reach: np.ndarray,
+    band: np.ndarray,
+    border: np.ndarray,
+    rhs: np.ndarray,
+    bordered: bool,
+) -> None:
+    """Weight the terms of an interval with pairs of the active splines.
+
+    `reach` (c, r, 2) are the runs of columns of S that each coordinate is coupled to. Terms across the frames after the
+    interval are left for the next one. The border is left out if not `bordered`.
+    """
+    n, size, c, at, most = len(first), len(band), rhs.shape[1], first[start], len(interval.gradient)
+    own = np.zeros((1 + LATER, most, _TOGETHER))
+    for k in range(start, end):
+        for later in range(min(LATER, n - 1 - k) + 1):
+            for i in range(6):
+                own[later, k - start, first[k + later] - at + i] = values[k + later, i]
+        for i in range(6):
+            for j in range(c):
+                rhs[at + i, j] += own[0, k - start, i] * interval.gradient[k - start, j]
+    products, pair = np.dot(_pair_weights(own), interval.squares), 0
+    for i in range(_TOGETHER):
+        for j in range(i, _TOGETHER):
+            if at + j < size:
+                block = band[at + i, j - i]
+                for row in range(c):
+                    for column in range(c):
+                        block[row, column] += products[pair, row * c + column]
+            pair += 1
+    for j in range(c if bordered else 0):
+        for run in range(reach.shape[1]):
+            begin, stop = reach[j, run, 0], reach[j, run, 1]
+            if begin < stop:
+                for i in range(6):
+                    _weigh(own[0, :, i], end - start, interval.across[:, j, begin:stop], border[at + i, j, begin:stop])
+                _pass_on(end - start, interval.across[:, j, begin:stop])
+
+
+@inlined
+def _weigh(weights: np.ndarray, count: int, across: np.ndarray, border: np.ndarray) -> None:
+    """Add the weighted terms (f, s) of so many frames, four at a time."""
+    k = 0
+    while k + 4 <= count:
+        w0, w1, w2, w3 = weights[k], weights[k + 1], weights[k + 2], weights[k + 3]
+        for s in range(len(border)):
+            border[s] += w0 * across[k, s] + w1 * across[k + 1, s] + w2 * across[k + 2, s] + w3 * across[k + 3, s]
+        k += 4
+    while k < count:
+        for s in range(len(border)):
+            border[s] += weights[k] * across[k, s]
+        k += 1
+
+
+@inlined
+def _pass_on(count: int, across: np.ndarray) -> None:
+    """Move the terms of the frames after an interval of `count` frames to the next interval, followed by zeros."""
+    for row in range(min(count + LATER, len(across))):
+        for s in range(across.shape[1]):
+            across[row, s] = across[count + row, s] if row < LATER else 0.0
+
+
+@part
+def _pair_weights(own: np.ndarray) -> np.ndarray:
+    """Compute weights (28, 5 f) of `Interval.squares` for each pair of splines, the second not before the first.
+
+    They come from the splines (3, f, 7) in each frame and in the two after it.
+    """
+    most, pair = own.shape[1], 0
+    weights = np.empty((_TOGETHER * (_TOGETHER + 1) // 2, (1 + 2 * LATER) * most))
+    for i in range(_TOGETHER):
+        for j in range(i, _TOGETHER):
+            for k in range(most):
+                weights[pair, k] = own[0, k, i] * own[0, k, j]
+                for later in range(1, LATER + 1):
+                    weights[pair, (2 * later - 1) * most + k] = own[0, k, i] * own[later, k, j]
+                    weights[pair, 2 * later * most + k] = own[later, k, i] * own[0, k, j]
+            pair += 1
+    return weights
+
+
+@part
+def to_border(at: int, weights: np.ndarray, across: np.ndarray, border: np.ndarray) -> None:
+    """Weight terms (c, s) of a frame with the six splines from `at` on."""
+    for i in range(6):
+        for j in range(across.shape[0]):
+            for s in range(across.shape[1]):
+                border[at + i, j, s] += weights[i] * across[j, s]

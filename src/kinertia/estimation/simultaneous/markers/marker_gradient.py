@@ -4,8 +4,7 @@ import numpy as np
 
 from kinertia.estimation.simultaneous.markers.marker_errors import LATER
 from kinertia.estimation.simultaneous.markers.visible_markers import PlacedMarkers, SeenMarkers, place_markers
-from kinertia.model.array_types import Float1, Float2, Int1
-from kinertia.model.compiled import compiled, part
+from kinertia.model.compiled import Float1, Float2, Int1, compiled, part
 from kinertia.model.kinematic_tree import hand_down
 from kinertia.model.spatial import inner
 from kinertia.motion.marker_sums import add_force

@@ -6,8 +6,7 @@ import numpy as np
 
 from kinertia.estimation.simultaneous.markers.marker_errors import ErrorInformation, ErrorProcess
 from kinertia.estimation.simultaneous.markers.skin import SkinPatterns
-from kinertia.model.array_types import Float2, Float3, Int1
-from kinertia.model.compiled import part
+from kinertia.model.compiled import Float2, Float3, Int1, part
 from kinertia.model.kinematic_tree import KinematicTree, place_axes
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.marker_sums import place_marker

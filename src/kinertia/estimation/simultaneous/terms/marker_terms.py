@@ -12,9 +12,16 @@ from typing import NamedTuple
 import numpy as np
 
 from kinertia.estimation.simultaneous.linear_algebra.frame_blocks import TimeBlock
-from kinertia.estimation.simultaneous.linear_algebra.knot_interval import Interval, longest_run, to_border, to_splines
 from kinertia.estimation.simultaneous.linear_algebra.motion_basis import MotionBasis
-from kinertia.estimation.simultaneous.linear_algebra.normal_equations import NO_BORDER, Gradient, NormalEquations
+from kinertia.estimation.simultaneous.linear_algebra.normal_equations import (
+    NO_BORDER,
+    Gradient,
+    Interval,
+    NormalEquations,
+    longest_run,
+    to_border,
+    to_splines,
+)
 from kinertia.estimation.simultaneous.markers.marker_errors import LATER
 from kinertia.estimation.simultaneous.markers.marker_gradient import add_gradient
 from kinertia.estimation.simultaneous.markers.visible_markers import (
@@ -24,8 +31,7 @@ from kinertia.estimation.simultaneous.markers.visible_markers import (
     seen_markers,
 )
 from kinertia.estimation.simultaneous.terms.cost_term import CostTerm, InTrial
-from kinertia.model.array_types import Float1, Float2, Float4, Int1, StridedFloat2, StridedFloat3
-from kinertia.model.compiled import compiled, inlined, part
+from kinertia.model.compiled import Float1, Float2, Float4, Int1, StridedFloat2, StridedFloat3, compiled, inlined, part
 from kinertia.model.kinematic_tree import hand_down
 from kinertia.model.spatial import inner
 from kinertia.motion.marker_sums import add_force, add_marker, met_force, swapped

@@ -11,8 +11,7 @@ moves, instead of I and B.
 
 import numpy as np
 
-from kinertia.model.array_types import Float1, Float2, Float3, Int1
-from kinertia.model.compiled import compiled, part
+from kinertia.model.compiled import Float1, Float2, Float3, Int1, compiled, part
 from kinertia.model.kinematic_tree import KinematicTree, hand_down, place_segments
 from kinertia.model.spatial import force_cross, inner, motion_cross
 from kinertia.motion.regressor import in_segment

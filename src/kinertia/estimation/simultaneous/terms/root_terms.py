@@ -16,9 +16,8 @@ from kinertia.estimation.simultaneous.linear_algebra.normal_equations import (
     write_by_splines,
 )
 from kinertia.estimation.simultaneous.terms.root_gradient import add_root_gradient
-from kinertia.model.array_types import Float2, Float4, Int1, StridedFloat3
 from kinertia.model.bsp import BodySegmentParameters
-from kinertia.model.compiled import compiled
+from kinertia.model.compiled import Float2, Float4, Int1, StridedFloat3, compiled
 from kinertia.model.kinematic_tree import KinematicTree
 from kinertia.model.log_cholesky import dynamic_jacobian
 from kinertia.model.skeleton import Skeleton

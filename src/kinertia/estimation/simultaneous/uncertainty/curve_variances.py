@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from kinertia.model.array_types import Float1, Float3, Single2, Single3, StridedFloat2, StridedFloat3
-from kinertia.model.compiled import compiled_sums
+from kinertia.model.compiled import Float1, Float3, Single2, Single3, StridedFloat2, StridedFloat3, compiled_sums
 
 
 @compiled_sums

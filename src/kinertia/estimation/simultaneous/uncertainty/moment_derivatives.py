@@ -13,9 +13,8 @@ import numpy as np
 
 from kinertia.estimation.simultaneous.inputs import BSP, STILL
 from kinertia.estimation.simultaneous.search.problem import MapProblem
-from kinertia.estimation.simultaneous.uncertainty.axis_columns import add_bodies, take_load
 from kinertia.estimation.simultaneous.uncertainty.delayed_loads import DelayedLoads, delayed_loads
-from kinertia.estimation.simultaneous.uncertainty.joint_rows import JointRows
+from kinertia.estimation.simultaneous.uncertainty.joint_rows import JointRows, add_bodies, take_load
 from kinertia.model.log_cholesky import dynamic_jacobian
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.dynamics import Motion, axis_motion

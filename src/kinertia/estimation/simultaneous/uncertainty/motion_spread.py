@@ -10,8 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kinertia.estimation.simultaneous.linear_algebra.blas import solve_lower
-from kinertia.estimation.simultaneous.linear_algebra.block_tridiagonal import BlockBand
+from kinertia.estimation.simultaneous.linear_algebra.block_tridiagonal import BlockBand, solve_lower
 from kinertia.estimation.simultaneous.linear_algebra.elimination import Factored
 from kinertia.estimation.simultaneous.linear_algebra.frame_blocks import TimeBlock
 from kinertia.estimation.simultaneous.linear_algebra.normal_equations import SPLINES_PER_BLOCK

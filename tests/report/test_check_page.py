@@ -10,9 +10,8 @@ from hypothesis import strategies as st
 
 from kinertia.findings.overview import Overview
 from kinertia.io.recording import read_recording
-from kinertia.report.check_figures import extremes_kept, force_figure, pressure_figure
-from kinertia.report.check_page import render_check
-from kinertia.report.marker_view import marker_scene
+from kinertia.report.check_page import extremes_kept, force_figure, pressure_figure, render_check
+from kinertia.report.marker_figures import marker_scene
 from kinertia.report.plots import as_plotly
 from kinertia.workflow.check import check_recording
 from report_page import figures_of, numbers

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from kinertia.estimation.simultaneous.uncertainty.axis_columns import add_bodies, take_load
+from kinertia.estimation.simultaneous.uncertainty.joint_rows import add_bodies, take_load
 from kinertia.synthetic.walk import walking_subject
 
 N, STATIC = 4, 37

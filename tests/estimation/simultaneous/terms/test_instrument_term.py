@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from kinertia.estimation.simultaneous.terms.instrument_term import ZEROS, InstrumentErrors
-from kinertia.estimation.simultaneous.terms.plate_tilt import TILT_SD_RAD, mean_loads_n
+from kinertia.estimation.simultaneous.terms.instrument_term import TILT_SD_RAD, ZEROS, InstrumentErrors, mean_loads_n
 from small_problem import small_problem
 
 

@@ -7,9 +7,8 @@ import os
 import plotly.graph_objects as go
 import pytest
 
-from kinertia.report import plotly_script
-from kinertia.report.figure import Figure
-from kinertia.report.plotly_script import packed_script, script_path
+from kinertia.report import figure as figure_module
+from kinertia.report.figure import Figure, packed_script, script_path
 from kinertia.report.result_page import Part, render_parts
 from report_page import TRACE_TYPES
 
@@ -19,7 +18,7 @@ def cache(monkeypatch, tmp_path):
     """An empty folder in place of the one that keeps compiled functions."""
     folder = tmp_path / "cache"
     folder.mkdir()
-    monkeypatch.setattr(plotly_script, "cache_folder", lambda: folder)
+    monkeypatch.setattr(figure_module, "cache_folder", lambda: folder)
     return folder
 
 
@@ -38,7 +37,7 @@ def test_another_plotly_takes_its_place(cache, monkeypatch, tmp_path):
     packed_script()
     other = tmp_path / "plotly.min.js"
     other.write_text("another", encoding="utf-8")
-    monkeypatch.setattr(plotly_script, "script_path", lambda: other)
+    monkeypatch.setattr(figure_module, "script_path", lambda: other)
     assert gzip.decompress(base64.b64decode(packed_script())) == b"another"
     other.write_text("a third", encoding="utf-8")
     os.utime(other, (1.0, 1.0))
@@ -47,7 +46,7 @@ def test_another_plotly_takes_its_place(cache, monkeypatch, tmp_path):
 
 
 def test_where_nothing_can_be_kept(monkeypatch, tmp_path):
-    monkeypatch.setattr(plotly_script, "cache_folder", lambda: tmp_path / "missing")
+    monkeypatch.setattr(figure_module, "cache_folder", lambda: tmp_path / "missing")
     assert gzip.decompress(base64.b64decode(packed_script())) == script_path().read_bytes()
 
 
