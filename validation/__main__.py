@@ -24,6 +24,7 @@ EVIDENCE = (
     "functional-trials",
     "held-out",
     "sessions",
+    "changes",
     "osim-models",
     "speed",
     "long-trials",

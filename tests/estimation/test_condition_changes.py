@@ -5,14 +5,22 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+from scipy import stats
 
 from command_line import run
 from kinertia.errors import KinertiaError
 from kinertia.estimation import condition_changes
-from kinertia.estimation.condition_changes import SOURCES, _judged, changes
-from kinertia.estimation.stride_features import EVENTS, event_bounds
+from kinertia.estimation.change import SOURCES
+from kinertia.estimation.condition_changes import changes, changes_of_strides
+from kinertia.estimation.stride_features import EVENTS, Rows, event_bounds
 from kinertia.motion.gait_cycle import Stride
-from kinertia.report.changes import change_columns, change_sentences, changed_sentence, discovered
+from kinertia.report.change_tables import (
+    change_columns,
+    change_sentences,
+    changed_sentence,
+    discovered,
+    limit_sentences,
+)
 from kinertia.report.saved_fit import write_fit
 
 DRAWS = 1000
@@ -30,7 +38,7 @@ def judged(change, strides, shared_sd, own_sd, stride_sd, seed=0):
     departures = shared_sd * rng.standard_normal((DRAWS, 1)) + own_sd * rng.standard_normal((DRAWS, count))
     still = np.broadcast_to(estimate, departures.shape)
     drawn = {"all": estimate + departures, "body": still, "instruments": still}
-    (found,) = _judged(keys, estimate, drawn, [~second, second])
+    (found,) = changes_of_strides(Rows(tuple(keys), estimate, drawn), [~second, second])
     return found
 
 
@@ -63,6 +71,32 @@ def test_few_strides_vary_no_less_than_is_usual():
     few, several = (judged(0.0, (count, count), 0.0, 1e-4, 0.0) for count in (2, 5))
     assert few.sd_by_source["stride"] > 0.015
     assert several.sd_by_source["stride"] < 0.002
+
+
+def test_a_spread_that_is_assumed_is_said():
+    few, several = (judged(0.0, (count, count), 0.0, 1e-4, 0.0) for count in (2, 5))
+    assert (few.assumed, several.assumed) == (True, False)
+    assert len(list(limit_sentences([few], ""))) == 1
+    assert not list(limit_sentences([several], ""))
+
+
+def test_repeats_needed_show_a_change_and_no_fewer_do():
+    """By simulation, with the spread known as well as these repeats show it."""
+    found = judged(0.0, (6, 6), 0.0, 0.02, 0.05)
+    needed = found.walks_needed(0.1)
+    rng = np.random.default_rng(1)
+    shared = np.hypot(*(found.sd_by_source[source] for source in ("body", "markers")))
+
+    def power(count):
+        first, second = (s * rng.standard_normal((4000, count)) for s in found.stride_sd)
+        change = 0.1 + second.mean(axis=1) - first.mean(axis=1) + shared * rng.standard_normal(4000)
+        of_strides = first.var(axis=1, ddof=1) + second.var(axis=1, ddof=1)
+        limit = stats.t.ppf(0.975, 2 * (count - 1)) * np.sqrt(shared**2 + of_strides / count)
+        return np.mean(np.abs(change) > limit)
+
+    assert power(needed) == pytest.approx(0.8, abs=0.12)
+    assert power(needed - 1) < power(needed)
+    assert found.walks_needed(1e-4) is None
 
 
 def test_events_lie_between_contacts():
@@ -138,7 +172,11 @@ def test_the_command_compares_conditions_of_a_result(twice, fit, tmp_path):
         table = pd.read_csv(tmp_path / "c" / "changes.csv")
         assert len(table) > 50
         page = (tmp_path / "c" / "compare.html").read_text(encoding="utf-8")
-        assert page.count("<tr") == len(table) + 1
+        assert page.count("<tr") == len(table) + 3, "a row for each change and the headings of three tables"
+        curves = pd.read_csv(tmp_path / "c" / "change_curves.csv")
+        assert set(curves["percent"]) == set(range(101))
+        assert {"knee", "hip", "ankle"} <= set(curves["joint"])
+        assert np.abs(curves["difference"].dropna()).max() < 1e-9
         refused = run("compare", tmp_path / "out", "--conditions", "barefoot", "running", "-o", tmp_path / "d")
     assert refused.status == 2
     assert "stated are: barefoot, with shoes" in refused.err

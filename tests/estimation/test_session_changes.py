@@ -145,14 +145,18 @@ def test_the_command_compares_sessions_first_of_all_by_joint_moments(sessions, t
     assert {row["quantity"] for row in rows} == {"moment", "angle"}
     assert "changed" not in {row["verdict"] for row in rows}
     assert not content["not_compared"]
-    assert len(pd.read_csv(tmp_path / "c" / "changes.csv")) == len(rows)
+    steps = [content["walking_speed"], *content["spatiotemporal"]]
+    assert [step["component"] for step in steps] == ["speed", "cadence", "length", "share", "share", "width"]
+    assert len(pd.read_csv(tmp_path / "c" / "changes.csv")) == len(steps) + len(rows)
+    assert len(pd.read_csv(tmp_path / "c" / "change_curves.csv")) % 101 == 0
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, "DRAWS", 2)
         said = run("compare", *folders, "-o", tmp_path / "c").out
     assert said.index("Walking speed") < said.index("knee adduction moment") < said.index("ody segment parameters")
     page = (tmp_path / "c" / "compare.html").read_text(encoding="utf-8")
     assert page.index('id="changes"') < page.index('id="bsp"')
-    assert page.count("<td>not shown</td>") == sum(row["verdict"] == "not shown" for row in rows)
+    assert page.count("<td>not shown</td>") == sum(row["verdict"] == "not shown" for row in (*steps, *rows))
+    assert page.count('class="plot"') > 8
 
 
 def test_results_that_are_no_sessions_say_why(demo_run, two_level_run, tmp_path):

@@ -11,8 +11,8 @@ import pytest
 from chromium import DESKTOP, PHONE, Opened, colour, ink, playwright
 from found import FAULT_FREE, UNUSABLE
 from kinertia.model.bsp import BodySegmentParameters
-from kinertia.report.comparison import render_comparison
 from kinertia.report.page import render
+from kinertia.report.side_by_side import render_comparison
 from report_page import without_plotly
 
 SWITCHED = """plot => {

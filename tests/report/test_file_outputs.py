@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from kinertia.motion.model_outputs import model_outputs
-from kinertia.report.comparison import comparison_summary, render_comparison
 from kinertia.report.file_outputs import compared_outputs, outputs_sentence, outputs_summary
 from kinertia.report.page import render
+from kinertia.report.side_by_side import comparison_summary, render_comparison
 from kinertia.trial.file_contents import FileOutputs
 from report_page import figures_of
 

@@ -14,10 +14,10 @@ from kinertia.estimation.result import Fit
 from kinertia.estimation.session_changes import why_incomparable
 from kinertia.io.results.output_folder import complete_folder
 from kinertia.io.subject.provenance import names_from_common_folder
-from kinertia.report.changes import change_columns
-from kinertia.report.compare import Comparison, fit_of
-from kinertia.report.compare import compare as compare_sessions
-from kinertia.report.comparison import (
+from kinertia.report.change_tables import change_columns, curve_columns
+from kinertia.report.file_outputs import outputs_sentence
+from kinertia.report.files import write_columns
+from kinertia.report.side_by_side import (
     MOST_FITS,
     comparison_columns,
     comparison_summary,
@@ -26,8 +26,8 @@ from kinertia.report.comparison import (
     remarks,
     render_comparison,
 )
-from kinertia.report.file_outputs import outputs_sentence
-from kinertia.report.files import write_columns
+from kinertia.report.what_changed import Comparison, fit_of
+from kinertia.report.what_changed import compare as compare_sessions
 
 
 def compare(
@@ -45,7 +45,7 @@ def compare(
 ) -> Outcome:
     """Compare sessions, conditions or methods: joint moments and angles, then body segment parameters.
 
-    Two sessions, subject files or results: what changed (changes.csv).
+    Two sessions, subject files or results: what changed (changes.csv, change_curves.csv).
     --conditions compares trials of one session, or chooses those of each.
     Two to six results: differences from the first (compare.html, compare.csv).
 
@@ -73,7 +73,7 @@ def compare(
         (work / "compare.html").write_text(page, encoding="utf-8")
         write_columns(work / "compare.csv", comparison_columns(fits))
         if found is not None:
-            write_columns(work / "changes.csv", change_columns(found.outcomes))
+            _write_tables(work, found)
     if found is None:
         out.print(f"Joint moments and angles are not compared: {reason}.", soft_wrap=True)
     else:
@@ -97,6 +97,11 @@ def _sessions(fits: list[Fit], conditions: tuple[str, str] | None, progress: Pro
         if conditions is not None:
             raise
         return None, str(error)
+
+
+def _write_tables(folder: Path, found: Comparison) -> None:
+    write_columns(folder / "changes.csv", change_columns((*found.steps, *found.outcomes)))
+    write_columns(folder / "change_curves.csv", curve_columns(found.curves))
 
 
 def _print_changes(found: Comparison) -> None:
@@ -129,7 +134,7 @@ def _compare_conditions(path: Path, conditions: tuple[str, str], output: Path, o
         found = compare_sessions(path, None, conditions, progress)
     with complete_folder(output, "compare") as work:
         (work / "compare.html").write_text(found.page(), encoding="utf-8")
-        write_columns(work / "changes.csv", change_columns(found.outcomes))
+        _write_tables(work, found)
     _print_changes(found)
     out.print(f"all outcomes in {output / 'compare.html'}", soft_wrap=True)
     return Outcome(found.summary)

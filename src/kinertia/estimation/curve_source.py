@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from typing import Literal, Protocol, Self, TypeAlias
 
 import numpy as np
@@ -77,7 +77,7 @@ class CurveSource:
 
     def __init__(self, trial: Estimated, stage: Stage) -> None:
         self.kinematics, self.stage, curves = trial.kinematics, stage, trial.joint_curves
-        k, c = trial.kinematics, len(trial.kinematics.ik.coordinates)
+        k = trial.kinematics
         time, inner = k.course_time, k.frames - k.course_frames.start
         self.reactions = trial.reactions.whole if stage == "estimate" else measured_reactions(k)
         deviations = trial.deviations if stage == "estimate" else None
@@ -92,38 +92,60 @@ class CurveSource:
             legs = k.trial.known_legs[k.course_frames] & shown
             spread = None if deviations is None else curves.deviations
             joints = curves.joints[stage].moments if stage in curves.joints else np.empty((len(time), 0, 3))
-        self.motion = [Gapped.of(time, q, partial(_moving, derivative=order)) for order in (0, 1)]
-        smooth, linear = (partial(_through, degree=degree) for degree in (3, 1))
-        self.loads, self.joints = Gapped.of(time, loads, smooth), Gapped.of(time, joints, smooth)
-        self.legs = Gapped.of(time, np.where(legs, 1.0, np.nan), linear)
-        self.spread = None if spread is None else [Gapped.of(time, each, linear) for each in spread.curves]
-        self.none = CurveDeviations.filled(0, c, joints.shape[1], np.nan)
+        self._time, self._angles, self._loads, self._joints = time, q, loads, joints
+        self._legs, self._spread = np.where(legs, 1.0, np.nan), spread
+
+    # curves are made when they are first asked for: draws of a fit ask for few of them
+    @cached_property
+    def _angle(self) -> "Gapped":
+        return Gapped.of(self._time, self._angles, partial(_moving, derivative=0))
+
+    @cached_property
+    def _speed(self) -> "Gapped":
+        return Gapped.of(self._time, self._angles, partial(_moving, derivative=1))
+
+    @cached_property
+    def _load(self) -> "Gapped":
+        return Gapped.of(self._time, self._loads, _cubic)
+
+    @cached_property
+    def _joint(self) -> "Gapped":
+        return Gapped.of(self._time, self._joints, _cubic)
+
+    @cached_property
+    def _known_leg(self) -> "Gapped":
+        return Gapped.of(self._time, self._legs, _linear)
+
+    @cached_property
+    def _deviation(self) -> "list[Gapped]":
+        return [] if self._spread is None else [Gapped.of(self._time, each, _linear) for each in self._spread.curves]
 
     def angle(self, time: np.ndarray) -> np.ndarray:
         """Return coordinates (n, c); those of IK + ID wherever inverse kinematics determined them."""
-        return self.motion[0](time) if self.stage == "estimate" else tracked(self.kinematics, time, 0)
+        return self._angle(time) if self.stage == "estimate" else tracked(self.kinematics, time, 0)
 
     def speed(self, time: np.ndarray) -> np.ndarray:
         """Return derivatives (n, c) of the coordinates."""
-        return self.motion[1](time) if self.stage == "estimate" else tracked(self.kinematics, time, 1)
+        return self._speed(time) if self.stage == "estimate" else tracked(self.kinematics, time, 1)
 
     def moment(self, time: np.ndarray) -> np.ndarray:
         """Return joint loads (n, c)."""
-        return self.loads(time)
+        return self._load(time)
 
     def joint_moment(self, time: np.ndarray) -> np.ndarray:
         """Return three-dimensional joint moments (n, j, 3), N m."""
-        return self.joints(time)
+        return self._joint(time)
 
     def deviations(self, time: np.ndarray) -> CurveDeviations:
         """Return standard deviations of all curves; NaN if there are none."""
-        if self.spread is None:
-            return self.none.spread_over(np.zeros(0, dtype=int), len(time))
-        return CurveDeviations(*(each(time) for each in self.spread))
+        if self._spread is None:
+            none = CurveDeviations.filled(0, self._angles.shape[1], self._joints.shape[1], np.nan)
+            return none.spread_over(np.zeros(0, dtype=int), len(time))
+        return CurveDeviations(*(each(time) for each in self._deviation))
 
     def force(self, time: np.ndarray) -> np.ndarray:
         """Return the ground reaction force (n, 2, 3) N on right and left foot."""
-        known, samples = self.legs(time), self.reactions.time
+        known, samples = self._known_leg(time), self.reactions.time
         forces = self.reactions.at(np.clip(time, samples[0], samples[-1]))[..., :3]
         return np.where(np.isfinite(known)[..., None], forces, np.nan)
 
@@ -188,6 +210,9 @@ def _through(time: np.ndarray, values: np.ndarray, degree: int) -> _Curve:
     """Return the spline of this degree, or less where there are few values."""
     curve: _Curve = make_interp_spline(time, values, k=min(degree, len(time) - 1))
     return curve
+
+
+_linear, _cubic = partial(_through, degree=1), partial(_through, degree=3)
 
 
 def _spread(count: int, rows: np.ndarray, values: np.ndarray) -> np.ndarray:

@@ -18,9 +18,9 @@ from functools import partial
 import numpy as np
 
 from kinertia.errors import KinertiaError
+from kinertia.estimation.change import Change
 from kinertia.estimation.condition_changes import (
     DRAWS,
-    Change,
     Condition,
     conditions_by_outcome,
     conditions_of,
@@ -30,7 +30,7 @@ from kinertia.estimation.condition_changes import (
 from kinertia.estimation.drawn_fit import kept_draws
 from kinertia.estimation.result import Fit
 from kinertia.estimation.simultaneous.uncertainty.posterior_draws import PosteriorDraws
-from kinertia.estimation.stride_features import features_of_draw, only, stride_features, usual_sources
+from kinertia.estimation.stride_features import Rows, StrideFeatures, only, stride_features, usual_sources
 from kinertia.estimation.trial_fit import TrialFit
 from kinertia.model.gait27 import AXIS_TILTS
 
@@ -113,21 +113,32 @@ def session_changes(
     """
     if reason := why_incomparable(before.fit, after.fit):
         raise KinertiaError(reason)
-    count = min(DRAWS, *(kept_draws(one.fit).count for one in (before, after)))
+    first, second = session_features(before, after, progress)
+    return changes_between(first.events, second.events, before.fixed_axes or after.fixed_axes)
+
+
+def session_features(
+    before: Session, after: Session, progress: Callable[[float], None] = lambda share: None, draws: int | None = None
+) -> tuple[StrideFeatures, StrideFeatures]:
+    """Compute the features of the strides of two sessions, with one body, and in so many draws of each."""
+    count = min(draws or DRAWS, *(kept_draws(one.fit).count for one in (before, after)))
     bodies = _one_body(before.fit, after.fit, count)
-    first = _outcomes(before, bodies[0], count, lambda share: progress(0.5 * share))
-    second = _outcomes(after, bodies[1], count, lambda share: progress(0.5 + 0.5 * share))
-    return tuple(judged(first, second, partial(_apart, before.fixed_axes or after.fixed_axes)))
+    first = _features(before, bodies[0], count, lambda share: progress(0.5 * share))
+    return first, _features(after, bodies[1], count, lambda share: progress(0.5 + 0.5 * share))
 
 
-def _outcomes(own: Session, bodies: np.ndarray, count: int, progress: Callable[[float], None]) -> dict[str, Condition]:
+def changes_between(before: Rows, after: Rows, fixed_axes: bool) -> tuple[Change, ...]:
+    """Judge the changes between two sessions by the events of both (`session_features`)."""
+    first, second = (conditions_by_outcome(one) for one in (before, after))
+    return tuple(judged(first, second, partial(_apart, fixed_axes)))
+
+
+def _features(own: Session, bodies: np.ndarray, count: int, progress: Callable[[float], None]) -> StrideFeatures:
     """Return the strides of a session with the first of these bodies, and draws with the others."""
     sources = usual_sources(own.fit)
     sources["shared"] = replace(sources["body"], bsp=bodies[1:])
-    found = stride_features(own.fit, own.trials, sources, count, progress)
     with_mean = replace(_unmoved(own.fit), bsp=bodies[:1])
-    estimate = features_of_draw(own.fit, own.trials, with_mean, found.keys)
-    return conditions_by_outcome(found.keys, estimate, found.drawn)
+    return stride_features(own.fit, own.trials, sources, count, progress, with_mean)
 
 
 def _one_body(before: Fit, after: Fit, count: int) -> tuple[np.ndarray, np.ndarray]:

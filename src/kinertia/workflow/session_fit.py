@@ -4,7 +4,7 @@ markers on anew."""
 from dataclasses import replace
 from pathlib import Path
 
-from kinertia.estimation.prepared import Progress
+from kinertia.estimation.prepared import Prepared, Progress
 from kinertia.estimation.result import Fit
 from kinertia.io.subject.reader import read_subject
 from kinertia.workflow.estimate import estimate
@@ -27,8 +27,12 @@ def fit_session(subject: Path, progress: Progress = lambda stage, share: None) -
     if wanted.settings.joint_axes is None and wanted.model.osim is None and wanted.model.static is not None:
         settings = wanted.settings.model_copy(update={"joint_axes": True})
         wanted = wanted.model_copy(update={"settings": settings})
-    ready = prepare_subject(wanted, progress)
+    return estimate(with_markers_anew(prepare_subject(wanted, progress)), progress)
+
+
+def with_markers_anew(ready: Prepared) -> Prepared:
+    """Let marker positions be as uncertain as between two sessions."""
     known = ready.uncertainty
-    if known.marker_sd_m is not None:
-        known = replace(known, marker_sd_m=max(known.marker_sd_m, MARKER_SD_M))
-    return estimate(replace(ready, uncertainty=known), progress)
+    if known.marker_sd_m is None:
+        return ready
+    return replace(ready, uncertainty=replace(known, marker_sd_m=max(known.marker_sd_m, MARKER_SD_M)))

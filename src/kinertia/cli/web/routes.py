@@ -260,7 +260,7 @@ class _Actions:
 
     async def compare(self, request: Request) -> Response:
         """Show the comparison of chosen results."""
-        from kinertia.report.comparison import MOST_FITS
+        from kinertia.report.side_by_side import MOST_FITS
 
         chosen = self._chosen(request)
         problem = "" if 2 <= len(chosen) <= MOST_FITS else f"Choose 2 to {MOST_FITS} people with results."
@@ -268,8 +268,8 @@ class _Actions:
 
     async def compared(self, request: Request) -> Response:
         """Serve what `kinertia compare` writes about them."""
-        from kinertia.report.comparison import MOST_FITS, render_comparison
         from kinertia.report.saved_fit import load_fit
+        from kinertia.report.side_by_side import MOST_FITS, render_comparison
 
         chosen = self._chosen(request)
         if not 2 <= len(chosen) <= MOST_FITS:

@@ -6,9 +6,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from kinertia.estimation import walking_speed
-from kinertia.estimation.walking_speed import NOTABLE, speed_change
-from kinertia.report.changes import speed_sentence
+from kinertia.estimation import gait_changes as walking_speed
+from kinertia.estimation.gait_changes import NOTABLE, speed_change
+from kinertia.report.change_tables import speed_sentence
 
 
 @pytest.fixture

@@ -1,16 +1,35 @@
 """Determines what changed between two sessions or conditions, from files, folders or results: `kinertia.compare`."""
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from kinertia.errors import KinertiaError
-from kinertia.estimation.condition_changes import Change, changes
+from kinertia.estimation.change import Change
+from kinertia.estimation.condition_changes import changes_of_strides, condition_features, masks_of
+from kinertia.estimation.curve_changes import CurveChange, apart, curve_changes, paired, rows_of
+from kinertia.estimation.gait_changes import gait_changes, speed_change
+from kinertia.estimation.instrument_doubts import instrument_doubt
 from kinertia.estimation.prepared import Progress
 from kinertia.estimation.result import Fit
-from kinertia.estimation.session_changes import session, session_changes
-from kinertia.estimation.walking_speed import speed_change
-from kinertia.report.changes import change_rows, change_sentences, changed_sentence, changes_summary, speed_sentence
+from kinertia.estimation.session_changes import (
+    Session,
+    changes_between,
+    session,
+    session_features,
+    why_incomparable,
+)
+from kinertia.report.change_figures import curve_figures
+from kinertia.report.change_tables import (
+    RELEVANT,
+    change_rows,
+    change_sentences,
+    changed_sentence,
+    changes_summary,
+    limit_sentences,
+    speed_sentence,
+)
 from kinertia.report.rendering import rendered
 from kinertia.report.saved_fit import load_fit
 from kinertia.workflow.from_files import fit_subject
@@ -25,6 +44,9 @@ class Comparison:
         before, after: their names.
         outcomes: joint moments and angles, event by event.
         speed: walking speed, which changes moments; None where it is not known.
+        gait: cadence, stride length, share of stance and step width, where they are known.
+        curves: joint moments and angles over the gait cycle, or over stance.
+        doubt: findings about instruments that keep changes of moments from being judged.
 
     Examples:
         >>> found = kinertia.compare("before/subject.toml", "after/subject.toml")  # doctest: +SKIP
@@ -35,11 +57,20 @@ class Comparison:
     after: str
     outcomes: tuple[Change, ...]
     speed: Change | None
+    gait: tuple[Change, ...] = ()
+    curves: tuple[CurveChange, ...] = ()
+    doubt: str = ""
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """Walking speed, each outcome that was named beforehand, and how many of the others changed."""
-        return (speed_sentence(self.speed), *change_sentences(self.outcomes), changed_sentence(self.outcomes))
+        """Walking speed, each outcome that was named beforehand, how many of the others changed, and limits."""
+        said = (speed_sentence(self.speed), *change_sentences(self.outcomes), changed_sentence(self.outcomes))
+        return (*said, *limit_sentences(self.outcomes, self.doubt))
+
+    @property
+    def steps(self) -> tuple[Change, ...]:
+        """Walking speed, where it is known, and `gait`."""
+        return (() if self.speed is None else (self.speed,)) + self.gait
 
     def shown(self) -> dict[str, Any]:
         """Return what the templates show of it."""
@@ -48,6 +79,9 @@ class Comparison:
             "after": self.after,
             "sentences": self.sentences,
             "rows": change_rows(self.outcomes),
+            "gait": change_rows(self.steps),
+            "figures": curve_figures(self.curves, self.before, self.after),
+            "relevant": RELEVANT,
         }
 
     def page(self) -> str:
@@ -57,7 +91,7 @@ class Comparison:
     @property
     def summary(self) -> dict[str, Any]:
         """What `kinertia compare --json` prints of it."""
-        return changes_summary(self.before, self.after, self.outcomes, self.speed)
+        return {**changes_summary(self.before, self.after, self.outcomes, self.speed, self.gait), "doubt": self.doubt}
 
 
 def compare(
@@ -84,17 +118,35 @@ def compare(
     if after is not None:
         fits = (fit_of(before, progress), fit_of(after, progress))
         first, other = (session(fit, name) for fit, name in zip(fits, conditions or (None, None), strict=True))
-        found = session_changes(first, other, share_done)
-        return Comparison(*(conditions or ("before", "after")), found, speed_change(first.trials, other.trials))
+        reasons = why_incomparable(*fits)
+        if reasons:
+            raise KinertiaError(reasons)
+        rows, later = session_features(first, other, share_done)
+        outcomes = changes_between(rows.events, later.events, first.fixed_axes or other.fixed_axes)
+        curves = curve_changes(rows.curves, later.curves, apart)
+        return _comparison(conditions or ("before", "after"), first, other, outcomes, curves)
     if conditions is None:
         raise KinertiaError("give two sessions, or two conditions of one")
     if isinstance(before, Fit) or Path(before).is_dir():
         fit = fit_of(before, progress)
     else:
         fit = fit_subject(before, progress)
-    found = changes(fit, *conditions, share_done)
+    features, condition = condition_features(fit, *conditions, share_done)
     first, other = (session(fit, name) for name in conditions)
-    return Comparison(*conditions, found, speed_change(first.trials, other.trials))
+    found = changes_of_strides(features.events, masks_of(features.events, condition, *conditions))
+    masks = masks_of(features.curves, condition, *conditions)
+    early, late = (rows_of(features.curves, mask) for mask in masks)
+    return _comparison(conditions, first, other, found, curve_changes(early, late, paired))
+
+
+def _comparison(
+    names: tuple[str, str], first: Session, other: Session, outcomes: Iterable[Change], curves: Iterable[CurveChange]
+) -> Comparison:
+    """Add speed, steps and doubts about instruments."""
+    doubt = instrument_doubt((first.fit, first.trials), (other.fit, other.trials))
+    judged = tuple(replace(one, doubt=doubt if one.quantity == "moment" else "") for one in outcomes)
+    walks = first.trials, other.trials
+    return Comparison(*names, judged, speed_change(*walks), gait_changes(*walks), tuple(curves), doubt)
 
 
 def fit_of(source: Fit | str | Path, progress: Progress) -> Fit:

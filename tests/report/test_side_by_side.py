@@ -10,9 +10,9 @@ import pytest
 from command_line import run
 from found import FAULT_FREE, FAULTY, UNUSABLE
 from kinertia.model.bsp import BodySegmentParameters
-from kinertia.report.comparison import comparison_columns, differences, moments_figure, remarks, render_comparison
 from kinertia.report.coordinate_titles import same_segment, same_sign
 from kinertia.report.files import save_fit
+from kinertia.report.side_by_side import comparison_columns, differences, moments_figure, remarks, render_comparison
 from report_page import Elements
 
 

@@ -6,11 +6,16 @@ from typing import Any
 
 import numpy as np
 
-from kinertia.estimation.condition_changes import PRIMARY, SOURCES, Change
-from kinertia.estimation.walking_speed import NOTABLE
+from kinertia.estimation.change import MOST_WALKS, PRIMARY, SOURCES, Change
+from kinertia.estimation.curve_changes import CurveChange
+from kinertia.estimation.gait_changes import NOTABLE
 from kinertia.report.style import SIDES
 
-_DIGITS = {"N m/kg": 3, "degrees": 1, "m/s": 2}
+_DIGITS = {"N m/kg": 3, "degrees": 1, "m/s": 2, "steps/min": 1, "m": 3, "%": 1}
+RELEVANT = {"N m/kg": 0.1, "degrees": 5.0, "m/s": 0.1, "steps/min": 5.0, "m": 0.05, "%": 2.0}
+"""Changes for which the repeats needed are stated. Errors above 5 degrees mislead (McGinley et al. 2009, Gait Posture
+29:360), and 0.1 m/s matter to patients (Bohannon and Glenney 2014, J Eval Clin Pract 20:295); the others are chosen
+here."""
 
 
 def change_sentences(found: Sequence[Change]) -> Iterator[str]:
@@ -37,11 +42,13 @@ def _judgement(one: Change) -> str:
     pair = f"{one.before:.{digits}f} before, {one.after:.{digits}f} after"
     if one.verdict != "changed":
         pair += f", {one.unit}"
+    if one.doubt:
+        return f"cannot be judged, see the finding about the instruments ({pair})"
     if one.verdict == "cannot be judged":
         return f"cannot be judged, with {one.strides[0]} and {one.strides[1]} repeats ({pair})"
     if one.verdict == "changed":
         return f"changed by {one.difference:+.{digits}f} {one.unit} (SD {one.sd:.{digits}f}; {pair})"
-    return f"no change shown; one below {one.mdc95:.{digits}f} {one.unit} would be missed ({pair})"
+    return f"change not shown; one below {one.mdc95:.{digits}f} {one.unit} would be missed ({pair})"
 
 
 def changed_sentence(found: Sequence[Change]) -> str:
@@ -55,6 +62,19 @@ def changed_sentence(found: Sequence[Change]) -> str:
         f"Of {len(others)} other moments and angles {count} changed; without any change about {0.05 * len(others):.0f} "
         f"would seem to. At a false discovery rate of 5 %, {remain} remain."
     )
+
+
+def limit_sentences(found: Sequence[Change], doubt: str) -> Iterator[str]:
+    """State what was assumed, and what cannot be judged."""
+    if doubt:
+        yield f"Changes of moments cannot be judged: {doubt}"
+    few = sorted({min(one.strides) for one in found if one.assumed})
+    if few:
+        least = f"{few[0]}" if len(few) == 1 else f"{few[0]} to {few[-1]}"
+        yield (
+            f"With {least} strides of a condition their spread is hardly known: at least that of four other people was "
+            "assumed. Three or more repeats of each condition show it."
+        )
 
 
 def discovered(p: Sequence[float], rate: float = 0.05) -> list[bool]:
@@ -73,6 +93,10 @@ def change_columns(found: Sequence[Change]) -> dict[str, list[Any]]:
     return {
         **{name: [getattr(one, name) for one in found] for name in names},
         **{f"sd_{source}": [one.sd_by_source[source] for one in found] for source in SOURCES},
+        "sd_between_strides_before": [one.stride_sd[0] for one in found],
+        "sd_between_strides_after": [one.stride_sd[1] for one in found],
+        "spread_assumed": [one.assumed for one in found],
+        "walks_needed": [one.walks_needed(RELEVANT[one.unit]) for one in found],
         "mdc95": [one.mdc95 for one in found],
         "p": [one.p for one in found],
         "strides_before": [one.strides[0] for one in found],
@@ -81,16 +105,32 @@ def change_columns(found: Sequence[Change]) -> dict[str, list[Any]]:
     }
 
 
+def curve_columns(found: Sequence[CurveChange]) -> dict[str, list[Any]]:
+    """Return the columns of `change_curves.csv`: a row per curve and percent, with the simultaneous band."""
+    rows = [(one, k) for one in found for k in range(len(one.before))]
+    bands = {id(one): one.band for one in found}
+    names = ("quantity", "joint", "component", "side", "phase", "unit")
+    curves = ("before", "after", "before_sd", "after_sd", "difference", "sd")
+    return {
+        **{name: [getattr(one, name) for one, _ in rows] for name in names},
+        "percent": [k for _, k in rows],
+        **{name: np.concatenate([getattr(one, name) for one in found]).tolist() if found else [] for name in curves},
+        **{end: [float(bands[id(one)][j][k]) for one, k in rows] for j, end in enumerate(("lower", "upper"))},
+    }
+
+
 def change_rows(found: Sequence[Change]) -> list[dict[str, Any]]:
     """Return the rows of the page's table: numbers with their text, outcomes that were named beforehand first."""
     order = sorted(found, key=lambda one: (not one.primary, one.quantity != "moment"))
     return [
         {
-            "outcome": f"{one.joint.replace('_', ' ')} {one.component.replace('_', ' ')} {one.quantity}",
+            "outcome": outcome_words(one),
             "side": SIDES[one.side][0] if one.side else "",
             "event": one.event,
             "unit": one.unit,
             "verdict": one.verdict,
+            "primary": one.primary,
+            "needed": one.walks_needed(RELEVANT[one.unit]) or f"over {MOST_WALKS}",
             "cells": [_cell(one, value) for value in (one.before, one.after)]
             + [_cell(one, one.difference, "+")]
             + [_cell(one, value) for value in (one.mdc95, one.sd, *(one.sd_by_source[source] for source in SOURCES))],
@@ -99,21 +139,35 @@ def change_rows(found: Sequence[Change]) -> list[dict[str, Any]]:
     ]
 
 
+def outcome_words(one: Change | CurveChange) -> str:
+    """Return what a change is of: "knee adduction moment", "walking speed"."""
+    quantity = "" if one.quantity == "gait" else f" {one.quantity}"
+    return f"{one.joint} {one.component}{quantity}".replace("_", " ")
+
+
 def _cell(one: Change, value: float, sign: str = "") -> dict[str, Any]:
     known = bool(np.isfinite(value))
     return {"value": value if known else 0.0, "text": f"{value:{sign}.{_DIGITS[one.unit]}f}" if known else "–"}
 
 
-def changes_summary(before: str, after: str, found: Sequence[Change], speed: Change | None) -> dict[str, Any]:
+def changes_summary(
+    before: str, after: str, found: Sequence[Change], speed: Change | None, gait: Sequence[Change]
+) -> dict[str, Any]:
     """Return what `kinertia compare --json` prints of changes."""
     rows = [_summary(one) for one in found]
     return {
         "before": before,
         "after": after,
         "walking_speed": None if speed is None else _summary(speed),
+        "spatiotemporal": [_summary(one) for one in gait],
         "outcomes": rows,
     }
 
 
 def _summary(one: Change) -> dict[str, Any]:
-    return {**asdict(one), "difference": one.difference, "verdict": one.verdict}
+    return {
+        **asdict(one),
+        "difference": one.difference,
+        "verdict": one.verdict,
+        "walks_needed": one.walks_needed(RELEVANT[one.unit]),
+    }

@@ -189,7 +189,7 @@ def render_comparison(fits: Mapping[str, Fit], changes: Mapping[str, Any] | None
     figure = moments_figure(fits)
     pairs = [(other_name, differences(first, other)) for other_name, other in others]
     return rendered(
-        "compare.html.j2",
+        "side_by_side.html.j2",
         title="Comparison: " + ", ".join(fits),
         first=name,
         changes=changes,

@@ -1,11 +1,15 @@
-"""Compares walking speed between two conditions or sessions: moments change with it."""
+"""Compares walking speed, cadence and steps between two conditions or sessions: moments change with speed.
+
+They hardly depend on instruments or body, so that strides are all of their deviation.
+"""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy import stats
 
-from kinertia.estimation.condition_changes import SOURCES, Change
+from kinertia.estimation.change import SOURCES, Change
 from kinertia.estimation.cycles import spatiotemporal_columns
 from kinertia.estimation.trial_fit import TrialFit
 
@@ -17,29 +21,71 @@ NOTABLE = 0.05
 """Relative difference of speed that is pointed out even where it is not shown to be one, chosen here."""
 
 
+@dataclass(frozen=True)
+class Measure:
+    """A spatiotemporal measure: column of `Fit.spatiotemporal`, words of it, its unit, and whether sides are apart."""
+
+    column: str
+    joint: str
+    component: str
+    unit: str
+    sided: bool = False
+
+
+MEASURES = (
+    Measure("cadence_steps_min", "walking", "cadence", "steps/min"),
+    Measure("stride_length_m", "stride", "length", "m"),
+    Measure("stance_percent", "stance", "share", "%", sided=True),
+    Measure("step_width_m", "step", "width", "m"),
+)
+
+
 def speed_change(before: Sequence[TrialFit], after: Sequence[TrialFit]) -> Change | None:
     """Compare walking speed, with each walk counted once (strides of one walk are alike); None where it is not known.
 
     One walk against one on a treadmill counts strides instead.
     """
     known = [[own for trial in trials if (own := _speeds(trial)).size] for trials in (before, after)]
+    return _change(Measure("speed_m_s", "walking", "speed", "m/s"), "", known)
+
+
+def gait_changes(before: Sequence[TrialFit], after: Sequence[TrialFit]) -> tuple[Change, ...]:
+    """Compare MEASURES between strides, each walk counted once as in `speed_change`; those that are known."""
+    tables = [[spatiotemporal_columns([trial]) for trial in trials] for trials in (before, after)]
+    found = []
+    for measure in MEASURES:
+        for side in ("r", "l") if measure.sided else ("",):
+            known = [[own for table in some if (own := _values(table, measure, side)).size] for some in tables]
+            found.append(_change(measure, side, known))
+    return tuple(one for one in found if one is not None)
+
+
+def _values(table: dict[str, list[object]], measure: Measure, side: str) -> np.ndarray:
+    values = np.array(table[measure.column], dtype=float)
+    own = np.isfinite(values) & (np.array([side in ("", one) for one in table["side"]], dtype=bool))
+    return np.asarray(values[own])
+
+
+def _change(measure: Measure, side: str, known: Sequence[Sequence[np.ndarray]]) -> Change | None:
+    """Compare the values of each walk of both conditions."""
     if not all(known):
         return None
     alone = min(map(len, known)) < 2
     values = [np.concatenate(each) if alone else np.array([own.mean() for own in each]) for each in known]
     means = [float(each.mean()) for each in values]
     counts = [len(each) for each in values]
-    squares = [float(np.var(each, ddof=1)) / len(each) if len(each) > 1 else np.nan for each in values]
+    spreads = [float(np.std(each, ddof=1)) if len(each) > 1 else np.nan for each in values]
+    squares = [spread**2 / count for spread, count in zip(spreads, counts, strict=True)]
     sd = float(np.sqrt(sum(squares)))
     freedom = sum(squares) ** 2 / max(sum(s**2 / max(n - 1, 1) for s, n in zip(squares, counts, strict=True)), 1e-300)
     of_sd = stats.t(max(freedom, 1.0)) if np.isfinite(freedom) else None
     return Change(
         quantity="gait",
-        joint="walking",
-        component="speed",
-        side="",
+        joint=measure.joint,
+        component=measure.component,
+        side=side,
         event="",
-        unit="m/s",
+        unit=measure.unit,
         before=means[0],
         after=means[1],
         strides=(counts[0], counts[1]),
@@ -47,6 +93,7 @@ def speed_change(before: Sequence[TrialFit], after: Sequence[TrialFit]) -> Chang
         sd_by_source={source: sd if source == "stride" else 0.0 for source in SOURCES},
         mdc95=np.nan if of_sd is None else float(of_sd.ppf(0.975)) * sd,
         p=np.nan if of_sd is None else float(2.0 * of_sd.sf(abs(means[1] - means[0]) / max(sd, 1e-300))),
+        stride_sd=(spreads[0], spreads[1]),
     )
 
 

@@ -1,0 +1,54 @@
+"""Which findings about instruments keep a change of moments from being judged."""
+
+from dataclasses import replace
+
+import pytest
+
+from kinertia.estimation.instrument_doubts import instrument_doubt
+from kinertia.findings.finding import Severity, finding
+from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
+
+
+def zero(trial):
+    where = Where(trial=trial, plate="plate 1", axis="vertical", file_axis="Y")
+    return finding("P213", where, level_n=Quantity(-23.1, "N", limit=15.0))
+
+
+@pytest.fixture(scope="module")
+def twice(fit):
+    """A walk that was recorded twice, without findings."""
+    (trial,) = fit.trials
+
+    def named(name):
+        return replace(trial, kinematics=replace(trial.kinematics, trial=replace(trial.kinematics.trial, name=name)))
+
+    return replace(fit, trials=(named("first"), named("second")), findings=())
+
+
+def doubt(fit, *findings):
+    one = replace(fit, findings=findings)
+    return instrument_doubt((one, one.trials[:1]), (one, one.trials[1:]))
+
+
+def test_an_error_of_one_condition_is_none_of_both(twice):
+    assert doubt(twice) == ""
+    assert doubt(twice, zero("first")).startswith("P213")
+    assert doubt(twice, zero("first"), zero("second")) == ""
+    assert doubt(twice, zero("third")) == ""
+
+
+def test_errors_of_both_that_a_user_waived_remain(twice):
+    both = [replace(zero(trial).at(Severity.ERROR), status="waived") for trial in ("first", "second")]
+    assert doubt(twice, *both).startswith("P213")
+
+
+def test_what_is_corrected_explained_or_ignored_is_none(twice):
+    assert doubt(twice, zero("first").at(Severity.CORRECTED)) == ""
+    assert doubt(twice, zero("first").muted("P201")) == ""
+    assert doubt(twice, replace(zero("first"), status="ignored")) == ""
+
+
+def test_sessions_have_errors_of_their_own(twice):
+    days = [replace(twice, findings=(zero(name),)) for name in ("first", "second")]
+    assert instrument_doubt((days[0], days[0].trials[:1]), (days[1], days[1].trials[1:])).startswith("P213")

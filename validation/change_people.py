@@ -1,0 +1,297 @@
+"""Measures synthetic people on three days, markers put on anew each day: without a change, and with a known one.
+
+Of each person, three walks a day. Walks of a day differ as strides of a person do. Markers are off by 5 mm each and by
+5 mm that all of a segment share, in the static trial and the walks alike: medial and lateral markers of knees and
+ankles then tilt their axes by about 4 degrees. Plates and synchronisation of each day have errors of their own. On the
+third day the person walks otherwise, by a change of known size.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from kinertia.estimation.change import Change
+from kinertia.estimation.joint_curves import JointCurves
+from kinertia.estimation.prior import literature_prior
+from kinertia.estimation.result import Fit
+from kinertia.estimation.session_changes import changes_between, session, session_features
+from kinertia.estimation.simultaneous.instruments.priors import InstrumentPrior
+from kinertia.estimation.stride_features import Rows, event_means
+from kinertia.estimation.trial_fit import TrialFit
+from kinertia.model.skeleton import Skeleton
+from kinertia.motion.dynamics import Motion, inverse_dynamics
+from kinertia.motion.gait_cycle import Stride
+from kinertia.motion.ground_reactions import GroundReactions
+from kinertia.motion.joint_moments import joint_moments
+from kinertia.motion.kinematics import Kinematics
+from kinertia.settings import Settings, Subject
+from kinertia.synthetic.laboratory import PERFECT, record
+from kinertia.synthetic.manner import Manner
+from kinertia.synthetic.noise import SkinMotion, camera_noise
+from kinertia.synthetic.skin_clusters import ClusterMotion
+from kinertia.synthetic.walk import SyntheticSubject, SyntheticTrial, walk, walking_subject
+from kinertia.trial.data import LOAD_THRESHOLD_N, Markers
+from kinertia.trial.sampled_time import runs
+from kinertia.trial.trial_input import TrialInput
+from kinertia.workflow.estimate import estimate
+from kinertia.workflow.prepare import prepare
+from kinertia.workflow.session_fit import with_markers_anew
+
+MARKER_SD_M, SEGMENT_SD_M = 0.005, 0.005
+DRAWS = 40
+"""Posterior draws of each day, half of what `kinertia compare` takes."""
+WALKS, WALK_S, PLATES_HZ, SAMPLES_PER_FRAME = 3, 2.5, 1000.0, 10
+CAMERA_SD_M, FORCE_SD_N, MOMENT_SD_NM = 0.0005, 1.0, 0.2
+STRIDE_DEG = {
+    "hip_flexion": 0.8,
+    "hip_adduction": 0.8,
+    "hip_rotation": 1.4,
+    "knee_angle": 1.6,
+    "ankle_angle": 1.2,
+    "subtalar_angle": 1.2,
+    "lumbar_extension": 1.0,
+    "lumbar_bending": 1.0,
+    "lumbar_rotation": 1.0,
+}
+"""Standard deviations of postures from walk to walk."""
+CHANGE_DEG = {"hip_adduction": 3.0, "hip_rotation": -8.0, "knee_angle": -6.0, "lumbar_bending": 4.0}
+"""What is added to the angles on the third day: positive about the model's axes on both sides."""
+LINEAR_SHARE = 2.0 / 3.0
+"""Of the variance of skin motion that follows the joints; the rest moves as rigid clusters."""
+
+
+@dataclass(frozen=True)
+class Judged:
+    """One outcome of two days, with its true difference."""
+
+    change: Change
+    truth: float
+
+    @property
+    def covered(self) -> bool:
+        """Whether the interval of the difference holds the true one."""
+        return abs(self.change.difference - self.truth) <= self.change.mdc95
+
+
+@dataclass(frozen=True, eq=False)
+class Person:
+    """One person on three days, as far as changes are judged by it.
+
+    Attributes:
+        seed: of the person.
+        unchanged, changed: features of the strides of the first and the second, or the first and the third day.
+        truth: true value of each outcome on each day.
+    """
+
+    seed: int
+    unchanged: tuple[Rows, Rows]
+    changed: tuple[Rows, Rows]
+    truth: tuple[Mapping[str, float], ...]
+
+    def judged(self, other_day: int) -> list[Judged]:
+        """Judge the changes from the first to the second or third day (1, 2)."""
+        found = changes_between(*(self.unchanged, self.changed)[other_day - 1], fixed_axes=False)
+        before, after = self.truth[0], self.truth[other_day]
+        return [Judged(one, after[name] - before[name]) for one in found if (name := outcome(one)) in before]
+
+
+@dataclass(frozen=True, eq=False)
+class Day:
+    """A fit of a day, and the true value of each outcome, the mean over its strides."""
+
+    fit: Fit
+    truth: Mapping[str, float]
+
+
+def person(seed: int) -> Person:
+    """Measure a person on three days."""
+    rng = np.random.default_rng(seed)
+    subject = walking_subject()
+    subject = replace(subject, bsp=literature_prior(subject.literature).draw(rng))
+    other = Manner(posture_rad={name: float(np.radians(size)) for name, size in CHANGE_DEG.items()})
+    days = [day(subject, manner, str(k), rng) for k, manner in enumerate((Manner(), Manner(), other), start=1)]
+    pairs = []
+    for later in days[1:]:
+        before, after = session_features(session(days[0].fit), session(later.fit), draws=DRAWS)
+        pairs.append((before.events, after.events))
+    return Person(seed, pairs[0], pairs[1], tuple(one.truth for one in days))
+
+
+def outcome(one: Change) -> str:
+    """Return what a change is of, in words."""
+    return " ".join((one.quantity, one.joint, one.component, one.event, one.side))
+
+
+def day(subject: SyntheticSubject, manner: Manner, name: str, rng: np.random.Generator) -> Day:
+    """Measure a person on one day, and fit all walks together."""
+    shift = _marker_shifts(subject, rng)
+    standing = replace(subject.static, markers=camera_noise(_standing(subject, shift), CAMERA_SD_M, rng))
+    manners = [_varied(manner, rng) for _ in range(WALKS)]
+    walks = [walk(subject, WALK_S, PLATES_HZ, manner=each) for each in manners]
+    skins = _Skin.draw(walks, rng)
+    instruments = _Instruments.draw(rng)
+    inputs = []
+    for number, trial in enumerate(walks):
+        read = replace(trial, foot_loads=instruments.read(trial.time, trial.foot_loads))
+        noise = replace(PERFECT, force_sd_n=FORCE_SD_N, force_offset_sd_n=FORCE_SD_N, moment_sd_nm=MOMENT_SD_NM)
+        lab = record(subject, read, noise, rng, SAMPLES_PER_FRAME)
+        placed = trial.skeleton.with_positions(trial.skeleton.marker_locals + shift[_moving(subject)])
+        q = trial.motion.q[::SAMPLES_PER_FRAME][: len(lab.walk.markers.time)]
+        exact = Markers(lab.walk.markers.time, placed.labels, placed.marker_positions(placed.pose(q)))
+        markers = camera_noise(skins.moved(exact, trial, q), CAMERA_SD_M, rng)
+        inputs.append(TrialInput(replace(lab.walk, name=f"{name} walk {number}", markers=markers), condition=name))
+    ready = prepare(Subject(name="synthetic", sex="male"), standing, inputs, Settings(joint_axes=True))
+    fit = estimate(with_markers_anew(ready))
+    return Day(fit, _truth(fit, walk(subject, WALK_S, PLATES_HZ, manner=manner)))
+
+
+def _marker_shifts(subject: SyntheticSubject, rng: np.random.Generator) -> np.ndarray:
+    """Draw how far each marker (m, 3) is off, in its segment's frame."""
+    skeleton = subject.skeleton
+    of_segment = rng.normal(0.0, SEGMENT_SD_M, (len(skeleton.segments), 3))
+    rows = [skeleton.segments.index(marker.segment) for marker in skeleton.markers]
+    return rng.normal(0.0, MARKER_SD_M, (len(rows), 3)) + of_segment[rows]
+
+
+def _moving(subject: SyntheticSubject) -> list[int]:
+    kept = set(subject.moving_skeleton.labels)
+    return [k for k, label in enumerate(subject.skeleton.labels) if label in kept]
+
+
+def _standing(subject: SyntheticSubject, shift: np.ndarray) -> Markers:
+    """Move the markers of the static trial, whose segments stand as the markers show."""
+    markers, skeleton = subject.static.markers, subject.skeleton
+    positions = markers.positions.copy()
+    mean = positions.mean(axis=0)
+    for segment in skeleton.segments:
+        own = [k for k, marker in enumerate(skeleton.markers) if marker.segment == segment]
+        columns = [markers.labels.index(skeleton.labels[k]) for k in own]
+        turn = np.eye(3)
+        if len(own) > 2:
+            local, seen = (each - each.mean(axis=0) for each in (skeleton.marker_locals[own], mean[columns]))
+            u, _, vt = np.linalg.svd(local.T @ seen)
+            turn = vt.T @ np.diag([1.0, 1.0, np.linalg.det(vt.T @ u.T)]) @ u.T
+        positions[:, columns] += shift[own] @ turn.T
+    return replace(markers, positions=positions)
+
+
+def _varied(manner: Manner, rng: np.random.Generator) -> Manner:
+    """Draw the manner of one walk."""
+    posture = {name: manner.posture_rad.get(name, 0.0) for name in {*STRIDE_DEG, *manner.posture_rad}}
+    drawn = {
+        name: value + float(np.radians(rng.normal(0.0, STRIDE_DEG.get(name, 0.0))))
+        for name, value in sorted(posture.items())
+    }
+    return replace(manner, posture_rad=drawn)
+
+
+@dataclass(frozen=True, eq=False)
+class _Skin:
+    """Skin motion of one day's markers."""
+
+    linear: SkinMotion
+    clusters: ClusterMotion
+
+    @classmethod
+    def draw(cls, walks: Sequence[SyntheticTrial], rng: np.random.Generator) -> "_Skin":
+        first, *others = walks
+        linear = SkinMotion.draw(first.skeleton, first.motion.q, rng, [one.motion.q for one in others])
+        return cls(linear, ClusterMotion.draw(first.skeleton, rng))
+
+    def moved(self, exact: Markers, trial: SyntheticTrial, q: np.ndarray) -> Markers:
+        parts = ((LINEAR_SHARE, self.linear), (1.0 - LINEAR_SHARE, self.clusters))
+        moved = sum(
+            np.sqrt(share) * (each.moved(exact, trial.skeleton, q).positions - exact.positions) for share, each in parts
+        )
+        return replace(exact, positions=exact.positions + moved)
+
+
+@dataclass(frozen=True, eq=False)
+class _Instruments:
+    """One day's delay (s), and gain (2,) and position (2, 3) m of the plates of both feet."""
+
+    delay_s: float
+    gain: np.ndarray
+    offset_m: np.ndarray
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator) -> "_Instruments":
+        prior = InstrumentPrior()
+        drawn = {name: np.array([prior.plate[name].draw(rng) for _ in "rl"]) for name in ("x", "z", "gain")}
+        common = [prior.floor[name].draw(rng) for name in "xz"]
+        offset = np.column_stack([drawn["x"] + common[0], np.zeros(2), drawn["z"] + common[1]])
+        return cls(prior.delay_s.draw(rng), drawn["gain"], offset)
+
+    def read(self, time: np.ndarray, loads: np.ndarray) -> np.ndarray:
+        """Return what the plates read of true loads (n, 2, 6)."""
+        later = np.asarray(CubicSpline(time, loads)(np.clip(time - self.delay_s, time[0], time[-1])))
+        later *= loads[..., 1:2] != 0.0
+        later[..., 3:] += np.cross(self.offset_m, later[..., :3])
+        return later * (1.0 + self.gain[:, None])
+
+
+def _truth(fit: Fit, exact: SyntheticTrial) -> dict[str, float]:
+    """Return the true value of each outcome, at the phases of the day's strides."""
+    found = event_means([_exactly(trial, exact) for trial in fit.trials], fit.mass_kg)
+    names: dict[str, list[float]] = {}
+    for (_, name, side, _), value in found.items():
+        quantity, joint, event = name.split(" ", 2)
+        joint, _, component = joint.partition("_")
+        component = {"angle": "flexion"}.get(component, component)
+        names.setdefault(" ".join((quantity, joint, component, event, side)), []).append(value)
+    return {name: float(np.mean(values)) for name, values in names.items()}
+
+
+@dataclass(frozen=True, eq=False)
+class _Exact:
+    """A trial whose curves are true (`curve_source.Estimated`)."""
+
+    name: str
+    kinematics: Kinematics
+    skeleton: Skeleton
+    motion: Motion
+    reactions: GroundReactions
+    joint_loads: Mapping[str, np.ndarray]
+    joint_curves: JointCurves
+    strides: tuple[Stride, ...]
+    phases: tuple[Stride, ...]
+    deviations: None = None
+
+
+def _exactly(trial: TrialFit, exact: SyntheticTrial) -> _Exact:
+    """Put the true motion and loads in place of the estimated ones."""
+    curves = trial.joint_curves
+    assert curves is not None
+    at = np.clip(np.searchsorted(exact.time, curves.time - 1e-9), 0, len(exact.time) - 1)
+    motion, loads = exact.motion.cut(at), exact.foot_loads[at]
+    forces = inverse_dynamics(exact.skeleton, exact.bsp, motion, loads)
+    joints = joint_moments(exact.skeleton, exact.bsp, motion, loads)
+    known = np.ones_like(curves.known)
+    own = JointCurves(curves.time, known, motion, {"estimate": forces}, {"estimate": joints}, None)
+    strides, phases = (tuple(_at_contacts(one, exact) for one in some) for some in (trial.strides, trial.phases))
+    kept = trial.kinematics, exact.skeleton, trial.motion, trial.reactions, trial.joint_loads
+    return _Exact(trial.name, *kept, own, strides, phases)
+
+
+def _at_contacts(stride: Stride, exact: SyntheticTrial) -> Stride:
+    """Put the true contacts in place of those that were found: whole ones, of both feet."""
+    landed, left = {}, {}
+    for foot, side in enumerate("rl"):
+        spans = runs(exact.foot_loads[:, foot, 1] >= LOAD_THRESHOLD_N)
+        landed[side] = exact.time[[first for first, _ in spans if first > 0]]
+        left[side] = exact.time[[last for _, last in spans if last < len(exact.time) - 1]]
+    other = "l" if stride.side == "r" else "r"
+
+    def nearest(times: np.ndarray, time_s: float) -> float:
+        return float(times[np.argmin(np.abs(times - time_s))]) if np.isfinite(time_s) else time_s
+
+    return replace(
+        stride,
+        start_s=nearest(landed[stride.side], stride.start_s),
+        end_s=nearest(landed[stride.side] if stride.phase == "stride" else left[stride.side], stride.end_s),
+        toe_off_s=nearest(left[stride.side], stride.toe_off_s),
+        opposite_toe_off_s=nearest(left[other], stride.opposite_toe_off_s),
+        opposite_strike_s=nearest(landed[other], stride.opposite_strike_s),
+    )
