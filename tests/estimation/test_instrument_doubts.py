@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from kinertia.estimation.instrument_doubts import instrument_doubt
+from kinertia.estimation.instrument_doubts import instrument_doubts
 from kinertia.findings.finding import Severity, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
@@ -28,7 +28,7 @@ def twice(fit):
 
 def doubt(fit, *findings):
     one = replace(fit, findings=findings)
-    return instrument_doubt((one, one.trials[:1]), (one, one.trials[1:]))
+    return instrument_doubts((one, one.trials[:1]), (one, one.trials[1:])).get("r", "")
 
 
 def test_an_error_of_one_condition_is_none_of_both(twice):
@@ -51,4 +51,13 @@ def test_what_is_corrected_explained_or_ignored_is_none(twice):
 
 def test_sessions_have_errors_of_their_own(twice):
     days = [replace(twice, findings=(zero(name),)) for name in ("first", "second")]
-    assert instrument_doubt((days[0], days[0].trials[:1]), (days[1], days[1].trials[1:])).startswith("P213")
+    found = instrument_doubts((days[0], days[0].trials[:1]), (days[1], days[1].trials[1:]))
+    assert set(found) == {"r", "l", ""}
+    assert found["l"].startswith("P213")
+
+
+def test_a_foot_beside_its_plate_leaves_the_other_leg(twice):
+    where = Where(trial="first", plate="plate 1")
+    beside = finding("P282", where, foot=Quantity("right"), overhang_m=Quantity(0.05, "m"))
+    one = replace(twice, findings=(beside,))
+    assert set(instrument_doubts((one, one.trials[:1]), (one, one.trials[1:]))) == {"r"}

@@ -18,8 +18,8 @@ _MILD = frozenset({"P105", "P106", "P107", "P108"})
 Trials = Sequence[TrialFit]
 
 
-def instrument_doubt(before: tuple[Fit, Trials], after: tuple[Fit, Trials]) -> str:
-    """State the findings, by code and message, that keep changes of moments from being judged; empty if none do.
+def instrument_doubts(before: tuple[Fit, Trials], after: tuple[Fit, Trials]) -> dict[str, str]:
+    """State the findings that keep changes of moments from being judged, by side of the leg: codes and messages.
 
     Args:
         before, after: fit and trials of each condition; of one session, the same fit.
@@ -28,8 +28,17 @@ def instrument_doubt(before: tuple[Fit, Trials], after: tuple[Fit, Trials]) -> s
     if before[0] is after[0]:
         everywhere = {_kind(one) for one in own[0]} & {_kind(one) for one in own[1]}
         own = [[one for one in some if one.severity is Severity.ERROR or _kind(one) not in everywhere] for some in own]
-    found = {one.code: f"{one.code}: {one.message}" for one in (*own[0], *own[1])}
-    return " ".join(found.values())
+    doubts: dict[str, dict[str, str]] = {}
+    for one in (*own[0], *own[1]):
+        for side in _sides(one):
+            doubts.setdefault(side, {})[one.code] = f"{one.code}: {one.message}"
+    return {side: " ".join(said.values()) for side, said in doubts.items()}
+
+
+def _sides(one: Finding) -> tuple[str, ...]:
+    """Return the sides whose loads a finding is about: that of a foot which it names, or all."""
+    foot = one.evidence.get("foot")
+    return {"right": ("r",), "left": ("l",)}.get("" if foot is None else str(foot.value), ("r", "l", ""))
 
 
 def _findings(fit: Fit, trials: Trials) -> list[Finding]:

@@ -67,7 +67,7 @@ def changed_sentence(found: Sequence[Change]) -> str:
 def limit_sentences(found: Sequence[Change], doubt: str) -> Iterator[str]:
     """State what was assumed, and what cannot be judged."""
     if doubt:
-        yield f"Changes of moments cannot be judged: {doubt}"
+        yield f"Changes of moments of the legs concerned cannot be judged: {doubt}"
     few = sorted({min(one.strides) for one in found if one.assumed})
     if few:
         least = f"{few[0]}" if len(few) == 1 else f"{few[0]} to {few[-1]}"

@@ -10,7 +10,7 @@ from kinertia.estimation.change import Change
 from kinertia.estimation.condition_changes import changes_of_strides, condition_features, masks_of
 from kinertia.estimation.curve_changes import CurveChange, apart, curve_changes, paired, rows_of
 from kinertia.estimation.gait_changes import gait_changes, speed_change
-from kinertia.estimation.instrument_doubts import instrument_doubt
+from kinertia.estimation.instrument_doubts import instrument_doubts
 from kinertia.estimation.prepared import Progress
 from kinertia.estimation.result import Fit
 from kinertia.estimation.session_changes import (
@@ -143,8 +143,9 @@ def _comparison(
     names: tuple[str, str], first: Session, other: Session, outcomes: Iterable[Change], curves: Iterable[CurveChange]
 ) -> Comparison:
     """Add speed, steps and doubts about instruments."""
-    doubt = instrument_doubt((first.fit, first.trials), (other.fit, other.trials))
-    judged = tuple(replace(one, doubt=doubt if one.quantity == "moment" else "") for one in outcomes)
+    doubts = instrument_doubts((first.fit, first.trials), (other.fit, other.trials))
+    doubt = " ".join(dict.fromkeys(doubts.values()))
+    judged = tuple(replace(one, doubt=doubts.get(one.side, "") if one.quantity == "moment" else "") for one in outcomes)
     walks = first.trials, other.trials
     return Comparison(*names, judged, speed_change(*walks), gait_changes(*walks), tuple(curves), doubt)
 
