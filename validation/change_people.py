@@ -28,10 +28,8 @@ from kinertia.motion.joint_moments import joint_moments
 from kinertia.motion.kinematics import Kinematics
 from kinertia.settings import Settings, Subject
 from kinertia.synthetic.laboratory import PERFECT, record
-from kinertia.synthetic.manner import Manner
-from kinertia.synthetic.noise import SkinMotion, camera_noise
-from kinertia.synthetic.skin_clusters import ClusterMotion
-from kinertia.synthetic.walk import SyntheticSubject, SyntheticTrial, walk, walking_subject
+from kinertia.synthetic.noise import ClusterMotion, SkinMotion, camera_noise
+from kinertia.synthetic.walk import Manner, SyntheticSubject, SyntheticTrial, walk, walking_subject
 from kinertia.trial.data import LOAD_THRESHOLD_N, Markers
 from kinertia.trial.sampled_time import runs
 from kinertia.trial.trial_input import TrialInput

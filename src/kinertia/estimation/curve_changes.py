@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinertia.estimation.change import UNITS, named_outcome
-from kinertia.estimation.common_strides import common_strides
 from kinertia.estimation.condition_changes import FEW, SHRINK, USUAL
+from kinertia.estimation.mean_cycles import common_strides
 from kinertia.estimation.stride_features import Rows
 from kinertia.motion.gait_cycle import PERCENT
 
