@@ -16,8 +16,8 @@ from examples import ROOT, blocks, link_measured
 
 FOLDER = ROOT / "docs" / "figures"
 PAGES = {
-    "report": ("report.html", "#verdict", [".headline", ".uses", ".steps"], 1160),
-    "report-cycle": ("report.html", "figure:has(#cycle-moments)", ["#cycle-moments", ".save"], 1130),
+    "report": ("report.html", "#verdict", [".headline", ".uses"], 1160),
+    "report-cycle": ("report.html", "figure:has(#cycle-joint-moments)", ["#cycle-joint-moments", ".save"], 860),
     "report-view": ("report.html", "#view", ["canvas", "#view .controls", "#view .legend"], 920),
     "check": ("check.html", "#recording2", ["#recording2-forces", "#recording2-pressure"], 1060),
 }
@@ -66,6 +66,9 @@ def main() -> None:
 
 def take(page: Page, part: str, marked: list[str], path: Path) -> None:
     """A picture of what is in the window, from the top of a part on, with numbers on what is marked."""
+    page.evaluate(
+        "part => document.querySelectorAll(part + '.more > details').forEach((one) => (one.open = true))", part
+    )
     while page.evaluate(_UNDRAWN):
         page.wait_for_timeout(200)
     page.evaluate(_NUMBERED, [part, marked])

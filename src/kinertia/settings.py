@@ -195,8 +195,11 @@ class Subject(Table):
         return {"name": folder_of(info).name or "subject", **data} if isinstance(data, dict) else data
 
 
+SignConvention = Literal["clinical", "isb", "opensim"]
+
+
 class Settings(Table):
-    """Options of the estimate.
+    """Options of the estimate, and signs of its report.
 
     Examples:
         >>> kinertia.Settings(cutoff_hz=6.0).method
@@ -224,6 +227,11 @@ class Settings(Table):
     )
     hip_centre: Literal["bell", "harrington"] = Field(
         default="bell", description='hip joint centres from the pelvis: "bell" or "harrington"'
+    )
+    convention: SignConvention | None = Field(
+        default=None,
+        description='signs in the report: "clinical", "isb" or "opensim"; left out: "opensim" for an OpenSim model, '
+        'else "clinical"',
     )
 
 

@@ -34,6 +34,18 @@ def test_the_report_is_written_again_as_it_was(results):
     assert "<code>kinertia " in before  # command and files stay known
 
 
+def test_a_letter_is_written_on_request_and_belongs_to_the_results(results):
+    outcome = run("report", results, "--letter", "--json")
+    assert outcome.status == 0, outcome.err
+    told = json.loads(outcome.out)
+    assert [told[name] for name in ("report", "letter")] == [
+        str(results / f"{one}.html") for one in ("report", "letter")
+    ]
+    assert 'class="summary letter"' in (results / "letter.html").read_text(encoding="utf-8")
+    assert run("report", results).status == 0
+    assert not (results / "letter.html").exists(), "it would be of another report"
+
+
 def test_the_report_with_norms(fit, results):
     """Norms as the docs make them: mean and spread of what `cycles.csv` has."""
     grouped = fit.cycles().groupby(["quantity", "percent"])["value"].agg(mean="mean", sd="std").dropna()

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from chromium import DESKTOP, PHONE, Opened, colour, ink, playwright
+from chromium import DESKTOP, PATIENCE_MS, PHONE, Opened, colour, ink, playwright
 from found import FAULT_FREE, UNUSABLE
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.report.page import render
@@ -209,24 +209,26 @@ def test_print_draws_everything_in_the_width_of_the_paper(demo):
     demo.page.evaluate("window.dispatchEvent(new Event('afterprint'))")
 
 
-def test_the_summary_is_two_pages_that_say_whose_they_are(demo):
+def test_the_letter_is_two_pages_that_say_whose_they_are(demo):
     page = demo.page
     page.evaluate("window.print = () => {}")
     page.locator("details.print").evaluate("part => (part.open = true)")
     page.get_by_label("Laboratory").fill("Ward <5>")
-    page.get_by_role("button", name="Summary, two pages").click()
+    page.get_by_role("button", name="Letter, two pages").click()
     page.emulate_media(media="print")
     shown = page.locator("h2:visible, h3:visible").all_text_contents()
     headings = page.locator(".ident:visible").all_inner_texts()
+    blank = page.locator(".paper .line:visible").count()
     scales = page.locator(".plot:visible").evaluate_all(
         "plots => plots.map(plot => Number(getComputedStyle(plot).zoom))"
     )
     page.emulate_media(media="null")
-    assert len(scales) == 3
+    assert len(scales) == 2
     assert min(scales) * SMALLEST_LETTERS_PX * POINTS_PER_PX > 5.5, "points, of the smallest letters"
-    assert shown == ["Verdict", "What may be used", "Do this next", "Joint moments", "Body", "Gait cycle", "Strides"]
+    assert shown == ["Verdict", "Strides", "Joint angles", "Joint moments and powers", "What to do next"]
     assert len(headings) == 2
     assert all("synthetic walker" in one and "72.6 kg" in one and "Laboratory: Ward <5>" in one for one in headings)
+    assert blank >= 3
     assert pages(page, prefer_css_page_size=True) == 2
     assert page.locator("body.summary").count() == 0, "once it is printed, everything is there again"
     assert pages(page, prefer_css_page_size=True) > 8
@@ -237,7 +239,7 @@ def pages(page, **paper):
 
 
 @pytest.mark.parametrize("findings", [FAULT_FREE, UNUSABLE])
-def test_the_summary_is_two_pages_whatever_was_found(browser, fit, tmp_path, findings):
+def test_the_letter_is_two_pages_whatever_was_found(browser, fit, tmp_path, findings):
     """On A4 and on Letter; the three steps that come first are on it."""
     path = tmp_path / "report.html"
     path.write_text(render(replace(fit, findings=findings, rules=61)), encoding="utf-8")
@@ -245,9 +247,9 @@ def test_the_summary_is_two_pages_whatever_was_found(browser, fit, tmp_path, fin
     page.evaluate("window.print = () => {}")
     for paper in ({"prefer_css_page_size": True}, {"format": "Letter"}):
         page.locator("details.print").evaluate("part => (part.open = true)")
-        page.get_by_role("button", name="Summary, two pages").click()
+        page.get_by_role("button", name="Letter, two pages").click()
         page.emulate_media(media="print")
-        steps = page.locator("#verdict ol li:visible").count()
+        steps = page.locator("#next ol li:visible").count()
         wide = page.evaluate("document.documentElement.scrollWidth - innerWidth")
         page.emulate_media(media="null")
         assert pages(page, **paper) == 2
@@ -263,7 +265,8 @@ def test_codes_lead_to_what_they_mean(browser, fit, tmp_path, viewport):
     page = Opened(browser, without_plotly(path, tmp_path), viewport).page
     meaning = page.locator("#explain-P244")
     playwright.expect(meaning).not_to_be_in_viewport()
-    page.locator("#verdict .steps a.code").first.click()
+    page.evaluate("document.querySelectorAll('details').forEach((part) => (part.open = false))")
+    page.locator("#next .steps a.code").first.click()
     playwright.expect(meaning).to_be_in_viewport()
     assert page.evaluate("document.documentElement.scrollWidth") <= viewport["width"]
     page.close()
@@ -271,18 +274,26 @@ def test_codes_lead_to_what_they_mean(browser, fit, tmp_path, viewport):
 
 @pytest.mark.parametrize("viewport", [DESKTOP, PHONE])
 @pytest.mark.parametrize("findings", [FAULT_FREE, UNUSABLE])
-def test_the_first_screen_has_what_may_be_used_and_what_to_do_next(browser, fit, tmp_path, findings, viewport):
-    """Every remedy that comes first is on it, and the reasons are below it on a phone."""
+def test_the_first_screen_has_what_may_be_used_and_why(browser, fit, tmp_path, findings, viewport):
+    """And the way to what to do next; everything that is not folded is at most 8,000 px on a desktop."""
     path = tmp_path / "report.html"
     path.write_text(render(replace(fit, findings=findings, rules=61)), encoding="utf-8")
     page = browser.new_page(viewport=viewport)
-    page.goto(without_plotly(path, tmp_path).as_uri())
-    last = page.locator("#verdict .steps, #verdict h3:has-text('Do this next') + p").bounding_box()
+    page.goto(path.as_uri())
+    last = page.locator("#verdict .uses").bounding_box()
     assert last["y"] + last["height"] <= viewport["height"]
-    assert page.locator("#verdict .at-a-glance .level:visible").count() == 3
-    assert page.locator("#verdict .at-a-glance .code:visible").count() == 0 or viewport is DESKTOP
+    assert page.locator("#verdict .level:visible").count() == 3
+    assert page.locator("#verdict .uses li > :nth-child(3):visible").count() == 3
+    assert page.evaluate("document.documentElement.scrollWidth") <= viewport["width"]
+    clipped = page.locator("nav a, .uses span, th, td").evaluate_all(
+        "all => all.filter(one => one.offsetParent && one.getBoundingClientRect().right > innerWidth + 1).length"
+    )
+    assert clipped == 0
+    if viewport is DESKTOP:
+        page.wait_for_function("() => document.querySelector('#cycle-forces[data-drawn]')", timeout=PATIENCE_MS)
+        assert page.evaluate("document.documentElement.scrollHeight") <= 8000
     page.get_by_text("output by output, and why").click()
-    assert page.locator("#verdict details .level:visible").count() == 5
+    assert page.locator("#outputs .level:visible").count() == 5
     page.close()
 
 
@@ -369,4 +380,24 @@ def test_comparison_is_drawn_fits_the_window_and_sorts(browser, comparison, widt
     assert len(cells) == 120
     assert opened.errors == []
     assert [url for url in opened.requests if not url.startswith(("data:", "blob:"))] == [page.url]
+    page.close()
+
+
+def test_a_letter_has_only_what_is_printed(browser, fit, tmp_path):
+    path = tmp_path / "letter.html"
+    path.write_text(render(fit, template="letter"), encoding="utf-8")
+    opened = Opened(browser, path)
+    page = opened.page
+    page.evaluate("window.print = () => {}")
+    assert page.locator(".plot:visible").count() == 2
+    assert page.locator("#cycle-powers:visible, .save:visible, .paper:visible").count() == 0
+    page.get_by_label("Laboratory").fill("Ward 5")
+    for paper in ({"prefer_css_page_size": True}, {"format": "Letter"}):
+        page.get_by_role("button", name="Print, two pages").click()
+        page.emulate_media(media="print")
+        assert page.locator(".paper .line:visible").count() == 3
+        assert page.locator(".ident:visible").all_inner_texts()[0].count("Laboratory: Ward 5") == 1
+        page.emulate_media(media="null")
+        assert pages(page, **paper) == 2
+    assert opened.errors == []
     page.close()

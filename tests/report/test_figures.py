@@ -169,15 +169,15 @@ def test_without_joint_curves_moments_are_those_of_the_measured_windows(fit):
     drawn = as_plotly(moment_figure(older, fit.skeleton, mass))
     trace = next(t for t in drawn.data if t.name == "right, estimate")
     np.testing.assert_allclose(trace.y, trial.moments["estimate"]["hip_flexion_r"] / mass, rtol=1e-5)
-    assert joint_moment_figure(older, mass) is None
+    assert joint_moment_figure(older, mass, "isb") is None
 
 
 def test_joint_moments_over_time_are_shaded_where_a_side_is_not_known(fit):
     trial, mass = fit.trials[0], fit.literature.total_mass_kg
     curves = trial.joint_curves
-    figure = as_plotly(joint_moment_figure(trial, mass))
+    figure = as_plotly(joint_moment_figure(trial, mass, "isb"))
     titles = [one.text for one in figure.layout.annotations]
-    panel = next(k for k, title in enumerate(titles) if "Knee moment, adduction" in title)
+    panel = next(k for k, title in enumerate(titles) if "Knee adduction" in title)
     axis = f"x{panel + 1}" if panel else "x"
     row = curves.joints["estimate"].joints.index("knee_r")
     values = curves.joints["estimate"].moments[:, row, 1]

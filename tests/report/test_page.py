@@ -19,15 +19,17 @@ from kinertia.io.subject.reader import read_subject
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.report.figure import packed_script
 from kinertia.report.finding_view import FindingView
-from kinertia.report.headline import purposes, words
+from kinertia.report.headline import Purpose, purposes, without_repetition, words
 from kinertia.report.page import bsp_rows, render
 from kinertia.report.wording import fixed
 from report_page import Elements, figures_of
 
 MOST_BYTES = 3_200_000
+SHOWN = ["verdict", "cycle", "angles", "moments", "forces", "next"]
+"""What people come for, in this order; all else is folded below."""
 PARTS = [
-    "verdict", "moments", "body", "findings", "changed", "cycle", "stance-walk", "bsp", "residuals", "kinematics",
-    "moments-over-time", "markers", "view", "computed", "explained",
+    *SHOWN, "findings", "outputs", "coordinates", "stance-walk", "moments-over-time", "kinematics", "body", "bsp",
+    "changed", "residuals", "markers", "view", "computed", "explained",
 ]  # fmt: skip
 
 
@@ -191,7 +193,30 @@ def test_page_has_all_parts_and_is_small_enough(page):
     assert len(set(ids)) == len(ids)
     links = {attrs["href"].removeprefix("#") for attrs in elements.named("a")}
     assert links <= set(ids)
-    assert set(PARTS) - {"changed", "stance-walk", "moments-over-time", "explained"} <= links
+    assert {*SHOWN, "more"} <= links
+    folded = [attrs["id"] for attrs in elements.named("section") if attrs.get("class") == "more"]
+    assert folded == [name for name in sections if name not in SHOWN]
+
+
+def test_what_is_not_folded_is_short(page):
+    """A clinician reads it on one screen after another: at most 1,500 words."""
+    shown = re.sub(
+        r"<details.*?</details>", "", re.sub(r"<(script|style).*?</\1>", "", page, flags=re.DOTALL), flags=re.DOTALL
+    )
+    assert 200 < len(re.sub(r"<[^>]+>", " ", shown).split()) <= 1500
+
+
+def test_legends_have_at_most_four_entries(page):
+    for name, figure in figures_of(page).items():
+        entries = {trace["name"] for trace in figure["data"] if trace.get("showlegend", "name" in trace)}
+        assert len(entries) <= 4, (name, entries)
+
+
+def test_a_reason_is_given_once():
+    moments, parameters, opensim = (Purpose(name, "use", "whole stride; 2 N") for name in ("Moments", "B", "OpenSim"))
+    shown = without_repetition([moments, parameters._replace(reason="other"), opensim], "whole stride")
+    assert [one.reason for one in shown] == ["2 N", "other", "as moments"]
+    assert [one.use for one in shown] == ["use"] * 3
 
 
 def test_every_picture_has_words_and_data(page):

@@ -19,8 +19,10 @@ from kinertia.io.results.output_folder import updated_files
 from kinertia.motion.model_outputs import CLINICAL_ANGLES
 from kinertia.report.cycle_figures import CurvesByStage, drawn_curves
 from kinertia.report.files import write_columns
-from kinertia.report.page import render
+from kinertia.report.page import Template, render
 from kinertia.report.saved_fit import read_saved
+
+LETTER = "letter.html"
 
 
 def report(
@@ -28,6 +30,9 @@ def report(
     norms: Annotated[
         Path | None, typer.Option(help="CSV file with norms, drawn as bands: quantity,percent,mean,sd.")
     ] = None,
+    letter: Annotated[
+        bool, typer.Option("--letter", help="Write letter.html, too: two pages for a patient's file.")
+    ] = False,
     quiet: Quiet = False,
 ) -> Outcome:
     """Write the report of a fit again, without the recordings: report.html in its folder is replaced.
@@ -40,15 +45,19 @@ def report(
 
     kinertia report out
 
-    kinertia report out --norms adults.csv
+    kinertia report out --norms adults.csv --letter
     """
     saved = read_saved(results)
     curves = drawn_curves(saved.fit)
     bands, without_curve = ({}, []) if norms is None else _norms_for(saved.fit, curves, norms)
     profile = gait_profile(saved.fit, bands) if set(CLINICAL_ANGLES) <= set(bands) else None
-    page = render(saved.fit, saved.provenance, saved.versions, bands, saved.truth, curves)
-    with updated_files(results, "fit", ["gps.csv"]) as work:
-        (work / "report.html").write_text(page, encoding="utf-8", newline="\n")
+    content = (saved.fit, saved.provenance, saved.versions, bands, saved.truth, curves)
+    pages: dict[str, Template] = {"report.html": "report"}
+    if letter:
+        pages[LETTER] = "letter"
+    with updated_files(results, "fit", ["gps.csv", LETTER]) as work:
+        for name, template in pages.items():
+            (work / name).write_text(render(*content, template), encoding="utf-8", newline="\n")
         cycles = bands or (results / "cycles.csv").is_file()
         if cycles and any(trial.strides for trial in saved.fit.trials):
             columns = columns_of(curves["estimate"])
@@ -56,8 +65,10 @@ def report(
             write_columns(work / "cycles.csv", columns, "%.6g")
         if profile:
             write_columns(work / "gps.csv", profile.columns(), "%.6g")
-    out.print(f"report in {results / 'report.html'}", soft_wrap=True)
-    summary: dict[str, Any] = {"report": str(results / "report.html"), "norms": list(bands)}
+    for name, template in pages.items():
+        out.print(f"{template} in {results / name}", soft_wrap=True)
+    summary: dict[str, Any] = {template: str(results / name) for name, template in pages.items()}
+    summary |= {"norms": list(bands)}
     if profile:
         overall = profile.overall_deg
         out.print(f"Gait Profile Score {score_text(overall)}; {results / 'gps.csv'}", soft_wrap=True)

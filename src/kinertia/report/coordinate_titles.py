@@ -122,15 +122,15 @@ def load_title(one: Coordinate, what: str) -> str:
     return f"{joint} {what}, {direction.replace(', to the', '').replace(',', '')}"
 
 
-def joint_moment_title(name: str) -> str:
-    """Title a three-dimensional joint moment with its direction.
+def joint_moment_words(name: str) -> tuple[str, str]:
+    """Return the joint and the positive direction of a three-dimensional joint moment, as its name has it.
 
-    >>> joint_moment_title("knee_adduction"), joint_moment_title("lumbar_bending")
-    ('Knee moment, adduction +', 'Trunk moment, bending right +')
+    >>> joint_moment_words("knee_rotation"), joint_moment_words("lumbar_bending")
+    (('Knee', 'internal rotation'), ('Trunk', 'bending right'))
     """
     joint, component = name.split("_")
     words = _COMPONENTS.get(name, {"rotation": "internal rotation"}.get(component, component))
-    return f"{'Trunk' if joint == 'lumbar' else joint.capitalize()} moment, {words} +"
+    return "Trunk" if joint == "lumbar" else joint.capitalize(), words
 
 
 def power_title(one: Coordinate, others: Sequence[Coordinate]) -> str:

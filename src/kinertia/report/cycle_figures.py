@@ -6,7 +6,7 @@ dotted. Gaps, where nothing was measured, are shaded in the side's colour.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
@@ -17,17 +17,19 @@ from kinertia.estimation.cycles import FORCES, UNITS, CycleCurve, Kind, curves_b
 from kinertia.estimation.mean_cycles import common_strides, main_task, mean_of, mean_of_common
 from kinertia.estimation.result import Fit
 from kinertia.io.norms_file import Norm
-from kinertia.model.shared_coordinates import opposite_on_left
+from kinertia.model.shared_coordinates import by_side, opposite_on_left
 from kinertia.model.skeleton import Skeleton
 from kinertia.motion.gait_cycle import PERCENT, Phase
 from kinertia.motion.joint_moments import component_names, joint_and_side
 from kinertia.motion.joint_wrench import body_joints
 from kinertia.motion.model_outputs import CLINICAL_ANGLES
 from kinertia.report import style
-from kinertia.report.coordinate_titles import joint_moment_title, load_title, panels_of, power_title
+from kinertia.report.coordinate_titles import load_title, panels_of, power_title
 from kinertia.report.figure import Figure, compact
 from kinertia.report.panels import Panel, plain, shaded, small_multiples
+from kinertia.report.signs import convention_of, signed_angles, signed_joint_moment
 from kinertia.report.wording import INTERVAL_SD, USUAL, start_of
+from kinertia.settings import SignConvention
 from kinertia.trial.data import FEET
 from kinertia.trial.sampled_time import runs
 
@@ -35,26 +37,13 @@ MOST_STRIDES = 100
 """Largest number of strides of a trial and side; if there are more, this many are taken, evenly spread."""
 _MOST_DRAWN = 5
 """Number of strides drawn per side; mean and bands are of all."""
+_TRUNK = "lumbar"
+_ROOT_COORDINATES = 6
+_OF_FILES: Mapping[Kind, SignConvention] = {"joint_moment": "isb", "clinical": "clinical"}
+"""Signs of the curves in `cycles.csv`."""
 _SD_OPACITY, _BAND_OPACITY, _STRIDE_OPACITY, _GAP_OPACITY = 0.13, 0.25, 0.45, 0.08
 _OF_LANDINGS: tuple[Kind, ...] = ("joint_moment", "moment", "angle", "power", "force")
 _PERCENT_OF: Mapping[Phase, str] = {"stride": "the gait cycle", "stance": "stance", "landing": "the landing"}
-_CLINICAL_TITLES = dict(
-    zip(
-        CLINICAL_ANGLES,
-        (
-            "Pelvic tilt, anterior +",
-            "Pelvic obliquity, this side up +",
-            "Pelvic rotation, this side forward +",
-            "Hip flexion +",
-            "Hip adduction +",
-            "Hip internal rotation +",
-            "Knee flexion +",
-            "Ankle dorsiflexion +",
-            "Foot progression, toes inward +",
-        ),
-        strict=True,
-    )
-)
 _FORCE_TITLES = dict(zip(FORCES, ("Forward +", "Upward +", "Towards the other foot +"), strict=True))
 
 Curves = Mapping[tuple[str, str], Sequence[CycleCurve]]
@@ -66,7 +55,7 @@ Norms = Mapping[str, Norm]
 
 
 def cycle_figures(
-    fit: Fit, norms: Norms = MappingProxyType({}), curves: CurvesByStage | None = None
+    fit: Fit, norms: Norms = MappingProxyType({}), curves: CurvesByStage | None = None, legs: bool = False
 ) -> dict[Kind, Figure]:
     """Draw all figures over the gait cycle, by kind; none where no trial has a stride, or no stride shows that kind.
 
@@ -76,6 +65,7 @@ def cycle_figures(
         fit: the fit.
         norms: grey bands below.
         curves: `drawn_curves` of the fit, where they are known.
+        legs: leave out the trunk in figures of joint moments and of an OpenSim model's angles.
     """
     fit = main_task(fit)
     if not any(trial.strides for trial in fit.trials):
@@ -85,7 +75,7 @@ def cycle_figures(
     estimate, literature = (
         _by_quantity(one for one in known[stage] if one.trial in names) for stage in ("estimate", "literature")
     )
-    drawn = _Drawn(fit, estimate, literature, norms)
+    drawn = _Drawn(fit, estimate, literature, norms, legs=legs)
     figures = {kind: drawn.figure(kind) for kind in UNITS}
     return {kind: figure for kind, figure in figures.items() if figure is not None}
 
@@ -100,7 +90,7 @@ class PhaseFigures:
     figures: dict[Kind, Figure]
 
 
-def phase_figures(fit: Fit, curves: CurvesByStage | None = None) -> tuple[PhaseFigures, ...]:
+def phase_figures(fit: Fit, curves: CurvesByStage | None = None, legs: bool = False) -> tuple[PhaseFigures, ...]:
     """Draw the stances and landings of each task over their own percentages, apart from all others.
 
     Of stances the joint moments alone: angles and the rest are in the figures over the gait cycle, or over time.
@@ -110,7 +100,7 @@ def phase_figures(fit: Fit, curves: CurvesByStage | None = None) -> tuple[PhaseF
     for task, phase in dict.fromkeys((one.task, one.stride.phase) for one in shown):
         own = {stage: [one for one in some if one.task == task] for stage, some in known.items()}
         estimate, literature = (_by_quantity(own[stage], phase) for stage in ("estimate", "literature"))
-        drawn = _Drawn(fit, estimate, literature, {}, phase)
+        drawn = _Drawn(fit, estimate, literature, {}, phase, legs)
         kinds: tuple[Kind, ...] = _OF_LANDINGS if phase == "landing" else ("joint_moment",)
         figures = {kind: drawn.figure(kind) for kind in kinds}
         of_phase = [one for one in own["estimate"] if one.stride.phase == phase]
@@ -141,17 +131,13 @@ def _by_quantity(curves: Iterable[CycleCurve], phase: Phase = "stride") -> Curve
 
 
 def titled_quantities(skeleton: Skeleton, kind: Kind) -> list[tuple[str, str]]:
-    """Return names and titles of the curves of a kind, in the order of the panels; a title states the positive
-    direction, which a coordinate's name does not do in every model.
+    """Return names and titles of the curves of a kind in `cycles.csv`, in the order of the panels; a title states the
+    positive direction, which a coordinate's name does not do in every model.
     """
+    if kind in ("joint_moment", "clinical"):
+        return [(name, title) for name, title, _ in _signed_quantities(skeleton, kind, _OF_FILES[kind])]
     if kind == "force":
         return list(_FORCE_TITLES.items())
-    if kind == "clinical":
-        return list(_CLINICAL_TITLES.items())
-    if kind == "joint_moment":
-        bases = dict.fromkeys(joint_and_side(joint.label)[0] for joint in body_joints(skeleton))
-        names = [name for base in bases for name in component_names(base)]
-        return [(f"{name}_joint_moment", joint_moment_title(name)) for name in names]
     coordinates = [one for one in panels_of(skeleton) if one.rotational]
     if kind == "angle":
         return [(f"{one.name}_angle", one.title) for one in coordinates]
@@ -160,6 +146,17 @@ def titled_quantities(skeleton: Skeleton, kind: Kind) -> list[tuple[str, str]]:
         coordinates = [one for one in coordinates if legs & set(one.columns.values())]
         return [(f"{one.name}_power", power_title(one, coordinates)) for one in coordinates]
     return [(f"{one.name}_moment", load_title(one, "moment")) for one in coordinates]
+
+
+def _signed_quantities(skeleton: Skeleton, kind: Kind, convention: SignConvention) -> list[tuple[str, str, float]]:
+    """Return names, titles and signs of the curves of a kind by a convention."""
+    if kind == "clinical":
+        return [(name, *signed) for name, signed in signed_angles(convention).items()]
+    if kind == "joint_moment":
+        bases = dict.fromkeys(joint_and_side(joint.label)[0] for joint in body_joints(skeleton))
+        names = [name for base in bases for name in component_names(base)]
+        return [(f"{name}_joint_moment", *signed_joint_moment(name, skeleton, convention)) for name in names]
+    return [(name, title, 1.0) for name, title in titled_quantities(skeleton, kind)]
 
 
 @dataclass(frozen=True)
@@ -171,16 +168,18 @@ class _Drawn:
     usual: Curves
     norms: Norms
     phase: Phase = "stride"
+    legs: bool = False
 
     def figure(self, kind: Kind) -> Figure | None:
         panels = [
             Panel(
-                f"{title} ({UNITS[kind]})",
-                [*self._traces(quantity, self._usual_name(kind))],
+                f"{title} ({'internal ' if kind == 'joint_moment' else ''}{UNITS[kind]})",
+                [*self._traces(quantity, self._usual_name(kind), sign)],
                 [*self._gaps(quantity), *self._toe_offs()],
             )
-            for quantity, title in titled_quantities(self.fit.skeleton, kind)
-            if any((quantity, side) in curves for side in FEET for curves in (self.estimate, self.usual))
+            for quantity, title, sign in _signed_quantities(self.fit.skeleton, kind, convention_of(self.fit))
+            if self._wanted(quantity, kind)
+            and any((quantity, side) in curves for side in FEET for curves in (self.estimate, self.usual))
         ]
         if not panels:
             return None
@@ -188,21 +187,35 @@ class _Drawn:
         axis["title"] = {"text": f"% of {_PERCENT_OF[self.phase]}", "font": {"size": 11}, "standoff": 2}
         return small_multiples(panels, self._alt(kind), axis)
 
+    def _wanted(self, quantity: str, kind: Kind) -> bool:
+        """Return whether a panel is drawn: with `legs` no moments of the trunk, nor angles of it if a model's own are
+        shown.
+        """
+        if not self.legs or kind not in ("joint_moment", "angle"):
+            return True
+        if kind == "joint_moment":
+            return not quantity.startswith(_TRUNK)
+        skeleton = self.fit.skeleton
+        columns = by_side(skeleton.coordinates)[quantity.removesuffix("_angle")].values()
+        of_legs = {*range(_ROOT_COORDINATES), *_leg_coordinates(skeleton)}
+        return convention_of(self.fit) != "opensim" or bool(of_legs & set(columns))
+
     def _usual_name(self, kind: Kind) -> str:
         """Name the dotted curves: body segment parameters only affect moments and powers."""
         return USUAL if kind in ("angle", "force") else start_of(self.fit).values
 
-    def _traces(self, quantity: str, usual_name: str) -> Iterator[dict[str, Any]]:
+    def _traces(self, quantity: str, usual_name: str, sign: float) -> Iterator[dict[str, Any]]:
         if norm := self.norms.get(quantity):
-            yield from _norm(norm, self._opposite(quantity))
+            yield from _norm(replace(norm, mean=sign * norm.mean), self._opposite(quantity))
         for side in FEET:
-            curves, usual = (each.get((quantity, side), []) for each in (self.estimate, self.usual))
+            both = (each.get((quantity, side), []) for each in (self.estimate, self.usual))
+            curves, usual = ([replace(one, value=sign * one.value) for one in some] for some in both)
             word, colour = style.SIDES[side]
             if curves:
                 yield from _estimate(curves, word, colour)
             if usual and quantity not in CLINICAL_ANGLES:  # which no estimate changes
-                line = {"color": colour, "dash": "dot", "width": 1.6}
-                yield {**mean_line(usual_mean(usual, curves)), "name": f"{word}, {usual_name}", "line": line}
+                dotted = {"line": {"color": colour, "dash": "dot", "width": 1.6}, "showlegend": not curves}
+                yield {**mean_line(usual_mean(usual, curves)), "name": f"{word}, {usual_name}", **dotted}
 
     def _opposite(self, quantity: str) -> bool:
         """Return whether the sides' curves of a quantity have opposite signs, though the norm is one."""
@@ -272,20 +285,25 @@ def _leg_coordinates(skeleton: Skeleton) -> set[int]:
 
 
 def _estimate(curves: Sequence[CycleCurve], word: str, colour: str) -> Iterator[dict[str, Any]]:
-    """Draw bands below, strides, and their mean on top."""
+    """Draw bands below, strides, and their mean on top, which alone is in the legend."""
+    quiet = {"showlegend": False}
     values = np.array([one.value for one in curves])
     common = common_strides(values)
     mean, spread = mean_of(values[common]), _spread(values[common])
     if spread is not None:
-        yield {**band(mean - spread, mean + spread, style.faded(colour, _SD_OPACITY)), "name": f"{word}, mean ± SD"}
+        yield {
+            **band(mean - spread, mean + spread, style.faded(colour, _SD_OPACITY)),
+            "name": f"{word}, mean ± SD",
+            **quiet,
+        }
     half = INTERVAL_SD * mean_of(np.array([one.sd for one in curves])[common])
     if np.isfinite(half).any():
         name = f"{word}, 95 % of the estimate"
-        yield {**band(mean - half, mean + half, style.faded(colour, _BAND_OPACITY)), "name": name}
+        yield {**band(mean - half, mean + half, style.faded(colour, _BAND_OPACITY)), "name": name, **quiet}
     if len(curves) > 1:
         shown = [curves[k] for k in np.unique(np.linspace(0, len(curves) - 1, _MOST_DRAWN).round().astype(int))]
         line = {"color": style.faded(colour, _STRIDE_OPACITY), "width": 0.8}
-        yield {**_strides(shown), "name": f"{word}, {curves[0].stride.phase}s", "line": line}
+        yield {**_strides(shown), "name": f"{word}, {curves[0].stride.phase}s", "line": line, **quiet}
     phase = curves[0].stride.phase
     name = "mean" if spread is not None else f"one {phase}" if len(curves) < 2 else f"longest {phase}"
     yield {**mean_line(mean), "name": f"{word}, {name}", "line": {"color": colour, "width": 2.2}}

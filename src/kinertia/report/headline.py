@@ -73,7 +73,7 @@ def impossible(fit: Fit) -> bool:
 
 
 def purposes(outputs: Sequence[Suitability], no_body: bool) -> tuple[Purpose, ...]:
-    """Rate three purposes by the five outputs: moments in the clinic, parameters in print, next steps in OpenSim."""
+    """Rate three purposes by the five outputs: joint moments, parameters in print, next steps in OpenSim."""
     of = {one.output: one for one in outputs}
     moments, motion = of["joint moments"], of["motion"]
     segments = [of[name] for name in ("segment masses", "centres of mass", "moments of inertia")]
@@ -87,10 +87,20 @@ def purposes(outputs: Sequence[Suitability], no_body: bool) -> tuple[Purpose, ..
     if no_body:
         opensim = opensim._replace(use=DO_NOT_USE, reason=f"a segment is physically impossible; see {IMPOSSIBLE}")
     return (
-        Purpose("Joint moments for clinical use", moments.use, moments.reason),
+        Purpose("Joint moments and powers", moments.use, moments.reason),
         Purpose("Segment parameters in a paper", parameters.use, parameters.reason),
         opensim,
     )
+
+
+def without_repetition(rated: Sequence[Purpose], said: str) -> list[Purpose]:
+    """Leave out of the reasons what the report states elsewhere, and what another purpose has stated."""
+    result: list[Purpose] = []
+    for one in rated:
+        like = next((other for other in rated[: len(result)] if other.reason == one.reason), None)
+        reason = one.reason.removeprefix(f"{said}; ") if like is None else f"as {like.name.lower()}"
+        result.append(one._replace(reason=reason))
+    return result
 
 
 def _motion(fit: Fit, trial: TrialFit) -> list[str]:

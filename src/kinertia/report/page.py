@@ -6,7 +6,7 @@ plotly.js is in the page once, compressed; its policy (Content-Security-Policy) 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from kinertia.io.norms_file import Norm
 from kinertia.io.subject.provenance import Provenance
 from kinertia.io.versions import versions
 from kinertia.model.bsp import PARAMETERS, BodySegmentParameters
-from kinertia.motion.model_outputs import CLINICAL_ANGLES
+from kinertia.report import style
 from kinertia.report.body_figure import body_figure
 from kinertia.report.bsp_figures import (
     MAIN,
@@ -36,7 +36,6 @@ from kinertia.report.bsp_figures import (
     segment_name,
 )
 from kinertia.report.cycle_figures import (
-    MOST_STRIDES,
     CurvesByStage,
     Norms,
     PhaseFigures,
@@ -49,10 +48,12 @@ from kinertia.report.cycle_table import peak_rows, stride_rows
 from kinertia.report.figure import Figure, written
 from kinertia.report.file_outputs import outputs_view
 from kinertia.report.finding_view import FindingView
-from kinertia.report.headline import held_sentence, hidden_combinations, words
+from kinertia.report.headline import held_sentence, hidden_combinations, without_repetition, words
 from kinertia.report.marker_figures import fit_gap_figure, marker_figure
+from kinertia.report.panels import base_layout
 from kinertia.report.rendering import rendered
 from kinertia.report.scene import view
+from kinertia.report.signs import convention_of
 from kinertia.report.skeleton_view import scene
 from kinertia.report.time_figures import (
     MOST_EVENTS,
@@ -76,6 +77,10 @@ VIEW_FRAMES = 300
 """Frames in the 3-D view, shared by the trials like those of the curves, so that the page stays below 3.2 MB."""
 
 
+Template = Literal["report", "letter"]
+"""The report, or of it what belongs into a patient's file: two printed pages."""
+
+
 def render(
     fit: Fit,
     provenance: Provenance | None = None,
@@ -83,8 +88,9 @@ def render(
     norms: Norms = MappingProxyType({}),
     truth: Truth | None = None,
     curves: CurvesByStage | None = None,
+    template: Template = "report",
 ) -> str:
-    """Render the report of a fit.
+    """Render the report of a fit, or its letter.
 
     Args:
         fit: the fit.
@@ -93,14 +99,17 @@ def render(
         norms: norms of the curves over the gait cycle, drawn as bands behind them.
         truth: truth of a synthetic person.
         curves: `drawn_curves` of the fit, where they are known.
+        template: which page.
     """
     true_bsp = None if truth is None else truth.bsp
     shown = fit.trials[:MOST_TRIALS]
+    covered, gaps, said = coverage_sentence(fit.trials), gaps_sentence(shown), words(fit)
     return rendered(
-        "report.html.j2",
-        title=f"{fit.subject.name}: body segment parameters",
+        f"{template}.html.j2",
+        title=f"{fit.subject.name}: gait report",
         fit=fit,
-        words=words(fit),
+        words=said,
+        purposes=without_repetition(said.purposes, covered),
         start=start_of(fit),
         expected=expected_of(fit),
         found=FindingView([fit.overview]),
@@ -110,9 +119,13 @@ def render(
         total_mass=[fit.subject.mass_kg, fit.literature.total_mass_kg, fit.estimate.total_mass_kg],
         cycle=_cycle(fit, norms, curves),
         more_cycles=[(task, _cycle(own, norms, curves)) for task, own in list(fits_by_task(fit).items())[1:]],
-        phases=[_phase(one) for one in phase_figures(fit, curves)],
-        covered=coverage_sentence(fit.trials),
-        gaps=gaps_sentence(shown),
+        phases=[_phase(one) for one in phase_figures(fit, curves, legs=True)],
+        convention=convention_of(fit),
+        about=_about(fit, provenance),
+        sides={side: name for side, (_, name) in style.SIDE_COLOURS.items()},
+        covered=covered,
+        gaps=gaps if "%" in covered else "",
+        all_gaps=gaps,
         beside=outputs_view(fit, shown, MOST_FRAMES // len(shown)),
         walks=any(gait_events(trial.kinematics.trial) for trial in fit.trials),
         body={
@@ -150,16 +163,28 @@ def _parameters(fit: Fit, true_bsp: BodySegmentParameters | None) -> dict[str, A
     return {**figures, "rows": bsp_rows(fit)}
 
 
+def _about(fit: Fit, provenance: Provenance | None) -> list[str]:
+    """List who was recorded, when and under which conditions, as far as it is known."""
+    person = fit.subject
+    parts = [person.sex, "" if person.age_years is None else f"{person.age_years:g} years", f"{fit.mass_kg:.1f} kg"]
+    parts += ["" if person.height_m is None else f"{person.height_m:.2f} m"]
+    conditions = dict.fromkeys(trial.kinematics.trial.condition for trial in fit.trials)
+    named = [f"{trial.name}" for trial in fit.trials[:MOST_TRIALS]]
+    more = len(fit.trials) - len(named)
+    about = [", ".join(filter(None, parts)), "" if provenance is None else provenance.date, *conditions]
+    return [*filter(None, about), ", ".join(named) + (f" and {more} more trials" if more else "")]
+
+
 def _written(figure: Figure | None) -> dict[str, Any] | None:
     return None if figure is None else written(figure)
 
 
 def _cycle(fit: Fit, norms: Norms, curves: CurvesByStage | None) -> dict[str, Any] | None:
     """Collect everything that the templates show of the gait cycle; None where there are no strides."""
-    figures = cycle_figures(fit, norms, curves)
+    figures = cycle_figures(fit, norms, curves, legs=True)
     if not figures:
         return None
-    clinical = figures.pop("clinical", None)
+    clinical, profile = figures.pop("clinical", None), profile_view(fit, norms)
     own = main_task(fit)
     names = {trial.name for trial in own.trials if trial.joint_curves is not None}
     estimate = (curves or drawn_curves(own))["estimate"]
@@ -168,10 +193,10 @@ def _cycle(fit: Fit, norms: Norms, curves: CurvesByStage | None) -> dict[str, An
         "rows": stride_rows(own),
         "peaks": peak_rows([one for one in estimate if one.trial in names]),
         "trials": [trial.name for trial in own.trials],
-        "most": MOST_STRIDES,
         "norms": bool(norms),
-        "profile": profile_view(fit, norms),
-        "clinical": _written(clinical) if set(CLINICAL_ANGLES) & set(norms) else None,
+        "profile": profile,
+        "map": None if profile is None else written(map_figure(profile)),
+        "clinical": None if convention_of(fit) == "opensim" else _written(clinical),
         "spread": has_spread(figures["moment"]),
         "strides": len(strides),
         "on_plates": sum(stride.on_plates for stride in strides),
@@ -217,7 +242,7 @@ def _trial(fit: Fit, trial: TrialFit, k: int, count: int, truth: Truth | None) -
                 None if truth is None else truth.joint_loads[trial.name],
             )
         ),
-        "joint_moments": _written(joint_moment_figure(trial, fit.mass_kg, frames // 2)),
+        "joint_moments": _written(joint_moment_figure(trial, fit.mass_kg, convention_of(fit), frames // 2)),
         "bands": trial.deviations is not None,
         "forces": forces_used(trial.reactions, fit.settings, trial.motion_hz),
         "markers": written(marker_figure(trial, () if noise is None else noise.drifting)),
@@ -332,6 +357,40 @@ def profile_view(fit: Fit, norms: Mapping[str, Norm]) -> ProfileView | None:
     ]
     rows.append(ScoreRow("Gait Profile Score", *(_degrees(profile.gps_deg[side]) for side in FEET)))
     return ProfileView(tuple(rows), _degrees(profile.overall_deg), profile.norm_people, profile.remarks)
+
+
+def map_figure(view: ProfileView) -> Figure:
+    """Draw the Movement Analysis Profile: a bar per variable and side, the Gait Profile Score last."""
+    traces = [
+        {
+            "type": "bar",
+            "orientation": "h",
+            "x": [_number(getattr(row, side)) for row in view.rows],
+            "y": list(range(len(view.rows))),
+            "name": side,
+            "marker": {"color": style.SIDES[side[0]][1]},
+            "hovertemplate": "%{x:.1f} degrees<extra>%{fullData.name}</extra>",
+        }
+        for side in ("right", "left")
+    ]
+    layout = base_layout("Movement Analysis Profile: Gait Variable Score of each angle, and Gait Profile Score.")
+    layout |= {
+        "height": 60 + 26 * len(view.rows),
+        "margin": {"t": 30, "b": 40, "l": 130, "r": 14},
+        "barmode": "group",
+        "xaxis": {"title": {"text": "Gait Variable Score (degrees)", "font": {"size": 11}}, "rangemode": "tozero"},
+        "yaxis": {
+            "tickmode": "array",
+            "tickvals": list(range(len(view.rows))),
+            "ticktext": [row.variable for row in view.rows],
+            "autorange": "reversed",
+        },
+    }
+    return Figure(traces, layout)
+
+
+def _number(degrees: str) -> float | None:
+    return None if degrees == "–" else float(degrees)
 
 
 def _degrees(value: float) -> str:

@@ -28,7 +28,7 @@ from kinertia.trial.data import FEET
 
 CHANGED_SD = INTERVAL_SD
 """A difference of more than this many of its own SDs is a change."""
-_COLOURS = (style.BLUE, style.VERMILION, style.GREEN, style.ORANGE, style.SKY, style.BLACK)
+_COLOURS = style.COMPARED
 MOST_FITS = len(_COLOURS)
 _MOST_TRIALS = 3
 """Number of trials of each result whose files' own outputs are shown."""

@@ -5,6 +5,10 @@ GREY, PALE, UNUSED = "#6B6B6B", "#C8C8C8", "#E9E9E9"
 
 SIDES = {"r": ("right", BLUE), "l": ("left", VERMILION), "": ("", BLACK)}
 """Word and colour by the suffix of a coordinate's name; "" where it has no side."""
+COMPARED = (BLACK, ORANGE, "#CC79A7", SKY, GREY, GREEN)
+"""Colours of results that are compared: none is a side's."""
+SIDE_COLOURS = {"r": (BLUE, "blue"), "l": (VERMILION, "vermilion")}
+"""Colour of each side, and its name."""
 
 STAGES = {
     "literature": {"color": GREY, "dash": "dot", "width": 1.5},

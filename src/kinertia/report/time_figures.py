@@ -17,10 +17,12 @@ from kinertia.model.skeleton import Skeleton
 from kinertia.motion.joint_moments import component_names, joint_and_side
 from kinertia.motion.kinematics import Kinematics
 from kinertia.report import style
-from kinertia.report.coordinate_titles import Coordinate, joint_moment_title, load_title, panels_of
+from kinertia.report.coordinate_titles import Coordinate, load_title, panels_of
 from kinertia.report.figure import Figure, compact
 from kinertia.report.panels import Panel, shaded, small_multiples
+from kinertia.report.signs import signed_joint_moment
 from kinertia.report.wording import INTERVAL_SD, LITERATURE, Start
+from kinertia.settings import SignConvention
 from kinertia.trial.file_contents import GaitEvent
 from kinertia.trial.gait_events import gait_events
 from kinertia.trial.rms import rms, rms_length
@@ -154,7 +156,7 @@ def bands(one: Coordinate, time: np.ndarray, values: np.ndarray, sd: np.ndarray,
         middle, half = values[:, column], INTERVAL_SD * sd[:, column]
         edge = {"line": {"width": 0}, "hoverinfo": "skip", "hovertemplate": None}
         name = f"{word} 95 % band".strip()
-        fill = {"fill": "tonexty", "fillcolor": style.faded(colour, 0.18), "name": name}
+        fill = {"fill": "tonexty", "fillcolor": style.faded(colour, 0.18), "name": name, "showlegend": False}
         lower = {"name": f"{name}, lower edge", "showlegend": False}
         traces.append({**_curve(time, middle - half, thin), **edge, **lower})
         traces.append({**_curve(time, middle + half, thin), **edge, **fill})
@@ -164,12 +166,13 @@ def bands(one: Coordinate, time: np.ndarray, values: np.ndarray, sd: np.ndarray,
 def lines_by_side(
     one: Coordinate, name: str, time: np.ndarray, values: np.ndarray, thin: slice, line: dict[str, Any]
 ) -> list[dict[str, Any]]:
-    """Draw a line per side, with its colour and a name that begins with the side."""
+    """Draw a line per side, with its colour and a name that begins with the side; the legend explains sides only."""
     return [
         {
             **_curve(time, values[:, column], thin),
             "name": ", ".join(filter(None, (style.SIDES[side][0], name))),
             "line": {"color": style.SIDES[side][1], **line},
+            "showlegend": bool(side),
         }
         for side, column in one.columns.items()
     ]
@@ -303,8 +306,10 @@ def moment_figure(
     return small_multiples(panels, alt, axis)
 
 
-def joint_moment_figure(trial: TrialFit, mass_kg: float, most_frames: int = MOST_FRAMES) -> Figure | None:
-    """Draw three-dimensional joint moments (N m/kg) as estimated, with the 95 % band; None without any."""
+def joint_moment_figure(
+    trial: TrialFit, mass_kg: float, convention: SignConvention, most_frames: int = MOST_FRAMES
+) -> Figure | None:
+    """Draw three-dimensional joint moments of the legs (N m/kg) as estimated, with the 95 % band; None without any."""
     curves = trial.joint_curves
     if curves is None or not np.isfinite(curves.joints["estimate"].moments).any():
         return None
@@ -316,12 +321,15 @@ def joint_moment_figure(trial: TrialFit, mass_kg: float, most_frames: int = MOST
     columns: dict[str, dict[str, int]] = {}
     for row, label in enumerate(joints.joints):
         base, side = joint_and_side(label)
+        if not side:
+            continue
         for component, name in enumerate(component_names(base)):
             columns.setdefault(name, {})[side] = 3 * row + component
     panels = []
     for name, own in columns.items():
-        one = Coordinate(name, f"{joint_moment_title(name)} (N m/kg)", own, True)
-        values = loads.stages["estimate"]
+        title, sign = signed_joint_moment(name, trial.skeleton, convention)
+        one = Coordinate(name, f"{title} (internal N m/kg)", own, True)
+        values = sign * loads.stages["estimate"]
         traces = [] if sd is None else bands(one, loads.time, values, sd / mass_kg, thin)
         traces += lines_by_side(one, "estimate", loads.time, values, thin, {"width": 2})
         panels.append(Panel(one.title, traces, [*loads.drawn(axis, one), *event_lines(events, one)]))

@@ -140,7 +140,7 @@ def test_a_person_is_renamed_and_results_stay_those_of_the_files(tab, app, c3d_l
 def test_the_first_screen_has_what_may_be_used_and_what_to_do_next(browser, app, c3d_lab, viewport):
     person = with_everything(app.library, f"First screen {viewport['width']}", c3d_lab)
     outcome = json.loads((person.results / "outcome.json").read_text())
-    moments = {"name": "Joint moments for clinical use", "use": "use with care", "reason": ""}
+    moments = {"name": "Joint moments and powers", "use": "use with care", "reason": ""}
     current = {**outcome, "inputs": person.inputs, "purposes": [moments]}
     (person.results / "outcome.json").write_text(json.dumps(current))
     tab = Tab(browser, app, viewport)

@@ -10,6 +10,7 @@ from pathlib import Path, PurePath, PurePosixPath
 
 from kinertia.errors import FileError
 from kinertia.io.recording import MARKER_FILES
+from kinertia.io.subject.person_recordings import session_date
 from kinertia.io.subject.tables import SubjectFile
 
 
@@ -21,11 +22,13 @@ class Provenance:
         command: command as typed on a command line.
         files: SHA-256 of every input file, by its path from the folder that holds them all.
         trials: path of each trial's markers, as in `files`.
+        date: day of the recording, as 2026-05-03; empty where unknown.
     """
 
     command: str
     files: Mapping[str, str]
     trials: Mapping[str, str] = field(default_factory=dict)
+    date: str = ""
 
 
 def provenance_of(wanted: SubjectFile, command: str) -> Provenance:
@@ -39,7 +42,8 @@ def provenance_of(wanted: SubjectFile, command: str) -> Provenance:
     names = names_from_common_folder(paths)
     by_path = dict(zip(paths, names, strict=True))
     trials = {trial.name: by_path[trial.markers] for trial in wanted.trials}
-    return Provenance(command, {name: sha256(path) for path, name in by_path.items()}, trials)
+    hashes = {name: sha256(path) for path, name in by_path.items()}
+    return Provenance(command, hashes, trials, str(session_date(wanted) or ""))
 
 
 def recordings(wanted: SubjectFile) -> tuple[str, ...]:

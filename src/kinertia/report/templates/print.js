@@ -1,5 +1,5 @@
 "use strict";
-// Prints the whole report, or of it what is of class "brief": two pages that say whose and from where they are.
+// Prints the whole report, or the letter: of it what is of class "brief", two pages that say whose and from where they are.
 (() => {
   document.querySelectorAll("[data-print]").forEach((button) =>
     button.addEventListener("click", () => {
@@ -7,7 +7,8 @@
       window.print();
     }),
   );
-  window.addEventListener("afterprint", () => document.body.classList.remove("summary"));
+  const letter = document.body.classList.contains("letter");
+  window.addEventListener("afterprint", () => document.body.classList.toggle("summary", letter));
   document.querySelectorAll("[data-says]").forEach((field) =>
     field.addEventListener("input", () =>
       document.querySelectorAll(`.said-${field.dataset.says}`).forEach((place) => {

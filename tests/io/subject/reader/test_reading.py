@@ -32,8 +32,16 @@ def test_reads_everything(folder):
         "cutoff_hz": 6.0,
         "joint_axes": None,
         "hip_centre": "harrington",
+        "convention": None,
         "force_cutoff_hz": "none",
     }
+
+
+def test_the_signs_of_the_report(folder):
+    stated = 'hip_centre = "harrington"'
+    assert read(folder, changed(stated, f'{stated}\nconvention = "isb"')).settings.convention == "isb"
+    with pytest.raises(FileError, match="convention"):
+        read(folder, changed(stated, f'{stated}\nconvention = "vicon"'))
 
 
 def test_the_task_of_a_trial(folder):
@@ -57,6 +65,7 @@ def test_least_file_gets_defaults(folder):
         "cutoff_hz": "gcv",
         "joint_axes": None,
         "hip_centre": "bell",
+        "convention": None,
         "force_cutoff_hz": "auto",
     }
 
