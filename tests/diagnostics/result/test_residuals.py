@@ -10,6 +10,8 @@ from kinertia.diagnostics.result.residuals import joint_angles, residuals
 from kinertia.model.coordinate_range import Range
 
 FRAMES = 50
+LIGHT_KG, HEAVY_KG = 20.0, 80.0
+"""By the residual per body mass no residual that is not good is harmless for the light person."""
 SEGMENTS = {"RASI": "pelvis", "RANK": "tibia_r", "RWRA": "hand_r"}
 MARKERS = [SimpleNamespace(label=label, segment=segment) for label, segment in SEGMENTS.items()]
 
@@ -33,7 +35,8 @@ def found(force_n=0.0, moment_nm=0.0, external_n=800.0, markers_m=0.008, full=1.
         marker_errors_m={"final": np.tile(np.broadcast_to(markers_m, 3), (FRAMES, 1))},
         skeleton=SimpleNamespace(markers=MARKERS),
     )
-    fit = SimpleNamespace(**{"trials": (trial,), "file": None, "skeleton": SimpleNamespace(locked={}), **changes})
+    known = {"trials": (trial,), "file": None, "skeleton": SimpleNamespace(locked={}), "mass_kg": LIGHT_KG}
+    fit = SimpleNamespace(**{**known, **changes})
     answers = list(residuals(ResultContext(fit, None)))
     assert {one.where.trial for one in answers} <= {"walk"}
     return {one.code: one for one in answers}
@@ -54,6 +57,16 @@ def test_a_good_fit_has_no_finding():
 )  # fmt: skip
 def test_force_by_the_guideline(force, expected):
     assert levels(found(force)).get("R301") == expected
+
+
+@pytest.mark.parametrize(
+    ("force", "expected"),
+    [(5.1, "INFO"), (8.7, "INFO"), (8.9, "WARNING"), (10.1, "ERROR"), ((3.0, 24.9), "INFO"), ((3.0, 25.1), "ERROR"),
+     (4.9, None)],
+)  # fmt: skip
+def test_a_force_is_judged_by_what_it_does_to_the_moments_of_this_body(force, expected):
+    """0.11 N per kg are 8.8 N for 80 kg; beyond OpenSim's guideline nothing is harmless."""
+    assert levels(found(force, mass_kg=HEAVY_KG)).get("R301") == expected
 
 
 @pytest.mark.parametrize(
