@@ -285,7 +285,7 @@ def test_the_first_screen_has_what_may_be_used_and_why(browser, fit, tmp_path, f
     assert page.locator("#verdict .level:visible").count() == 3
     assert page.locator("#verdict .uses li > :nth-child(3):visible").count() == 3
     assert page.evaluate("document.documentElement.scrollWidth") <= viewport["width"]
-    clipped = page.locator("nav a, .uses span, th, td").evaluate_all(
+    clipped = page.locator("nav a, .uses span, #cycle th, #cycle td, #moments th, #moments td").evaluate_all(
         "all => all.filter(one => one.offsetParent && one.getBoundingClientRect().right > innerWidth + 1).length"
     )
     assert clipped == 0

@@ -22,6 +22,7 @@ from kinertia.io.norms_file import Norm
 from kinertia.io.subject.provenance import Provenance
 from kinertia.io.versions import versions
 from kinertia.model.bsp import PARAMETERS, BodySegmentParameters
+from kinertia.motion.model_outputs import CLINICAL_ANGLES
 from kinertia.report import style
 from kinertia.report.body_figure import body_figure
 from kinertia.report.bsp_figures import (

@@ -17,7 +17,7 @@ _BOTTOM_PX, _RIGHT_PX = 44, 14
 _LEGEND_ROW_PX, _LEGEND_PER_ROW = 27, {1: 1, 2: 2, 3: 4}
 _TITLE_PX, _TICKS_PX, _NOMINAL_WIDTH_PX = 30, 40, 960
 MOST_COLUMNS = 3
-_PAPER_PX = 800
+_PAPER_PX = 620
 """Rows of panels on a sheet of paper, below the table of strides, at the scale of the page's print style."""
 
 
