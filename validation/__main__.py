@@ -17,6 +17,7 @@ EVIDENCE = (
     "populations",
     "sensitivity",
     "peers",
+    "scoreboard",
     "measured-trials",
     "field-trials",
     "vicon-moments",
