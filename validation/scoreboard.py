@@ -213,8 +213,8 @@ frames, with OpenSim {version}.
 
 {failed} Its settings are those of OpenSim's gait2354 example, which is a walk.
 
-*AddBiomechanics, inverse kinematics*: the motion that it delivered for this walk, low-passed at 6 Hz, with the model that
-it scaled; its dynamic fit is not among the files. Its paper
+*AddBiomechanics, inverse kinematics*: the motion that it delivered for this walk, low-passed at 6 Hz, with the model
+that it scaled; its dynamic fit is not among the files. Its paper
 ([Werling et al. 2023](https://doi.org/10.1371/journal.pone.0295152)) has this table for Hamner's, Arnold's and
 Uhlrich's people. They are not repeated here: those recordings are not among these, and different ones cannot be ranked
 in one table.
