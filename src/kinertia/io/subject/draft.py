@@ -88,7 +88,9 @@ def init_files(folder: str | Path, nearby: bool = True, marker_set: bool = True)
         text += ["", "[prior]", _entry(PriorFiles, "measures", sheets[0] if len(sheets) == 1 else None, sheets[0])]
     stated = Settings().model_dump(exclude_none=True)
     text += ["", "[settings]", *(_entry(Settings, *item) for item in stated.items())]
-    text += ["# " + _entry(Settings, key, example) for key, example in (("joint_axes", True), ("convention", "clinical"))]
+    text += [
+        "# " + _entry(Settings, key, example) for key, example in (("joint_axes", True), ("convention", "clinical"))
+    ]
     text += [""]
     return {SUBJECT: "\n".join(text)} | ({} if draft is None else {MARKER_SET: draft.text})
 
