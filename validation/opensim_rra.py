@@ -17,7 +17,7 @@ import pandas as pd
 from kinertia.io.text.sto import read_sto, write_sto
 
 CUTOFF_HZ = 6.0
-LIMIT_S = 900.0
+LIMIT_S = 300.0
 RESIDUALS = {
     "FX": (4.0, 20.0),
     "FY": (8.0, 20.0),

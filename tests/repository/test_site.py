@@ -13,7 +13,7 @@ from examples import PAGES, ROOT
 
 
 @pytest.mark.slow
-def test_site_is_whole_and_needs_no_network(tmp_path):
+def test_site_is_whole_and_needs_no_network(tmp_path, request):
     for module in ("material", "mkdocstrings_handlers.python", "latex2mathml"):
         pytest.importorskip(module, reason='needs the documentation tools: pip install -e ".[docs]"')
     command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(tmp_path)]
@@ -24,7 +24,7 @@ def test_site_is_whole_and_needs_no_network(tmp_path):
     expect_every_page_without_equations_left_over(tmp_path)
     expect_nothing_from_the_network(tmp_path)
     expect_every_exported_name(tmp_path)
-    expect_search_from_the_disk(tmp_path)
+    expect_search_from_the_disk(tmp_path, request.getfixturevalue("browser"))
 
 
 def expect_every_page_without_equations_left_over(site: Path) -> None:
@@ -51,16 +51,12 @@ def expect_every_exported_name(site: Path) -> None:
     assert (site / "search" / "search_index.json").is_file()
 
 
-def expect_search_from_the_disk(site: Path) -> None:
-    from chromium import CHROMIUM, FLAGS, playwright  # skips without playwright
+def expect_search_from_the_disk(site: Path, browser) -> None:
+    from chromium import playwright
 
-    if not CHROMIUM.exists():
-        return
-    with playwright.sync_playwright() as drive:
-        browser = drive.chromium.launch(executable_path=str(CHROMIUM), args=FLAGS)
-        page = browser.new_page()
-        page.goto((site / "api" / "fit.html").as_uri())
-        page.locator("input.md-search__input").fill("knee adduction")
-        first = page.locator(".md-search-result__link").first
-        playwright.expect(first).to_have_attribute("href", re.compile(rf"{re.escape(site.as_uri())}/.+\.html"))
-        browser.close()
+    page = browser.new_page()
+    page.goto((site / "api" / "fit.html").as_uri())
+    page.locator("input.md-search__input").fill("knee adduction")
+    first = page.locator(".md-search-result__link").first
+    playwright.expect(first).to_have_attribute("href", re.compile(rf"{re.escape(site.as_uri())}/.+\.html"))
+    page.close()
