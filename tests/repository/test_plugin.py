@@ -100,10 +100,11 @@ def test_a_package_that_cannot_be_loaded_is_named(tmp_path):
     assert "kinertia-example" in done.stderr
 
 
-@pytest.mark.parametrize("command", ["explain X101", "check walk.csv"])
-def test_the_command_line_names_it_and_no_internal_error(tmp_path, command):
+@pytest.mark.parametrize("words", [["explain", "X101"], ["check"]])
+def test_the_command_line_names_it_and_no_internal_error(tmp_path, synthetic_lab, words):
+    command = words if words[1:] else [*words, str(synthetic_lab / "walk.c3d")]
     describe(tmp_path / "site", {"kinertia.rules": {"X": "nowhere:x"}})
-    code = f"from kinertia.cli.app import main; main({command.split()})"
+    code = f"import sys; sys.argv = ['kinertia', *{command}]; from kinertia.cli.start import main; main()"
     done = ran(code, [tmp_path / "site"], tmp_path)
     assert done.returncode == 2
     assert "kinertia-example" in done.stderr

@@ -121,11 +121,7 @@ _UsageError: type[Exception] = typer.BadParameter.__mro__[1]
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line on these arguments, or on those of this process."""
     given = sys.argv[1:] if arguments is None else list(arguments)
-    try:
-        run(application_for(given), given)
-    except ExtensionError as error:  # as soon as its modules are imported
-        _show(str(error), "--json" in given)
-        raise SystemExit(2) from None
+    run(application_for(given), given)
 
 
 def application_for(given: Sequence[str]) -> typer.Typer:
@@ -150,8 +146,8 @@ def run(app: typer.Typer, given: Sequence[str]) -> None:
         where = "" if error.filename is None else f"{error.filename}: "
         problem = f"{where}{error.strerror or error}; check the path, its permissions and the space on the disk"
         _show(problem, as_json)
-    except ExtensionError:
-        raise
+    except ExtensionError as error:
+        _show(str(error), as_json)
     except Exception as error:
         # Ctrl-C in the middle of a compiled function, which reports it so
         cause: BaseException | None = error

@@ -6,7 +6,8 @@ out; one of the person, or of the static trial, stops everything.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
+from typing import Any
 
 from kinertia.diagnostics.context import RecordingContext
 from kinertia.diagnostics.person_context import PersonContext
@@ -31,9 +32,14 @@ from kinertia.workflow.joint_widths import with_widths
 from kinertia.workflow.person import Person
 from kinertia.workflow.recording_corrections import with_model_spelling, with_upright_static
 
-_MOTION_CHECKS = (*MOTION_CHECKS, *added_checks())
 _OF_FORCES = ("P", "T211", "T212")
 """ERRORs that do not concern the markers."""
+
+
+@cache
+def _motion_checks() -> tuple[Check[Any], ...]:
+    """Return the checks of the recording of a motion, with those of other packages, loaded when they are needed."""
+    return (*MOTION_CHECKS, *added_checks())
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +62,7 @@ class Screened:
     def rules(self) -> int:
         """Number of rules that were checked."""
         of_static = STATIC_CHECKS if self.context.standing else ()
-        return rules_of(*_MOTION_CHECKS, *of_static, *PERSON_CHECKS)
+        return rules_of(*_motion_checks(), *of_static, *PERSON_CHECKS)
 
     @cached_property
     def stops(self) -> list[Finding]:
@@ -115,7 +121,7 @@ def screen(person: Person) -> Screened:
     for static in context.standing:
         found += _of_recording(static, STATIC_CHECKS)
     for trial in context.trials:
-        found += _of_recording(trial, _MOTION_CHECKS)
+        found += _of_recording(trial, _motion_checks())
     unmatched = person.labels.finding if isinstance(person.labels, MarkerSetError) else None
     if unmatched is not None and unmatched.code not in {one.code for one in found}:
         found.append(unmatched)
@@ -145,7 +151,7 @@ def _markers_only(screened: Screened) -> tuple[RecordingContext, ...]:
     names = {one.name for one in markers_only}
     found = [one for one in screened.findings if one.where.trial not in names]
     for trial in markers_only:
-        found += _of_recording(trial, _MOTION_CHECKS)
+        found += _of_recording(trial, _motion_checks())
     trials = [one for one in context.trials if one.name not in names]
     found += _of_person(replace(context, trials=[*trials, *markers_only]), found)
     more = [one for one in blocking(screened.overruled(found)) if one not in against]
