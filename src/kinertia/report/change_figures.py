@@ -54,8 +54,8 @@ def joint_figure(curves: Sequence[CurveChange], title: str, before: str, after: 
 def _both(one: CurveChange, before: str, after: str) -> Panel:
     traces: list[dict[str, Any]] = []
     for name, mean, sd, colour in (
-        (before, one.before, one.before_sd, style.BLUE),
-        (after, one.after, one.after_sd, style.VERMILION),
+        (before, one.before, one.before_sd, style.COMPARED[0]),
+        (after, one.after, one.after_sd, style.COMPARED[1]),
     ):
         traces.append(band(mean - INTERVAL_SD * sd, mean + INTERVAL_SD * sd, style.faded(colour, _OPACITY)))
         traces.append({**mean_line(mean), "name": plain(name), "line": {"color": colour, "width": 2}})
@@ -66,8 +66,8 @@ def _difference(one: CurveChange) -> Panel:
     low, high = one.band
     traces: list[dict[str, Any]] = []
     if np.isfinite(one.factor):
-        traces.append(band(low, high, style.faded(style.BLACK, _OPACITY)))
-    traces.append({**mean_line(one.difference), "name": "difference", "line": {"color": style.BLACK, "width": 2}})
+        traces.append(band(low, high, style.faded(style.GREY, _OPACITY)))
+    traces.append({**mean_line(one.difference), "name": "difference", "line": {"color": style.GREY, "width": 2}})
     return Panel(f"Difference: {_words(one)}", traces, shapes=list(_shown(one)))
 
 
