@@ -8,8 +8,9 @@ RRA takes most of the time, a minute or two per walk; runs that are finished in 
 import tempfile
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
 import matplotlib as mpl
 import matplotlib.pyplot as plt
@@ -22,7 +23,7 @@ from scipy.signal import butter, sosfiltfilt
 from kinertia.io.text.sto import read_sto
 from validation.measured_trials import table
 from validation.page import PAGES, write_page
-from validation.peer_cases import Case, Result, measured_cases, results, truth_case
+from validation.peer_cases import Case, measured_cases, results, truth_case
 
 FIRST_SEED = 100
 JOINTS = {
@@ -84,12 +85,33 @@ def moment_errors(cases: list[tuple[Case, Runs]], program: str) -> dict[str, flo
     return dict(pd.DataFrame([pooled(errors) for errors in per_cutoff.values()], columns=list(JOINTS)).min())
 
 
-def residual(result: Result, time: np.ndarray, kind: str) -> float:
-    """Return the RMS size of the force or moment that OpenSim finds at the pelvis (NaN without a result)."""
-    if result.opensim is None:
-        return np.nan
-    names = [name for name in map(str, result.opensim) if name.startswith("pelvis_") and name.endswith(kind)]
-    return float(np.sqrt(sum(float(np.mean(at(result.opensim, name, time) ** 2)) for name in names)))
+@dataclass(frozen=True)
+class Residuals:
+    """Residual force or moment at the pelvis by three definitions, N or N m.
+
+    Attributes:
+        rms: RMS over frames of its size.
+        component: mean over frames of the absolute value of a component, averaged over the three.
+        peak: largest size.
+    """
+
+    rms: float
+    component: float
+    peak: float
+
+    @classmethod
+    def of(cls, moments: pd.DataFrame, time: np.ndarray, kind: str) -> Self:
+        """Compute them from inverse dynamics at these times; `kind` is `force` or `moment`.
+
+        >>> frames = pd.DataFrame({"pelvis_tx_force": [3.0, 3.0], "pelvis_ty_force": [4.0, 4.0],
+        ...                        "pelvis_tz_force": [0.0, 0.0]}, index=[0.0, 1.0])
+        >>> Residuals.of(frames, np.array([0.0, 0.5]), "force")
+        Residuals(rms=5.0, component=2.3333333333333335, peak=5.0)
+        """
+        names = [name for name in map(str, moments) if name.startswith("pelvis_") and name.endswith(kind)]
+        values = np.stack([at(moments, name, time) for name in names], axis=-1)
+        size = np.sqrt(np.sum(values**2, axis=-1))
+        return cls(float(np.sqrt(np.mean(size**2))), float(np.mean(np.abs(values))), float(size.max()))
 
 
 def figures_of(all_runs: list[Runs], program: str) -> list[str]:
@@ -98,7 +120,7 @@ def figures_of(all_runs: list[Runs], program: str) -> list[str]:
     if not done:
         return ["failed", "", "", ""]
     force, moment = (
-        np.sqrt(np.mean([residual(runs[program], runs["time"], kind) ** 2 for runs in done]))
+        np.sqrt(np.mean([Residuals.of(runs[program].opensim, runs["time"], kind).rms ** 2 for runs in done]))
         for kind in ("force", "moment")
     )
     markers = np.sqrt(np.mean([runs[program].marker_rms_m ** 2 for runs in done])) * 1e3

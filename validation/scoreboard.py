@@ -8,7 +8,6 @@ import re
 import tempfile
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -23,40 +22,11 @@ from validation.measured_trials import table
 from validation.opensim_runs import inverse_dynamics, quietly
 from validation.page import PAGES, write_page
 from validation.peer_cases import Case, Result, marker_errors, measured_cases, results
-from validation.peers import PROGRAMS, Runs, at
+from validation.peers import PROGRAMS, Residuals, Runs, at
 
 THEIRS = "addbiomechanics"
 PROGRAMS_HERE = {**PROGRAMS, THEIRS: "AddBiomechanics, inverse kinematics"}
 ORDER = ("opensim", THEIRS, "rra", "default", "calibrated")
-
-
-@dataclass(frozen=True)
-class Residuals:
-    """Residual force or moment at the pelvis by three definitions, N or N m.
-
-    Attributes:
-        rms: RMS over frames of its size.
-        component: mean over frames of the absolute value of a component, averaged over the three.
-        peak: largest size.
-    """
-
-    rms: float
-    component: float
-    peak: float
-
-    @classmethod
-    def of(cls, moments: pd.DataFrame, time: np.ndarray, kind: str) -> "Residuals":
-        """Compute them from inverse dynamics at these times; `kind` is `force` or `moment`.
-
-        >>> frames = pd.DataFrame({"pelvis_tx_force": [3.0, 3.0], "pelvis_ty_force": [4.0, 4.0],
-        ...                        "pelvis_tz_force": [0.0, 0.0]}, index=[0.0, 1.0])
-        >>> Residuals.of(frames, np.array([0.0, 0.5]), "force")
-        Residuals(rms=5.0, component=2.3333333333333335, peak=5.0)
-        """
-        names = [name for name in map(str, moments) if name.startswith("pelvis_") and name.endswith(kind)]
-        values = np.stack([at(moments, name, time) for name in names], axis=-1)
-        size = np.sqrt(np.sum(values**2, axis=-1))
-        return cls(float(np.sqrt(np.mean(size**2))), float(np.mean(np.abs(values))), float(size.max()))
 
 
 def cases(folder: Path) -> Iterator[tuple[Case, Path | None]]:
@@ -152,9 +122,8 @@ def hidden() -> list[list[str]]:
     agreed = float((sessions["chi2/n, mean"].astype(float) * count).sum() / count.sum())
     apart = float((sessions["beyond 99 %"].astype(float)).sum() / count.sum())
     skin = tables_of("measured-skin")[0]
-    covered = skin["covered"].iloc[:, 0] if isinstance(skin["covered"], pd.DataFrame) else skin["covered"]
     ratios = skin["ratio"].astype(float)
-    shares = covered.str.rstrip(" %").astype(float)
+    shares = skin.iloc[:, [*skin].index("covered")].str.rstrip(" %").astype(float)  # the first: not after heel strike
     return [
         [
             "residual force of a trial that the estimate has not seen",

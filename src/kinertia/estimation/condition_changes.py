@@ -13,6 +13,7 @@ deviations, with degrees of freedom by Satterthwaite (1946, Biometrics Bulletin 
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from scipy import stats
@@ -23,6 +24,7 @@ from kinertia.estimation.drawn_fit import kept_draws
 from kinertia.estimation.result import Fit
 from kinertia.estimation.stride_features import Rows, StrideFeatures, stride_features, usual_sources
 
+Spread = TypeVar("Spread", float, np.ndarray)
 DRAWS = 80
 SHRINK = 6.0
 FEW = 3
@@ -167,6 +169,19 @@ def parts_of(total: float, instruments: float, body: float) -> dict[str, float]:
     }
 
 
+def spread_beyond(estimate: np.ndarray, drawn: np.ndarray) -> np.ndarray:
+    """Return the variance (...) between k >= 2 strides (k, ...) beyond what draws (n, k, ...) of them leave."""
+    departures = drawn - drawn.mean(axis=0)
+    measured = np.var(departures, axis=1, ddof=1).mean(axis=0)
+    return np.asarray(np.maximum(np.var(estimate, axis=0, ddof=1) - measured, 0.0))
+
+
+def shrunk(spread: Spread, count: int, pooled: float, weight: float) -> tuple[Spread, float]:
+    """Return a variance of this many strides, shrunk to a pooled one of this weight, and its degrees of freedom."""
+    freedom = max(count - 1 + weight, 1.0)
+    return ((count - 1) * spread + weight * pooled) / freedom, freedom
+
+
 def _condition(estimate: np.ndarray, drawn: Mapping[str, np.ndarray], mask: np.ndarray) -> Condition:
     seen = mask & np.isfinite(estimate)
     seen[seen] = np.isfinite(drawn["all"][:, seen]).all(axis=0)
@@ -176,9 +191,7 @@ def _condition(estimate: np.ndarray, drawn: Mapping[str, np.ndarray], mask: np.n
     means = {source: rows[:, seen].mean(axis=1) for source, rows in drawn.items()}
     spread = 0.0
     if count > 1:
-        departures = drawn["all"][:, seen] - drawn["all"][:, seen].mean(axis=0)
-        measured = np.var(departures, axis=1, ddof=1).mean()
-        spread = max(0.0, float(np.var(estimate[seen], ddof=1) - measured))
+        spread = float(spread_beyond(estimate[seen], drawn["all"][:, seen]))
     return Condition(float(estimate[seen].mean()), count, means, spread)
 
 
@@ -198,9 +211,10 @@ def _change(
         weight = min(SHRINK, 0.5 * sum(each.count - 1 for each in others if each is not one))
         if one.count < FEW and usual:
             pooled, weight = max(pooled, usual**2), SHRINK
-        freedom.append(max(one.count - 1 + weight, 1.0))
-        strides.append(((one.count - 1) * one.spread + weight * pooled) / freedom[-1])
-        between.append(strides[-1] / one.count)
+        variance, own_freedom = shrunk(one.spread, one.count, pooled, weight)
+        strides.append(variance)
+        freedom.append(own_freedom)
+        between.append(variance / one.count)
     variances = {**measured, "stride": sum(between)}
     total = sum(variances.values())
     of_strides = sum(each**2 / own_freedom for each, own_freedom in zip(between, freedom, strict=True))

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kinertia.estimation.change import UNITS, named_outcome
-from kinertia.estimation.condition_changes import FEW, SHRINK, USUAL
+from kinertia.estimation.condition_changes import FEW, SHRINK, USUAL, shrunk, spread_beyond
 from kinertia.estimation.mean_cycles import common_strides
 from kinertia.estimation.stride_features import Rows
 from kinertia.motion.gait_cycle import PERCENT
@@ -20,7 +20,6 @@ from kinertia.motion.gait_cycle import PERCENT
 _SIMULATED = 2000
 _SEED = 68
 _SHARE = 0.95
-_TWO_SIDED = 1.959964
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,8 +158,7 @@ def _condition(curves: np.ndarray, drawn: Mapping[str, np.ndarray]) -> CurveCond
     residuals = curves - curves.mean(axis=0)
     spread = np.zeros(len(PERCENT))
     if len(curves) > 1:
-        departures = drawn["all"] - drawn["all"].mean(axis=0)
-        spread = np.maximum(curves.var(axis=0, ddof=1) - departures.var(axis=1, ddof=1).mean(axis=0), 0.0)
+        spread = spread_beyond(curves, drawn["all"])
     departed = {source: own - own.mean(axis=0) for source, own in means.items()}
     return CurveCondition(curves.mean(axis=0), len(curves), departed, residuals, spread)
 
@@ -209,11 +207,11 @@ def _compared(
 
 def _of_strides(one: CurveCondition, usual: float) -> tuple[np.ndarray, float]:
     """Return the variance (101,) that strides leave in a mean, and its degrees of freedom."""
-    pooled, weight = float(np.nanmean(one.spread)) if np.isfinite(one.spread).any() else 0.0, SHRINK
+    pooled = float(np.nanmean(one.spread)) if np.isfinite(one.spread).any() else 0.0
     if one.count < FEW:
         pooled = max(pooled, usual**2)
-    freedom = one.count - 1 + weight
-    return ((one.count - 1) * one.spread + weight * pooled) / freedom / one.count, freedom
+    variance, freedom = shrunk(one.spread, one.count, pooled, SHRINK)
+    return variance / one.count, freedom
 
 
 def _departed(departures: Sequence[np.ndarray], variance: np.ndarray, random: np.random.Generator) -> np.ndarray:
