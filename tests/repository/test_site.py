@@ -56,7 +56,7 @@ def expect_search_from_the_disk(site: Path, browser) -> None:
 
     page = browser.new_page()
     page.goto((site / "api" / "fit.html").as_uri())
-    page.locator("input.md-search__input").fill("knee adduction")
+    page.locator("input.md-search__input").press_sequentially("knee adduction")  # fill() releases no key
     first = page.locator(".md-search-result__link").first
     playwright.expect(first).to_have_attribute("href", re.compile(rf"{re.escape(site.as_uri())}/.+\.html"))
     page.close()
