@@ -251,12 +251,13 @@ rotation. Published values hold the differences of one person's gait between day
 ## What does not hold
 
 - Between days, errors of hip and pelvis angles exceed their deviations: three markers show the pelvis, and one of them
-  6 mm off tilts it by 2 degrees. Markers were 7 mm uncertain at first, which covered hip angles in 67 % in the first
-  two people (87 % with 10 mm), pelvis angles in 78 % (96 %).
+  6 mm off tilts it by 2 degrees. Marker places are therefore taken as 10 mm uncertain between days: with 7 mm, hip
+  angles of two people were covered in 67 %, with 10 mm in 87 %; pelvis angles in 78 and 96 %.
 - With a true change, hip and knee moments are covered less often than without. The likely cause, untested: contacts and
   joint axes whose errors depend on the posture.
-- Forty people were planned; the table says how many there were time for. Standard errors count them.
-- The factor 1.6 on deviations of fits with fixed axes comes from another study and was not tested here.
+- Forty people are the default; the table says how many were run, and its standard errors count them.
+- Where joint axes are fixed in the fits, `compare` multiplies deviations by 1.6. Axes are free here, so that this
+  factor is not tested.
 - One walk of each kind, runs of two strides and people with two or three walks cannot show a rate between 3 and 8 %,
   nor judge the spread of three and more repeats, which is what `compare` needs.
 - Toes in raised the second peak of the knee adduction moment and did not lower the first beyond 95 %; one walk.
