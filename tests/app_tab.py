@@ -8,7 +8,7 @@ from chromium import DESKTOP, PATIENCE_MS, playwright
 from found import FAULTY
 from kinertia.findings.overview import Overview
 from kinertia.io.subject.provenance import sha256
-from kinertia.report.finding_view import digest
+from kinertia.report.pages.finding_view import digest
 
 
 class Tab:

@@ -8,7 +8,7 @@ from html.parser import HTMLParser
 
 import numpy as np
 
-from kinertia.report.figure import packed_script
+from kinertia.report.figures.figure import packed_script
 
 TRACE_TYPES = ("bar", "scatter", "scatter3d")
 """Types of traces that figures have; the last one in notebooks only."""

@@ -16,7 +16,7 @@ from kinertia.estimation.prior import BspPrior
 from kinertia.estimation.simultaneous.observed_trial import Observation
 from kinertia.estimation.simultaneous.search.problem import MapProblem
 from kinertia.estimation.simultaneous.uncertainty.fisher_information import Information
-from kinertia.report.truth_comparison import JOINTS
+from kinertia.report.pages.truth_comparison import JOINTS
 from kinertia.studies.parallel import in_parallel
 from kinertia.studies.sensitivity import Scenario, estimate_person
 from kinertia.synthetic.faults import Faults

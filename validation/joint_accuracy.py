@@ -12,7 +12,7 @@ from kinertia.motion.dynamics import Motion, inverse_dynamics
 from kinertia.motion.ground_reactions import GroundReactions, measured_reactions
 from kinertia.motion.kinematics import Kinematics
 from kinertia.motion.smoothing import smooth
-from kinertia.report.truth_comparison import JOINTS
+from kinertia.report.pages.truth_comparison import JOINTS
 from kinertia.synthetic.walk import SyntheticTrial
 
 USUAL_HZ = (6.0, 10.0, 12.0)

@@ -9,7 +9,7 @@ import numpy as np
 
 from kinertia.estimation.trial_fit import TrialFit
 from kinertia.motion.joint_moments import joint_and_side
-from kinertia.report.saved_fit import FIT_FILE, load_fit
+from kinertia.report.exports.saved_fit import FIT_FILE, load_fit
 from kinertia.trial.data import FEET, LOAD_THRESHOLD_N
 from kinertia.trial.sampled_time import nearest_samples
 from kinertia.trial.trial_input import GAIT

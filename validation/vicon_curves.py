@@ -15,8 +15,8 @@ from kinertia.estimation.trial_fit import TrialFit
 from kinertia.motion.ground_reactions import measured_reactions
 from kinertia.motion.joint_moments import component_signs
 from kinertia.motion.joint_wrench import joint_wrenches, leg_joints
-from kinertia.report.c3d_results import outputs_of
-from kinertia.report.file_outputs import moment_divisor
+from kinertia.report.exports.c3d_results import outputs_of
+from kinertia.report.pages.file_outputs import moment_divisor
 from kinertia.report.wording import INTERVAL_SD
 from kinertia.trial.data import FEET
 from kinertia.trial.sampled_time import nearest_samples

@@ -13,8 +13,8 @@ import typer
 
 from kinertia.cli.app import main as kinertia
 from kinertia.estimation.result import Fit
-from kinertia.report.file_outputs import OutputComparison, compared_outputs
-from kinertia.report.saved_fit import load_fit
+from kinertia.report.exports.saved_fit import load_fit
+from kinertia.report.pages.file_outputs import OutputComparison, compared_outputs
 from kinertia.report.wording import INTERVAL_SD
 from validation.measured_data import data_folder
 from validation.measured_trials import table

@@ -20,7 +20,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 
 from kinertia.model.skeleton import Pose
-from kinertia.report.measures_picture import measures_picture
+from kinertia.report.figures.measures_picture import measures_picture
 from kinertia.synthetic.walk import SyntheticTrial, centre_of_pressure, walk, walking_subject
 
 FOLDER = Path(__file__).resolve().parents[1] / "figures"

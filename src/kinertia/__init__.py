@@ -64,9 +64,9 @@ if TYPE_CHECKING:
     from kinertia.motion.dynamics import Motion as Motion
     from kinertia.motion.dynamics import inverse_dynamics as inverse_dynamics
     from kinertia.motion.dynamics import residual as residual
-    from kinertia.report.files import save_fit as save_fit
-    from kinertia.report.saved_fit import load_fit as load_fit
-    from kinertia.report.what_changed import compare as compare
+    from kinertia.report.comparison.what_changed import compare as compare
+    from kinertia.report.exports.files import save_fit as save_fit
+    from kinertia.report.exports.saved_fit import load_fit as load_fit
     from kinertia.settings import Attached as Attached
     from kinertia.settings import Instruments as Instruments
     from kinertia.settings import Overrule as Overrule
@@ -142,9 +142,9 @@ _ROOMS = {
     "studies.cross_validation": "HeldOut cross_validate",
     "studies.plan": "Plan plan",
     "cohort.tables": "read_cohort",
-    "report.what_changed": "compare",
-    "report.files": "save_fit",
-    "report.saved_fit": "load_fit",
+    "report.comparison.what_changed": "compare",
+    "report.exports.files": "save_fit",
+    "report.exports.saved_fit": "load_fit",
 }
 """Where the public names are, from the lowest room up."""
 _HOMES = {name: module for module, names in _ROOMS.items() for name in names.split()}

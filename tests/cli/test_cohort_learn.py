@@ -15,7 +15,7 @@ from kinertia.io.subject.population_file import read_population
 from kinertia.io.subject.provenance import recordings
 from kinertia.io.subject.reader import read_subject
 from kinertia.io.subject.session_file import read_session
-from kinertia.report.saved_fit import FIT_FILE, write_fit
+from kinertia.report.exports.saved_fit import FIT_FILE, write_fit
 from kinertia.workflow.from_files import prepare_subject
 
 NAMES = tuple("ABCDEF")

@@ -17,7 +17,7 @@ from kinertia.io.subject.person_recordings import read_inputs
 from kinertia.io.subject.reader import read_subject
 from kinertia.io.text.sto import read_sto
 from kinertia.motion.dynamics import inverse_dynamics
-from kinertia.report.page import render
+from kinertia.report.pages.page import render
 from kinertia.synthetic.walk import unlike_literature, walking_subject
 from kinertia.workflow.from_files import prepare_subject
 from kinertia.workflow.prepare import prepare

@@ -12,7 +12,7 @@ from kinertia.cli import terminal
 from kinertia.cli.fit_report import report_tables
 from kinertia.findings.finding import Severity, finding
 from kinertia.findings.quantity import Quantity
-from kinertia.report.files import summary
+from kinertia.report.exports.files import summary
 from synthetic_lab import synthetic_arguments
 
 

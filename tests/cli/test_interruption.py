@@ -43,7 +43,7 @@ def test_the_request_to_end_leaves_nothing(tmp_path, person, name):
     code = """
         import contextlib, os, signal, sys
         from kinertia.cli.app import main
-        from kinertia.report import check_page
+        from kinertia.report.pages import check_page
         name, made = sys.argv.pop(), check_page.complete_folder
         signal.signal(getattr(signal, name), signal.SIG_DFL)  # nohup ignores it
         @contextlib.contextmanager

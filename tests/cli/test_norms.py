@@ -12,7 +12,7 @@ from command_line import run
 from kinertia.cli.report import score_text
 from kinertia.estimation.drawn_fit import drawn_fit
 from kinertia.io.norms_file import read_norms
-from kinertia.report.saved_fit import FIT_FILE, write_fit
+from kinertia.report.exports.saved_fit import FIT_FILE, write_fit
 from report_page import figures_of
 
 

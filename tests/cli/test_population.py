@@ -12,7 +12,7 @@ from kinertia.estimation.learnt_prior import information_of
 from kinertia.estimation.prior import literature_prior
 from kinertia.io.subject.provenance import Provenance, command_line, recordings
 from kinertia.io.subject.reader import read_subject
-from kinertia.report.saved_fit import FIT_FILE, write_fit
+from kinertia.report.exports.saved_fit import FIT_FILE, write_fit
 from kinertia.workflow.from_files import prepare_subject
 from validation.other_prior import with_prior
 

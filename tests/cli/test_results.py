@@ -9,7 +9,7 @@ import pytest
 from scipy.io import loadmat
 
 from command_line import run
-from kinertia.report.saved_fit import FIT_FILE
+from kinertia.report.exports.saved_fit import FIT_FILE
 from report_page import figures_of
 
 

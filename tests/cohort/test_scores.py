@@ -12,7 +12,7 @@ from kinertia.estimation.gait_profile import gait_profile
 from kinertia.io.norms_file import Norm
 from kinertia.io.versions import VERSION
 from kinertia.motion.model_outputs import CLINICAL_ANGLES
-from kinertia.report.saved_fit import FIT_FILE, write_fit
+from kinertia.report.exports.saved_fit import FIT_FILE, write_fit
 
 parquet = pytest.importorskip("pyarrow.parquet")
 

@@ -14,14 +14,14 @@ from kinertia.estimation.change import SOURCES
 from kinertia.estimation.condition_changes import changes, changes_of_strides
 from kinertia.estimation.stride_features import EVENTS, Rows, event_bounds
 from kinertia.motion.gait_cycle import Stride
-from kinertia.report.change_tables import (
+from kinertia.report.comparison.change_tables import (
     change_columns,
     change_sentences,
     changed_sentence,
     discovered,
     limit_sentences,
 )
-from kinertia.report.saved_fit import write_fit
+from kinertia.report.exports.saved_fit import write_fit
 
 DRAWS = 1000
 

@@ -6,8 +6,7 @@ import pytest
 from kinertia.estimation.curve_changes import CurveChange, curve_changes, paired
 from kinertia.estimation.stride_features import Rows
 from kinertia.motion.gait_cycle import PERCENT
-from kinertia.report.change_figures import curve_figures, joint_figure
-from kinertia.report.change_tables import curve_columns
+from kinertia.report.comparison.change_tables import curve_columns, curve_figures, joint_figure
 
 _PHASE = 2.0 * np.pi * PERCENT / 100.0
 SHAPES = np.array([np.ones(101), np.sin(_PHASE), np.cos(_PHASE), np.sin(2 * _PHASE), np.cos(3 * _PHASE)])

@@ -14,8 +14,8 @@ from kinertia.estimation.simultaneous.uncertainty import posterior_draws
 from kinertia.estimation.simultaneous.uncertainty.posterior_draws import TrialDraws
 from kinertia.motion.dynamics import inverse_dynamics
 from kinertia.motion.ground_reactions import GroundReactions
-from kinertia.report.draw_files import write_draws
-from kinertia.report.saved_fit import load_fit, write_fit
+from kinertia.report.exports.draw_files import write_draws
+from kinertia.report.exports.saved_fit import load_fit, write_fit
 
 SYSTEMATIC = 0.10
 """Of reported deviations, which are linear in all unknowns but the delay; draws are not."""

@@ -8,7 +8,7 @@ import pytest
 
 from kinertia.estimation import gait_changes as walking_speed
 from kinertia.estimation.gait_changes import NOTABLE, speed_change
-from kinertia.report.change_tables import speed_sentence
+from kinertia.report.comparison.change_tables import speed_sentence
 
 
 @pytest.fixture

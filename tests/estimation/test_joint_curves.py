@@ -7,7 +7,7 @@ from kinertia.estimation.drawn_fit import drawn_fit, kept_draws
 from kinertia.estimation.simultaneous.uncertainty.knee_geometry import CENTRE_SD_M
 from kinertia.io.text.sto import read_sto
 from kinertia.motion.joint_wrench import body_joints
-from kinertia.report.saved_fit import load_fit
+from kinertia.report.exports.saved_fit import load_fit
 from recordings import FITTED
 
 WALKS = sorted(name for name in FITTED if name in ("synthetic", "pig_a"))

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from kinertia.estimation.mean_cycles import common_strides, fits_by_task, main_task, mean_curves, mean_of_common
-from kinertia.report.cycle_figures import cycle_figures
-from kinertia.report.page import render
+from kinertia.report.figures.cycle_figures import cycle_figures
+from kinertia.report.pages.page import render
 
 PERCENT = np.arange(101)
 

@@ -8,8 +8,8 @@ import pytest
 from kinertia.estimation.cycles import CycleCurve
 from kinertia.estimation.moment_peaks import LANDING_PEAKS, PEAKS, peak_columns
 from kinertia.motion.gait_cycle import PERCENT, Stride
-from kinertia.report.cycle_figures import drawn_curves
-from kinertia.report.cycle_table import peak_rows
+from kinertia.report.figures.cycle_figures import drawn_curves
+from kinertia.report.pages.cycle_table import peak_rows
 
 STRIDE = Stride("r", 1, 0.0, 1.0, 0.6, 0.1, 0.5, True)
 FIRST, SECOND, IMPULSE = (one.name for one in PEAKS[:3])

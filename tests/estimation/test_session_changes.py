@@ -13,7 +13,7 @@ from kinertia.errors import KinertiaError
 from kinertia.estimation import session_changes as module
 from kinertia.estimation.session_changes import Session, session, session_changes, why_incomparable
 from kinertia.model.bsp import BodySegmentParameters
-from kinertia.report.saved_fit import write_fit
+from kinertia.report.exports.saved_fit import write_fit
 from report_page import Elements
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from kinertia.report.page import render
+from kinertia.report.pages.page import render
 
 
 @pytest.fixture(scope="session")

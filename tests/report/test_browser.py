@@ -11,8 +11,8 @@ import pytest
 from chromium import DESKTOP, PATIENCE_MS, PHONE, Opened, colour, ink, playwright
 from found import FAULT_FREE, UNUSABLE
 from kinertia.model.bsp import BodySegmentParameters
-from kinertia.report.page import render
-from kinertia.report.side_by_side import render_comparison
+from kinertia.report.comparison.side_by_side import render_comparison
+from kinertia.report.pages.page import render
 from report_page import without_plotly
 
 SWITCHED = """plot => {

@@ -14,12 +14,12 @@ from kinertia.io.text.sto import read_sto
 from kinertia.motion.dynamics import inverse_dynamics
 from kinertia.motion.ground_reactions import measured_reactions
 from kinertia.motion.smoothing import smooth
-from kinertia.report.cycle_figures import cycle_figure, cycle_figures, drawn_curves, mean_curve, usual_mean
-from kinertia.report.cycle_table import stride_rows
-from kinertia.report.files import save_fit
-from kinertia.report.page import render
-from kinertia.report.saved_fit import load_fit
-from kinertia.report.time_figures import moment_figure
+from kinertia.report.exports.files import save_fit
+from kinertia.report.exports.saved_fit import load_fit
+from kinertia.report.figures.cycle_figures import cycle_figure, cycle_figures, drawn_curves, mean_curve, usual_mean
+from kinertia.report.figures.time_figures import moment_figure
+from kinertia.report.pages.cycle_table import stride_rows
+from kinertia.report.pages.page import render
 from report_page import Elements
 
 

@@ -11,16 +11,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from kinertia.report.body_figure import body_figure
-from kinertia.report.bsp_figures import change_figure, departure_figure, departures, information_figure
-from kinertia.report.coordinate_titles import panels_of, title_of
-from kinertia.report.figure import Figure, compact
-from kinertia.report.marker_figures import fit_gap_figure, marker_figure
-from kinertia.report.page import render
-from kinertia.report.panels import Panel, small_multiples
-from kinertia.report.plots import as_plotly
-from kinertia.report.style import BLUE, SIDES, between, faded
-from kinertia.report.time_figures import (
+from kinertia.report.figures.body_figure import body_figure
+from kinertia.report.figures.bsp_figures import change_figure, departure_figure, departures, information_figure
+from kinertia.report.figures.coordinate_titles import panels_of, title_of
+from kinertia.report.figures.figure import Figure, Panel, compact, small_multiples
+from kinertia.report.figures.marker_figures import fit_gap_figure, marker_figure
+from kinertia.report.figures.plots import as_plotly
+from kinertia.report.figures.style import BLUE, SIDES, between, faded
+from kinertia.report.figures.time_figures import (
     BAND_EVERY,
     coordinate_figure,
     joint_moment_figure,
@@ -29,6 +27,7 @@ from kinertia.report.time_figures import (
     residual_figure,
     stage_name,
 )
+from kinertia.report.pages.page import render
 from kinertia.report.wording import LITERATURE
 from kinertia.trial.data import FootLoads, Markers, Trial
 from kinertia.trial.gait_events import gait_events

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from kinertia.report.page import render
-from kinertia.report.time_figures import bandwidths
+from kinertia.report.figures.time_figures import bandwidths
+from kinertia.report.pages.page import render
 from report_page import Elements
 
 

@@ -9,7 +9,7 @@ import pytest
 from kinertia.estimation.joint_curves import JointCurves
 from kinertia.estimation.simultaneous.uncertainty.curve_deviations import CurveDeviations
 from kinertia.motion.dynamics import Motion
-from kinertia.report.page import MOST_TRIALS, render
+from kinertia.report.pages.page import MOST_TRIALS, render
 from kinertia.trial.data import FootLoads
 from report_page import Elements
 

@@ -3,7 +3,7 @@ import pytest
 
 import study_results
 from command_line import run
-from kinertia.report.table1 import HEADINGS, save_variants, variants_frame, variants_rows
+from kinertia.report.pages.table1 import HEADINGS, save_variants, variants_frame, variants_rows
 from kinertia.studies.table1_variants import LONG, LONG_GROUND, NOISY
 
 

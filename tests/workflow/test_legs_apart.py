@@ -7,7 +7,7 @@ import pytest
 
 from kinertia.io.text.sto import TimeTable, read_table, write_table
 from kinertia.io.text.trc import read_trc, write_trc
-from kinertia.report.saved_fit import load_fit
+from kinertia.report.exports.saved_fit import load_fit
 from kinertia.workflow.from_files import fit_subject
 from recordings import is_here
 from validation.measured_data import find

@@ -36,7 +36,7 @@ from kinertia.io.opensim.reader import read_osim
 from kinertia.io.subject.reader import expect_one_model, read_subject, subject_file_in
 from kinertia.io.text.number_table import expect_path
 from kinertia.model.anthropometry import check_subject
-from kinertia.report.check_page import save_check_page
+from kinertia.report.pages.check_page import save_check_page
 from kinertia.settings import Subject
 from kinertia.workflow.check import (
     ModelOverview,

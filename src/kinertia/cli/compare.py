@@ -14,10 +14,8 @@ from kinertia.estimation.result import Fit
 from kinertia.estimation.session_changes import why_incomparable
 from kinertia.io.results.output_folder import complete_folder
 from kinertia.io.subject.provenance import names_from_common_folder
-from kinertia.report.change_tables import change_columns, curve_columns
-from kinertia.report.file_outputs import outputs_sentence
-from kinertia.report.files import write_columns
-from kinertia.report.side_by_side import (
+from kinertia.report.comparison.change_tables import change_columns, curve_columns
+from kinertia.report.comparison.side_by_side import (
     MOST_FITS,
     comparison_columns,
     comparison_summary,
@@ -26,8 +24,10 @@ from kinertia.report.side_by_side import (
     remarks,
     render_comparison,
 )
-from kinertia.report.what_changed import Comparison, fit_of
-from kinertia.report.what_changed import compare as compare_sessions
+from kinertia.report.comparison.what_changed import Comparison, fit_of
+from kinertia.report.comparison.what_changed import compare as compare_sessions
+from kinertia.report.exports.files import write_columns
+from kinertia.report.pages.file_outputs import outputs_sentence
 
 
 def compare(

@@ -29,8 +29,8 @@ from kinertia.io.subject.reader import read_subject, with_settings
 from kinertia.io.subject.tables import SubjectFile
 from kinertia.model.bsp import BodySegmentParameters
 from kinertia.motion.dynamics import inverse_dynamics
-from kinertia.report.files import save_fit, summary
-from kinertia.report.truth_comparison import Truth
+from kinertia.report.exports.files import save_fit, summary
+from kinertia.report.pages.truth_comparison import Truth
 from kinertia.synthetic.laboratory import LabNoise, record, write_lab
 from kinertia.synthetic.walk import SyntheticTrial, unlike_literature, walk, walking_subject
 from kinertia.workflow.estimate import estimate_bsp

@@ -38,7 +38,7 @@ from kinertia.io.subject.provenance import command_line, provenance_of
 from kinertia.io.subject.reader import read_subject, subject_file_in, subject_from_options, with_settings
 from kinertia.io.subject.tables import SubjectFile
 from kinertia.io.text.number_table import expect_path
-from kinertia.report.files import FIT_FILES, TRIAL_FILES, save_fit, summary
+from kinertia.report.exports.files import FIT_FILES, TRIAL_FILES, save_fit, summary
 from kinertia.settings import Overrule, Settings
 from kinertia.workflow.from_files import fit_subject
 

@@ -8,7 +8,7 @@ from kinertia.cli.terminal import out, plain_table
 from kinertia.estimation.identifiability import evidence
 from kinertia.estimation.leg_moments import coverage_sentence
 from kinertia.estimation.result import Fit
-from kinertia.report.files import summary
+from kinertia.report.exports.files import summary
 from kinertia.report.wording import start_of
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from kinertia.io.results.output_folder import write_then_rename
 from kinertia.io.subject.draft import FILL_IN, MARKER_SET, NO_FORCES, NOT_USED, SUBJECT, init_files
 from kinertia.io.subject.measures_file import measures_sheet
 from kinertia.io.subject.provenance import command_line
-from kinertia.report.measures_picture import measures_picture
+from kinertia.report.figures.measures_picture import measures_picture
 
 
 def init(

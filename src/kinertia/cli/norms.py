@@ -17,7 +17,7 @@ from kinertia.estimation.result import Fit
 from kinertia.io.norms_file import read_norms
 from kinertia.io.results.output_folder import write_then_rename
 from kinertia.io.text.csv_file import inert
-from kinertia.report.saved_fit import read_saved
+from kinertia.report.exports.saved_fit import read_saved
 
 
 def norms(

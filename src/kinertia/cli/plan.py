@@ -9,7 +9,7 @@ from kinertia.cli.options import Output, Overwrite, Quiet, results_folder
 from kinertia.cli.outcome import Outcome
 from kinertia.cli.terminal import out, plain_table, shown_progress
 from kinertia.io.subject.reader import read_subject
-from kinertia.report.plan_page import (
+from kinertia.report.pages.plan_page import (
     CROSSVAL_HEADINGS,
     PLAN_CAPTION,
     PLAN_HEADINGS,

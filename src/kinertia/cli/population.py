@@ -19,7 +19,7 @@ from kinertia.io.results.output_folder import write_then_rename
 from kinertia.io.subject.population_file import population_text, read_population
 from kinertia.io.versions import VERSION
 from kinertia.model.bsp import PARAMETERS
-from kinertia.report.saved_fit import SavedFit, read_saved
+from kinertia.report.exports.saved_fit import SavedFit, read_saved
 
 _SHOWN = 12
 

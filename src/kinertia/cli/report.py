@@ -17,10 +17,10 @@ from kinertia.estimation.result import Fit
 from kinertia.io.norms_file import Norm, read_norms
 from kinertia.io.results.output_folder import updated_files
 from kinertia.motion.model_outputs import CLINICAL_ANGLES
-from kinertia.report.cycle_figures import CurvesByStage, drawn_curves
-from kinertia.report.files import write_columns
-from kinertia.report.page import Template, render
-from kinertia.report.saved_fit import read_saved
+from kinertia.report.exports.files import write_columns
+from kinertia.report.exports.saved_fit import read_saved
+from kinertia.report.figures.cycle_figures import CurvesByStage, drawn_curves
+from kinertia.report.pages.page import Template, render
 
 LETTER = "letter.html"
 

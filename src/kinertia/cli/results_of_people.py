@@ -7,7 +7,7 @@ from kinertia.cli.terminal import out
 from kinertia.cohort.tables import fitted_people
 from kinertia.errors import FileError
 from kinertia.io.text.csv_file import inert
-from kinertia.report.saved_fit import FIT_FILE
+from kinertia.report.exports.saved_fit import FIT_FILE
 
 
 @dataclass(frozen=True)

@@ -11,10 +11,10 @@ from kinertia.cli.options import Output, Overwrite, Quiet, results_folder
 from kinertia.cli.outcome import Outcome, add_command
 from kinertia.cli.terminal import out, plain_table, shown_progress
 from kinertia.io.subject.reader import read_subject
-from kinertia.report.matplotlib_extra import HOW, has_matplotlib
-from kinertia.report.sensitivity import save_sensitivity, sensitivity_summary
-from kinertia.report.table1 import HEADINGS as VARIANT_HEADINGS
-from kinertia.report.table1 import (
+from kinertia.report.figures.journal_figure import HOW, has_matplotlib
+from kinertia.report.pages.sensitivity import save_sensitivity, sensitivity_summary
+from kinertia.report.pages.table1 import HEADINGS as VARIANT_HEADINGS
+from kinertia.report.pages.table1 import (
     save_table1,
     save_variants,
     table1_rows,

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kinertia.estimation.simultaneous.calibration_entry import GAIN, SHOWN_UNIT, item_text, quantity_text
-from kinertia.report import style
-from kinertia.report.panels import Panel, plain, small_multiples
-from kinertia.report.result_page import Part
+from kinertia.report.figures import style
+from kinertia.report.figures.figure import Panel, plain, small_multiples
+from kinertia.report.pages.rendering import Part
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -30,7 +30,7 @@ from kinertia.io.subject.session_file import PersonInstruments, session_text
 from kinertia.io.subject.tables import InstrumentsFiles, SubjectFile, subject_text
 from kinertia.io.text.toml_lines import read_toml
 from kinertia.io.versions import VERSION
-from kinertia.report.saved_fit import read_saved
+from kinertia.report.exports.saved_fit import read_saved
 from kinertia.studies.parallel import in_parallel
 from kinertia.workflow.from_files import check_plates
 from kinertia.workflow.session import person_instruments, session_instruments

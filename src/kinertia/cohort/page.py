@@ -18,13 +18,11 @@ from kinertia.estimation.cycles import UNITS, Kind
 from kinertia.io.results.output_folder import write_then_rename
 from kinertia.model.bsp import PARAMETERS
 from kinertia.motion.gait_cycle import PERCENT
-from kinertia.report import style
-from kinertia.report.bsp_figures import NAMES, segment_name
-from kinertia.report.cycle_figures import band, mean_line
-from kinertia.report.figure import Figure
-from kinertia.report.panels import Panel, small_multiples
-from kinertia.report.result_page import Part, render_parts
-from kinertia.report.row_figures import dot_figure
+from kinertia.report.figures import style
+from kinertia.report.figures.bsp_figures import NAMES, segment_name
+from kinertia.report.figures.cycle_figures import band, mean_line
+from kinertia.report.figures.figure import Figure, Panel, dot_figure, small_multiples
+from kinertia.report.pages.rendering import Part, render_parts
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -39,8 +37,8 @@ from kinertia.findings.finding import Severity
 from kinertia.findings.overview import USES
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.rule import matching, rule
-from kinertia.report.finding_view import linked
-from kinertia.report.row_figures import bar_figure
+from kinertia.report.figures.figure import bar_figure
+from kinertia.report.pages.finding_view import linked
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -25,7 +25,7 @@ from kinertia.io.subject.provenance import command_line, provenance_of
 from kinertia.io.subject.reader import read_subject
 from kinertia.io.subject.tables import SubjectFile
 from kinertia.io.versions import VERSION
-from kinertia.report.files import save_fit
+from kinertia.report.exports.files import save_fit
 from kinertia.workflow.from_files import fit_subject
 
 _ENDED = "Timeout ("

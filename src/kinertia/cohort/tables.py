@@ -28,9 +28,9 @@ from kinertia.findings.overview import Overview, finding_columns
 from kinertia.io.norms_file import Norm
 from kinertia.io.results.working_folder import working_folder
 from kinertia.io.text.csv_file import inert, read_csv
-from kinertia.report.cycle_figures import MOST_STRIDES, titled_quantities
-from kinertia.report.files import summary
-from kinertia.report.saved_fit import load_fit
+from kinertia.report.exports.files import summary
+from kinertia.report.exports.saved_fit import load_fit
+from kinertia.report.figures.cycle_figures import MOST_STRIDES, titled_quantities
 
 if TYPE_CHECKING:
     import pyarrow

@@ -5,13 +5,13 @@ from kinertia.estimation.result import Fit
 from kinertia.estimation.trial_fit import TrialFit
 from kinertia.findings.finding import Severity
 from kinertia.io.norms_file import read_norms
-from kinertia.report.datasets import curve_dataset, draw_dataset
-from kinertia.report.files import save_fit
-from kinertia.report.finding_view import lines
-from kinertia.report.journal_figure import save_figure
-from kinertia.report.page import bsp_rows, residual_rows
-from kinertia.report.plots import FitFigures, as_plotly
-from kinertia.report.rendering import rendered
+from kinertia.report.exports.datasets import curve_dataset, draw_dataset
+from kinertia.report.exports.files import save_fit
+from kinertia.report.figures.journal_figure import save_figure
+from kinertia.report.figures.plots import FitFigures, as_plotly
+from kinertia.report.pages.finding_view import lines
+from kinertia.report.pages.page import bsp_rows, residual_rows
+from kinertia.report.pages.rendering import rendered
 from kinertia.report.wording import start_of
 from kinertia.trial import display
 from kinertia.trial.data import LOAD_THRESHOLD_N, Markers, Recording, Trial

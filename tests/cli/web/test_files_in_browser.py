@@ -12,7 +12,7 @@ from app_server import running
 from app_tab import Tab, folder_of
 from chromium import playwright
 from command_line import fitted
-from kinertia.report.saved_fit import load_fit
+from kinertia.report.exports.saved_fit import load_fit
 
 pytestmark = pytest.mark.slow
 

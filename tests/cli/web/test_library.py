@@ -18,7 +18,7 @@ from kinertia.errors import FileError
 from kinertia.findings.overview import Overview
 from kinertia.io.file_names import fits_everywhere
 from kinertia.io.subject.provenance import sha256
-from kinertia.report.finding_view import digest
+from kinertia.report.pages.finding_view import digest
 
 
 @pytest.fixture

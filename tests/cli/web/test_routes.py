@@ -19,7 +19,7 @@ from kinertia.errors import internal_error
 from kinertia.io import samples
 from kinertia.io.subject.measures_file import measures_sheet
 from kinertia.io.subject.reader import read_subject
-from kinertia.report.measures_picture import measures_picture
+from kinertia.report.figures.measures_picture import measures_picture
 
 
 @pytest.fixture

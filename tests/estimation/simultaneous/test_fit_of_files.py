@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from kinertia.estimation.result import Fit
-from kinertia.report.files import save_fit
+from kinertia.report.exports.files import save_fit
 from kinertia.settings import Settings, Subject
 from kinertia.trial.trial_input import TrialInput
 from kinertia.workflow.estimate import estimate_bsp

@@ -19,7 +19,7 @@ from kinertia.cli.web.rows import rows as rows_of
 from kinertia.cli.web.uploads import LIMITS
 from kinertia.errors import KinertiaError
 from kinertia.model.marker_set import SEGMENTS
-from kinertia.report.finding_view import LOOKS
+from kinertia.report.pages.finding_view import LOOKS
 
 _ENDED = {
     "cancelled": "Cancelled.",

@@ -19,7 +19,7 @@ from kinertia.cli.web.jobs import Work
 from kinertia.cli.web.library import PersonFolder
 from kinertia.errors import FileError
 from kinertia.io.versions import VERSION
-from kinertia.report.rendering import templates_of
+from kinertia.report.pages.rendering import templates_of
 
 _LARGEST_FORM = 1_000_000
 _PIECE = 1 << 20

@@ -26,7 +26,7 @@ from kinertia.errors import KinertiaError, internal_error
 from kinertia.io.results.output_folder import complete_folder, expect_own_folder
 from kinertia.io.samples import SIZE_MB
 from kinertia.io.subject.measures_file import measures_sheet
-from kinertia.report.measures_picture import measures_picture
+from kinertia.report.figures.measures_picture import measures_picture
 
 Example = Callable[[Path], object]
 """Writes the files of a person to try the page with into a folder."""
@@ -260,7 +260,7 @@ class _Actions:
 
     async def compare(self, request: Request) -> Response:
         """Show the comparison of chosen results."""
-        from kinertia.report.side_by_side import MOST_FITS
+        from kinertia.report.comparison.side_by_side import MOST_FITS
 
         chosen = self._chosen(request)
         problem = "" if 2 <= len(chosen) <= MOST_FITS else f"Choose 2 to {MOST_FITS} people with results."
@@ -268,8 +268,8 @@ class _Actions:
 
     async def compared(self, request: Request) -> Response:
         """Serve what `kinertia compare` writes about them."""
-        from kinertia.report.saved_fit import load_fit
-        from kinertia.report.side_by_side import MOST_FITS, render_comparison
+        from kinertia.report.comparison.side_by_side import MOST_FITS, render_comparison
+        from kinertia.report.exports.saved_fit import load_fit
 
         chosen = self._chosen(request)
         if not 2 <= len(chosen) <= MOST_FITS:

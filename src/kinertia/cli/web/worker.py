@@ -25,8 +25,8 @@ Progress = Callable[[str, float], None]
 
 def check(person: PersonFolder, progress: Progress) -> None:
     """Run `kinertia check` on the subject file: check.html, and its findings for the page."""
-    from kinertia.report.check_page import save_check_page
-    from kinertia.report.finding_view import digest
+    from kinertia.report.pages.check_page import save_check_page
+    from kinertia.report.pages.finding_view import digest
     from kinertia.workflow.check import check_person
     from kinertia.workflow.person import read_person
 
@@ -39,9 +39,9 @@ def check(person: PersonFolder, progress: Progress) -> None:
 def fit(person: PersonFolder, progress: Progress) -> None:
     """Run `kinertia fit` on the subject file: the results, and the subject file that they are of."""
     from kinertia.io.subject.provenance import provenance_of
-    from kinertia.report.files import save_fit
-    from kinertia.report.finding_view import digest
-    from kinertia.report.headline import words
+    from kinertia.report.exports.files import save_fit
+    from kinertia.report.pages.finding_view import digest
+    from kinertia.report.pages.headline import words
     from kinertia.workflow.from_files import fit_subject
 
     begun = time.time()

@@ -1,0 +1,1 @@
+"""Compares results: two sessions or conditions, several results, and results with what files contain."""

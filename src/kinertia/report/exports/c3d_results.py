@@ -1,0 +1,327 @@
+"""Writes results of a trial into its C3D file, as Vicon and Visual3D name and type model outputs."""
+
+import tempfile
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from kinertia.errors import FileError
+from kinertia.estimation.drawn_fit import drawn_fit
+from kinertia.estimation.joint_curves import JointCurves
+from kinertia.estimation.result import Fit
+from kinertia.estimation.trial_fit import TrialFit
+from kinertia.io.c3d.events import EventToWrite
+from kinertia.io.c3d.outputs import C3dFrames, Measure, OutputPoint, frames_of, too_many, unit_factor, with_outputs
+from kinertia.io.c3d.parameters import TooManyParameters, Value
+from kinertia.io.c3d.writer import write_c3d
+from kinertia.io.recording import read_recording
+from kinertia.io.subject.provenance import trial_file
+from kinertia.io.versions import VERSION
+from kinertia.model.bsp import PARAMETERS
+from kinertia.model.marker_set import shared_prefix, spellings
+from kinertia.motion.gait_cycle import Stride, feet_under_pelvis, found_events
+from kinertia.motion.joint_wrench import leg_joints
+from kinertia.motion.model_outputs import CONVENTIONS, UNITS, Convention, Departures, ModelOutput, model_outputs
+from kinertia.motion.spatiotemporal import Spatiotemporal, spatiotemporal
+from kinertia.report.exports.saved_fit import SavedFit
+from kinertia.trial.data import FEET, Recording
+
+SUFFIX = "Kinertia"
+"""Ends all labels where the file has outputs of the same names already."""
+SD = "SD"
+_MOST_DRAWS = 100
+"""A correlation is known to 0.1 or better from so many."""
+NO_DEVIATION = -1.0
+"""Value on axes without an SD, where a point has others: readers take a point with any NaN for missing."""
+_PLUG_IN_GAIT = ({"LASI", "RASI", "LTHI", "RTHI", "LTIB", "RTIB"}, {"LASI", "RASI", "LTHI", "RTHI", "SACR"})
+_SAME_PLACE = 1e-3
+"""Largest error of markers against the fit's, as a share of their distances: a file stores single precision."""
+_SAME_TIME_FRAMES = 0.02
+_CONTEXTS = {"r": "Right", "l": "Left"}
+
+
+def write_c3d_results(
+    saved: SavedFit, results: Path, recordings: Path | None, convention: str | None, folder: Path
+) -> Convention:
+    """Write a C3D file with its results for each trial of a fit; return the convention.
+
+    Args:
+        saved: the fit.
+        results: folder of the fit.
+        recordings: folder of the trials' files; searched for if None (`trial_file`).
+        convention: convention of signs, axes and units; the usual one of the marker set if None.
+        folder: folder to write to.
+
+    Raises:
+        FileError: a trial's file is not found, has changed, or cannot take results.
+    """
+    fit, provenance = saved.fit, saved.provenance
+    chosen = next((one for one in CONVENTIONS if one == convention), usual_convention(fit))
+    for trial in fit.trials:
+        path = trial_file(provenance, trial.name, results, recordings)
+        source = path if path.suffix.lower() == ".c3d" else read_recording(path)
+        content = c3d_with_results(fit, trial, source, chosen, provenance.files if provenance is not None else {})
+        (folder / f"{trial.name}.c3d").write_bytes(content)
+    return chosen
+
+
+def usual_convention(fit: Fit) -> Convention:
+    """Return Plug-in Gait's convention where its markers are present, else ISB's."""
+    prefix = shared_prefix(fit.skeleton.labels)
+    labels = {label.removeprefix(prefix) for label in fit.skeleton.labels}
+    return "plug-in-gait" if any(own <= labels for own in _PLUG_IN_GAIT) else "isb"
+
+
+def outputs_of(fit: Fit, trial: TrialFit, convention: Convention) -> list[ModelOutput]:
+    """Return model outputs at `_times`, with SDs from the posterior draws; NaN where they are not known."""
+    loads, body, drawn = trial.reactions.at(_times(trial)), fit.estimate, _departures(fit, trial)
+    curves = trial.joint_curves
+    motion, sd = (trial.motion, trial.deviations) if curves is None else (curves.motion, curves.deviations)
+    found = model_outputs(trial.skeleton, body, motion, loads, fit.mass_kg, convention, sd, drawn)
+    return found if curves is None else [_where_known(one, curves, convention, fit.mass_kg) for one in found]
+
+
+def _times(trial: TrialFit) -> np.ndarray:
+    """Return the times (w,) s of the outputs: of all frames in which any joint's load is known."""
+    return trial.time if trial.joint_curves is None else trial.joint_curves.time
+
+
+def _where_known(one: ModelOutput, curves: JointCurves, convention: Convention, mass_kg: float) -> ModelOutput:
+    """Return an output with NaN where it is not known; what a hinge transmits gets the SD of `JointCurves`."""
+    label, joints = f"{one.joint.lower()}_{one.side}", curves.joints["estimate"]
+    if one.kind == "ANGLES" or label not in joints.joints:
+        known = np.logical_or.reduce(curves.known, axis=1)
+    else:
+        row = joints.joints.index(label)
+        known = np.isfinite(joints.moments[:, row, 0])
+        if one.kind == "MOMENTS" and curves.moment_sd is not None:
+            factor = (1000.0 if convention == "plug-in-gait" else 1.0) / mass_kg
+            one = replace(one, sd=np.where(np.isfinite(one.sd), one.sd, factor * curves.moment_sd[:, row]))
+    shown = known[:, None]
+    return replace(one, values=np.where(shown, one.values, np.nan), sd=np.where(shown, one.sd, np.nan))
+
+
+def new_file(recording: Recording, folder: Path) -> Path:
+    """Write a C3D file for a recording in other formats; plates whose corners are unknown are left out."""
+    plates = recording.plates if recording.plates is not None and recording.plates.corners is not None else None
+    path = folder / f"{recording.name}.c3d"
+    write_c3d(path, replace(recording, plates=plates))
+    return path
+
+
+def c3d_with_results(
+    fit: Fit, trial: TrialFit, source: Path | Recording, convention: Convention, files: Mapping[str, str]
+) -> bytes:
+    """Return the content of a C3D file with a trial's results.
+
+    Args:
+        fit, trial: the fit and its trial.
+        source: the trial's own C3D file, or its recording read from other formats.
+        convention: convention of signs, axes and units.
+        files: SHA-256 of the files of the fit, by name.
+
+    Raises:
+        FileError: the file is damaged, is not the trial's, or has no room.
+    """
+    if isinstance(source, Recording):
+        with tempfile.TemporaryDirectory() as folder:
+            return c3d_with_results(fit, trial, new_file(source, Path(folder)), convention, files)
+    frames = frames_of(source)
+    prefix = prefix_of(frames, trial)
+    at = _frames_at(source, frames, trial)
+    outputs = outputs_of(fit, trial, convention)
+    if not outputs:
+        legs = "legs are not hip, knee and ankle with axes forward, up and right"
+        raise FileError(source, f"cannot take results of the model {fit.skeleton.name}: its {legs}")
+    points = [*_points(outputs, frames, at, UNITS[convention]), *_centres(source, frames, trial, prefix, at)]
+    taken = set(frames.labels)
+    if any(prefix + one.label in taken for one in points):
+        points = [replace(one, label=_suffixed(one.label)) for one in points]
+    units = {kind: frames.units.get(kind, unit) for kind, unit in UNITS[convention].items()}
+    known = found_events(trial.skeleton, trial.kinematics)
+    events = [EventToWrite(one.event, one.source) for one in known if one.source != "file"]
+    try:
+        own, measures = _own(fit, convention, files, units), _stride_measures(trial)
+        return with_outputs(frames, points, prefix, units, own, events, measures)
+    except TooManyParameters:
+        raise too_many(source) from None
+
+
+def _suffixed(label: str) -> str:
+    return label[: -len(SD)] + SUFFIX + SD if label.endswith(SD) else label + SUFFIX
+
+
+def prefix_of(frames: C3dFrames, trial: TrialFit) -> str:
+    """Return the subject prefix that most of the trial's markers have in the file.
+
+    Labels of other people in it keep their prefixes, and do not count.
+    """
+    labels = set(frames.labels)
+    every = trial.kinematics.trial.markers.labels
+    own = [label for label in every if ":" not in label] or every
+    prefixes = dict.fromkeys(["", *(label.split(":", 1)[0] + ":" for label in frames.labels if ":" in label)])
+    return max(prefixes, key=lambda prefix: sum(prefix + label in labels for label in own))
+
+
+def _frames_at(source: Path, frames: C3dFrames, trial: TrialFit) -> np.ndarray:
+    """Return the indices (w,) in the file of the frames of the fit."""
+    exact = _times(trial) * frames.rate_hz - (frames.first - 1)
+    at = exact.round().astype(int)
+    if np.abs(exact - at).max() > _SAME_TIME_FRAMES or at[0] < 0 or at[-1] >= len(frames.points):
+        raise _another(source, trial)
+    return at
+
+
+def _another(source: Path, trial: TrialFit) -> FileError:
+    return FileError(source, f"holds other frames or markers than trial {trial.name} of the fit; give its own file")
+
+
+def _points(
+    outputs: list[ModelOutput], frames: C3dFrames, at: np.ndarray, units: Mapping[str, str]
+) -> list[OutputPoint]:
+    """Return outputs and their SDs at all frames of the file, in the file's units where it states others."""
+    points, count = [], len(frames.points)
+    for one in outputs:
+        own = unit_factor(one.kind, units[one.kind])
+        stated = unit_factor(one.kind, frames.units.get(one.kind, units[one.kind]))
+        assert own is not None
+        assert stated is not None  # `frames_of` refuses others
+        factor = own / stated
+        points.append(OutputPoint(one.name, one.kind, _spread(factor * one.values, at, count)))
+        if np.isfinite(one.sd).any():
+            sd = np.where(np.isfinite(one.sd), factor * one.sd, NO_DEVIATION)
+            points.append(OutputPoint(one.name + SD, one.kind, _spread(sd, at, count), "SD; -1: none"))
+    return points
+
+
+def _spread(values: np.ndarray, at: np.ndarray, count: int) -> np.ndarray:
+    result = np.full((count, 3), np.nan)
+    result[at] = values
+    return result
+
+
+def _centres(source: Path, frames: C3dFrames, trial: TrialFit, prefix: str, at: np.ndarray) -> list[OutputPoint]:
+    """Return joint centres in the axes and units of the file."""
+    lab, origin = to_file(source, frames, trial, prefix)
+    pose = trial.skeleton.pose(trial.motion.q if trial.joint_curves is None else trial.joint_curves.motion.q)
+    return [
+        OutputPoint(
+            f"{joint.side.upper()}{joint.name[0]}JC",
+            "",
+            _spread(joint.centre(trial.skeleton, pose) @ lab + origin, at, len(frames.points)),
+            f"{joint.name.lower()} joint centre",
+        )
+        for joint in leg_joints(trial.skeleton)
+    ]
+
+
+def to_file(source: Path, frames: C3dFrames, trial: TrialFit, prefix: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return rotation (3, 3) and translation (3,) from the axes of the fit (m, facing +X) to the file's, by markers."""
+    markers, columns = trial.kinematics.trial.markers, {label: k for k, label in enumerate(frames.labels)}
+    wanted = [prefix + label for label in markers.labels]
+    read_as = spellings(wanted, frames.labels)
+    written = [read_as.get(label, label) for label in wanted]
+    shared = [(k, columns[label]) for k, label in enumerate(written) if label in columns]
+    index = (markers.time * frames.rate_hz - (frames.first - 1)).round().astype(int)
+    inside = (index >= 0) & (index < len(frames.points))
+    ours = markers.positions[inside][:, [k for k, _ in shared]].reshape(-1, 3)
+    theirs = frames.points[index[inside]][:, [k for _, k in shared]].reshape(-1, 3)
+    known = np.isfinite(ours).all(axis=1) & np.isfinite(theirs).all(axis=1)
+    if known.sum() < 100:
+        raise _another(source, trial)
+    ours, theirs = np.column_stack([ours[known], np.ones(known.sum())]), theirs[known]
+    for _ in range(3):  # markers whose labels were corrected have other labels in the file
+        turn, *_ = np.linalg.lstsq(ours, theirs, rcond=None)
+        apart = np.linalg.norm(ours @ turn - theirs, axis=1)
+        near = apart <= max(3.0 * float(np.median(apart)), 1e-9)
+        ours, theirs = ours[near], theirs[near]
+    if np.median(apart) > _SAME_PLACE * float(np.ptp(theirs, axis=0).max()):
+        raise _another(source, trial)
+    return turn[:3], turn[3]
+
+
+def _own(
+    fit: Fit, convention: Convention, files: Mapping[str, str], units: Mapping[str, str]
+) -> dict[str, tuple[Value, tuple[int, ...] | None]]:
+    """Return the group KINERTIA: what the outputs are, segment masses (kg), centres of mass (m, segment axes)."""
+    bsp, table = fit.estimate, fit.estimate.table()
+    coms = [PARAMETERS.index(name) for name in ("com_x", "com_y", "com_z")]
+    count = len(bsp.segments)
+    own: dict[str, tuple[Value, tuple[int, ...] | None]] = {
+        "VERSION": ([VERSION], None),
+        "CONVENTION": ([convention], None),
+        "UNITS": ([f"{kind} {unit}{'' if kind == 'ANGLES' else '/kg'}" for kind, unit in units.items()], None),
+        "BODY_MASS": (np.array([fit.mass_kg]), None),
+        "SEGMENTS": (list(bsp.segments), None),
+        "MASS": (table[:, PARAMETERS.index("mass")], None),
+        "COM": (table[:, coms], (3, count)),
+    }
+    if fit.posterior is not None:
+        own["MASS_SD"] = (fit.posterior.sd[:, PARAMETERS.index("mass")], None)
+        own["COM_SD"] = (fit.posterior.sd[:, coms], (3, count))
+    if files:
+        own["FILES"], own["SHA256"] = (list(files), None), (list(files.values()), None)
+    return own
+
+
+def _departures(fit: Fit, trial: TrialFit) -> Departures | None:
+    """Return the departures of the draws in a trial, at `_times`; None if the fit has no draws."""
+    if fit.posterior is None or fit.posterior.draws is None:
+        return None
+    k, kept = [one.name for one in fit.trials].index(trial.name), fit.posterior.draws
+    own = replace(kept, trials=(kept.trials[k],))
+    alone = replace(fit, trials=(trial,), posterior=replace(fit.posterior, draws=own))
+    here = _curves(trial)
+    drawn = [_curves(drawn_fit(alone, number).trials[0]) for number in range(min(kept.count, _MOST_DRAWS))]
+    return Departures(*(np.array(each) - at for each, at in zip(zip(*drawn, strict=True), here, strict=True)))
+
+
+def _curves(trial: TrialFit) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return coordinates, moments and powers (w, c) at `_times`."""
+    curves = trial.joint_curves
+    if curves is not None:
+        forces = curves.forces["estimate"]
+        return curves.motion.q, forces, forces * curves.motion.qd
+    moments = trial.joint_loads["estimate"]
+    return trial.motion.q, moments, moments * trial.motion.qd
+
+
+def _stride_measures(trial: TrialFit) -> list[Measure]:
+    """Return all mean stride measures that are known, with Vicon's names and units; none without strides."""
+    if not trial.strides:
+        return []
+    feet = feet_under_pelvis(trial.skeleton, trial.kinematics)
+    found = [
+        (stride.side, _measures(stride, one))
+        for stride, one in zip(
+            trial.strides, spatiotemporal(feet, trial.strides, trial.kinematics.trial.belt), strict=True
+        )
+    ]
+    result = []
+    for side in FEET:
+        own = [measures for of, measures in found if of == side]
+        for name, unit in own[0] if own else ():
+            values = np.array([measures[name, unit] for measures in own])
+            if np.isfinite(values).any():
+                result.append(Measure(_CONTEXTS[side], name, unit, float(np.nanmean(values))))
+    return result
+
+
+def _measures(stride: Stride, one: Spatiotemporal) -> dict[tuple[str, str], float]:
+    """Return the measures by name and unit."""
+    return {
+        ("Cadence", "steps/min"): one.cadence_steps_min,
+        ("Walking Speed", "m/s"): one.speed_m_s,
+        ("Stride Time", "s"): one.stride_time_s,
+        ("Step Time", "s"): one.step_time_s,
+        ("Opposite Foot Off", "%"): stride.percent(stride.opposite_toe_off_s),
+        ("Opposite Foot Contact", "%"): stride.percent(stride.opposite_strike_s),
+        ("Foot Off", "%"): stride.percent(stride.toe_off_s),
+        ("Single Support", "s"): stride.opposite_strike_s - stride.opposite_toe_off_s,
+        ("Double Support", "s"): 0.01 * one.double_support_percent * one.stride_time_s,
+        ("Stride Length", "m"): one.stride_length_m,
+        ("Step Length", "m"): one.step_length_m,
+        ("Step Width", "m"): one.step_width_m,
+    }

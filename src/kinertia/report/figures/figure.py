@@ -1,0 +1,318 @@
+"""Defines a figure as plain data, and how its panels and rows are laid out.
+
+Reports do not load plotly for this: its objects check every value against a schema, which took a fifth of a fit's time;
+here the tests check every figure once.
+
+A report carries plotly's script, and unpacks it when it is opened, so that it stays one file that needs no network.
+
+The page rearranges the panels for its width: `layout.meta.arrangements` holds the input of plotly's `relayout` for each
+number of columns and for "print".
+"""
+
+import base64
+import gzip
+import html
+import json
+import math
+import textwrap
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from kinertia.errors import FileError
+from kinertia.io.results.output_folder import write_then_rename
+from kinertia.model.compiled import cache_folder
+from kinertia.report.figures import style
+
+_BEST = 9
+_BOTTOM_PX, _RIGHT_PX = 44, 14
+_LEGEND_ROW_PX, _LEGEND_PER_ROW = 27, {1: 1, 2: 2, 3: 4}
+_TITLE_PX, _TICKS_PX, _NOMINAL_WIDTH_PX = 30, 40, 960
+MOST_COLUMNS = 3
+_PAPER_PX = 620
+"""Rows of panels on a sheet of paper, below the table of strides, at the scale of the page's print style."""
+_AXIS = {
+    "zeroline": True,
+    "zerolinecolor": style.PALE,
+    "zerolinewidth": 1,
+    "gridcolor": "#EFEFEF",
+    "linecolor": style.GREY,
+    "ticks": "outside",
+    "ticklen": 3,
+    "tickfont": {"size": 11},
+    "automargin": False,
+}
+_COLOURS = (style.GREY, style.BLUE, style.ORANGE, style.GREEN)
+_BARS = (style.BLUE, style.SKY, style.PALE, style.VERMILION)
+_SYMBOLS = ("circle-open", "circle", "diamond", "square")
+_ROW_PX, _LEFT_PX, _LETTERS = 34, 150, 22
+
+
+@dataclass(frozen=True)
+class Figure:
+    """Traces and layout, named and nested as in plotly's reference (https://plotly.com/javascript/reference).
+
+    Attributes:
+        data: traces; numbers may be lists, or the arrays that `compact` makes.
+        layout: axes, shapes, annotations, height; `meta.alt` is the text alternative.
+        frames: frames of an animation.
+    """
+
+    data: Sequence[Mapping[str, Any]]
+    layout: Mapping[str, Any]
+    frames: Sequence[Mapping[str, Any]] = ()
+
+    @property
+    def alt(self) -> str:
+        """Description of the figure in words."""
+        text: str = self.layout["meta"]["alt"]
+        return text
+
+    def to_json(self) -> str:
+        """Return traces and layout as JSON for plotly.js.
+
+        Raises:
+            ValueError: a number outside of arrays is not finite, which JSON cannot represent.
+        """
+        content = {"data": self.data, "layout": self.layout}
+        return json.dumps(content, default=_typed_array, allow_nan=False, separators=(",", ":"))
+
+
+def written(figure: Figure) -> dict[str, Any]:
+    """Return a figure for the templates: its text alternative, and the compressed input of plotly.js."""
+    return {"alt": figure.alt, "packed": packed(figure.to_json().encode()), "height": figure.layout["height"]}
+
+
+def compact(values: np.ndarray) -> np.ndarray:
+    """Convert to single precision, in which `Figure.to_json` writes arrays: half the size, beyond visible accuracy."""
+    return np.asarray(values, dtype=np.float32)
+
+
+def _typed_array(values: object) -> dict[str, str]:
+    """Return plotly.js' form of a binary array, little-endian in base64; NaN, a gap in a curve, is allowed here."""
+    known = {np.dtype(np.float32): "f4", np.dtype(np.uint8): "u1"}
+    if not (isinstance(values, np.ndarray) and values.dtype in known and values.ndim == 1):
+        raise TypeError(f"a figure holds lists and one-dimensional arrays of float32 or uint8, not {values!r}")
+    name = known[values.dtype]
+    return {"dtype": name, "bdata": base64.b64encode(values.astype(f"<{name}").tobytes()).decode("ascii")}
+
+
+def script_path() -> Path:
+    """Return the path of the script in the plotly package, which is not imported."""
+    spec = find_spec("plotly")
+    assert spec is not None, "plotly is a dependency"
+    assert spec.origin is not None
+    return Path(spec.origin).parent / "package_data" / "plotly.min.js"
+
+
+def packed_script() -> str:
+    """Return the script, gzip in base64; compressed again only where another plotly was installed since."""
+    script = script_path()
+    state = script.stat()
+    kept = cache_folder() / f"plotly-{state.st_size}-{state.st_mtime_ns}.txt"
+    with suppress(OSError):
+        return kept.read_text(encoding="ascii")
+    text = packed(script.read_bytes(), _BEST)
+    with suppress(OSError, FileError):  # where nothing can be kept, every report compresses it
+        for older in kept.parent.glob("plotly-*.txt"):
+            older.unlink()
+        write_then_rename(kept, text)
+    return text
+
+
+def packed(text: bytes, level: int = 6) -> str:
+    """Compress a text to gzip and base64, reproducibly, at a level from 1 (fast) to 9 (small)."""
+    return base64.b64encode(gzip.compress(text, level, mtime=0)).decode("ascii")
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One panel of a figure.
+
+    Attributes:
+        title: title with the unit.
+        traces: plotly traces without their axes.
+        shapes: plotly shapes without their axes; `yref` "domain" spans the height of the panel, `xref` its width.
+        y: further settings of the vertical axis.
+    """
+
+    title: str
+    traces: Sequence[dict[str, Any]]
+    shapes: Sequence[dict[str, Any]] = ()
+    y: dict[str, Any] | None = None
+
+
+def plain(text: str) -> str:
+    """Escape text that plotly would interpret as markup, which names of markers and trials may contain."""
+    return html.escape(text)
+
+
+def shaded(first: float, last: float, colour: str) -> dict[str, Any]:
+    """Shade the panel from one value of the horizontal axis to another."""
+    place = {"x0": first, "x1": last, "y0": 0, "y1": 1, "yref": "domain"}
+    return {"type": "rect", **place, "fillcolor": colour, "line": {"width": 0}, "layer": "below"}
+
+
+def small_multiples(
+    panels: Sequence[Panel], alt: str, x: dict[str, Any], row_px: int = 170, left_px: int = 52, linked: bool = True
+) -> Figure:
+    """Arrange panels of one kind as one figure.
+
+    Args:
+        panels: panels from left to right, then downwards.
+        alt: text alternative of the figure.
+        x: settings of the horizontal axes.
+        row_px: height of a panel.
+        left_px: room for the labels of a vertical axis.
+        linked: whether all panels have the same horizontal range.
+    """
+    data, shapes, titles = [], [], []
+    axes: dict[str, Any] = {}
+    shown: set[str] = set()
+    for k, panel in enumerate(panels):
+        suffix = "" if k == 0 else str(k + 1)
+        axes[f"xaxis{suffix}"] = {**_AXIS, **x, "anchor": f"y{suffix}", **({"matches": "x"} if k and linked else {})}
+        axes[f"yaxis{suffix}"] = {**_AXIS, **(panel.y or {}), "anchor": f"x{suffix}"}
+        for trace in panel.traces:
+            name = trace.get("name", "")
+            first = bool(name) and trace.get("showlegend", True) and name not in shown
+            shown |= {name} if first else set()
+            place = {"xaxis": f"x{suffix}", "yaxis": f"y{suffix}", "legendgroup": name, "showlegend": first}
+            data.append({**trace, **place})
+        for shape in panel.shapes:
+            refs = {ref: f"{ref[0]}{suffix}{' domain' if shape.get(ref) else ''}" for ref in ("xref", "yref")}
+            shapes.append({**shape, **refs})
+        place = {"xref": f"x{suffix} domain", "yref": f"y{suffix} domain", "x": 0, "y": 1}
+        anchors = {"xanchor": "left", "yanchor": "bottom", "showarrow": False, "font": {"size": 12}}
+        titles.append({"text": f"<b>{plain(panel.title)}</b>", **place, **anchors})
+    ways: dict[str, Any] = {
+        str(c): _arrangement(len(panels), c, row_px, left_px, len(shown)) for c in range(1, MOST_COLUMNS + 1)
+    }
+    rows = math.ceil(len(panels) / MOST_COLUMNS)
+    on_paper_px = min(row_px, _PAPER_PX // rows - _TITLE_PX - _TICKS_PX)
+    ways["print"] = _arrangement(len(panels), MOST_COLUMNS, max(on_paper_px, 80), left_px, len(shown))
+    layout = {**base_layout(alt), **axes, "shapes": shapes, "annotations": titles}
+    layout["meta"] = {**layout["meta"], "arrangements": ways}
+    return Figure(data, _arranged(layout, ways[str(MOST_COLUMNS)]))
+
+
+def _arranged(layout: dict[str, Any], flat: dict[str, Any]) -> dict[str, Any]:
+    """Apply the settings of an arrangement, whose names are paths such as "xaxis2.domain", to the layout."""
+    result = dict(layout)
+    for path, value in flat.items():
+        name, _, inner = path.partition(".")
+        result[name] = {**result[name], inner: value} if inner else value
+    return result
+
+
+def base_layout(alt: str) -> dict[str, Any]:
+    """Return the common layout of figures: font, white ground, legend on top, text `alt`, and no notebook template."""
+    return {
+        "template": {},
+        "font": {"family": style.FONT, "size": 12, "color": "#1A1A1A"},
+        "paper_bgcolor": "#FFFFFF",
+        "plot_bgcolor": "#FFFFFF",
+        "margin": {"t": _TITLE_PX, "b": _BOTTOM_PX, "l": 52, "r": _RIGHT_PX},
+        "legend": {"orientation": "h", "yref": "container", "y": 1, "yanchor": "top", "x": 0, "xanchor": "left"},
+        "hovermode": "closest",
+        "meta": {"alt": alt},
+    }
+
+
+def sentence_figure(text: str) -> Figure:
+    """Show words in place of a figure that has nothing to show."""
+    layout = base_layout(text)
+    hidden = {"visible": False}
+    place = {"xref": "paper", "yref": "paper", "x": 0, "y": 0.5, "xanchor": "left", "showarrow": False}
+    layout |= {"height": 90, "xaxis": hidden, "yaxis": hidden, "annotations": [{"text": plain(text), **place}]}
+    return Figure([], layout)
+
+
+def _arrangement(count: int, columns: int, row_px: int, left_px: int, legend: int) -> dict[str, Any]:
+    """Return domains of all axes, top margin and height of the figure, for this many columns and legend entries.
+
+    Fewer panels than columns fill the width.
+    """
+    legend_rows = math.ceil(legend / _LEGEND_PER_ROW[columns])
+    columns = min(columns, count)
+    rows = math.ceil(count / columns)
+    inner_px = rows * row_px + (rows - 1) * (_TITLE_PX + _TICKS_PX)
+    gap = (left_px + 6) / (_NOMINAL_WIDTH_PX - left_px - _RIGHT_PX)
+    width = (1 - (columns - 1) * gap) / columns
+    top_px = _TITLE_PX + _LEGEND_ROW_PX * legend_rows
+    layout: dict[str, Any] = {"height": inner_px + top_px + _BOTTOM_PX, "margin.t": top_px, "margin.l": left_px}
+    for k in range(count):
+        row, column = divmod(k, columns)
+        suffix = "" if k == 0 else str(k + 1)
+        left, top = column * (width + gap), 1 - row * (row_px + _TITLE_PX + _TICKS_PX) / inner_px
+        layout[f"xaxis{suffix}.domain"] = [round(left, 5), round(min(left + width, 1.0), 5)]
+        layout[f"yaxis{suffix}.domain"] = [round(max(top - row_px / inner_px, 0.0), 5), round(top, 5)]
+    return layout
+
+
+def dot_figure(names: Sequence[str], panels: Mapping[str, Mapping[str, Sequence[float]]], alt: str) -> Figure:
+    """Draw a panel per quantity, with a row per name and a dot per series.
+
+    Args:
+        names: names of the rows, downwards.
+        panels: title with unit -> series -> a value per row.
+        alt: text alternative of the figure.
+    """
+    drawn = []
+    only = all(len(series) == 1 for series in panels.values())
+    symbols, colours = (_SYMBOLS[1:], _COLOURS[1:]) if only else (_SYMBOLS, _COLOURS)
+    for title, series in panels.items():
+        traces = [
+            {
+                "type": "scatter",
+                "mode": "markers",
+                "x": [float(value) for value in values],
+                "y": list(range(len(names))),
+                "name": plain(name),
+                "marker": {"symbol": symbols[k], "size": 9, "color": colours[k], "line": {"width": 1.5}},
+                "text": [f"{plain(row)}: {value:.3g}" for row, value in zip(names, values, strict=True)],
+                "hovertemplate": "%{text}<extra>%{fullData.name}</extra>",
+            }
+            for k, (name, values) in enumerate(series.items())
+        ]
+        drawn.append(Panel(title, traces, (), _rows(names)))
+    x = {"rangemode": "tozero", "nticks": 5}
+    return small_multiples(drawn, alt, x, row_px=40 + _ROW_PX * len(names), left_px=_LEFT_PX, linked=False)
+
+
+def bar_figure(names: Sequence[str], series: Mapping[str, Sequence[float]], alt: str, title: str) -> Figure:
+    """Draw a row per name with a bar of all series, stacked; `title` states what they count."""
+    traces = [
+        {
+            "type": "bar",
+            "orientation": "h",
+            "x": list(values),
+            "y": list(range(len(names))),
+            "name": plain(name),
+            "marker": {"color": _BARS[k]},
+            "hovertemplate": "%{x}<extra>%{fullData.name}</extra>",
+        }
+        for k, (name, values) in enumerate(series.items())
+    ]
+    layout = base_layout(alt)
+    layout |= {
+        "legend": {**layout["legend"], "traceorder": "normal", "xref": "container"},
+        "height": 136 + _ROW_PX * len(names),
+        "margin": {"t": 70, "b": 48, "l": _LEFT_PX, "r": 14},
+        "barmode": "stack",
+        "xaxis": {"title": {"text": title, "standoff": 4, "font": {"size": 11}}, "gridcolor": "#EFEFEF"},
+        "yaxis": _rows(names),
+    }
+    return Figure(traces, layout)
+
+
+def _rows(names: Sequence[str]) -> dict[str, Any]:
+    """Return the vertical axis with a name per row, downwards."""
+    texts = ["<br>".join(plain(line) for line in textwrap.wrap(name, _LETTERS)) for name in names]
+    ticks = {"tickmode": "array", "tickvals": list(range(len(names))), "ticktext": texts, "tickfont": {"size": 10}}
+    return {**ticks, "range": [len(names) - 0.4, -0.6], "zeroline": False}

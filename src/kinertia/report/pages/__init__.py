@@ -1,0 +1,1 @@
+"""Writes pages: reports of fits, checks, plans and studies, each one self-contained file."""

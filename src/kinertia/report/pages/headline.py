@@ -1,0 +1,191 @@
+"""Writes the report's first part: fitness for use, and what the estimate changed.
+
+Findings state what is wrong and `suitability` the consequence for each output; this module applies it to the purposes
+that people have.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from kinertia.diagnostics.result.suitability import Suitability, suitability
+from kinertia.estimation.identifiability import INFORMED, MEASURED, evidence
+from kinertia.estimation.result import Fit
+from kinertia.estimation.trial_fit import TrialFit
+from kinertia.findings.finding import Severity
+from kinertia.findings.overview import DO_NOT_USE, USES, WITH_CARE
+from kinertia.model.bsp import PARAMETERS
+from kinertia.report.figures.bsp_figures import DEPARTURE_SD, NAMES, departures, estimated_rows, segment_name
+from kinertia.report.figures.coordinate_titles import title_of
+from kinertia.report.figures.time_figures import motion_change
+from kinertia.report.wording import decimals, expected_of, fixed, read_in
+from kinertia.trial.rms import rms
+
+_LISTED_FAR = 12
+_EVIDENCE = {
+    "measured": "well informed by the data",
+    "informed": "partly informed by the data",
+    "assumed": "not informed by the data, not to be read as this person's",
+}
+IMPOSSIBLE = "R202"
+"""The code of bodies that cannot exist."""
+
+
+class Purpose(NamedTuple):
+    """Purpose of a result, whether this one is suitable ("use", "use with care", "do not use"), and why."""
+
+    name: str
+    use: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class Words:
+    """Description of a fit in sentences.
+
+    Attributes:
+        purposes: suitability by purpose.
+        outputs: suitability by output.
+        motion: how far the motion was changed.
+        knowledge: which body segment parameters the data determine.
+        departures: estimates more than two prior SDs from the prior's mean.
+    """
+
+    purposes: tuple[Purpose, ...]
+    outputs: tuple[Suitability, ...]
+    motion: tuple[str, ...]
+    knowledge: tuple[str, ...]
+    departures: tuple[str, ...]
+
+
+def words(fit: Fit) -> Words:
+    """Describe a fit in sentences."""
+    outputs = suitability(fit, fit.findings, fit.left_out)
+    motion = tuple(sentence for trial in fit.trials for sentence in _motion(fit, trial))
+    return Words(purposes(outputs, impossible(fit)), outputs, motion, _knowledge(fit), _departures(fit))
+
+
+def impossible(fit: Fit) -> bool:
+    """Return whether an impossible body was estimated, which no simulation accepts."""
+    return any(one.code == IMPOSSIBLE and one.severity is Severity.ERROR for one in fit.findings)
+
+
+def purposes(outputs: Sequence[Suitability], no_body: bool) -> tuple[Purpose, ...]:
+    """Rate three purposes by the five outputs: joint moments, parameters in print, next steps in OpenSim."""
+    of = {one.output: one for one in outputs}
+    moments, motion = of["joint moments"], of["motion"]
+    segments = [of[name] for name in ("segment masses", "centres of mass", "moments of inertia")]
+    uses = {one.use for one in segments}
+    by_use = [f"{use}: {', '.join(one.output for one in segments if one.use == use)}" for use in USES if use in uses]
+    codes = dict.fromkeys(code for one in segments for code in one.codes)
+    by_use += [f"see {', '.join(codes)}"] if codes else []
+    parameters = segments[0] if len(uses) == 1 else Suitability("", WITH_CARE, "; ".join(by_use))
+    worse = max((moments, motion), key=lambda one: USES.index(one.use))
+    opensim = Purpose("Next OpenSim step (RRA, CMC)", worse.use, worse.reason)
+    if no_body:
+        opensim = opensim._replace(use=DO_NOT_USE, reason=f"a segment is physically impossible; see {IMPOSSIBLE}")
+    return (
+        Purpose("Joint moments and powers", moments.use, moments.reason),
+        Purpose("Segment parameters in a paper", parameters.use, parameters.reason),
+        opensim,
+    )
+
+
+def without_repetition(rated: Sequence[Purpose], said: str) -> list[Purpose]:
+    """Leave out of the reasons what the report states elsewhere, and what another purpose has stated."""
+    result: list[Purpose] = []
+    for one in rated:
+        like = next((other for other in rated[: len(result)] if other.reason == one.reason), None)
+        reason = one.reason.removeprefix(f"{said}; ") if like is None else f"as {like.name.lower()}"
+        result.append(one._replace(reason=reason))
+    return result
+
+
+def _motion(fit: Fit, trial: TrialFit) -> list[str]:
+    before, after = (1e3 * rms(trial.marker_errors_m[stage]) for stage in ("ik", "final"))
+    change = motion_change(trial)
+    angles = np.flatnonzero(fit.skeleton.rotational)
+    each = np.degrees([rms(change[:, k]) for k in angles])
+    worst = int(np.nanargmax(each))
+    name = title_of(fit.skeleton, int(angles[worst]))
+    moved = 1e3 * np.linalg.norm(change[:, :3], axis=1)
+    overall = float(np.degrees(rms(change[:, angles])))
+    return [
+        f"{trial.name}: model and measured markers are {before:.1f} mm (RMS) apart by inverse kinematics and "
+        f"{after:.1f} mm by the estimate",
+        f"{trial.name}: joint angles were changed by {overall:.1f} degrees (RMS), most of all {name} by "
+        f"{each[worst]:.1f}; the pelvis was moved by {rms(moved):.0f} mm (RMS), {np.nanmax(moved):.0f} mm at most",
+    ]
+
+
+def _knowledge(fit: Fit) -> tuple[str, ...]:
+    if fit.posterior is None:
+        return (
+            "the two-level method has no error bars, so it is unknown which parameters the data inform. Small "
+            "residuals alone prove nothing about single parameters; use the simultaneous method",
+        )
+    posterior = fit.posterior
+    grades = [evidence(value) for value in posterior.information[posterior.prior_sd > 0]]
+    counts = {word: grades.count(word) for word in _EVIDENCE}
+    whose = expected_of(fit).whose
+    sentences = [
+        f"of {len(grades)} parameters {counts['measured']} are well informed by the data (information above "
+        f"{100 * MEASURED:g} %), {counts['informed']} partly and {counts['assumed']} not (below {100 * INFORMED:g} %; "
+        f'"assumed" in the table): the latter remain about as uncertain as {whose}, even where they moved'
+    ]
+    masses = {fit.estimate.segments[i]: evidence(posterior.information[i, 0]) for i in estimated_rows(fit)}
+    for word, meaning in _EVIDENCE.items():
+        if names := [name for name, one in masses.items() if one == word]:
+            sentences.append(f"masses {meaning}: {_segments(names)}")
+    if kept := held_sentence(fit):
+        sentences.append(kept)
+    if never := posterior.base.never:
+        sentences.append(
+            f"{hidden_combinations(fit)} combinations cannot be seen in any motion, such as {never[0]}: all are listed "
+            "above the table"
+        )
+    return tuple(sentences)
+
+
+def held_sentence(fit: Fit) -> str:
+    """List the segments that were not estimated, in a sentence; empty where all were."""
+    estimated = set(estimated_rows(fit))
+    names = [name for i, name in enumerate(fit.estimate.segments) if i not in estimated]
+    return f"fixed at the model's values, not estimated: {_segments(names)}" if names else ""
+
+
+def hidden_combinations(fit: Fit) -> int:
+    """Count independent combinations of the estimated parameters that no motion shows: parameters minus rank."""
+    if fit.posterior is None:
+        return 0
+    base = fit.posterior.base
+    return len(PARAMETERS) * len(estimated_rows(fit)) - base.count
+
+
+def _segments(names: list[str]) -> str:
+    """List segments: "thigh (both), foot, left"."""
+    pairs = {name[:-2] for name in names if name.endswith("_r") and f"{name[:-2]}_l" in names}
+    short = [name[:-2].replace("_", " ") if name[:-2] in pairs else segment_name(name) for name in names]
+    return "; ".join(dict.fromkeys(short))
+
+
+def _departures(fit: Fit) -> tuple[str, ...]:
+    away = departures(fit)
+    if away is None or fit.posterior is None:
+        return ()
+    scale = fit.posterior.prior_sd
+    before, after, start = fit.expected.table(), fit.estimate.table(), expected_of(fit)
+    far = [(int(i), int(k)) for i, k in np.argwhere(np.abs(away) > DEPARTURE_SD)]
+    far.sort(key=lambda place: -abs(away[place]))
+    sentences = []
+    for i, k in far[:_LISTED_FAR]:
+        (unit, factor), digits = read_in(k), decimals(k, scale[i, k])
+        sentences.append(
+            f"{NAMES[k]} of {segment_name(fit.estimate.segments[i])}: {fixed(factor * after[i, k], digits)} {unit}; "
+            f"{start.word} {fixed(factor * before[i, k], digits)}; {away[i, k]:+.1f} prior SDs apart"
+        )
+    if len(far) > _LISTED_FAR:
+        sentences.append(f"and {len(far) - _LISTED_FAR} more: sort the table by prior SDs to see them")
+    return tuple(sentences)
