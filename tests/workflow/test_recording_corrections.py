@@ -83,6 +83,21 @@ def test_another_spelling_is_read_as_the_models(recording_of, file_of, of_walk):
     assert max(one.severity for one in result.findings) < Severity.ERROR
 
 
+@pytest.mark.measured
+def test_points_that_a_program_calculated_are_left_out_with_a_model(recording_of, file_of):
+    """Such as hip centres among the markers of a model's thighs; without a model joints may be placed by them."""
+    walk = recording_of("subject4/walking1.trc")
+    model = read_osim(file_of("subject4/addbiomechanics_scaled.osim"))
+    result = screen(Person(Subject(name="anna", mass_kg=62.6), (TrialInput(walk),), model=model))
+    read = result.context.trials[0].recording.markers.labels
+    assert set(walk.markers.labels) - set(read) == {"L_HJC", "R_HJC"}
+    found = [one for one in result.findings if one.code == "M151"]
+    assert [(one.where.markers, one.severity) for one in found] == [
+        (("L_HJC",), Severity.CORRECTED),
+        (("R_HJC",), Severity.CORRECTED),
+    ]
+
+
 def test_labels_of_another_set_stay_as_they_are(person):
     static, walk = person[0], spelled(person[1], lambda label: f"{len(label)}{label[::-1]}")
     result = screened(static, walk)

@@ -1,4 +1,5 @@
-"""Corrects recordings before any check: labels spelled otherwise, and a static trial that is not upright."""
+"""Corrects recordings before any check: labels spelled otherwise, a static trial that is not upright, points that a
+program calculated among the markers of a model."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -6,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from kinertia.diagnostics.evidence.landmarks import feet_to_pelvis_m, landmark_positions
+from kinertia.diagnostics.markers.computed_markers import computed_points
 from kinertia.errors import MarkerSetError
-from kinertia.findings.finding import finding
+from kinertia.findings.finding import Severity, finding
 from kinertia.findings.quantity import Quantity
 from kinertia.findings.where import Where
 from kinertia.io.lab_axes import rotation_of_line
@@ -67,3 +69,24 @@ def _spelled(recording: Recording, marker_set: MarkerSet, known: Sequence[str]) 
     ]
     markers = replace(recording.markers, labels=alike)
     return replace(recording, markers=markers, findings=(*recording.findings, *found))
+
+
+def without_computed_points(person: Person) -> Person:
+    """Return the person, with an OpenSim model, without markers that were calculated from others (M151).
+
+    They contain no measurement of their own, and the model's joint centres do not depend on them. Without a model they
+    may be what the laboratory places joints by: they stay.
+    """
+    if person.model is None or isinstance(person.labels, MarkerSetError):
+        return person
+    trials = [replace(one, recording=_measured_only(one.recording, person.labels)) for one in person.trials]
+    return person if trials == [*person.trials] else replace(person, trials=trials)
+
+
+def _measured_only(recording: Recording, marker_set: MarkerSet) -> Recording:
+    found = list(computed_points(recording, marker_set, Severity.CORRECTED))
+    computed = {label for one in found for label in one.where.markers}
+    if not computed:
+        return recording
+    measured = [label for label in recording.markers.labels if label not in computed]
+    return replace(recording, markers=recording.markers.select(measured), findings=(*recording.findings, *found))

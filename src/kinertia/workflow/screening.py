@@ -30,7 +30,11 @@ from kinertia.settings import Subject
 from kinertia.trial.data import Recording
 from kinertia.workflow.joint_widths import with_widths
 from kinertia.workflow.person import Person
-from kinertia.workflow.recording_corrections import with_model_spelling, with_upright_static
+from kinertia.workflow.recording_corrections import (
+    with_model_spelling,
+    with_upright_static,
+    without_computed_points,
+)
 
 _OF_FORCES = ("P", "T211", "T212")
 """ERRORs that do not concern the markers."""
@@ -113,7 +117,7 @@ class Screened:
 
 def screen(person: Person) -> Screened:
     """Check everything that can be checked before inverse kinematics."""
-    person = with_upright_static(with_model_spelling(person))
+    person = without_computed_points(with_upright_static(with_model_spelling(person)))
     context = person_context(person)
     found = [*person.unread]
     if isinstance(person.completed, SubjectError) and person.completed.finding is not None:

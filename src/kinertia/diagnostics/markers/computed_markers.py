@@ -13,10 +13,11 @@ from typing import NamedTuple
 import numpy as np
 
 from kinertia.diagnostics.context import RecordingContext
-from kinertia.findings.finding import Finding, finding
+from kinertia.findings.finding import Finding, Severity, finding
 from kinertia.findings.quantity import Quantity
+from kinertia.findings.where import Where
 from kinertia.model.marker_set import MarkerSet
-from kinertia.trial.data import FloatArray
+from kinertia.trial.data import FloatArray, Recording
 
 _EXACT_M, _SKIN_M = 1e-4, 3e-4
 """Skin moves by more than the latter; where pelvis markers do not, they are computed themselves, or on one plate."""
@@ -41,15 +42,20 @@ class _Computed(NamedTuple):
 
 def computed_markers(context: RecordingContext) -> Iterator[Finding]:
     """Report M151, one per point that was computed from other markers; of a motion."""
-    markers, marker_set = context.markers, context.marker_set
-    if marker_set is None:
-        return
+    if context.marker_set is not None:
+        yield from computed_points(context.recording, context.marker_set, Severity.WARNING)
+
+
+def computed_points(recording: Recording, marker_set: MarkerSet, severity: Severity) -> Iterator[Finding]:
+    """Find points of a marker set that were computed from other markers of this recording: M151 of this severity."""
+    markers = recording.markers
     few = markers.positions[:: -(-len(markers.time) // _FRAMES)]
     place = {label: few[:, k] for k, label in enumerate(markers.labels)}
     for label, computed in sorted({**_in_pelvis(place, marker_set), **_between(place, marker_set)}.items()):
         yield finding(
             "M151",
-            context.at(markers=(label,)),
+            Where(trial=recording.name, markers=(label,)),
+            severity,
             sd_m=Quantity(computed.sd_m, "m", limit=_EXACT_M),
             sources=Quantity(", ".join(computed.sources)),
         )
