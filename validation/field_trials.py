@@ -43,6 +43,7 @@ class Case:
     folder: Path
     arguments: tuple[str, ...]
     truth: str
+    sound: bool | None
     status: tuple[int, ...]
     expected: tuple[str, ...]
     allowed: tuple[str, ...]
@@ -84,6 +85,12 @@ class Outcome:
     seconds: float
     content: dict[str, Any]
 
+    @property
+    def joint_moments(self) -> str:
+        """What it says of joint moments: use, use with care, do not use; refused where there is no estimate."""
+        said = {one["output"]: one["use"] for one in self.content.get("suitability") or []}
+        return said.get("joint moments", "refused")
+
     def residuals(self) -> str:
         """Format root residuals (N, N m) with the literature's parameters and with the estimate, where there is one."""
         trials = self.content.get("trials") or []
@@ -108,6 +115,7 @@ def cases(data: Path) -> Iterator[Case]:
                 folder=folder,
                 arguments=("check" if laboratory.get("check") else "fit", *arguments),
                 truth=recording["truth"],
+                sound=recording.get("sound"),
                 status=tuple(recording["status"]),
                 expected=tuple(recording.get("expected", ())),
                 allowed=(*laboratory.get("allowed", ()), *recording.get("allowed", ())),
@@ -143,13 +151,30 @@ def document(outcomes: Sequence[tuple[Case, Outcome]]) -> str:
     for case, outcome in outcomes:
         against = case.against(outcome)
         codes = " ".join(dict.fromkeys(one["code"] for one in severe(outcome.content))) or "-"
-        end = [str(outcome.status), str(outcome.tries), codes, outcome.residuals(), f"{outcome.seconds:.0f}"]
+        end = [str(outcome.status), outcome.joint_moments, str(outcome.tries), codes, outcome.residuals()]
+        end.append(f"{outcome.seconds:.0f}")
         rows.append([case.title, case.truth, f"no: {against}" if against else "yes", *end])
         messages += [f"- {case.title}: {message}" for message in dict.fromkeys(messages_of(outcome.content))]
-    heads = ["recording", "what is true of it", "as it should be", "exit status", "tries", "findings"]
-    heads += ["residuals (N, N m), literature → estimate", "s"]
+    heads = ["recording", "what is true of it", "as it should be", "exit status", "joint moments", "tries"]
+    heads += ["findings", "residuals (N, N m), literature → estimate", "s"]
     good = sum(row[2] == "yes" for row in rows)
-    return TEXT.format(good=good, count=len(rows), results=table(heads, rows), messages="\n".join(messages))
+    return TEXT.format(
+        good=good,
+        count=len(rows),
+        verdicts=verdicts(outcomes),
+        results=table(heads, rows),
+        messages="\n".join(messages),
+    )
+
+
+def verdicts(outcomes: Sequence[tuple[Case, Outcome]]) -> str:
+    """Return how many sound recordings, and how many with a fault, get which verdict on joint moments."""
+    said = ("use", "use with care", "do not use", "refused")
+    rows = []
+    for title, sound in (("nothing known that concerns joint moments", True), ("a fault that concerns them", False)):
+        own = [outcome.joint_moments for case, outcome in outcomes if case.sound is sound]
+        rows.append([title, *(f"{own.count(each)} of {len(own)}" for each in said)])
+    return table(["recordings with", *(f"*{each}*" for each in said)], rows)
 
 
 TEXT = """# Field trials
@@ -162,6 +187,11 @@ there; no estimate to use has an impossible pose. *Exit status* 0: an estimate t
 estimate, or a recording, not to be used; 2: refused. *Tries*: 2 where no preset fits, and the marker set of `kinertia
 markers` was used as drafted. *Findings* above CORRECTED. *Residuals*: RMS over the frames used, of measured motion with
 the literature's body segment parameters, and of the estimate. Seconds are this machine's.
+
+Does the verdict on joint moments separate sound recordings from doubtful ones? Recordings of which nobody can say, and
+those that were only checked, are left out.
+
+{verdicts}
 
 {results}
 

@@ -103,6 +103,7 @@ def field_case(**changes):
         folder=Path(),
         arguments=("fit", "walk.c3d"),
         truth="right heel beyond plate 2",
+        sound=False,
         status=(0,),
         expected=("P282|P281",),
         allowed=("S111",),
@@ -141,9 +142,18 @@ def test_page_of_field_trials():
     good, bad = (field_case(), field_outcome(0, "P282")), (field_case(title="lab: jump"), field_outcome(2, "T101"))
     page = field_trials.document([good, bad])
     assert "1 of 2 are as they\nshould be" in page
-    assert "| lab: walk | right heel beyond plate 2 | yes | 0 | 1 | P282 | - | 2 |" in page
+    assert "| lab: walk | right heel beyond plate 2 | yes | 0 | refused | 1 | P282 | - | 2 |" in page
     assert "| lab: jump | right heel beyond plate 2 | no: exit status 2, P282 or P281 missing, T101 is false |" in page
     assert "- lab: jump: T101 T101 said." in page
+
+
+def test_verdicts_on_sound_recordings_and_on_others():
+    said = {"suitability": [{"output": "motion", "use": "do not use"}, {"output": "joint moments", "use": "use"}]}
+    used = replace(field_outcome(0), content={"findings": [], **said})
+    outcomes = [(field_case(sound=sound), one) for sound in (True, False, None) for one in (used, field_outcome(2))]
+    found = field_trials.verdicts([*outcomes, (field_case(), field_outcome(2))])
+    assert "| nothing known that concerns joint moments | 1 of 2 | 0 of 2 | 0 of 2 | 1 of 2 |" in found
+    assert "| a fault that concerns them | 1 of 3 | 0 of 3 | 0 of 3 | 2 of 3 |" in found
 
 
 def test_every_field_case_has_its_files(measured_folder):
