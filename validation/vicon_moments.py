@@ -15,11 +15,12 @@ from kinertia.cli.app import main as kinertia
 from kinertia.estimation.result import Fit
 from kinertia.report.exports.saved_fit import load_fit
 from kinertia.report.pages.file_outputs import OutputComparison, compared_outputs
+from kinertia.report.pages.vicon_differences import COMPONENTS, corrections
 from kinertia.report.wording import INTERVAL_SD
 from validation.measured_data import data_folder
 from validation.measured_trials import table
 from validation.page import write_page
-from validation.vicon_curves import COMPONENTS, agreement, centres_apart_m, curves
+from validation.vicon_curves import agreement, centres_apart_m, curves
 from validation.walks import fit_arguments
 
 WALKS = {"Plug-in Gait A": "pig_a", "Plug-in Gait B": "pig_b"}
@@ -32,8 +33,6 @@ FOLDERS = {
 }
 CHILDREN = ("HC002D", "HC030A", "HC032A", "HC036A", "HC038A")
 """Children of one laboratory (biomechZoo), with fits of their straight walks."""
-_CLEAR_SD = 2.0
-_PERCENT, _MS = 100.0, 1000.0
 _FEWEST = 20
 """Frames that both have."""
 _BESIDE = 3
@@ -43,16 +42,16 @@ _LEAST_NM_KG = 0.1
 _EXPLAINED = ("same axes", "same forces")
 
 
-def commands(data: Path) -> Iterator[tuple[str, Path, list[str]]]:
-    """Yield title, folder of the files and arguments of every fit."""
+def commands(data: Path) -> Iterator[tuple[str, list[str]]]:
+    """Yield title and arguments of every fit."""
     for title, walk in WALKS.items():
-        yield title, data / "pig_c3d", fit_arguments(data, walk)
+        yield title, fit_arguments(data, walk)
     for title, folder in FOLDERS.items():
-        yield title, data / folder, [str(data / folder)]
+        yield title, [str(data / folder)]
     for child in CHILDREN:
         files = data / "field" / "biomechzoo" / child
         walk, static = str(files / "straight.c3d"), str(files / "static.c3d")
-        yield f"Child {child}", files, [walk, "--static", static, "--sex", "male"]
+        yield f"Child {child}", [walk, "--static", static, "--sex", "male"]
 
 
 def fitted(arguments: list[str], out: Path) -> Fit:
@@ -62,18 +61,6 @@ def fitted(arguments: list[str], out: Path) -> Fit:
     with contextlib.redirect_stdout(io.StringIO()), contextlib.suppress(SystemExit):
         kinertia(["fit", *arguments, "-o", str(out), "--quiet"])
     return load_fit(out)
-
-
-def corrections(fit: Fit) -> str:
-    """List the clear gains and delays that the fit has corrected, which Vicon has not."""
-    found = []
-    for one in () if fit.posterior is None else fit.posterior.calibration:
-        if one.sd and abs(one.value) > _CLEAR_SD * one.sd:
-            if one.quantity == "gain":
-                found.append(f"{one.plate} {_PERCENT * one.value:+.1f} %")
-            elif one.quantity == "delay":
-                found.append(f"delay {_MS * one.value:.1f} ms")
-    return ", ".join(dict.fromkeys(found)) or "-"
 
 
 def rows(title: str, fit: Fit) -> Iterator[tuple[list[str], float]]:
@@ -98,7 +85,7 @@ def _row(title: str, fit: Fit, one: OutputComparison, both: np.ndarray) -> tuple
     off = float(ours.max() - theirs.max())
     numbers = [f"{theirs.max():.2f}", f"{ours.max():.2f} ± {bar:.2f}", f"{off:+.2f}"]
     leg = {"r": "right", "l": "left"}[one.side]
-    return [title, one.trial, f"{leg} {one.joint.lower()}", *numbers, corrections(fit)], off
+    return [title, one.trial, f"{leg} {one.joint.lower()}", *numbers, corrections(fit) or "-"], off
 
 
 def stance_table(stance: pd.DataFrame) -> str:
@@ -226,11 +213,11 @@ def main(
     """Run all fits and write the page."""
     data, compared, stance, apart = data_folder(), [], [], []
     with tempfile.TemporaryDirectory() as folder:
-        for title, files, arguments in commands(data):
+        for title, arguments in commands(data):
             fit = fitted(arguments, (keep or Path(folder)) / title.replace(" ", "-"))
             found = list(rows(title, fit))
             compared += found
-            stance += list(curves(title, fit, files))
-            apart += list(centres_apart_m(fit, files))
+            stance += list(curves(title, fit))
+            apart += list(centres_apart_m(fit))
             print(f"{title}: {len(found)} peaks", flush=True)
     write_page("vicon-moments", document(compared, pd.concat(stance, ignore_index=True), apart))

@@ -141,6 +141,18 @@ def test_implausible_or_missing_option(lab, changes, code, evidence):
         assert f"--{next(iter(changes))}" in refusal.message
 
 
+@pytest.mark.parametrize("option", ["trial", "--static", "--forces", "--model"])
+def test_a_missing_file_is_named_before_missing_options(lab, option):
+    """Without --sex, too: nobody types an option more for a file that is not there."""
+    gone = lab / "gone.c3d"
+    given = ["fit", gone if option == "trial" else lab / "walk.trc", *([] if option == "trial" else [option, gone])]
+    outcome = run(*given, "-o", lab / "out")
+    assert outcome.status == 2
+    assert " F101 " in outcome.err
+    assert "gone.c3d" in outcome.err
+    assert "--sex" not in outcome.err
+
+
 def test_missing_option(lab):
     expect(refused(lab, sex=None), "--sex")
     no_static = refused(lab, static=None)

@@ -249,6 +249,9 @@ def _from_options(trial: Path, options: dict[str, Any]) -> SubjectFile:
         key: str(value) if isinstance(value, Path) else value for key, value in options.items() if value is not None
     }
     expect_recording(trial)
+    for path in (trial, *(options[name] for name in ("--static", "--forces", "--loads", "--model"))):
+        if path is not None:
+            expect_path(path)
     if "--sex" not in given and "--model" not in given:
         raise FileError(
             trial, "a trial on its own needs --sex (or --model); or write a subject file (kinertia init FOLDER)"

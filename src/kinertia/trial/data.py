@@ -375,7 +375,7 @@ class Trial:
         return display.html(self)
 
     def rotated(self, rotation: FloatArray) -> Trial:
-        """Return the trial, markers and loads alike, in axes rotated about the vertical: new = rotation @ old.
+        """Return the trial, markers, loads and outputs alike, in axes rotated about the vertical: new = rotation @ old.
 
         Raises:
             ValueError: `rotation` is not a rotation about the vertical (Y) axis.
@@ -383,7 +383,9 @@ class Trial:
         proper = np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-9) and np.linalg.det(rotation) > 0
         if not (proper and np.allclose(rotation[1], [0, 1, 0], atol=1e-9)):
             raise ValueError(f"expected a rotation about the vertical (Y) axis, got {np.asarray(rotation).tolist()}")
-        return replace(self, markers=self.markers.rotated(rotation), loads=self.loads.rotated(rotation))
+        outputs = None if self.outputs is None else self.outputs.rotated(rotation)
+        markers, loads = self.markers.rotated(rotation), self.loads.rotated(rotation)
+        return replace(self, markers=markers, loads=loads, outputs=outputs)
 
 
 def _expect_shape(name: str, array: npt.NDArray[np.generic], shape: tuple[int, ...]) -> None:

@@ -1,8 +1,8 @@
 """Defines what files state besides markers and forces: events, angles and moments of other software, torque columns."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from dataclasses import dataclass, field, replace
+from typing import Literal, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -78,10 +78,16 @@ class FileOutputs:
         time: (f,) s, all frames of the file.
         values: "LHipAngles" -> (f, 3) deg, "LHipMoment" -> N m, "LHipPower" -> W, the last two per kg or not, as the
             file has them; NaN where they are missing.
+        points: joint centres and ends of axes of Vicon's segments, "LFEO" -> (f, 3) m in ground axes, NaN likewise.
     """
 
     time: FloatArray
     values: Mapping[str, FloatArray]
+    points: Mapping[str, FloatArray] = field(default_factory=dict)
+
+    def rotated(self, rotation: FloatArray) -> Self:
+        """Return the same outputs with points in axes rotated by `rotation` (3, 3): new = rotation @ old."""
+        return replace(self, points={name: each @ rotation.T for name, each in self.points.items()})
 
 
 class TorqueColumns(NamedTuple):

@@ -8,6 +8,7 @@ import contextlib
 import re
 import tempfile
 from collections.abc import Iterator, Sequence, Set
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -105,7 +106,7 @@ def read_c3d(path: str | Path, length_unit: str | None = None, standing: bool = 
         up,
         virtual,
         events=file_events(parameters, labels),
-        outputs=_file_outputs(file, time),
+        outputs=_file_outputs(file, time, unit * rotation),
     )
 
 
@@ -246,11 +247,13 @@ def _markers(path: Path, file: Any) -> tuple[tuple[str, ...], FloatArray, list[F
     return tuple(chosen), positions[:, list(chosen.values())], findings
 
 
-def _file_outputs(file: Any, time: FloatArray) -> FileOutputs | None:
+def _file_outputs(file: Any, time: FloatArray, to_ground_m: FloatArray) -> FileOutputs | None:
     parameters = file["parameters"]
     points = np.moveaxis(file["data"]["points"][:3], 0, 2).swapaxes(0, 1)
     labels = text_list(parameters, "POINT", "LABELS")[: points.shape[1]]
-    return file_outputs(parameters, labels, points, time, set(text_list(parameters, OWN_GROUP, "LABELS")))
+    ours = set(text_list(parameters, OWN_GROUP, "LABELS"))
+    found = file_outputs(parameters, labels, points, time, ours)
+    return None if found is None else replace(found, points=segment_points(labels, points @ to_ground_m.T, ours))
 
 
 def _outputs(parameters: Any, labels: list[str]) -> set[str]:
@@ -289,6 +292,23 @@ def file_outputs(
         if factor is not None and np.isfinite(values).any() and (vicon or name not in found):
             found[name] = vicon, factor * values
     return FileOutputs(time, {name: values for name, (_, values) in found.items()}) if found else None
+
+
+_SEGMENT_POINT = re.compile(r"(?:.*:)?([LR](?:FE|TI|FO)[OALP])")
+"""Origin of a thigh, shank or foot (the joint centre below it), and ends of its axes: anterior, lateral, proximal."""
+
+
+def segment_points(labels: Sequence[str], points: FloatArray, ours: Set[str]) -> dict[str, FloatArray]:
+    """Return the points (f, 3) that show Plug-in Gait's segments, by name: "LFEO"; NaN where they are missing.
+
+    Args:
+        labels: labels of the points.
+        points: (f, p, 3).
+        ours: labels of points that Kinertia wrote.
+    """
+    matches = ((k, None if label in ours else _SEGMENT_POINT.fullmatch(label)) for k, label in enumerate(labels))
+    named = ((k, match[1]) for k, match in matches if match is not None)
+    return {name: np.where((points[:, k] == 0.0).all(axis=1)[:, None], np.nan, points[:, k]) for k, name in named}
 
 
 def _factor(parameters: Any, name: str) -> float | None:

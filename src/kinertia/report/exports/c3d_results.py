@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from kinertia.errors import FileError
-from kinertia.estimation.drawn_fit import drawn_fit
-from kinertia.estimation.joint_curves import JointCurves
+from kinertia.estimation.leg_outputs import output_times, outputs_of
 from kinertia.estimation.result import Fit
 from kinertia.estimation.trial_fit import TrialFit
 from kinertia.io.c3d.events import EventToWrite
@@ -23,7 +22,7 @@ from kinertia.model.bsp import PARAMETERS
 from kinertia.model.marker_set import shared_prefix, spellings
 from kinertia.motion.gait_cycle import Stride, feet_under_pelvis, found_events
 from kinertia.motion.joint_wrench import leg_joints
-from kinertia.motion.model_outputs import CONVENTIONS, UNITS, Convention, Departures, ModelOutput, model_outputs
+from kinertia.motion.model_outputs import CONVENTIONS, UNITS, Convention, ModelOutput
 from kinertia.motion.spatiotemporal import Spatiotemporal, spatiotemporal
 from kinertia.report.exports.saved_fit import SavedFit
 from kinertia.trial.data import FEET, Recording
@@ -31,8 +30,6 @@ from kinertia.trial.data import FEET, Recording
 SUFFIX = "Kinertia"
 """Ends all labels where the file has outputs of the same names already."""
 SD = "SD"
-_MOST_DRAWS = 100
-"""A correlation is known to 0.1 or better from so many."""
 NO_DEVIATION = -1.0
 """Value on axes without an SD, where a point has others: readers take a point with any NaN for missing."""
 _PLUG_IN_GAIT = ({"LASI", "RASI", "LTHI", "RTHI", "LTIB", "RTIB"}, {"LASI", "RASI", "LTHI", "RTHI", "SACR"})
@@ -72,35 +69,6 @@ def usual_convention(fit: Fit) -> Convention:
     prefix = shared_prefix(fit.skeleton.labels)
     labels = {label.removeprefix(prefix) for label in fit.skeleton.labels}
     return "plug-in-gait" if any(own <= labels for own in _PLUG_IN_GAIT) else "isb"
-
-
-def outputs_of(fit: Fit, trial: TrialFit, convention: Convention) -> list[ModelOutput]:
-    """Return model outputs at `_times`, with SDs from the posterior draws; NaN where they are not known."""
-    loads, body, drawn = trial.reactions.at(_times(trial)), fit.estimate, _departures(fit, trial)
-    curves = trial.joint_curves
-    motion, sd = (trial.motion, trial.deviations) if curves is None else (curves.motion, curves.deviations)
-    found = model_outputs(trial.skeleton, body, motion, loads, fit.mass_kg, convention, sd, drawn)
-    return found if curves is None else [_where_known(one, curves, convention, fit.mass_kg) for one in found]
-
-
-def _times(trial: TrialFit) -> np.ndarray:
-    """Return the times (w,) s of the outputs: of all frames in which any joint's load is known."""
-    return trial.time if trial.joint_curves is None else trial.joint_curves.time
-
-
-def _where_known(one: ModelOutput, curves: JointCurves, convention: Convention, mass_kg: float) -> ModelOutput:
-    """Return an output with NaN where it is not known; what a hinge transmits gets the SD of `JointCurves`."""
-    label, joints = f"{one.joint.lower()}_{one.side}", curves.joints["estimate"]
-    if one.kind == "ANGLES" or label not in joints.joints:
-        known = np.logical_or.reduce(curves.known, axis=1)
-    else:
-        row = joints.joints.index(label)
-        known = np.isfinite(joints.moments[:, row, 0])
-        if one.kind == "MOMENTS" and curves.moment_sd is not None:
-            factor = (1000.0 if convention == "plug-in-gait" else 1.0) / mass_kg
-            one = replace(one, sd=np.where(np.isfinite(one.sd), one.sd, factor * curves.moment_sd[:, row]))
-    shown = known[:, None]
-    return replace(one, values=np.where(shown, one.values, np.nan), sd=np.where(shown, one.sd, np.nan))
 
 
 def new_file(recording: Recording, folder: Path) -> Path:
@@ -167,7 +135,7 @@ def prefix_of(frames: C3dFrames, trial: TrialFit) -> str:
 
 def _frames_at(source: Path, frames: C3dFrames, trial: TrialFit) -> np.ndarray:
     """Return the indices (w,) in the file of the frames of the fit."""
-    exact = _times(trial) * frames.rate_hz - (frames.first - 1)
+    exact = output_times(trial) * frames.rate_hz - (frames.first - 1)
     at = exact.round().astype(int)
     if np.abs(exact - at).max() > _SAME_TIME_FRAMES or at[0] < 0 or at[-1] >= len(frames.points):
         raise _another(source, trial)
@@ -264,28 +232,6 @@ def _own(
     if files:
         own["FILES"], own["SHA256"] = (list(files), None), (list(files.values()), None)
     return own
-
-
-def _departures(fit: Fit, trial: TrialFit) -> Departures | None:
-    """Return the departures of the draws in a trial, at `_times`; None if the fit has no draws."""
-    if fit.posterior is None or fit.posterior.draws is None:
-        return None
-    k, kept = [one.name for one in fit.trials].index(trial.name), fit.posterior.draws
-    own = replace(kept, trials=(kept.trials[k],))
-    alone = replace(fit, trials=(trial,), posterior=replace(fit.posterior, draws=own))
-    here = _curves(trial)
-    drawn = [_curves(drawn_fit(alone, number).trials[0]) for number in range(min(kept.count, _MOST_DRAWS))]
-    return Departures(*(np.array(each) - at for each, at in zip(zip(*drawn, strict=True), here, strict=True)))
-
-
-def _curves(trial: TrialFit) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return coordinates, moments and powers (w, c) at `_times`."""
-    curves = trial.joint_curves
-    if curves is not None:
-        forces = curves.forces["estimate"]
-        return curves.motion.q, forces, forces * curves.motion.qd
-    moments = trial.joint_loads["estimate"]
-    return trial.motion.q, moments, moments * trial.motion.qd
 
 
 def _stride_measures(trial: TrialFit) -> list[Measure]:

@@ -64,6 +64,7 @@ from kinertia.report.pages.finding_view import FindingView
 from kinertia.report.pages.headline import held_sentence, hidden_combinations, without_repetition, words
 from kinertia.report.pages.rendering import rendered
 from kinertia.report.pages.truth_comparison import Truth, truth_rows
+from kinertia.report.pages.vicon_differences import differences_view
 from kinertia.report.wording import INTERVAL_SD, asymmetry_sentences, decimals, expected_of, fixed, read_in, start_of
 from kinertia.trial.data import FEET
 from kinertia.trial.gait_events import gait_events
@@ -126,6 +127,7 @@ def render(
         gaps=gaps if "%" in covered else "",
         all_gaps=gaps,
         beside=outputs_view(fit, shown, MOST_FRAMES // len(shown)),
+        vicon=differences_view(fit),
         walks=any(gait_events(trial.kinematics.trial) for trial in fit.trials),
         body={
             "mass": _written(body_figure(fit)),

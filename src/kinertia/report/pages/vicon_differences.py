@@ -1,0 +1,291 @@
+"""Finds why Kinertia's joint moments differ from Plug-in Gait's in the file: frame by frame in stance on plates.
+
+Moments are computed again with one thing at a time as Vicon has it: its joint centre, its axes of the segment below
+the joint, forces as they were measured (no delay or error of a plate corrected), segments of the tables. What lowers
+the mean square of a difference by more than half is its likely cause. So is filtering, where more than half of the
+mean square is faster than the motion. Nothing is claimed of a difference within the error bars.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from kinertia.estimation.leg_outputs import outputs_of
+from kinertia.estimation.result import Fit
+from kinertia.estimation.simultaneous.calibration_entry import DELAY, GAIN
+from kinertia.estimation.trial_fit import TrialFit
+from kinertia.motion.ground_reactions import measured_reactions
+from kinertia.motion.joint_moments import component_signs
+from kinertia.motion.joint_wrench import joint_wrenches, leg_joints
+from kinertia.motion.smoothing import smooth
+from kinertia.motion.vicon_points import ViconPoints
+from kinertia.report.figures import style
+from kinertia.report.pages.file_outputs import moment_divisor
+from kinertia.report.wording import INTERVAL_SD
+from kinertia.trial.data import FEET
+from kinertia.trial.sampled_time import nearest_samples, runs
+
+COMPONENTS = ("flexion", "adduction", "rotation")
+_LOADED_N = 20.0
+_RIGHT_FORWARD_UP = [2, 0, 1]
+_NM = 1e-3
+_FEWEST = 10
+"""Frames to compare."""
+_MOST_OF_IT = 0.5
+"""Share of a difference's mean square that a cause explains."""
+_CLEAR_SD = 2.0
+_SPLINE = 6
+"""Samples that a spline needs."""
+
+
+@dataclass(frozen=True, eq=False)
+class MomentDifference:
+    """A component of a joint's moment over n frames of stance on plates, N m/kg, with Vicon's signs.
+
+    Attributes:
+        trial, joint, side, component: which: "Knee", "r", "adduction".
+        time: (n,) s.
+        inside: (n,) whether all ground contact is on plates.
+        vicon: (n,) of the file.
+        ours, sd: (n,) Kinertia's with its standard deviation; NaN where the leg's load is not known.
+        others: (n,) Kinertia's, by what is as Vicon has it: "centre", "axes", "forces", "tables"; "centre and axes";
+            "all" of the first three. Those that need points which the file lacks are NaN.
+        slow: (n,) difference from Vicon's, ours minus theirs, without what is faster than the motion.
+        apart_mm, apart_deg: distance of the joint's centre and angle of the segment's axes from Vicon's, RMS.
+    """
+
+    trial: str
+    joint: str
+    side: str
+    component: str
+    time: np.ndarray
+    inside: np.ndarray
+    vicon: np.ndarray
+    ours: np.ndarray
+    sd: np.ndarray
+    others: Mapping[str, np.ndarray]
+    slow: np.ndarray
+    apart_mm: float
+    apart_deg: float
+
+
+def moment_differences(fit: Fit, trial: TrialFit) -> Iterator[MomentDifference]:
+    """Yield the differences of every joint, side and component that the file of a trial has; none without outputs."""
+    curve, stated = trial.joint_curves, trial.kinematics.trial.outputs
+    if curve is None or stated is None:
+        return
+    outputs = outputs_of(fit, trial, "plug-in-gait", correlated=False)
+    found = {(one.joint, one.side): one for one in outputs if one.kind == "MOMENTS"}
+    force_n = measured_reactions(trial.kinematics).at(curve.time)[:, :, 1]
+    inside = np.isin(np.round(curve.time, 6), np.round(trial.time, 6))
+    others, apart = _as_vicon(fit, trial, ViconPoints.at(stated, curve.time))
+    for (joint, side), one in found.items():
+        if one.name not in stated.values:
+            continue
+        theirs = stated.values[one.name] / moment_divisor(stated, one.kind, fit.mass_kg)
+        theirs = theirs[nearest_samples(stated.time, curve.time)]
+        stance = force_n[:, FEET.index(side)] > _LOADED_N
+        for row, component in enumerate(COMPONENTS):
+            seen, ours = stance & np.isfinite(theirs[:, row]), _NM * one.values[:, row]
+            yield MomentDifference(
+                trial.name,
+                joint,
+                side,
+                component,
+                curve.time[seen],
+                inside[seen],
+                theirs[seen, row],
+                ours[seen],
+                _NM * one.sd[seen, row],
+                {name: values[joint, side][seen, row] for name, values in others.items()},
+                _slow(curve.time, ours - theirs[:, row], trial.motion_hz)[seen],
+                *apart[joint, side],
+            )
+
+
+def _as_vicon(
+    fit: Fit, trial: TrialFit, points: ViconPoints
+) -> tuple[dict[str, dict[tuple[str, str], np.ndarray]], dict[tuple[str, str], tuple[float, float]]]:
+    """Return moments (f, 3) N m/kg by what is Vicon's, joint and side; and how far centres (mm) and axes (deg) are."""
+    curve, skeleton = trial.joint_curves, trial.skeleton
+    assert curve is not None
+    corrected, measured = (each.at(curve.time) for each in (trial.reactions, measured_reactions(trial.kinematics)))
+    joints = leg_joints(skeleton)
+    whole, raw, tables = (
+        joint_wrenches(skeleton, body, curve.motion, loads, joints)
+        for body, loads in ((fit.estimate, corrected), (fit.estimate, measured), (fit.literature, corrected))
+    )
+    pose, apart = skeleton.pose(curve.motion.q), {}
+    result: dict[str, dict[tuple[str, str], np.ndarray]] = {}
+    for joint in joints:
+        ours, at = pose.rotation[:, skeleton.segments.index(joint.child)], joint.centre(skeleton, pose)
+        centre, axes = _or_nan(points.centre(joint), at), _or_nan(points.axes(joint, ours), ours)
+        for name, wrenches, about, along in (
+            ("centre", whole, centre, ours),
+            ("axes", whole, at, axes),
+            ("forces", raw, at, ours),
+            ("tables", tables, at, ours),
+            ("centre and axes", whole, centre, axes),
+            ("all", raw, centre, axes),
+        ):
+            wrench = wrenches[joint]
+            moment = wrench[:, 3:] + np.cross(at - about, wrench[:, :3])
+            moment = np.einsum("nka,nk->na", along[:, :, _RIGHT_FORWARD_UP], moment)
+            own = result.setdefault(name, {})
+            own[joint.name, joint.side] = -component_signs(joint) * moment / fit.mass_kg
+        apart[joint.name, joint.side] = _apart(at - centre, ours, axes)
+    return result, apart
+
+
+def _or_nan(values: np.ndarray | None, like: np.ndarray) -> np.ndarray:
+    return np.full_like(like, np.nan) if values is None else values
+
+
+def _apart(centre: np.ndarray, ours: np.ndarray, axes: np.ndarray) -> tuple[float, float]:
+    """Return RMS distance (mm) and angle (deg) over the frames that show them; NaN where none does."""
+    near, seen = np.isfinite(centre).all(axis=1), np.isfinite(axes).all(axis=(1, 2))
+    if not near.any() or not seen.any():
+        return np.nan, np.nan
+    turn = Rotation.from_matrix(ours[seen].swapaxes(1, 2) @ axes[seen]).magnitude()
+    return 1e3 * _rms(np.linalg.norm(centre[near], axis=1)), float(np.degrees(_rms(turn)))
+
+
+def _slow(time: np.ndarray, values: np.ndarray, motion_hz: float) -> np.ndarray:
+    """Return values (f,) without what is faster than the motion; NaN where they are, and in intervals too short."""
+    result = np.full_like(values, np.nan)
+    for first, last in runs(np.isfinite(values)):
+        if last - first >= _SPLINE:
+            part = slice(first, last + 1)
+            result[part] = smooth(time[part], values[part], motion_hz)(time[part])
+    return result
+
+
+def _rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+@dataclass(frozen=True)
+class CurveDifference:
+    """How far a component of a side's joint moment is from Vicon's over all trials, N m/kg, and why.
+
+    Attributes:
+        joint, side, component: which.
+        rms: of the difference.
+        bars: `rms` in error bars: over 1.96 times the RMS standard deviation; NaN without any.
+        cause: "centre", "axes", "forces", "tables", "filter"; "together" if only centre, axes and forces together
+            explain it; "within" the error bars; "" if nothing that was tried does.
+        explained: share of the mean square that goes with the cause; NaN without one.
+        tried: whether the file holds the points that centre and axes need.
+        apart_mm, apart_deg: of centre and axes from Vicon's, RMS.
+    """
+
+    joint: str
+    side: str
+    component: str
+    rms: float
+    bars: float
+    cause: str
+    explained: float
+    tried: bool
+    apart_mm: float
+    apart_deg: float
+
+    @classmethod
+    def of(cls, parts: Sequence[MomentDifference]) -> "CurveDifference | None":
+        """Judge one component over the trials that show it; None with fewer than ten frames."""
+        first = parts[0]
+        ours, theirs, sd, slow = (
+            np.concatenate([getattr(one, name) for one in parts]) for name in ("ours", "vicon", "sd", "slow")
+        )
+        known = np.isfinite(ours) & np.isfinite(slow)
+        if known.sum() < _FEWEST:
+            return None
+        rms = _rms((ours - theirs)[known])
+        bars = rms / (INTERVAL_SD * _rms(sd[known])) if np.isfinite(sd[known]).all() else np.nan
+        shares = {"filter": 1.0 - (_rms(slow[known]) / max(rms, 1e-12)) ** 2}
+        for name in ("centre", "axes", "forces", "tables", "all"):
+            other = np.concatenate([one.others[name] for one in parts])
+            both = known & np.isfinite(other)
+            if both.sum() >= _FEWEST:
+                shares[name] = 1.0 - (_rms((other - theirs)[both]) / max(_rms((ours - theirs)[both]), 1e-12)) ** 2
+        together = shares.pop("all", -np.inf)
+        best = max(shares, key=lambda name: shares[name])
+        cause, explained = "", np.nan
+        if bars <= 1.0:
+            cause = "within"
+        elif shares[best] > _MOST_OF_IT:
+            cause, explained = best, shares[best]
+        elif together > _MOST_OF_IT:
+            cause, explained = "together", together
+        apart = (_rms(np.array([getattr(one, name) for one in parts])) for name in ("apart_mm", "apart_deg"))
+        return cls(first.joint, first.side, first.component, rms, bars, cause, explained, "centre" in shares, *apart)
+
+
+def curve_differences(fit: Fit) -> list[CurveDifference]:
+    """Return how far each moment curve is from Vicon's, over all trials whose files hold them."""
+    found: dict[tuple[str, str, str], list[MomentDifference]] = {}
+    for trial in fit.trials:
+        for one in moment_differences(fit, trial):
+            found.setdefault((one.joint, one.component, one.side), []).append(one)
+    judged = (CurveDifference.of(parts) for parts in found.values())
+    return [one for one in judged if one is not None]
+
+
+def corrections(fit: Fit) -> str:
+    """List the clear gains and delays that the fit has corrected, which Vicon has not; empty if there are none."""
+    found = []
+    for one in () if fit.posterior is None else fit.posterior.calibration:
+        if one.sd and abs(one.value) > _CLEAR_SD * one.sd:
+            if one.quantity == GAIN:
+                found.append(f"{one.plate} {100.0 * one.value:+.1f} %")
+            elif one.quantity == DELAY:
+                found.append(f"delay {1e3 * one.value:.1f} ms")
+    return ", ".join(dict.fromkeys(found))
+
+
+_AXES = {"Hip": "knee axis", "Knee": "shank axes", "Ankle": "foot axes"}
+"""What decides the axes of the segment below a joint: those of the thigh come from the knee's."""
+_WORDS = {
+    "forces": "corrected forces",
+    "tables": "segment masses",
+    "filter": "filter",
+    "together": "joint centre, axes and forces together",
+    "": "not explained",
+}
+
+
+def differences_view(fit: Fit) -> dict[str, Any] | None:
+    """Return the content of the report's table: a row per component of each joint's moment; None without curves."""
+    found = curve_differences(fit)
+    rows = []
+    for joint, component in dict.fromkeys((one.joint, one.component) for one in found):
+        own = [one for one in found if (one.joint, one.component) == (joint, component)]
+        row = {"curve": f"{joint} {component}", "cause": _causes(own)}
+        for one in own:
+            row[one.side] = f"{one.rms:.2f}" + (f" ({one.bars:.1f})" if np.isfinite(one.bars) else "")
+        rows.append(row)
+    tried = all(one.tried for one in found)
+    return {"rows": rows, "tried": tried, "corrected": corrections(fit)} if found else None
+
+
+def _causes(sides: Sequence[CurveDifference]) -> str:
+    """State the likely causes on both sides, with the size of what differs."""
+    beyond = [one for one in sides if one.cause != "within"]
+    texts = []
+    for cause in dict.fromkeys(one.cause for one in beyond):
+        own = [one for one in beyond if one.cause == cause]
+        whose = "" if len(own) == len(sides) else f"{style.SIDES[own[0].side][0]}: "
+        texts.append(whose + _cause(cause, own))
+    return "; ".join(texts) or "within the error bars"
+
+
+def _cause(cause: str, sides: Sequence[CurveDifference]) -> str:
+    joint = sides[0].joint
+    if cause == "centre":
+        return f"{joint.lower()} centre, {' and '.join(f'{one.apart_mm:.0f}' for one in sides)} mm apart"
+    if cause == "axes":
+        return f"{_AXES[joint]}, {' and '.join(f'{one.apart_deg:.0f}' for one in sides)}° apart"
+    return _WORDS[cause]
